@@ -6,7 +6,10 @@ Ten sentences are spoken by a synthetic voice (the extra ``text``), so their pho
 
 *Re-tracked*: the faces are drawn at 25 frames a second, written as .mp4 and tracked by ``lipmotion.vision.track`` (the
 extra ``video``); ACC of opening, width and outer, pooled over all sentences, against the motion given. ``distances
-alone``: the same motion, but only silence is known of the phones, so that nothing but the channels is drawn.
+alone``: the same motion, but only silence is known of the phones, so that nothing but the channels is drawn. *Told*:
+the gap and the width of the poses, that is the motion with what the phones add. *By colour*: a second judge, which
+counts the pixels of the opening down the middle of the mouth, and the columns of the lips, on the pictures themselves;
+it knows the colours of the character.
 
 *Confusion*: in the middle of every p b m f v th oo w aa ee the drawn mouth is measured: width and height of the lips
 and of the opening, how round the opening is, and the dark, the teeth and the tongue in it (roots of areas), by colour,
@@ -30,6 +33,7 @@ from numpy.typing import NDArray
 import lipmotion
 from lipmotion.export.video import write_mp4
 from lipmotion.faces import face_named
+from lipmotion.faces.portrait.pose import mouth_poses
 from lipmotion.types import Audio, Motion, Timeline, Unit
 
 try:
@@ -67,36 +71,70 @@ def drawn(face: str, motion: Motion, units: Timeline[Unit], fps: float, still: b
 def retracked(face: str, spoken: Sequence[Spoken], still: bool) -> dict[str, Any]:
     from lipmotion.vision.track import track
 
-    given, measured = [], []
+    given, measured, told, coloured = [], [], [], []
+    tones = tones_of(face)
     with tempfile.TemporaryDirectory() as folder:
         for sound, motion, units in spoken:
             path = Path(folder) / "drawn.mp4"
-            write_mp4(path, drawn(face, motion, units, 25.0, still), fps=25.0, audio=sound)
+            pictures = list(drawn(face, motion, units, 25.0, still))
+            write_mp4(path, iter(pictures), fps=25.0, audio=sound)
             found = track(path, crops=False)
             frames = min(len(found.motion.values), len(motion.resampled(25.0).values))
             seen = found.seen[:frames]
             names = ("opening", "width", "outer")
             given.append(np.stack([motion.resampled(25.0)[name][:frames][seen] for name in names], axis=1))
             measured.append(np.stack([found.motion[name][:frames][seen] for name in names], axis=1))
+            poses = mouth_poses(motion, units, 25.0)[:frames]
+            told.append(np.array([(pose.gap, pose.width) for pose in poses])[seen])
+            coloured.append(np.array([colour_measures(picture, tones) for picture in pictures[:frames]])[seen])
     one, other = np.concatenate(given), np.concatenate(measured)
     figures = {
         name: float(np.corrcoef(one[:, k], other[:, k])[0, 1]) for k, name in enumerate(("opening", "width", "outer"))
     }
     closed = one[:, 0] < 0.012
+    asked, painted = np.concatenate(told), np.concatenate(coloured)
     return {
         "ACC": figures,
+        "ACC of told with given": accuracies(asked, one),
+        "ACC of tracked with told": accuracies(other, asked),
+        "ACC by colour": accuracies(painted, one),
+        "ACC by colour with told": accuracies(painted, asked),
         "opening where closed, 95th percentile": float(np.percentile(other[closed, 0], 95)),
         "widest opening": float(np.percentile(other[:, 0], 99.5)),
         "frames": len(one),
     }
 
 
+def accuracies(one: NDArray[np.float64], other: NDArray[np.float64]) -> dict[str, float | None]:
+    """Return ACC of opening and width; None where a judge sees no movement."""
+    return {
+        name: float(np.corrcoef(one[:, k], other[:, k])[0, 1]) if np.ptp(one[:, k]) > 0 else None
+        for k, name in enumerate(("opening", "width"))
+    }
+
+
+def colour_measures(frame: NDArray[np.uint8], tones: NDArray[np.float64]) -> tuple[float, float]:
+    """Return the opening down the middle of the mouth, and the width of the lips, in eye distances."""
+    label, scale = labelled(frame, tones)
+    corners = (label > 0)[int(0.2 * scale) : int(0.42 * scale)]  # between nose and chin, about the line of the lips
+    corners[:, : int(0.06 * scale)] = corners[:, -int(0.06 * scale) :] = False
+    columns = np.flatnonzero(corners.sum(axis=0) > 1)
+    if not len(columns):
+        return 0.0, 0.0
+    middle = (columns[0] + columns[-1]) // 2
+    down = label[int(0.13 * scale) :, middle - 2 : middle + 3] >= 3
+    return float(down.sum()) / 5 / scale, float(np.ptp(columns) + 1) / scale
+
+
 def silence_of(units: Timeline[Unit]) -> Timeline[Unit]:
     return Timeline(tuple(span for span in units if span.label.phone == "sil"))
 
 
-def mouth_measures(frame: NDArray[np.uint8], tones: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return width and height of lips and opening, roundness, and areas inside, in parts of the picture's height."""
+def labelled(frame: NDArray[np.uint8], tones: NDArray[np.float64]) -> tuple[NDArray[np.intp], float]:
+    """Return what the pixels around the mouth show, and the pixels in an eye distance.
+
+    0: skin, 1 and 2: lips, 3: the dark of the mouth, 4: teeth, 5: tongue
+    """
     height = len(frame)
     scale = 0.285 * height
     area = frame[
@@ -107,6 +145,12 @@ def mouth_measures(frame: NDArray[np.uint8], tones: NDArray[np.float64]) -> NDAr
         np.square(area[:, :, None].astype(float) - tones).sum(axis=3).argmin(axis=2)
     )  # skin skin lip lip dark tooth tongue
     label = np.where(label <= 1, 0, label - 1)
+    return label, scale
+
+
+def mouth_measures(frame: NDArray[np.uint8], tones: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return width and height of lips and opening, roundness, and areas inside, in parts of the picture's height."""
+    label, scale = labelled(frame, tones)
     lips = label > 0
     columns, rows = np.flatnonzero(lips.sum(axis=0) > 2), np.flatnonzero(lips.sum(axis=1) > 4)
     inside = np.isin(label, (3, 4))

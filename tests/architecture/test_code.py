@@ -16,7 +16,7 @@ EMPTY_NAMES = {"utils", "util", "helpers", "helper", "common", "core", "misc"}
 """Module names without meaning."""
 LONGEST_MODULE, LONGEST_VERB = 400, 70
 VERBS = {verb.__name__.rpartition(".")[2] for verb in command_line.VERBS}
-PICKLES = {"pickle", "shelve", "marshal", "joblib", "dill"}
+PICKLES = {"pickle", "shelve", "marshal", "dill"}
 Definition = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
 Rule = Callable[[str], Iterator[int]]
 
@@ -51,7 +51,8 @@ def pickled(text: str) -> Iterator[int]:
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import | ast.ImportFrom):
             modules = {alias.name for alias in node.names} | {getattr(node, "module", "")}
-            if modules & PICKLES:
+            of_joblib = {"load", "dump"} & modules and getattr(node, "module", "") == "joblib"
+            if modules & PICKLES or of_joblib or "joblib" in {alias.name for alias in node.names}:
                 yield node.lineno
         if not isinstance(node, ast.Call):
             continue
@@ -117,6 +118,9 @@ OFFENCES: list[tuple[Rule, str, list[int]]] = [
     (asserted, "x = 1\nassert x\n", [2]),
     (pickled, "import pickle\n", [1]),
     (pickled, "from pickle import loads\n", [1]),
+    (pickled, "import joblib\n", [1]),
+    (pickled, "from joblib import load\n", [1]),
+    (pickled, "from joblib import Parallel, delayed\n", []),
     (pickled, "np.load(path)\n", [1]),
     (pickled, "np.load(path, allow_pickle=False)\njson.load(file)\n", []),
     (changeable, "@dataclass\nclass A: ...\n", [2]),

@@ -29,6 +29,7 @@ poses = st.builds(
     spread=st.floats(0, 1),
     press=st.floats(0, 1),
     teeth=st.floats(0, 1),
+    oval=st.floats(0, 1),
 )
 DESIGNS = {"woman": WOMAN, "man": MAN, "cartoon": CARTOON}
 designs = st.sampled_from(sorted(DESIGNS))
@@ -144,3 +145,31 @@ def test_sounds_have_shapes_of_their_own():
     assert 2 * oo[0] < 2.6 * oo[1]
     assert 2 * ee[0] > 5 * ee[1]
     assert aa[1] > 2.5 * ee[1]
+
+
+def test_the_hole_of_w_is_that_of_oo_but_smaller() -> None:
+    def hole(drawn: MouthPose) -> tuple[float, float]:
+        shape = lip_outlines(LIPS, drawn, X)
+        return 2 * shape.inner_half_width, float((shape.lower_inner - shape.upper_inner).max())
+
+    w, oo = hole(pose(0.045, 0.75, protrusion=1, press=0.5)), hole(pose(0.085, 0.8, protrusion=1))
+    assert w[0] < 0.7 * oo[0]
+    assert w[1] < 0.6 * oo[1]
+    assert 1 < oo[0] / oo[1] < 1.7
+
+
+def test_the_corners_of_an_oval_are_halfway_down() -> None:
+    drawn = pose(0.2, 0.85, oval=1.0)
+    shape = lip_outlines(LIPS, drawn, X)
+    top, bottom = shape.upper_inner[MIDDLE], shape.lower_inner[MIDDLE]
+    assert abs(shape.corner_y - (top + bottom) / 2) < 0.02
+
+
+def test_above_a_tucked_lip_the_opening_is_full_of_upper_teeth_and_arched_upwards() -> None:
+    drawn = pose(TUCKED_GAP[0], tuck=1.0)
+    shape = lip_outlines(LIPS, drawn, X)
+    within = mouth_interior(LIPS, drawn, X, shape)
+    near = np.abs(X) < 0.6 * shape.inner_half_width
+    assert (within.teeth_upper >= shape.lower_inner - 1e-9)[near].all()
+    assert (within.teeth_lower >= shape.lower_inner - 1e-9)[near].all()
+    assert shape.corner_y - shape.upper_inner[MIDDLE] > 1.5 * (shape.lower_inner[MIDDLE] - shape.corner_y)

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.faces.mesh import MeshFace, MeshStage, blink_curve
+from lipmotion.faces.base import Staging
+from lipmotion.faces.mesh import MeshFace, MeshStage
+from lipmotion.rig.bones import HEAD, NECK, Bone
 from lipmotion.rig.driven import DrivenCharacter, driven_character
 from lipmotion.rig.gltf_writer import write_glb
 from lipmotion.rig.mesh import Material, Mesh, MeshPart
 from rig.heads import head
 from rig.speech import motion, units
+
+STILL = Staging(blinks=False, gaze=False, brows=False, head=False)
 
 
 @pytest.fixture(scope="module")
@@ -24,9 +30,13 @@ def character(tmp_path_factory) -> DrivenCharacter:
     return driven_character(path)
 
 
+def drawn(character, staging: Staging) -> list[np.ndarray]:
+    return list(MeshFace(character, 256, 144).staged(staging).render(motion(), units(), fps=10.0))
+
+
 @pytest.fixture(scope="module")
 def pictures(character):
-    return list(MeshFace(character, 256, 144).render(motion(), units(), fps=10.0))
+    return drawn(character, STILL)
 
 
 def test_there_is_a_picture_for_every_time(pictures):
@@ -36,7 +46,7 @@ def test_there_is_a_picture_for_every_time(pictures):
 
 
 def test_the_same_motion_gives_the_same_pixels(character, pictures):
-    again = list(MeshFace(character, 256, 144).render(motion(), units(), fps=10.0))
+    again = drawn(character, STILL)
     assert all((one == two).all() for one, two in zip(pictures, again, strict=True))
 
 
@@ -58,13 +68,65 @@ def test_only_what_moves_is_drawn_anew(character):
     np.testing.assert_array_equal(at_rest, whole)
 
 
-def test_blinks_come_and_go():
-    shut = blink_curve(np.arange(1000) / 50.0, seed=1)
-    assert shut.max() == pytest.approx(1)
-    assert 0.005 < (shut > 0.5).mean() < 0.1
-    assert blink_curve(np.zeros(0)).size == 0
-
-
 def test_a_rate_of_0_is_refused(character):
     with pytest.raises(InputError, match="frame rate is 0"):
         next(MeshFace(character, 256, 144).render(motion(), units(), fps=0))
+
+
+def test_the_head_moves_unless_it_is_told_not_to(character, pictures):
+    """Above the eyes, only the movement of the head changes a picture."""
+    moving = drawn(character, Staging())
+    edge = np.s_[:45]
+    assert max(np.abs(one[edge].astype(int) - pictures[0][edge]).max() for one in moving) > 40
+    assert max(np.abs(one[edge].astype(int) - pictures[0][edge]).max() for one in pictures) < 8
+
+
+def test_another_seed_gives_other_movements_and_the_same_seed_the_same_ones(character):
+    one, again, other = (drawn(character, Staging(seed=seed)) for seed in (1, 1, 2))
+    assert all((a == b).all() for a, b in zip(one, again, strict=True))
+    assert any((a != b).any() for a, b in zip(one, other, strict=True))
+
+
+def test_a_size_is_the_height_of_the_picture(character):
+    picture = next(MeshFace(character).staged(Staging(size=90)).render(motion(), units()))
+    assert picture.shape == (90, 160, 3)
+
+
+def test_a_colour_is_the_background(character):
+    picture = drawn(character, Staging(background="#40a0ff"))[0]
+    assert np.abs(picture[0, 0].astype(int) - [0x40, 0xA0, 0xFF]).max() <= 2
+
+
+def test_a_transparent_background_has_alpha(character):
+    picture = drawn(character, Staging(background="transparent"))[0]
+    assert picture.shape == (144, 256, 4)
+    assert picture[0, 0, 3] == 0
+    assert picture[40, 128, 3] == 255
+    solid = drawn(character, Staging())[0]
+    assert np.abs(picture[40, 128, :3].astype(int) - solid[40, 128]).max() <= 2
+
+
+def test_intensity_opens_the_mouth_further_and_leaves_closed_lips_closed(character, pictures):
+    loud = drawn(character, Staging(intensity=2.0, blinks=False, gaze=False, brows=False, head=False))
+    opened = [int((np.abs(each[7].astype(int) - each[0]).max(axis=2) > 40).sum()) for each in (pictures, loud)]
+    assert opened[1] > 1.3 * opened[0]
+    closed = int((np.abs(loud[18].astype(int) - loud[0]).max(axis=2) > 40).sum())
+    assert closed < opened[1] / 5
+
+
+def test_bones_say_what_follows_the_head(character):
+    """With a head bone that holds all of the sheet, it turns as a whole; where it holds nothing but the neck's share,
+    less."""
+    mesh = character.mesh
+    rows = np.arange(len(mesh.vertices))
+    place = np.array([0.0, -6.0, -9.0])
+    head_bone = Bone(HEAD, place, rows, np.ones(len(rows)))
+    neck_bone = Bone(NECK, place, rows, np.ones(len(rows)))
+    turned = [
+        MeshStage(replace(character, mesh=replace(mesh, bones=bones)), 256, 144).picture(mesh.vertices, (0.2, 0, 0))
+        for bones in ((head_bone, neck_bone), (neck_bone,), ())
+    ]
+    still = MeshStage(character, 256, 144).picture(mesh.vertices)
+    assert all((each != still).any() for each in turned)
+    assert (turned[0] != turned[2]).any()
+    assert (turned[1] == turned[2]).all()  # without a head bone, heights say it

@@ -4,8 +4,11 @@ import pytest
 from lipmotion.errors import InputError
 from lipmotion.faces.portrait.pose import (
     CLOSED_BELOW,
+    PARTED,
+    PURSED_GAP,
     TUCKED_GAP,
     WIDEST,
+    MouthPose,
     drawn_gap,
     jaw_drop,
     mouth_poses,
@@ -29,8 +32,9 @@ def test_lips_that_nearly_touch_are_drawn_shut():
     assert drawn_gap(np.array([-0.01, 0, 0.005, CLOSED_BELOW])).tolist() == [0, 0, 0, 0]
 
 
-def test_the_gap_is_the_opening_at_first_and_then_larger():
-    assert drawn_gap(np.array([0.025, 0.03])) == pytest.approx([0.0216667, 0.03], abs=1e-6)
+def test_small_openings_are_drawn_large_enough_to_be_seen():
+    """The tracker sees drawn lips that are less than 0.045 apart as closed, and measured people no better."""
+    assert drawn_gap(np.array([PARTED, 0.04])).min() > 0.045
     large = np.array([0.08, 0.12, 0.16])
     assert (drawn_gap(large) > 1.15 * large).all()
     assert (drawn_gap(large) < 1.8 * large).all()
@@ -197,11 +201,65 @@ def test_articulatory_channels_of_the_motion_are_drawn_instead_of_those_of_the_p
     assert poses[19].protrusion > 0.9
 
 
+def middle_pose(phone: str, opening: float = 0.06, width: float = 0.57) -> MouthPose:
+    """Return the pose in the middle of a phone between silences, whatever is measured there."""
+    said_s = said((0, 0.2, "sil"), (0.3, 0.7, phone))
+    time_s = np.arange(101) / 100
+    return mouth_poses(
+        motion(100.0, opening=np.full(101, opening), width=np.where(time_s < 0.25, 0.57, width)), said_s, 25
+    )[12]
+
+
 def test_every_sound_has_a_pose_of_its_own() -> None:
-    """At one measured opening and width, oo is far narrower than ee, which is wider than at rest."""
-    flat = motion(100.0, opening=np.full(101, 0.06), width=np.full(101, 0.57))
-    ee, oo = (mouth_poses(flat, said((0, 0.2, "sil"), (0.3, 0.7, phone)), 25)[12] for phone in ("iy", "uw"))
-    assert oo.width < 0.78 * ee.width
-    assert ee.width > 1.04
+    """At one measured opening and width, oo is narrower than ee, which is wider than at rest; at usual ones far so."""
+    ee, oo = middle_pose("iy"), middle_pose("uw")
+    assert oo.width < 0.9 * ee.width
+    assert middle_pose("uw", width=0.54).width < 0.78 * middle_pose("iy", width=0.585).width
+    assert ee.width > 1.03
     assert ee.teeth > 0.8
     assert oo.teeth < 0.1
+
+
+@pytest.mark.parametrize("opening", [0.04, 0.08])
+def test_w_is_a_smaller_hole_in_narrower_lips_than_oo(opening: float) -> None:
+    w, oo = middle_pose("w", opening), middle_pose("uw", opening)
+    assert w.protrusion > 0.9
+    assert oo.protrusion > 0.9
+    assert 0 < w.gap <= PURSED_GAP[1] + 1e-3
+    assert oo.gap > 1.4 * w.gap
+    assert w.width < oo.width - 0.04
+
+
+def test_w_opens_quickly_and_oo_is_held() -> None:
+    def gaps(phone: str) -> np.ndarray:
+        units = said((0, 0.2, "sil"), (0.3, 0.5, phone), (0.5, 0.8, "ah"))
+        return np.array([pose.gap for pose in mouth_poses(motion(100.0, opening=np.full(101, 0.06)), units, 100.0)])
+
+    w, oo = gaps("w"), gaps("uw")
+    assert w[54] > 1.4 * w[40]
+    assert np.ptp(oo[34:48]) < 0.01
+
+
+def test_aa_is_taller_and_narrower_than_the_same_opening_of_another_vowel() -> None:
+    aa, eh = middle_pose("aa", 0.14), middle_pose("eh", 0.14)
+    assert aa.oval > 0.8
+    assert eh.oval < 0.4
+    assert aa.gap > 1.1 * eh.gap
+    assert aa.width < eh.width - 0.08
+    assert aa.jaw > eh.jaw
+
+
+@pytest.mark.parametrize("phone", ["th", "dh", "w"])
+def test_lips_that_were_tracked_as_closed_part_for_th_and_w_but_not_beside_b(phone: str) -> None:
+    poses = mouth_poses(
+        motion(100.0, opening=np.zeros(101)), said((0.3, 0.4, phone), (0.4, 0.5, "b"), (0.5, 0.6, phone)), 100.0
+    )
+    assert poses[33].gap > 0.03
+    assert [pose.gap for pose in poses[42:48]] == [0] * 6
+
+
+@pytest.mark.parametrize("phone", ["f", "th", "w"])
+def test_without_intensity_the_lips_stay_closed(phone: str) -> None:
+    opening = np.full(101, 0.1)
+    poses = mouth_poses(motion(100.0, opening=opening), said((0.3, 0.6, phone)), 25.0, intensity=0.0)
+    assert max(pose.gap for pose in poses) < 1e-9

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
 import sys
 from pathlib import Path
@@ -70,8 +71,12 @@ else:
     for _ in range(2):  # keying again changes nothing
         answer = list(bpy.ops.lipmotion.key())
 moving = first.data.shape_keys
-strip = moving.animation_data.action.layers[0].strips[0]
-points = strip.channelbag(moving.animation_data.action_slot).fcurves[0].keyframe_points
+action = moving.animation_data.action
+if hasattr(action, "slots"):  # since 4.4
+    curves = action.layers[0].strips[0].channelbag(moving.animation_data.action_slot).fcurves
+else:
+    curves = action.fcurves
+points = curves[0].keyframe_points
 last = math.ceil(max(point.co[0] for point in points))
 frames = []
 for frame in range(1, last + 1):
@@ -82,6 +87,10 @@ for frame in range(1, last + 1):
         {"face": [key.value for key in keys], "other": [key.value for key in other.data.shape_keys.key_blocks[1:]],
          "jaw": math.degrees(jaw.rotation_euler.x), "open": jaw["open"], "lips": bones["lips"]}
     )  # fmt: skip
-strips = [] if scene.sequence_editor is None else [strip.name for strip in scene.sequence_editor.strips]
+editor = scene.sequence_editor
+strips = [] if editor is None else [strip.name for strip in getattr(editor, "strips", getattr(editor, "sequences", []))]
 found = {"version": bpy.app.version_string, "fps": scene.render.fps, "answer": answer, "frames": frames}
+found["plays_sound"] = bpy.app.build_options.audaspace
 print(json.dumps(found | {"last": last, "end": scene.frame_end, "strips": strips}))
+sys.stdout.flush()
+os._exit(0)  # bpy 4.2 may crash when it is unloaded

@@ -37,6 +37,27 @@ def document() -> tuple[dict, bytes]:
     return content, b"".join(array.tobytes() for array in arrays)
 
 
+UV = np.array([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]], "<f4")
+"""Of the square, v goes down."""
+
+
+def textured_document(picture: bytes, material=None, extension=None) -> tuple[dict, bytes]:
+    """The square with a picture on it."""
+    content, binary = document()
+    start = len(binary)
+    content["bufferViews"] += [
+        {"buffer": 0, "byteOffset": start, "byteLength": UV.nbytes},
+        {"buffer": 0, "byteOffset": start + UV.nbytes, "byteLength": len(picture)},
+    ]
+    content["accessors"].append({"bufferView": 4, "componentType": 5126, "count": 4, "type": "VEC2"})
+    content["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = 4
+    content["meshes"][0]["primitives"][0]["material"] = 0
+    place = {"index": 0} | ({"extensions": extension} if extension else {})
+    content["materials"] = [{"pbrMetallicRoughness": {"baseColorTexture": place}} | (material or {})]
+    content["textures"], content["images"] = [{"source": 0}], [{"bufferView": 5, "mimeType": "image/png"}]
+    return content, binary + UV.tobytes() + picture
+
+
 def glb(content: dict, binary: bytes) -> bytes:
     """A document and its bytes as GLB."""
     text = json.dumps(content).encode()

@@ -51,8 +51,8 @@ def test_the_lips_follow_the_motion(files, by):
 def test_only_the_moving_vertices_move(files):
     character = driven_character(files / "head.glb")
     still = np.setdiff1d(np.arange(len(character.mesh.vertices)), character.moving)
-    blinks = np.linspace(0, 1, len(TIME_S))
-    for vertices in character.vertices(motion(), units(), TIME_S, blinks):
+    others = {"eyeBlinkLeft": np.linspace(0, 1, len(TIME_S))}
+    for vertices in character.vertices(motion(), units(), TIME_S, others):
         np.testing.assert_allclose(vertices[still], character.mesh.vertices[still], atol=1e-12)
     eyes = character.mesh.vertices[:, 1] > 2.1
     assert np.abs(vertices - character.mesh.vertices)[eyes, 1].max() == pytest.approx(0.5, abs=1e-5)

@@ -26,8 +26,10 @@ MOST_HOLD_MS = 10_000.0
 MOST_OFFSET_MS = 24 * 3600 * 1000.0
 USUAL_HOLD_MS = 2000 / 24
 """Held poses last as long as two frames of an animation at 24 frames a second, if nothing else is asked for."""
-TOUCHING = 0.03
-"""Lips that are less further open than at rest, in eye distances, move less than in proportion to the intensity."""
+CLOSED_BELOW = 0.012
+"""Tracked lips that touch have openings up to this, in eye distances."""
+FREE = 0.03
+"""Lips that have just parted by less than this, in eye distances, move less than in proportion to the intensity."""
 GROWING = ("protrusion", "spread")
 """The articulatory channels that grow with the intensity; the others say what touches what."""
 DECIDING = ("opening", "width", "outer")
@@ -135,9 +137,9 @@ def intensified(generation: Generation, intensity: float, opening: Curve | None 
     """Return a generation with movements away from the rest pose so many times as large.
 
     opening : how far the lips are apart in every frame [shape=(T,)]; None: the channel ``opening``
-    In every frame the whole face moves by one factor, so that distances and points agree. It is 1 where the lips are no
-    further apart than at rest (silence, p b m), and the intensity where they are open; openings beyond the largest of
-    the motion approach twice that. Weights stay between 0 and 1.
+    In every frame the whole face moves by one factor, so that distances and points agree. It is 1 where the lips touch,
+    or are no further apart than at rest (silence, p b m), and the intensity where they are open; openings beyond the
+    largest of the motion approach twice that. Weights stay between 0 and 1.
     Without an opening the factor is the intensity everywhere.
     """
     motion = generation.motion
@@ -148,7 +150,8 @@ def intensified(generation: Generation, intensity: float, opening: Curve | None 
     rest = _at_rest(motion, generation.units, opening)
     factor = np.full(len(motion.values), float(intensity))
     if opening is not None:
-        factor = _factors(opening - float(np.median(opening[rest])), intensity)
+        closed = float(np.median(opening[rest]))
+        factor = _factors(opening - closed, max(CLOSED_BELOW - closed, 0.0), intensity)
     values = motion.values.astype(np.float64)
     still = np.median(values[rest], axis=0)
     larger = still + factor[:, None] * (values - still)
@@ -228,13 +231,16 @@ def closed_frames(generation: Generation) -> list[int]:
     return sorted(set(found))
 
 
-def _factors(further: Curve, intensity: float) -> Curve:
-    """Return the factor of every frame, by how much further than at rest the lips are apart [shape=(T,)]."""
+def _factors(further: Curve, touching: float, intensity: float) -> Curve:
+    """Return the factor of every frame, by how much further than at rest the lips are apart [shape=(T,)].
+
+    touching : lips that are no further apart than this, more than at rest, still touch
+    """
     most = max(float(further.max()), 1e-9)
     wanted = np.maximum(intensity * further, 0)
     beyond = np.maximum(wanted - most, 0)
     limited = np.where(beyond > 0, most + most * np.tanh(beyond / most), wanted)
-    share = np.clip(further / TOUCHING, 0, 1)
+    share = np.clip((further - touching) / FREE, 0, 1)
     weight = share * share * (3 - 2 * share)
     factor = np.divide(limited, further, out=np.ones_like(further), where=further > 0)
     return 1 + weight * (factor - 1)

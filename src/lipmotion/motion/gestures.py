@@ -24,8 +24,12 @@ from lipmotion.units import LIP_CLOSING, is_silent
 Curve = NDArray[np.float64]
 GESTURES = ("tongue", "lip_tuck", "protrusion", "spread", "lip_press", "teeth")
 """The articulatory channels; each is a weight from 0 to 1 (docs/articulation.md)."""
+OVAL = "oval"
+"""How far the opening is tall and narrow instead of wide: for aa. It is drawn, but is no channel of motion files."""
 TIP_UP, TIP_OUT = 0.6, 1.0
 """Values of ``tongue``: the tip is at the ridge behind the upper teeth; the tip is between the teeth."""
+PURSED = 0.5
+"""Value of ``lip_press`` of w: with protruded lips, a hole that is almost closed. The round hole of uw has 0."""
 REACH = 4.0
 """Dominance is 0 further than so many widths from a phone."""
 LEAST_PAUSE_S = 0.06
@@ -66,7 +70,7 @@ _TARGETS: dict[str, tuple[GestureTarget, Targets]] = {
     ),
     "lip_tuck": (
         GestureTarget(0, 0, 1.0, 0.022),
-        _steady({"f v": 1.0}, 4.0, 0.018) | _steady({_CLOSED: 0.0}, 8.0, 0.022),
+        _steady({"f v": 1.0}, 4.0, 0.022) | _steady({_CLOSED: 0.0}, 8.0, 0.022),
     ),
     "protrusion": (
         GestureTarget(0, 0, 0.25, 0.03),
@@ -75,9 +79,9 @@ _TARGETS: dict[str, tuple[GestureTarget, Targets]] = {
         | {
             "ow": GestureTarget(0.55, 1.0, 2.2, 0.05),
             "oy": GestureTarget(0.6, 0.0, 1.6, 0.04),
-            "aw": GestureTarget(0.0, 0.75, 1.4, 0.04),
+            "aw": GestureTarget(0.0, 0.6, 1.4, 0.04),
         }
-        | _steady({"sh zh ch jh": 0.6}, 1.4, 0.04)
+        | _steady({"sh zh ch jh": 0.5}, 1.4, 0.04)
         | _steady({"r": 0.55, "er axr": 0.4}, 1.2, 0.04)
         | _steady({"iy ih ey ae eh ay aa ah": 0.0}, 1.2, 0.035)
         | _steady({"f v": 0.0, "s z": 0.0, "sil sp": 0.0}, 0.7, 0.03),
@@ -95,10 +99,19 @@ _TARGETS: dict[str, tuple[GestureTarget, Targets]] = {
         | _steady({"uw w uh ow ao aa r er axr sh zh ch jh": 0.0}, 1.5, 0.04)
         | _steady({"sil sp": 0.0}, 0.7, 0.03),
     ),
-    "lip_press": (GestureTarget(0, 0, 1.0, 0.02), _steady({_CLOSED: 1.0}, 3.0, 0.02)),
+    "lip_press": (
+        GestureTarget(0, 0, 1.0, 0.02),
+        _steady({_CLOSED: 1.0}, 3.0, 0.02) | {"w": GestureTarget(PURSED, 0.8 * PURSED, 3.0, 0.02)},
+    ),
+    "oval": (
+        GestureTarget(0, 0, 0.4, 0.03),
+        _steady({"aa": 1.0, "ah": 0.7, "ao": 0.8}, 2.0, 0.04)
+        | {"ay": GestureTarget(0.8, 0.0, 1.4, 0.035), "aw": GestureTarget(1.0, 0.3, 1.4, 0.035)}
+        | _steady({"ae eh": 0.2}, 1.0, 0.035),
+    ),
     "teeth": (
         GestureTarget(0.5, 0.5, 0.5, 0.03),
-        _steady({"s z": 1.0, "iy": 0.9, "sh zh ch jh": 0.95}, 2.0, 0.03)
+        _steady({"s z": 1.0, "iy": 0.87, "sh zh ch jh": 0.97}, 2.0, 0.03)
         | _steady({"ih ix ey y": 0.75, "t d n en": 0.7, "ae eh": 0.6, "k g ng": 0.6}, 0.8, 0.03)
         | _steady({"f v th dh": 0.5}, 2.0, 0.025)
         | _steady({"uw w": 0.0, "uh": 0.15, "ao": 0.3, "aa": 0.4}, 2.0, 0.04)
@@ -113,7 +126,7 @@ def gesture_curves(units: Timeline[Unit], time_s: Curve, names: Collection[str] 
 
     units  : the phones in time; an unknown phone asks nothing special
     time_s : in seconds, rising
-    names  : of ``GESTURES``
+    names  : of ``GESTURES``, or ``OVAL``
     Without phones, ``teeth`` is that of speech, and all others are 0.
     """
     return {name: _curve(name, units, time_s) for name in names}

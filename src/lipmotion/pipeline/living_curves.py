@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.faces.base import Staging
-from lipmotion.faces.character import staged_pose
-from lipmotion.faces.character.liveliness import SEED
-from lipmotion.faces.character.performance import head_poses
-from lipmotion.faces.character.pose import CharacterPose
-from lipmotion.faces.character.shapes import BROWS_UP, EYE_ACROSS, EYE_UPWARDS
 from lipmotion.types import Channel, Motion, Prosody, Timeline, Unit
 from lipmotion.types.motion import WEIGHT
+
+if TYPE_CHECKING:
+    from lipmotion.faces.character.pose import CharacterPose
 
 RADIAN = "radian"
 """The unit of the angles of a head."""
@@ -32,6 +31,10 @@ def living_curves(
     They are those of the 3D head with the same seed. Channels are blendshapes (weights), and ``HEAD`` in radians.
     Raises InputError: the motion has no channel ``opening``.
     """
+    from lipmotion.faces.character import staged_pose
+    from lipmotion.faces.character.performance import head_poses
+    from lipmotion.faces.liveliness import SEED
+
     chosen = staging or Staging()
     poses = head_poses(motion, units, motion.rate_hz, seed=SEED + chosen.seed, prosody=prosody)
     return curves_of_poses([staged_pose(pose, chosen) for pose in poses], motion.rate_hz)
@@ -39,6 +42,8 @@ def living_curves(
 
 def curves_of_poses(staged: Sequence[CharacterPose], rate_hz: float) -> Motion:
     """Return blinks, gaze, brows and the head's angles in poses, one a frame, as ``living_curves`` does."""
+    from lipmotion.faces.character.shapes import BROWS_UP, EYE_ACROSS, EYE_UPWARDS
+
     gaze = np.array([pose.gaze for pose in staged]).reshape(-1, 2)
     turn = np.array([pose.turn for pose in staged]).reshape(-1, 3)
     shut, brows = (np.array([getattr(pose, name) for pose in staged]) for name in ("shut", "brows"))

@@ -8,19 +8,12 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from lipmotion.faces.base import Staging
-from lipmotion.faces.character import staged_pose
-from lipmotion.faces.character.figure import PIVOT, turned
-from lipmotion.faces.character.liveliness import SEED
-from lipmotion.faces.character.performance import head_poses
-from lipmotion.faces.character.shape_fit import mouth_weights
-from lipmotion.faces.character.shapes import head_mesh
-from lipmotion.faces.character.stage import figure
 from lipmotion.faces.mesh import MeshFace
 from lipmotion.pipeline.living_curves import curves_of_poses, living_curves
 from lipmotion.rig.driven import DrivenCharacter, at_times
+from lipmotion.rig.gltf_animator import write_animated_gltf
 from lipmotion.rig.gltf_writer import write_gltf_scene
 from lipmotion.rig.mesh import Blendshape
 from lipmotion.rig.point_motion import point_motion
@@ -33,6 +26,8 @@ from lipmotion.types.motion import WEIGHT
 
 GLTF, USD = ".glb", ".usda"
 SCENE_SUFFIXES = (GLTF, USD)
+KEPT = (GLTF, ".vrm")
+"""Suffixes of files of characters that are kept as they are, with an animation more."""
 METRES = 0.09
 """The distance between the outer eye corners of the 3D head, in metres."""
 
@@ -59,14 +54,24 @@ def scene_of(
 def write_scene(path: Path, scene: Scene, sound: Path | None = None) -> None:
     """Write a character with its animation as ``.glb`` or ``.usda``, by the suffix.
 
+    A ``.glb`` of a character from a ``.glb`` or ``.vrm`` is that file with one animation more, where that is possible.
     sound : the file that is referred to, by its path from the folder of the output; None: none
     Raises ExportError: the file cannot be written.
     """
     heard = replace(scene, sound="" if sound is None else sound_reference(sound, path))
+    if _keeps_original(path, heard):
+        return
     if path.suffix.lower() == USD:
         write_usda(path, heard)
     else:
         write_gltf_scene(path, heard)
+
+
+def _keeps_original(path: Path, scene: Scene) -> bool:
+    """Write the user's file with its animation, and return whether that was possible."""
+    if path.suffix.lower() != GLTF or scene.original is None or scene.original.suffix.lower() not in KEPT:
+        return False
+    return scene.weights is not None and write_animated_gltf(path, scene.original, scene.weights, scene.sound)
 
 
 def head_scene(
@@ -82,6 +87,16 @@ def head_scene(
     staging, prosody : as of videos; size and background do not count
     The mesh is in metres. Raises InputError: the motion has no channel ``opening``.
     """
+    from scipy.spatial.transform import Rotation
+
+    from lipmotion.faces.character import staged_pose
+    from lipmotion.faces.character.figure import PIVOT
+    from lipmotion.faces.character.performance import head_poses
+    from lipmotion.faces.character.shape_fit import mouth_weights
+    from lipmotion.faces.character.shapes import head_mesh
+    from lipmotion.faces.character.stage import figure
+    from lipmotion.faces.liveliness import SEED, turned
+
     hertz, chosen = rate_hz or generation.motion.rate_hz, staging or Staging()
     drawn = head_poses(
         generation.motion, generation.units, hertz, seed=SEED + chosen.seed, intensity=chosen.intensity, prosody=prosody
@@ -126,7 +141,7 @@ def character_scene(
     hertz = rate_hz or motion.rate_hz
     time_s = np.arange(int(np.floor(motion.time_s[-1] * hertz + 1e-9)) + 1) / hertz
     rows = at_times(table, point_motion(motion, units).gap, motion.rate_hz, time_s)
-    return Scene(character.mesh, Motion(rows, hertz, channels))
+    return Scene(character.mesh, Motion(rows, hertz, channels), original=character.file)
 
 
 def _continued(rotations: NDArray[np.float64]) -> NDArray[np.float64]:

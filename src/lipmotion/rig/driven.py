@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -16,18 +16,20 @@ from lipmotion.rig.binding_files import BINDING_SUFFIX, load_binding, read_point
 from lipmotion.rig.blendshape_motion import given_weights
 from lipmotion.rig.character_files import read_character
 from lipmotion.rig.face_shapes import FaceShapes, face_shapes
+from lipmotion.rig.jaw_bone import with_jaw
 from lipmotion.rig.lip_placement import LipPlacement, placed_by_points, placed_by_shape, surface_of_named
 from lipmotion.rig.mesh import Mesh
 from lipmotion.rig.point_motion import closed_displacements, point_motion
-from lipmotion.rig.shape_names import by_arkit_name
-from lipmotion.rig.shape_weights import shape_weights
+from lipmotion.rig.rounding import rounded_displacements, roundness
+from lipmotion.rig.shape_names import ARKIT_OTHERS, by_arkit_name
+from lipmotion.rig.shape_weights import SolverOptions, shape_weights
 from lipmotion.rig.surface import mesh_surface
 from lipmotion.types import Motion, Timeline, Unit
 from lipmotion.types.motion import between_frames
 
 Array = NDArray[np.float64]
 
-BLINKS = ("eyeBlinkLeft", "eyeBlinkRight")
+EYES_AND_BROWS = tuple(name for name in ARKIT_OTHERS if name.startswith(("eyeBlink", "eyeLook", "brow")))
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,12 +38,14 @@ class DrivenCharacter:
 
     shapes  : the blendshapes of its mouth; None: control points move it
     binding : weights of control points; None: blendshapes move it
+    file    : where it was read from; None: from no file
     """
 
     mesh: Mesh
     placement: LipPlacement
     shapes: FaceShapes | None
     binding: ControlBinding | None
+    file: Path | None = None
 
     def weights(self, motion: Motion, units: Timeline[Unit]) -> Motion:
         """Return the weights of the blendshapes over time, channels by the names of the mesh, 0 to 1.
@@ -58,57 +62,80 @@ class DrivenCharacter:
         return given or shape_weights(motion, units, self.shapes)
 
     def vertices(
-        self, motion: Motion, units: Timeline[Unit], time_s: Array, blinks: Array | None = None
+        self,
+        motion: Motion,
+        units: Timeline[Unit],
+        time_s: Array,
+        others: Mapping[str, Array] | None = None,
+        *,
+        intensity: float = 1.0,
     ) -> Iterator[Array]:
         """Yield the vertices at some times in seconds [each shape=(V, 3)].
 
-        blinks : how far the eyes are shut at each time, 0 to 1 [shape=(T,)]; None: they stay open
+        others    : weights of ARKit's blendshapes of eyes and brows, 0 to 1 [each shape=(T,)]; those that the mesh does
+                    not have are left out; None: they stay at rest
+        intensity : 1: movements of the mouth as spoken; more: larger. Closed lips stay closed
         A closure between two times is shown at the nearer one.
         Raises InputError: as ``point_motion``.
         """
-        points = point_motion(motion, units)
+        points = point_motion(motion, units).scaled(intensity)
+        beside = self._beside(others or {}, len(time_s))
         if self.shapes is not None:
-            rows = at_times(self.weights(motion, units).values.astype(np.float64), points.gap, motion.rate_hz, time_s)
-            shut = np.zeros(len(time_s)) if blinks is None or self._eyelids is None else blinks
-            for row, closed in zip(rows, shut, strict=True):
-                yield self._shaped(row, float(closed))
+            solved = shape_weights(motion, units, self.shapes, SolverOptions(intensity=intensity)).values
+            rows = at_times(solved.astype(np.float64), points.gap, motion.rate_hz, time_s)
+            for row, other in zip(rows, beside, strict=True):
+                yield self._shaped(row @ self._displacements, other)
         elif self.binding is not None:
-            flat = closed_displacements(points).reshape(len(points.gap), -1)
-            for row in at_times(flat, points.gap, motion.rate_hz, time_s):
-                yield self.binding.moved(self.mesh, row.reshape(-1, 3))
+            round_lips = rounded_displacements(closed_displacements(points), roundness(units, motion.time_s))
+            flat = round_lips.reshape(len(points.gap), -1)
+            for row, other in zip(at_times(flat, points.gap, motion.rate_hz, time_s), beside, strict=True):
+                vertices = self.binding.moved(self.mesh, row.reshape(-1, 3))
+                vertices[self.moving] += (other @ self._others).reshape(-1, 3)
+                yield vertices
 
     @cached_property
     def moving(self) -> NDArray[np.int64]:
-        """The vertices that ever move, ascending [shape=(N,)]."""
-        if self.binding is not None:
-            return self.binding.rows
-        names = {*(self.shapes.names if self.shapes else ()), *self._blink_names}
+        """The vertices that ever move, but for the turning of the head, ascending [shape=(N,)]."""
+        names = {*(self.shapes.names if self.shapes else ()), *self._other_names.values()}
         rows = [shape.rows for shape in self.mesh.shapes if shape.name in names]
+        if self.binding is not None:
+            rows.append(self.binding.rows)
         return np.unique(np.concatenate(rows)) if rows else np.zeros(0, np.int64)
 
-    @property
-    def _blink_names(self) -> tuple[str, ...]:
-        known = by_arkit_name(self.mesh.shape_names)
-        return tuple(known[name] for name in BLINKS if name in known)
+    def has_shape(self, known: str) -> bool:
+        """Return whether the mesh has a blendshape that moves something, by its name of ARKit."""
+        return known in self._other_names or (self.shapes is not None and known in self.shapes.known)
+
+    @cached_property
+    def _other_names(self) -> dict[str, str]:
+        """The mesh's names of ARKit's blendshapes of eyes and brows, by ARKit's."""
+        known = by_arkit_name(shape.name for shape in self.mesh.shapes if len(shape.rows))
+        return {name: known[name] for name in EYES_AND_BROWS if name in known}
 
     @cached_property
     def _displacements(self) -> Array:
         """What every blendshape of the mouth does to the moving vertices [shape=(S, N · 3)]."""
-        names = self.shapes.names if self.shapes else ()
-        chosen = [self.mesh.shape_names.index(name) for name in names]
-        return self.mesh.displacements(self.moving)[chosen].reshape(len(chosen), -1)
+        return self._moved(self.shapes.names if self.shapes else ())
 
     @cached_property
-    def _eyelids(self) -> Array | None:
-        """What shut eyes do to the moving vertices [shape=(N, 3)], or None."""
-        chosen = [self.mesh.shape_names.index(name) for name in self._blink_names]
-        return self.mesh.displacements(self.moving)[chosen].sum(axis=0) if chosen else None
+    def _others(self) -> Array:
+        """What the blendshapes of eyes and brows do to the moving vertices [shape=(S, N · 3)]."""
+        return self._moved(tuple(self._other_names.values()))
 
-    def _shaped(self, weights: Array, shut: float) -> Array:
+    def _moved(self, names: Sequence[str]) -> Array:
+        chosen = [self.mesh.shape_names.index(name) for name in names]
+        return self.mesh.displacements(self.moving)[chosen].reshape(len(chosen), 3 * len(self.moving))
+
+    def _beside(self, others: Mapping[str, Array], count: int) -> Array:
+        """Return the weights of the blendshapes of eyes and brows over time [shape=(T, S)]."""
+        columns = [others.get(known, np.zeros(count)) for known in self._other_names]
+        return np.stack(columns, axis=1) if columns else np.zeros((count, 0))
+
+    def _shaped(self, moved: Array, other: Array) -> Array:
         vertices = self.mesh.vertices.copy()
-        vertices[self.moving] += (weights @ self._displacements).reshape(-1, 3)
-        if shut and self._eyelids is not None:
-            vertices[self.moving] += shut * self._eyelids
+        vertices[self.moving] += moved.reshape(-1, 3)
+        if other.any():
+            vertices[self.moving] += (other @ self._others).reshape(-1, 3)
         return vertices
 
 
@@ -130,12 +157,12 @@ def driven_character(
     Raises InputError: a file is damaged, or what moves the mouth is not found in it.
     Raises ModelFormatError: the binding is damaged.
     """
-    mesh = read_character(path)
+    mesh = with_jaw(read_character(path))
     is_stored = binding is not None and binding.suffix.lower() == BINDING_SUFFIX
     try:
         if is_stored and binding is not None:
             stored = load_binding(binding, mesh)
-            return DrivenCharacter(mesh, stored.placement, None, stored)
+            return DrivenCharacter(mesh, stored.placement, None, stored, Path(path))
         if points is not None:
             named = read_points(points)
             surface = surface_of_named(mesh, named)
@@ -144,11 +171,11 @@ def driven_character(
             surface = mesh_surface(mesh)
             placement = placed_by_shape(mesh, surface)
         if mesh.shapes and not by_points and binding is None:
-            return DrivenCharacter(mesh, placement, face_shapes(mesh, placement, only), None)
+            return DrivenCharacter(mesh, placement, face_shapes(mesh, placement, only), None, Path(path))
         bound = bind(mesh, surface, placement)
         if binding is not None:
             bound = painted(bound, mesh, read_weights(binding))
-        return DrivenCharacter(mesh, placement, None, bound)
+        return DrivenCharacter(mesh, placement, None, bound, Path(path))
     except InputError as error:
         text = str(error)
         raise InputError(text if str(path) in text else f"{path}: {text}") from error

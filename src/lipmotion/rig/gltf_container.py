@@ -13,7 +13,8 @@ from urllib.parse import unquote
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.rig.limits import LARGEST_FILE, file_bytes
-from lipmotion.storage.json_text import from_json
+from lipmotion.storage.files import whole_file
+from lipmotion.storage.json_text import as_json, from_json
 
 MAGIC, VERSION = b"glTF", 2
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
@@ -35,10 +36,12 @@ class GltfDocument:
 
     json    : the document, an object
     buffers : by number; a buffer that only the extension for compression could use is missing
+    folder  : where the files are that the document names; None: it may name none
     """
 
     json: Mapping[str, Any]
     buffers: Mapping[int, bytes] = field(default_factory=dict)
+    folder: Path | None = None
 
     def items(self, name: str) -> list[dict[str, Any]]:
         """Return a list of objects of the document; none if it is missing. Raises InputError: it is something else."""
@@ -53,6 +56,21 @@ class GltfDocument:
         if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < len(found):
             raise InputError(f"it refers to {name} {shortened(repr(number))} of {len(found)}; export it again")
         return found[number]
+
+    def linked(self, uri: Any, kind: str) -> bytes:
+        """Return what an address in the document stands for: bytes inside of it, or a file in the same folder.
+
+        kind : what it should be, for messages
+        Raises InputError: no such file, a file elsewhere, too large, or damaged.
+        """
+        if not isinstance(uri, str) or self.folder is None:
+            raise InputError(f"its {kind} has no address; export it again")
+        if uri.startswith("data:"):
+            return _data(uri)
+        name = unquote(uri)
+        if not name or Path(name).name != name or "\\" in name or "\0" in name:
+            raise InputError(f"its {kind} is {shortened(repr(name))}, required a file in the same folder")
+        return file_bytes(self.folder / name, kind)
 
 
 def read_gltf_document(path: Path) -> GltfDocument:
@@ -75,8 +93,19 @@ def read_gltf_document(path: Path) -> GltfDocument:
     if version.split(".", maxsplit=1)[0] != str(VERSION):
         raise InputError(f"glTF version {shortened(version)!r}, required 2.0; export it again")
     _check_extensions(json.get("extensionsRequired", []))
-    document = GltfDocument(json)
-    return GltfDocument(json, _buffers(document, path.parent, binary))
+    document = GltfDocument(json, folder=path.parent)
+    return GltfDocument(json, _buffers(document, binary), path.parent)
+
+
+def write_container(path: Path, json: dict[str, Any], body: bytes) -> None:
+    """Write a ``.glb`` of a document and one buffer. Raises ExportError: the file cannot be written."""
+    text = as_json(json, separators=(",", ":"), ensure_ascii=False).encode()
+    text += b" " * (-len(text) % 4)
+    padded = body + b"\0" * (-len(body) % 4)
+    with whole_file(path) as unfinished, unfinished.open("wb") as file:
+        file.write(struct.pack("<4sII", MAGIC, VERSION, 28 + len(text) + len(padded)))
+        file.write(struct.pack("<II", len(text), JSON_CHUNK) + text)
+        file.write(struct.pack("<II", len(padded), BINARY_CHUNK) + padded)
 
 
 def _chunks(content: bytes) -> tuple[bytes, bytes | None]:
@@ -111,7 +140,7 @@ def _check_extensions(required: Any) -> None:
             )
 
 
-def _buffers(document: GltfDocument, folder: Path, binary: bytes | None) -> dict[int, bytes]:
+def _buffers(document: GltfDocument, binary: bytes | None) -> dict[int, bytes]:
     buffers: dict[int, bytes] = {}
     total = 0
     for number, buffer in enumerate(document.items("buffers")):
@@ -119,13 +148,8 @@ def _buffers(document: GltfDocument, folder: Path, binary: bytes | None) -> dict
         if uri is None:
             if number == 0 and binary is not None:
                 buffers[number] = binary
-        elif isinstance(uri, str) and uri.startswith("data:"):
-            buffers[number] = _data(uri)
         elif isinstance(uri, str):
-            name = unquote(uri)
-            if not name or Path(name).name != name or "\\" in name:
-                raise InputError(f"its buffer is {shortened(repr(name))}, required a file in the same folder")
-            buffers[number] = file_bytes(folder / name, "buffer")
+            buffers[number] = document.linked(uri, "buffer")
         total += len(buffers.get(number, b""))
         if total > LARGEST_FILE:
             raise InputError(f"buffers of {total} bytes, required at most {LARGEST_FILE}; reduce the mesh")

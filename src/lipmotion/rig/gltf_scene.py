@@ -11,9 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
+from lipmotion.rig.bones import Bone, merged_bones
 from lipmotion.rig.gltf_accessors import GltfArrays
 from lipmotion.rig.gltf_container import GltfDocument, read_gltf_document
-from lipmotion.rig.gltf_textures import gltf_material, texture_colours
+from lipmotion.rig.gltf_skins import head_bones, held_bones, kinds_of_nodes, skin_weights
+from lipmotion.rig.gltf_textures import GltfMaterials
 from lipmotion.rig.limits import (
     MOST_DISPLACEMENTS,
     MOST_SHAPES,
@@ -27,8 +29,6 @@ from lipmotion.rig.vrm import expression_shapes, looks_backwards
 Matrix = NDArray[np.float64]
 TRIANGLES = 4
 """The mode of primitives that are lists of triangles; strips, fans, lines and points are not read."""
-HALF_CLEAR = 0.5
-"""A triangle is clear where the texture in its middle is clearer than this."""
 DEEPEST = 256
 """Most levels of nodes."""
 LEAST = 1e-9
@@ -39,15 +39,18 @@ LEAST = 1e-9
 class _Surface:
     """What the primitives have given so far."""
 
+    materials: GltfMaterials
     vertices: list[Matrix] = field(default_factory=list)
     triangles: list[NDArray[np.int64]] = field(default_factory=list)
-    uv: list[Matrix | None] = field(default_factory=list)
+    uv: list[Matrix] = field(default_factory=list)
+    mapped: bool = False
     colours: list[Matrix] = field(default_factory=list)
     parts: list[tuple[str, Material]] = field(default_factory=list)
     moved: dict[str, list[tuple[NDArray[np.int64], Matrix]]] = field(default_factory=dict)
     targets: dict[tuple[int, int], str] = field(default_factory=dict)
     first: dict[Any, int] = field(default_factory=dict)
     blocks: dict[Any, int] = field(default_factory=dict)
+    bones: list[Bone] = field(default_factory=list)
     count: int = 0
     displacements: int = 0
 
@@ -69,7 +72,7 @@ def read_gltf(path: Path) -> Mesh:
 
 
 def _mesh(document: GltfDocument, arrays: GltfArrays) -> Mesh:
-    surface = _Surface()
+    surface = _Surface(GltfMaterials(document, arrays))
     places = dict(_global_matrices(document))
     for number, matrix in sorted(places.items()):
         node = document.item("nodes", number)
@@ -89,14 +92,14 @@ def _mesh(document: GltfDocument, arrays: GltfArrays) -> Mesh:
         MeshPart(name, int(first), int(stop), material)
         for (name, material), first, stop in zip(surface.parts, stops, stops[1:], strict=False)
     )
-    uv = [each for each in surface.uv if each is not None]
     return Mesh(
         vertices * turn,
         np.concatenate(surface.triangles).astype(np.int32),
         parts,
         tuple(shapes),
-        np.concatenate(uv) if len(uv) == len(surface.uv) else None,
+        np.concatenate(surface.uv) if surface.mapped else None,
         np.concatenate(surface.colours),
+        tuple(replace(bone, place=bone.place * turn) for bone in merged_bones(surface.bones)),
     )
 
 
@@ -141,29 +144,24 @@ def _add_primitive(
     corners = arrays.whole(primitive["indices"])[:, 0] if "indices" in primitive else np.arange(count)
     if corners.size % 3 or (corners.size and not 0 <= corners.min() <= corners.max() < count):
         raise InputError(f"triangles of vertices up to {corners.max(initial=0)} of {count}; export it again")
-    material = gltf_material(document, primitive.get("material"))
+    material = surface.materials.material(primitive.get("material"))
     check_count("triangles", sum(map(len, surface.triangles)) + corners.size // 3, MOST_TRIANGLES)
-    triangles, clear, mapped = corners.reshape(-1, 3), np.zeros(corners.size // 3, bool), None
-    block = surface.colours[surface.blocks[shared]]
+    used, block = np.unique(corners), surface.colours[surface.blocks[shared]]
+    block[used] = material.colour
+    mapped = np.zeros((corners.size // 3, 3, 2))
     if "TEXCOORD_0" in attributes:
         in_texture = arrays.floats(attributes["TEXCOORD_0"], 2)
         if len(in_texture) != count:
             raise InputError("texture coordinates of another number of vertices; export it again")
+        in_texture = surface.materials.moved(primitive.get("material"), in_texture)
         mapped = (in_texture * (1.0, -1.0) + (0.0, 1.0))[corners].reshape(-1, 3, 2)
-        seen = texture_colours(document, arrays, primitive.get("material"), in_texture)
-        if seen is not None:
-            block[np.unique(corners)] = seen[np.unique(corners), :3]
-            middles = texture_colours(document, arrays, primitive.get("material"), in_texture[triangles].mean(axis=1))
-            clear = middles[:, 3] < HALF_CLEAR if middles is not None else clear
-    else:
-        block[np.unique(corners)] = material.colour
-    for hidden in (False, True):  # what a texture leaves out becomes a part of its own
-        chosen = clear == hidden
-        if chosen.any():
-            look = replace(material, opacity=0.0) if hidden else material
-            surface.triangles.append(triangles[chosen] + first)
-            surface.parts.append((_unused(owner[1], look.name, surface), look))
-            surface.uv.append(None if mapped is None else mapped[chosen])
+        surface.mapped = True
+        if material.texture is not None:
+            block[used] = material.texture.at(in_texture[used])[:, :3] * material.colour
+    if corners.size:
+        surface.triangles.append(corners.reshape(-1, 3) + first)
+        surface.parts.append((_unused(owner[1], material.name, surface), material))
+        surface.uv.append(mapped)
 
 
 def _add_vertices(
@@ -180,16 +178,19 @@ def _add_vertices(
     vertices = arrays.floats(primitive["attributes"].get("POSITION"), 3)
     check_count("vertices", surface.count + len(vertices), MOST_VERTICES)
     if "skin" in node:
-        linear, shift = _skinned(document, arrays, node["skin"], primitive["attributes"], len(vertices), places)
+        joints, weights = skin_weights(document, arrays, node["skin"], primitive["attributes"], len(vertices))
+        linear, shift = _skinned(document, arrays, node["skin"], joints, weights, places)
+        surface.bones += head_bones(document, node["skin"], joints, weights, places, surface.count)
         surface.vertices.append(np.einsum("nij,nj->ni", linear, vertices) + shift)
     else:
         linear = np.broadcast_to(matrix[:3, :3], (len(vertices), 3, 3))
         surface.vertices.append(vertices @ matrix[:3, :3].T + matrix[:3, 3])
+        surface.bones += held_bones(kinds_of_nodes(document).get(id(node), {}), places, surface.count, len(vertices))
     targets = primitive.get("targets", [])
     check_count("blendshapes", len(targets), MOST_SHAPES)
     surface.displacements += len(targets) * len(vertices)
     check_count("displacements", surface.displacements, MOST_DISPLACEMENTS)
-    names = _target_names(mesh, primitive, len(targets))
+    names = target_names(mesh, primitive, len(targets))
     for number, (name, target) in enumerate(zip(names, targets, strict=True)):
         surface.targets[(int(node["mesh"]), number)] = name
         moved = arrays.floats(target["POSITION"], 3) if "POSITION" in target else np.zeros_like(vertices)
@@ -198,7 +199,8 @@ def _add_vertices(
         moved = np.einsum("nij,nj->ni", linear, moved)
         rows = np.flatnonzero(np.abs(moved).max(axis=1, initial=0.0) > LEAST)
         surface.moved.setdefault(name, []).append((rows + surface.count, moved[rows]))
-    surface.colours.append(np.tile(gltf_material(document, primitive.get("material")).colour, (len(vertices), 1)))
+    colour = surface.materials.material(primitive.get("material")).colour
+    surface.colours.append(np.tile(colour, (len(vertices), 1)))
     surface.count += len(vertices)
 
 
@@ -206,33 +208,26 @@ def _skinned(
     document: GltfDocument,
     arrays: GltfArrays,
     skin_number: Any,
-    attributes: dict[str, Any],
-    count: int,
+    joints: NDArray[np.int64],
+    weights: Matrix,
     places: dict[int, Matrix],
 ) -> tuple[Matrix, Matrix]:
     """Return how a skin at rest maps every vertex: matrices [shape=(N, 3, 3)] and shifts [shape=(N, 3)]."""
     skin = document.item("skins", skin_number)
-    joints = skin.get("joints")
-    if not isinstance(joints, list) or not all(joint in places for joint in joints if isinstance(joint, int)):
+    listed = skin["joints"]
+    if not all(joint in places for joint in listed if isinstance(joint, int)):
         raise InputError("a skin with joints that are not in the scene; export it again")
-    matrices = np.array([places.get(joint, np.eye(4)) for joint in joints])
+    matrices = np.array([places.get(joint, np.eye(4)) for joint in listed])
     if "inverseBindMatrices" in skin:
         inverse = arrays.floats(skin["inverseBindMatrices"], 16).reshape(-1, 4, 4).transpose(0, 2, 1)
-        if len(inverse) < len(joints):
-            raise InputError(f"{len(inverse)} matrices of {len(joints)} joints; export it again")
-        matrices = matrices @ inverse[: len(joints)]
+        if len(inverse) < len(listed):
+            raise InputError(f"{len(inverse)} matrices of {len(listed)} joints; export it again")
+        matrices = matrices @ inverse[: len(listed)]
+    count = len(weights)
     blended = np.zeros((count, 3, 4))
-    total = np.zeros(count)
-    for group in range(8):
-        if f"JOINTS_{group}" not in attributes:
-            break
-        numbers = arrays.whole(attributes[f"JOINTS_{group}"], 4)
-        weights = arrays.floats(attributes.get(f"WEIGHTS_{group}"), 4)
-        if len(numbers) != count or len(weights) != count or (count and numbers.max() >= len(joints)):
-            raise InputError("joints of vertices that do not fit; export it again")
-        for column in range(4):
-            blended += weights[:, column, None, None] * matrices[numbers[:, column], :3]
-            total += weights[:, column]
+    for column in range(weights.shape[1]):
+        blended += weights[:, column, None, None] * matrices[joints[:, column], :3]
+    total = weights.sum(axis=1)
     held = total > 1e-6
     blended[held] /= total[held, None, None]
     blended[~held] = np.eye(4)[:3]
@@ -295,7 +290,7 @@ def _numbers(value: Any) -> list[int]:
     return value
 
 
-def _target_names(mesh: dict[str, Any], primitive: dict[str, Any], count: int) -> list[str]:
+def target_names(mesh: dict[str, Any], primitive: dict[str, Any], count: int) -> list[str]:
     """Return the names of morph targets; those without a name are numbered."""
     for holder in (mesh, primitive):
         extras = holder.get("extras")

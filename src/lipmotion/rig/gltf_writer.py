@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError
-from lipmotion.rig.gltf_container import BINARY_CHUNK, JSON_CHUNK, MAGIC, VERSION
+from lipmotion.rig.gltf_container import write_container
 from lipmotion.rig.mesh import Blendshape, Mesh, MeshPart
 from lipmotion.rig.scene import HeadTurn, Scene, ShadingNormals, shading_normals
-from lipmotion.storage.files import whole_file
-from lipmotion.storage.json_text import as_json
 from lipmotion.types import Motion
 
 FLOAT, UNSIGNED, UNSIGNED_BYTE = 5126, 5125, 5121
@@ -102,15 +99,8 @@ def write_gltf_scene(path: Path, scene: Scene) -> None:
     Raises ExportError: the file cannot be written.
     """
     buffer = _Buffer()
-    text = as_json(
-        _document(scene, buffer, shading_normals(scene.mesh, split=scene.split)), separators=(",", ":")
-    ).encode()
-    text += b" " * (-len(text) % 4)
-    body = b"".join(buffer.chunks)
-    with whole_file(path) as unfinished, unfinished.open("wb") as file:
-        file.write(struct.pack("<4sII", MAGIC, VERSION, 28 + len(text) + len(body)))
-        file.write(struct.pack("<II", len(text), JSON_CHUNK) + text)
-        file.write(struct.pack("<II", len(body), BINARY_CHUNK) + body)
+    document = _document(scene, buffer, shading_normals(scene.mesh, split=scene.split))
+    write_container(path, document, b"".join(buffer.chunks))
 
 
 def _document(scene: Scene, buffer: _Buffer, normals: ShadingNormals) -> dict[str, Any]:

@@ -9,6 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
+from lipmotion.rig.bones import Bone
+from lipmotion.rig.textures import Texture
+
+OPAQUE, MASK, BLEND = "OPAQUE", "MASK", "BLEND"
+"""How the opacity of a texture counts: not at all; there is a hole where it is low; what is behind shines through."""
 
 
 @dataclass(frozen=True)
@@ -19,12 +24,20 @@ class Material:
     colour   : red, green and blue of the diffuse reflection, sRGB, 0 to 1
     gloss    : 0 is dull as cloth, 1 shines as a wet eye
     opacity  : 0 is clear as air, 1 hides what is behind
+    texture  : the picture on it, whose colours are multiplied by ``colour``; None: it has one colour
+    alpha    : how the opacity of the texture counts: ``OPAQUE``, ``MASK`` or ``BLEND``
+    cutoff   : with ``MASK``, there is a hole where the opacity is below this
+    two_sided : it is seen from behind as well
     """
 
     name: str = ""
     colour: tuple[float, float, float] = (0.8, 0.8, 0.8)
     gloss: float = 0.2
     opacity: float = 1.0
+    texture: Texture | None = None
+    alpha: str = OPAQUE
+    cutoff: float = 0.5
+    two_sided: bool = False
 
 
 @dataclass(frozen=True)
@@ -77,6 +90,7 @@ class Mesh:
     shapes    : blendshapes, in the order of their weights
     uv        : the place of each triangle's corners in a texture, 0 to 1, v upwards [shape=(F, 3, 2)], or None
     colours   : of every vertex, sRGB, 0 to 1, in place of the materials' [shape=(V, 3)], or None
+    bones     : of head, neck, jaw and eyes, where a file has a skeleton; at most one of each kind
     Raises InputError: shapes of arrays that do not fit, values that are not finite, a triangle or a blendshape of a
     vertex that does not exist, parts that do not follow one another, or two blendshapes of one name.
     """
@@ -87,6 +101,7 @@ class Mesh:
     shapes: tuple[Blendshape, ...] = ()
     uv: NDArray[np.float64] | None = None
     colours: NDArray[np.float64] | None = None
+    bones: tuple[Bone, ...] = ()
 
     def __post_init__(self) -> None:
         _check_places("vertices", self.vertices)
@@ -162,7 +177,8 @@ class Mesh:
 def joined(meshes: Mapping[str, Mesh]) -> Mesh:
     """Return one mesh of several ones; each gives one part of its name, of the material of its first part.
 
-    Blendshapes of one name become one. Texture coordinates and colours remain where all of them have some.
+    Blendshapes of one name become one. Texture coordinates remain where one has some, and are 0 in the others; colours
+    remain where all have some.
     """
     offsets = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes.values())])
     triangles = [mesh.triangles + offset for mesh, offset in zip(meshes.values(), offsets, strict=False)]
@@ -175,7 +191,8 @@ def joined(meshes: Mapping[str, Mesh]) -> Mesh:
     for mesh, offset in zip(meshes.values(), offsets, strict=False):
         for shape in mesh.shapes:
             shapes.setdefault(shape.name, []).append((shape.rows + offset, shape.displacements))
-    uv = [mesh.uv for mesh in meshes.values() if mesh.uv is not None]
+    uv = [np.zeros((*mesh.triangles.shape, 2)) if mesh.uv is None else mesh.uv for mesh in meshes.values()]
+    mapped = any(mesh.uv is not None for mesh in meshes.values())
     colours = [mesh.colours for mesh in meshes.values() if mesh.colours is not None]
     return Mesh(
         np.concatenate([mesh.vertices for mesh in meshes.values()]),
@@ -185,7 +202,7 @@ def joined(meshes: Mapping[str, Mesh]) -> Mesh:
             Blendshape(name, np.concatenate([rows for rows, _ in moved]), np.concatenate([way for _, way in moved]))
             for name, moved in shapes.items()
         ),
-        np.concatenate(uv) if len(uv) == len(meshes) else None,
+        np.concatenate(uv) if mapped else None,
         np.concatenate(colours) if len(colours) == len(meshes) else None,
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -11,7 +12,8 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.rig.limits import MOST_DISPLACEMENTS, MOST_SHAPES, MOST_TRIANGLES, MOST_VERTICES, check_count, file_bytes
-from lipmotion.rig.mesh import Blendshape, Material, Mesh, MeshPart
+from lipmotion.rig.mesh import MASK, OPAQUE, Blendshape, Material, Mesh, MeshPart
+from lipmotion.rig.textures import read_texture
 from lipmotion.storage.files import whole_file
 
 NEUTRAL = "neutral"
@@ -23,6 +25,8 @@ LARGEST_NUMBER = 1e9
 LARGEST_LIBRARY = 1 << 20
 MOST_CORNERS = 1000
 """Most corners of a polygon."""
+OPAQUE_FROM = 250
+"""A texture with pixels of a lower opacity than this, of 255, has holes."""
 _SHININESS = 60.0
 """A specular exponent (``Ns``) of so much is a gloss of 1/2."""
 
@@ -54,8 +58,8 @@ class _Faces:
 def read_obj(path: Path) -> Mesh:
     """Return the mesh of an OBJ file; polygons become triangles, materials become parts.
 
-    Vertices keep their numbers, counted from 0. Colours come from a ``.mtl`` file in the same folder, where there is
-    one. Lines, curves and normals are ignored.
+    Vertices keep their numbers, counted from 0. Colours and textures (``map_Kd``) come from files in the same folder,
+    where there are some. Lines, curves and normals are ignored.
     Raises InputError: no such file, too large, no triangles, or a damaged line, whose number is named.
     """
     content = file_bytes(path, "mesh")
@@ -153,7 +157,7 @@ def _mesh(
         for (group, material), first, stop in zip(faces.names, stops, stops[1:], strict=False)
     )
     textures = np.array(faces.textures)[order]
-    mapped = uv[textures] if len(uv) and textures.min() >= 0 else None
+    mapped = np.where(textures[..., None] >= 0, uv[textures], 0.0) if len(uv) else None
     return Mesh(vertices, np.array(faces.corners, np.int32)[order], parts, uv=mapped)
 
 
@@ -217,9 +221,28 @@ def _materials(folder: Path, library: str) -> dict[str, Material]:
         elif name and len(words) == 2 and words[0] == b"Ns":
             shininess = max(_number(words[1]), 0.0)
             found[name] = replace(found[name], gloss=shininess / (shininess + _SHININESS))
+        elif name and len(words) > 1 and words[0] == b"map_Kd":
+            found[name] = _with_texture(found[name], folder, _text(words[-1:]))
         elif name and len(words) > 1 and words[0] in {b"d", b"Tf"}:  # Maya writes Tf as 1 less the transparency
             found[name] = replace(found[name], opacity=min(max(_number(words[-1]), 0.0), 1.0))
     return found
+
+
+def _with_texture(material: Material, folder: Path, name: str) -> Material:
+    """Return a material with the picture of a name, in the same folder; where its pixels are clear, there are holes."""
+    texture = None
+    if Path(name).name == name and "\0" not in name and (folder / name).is_file():
+        texture = read_texture(file_bytes(folder / name, "picture"))
+    if texture is None:
+        warnings.warn(
+            f"{folder / name}: a texture of the character is not in the same folder, or is no PNG, JPEG or WebP. Its "
+            "surface has one colour",
+            UserWarning,
+            stacklevel=2,
+        )
+        return material
+    clear = bool((texture.pixels[..., 3] < OPAQUE_FROM).any())
+    return replace(material, texture=texture, alpha=MASK if clear else OPAQUE)
 
 
 def _number(word: bytes) -> float:

@@ -40,6 +40,10 @@ class PointMotion:
     gap: Array
     rate_hz: float
 
+    def scaled(self, factor: float) -> PointMotion:
+        """Return the same motion, so many times as large; lips that touch still touch."""
+        return PointMotion(factor * self.displacements, factor * self.gap, self.rate_hz)
+
 
 def point_motion(motion: Motion, units: Timeline[Unit]) -> PointMotion:
     """Return the motion of lip and jaw points away from the rest pose, which is that of the silences.

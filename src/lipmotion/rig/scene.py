@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +43,7 @@ class Scene:
     turn    : of the head; None: it stands still
     sound   : the file with the sound as the scene's file names it: a path from its folder, with slashes; empty: none
     metres  : the length of the mesh's unit in metres, for formats that say it
+    original : the file that the mesh is from; a ``.glb`` of it keeps all that is in that file; None: no file
     split   : whether vertices at one place may be one: files split them along seams, which should not be seen
     Raises ExportError: a channel that is no blendshape. Raises InputError: a turn that does not fit the mesh.
     """
@@ -51,6 +53,7 @@ class Scene:
     turn: HeadTurn | None = None
     sound: str = ""
     metres: float = 1.0
+    original: Path | None = None
     split: bool = True
 
     def __post_init__(self) -> None:

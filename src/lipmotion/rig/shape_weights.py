@@ -12,6 +12,7 @@ from lipmotion.rig.face_shapes import NOT_FROM_POINTS, FaceShapes
 from lipmotion.rig.gestures import gesture_curves, phone_weights
 from lipmotion.rig.mouth_template import FACING, mouth_template
 from lipmotion.rig.point_motion import PointMotion, point_motion
+from lipmotion.rig.rounding import rounded_weights, roundness
 from lipmotion.rig.visemes import NEAREST_VOWEL, viseme_curves
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
 from lipmotion.units import LIP_CLOSING
@@ -37,11 +38,13 @@ class SolverOptions:
     """How weights are solved.
 
     costs    : of large and of sudden weights
-    gestures : whether phones add what points do not show (pressed lips, a tucked lip, the tongue)
+    gestures : whether phones add what points do not show (pressed lips, a tucked lip, the tongue, round lips)
+    intensity : 1: movements as they are; more: larger
     """
 
     costs: CurveCosts = field(default_factory=CurveCosts)
     gestures: bool = True
+    intensity: float = 1.0
 
 
 def shape_weights(
@@ -57,7 +60,7 @@ def shape_weights(
     Raises InputError: as ``point_motion``.
     """
     options = options or SolverOptions()
-    points = point_motion(motion, units)
+    points = point_motion(motion, units).scaled(options.intensity)
     if shapes.style == "visemes":
         weights = _spoken_weights(points, motion, units, shapes, options)
     else:
@@ -119,6 +122,8 @@ def _free_weights(
     weights[:, free] += solved
     if jaw is not None and close is not None:
         weights[:, jaw] += weights[:, close]
+    if options.gestures:
+        weights = rounded_weights(weights, shapes, roundness(units, motion.time_s))
     return np.clip(weights, 0.0, 1.0)
 
 

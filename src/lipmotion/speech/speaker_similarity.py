@@ -45,7 +45,7 @@ def speaker_similarity(hmm: UnitHmm, audio: AnalysedAudio) -> SpeakerSimilarity:
 
 @lru_cache(maxsize=2)
 def _densities(hmm: UnitHmm) -> QuadraticForm:
-    """Return the densities of ``UnitHmm.fit``, ready for use; those of the last models are kept for short recordings."""
+    """Return the densities of ``UnitHmm.fit``, ready for use; those of the last models are kept."""
     return hmm.mixtures.quadratic(np.arange(len(hmm.log_stay), dtype=np.intp))
 
 

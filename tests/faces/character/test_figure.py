@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from lipmotion.faces.character.figure import turned
 from lipmotion.faces.character.forms import MOUTH_Y, head
 from lipmotion.faces.character.pose import CharacterPose
 from lipmotion.faces.character.shapes import POSES, SIDED_POSES, head_mesh
 from lipmotion.faces.character.skin import REST
 from lipmotion.faces.character.stage import camera_for, figure
+from lipmotion.faces.liveliness import turned
 
 VIEWER = camera_for(640, 360).place
 OPEN = CharacterPose(gap=0.25, upper_rise=0.04, jaw=0.18)
@@ -123,3 +123,14 @@ def test_sided_shapes_leave_the_other_side_alone(mesh):
     moved = mesh.shaped({"mouthSmileLeft": 1.0}) - mesh.vertices
     assert np.abs(moved[mesh.vertices[:, 0] < -0.15]).max() < 1e-9
     assert np.abs(moved[mesh.vertices[:, 0] > 0.15]).max() > 0.03
+
+
+def test_cheeks_come_forward_beside_spread_lips_and_sink_beside_round_ones():
+    skin = figure().skin
+    cheek = np.argmin(np.linalg.norm(skin.rest[: len(skin.face)] - [0.42, -0.46, -0.1], axis=1))
+
+    def forward(pose: CharacterPose) -> float:
+        return float(skin.posed(pose)[0][cheek, 2] - skin.rest[cheek, 2])
+
+    assert forward(CharacterPose(spread=1.0)) > 0.01
+    assert forward(CharacterPose(roundness=1.0)) < -0.005

@@ -34,7 +34,7 @@ def poses(draw) -> CharacterPose:
     return CharacterPose(
         gap=gap, upper_rise=gap * draw(st.floats(0.15, 0.5)), jaw=0.85 * gap, width=draw(st.floats(0.65, 1.25)),
         fullness=draw(st.floats(0.75, 1.25)), roundness=roundness, spread=draw(SHARES) * (1 - roundness),
-        protrusion=0.085 * roundness, bite=draw(SHARES),
+        protrusion=(0.08 + 0.035 * draw(SHARES)) * roundness, bite=draw(SHARES), oval=draw(SHARES),
     )  # fmt: skip
 
 
@@ -49,6 +49,9 @@ def test_closed_lips_meet_at_every_column():
         CharacterPose(press=1),
         CharacterPose(roundness=1, protrusion=0.08, width=0.7),
         CharacterPose(width=1.2),
+        CharacterPose(width=1.1, spread=1),
+        CharacterPose(width=0.9, oval=1),
+        CharacterPose(roundness=0.6, press=0.7, protrusion=0.05),
     ):
         places = contact(pose)
         for upper, lower in PAIRS:
@@ -76,7 +79,7 @@ def test_both_halves_of_the_mouth_are_alike(pose):
 def test_lips_never_reach_into_the_teeth(pose, tuck, press):
     """What is above the edge of the upper teeth is before them; what is below the lower edge is before those."""
     moved = pose._replace(
-        tuck=tuck, upper_rise=max(pose.upper_rise, 0.036 * tuck), gap=max(pose.gap, 0.045 * tuck), press=press
+        tuck=tuck, upper_rise=max(pose.upper_rise, 0.054 * tuck), gap=max(pose.gap, 0.054 * tuck), press=press
     )
     lips = lip_surface(section_points(moved, figure().skin.base_z))[:FRONT].reshape(-1, 3)
     teeth = TEETH_Z - ARCH * lips[:, 0] ** 2

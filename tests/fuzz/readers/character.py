@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+import io
 import tempfile
+import warnings
 from itertools import islice
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import require
+from lipmotion.faces.mesh import MeshStage
 from lipmotion.pipeline.characters import curves_of
 from lipmotion.rig.binding_files import save_binding, write_weights
+from lipmotion.rig.character_files import read_character
+from lipmotion.rig.drawn_surface import drawn_surface
 from lipmotion.rig.driven import driven_character
 from lipmotion.rig.gltf_writer import write_glb
 from lipmotion.rig.obj_files import write_obj
-from rig.gltf import data_uri, document, glb, packed_attributes
+from rig.gltf import data_uri, document, glb, packed_attributes, textured_document
 from rig.heads import head, lip_points
 from rig.speech import motion, units
 
@@ -42,6 +48,12 @@ def seeds(_: Good) -> list[Files]:
     extension = {"buffer": 0, "byteOffset": len(binary), "byteLength": len(packed), "byteStride": 12, "count": 4}
     squeezed = [dict(view) for view in content["bufferViews"]]
     squeezed[0]["extensions"] = {"EXT_meshopt_compression": extension | {"mode": "ATTRIBUTES"}}
+    skinned, joints = _skinned()
+    picture = _picture()
+    library = b"newmtl skin\nKd 0.9 0.8 0.7\nmap_Kd skin.png\n"
+    mapped = b"mtllib head.mtl\nvt 0 0\nvt 1 0\nvt 1 1\nusemtl skin\n" + files["head.obj"].replace(b"usemtl", b"#")
+    moved = {"KHR_texture_transform": {"offset": [0.5, 0.25], "scale": [2, 2], "rotation": 0.3}}
+    clear = {"alphaMode": "BLEND", "doubleSided": True}
     return [
         {"head.glb": files["head.glb"]},
         {"head.obj": files["head.obj"], "points.csv": files["points.csv"]},
@@ -50,20 +62,58 @@ def seeds(_: Good) -> list[Files]:
         {"head.glb": files["head.glb"], "rig.csv": TABLE.encode()},
         {"head.glb": glb(small | {"bufferViews": squeezed}, b"")},
         {"head.glb": glb(content, binary)},
+        {"head.obj": mapped, "head.mtl": library, "skin.png": picture, "points.csv": files["points.csv"]},
+        {"head.glb": glb(*textured_document(picture, clear, moved))},
+        {"head.glb": glb(skinned, joints)},
     ]
+
+
+def _picture() -> bytes:
+    file = io.BytesIO()
+    Image.fromarray(np.random.default_rng(1).integers(0, 256, (8, 8, 4)).astype(np.uint8)).save(file, "PNG")
+    return file.getvalue()
+
+
+def _skinned() -> tuple[dict, bytes]:
+    """The square on a neck, a head and a jaw."""
+    content, binary = document()
+    joints, weights = np.tile(np.array([0, 1, 2, 0], np.uint8), (4, 1)), np.full((4, 4), 0.25, "<f4")
+    content["nodes"] = [
+        {"mesh": 0, "skin": 0},
+        {"name": "Neck", "children": [2]},
+        {"name": "Head", "children": [3]},
+        {"name": "JawBone"},
+    ]
+    content["scenes"], content["skins"] = [{"nodes": [0, 1]}], [{"joints": [1, 2, 3]}]
+    views: list[dict] = [{"buffer": 0, "byteOffset": len(binary), "byteLength": 16}]
+    views.append({"buffer": 0, "byteOffset": len(binary) + 16, "byteLength": 64})
+    content["bufferViews"] += views
+    content["accessors"] += [
+        {"bufferView": 4, "componentType": 5121, "count": 4, "type": "VEC4"},
+        {"bufferView": 5, "componentType": 5126, "count": 4, "type": "VEC4"},
+    ]
+    content["meshes"][0]["primitives"][0]["attributes"] |= {"JOINTS_0": 4, "WEIGHTS_0": 5}
+    del content["meshes"][0]["extras"]
+    return content, binary + joints.tobytes() + weights.tobytes()
 
 
 def read(folder: Path, _: Good) -> None:
     """Read a character and move it; read a table of controls and fill it."""
+    warnings.filterwarnings("ignore", ".*texture of the character.*")  # the surface then has one colour
     found = {path.name: path for path in folder.iterdir()}
     if "rig.csv" in found:
         controls = curves_of(motion(), units(), found["rig.csv"])
         require(bool(np.isfinite(controls.values).all()), "controls that are not finite")
     path = found.get("head.glb") or found["head.obj"]
     binding = found.get("head.binding") or found.get("weights.csv")
+    mesh = read_character(path)
+    surface = drawn_surface(mesh, np.ones(len(mesh.triangles), bool), 1.0)
+    require(len(surface.triangles.levels) > surface.triangles.looks[:, 0].max(initial=-1), "a texture that is missing")
     character = driven_character(path, points=found.get("points.csv"), binding=binding)
     for vertices in islice(character.vertices(motion(), units(), np.array([0.55, 0.75, 1.15])), 3):
         require(bool(np.isfinite(vertices).all()), "vertices that are not finite")
+    picture = MeshStage(character, 64, 64).picture(character.mesh.vertices, (0.1, 0.05, 0.0), (0.1, 0.0))
+    require(picture.shape == (64, 64, 3), "a picture of another size")
     if character.shapes is not None:
         weights = character.weights(motion(), units()).values
         require(bool((weights >= 0).all() and (weights <= 1).all()), "weights beyond 0 to 1")

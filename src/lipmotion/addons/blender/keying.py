@@ -99,7 +99,7 @@ def key_controls(
 
 
 def add_sound(scene: Any, path: str, first: float) -> bool:
-    """Add a sound to the sequencer at a frame, in place of an earlier one of its kind; return whether it exists."""
+    """Add a sound to the sequencer at a frame, in place of an earlier one of its kind; return whether it is there."""
     if not path or not os.path.isfile(path):  # noqa: PTH113
         return False
     editor = scene.sequence_editor or scene.sequence_editor_create()
@@ -108,7 +108,10 @@ def add_sound(scene: Any, path: str, first: float) -> bool:
         strips.remove(strip)
     taken = {strip.channel for strip in strips}
     channel = next(number for number in range(1, 130) if number not in taken)
-    strips.new_sound(STRIP, path, channel, round(first))
+    try:
+        strips.new_sound(STRIP, path, channel, round(first))
+    except RuntimeError:  # no sound file, or a Blender that was built without sound
+        return False
     scene.sync_mode = "AUDIO_SYNC"
     return True
 

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.faces.base import SMALLEST, TRANSPARENT, Face, Staging
-from lipmotion.faces.character.liveliness import SEED
 from lipmotion.faces.character.performance import head_poses
 from lipmotion.faces.character.pose import CharacterPose
+from lipmotion.faces.liveliness import SEED
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 
 if TYPE_CHECKING:

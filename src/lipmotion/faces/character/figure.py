@@ -19,6 +19,7 @@ from lipmotion.faces.character.part import part
 from lipmotion.faces.character.pose import CharacterPose
 from lipmotion.faces.character.skin import REST, Skin, jaw_moved
 from lipmotion.faces.character.tint import skin_colours
+from lipmotion.faces.liveliness import turned
 from lipmotion.rig.lighting import Lighting
 from lipmotion.rig.occlusion import reaches
 from lipmotion.rig.rasteriser import normals_of
@@ -192,12 +193,3 @@ class Figure:
         lit[self._wall] = 1
         lit[:, 0] = np.clip(1.08 * lit[:, 0], 0.12, 1) ** 1.15
         return lit
-
-
-def turned(yaw: float, pitch: float, roll: float = 0.0) -> Real:
-    """Return the rotation to the character's left, upwards and to the left shoulder, in radians [shape=(3, 3)]."""
-    (cy, sy), (cp, sp), (cr, sr) = ((np.cos(a), np.sin(a)) for a in (yaw, pitch, roll))
-    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
-    about_x = np.array([[1, 0, 0], [0, cp, sp], [0, -sp, cp]])
-    about_z = np.array([[cr, sr, 0], [-sr, cr, 0], [0, 0, 1]])
-    return np.asarray(about_y @ about_x @ about_z)

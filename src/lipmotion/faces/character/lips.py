@@ -75,8 +75,7 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
     x = half * ACROSS
     rise = pose.upper_rise
     drop = pose.gap - rise
-    middle = MOUTH_Y + (1 - 0.8 * pose.roundness - 0.6 * pose.spread) * _LINE + pose.smile * ACROSS**2
-    middle = middle - 0.22 * pose.gap * (1 - 0.6 * pose.spread) * ACROSS**2 - (ROUND_DROP + 0.2 * pose.gap) * pose.roundness
+    middle = _between(pose)
     squeeze = _squeeze(pose)
     belly = _ENVELOPE + squeeze * (1 - _ENVELOPE)
     hole, contour = _opening(pose)
@@ -117,6 +116,13 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
         (1.12 * x, inner_y + up * (0.13 * _ENVELOPE + 0.012), behind - 0.01),
     ]
     return np.stack([np.stack(row, axis=1) for row in rows])
+
+
+def _between(pose: CharacterPose) -> Real:
+    """Return the height of the line between the lips, closed, at every column [shape=(COLUMNS,)]."""
+    line = (1 - 0.8 * pose.roundness - 0.6 * pose.spread) * _LINE
+    raised = (pose.smile - 0.22 * pose.gap * (1 - 0.6 * pose.spread)) * ACROSS**2
+    return np.asarray(MOUTH_Y + line + raised - (ROUND_DROP + 0.2 * pose.gap) * pose.roundness)
 
 
 def _opposite(base_z: Real) -> Real:

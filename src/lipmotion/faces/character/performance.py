@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.faces.character import gestures
-from lipmotion.faces.character.liveliness import SEED, liveliness
 from lipmotion.faces.character.pose import CharacterPose
+from lipmotion.faces.liveliness import SEED, accent_of, liveliness
 from lipmotion.motion.rest import against_rest, rest_frames
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion.units import LIP_CLOSING
@@ -24,6 +24,8 @@ WIDEST = 0.4
 """Largest drawn gap; openings of speech stay below 0.35."""
 WIDTH_GAIN, WIDTH_REACH = 1.5, 0.34
 """Changes of width are exaggerated: small ones by the factor, none beyond the reach."""
+WIDER = {"round": -0.13, "pucker": -0.07, "spread": 0.05, "oval": -0.09}
+"""What gestures add to the width, relative to the rest pose."""
 TUCKED_GAP = 0.054
 """How far the upper lip bares the upper teeth while the lower lip is on them."""
 PUCKERED_GAP, HELD_GAP = 0.028, 0.036
@@ -84,13 +86,13 @@ def head_poses(
     gap = _articulated(np.minimum(intensity * _gap(motion, time_s, fps), WIDEST), said, pause)
     gap = _closed(gap, units, time_s)
     bite = np.maximum(said["bite"], said["spread"] ** 1.5) * np.clip((BITTEN_GAP[1] - gap) / np.ptp(BITTEN_GAP), 0, 1)
-    alive = liveliness(gap, pause, fps, seed=seed, accent=_accent(prosody, time_s))
+    alive = liveliness(gap, pause, fps, seed=seed, accent=accent_of(prosody, time_s))
     curves = {
         "gap": gap,
         "upper_rise": _rise(gap, said),
         "jaw": _jaw(motion, rest, gap, time_s) * (1 - 0.85 * bite),
         "bite": np.maximum(bite, said["press"]),
-        "width": 1 + change - 0.13 * said["round"] - 0.07 * said["pucker"] + 0.05 * said["spread"] - 0.09 * said["oval"],
+        "width": 1 + change + sum(WIDER[name] * said[name] for name in WIDER),
         "fullness": _at(motion, _fullness(motion, rest), time_s) * (1 + 0.08 * roundness),
         "roundness": roundness,
         "spread": wide,
@@ -127,21 +129,6 @@ def _said(motion: Motion, units: Timeline[Unit], time_s: Curve) -> dict[str, Cur
     if "teeth" in given:
         said["bite"] = np.clip(2 * given["teeth"] - 1, 0, 1)
     return said
-
-
-def _accent(prosody: Prosody | None, time_s: Curve) -> Curve | None:
-    """Return how loud and high the voice is against its surroundings, about -1 to 1 [shape=(T,)]; None: not known."""
-    if prosody is None or not len(prosody.level_db):
-        return None
-    at_s = np.arange(len(prosody.level_db)) / 100.0
-    voiced = np.isfinite(prosody.log_f0)
-    high = np.zeros(len(at_s))
-    if voiced.any():
-        high = np.interp(at_s, at_s[voiced], prosody.log_f0[voiced])
-        high = (high - np.median(high[voiced])) / max(float(np.std(high[voiced])), 0.02)
-    loud = np.asarray(prosody.level_db, float)
-    loud = (loud - np.median(loud)) / max(float(np.std(loud)), 1.0)
-    return np.interp(time_s, at_s, np.tanh(0.6 * high + 0.4 * loud) * np.clip(loud + 1, 0, 1))
 
 
 def _articulated(gap: Curve, said: dict[str, Curve], pause: Curve) -> Curve:

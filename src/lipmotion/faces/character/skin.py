@@ -22,6 +22,8 @@ SPACING = 0.033
 HINGE = np.array([0.0, -0.32, -0.82])
 """The axis of the jaw goes through here, from ear to ear."""
 REST = CharacterPose()
+CHEEKS_SPREAD, CHEEKS_ROUND = 0.035, 0.025
+"""How far cheeks come forward beside spread lips, and sink beside round ones."""
 _LEFT_CORNER = 40
 CALM_RADIUS = 0.035
 """Round the corners of the lips, where the surface folds, the shading changes less than the surface."""
@@ -59,6 +61,7 @@ class Skin:
             "lids": len(grids[1]) + len(grids[2]),
         }
         self._bind(contour)
+        self._cheeks = _cheeks(fill, len(self.face))
         self.rest = self.places(REST)
         meshed = normals_of(self.rest, self.triangles)
         self.normals = meshed.copy()
@@ -120,9 +123,19 @@ class Skin:
         own = moved - by_jaw[:COLUMNS]
         face = self.face + by_jaw
         face[self._bound] += self._shares @ own
+        face += (CHEEKS_SPREAD * pose.spread - CHEEKS_ROUND * pose.roundness) * self._cheeks
         face[:COLUMNS] = lips[0]
         left = self.lids_of_eye.rings(pose).reshape(-1, 3)
         return np.concatenate([face, lips[1:].reshape(-1, 3), left, left * [-1, 1, 1]])
+
+
+def _cheeks(fill: Real, count: int) -> Real:
+    """Return how cheeks move, out and up, for all vertices of the face, of which these are the last [shape=(N, 3)]."""
+    away = np.stack([(np.abs(fill[:, 0]) - 0.40) / 0.15, (fill[:, 1] + 0.47) / 0.15], axis=1)
+    share = np.exp(-np.sum(away**2, axis=1)) * (fill[:, 2] > -0.75)
+    moved = np.zeros((count, 3))
+    moved[count - len(fill) :] = share[:, None] * (outward(head, fill) + np.array([0.0, 0.4, 0.0]))
+    return moved
 
 
 def jaw_weight(places: Real) -> Real:

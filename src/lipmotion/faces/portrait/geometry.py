@@ -17,7 +17,7 @@ from lipmotion.faces.portrait.pose import MouthPose, upper_share
 
 Heights = NDArray[np.float64]
 
-TEETH_EDGE = 0.03
+TEETH_EDGE = 0.024
 """The upper incisors end this far below the line of the closed lips; they belong to the skull."""
 TUCK_OVERLAP = 0.012
 """So far the upper teeth stand in front of the lower lip that is tucked under them."""
@@ -65,21 +65,22 @@ def lip_outlines(lips: LipDesign, pose: MouthPose, x: Heights) -> LipOutlines:
     half_width = lips.half_width * pose.width
     u = np.minimum(np.abs(x) / half_width, 1)
     out, wide = pose.protrusion, pose.spread
-    rise = float(upper_share(pose.gap)) * (1 + 0.5 * pose.tuck)
-    rise += out * (0.45 * pose.gap - rise)
+    rise = float(upper_share(pose.gap))
+    rise += pose.tuck * (1 - out) * max(min(0.6 * pose.gap, 0.036) - rise, 0) + out * (0.45 * pose.gap - rise)
     drop = pose.gap - rise
-    middle = lips.line_y + pose.tuck * max(TEETH_EDGE + 0.002 - drop, -0.06) - 0.008 * out
+    middle = lips.line_y + pose.tuck * max(TEETH_EDGE - 0.01 - drop, -0.03) - 0.008 * out
     sag = (0.5 - 0.3 * wide) * drop * (1 - pose.tuck) + 0.018 * out - 0.012 * wide * (1 - pose.press)
+    sag += pose.oval * (0.5 * (drop - rise) - sag) + 0.014 * pose.tuck
     bend = sag * u * u
     line = middle + (1 - 0.7 * out) * _on("line", u) + lips.smile * u**3 + bend
-    inner_share = _inner_share(pose.gap, out, wide)
+    inner_share = _inner_share(pose, half_width)
     inner = u / inner_share
     open_share = min(pose.gap / 0.05, 1)
     upper_inner = line - rise * _arch(inner, 0.7 - 0.22 * open_share * max(out, 1 - wide) - 0.26 * wide)
-    lower_inner = line + drop * _arch(inner, 0.6 - 0.12 * out - 0.26 * wide)
-    thin = 1 - 0.28 * pose.press
+    lower_inner = line + drop * _arch(inner, 0.6 - 0.12 * max(out, pose.oval) - 0.26 * max(wide, pose.tuck))
+    thin = 1 - 0.28 * pose.press * (1 - out)
     upper = lips.upper * pose.fullness * thin * (1 - 0.12 * pose.tuck + 0.22 * out - 0.14 * wide)
-    lower = lips.lower * pose.fullness * thin * (1 - 0.42 * pose.tuck + 0.12 * out - 0.16 * wide)
+    lower = lips.lower * pose.fullness * thin * (1 - 0.48 * pose.tuck + 0.12 * out - 0.16 * wide)
     follow = 0.85 * (1 - 0.35 * out)
     return LipOutlines(
         half_width=half_width,
@@ -101,15 +102,15 @@ def mouth_interior(lips: LipDesign, pose: MouthPose, x: Heights, outlines: LipOu
     outlines : of the lips of this pose
     """
     edge = lips.line_y + TEETH_EDGE
-    upper_edge = edge - 0.03 * pose.protrusion - 0.05 * max(0.5 - pose.teeth, 0)
+    upper_edge = edge - 0.05 * pose.protrusion - 0.05 * max(0.5 - pose.teeth, 0) * (1 - far_open(pose))
     upper = upper_edge - 0.35 * x * x
     reveal = min(max(2.5 * pose.teeth - 1.25, 0), 1)
     low_lip = float(outlines.lower_inner.max())
     below_lip = low_lip + 0.012 - 0.1 * pose.gap
-    met = upper_edge + 0.002 + 0.1 * pose.jaw + 0.1 * max(1 - pose.teeth, 0)
+    met = upper_edge + 0.002 + 0.1 * pose.jaw + max(0.93 - pose.teeth, 0) * (0.1 + 3 * max(pose.gap - 0.07, 0))
     lower = below_lip + reveal * (min(met, below_lip) - below_lip) + (0.2 - 0.55 * reveal) * x * x
     top, bottom = _tongue(pose, x, edge, low_lip)
-    over = max(pose.tongue - 0.6, 0) / 0.4 * 0.026 * _arch(x / min(0.14, 0.9 * outlines.inner_half_width), 0.5)
+    over = max(pose.tongue - 0.6, 0) / 0.4 * 0.03 * _arch(x / min(0.15, 0.9 * outlines.inner_half_width), 0.5)
     tucked = TUCK_OVERLAP * pose.tuck * _arch(x / outlines.inner_half_width, 0.5)
     cut = outlines.upper_inner, outlines.lower_inner
     return MouthInterior(
@@ -120,13 +121,18 @@ def mouth_interior(lips: LipDesign, pose: MouthPose, x: Heights, outlines: LipOu
     )
 
 
+def far_open(pose: MouthPose) -> float:
+    """Return how far a mouth is open so wide that its upper teeth are seen whatever the sound, 0..1."""
+    return min(max((pose.gap - 0.06 - 0.05 * pose.protrusion) / 0.05, 0), 1)
+
+
 def _on(curve: str, u: Heights) -> Heights:
     return np.interp(u, *_CURVES[curve])
 
 
 def _thickness(lip: str, u: Heights, out: float) -> Heights:
     """Return the thickness of a lip along its half width; rounded lips stay thick towards their corners."""
-    return (1 - 0.75 * out) * _on(lip, u) + 0.75 * out * _arch(u, 0.5)
+    return (1 - 0.6 * out) * _on(lip, u) + 0.6 * out * _arch(u, 0.5)
 
 
 def _arch(u: Heights, power: float) -> Heights:
@@ -134,10 +140,15 @@ def _arch(u: Heights, power: float) -> Heights:
     return np.maximum(1 - u * u, 0) ** power
 
 
-def _inner_share(gap: float, out: float, wide: float) -> float:
-    """Return the share of the mouth's width along which the lips are apart; it grows with the gap."""
-    share = 0.72 + 0.2 * min(gap / 0.12, 1) + 0.1 * wide * min(gap / 0.05, 1)
-    return min(share, 0.95) * (1 - out * (0.68 - 0.25 * min(gap / 0.2, 1)))
+def _inner_share(pose: MouthPose, half_width: float) -> float:
+    """Return the share of the mouth's width along which the lips are apart; it grows with the gap.
+
+    The hole of protruded lips is round, that above a tucked lip is as wide as the teeth that show in it.
+    """
+    gap, wide = pose.gap, pose.spread
+    share = min(0.72 + 0.2 * min(gap / 0.12, 1) + 0.1 * wide * min(gap / 0.05, 1), 0.95) * (1 - 0.26 * pose.tuck)
+    hole = min((0.012 + 0.62 * gap) / half_width, share)
+    return share + min(pose.protrusion / 0.85, 1) * (hole - share)
 
 
 def _tongue(pose: MouthPose, x: Heights, edge: float, low_lip: float) -> tuple[Heights, Heights]:

@@ -8,7 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.faces.portrait.design import Design
-from lipmotion.faces.portrait.geometry import Heights, LipOutlines, MouthInterior, lip_outlines, mouth_interior
+from lipmotion.faces.portrait.geometry import (
+    Heights,
+    LipOutlines,
+    MouthInterior,
+    far_open,
+    lip_outlines,
+    mouth_interior,
+)
 from lipmotion.faces.portrait.pose import MouthPose
 from lipmotion.faces.portrait.textures import SPAN, MouthTextures, Texture, mouth_textures
 from lipmotion.faces.portrait.view import Window
@@ -80,17 +87,23 @@ class MouthPainter:
         across = _place(x, SPAN)
         if pose.tongue > 0.6:
             on.paint(within.tongue_top, within.tongue_bottom, across, art.tongue, (pose.tongue - 0.6) / 0.4)
-        on.paint(top, within.teeth_upper, across, art.upper_teeth, min(2.5 * pose.teeth, 1) * _lit(pose))
+        on.paint(
+            top, within.teeth_upper, across, art.upper_teeth, max(min(2.5 * pose.teeth, 1), far_open(pose)) * _lit(pose)
+        )
         on.paint(top, np.minimum(top + 0.028, bottom), across, art.lip_shadow)
+        if pose.tuck > 0:  # the teeth stand on the lip, and throw a shadow on it
+            edge = within.teeth_upper
+            on.paint(edge, np.where(edge > top, edge + 0.02, edge), across, art.lip_shadow, pose.tuck)
         if line := self._lips.outline:
             part = 0.8 * line * np.minimum((bottom - top) / 0.01, 1)
-            for edge in (top, bottom):
+            out = np.maximum(bottom, within.tongue_bottom) if pose.tongue > 0.6 else bottom
+            for edge in (top, out):
                 on.paint(edge - part / 2, edge + part / 2, across, art.outline)
 
 
 def _lit(pose: MouthPose) -> float:
     """Return how well the upper teeth are lit, 0..1: less behind lips that hardly part, unless the sound shows them."""
-    return float(max(min(max((pose.gap - 0.015) / 0.06, 0.15), 1), pose.tuck, 2 * pose.teeth - 1))
+    return float(max(min(max((pose.gap - 0.015) / 0.04, 0.15), 1), pose.tuck, 2 * pose.teeth - 1))
 
 
 class _Columns(NamedTuple):

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.motion.gestures import GESTURES, gesture_curves, pause_curve
+from lipmotion.motion.gestures import GESTURES, OVAL, PURSED, TIP_OUT, TIP_UP, gesture_curves, pause_curve
 from lipmotion.motion.rest import against_rest, rest_frames
 from lipmotion.types import Motion, Timeline, Unit
 
@@ -16,22 +16,35 @@ Curve = NDArray[np.float64]
 
 CLOSED_BELOW = 0.012
 """Tracked lips that touch have openings up to this; smaller openings are drawn closed."""
-FAITHFUL_ABOVE = 0.03
-"""From here on the drawn gap follows the opening; between the two limits it rises linearly."""
-WIDER = 0.4
-"""Openings are drawn by so much larger than measured, beyond ``FAITHFUL_ABOVE``: a drawing shows less than a face."""
+PARTED = 0.03
+"""From this opening on the lips are drawn apart; below, down to ``CLOSED_BELOW``, the drawn gap falls to 0."""
+DRAWN_GAPS = ((CLOSED_BELOW, 0.0), (PARTED, 0.05), (0.06, 0.085), (0.12, 0.15), (1.0, 1.18))
+"""Openings, and the gaps at which the face tracker, by which openings were measured, sees them 1.3 times as large.
+
+Small openings it hardly sees, on drawings as on people (docs/results/character.md): 0.045 is closed to it.
+"""
 WIDEST = 0.45
 """Largest drawn gap; openings of speech stay below 0.35."""
 WIDTH_GAIN, WIDTH_REACH = 2.0, 0.32
 """Changes of width are exaggerated: small ones by the factor, none beyond the reach."""
-ROUNDED, STRETCHED = 0.23, 0.06
-"""So much narrower are protruded lips, and so much wider are spread ones, beside what was measured."""
-TUCKED_GAP = (0.05, 0.07)
+ROUNDED, PURSED_MORE, STRETCHED = 0.1, 0.06, 0.04
+"""So much narrower are protruded lips, pursed ones beyond that, and so much wider spread ones, than was measured."""
+ROUNDED_UNMEASURED = 0.2
+"""``ROUNDED`` for a motion without ``width``."""
+TUCKED_GAP = (0.06, 0.07)
 """Range of the gap while the lower lip is on the teeth: enough to show them."""
-TONGUE_GAP, TEETH_GAP, ROUND_GAP = 0.085, 0.05, 0.07
+TONGUE_GAP, TEETH_GAP, ROUND_GAP = 0.085, 0.05, 0.08
 """Least gap while the tongue is between the teeth, while both rows of teeth are shown, and of protruded lips."""
-OVAL = 0.4
-"""How much narrower a mouth is that opens far, relative to the rest pose and for each eye distance."""
+PURSED_GAP = (0.045, 0.055)
+"""Range of the gap of pursed lips: the hole of w is small, but seen."""
+TEETH_FILL, ROUND_FILL = 0.012, 0.012
+"""Openings look smaller where teeth fill them, or where they are small holes; they are drawn so much larger."""
+FLAT = 0.1
+"""Share by which the slot of spread lips is lower than an opening without phones."""
+OVAL_NARROWER, OVAL_TALLER = 0.14, 0.15
+"""Shares of width and gap by which an oval mouth is narrower and taller than was measured."""
+OVAL_GAPS = (0.08, 0.18)
+"""Gap at which the opening begins to become an oval, and at which it is one, where the phone asks for it."""
 PAUSE_S = 0.15
 """In pauses of at least this duration the mouth closes."""
 DRAWN = ("opening", "width", "outer", "y_152", *GESTURES)
@@ -46,6 +59,7 @@ class MouthPose(NamedTuple):
     fullness : thickness of the lips relative to the rest pose
     jaw      : drop of the chin, in eye distances
     tongue, tuck, protrusion, spread, press, teeth : the articulatory channels, 0..1 (docs/articulation.md)
+    oval     : how far the opening is an oval: corners halfway down, round above and below, 0..1
     """
 
     gap: float
@@ -58,6 +72,7 @@ class MouthPose(NamedTuple):
     spread: float = 0.0
     press: float = 0.0
     teeth: float = 0.5
+    oval: float = 0.0
 
 
 def frame_times(motion: Motion, fps: float) -> Curve:
@@ -78,24 +93,30 @@ def mouth_poses(motion: Motion, units: Timeline[Unit], fps: float, intensity: fl
     rest = rest_frames(motion, units)
     tongue, tuck, protrusion, spread, press, teeth = _gestures(motion, units, time_s, intensity)
     gap = _gap(motion, time_s, fps, intensity)
-    free = (1 - press) * np.clip(gap / FAITHFUL_ABOVE, 0, 1)
-    gap += np.maximum(tuck - press, 0) * (np.clip(gap, *TUCKED_GAP) - gap)
+    free = (1 - press) * np.clip(gap / 0.05, 0, 1)
+    pursed = np.minimum(press / (0.8 * PURSED), 1) * protrusion
+    gap += min(intensity, 1) * np.maximum(tuck - press, 0) * (np.clip(gap, *TUCKED_GAP) - gap)
     shown = np.maximum(2 * teeth - 1, 0)
-    for weight, least in (
-        (np.maximum(tongue - 0.5, 0) / 0.5, TONGUE_GAP),
-        (shown, TEETH_GAP),
-        (protrusion**2, ROUND_GAP),
-    ):
+    for weight, least in ((shown, TEETH_GAP), (protrusion**2 * (1 - pursed), ROUND_GAP)):
         gap += free * weight * (np.maximum(gap, least) - gap)
-    gap *= 1 - 0.12 * (protrusion + shown) * np.clip((gap - 0.05) / 0.05, 0, 1)
-    gap *= 1 - pause_curve(units, time_s, PAUSE_S, blend_s=0.1, after_s=0.08, before_s=0.14)
+    gap += free * (1 - tuck) * (TEETH_FILL * shown + ROUND_FILL * protrusion)
+    # lips of th and w are apart, also where they were tracked as closed
+    parted = min(intensity, 1) * np.clip((0.75 - press) / 0.15, 0, 1)
+    gap *= 1 - FLAT * spread * np.clip((gap - 0.08) / 0.05, 0, 1)
+    gap += pursed * parted * (np.clip(gap, *PURSED_GAP) - gap)
+    between = parted * np.clip((tongue - TIP_UP) / (TIP_OUT - TIP_UP), 0, 1)
+    gap += between * (np.maximum(gap, TONGUE_GAP) - gap)
+    oval = _oval(units, time_s) * np.clip((gap - OVAL_GAPS[0]) / (OVAL_GAPS[1] - OVAL_GAPS[0]), 0, 1)
+    gap *= 1 + OVAL_TALLER * oval
+    gap *= 1 - pause_curve(units, time_s, PAUSE_S, blend_s=0.1, after_s=0.08, before_s=0.2)
     width = _at(motion, _width(motion, rest, intensity), time_s)
-    width += intensity * (STRETCHED * spread - ROUNDED * protrusion * np.minimum(width, 1))
-    width -= OVAL * np.maximum(gap - 0.08, 0) * (1 - spread)
+    narrower = (ROUNDED if "width" in motion.names else ROUNDED_UNMEASURED) * protrusion + PURSED_MORE * pursed
+    width += intensity * (STRETCHED * spread - narrower)
+    width -= OVAL_NARROWER * oval
     width = np.clip(width, 0.5, 1.35)
     fullness = _at(motion, _fullness(motion, rest), time_s)
     jaw = _jaw(motion, rest, gap, time_s)
-    curves = gap, width, fullness, jaw, tongue, tuck, protrusion, spread, press, teeth
+    curves = gap, width, fullness, jaw, tongue, tuck, protrusion, spread, press, teeth, oval
     return [MouthPose(*row) for row in np.stack(curves, axis=1).tolist()]
 
 
@@ -104,9 +125,7 @@ def drawn_gap(opening: Curve, intensity: float = 1.0) -> Curve:
 
     It is continuous and never falls where the opening rises. Large gaps approach ``WIDEST``.
     """
-    rising = (opening - CLOSED_BELOW) * (FAITHFUL_ABOVE / (FAITHFUL_ABOVE - CLOSED_BELOW))
-    gap = np.maximum(np.minimum(opening, rising), 0)
-    gap = (gap + WIDER * np.maximum(gap - FAITHFUL_ABOVE, 0)) * intensity
+    gap = np.interp(opening, *np.transpose(DRAWN_GAPS)) * intensity
     bend = 0.6 * WIDEST
     return np.where(gap < bend, gap, bend + (WIDEST - bend) * np.tanh((gap - bend) / (WIDEST - bend)))
 
@@ -146,6 +165,10 @@ def _gestures(motion: Motion, units: Timeline[Unit], time_s: Curve, intensity: f
     for name in ("protrusion", "spread"):  # grows with the intensity, without a corner at 1
         curves[name] = 1 - (1 - curves[name]) ** np.sqrt(intensity)
     return [curves[name] for name in GESTURES]
+
+
+def _oval(units: Timeline[Unit], time_s: Curve) -> Curve:
+    return gesture_curves(units, time_s, [OVAL])[OVAL]
 
 
 def _at(motion: Motion, curve: Curve, time_s: Curve) -> Curve:

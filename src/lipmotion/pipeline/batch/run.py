@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import os
 import uuid
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
 from lipmotion.errors import CorpusError, ExportError
 from lipmotion.pipeline.batch.ledger import FAILED, Place, Record, opened_ledger
-from lipmotion.pipeline.batch.lines import Line, check_names, read_lines
+from lipmotion.pipeline.batch.lines import BatchLine, check_names, read_lines
 from lipmotion.pipeline.batch.one_line import LineWork, check_line_settings, finished_line
 from lipmotion.pipeline.batch.pool import Pool, WorkerDied, cluster_pool, died_alone, local_pool
 from lipmotion.pipeline.batch.report import write_reports
@@ -48,7 +48,7 @@ class BatchSummary:
 
 
 def batch(
-    source: str | Path | Sequence[Line],
+    source: str | Path | Sequence[BatchLine],
     out: str | Path,
     settings: BatchSettings | None = None,
     *,
@@ -90,7 +90,7 @@ def batch(
     _check_outside(lines, place)
     check_line_settings(settings)
     of_settings = fingerprint_of(settings)
-    with opened_ledger(place) as ledger:
+    with opened_ledger(place, lines) as ledger:
         counter = _Counter(len(lines), monitor)
         waiting = []
         for line in lines:
@@ -109,14 +109,12 @@ def batch(
     return BatchSummary(counter.done, counter.kept, counter.failed, csv, html)
 
 
-def _check_outside(lines: Sequence[Line], place: Place) -> None:
+def _check_outside(lines: Sequence[BatchLine], place: Place) -> None:
     """Raise ExportError if a recording lies in the folder of the outputs, where an output could replace it."""
     inside = os.path.realpath(place.out) + os.sep
     for line in lines:
         if os.path.realpath(line.recording).startswith(inside):
-            raise ExportError(
-                f"{place.out}: holds the recording {line.recording}; give another folder for the outputs"
-            )
+            raise ExportError(f"{place.out}: holds the recording {line.recording}; give another folder for the outputs")
 
 
 def _forget(place: Place, record: Record) -> None:
@@ -124,7 +122,7 @@ def _forget(place: Place, record: Record) -> None:
     place.receipt(record["name"]).unlink(missing_ok=True)
 
 
-def _finished(each: Pool, waiting: Sequence[LineWork]) -> Iterator[Record]:
+def _finished(each: Pool, waiting: Sequence[LineWork]) -> Generator[Record, None, None]:
     """Yield the record of every line. Where a worker dies, the lines go on that it had; one that kills again fails."""
     left, deaths = {work.line.name: work for work in waiting}, 0
     while left:
@@ -177,5 +175,3 @@ class _Counter:
         finished = self.done + self.kept + self.failed
         self._monitor(Item(name, outcome, reason))
         self._monitor(Progress(STAGE, finished, self._lines, finished / self._lines))
-
-

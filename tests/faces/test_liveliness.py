@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from lipmotion.faces.character.liveliness import liveliness
+from lipmotion.faces.liveliness import liveliness
 
 FPS = 50.0
 TIME_S = np.arange(0, 60, 1 / FPS)

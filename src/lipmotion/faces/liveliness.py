@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import gaussian_filter1d
 
+from lipmotion.types import Prosody
+
 Curve = NDArray[np.float64]
 
 SEED = 16
@@ -107,3 +109,27 @@ def _brow_drift(draw: np.random.Generator, time_s: Curve) -> Curve:
     end_s = float(time_s[-1]) + 4 if len(time_s) else 4.0
     at_s = np.arange(-1.0, end_s, 1.3)
     return np.asarray(PchipInterpolator(at_s, draw.uniform(-0.006, 0.016, len(at_s)))(time_s))
+
+
+def accent_of(prosody: Prosody | None, time_s: Curve) -> Curve | None:
+    """Return how loud and high the voice is against its surroundings, about -1 to 1 [shape=(T,)]; None: not known."""
+    if prosody is None or not len(prosody.level_db):
+        return None
+    at_s = np.arange(len(prosody.level_db)) / 100.0
+    voiced = np.isfinite(prosody.log_f0)
+    high = np.zeros(len(at_s))
+    if voiced.any():
+        high = np.interp(at_s, at_s[voiced], prosody.log_f0[voiced])
+        high = (high - np.median(high[voiced])) / max(float(np.std(high[voiced])), 0.02)
+    loud = np.asarray(prosody.level_db, float)
+    loud = (loud - np.median(loud)) / max(float(np.std(loud)), 1.0)
+    return np.interp(time_s, at_s, np.tanh(0.6 * high + 0.4 * loud) * np.clip(loud + 1, 0, 1))
+
+
+def turned(yaw: float, pitch: float, roll: float = 0.0) -> Curve:
+    """Return the rotation to the character's left, upwards and to the left shoulder, in radians [shape=(3, 3)]."""
+    (cy, sy), (cp, sp), (cr, sr) = ((np.cos(a), np.sin(a)) for a in (yaw, pitch, roll))
+    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    about_x = np.array([[1, 0, 0], [0, cp, sp], [0, -sp, cp]])
+    about_z = np.array([[cr, sr, 0], [-sr, cr, 0], [0, 0, 1]])
+    return np.asarray(about_y @ about_x @ about_z)

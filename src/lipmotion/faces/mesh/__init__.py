@@ -1,0 +1,81 @@
+"""The user's own character as a face: its mesh, moved by its blendshapes or control points, drawn by the rasteriser."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion.faces.base import SMALLEST, TRANSPARENT, Face, Staging
+from lipmotion.faces.mesh.performance import mesh_performance
+from lipmotion.faces.mesh.stage import MeshStage
+from lipmotion.rig.driven import DrivenCharacter
+from lipmotion.types import Motion, Prosody, Timeline, Unit
+
+__all__ = ["MeshFace", "MeshStage"]
+
+WIDTH, HEIGHT = 1280, 720
+THREADS = 2
+"""Pictures that are drawn at the same time."""
+
+
+@final
+class MeshFace(Face):
+    """A character from a file, head and shoulders from the front.
+
+    character     : from ``driven_character``
+    width, height : of the pictures in pixels, even; a size of the staging counts instead, 16 to 9
+    staging       : background, intensity, seed, and what moves on its own; None: the defaults
+    prosody       : of the speech that will be rendered, for accents of brows and head; None: not known
+    """
+
+    def __init__(
+        self,
+        character: DrivenCharacter,
+        width: int = WIDTH,
+        height: int = HEIGHT,
+        staging: Staging | None = None,
+        prosody: Prosody | None = None,
+    ) -> None:
+        self.staging = staging or Staging()
+        self._character, self._prosody, self._size = character, prosody, (width, height)
+
+    @property
+    def character(self) -> DrivenCharacter:
+        """The character that is shown."""
+        return self._character
+
+    def staged(self, staging: Staging, prosody: Prosody | None = None) -> MeshFace:
+        """Return the same character with other settings.
+
+        prosody : of the speech that will be rendered, for accents of brows and head; None: not known
+        """
+        return MeshFace(self._character, *self._size, staging, prosody)
+
+    def render(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> Iterator[NDArray[np.uint8]]:  # noqa: D102
+        if not 0 < fps < np.inf:
+            raise InputError(f"the frame rate is {fps}, required more than 0")
+        width, height = self._size
+        if self.staging.size:
+            width, height = max(2 * round(self.staging.size * 8 / 9), SMALLEST), self.staging.size
+        stage = MeshStage(self._character, width, height, self.staging.colour)
+        draw = stage.cut_out if self.staging.background == TRANSPARENT else stage.picture
+        count = int(np.floor((len(motion.values) - 1) / motion.rate_hz * fps + 1e-9)) + 1
+        time_s = np.arange(count) / fps
+        intensity = self.staging.intensity
+        alive = mesh_performance(motion, units, time_s, self.staging, self._prosody)
+        frames = self._character.vertices(motion, units, time_s, alive.weights, intensity=intensity)
+        gaze = alive.gaze if not self._character.has_shape("eyeLookOutLeft") else np.zeros_like(alive.gaze)
+        with ThreadPoolExecutor(THREADS) as threads:
+            waiting: deque[Future[NDArray[np.uint8]]] = deque()
+            for vertices, turn, look in zip(frames, alive.turn.tolist(), gaze.tolist(), strict=True):
+                waiting.append(threads.submit(draw, vertices, tuple(turn), tuple(look)))
+                if len(waiting) > THREADS:
+                    yield waiting.popleft().result()
+            while waiting:
+                yield waiting.popleft().result()

@@ -1,0 +1,89 @@
+"""A user's own ``.glb`` with one animation more: everything else in it, textures and bones, stays as it is."""
+
+from __future__ import annotations
+
+import copy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion.rig.gltf_container import GltfDocument, read_gltf_document, write_container
+from lipmotion.rig.gltf_scene import target_names
+from lipmotion.types import Motion
+
+FLOAT = 5126
+
+
+def write_animated_gltf(path: Path, original: Path, weights: Motion, sound: str = "") -> bool:
+    """Write a ``.glb`` or ``.vrm`` again, with the weights of its morph targets as its first animation, ``speech``.
+
+    weights : channels by the names of the morph targets, in all meshes that have them
+    sound   : as of ``Scene``
+    Returns False, and writes nothing, where the file is no single ``.glb``, or a channel is none of its morph targets
+    (an expression of a VRM file is several of them).
+    Raises InputError: the original cannot be read. Raises ExportError: the file cannot be written.
+    """
+    document = read_gltf_document(original)
+    binary = document.buffers.get(0)
+    buffers = document.items("buffers")
+    if binary is None or not buffers or "uri" in buffers[0] or len(document.buffers) > 1 or not len(weights.values):
+        return False
+    moved = _moved_nodes(document, weights)
+    if not set(weights.names) <= {name for _, names in moved for name in names}:
+        return False
+    json = copy.deepcopy(dict(document.json))
+    body = bytearray(binary[: json["buffers"][0].get("byteLength", len(binary))])
+    times = _added(json, body, weights.time_s, limits=True)
+    samplers: list[dict[str, Any]] = []
+    channels: list[dict[str, Any]] = []
+    for node, names in moved:
+        table = np.zeros((len(weights.values), len(names)))
+        for column, name in enumerate(names):
+            if name in weights.names:
+                table[:, column] = weights[name]
+        channels.append({"sampler": len(samplers), "target": {"node": node, "path": "weights"}})
+        output = _added(json, body, table.reshape(-1))
+        samplers.append({"input": times, "output": output, "interpolation": "LINEAR"})
+    json.setdefault("animations", []).insert(0, {"name": "speech", "channels": channels, "samplers": samplers})
+    json["buffers"][0]["byteLength"] = len(body)
+    if sound:
+        scene = json["scenes"][json.get("scene", 0)]
+        extras = scene.get("extras")
+        scene["extras"] = (extras if isinstance(extras, dict) else {}) | {"audio": {"uri": sound, "start_s": 0.0}}
+    write_container(path, json, bytes(body))
+    return True
+
+
+def _moved_nodes(document: GltfDocument, weights: Motion) -> list[tuple[int, list[str]]]:
+    """Return the nodes whose mesh has morph targets that move, with the names of all of its targets."""
+    found = []
+    for number, node in enumerate(document.items("nodes")):
+        if "mesh" not in node:
+            continue
+        mesh = document.item("meshes", node["mesh"])
+        primitives = mesh.get("primitives")
+        first = primitives[0] if isinstance(primitives, list) and primitives else {}
+        targets = first.get("targets", []) if isinstance(first, dict) else []
+        if not isinstance(targets, list):
+            raise InputError("morph targets that are no list of objects; export it again")
+        names = target_names(mesh, first, len(targets)) if targets else []
+        if set(names) & set(weights.names):
+            found.append((number, names))
+    return found
+
+
+def _added(json: dict[str, Any], body: bytearray, values: NDArray[np.float64], *, limits: bool = False) -> int:
+    """Add numbers [shape=(N,)] to the buffer and return the number of their accessor."""
+    stored = np.ascontiguousarray(values, "<f4")
+    body += b"\0" * (-len(body) % 4)
+    views, accessors = json.setdefault("bufferViews", []), json.setdefault("accessors", [])
+    views.append({"buffer": 0, "byteOffset": len(body), "byteLength": stored.nbytes})
+    body += stored.tobytes()
+    accessor = {"bufferView": len(views) - 1, "componentType": FLOAT, "count": len(stored), "type": "SCALAR"}
+    if limits:
+        accessor |= {"min": [float(stored.min())], "max": [float(stored.max())]}
+    accessors.append(accessor)
+    return len(accessors) - 1

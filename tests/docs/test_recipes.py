@@ -1,0 +1,58 @@
+"""The pages for other programs: short, and with tables and commands that exist."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.cli.command_line import parser
+from lipmotion.pipeline.characters import curves_of
+from lipmotion.rig.rig_tables import read_rig_table
+from rig.speech import motion, units
+
+ROOT = Path(__file__).parents[2]
+PAGES = sorted((ROOT / "docs" / "recipes").glob("*.md"))
+TABLES = sorted((ROOT / "examples" / "rigs").glob("*.csv"))
+MOST_LINES = 60
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_a_page_is_about_a_screen(page: Path) -> None:
+    assert len(page.read_text(encoding="utf-8").splitlines()) <= MOST_LINES
+
+
+@pytest.mark.parametrize("page", [*PAGES, ROOT / "docs" / "controls.md"], ids=lambda page: page.stem)
+def test_the_commands_of_a_page_are_understood(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    commands = re.findall(
+        r"^(?: {4})?(?:ffmpeg [^|]*\| )?lipmotion ((?!batch).*?)(?:\s+#.*|\s+> \S+)?$", text, re.MULTILINE
+    )
+    assert commands
+    for command in commands:
+        parser().parse_args(shlex.split(command))
+
+
+@pytest.mark.parametrize("table", TABLES, ids=lambda table: table.stem)
+def test_a_table_moves_its_rig(table: Path) -> None:
+    rows = read_rig_table(table)
+    said = curves_of(motion(), units(), table)
+    assert said.names == tuple(dict.fromkeys(row.control for row in rows))
+    assert np.ptp(said.values, axis=0).max() > 0
+    first = {row.control: row for row in reversed(rows)}
+    for name in said.names:
+        assert first[name].low <= said[name].min() <= said[name].max() <= first[name].high
+
+
+def test_a_jaw_opens_and_closes() -> None:
+    jaw = curves_of(motion(), units(), ROOT / "examples" / "rigs" / "jaw-bone.csv")["jaw.rotation.x"]
+    assert jaw.max() == pytest.approx(65 * 0.2 - 0.8, abs=0.5)
+    assert jaw[[20, 55, 95]] == pytest.approx(0.0)
+
+
+def test_every_table_is_in_a_recipe() -> None:
+    text = "".join(page.read_text(encoding="utf-8") for page in PAGES)
+    assert [table.name for table in TABLES if table.name not in text] == []

@@ -1,0 +1,151 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lipmotion.kernels import textured
+from lipmotion.kernels.choice import numba_works
+from lipmotion.kernels.textured import CLEAR, CUT, SOLID, TexturedTriangles
+
+TONE = np.arange(256).astype(np.uint8)
+HEIGHT, WIDTH = 40, 56
+FACING = [[0, 1, 2], [0, 2, 3]]
+CORNERS = np.array([[0.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, 0.0]])
+"""Of a square, as ``square`` has them: v goes down."""
+WHITE = np.full((4, 3), 1.0)
+
+
+def surface(triangles, uv, texture, *, kind=SOLID, cut=0.5, factor=1.0, row=0) -> TexturedTriangles:
+    """Triangles with one texture [shape=(h, w, 4), 0 to 1]."""
+    count = len(triangles)
+    return TexturedTriangles(
+        np.asarray(triangles, np.int32),
+        np.asarray(uv, float),
+        np.tile(np.array([row, kind], np.int32), (count, 1)),
+        np.tile([cut, factor], (count, 1)),
+        np.rint(65535 * np.asarray(texture, float)).astype(np.uint16).reshape(-1, 4),
+        np.array([[0, np.shape(texture)[1], np.shape(texture)[0]]]),
+    )
+
+
+def drawn(points, light, what, *, shine=None, area=(0, 0, WIDTH, HEIGHT), background=0.0, compiled=False):
+    picture, opacity = np.full((HEIGHT, WIDTH, 3), 7, np.uint8), np.full((HEIGHT, WIDTH), 7, np.uint8)
+    behind = np.full((HEIGHT, WIDTH, 3), background, np.float32)
+    glare = np.zeros(np.shape(light)) if shine is None else shine
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(textured, "compiled_pays", lambda _: compiled)
+        textured.draw_textured(
+            np.asarray(points, float),
+            np.asarray(light, np.float32),
+            np.asarray(glare, np.float32),
+            what,
+            area,
+            behind,
+            TONE,
+            picture,
+            opacity,
+        )
+    return picture, opacity
+
+
+def square(x0: float, y0: float, x1: float, y1: float, near: float = 1.0) -> list[list[float]]:
+    return [[x0, y0, -near], [x0, y1, -near], [x1, y1, -near], [x1, y0, -near]]
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+@settings(deadline=None, max_examples=12)
+def test_both_forms_draw_the_same_bits(seed):
+    if not numba_works():
+        pytest.skip("numba is not installed")
+    draw = np.random.default_rng(seed)
+    points = draw.uniform([-9, -9, -1], [WIDTH + 9, HEIGHT + 9, -0.2], (40, 3))
+    points[::3, :2] = np.rint(points[::3, :2])  # edges through the middles of samples
+    light, shine = draw.uniform(0, 1.1, (40, 3)), draw.uniform(0, 0.2, (40, 3))
+    triangles = draw.integers(0, 40, (60, 3)).astype(np.int32)
+    looks = np.stack([draw.integers(-1, 2, 60), draw.integers(0, 3, 60)], axis=1).astype(np.int32)
+    what = TexturedTriangles(
+        triangles,
+        draw.uniform(-2, 2, (60, 3, 2)),
+        looks,
+        draw.uniform([0.2, 0.5], [0.8, 1.0], (60, 2)),
+        draw.integers(0, 65536, (5 * 7 + 3 * 2, 4)).astype(np.uint16),
+        np.array([[0, 5, 7], [35, 3, 2]]),
+    )
+    first, second = (
+        drawn(points, light, what, shine=shine, area=(3, 5, 50, 31), background=0.3, compiled=form)
+        for form in (False, True)
+    )
+    np.testing.assert_array_equal(first[0], second[0])
+    np.testing.assert_array_equal(first[1], second[1])
+
+
+def test_a_texture_is_seen_where_it_lies():
+    texture = np.ones((2, 2, 4))
+    texture[0, 0, :3], texture[0, 1, :3] = (1, 0, 0), (0, 1, 0)
+    texture[1, 0, :3], texture[1, 1, :3] = (0, 0, 1), (1, 1, 1)
+    picture, opacity = drawn(square(8, 10, 28, 30), WHITE, surface(FACING, CORNERS[FACING], texture))
+    assert picture[15, 13].tolist() == pytest.approx([255, 0, 0], abs=30)
+    assert picture[15, 23].tolist() == pytest.approx([0, 255, 0], abs=30)
+    assert picture[25, 13].tolist() == pytest.approx([0, 0, 255], abs=30)
+    assert picture[25, 23].tolist() == pytest.approx([255, 255, 255], abs=30)
+    assert opacity[15, 13] == 255
+    assert opacity[5, 5] == 0
+
+
+def test_between_texels_the_texture_is_interpolated():
+    """From black in the middle of the first texel to white in that of the second one, evenly."""
+    texture = np.ones((1, 2, 4))
+    texture[0, 0, :3] = 0
+    picture, _ = drawn(square(0, 0, 40, 40), WHITE, surface(FACING, CORNERS[FACING], texture))
+    assert np.diff(picture[20, 10:30, 0].astype(int)) == pytest.approx(np.full(19, 255 / 20), abs=1)
+
+
+def test_a_texture_on_a_slanting_surface_is_seen_in_perspective():
+    """A square whose right edge is three times as far: its middle is seen nearer to that edge."""
+    near, far = 1.0, 1 / 3
+    points = [[0, 0, -near], [0, 40, -near], [40, 40, -far], [40, 0, -far]]
+    texture = np.ones((1, 64, 4))
+    texture[0, 32:, :3] = 0
+    picture, _ = drawn(points, WHITE, surface(FACING, CORNERS[FACING], texture))
+    assert int((picture[20, 1:40, 0] > 127).sum()) + 1 == pytest.approx(30, abs=1)
+
+
+def test_clear_places_of_a_cut_surface_are_holes():
+    texture = np.ones((1, 2, 4))
+    texture[0, 1, 3] = 0
+    points = square(8, 10, 28, 30)
+    cut, _ = drawn(points, WHITE, surface(FACING, CORNERS[FACING], texture, kind=CUT))
+    assert cut[20, 13].tolist() == [255, 255, 255]
+    assert cut[20, 23].tolist() == [0, 0, 0]
+    solid, _ = drawn(points, WHITE, surface(FACING, CORNERS[FACING], texture))
+    assert solid[20, 23].tolist() == [255, 255, 255]
+
+
+def test_a_blended_surface_is_mixed_with_what_is_behind_it():
+    texture = np.ones((1, 1, 4))
+    points = [*square(8, 10, 28, 30, 1.0), *square(0, 0, 40, 40, 0.5)]
+    light = np.concatenate([WHITE, np.tile([0.0, 1.0, 0.0], (4, 1))])
+    both = surface([*FACING, *(np.array(FACING) + 4)], np.zeros((4, 3, 2)), texture, factor=0.25)
+    both.looks[:2, 1] = CLEAR
+    both.alphas[2:, 1] = 1.0
+    picture, opacity = drawn(points, light, both)
+    assert picture[20, 20].tolist() == pytest.approx([64, 255, 64], abs=1)
+    assert opacity[20, 20] == 255
+    alone, part = drawn(points[:4], WHITE, surface(FACING, CORNERS[FACING], texture, kind=CLEAR, factor=0.25))
+    assert alone[20, 20].tolist() == pytest.approx([64, 64, 64], abs=1)
+    assert abs(int(part[20, 20]) - 64) <= 1
+
+
+def test_highlights_keep_the_colour_of_the_lamp():
+    texture = np.zeros((1, 1, 4))
+    texture[..., 3] = 1
+    what = surface(FACING, CORNERS[FACING], texture)
+    picture, _ = drawn(square(8, 10, 28, 30), WHITE, what, shine=np.full((4, 3), 0.5))
+    assert picture[20, 20].tolist() == pytest.approx([127, 127, 127], abs=1)
+
+
+def test_half_a_pixel_is_half_the_light():
+    what = surface(FACING, CORNERS[FACING], np.ones((1, 1, 4)))
+    picture, opacity = drawn(square(8.5, 10, 20, 15), WHITE, what)
+    assert (picture[10:15, 8] == 127).all()
+    assert abs(int(opacity[12, 8]) - 127) <= 1

@@ -1,0 +1,302 @@
+"""Whole batches: outputs as of ``animate``, failures among them, kept lines, processes that die, a cluster."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import lipmotion
+from lipmotion.errors import CorpusError, ExportError, InputError
+from lipmotion.motion.delivery import Delivery
+from lipmotion.pipeline.batch import BatchLine, BatchSettings, batch, read_lines
+from lipmotion.pipeline.batch import run as run_module
+from lipmotion.pipeline.batch.ledger import Place
+from lipmotion.pipeline.batch.one_line import LineWork, finished_line
+from lipmotion.pipeline.batch.pool import WorkerDied
+from lipmotion.types import Item
+
+pytest.importorskip("joblib")
+
+
+@pytest.fixture
+def sounds(tmp_path: Path, toy_speech: Path) -> Path:
+    folder = tmp_path / "sounds"
+    for name in ("one.wav", "deep/two.wav", "three.wav"):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(toy_speech, folder / name)
+    (folder / "one.txt").write_text("see papa mama")
+    return folder
+
+
+@pytest.fixture
+def settings(toy_model_file: Path) -> BatchSettings:
+    return BatchSettings(model=str(toy_model_file), recogniser="own")
+
+
+def ledger_rows(out: Path) -> list[dict]:
+    return [json.loads(row) for row in (out / "batch.jsonl").read_bytes().splitlines()]
+
+
+def contents(out: Path) -> dict[str, bytes]:
+    reports = ("report.csv", "report.html", "batch.jsonl")
+    files = [path for path in out.rglob("*") if path.is_file() and path.name not in reports]
+    return {path.relative_to(out).as_posix(): path.read_bytes() for path in files}
+
+
+def test_the_outputs_are_those_of_animate(sounds: Path, settings: BatchSettings, tmp_path: Path) -> None:
+    (sounds / "broken.wav").write_text("no sound")
+    events: list[Item] = []
+    out = tmp_path / "out"
+    settings = BatchSettings(("json", "cues.tsv", "TextGrid"), recogniser="own", model=settings.model)
+    found = batch(sounds, out, settings, jobs=1, monitor=lambda e: events.append(e) if isinstance(e, Item) else None)
+    assert (found.done, found.kept, found.failed) == (3, 0, 1)
+    assert {item.name: item.outcome for item in events} == {
+        "broken": "failed", "deep/two": "done", "one": "done", "three": "done",
+    }  # fmt: skip
+    kinds = ("json", "cues.tsv", "TextGrid")
+    assert set(contents(out)) == {f"{name}.{kind}" for name in ("one", "deep/two", "three") for kind in kinds}
+    model = lipmotion.load_model(settings.model)
+    alone = lipmotion.animate(
+        lipmotion.SpeechRequest(sounds / "one.wav", "see papa mama", recogniser="own"), model=model
+    )
+    lipmotion.write(alone, tmp_path / "one.json", speech=sounds / "one.wav", model=model)
+    assert (out / "one.json").read_bytes() == (tmp_path / "one.json").read_bytes()
+    rows = {row["name"]: row for row in ledger_rows(out)}
+    assert rows["one"]["words"] == "transcript"
+    assert rows["three"]["words"] != "transcript"
+    assert "not a readable recording" in rows["broken"]["error"]
+    assert rows["one"]["closures_heard"] >= rows["one"]["closures_made"] >= 1
+
+
+def test_what_was_done_is_kept(sounds: Path, settings: BatchSettings, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    batch(sounds, out, settings, jobs=1)
+    before = {name: (out / name).stat().st_mtime_ns for name in contents(out)}
+    assert batch(sounds, out, settings, jobs=1).text == "3 lines: 0 done, 3 kept, 0 failed"
+    (out / "three.json").unlink()
+    (sounds / "one.txt").write_text("see mama")
+    found = batch(sounds, out, settings, jobs=1)
+    assert (found.done, found.kept) == (2, 1)
+    changed = {name for name, time in before.items() if (out / name).stat().st_mtime_ns != time}
+    assert changed == {"one.json", "three.json"}
+    assert Counter(row["name"] for row in ledger_rows(out)) == {"one": 2, "three": 2, "deep/two": 1}
+    assert batch(sounds, out, BatchSettings(("csv",), model=settings.model), jobs=1).done == 3
+
+
+def test_inputs_are_never_outputs(sounds: Path, settings: BatchSettings) -> None:
+    with pytest.raises(ExportError, match="lies in the list or folder of recordings"):
+        batch(sounds, sounds / "out", settings, jobs=1)
+    with pytest.raises(ExportError, match="holds the recording"):
+        batch([BatchLine("a", str(sounds / "one.wav"))], sounds, settings, jobs=1)
+
+
+def test_a_mistake_in_the_settings_ends_it_before_the_first_line(sounds: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such model"):
+        batch(sounds, tmp_path / "out", BatchSettings(model="missing.lipmotion"), jobs=1)
+    with pytest.raises(ExportError, match="required some of"):
+        batch(sounds, tmp_path / "out", BatchSettings(("wav",)), jobs=1)
+    with pytest.raises(ExportError, match="a video has its own sound"):
+        batch(sounds, tmp_path / "out", BatchSettings(("mp4",), delivery=Delivery(offset_ms=50)), jobs=1)
+    assert not (tmp_path / "out").exists()
+
+
+def test_files_that_refer_to_the_sound(sounds: Path, settings: BatchSettings, tmp_path: Path) -> None:
+    """The outputs are written under other names first; what they refer to is found from where they end."""
+    out = tmp_path / "out"
+    batch([BatchLine("deep/two", str(sounds / "deep/two.wav"))], out, replace(settings, kinds=("usda",)), jobs=1)
+    assert "@../../sounds/deep/two.wav@" in (out / "deep/two.usda").read_text()
+    assert [path.name for path in (out / "deep").iterdir()] == ["two.usda"]
+
+
+def test_what_a_killed_run_left_is_removed(sounds: Path, settings: BatchSettings, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    (out / "deep").mkdir(parents=True)
+    (out / "deep" / ".part-batch-0123-4567.json").touch()
+    batch(sounds, out, settings, jobs=1)
+    assert [path.name for path in (out / "deep").iterdir()] == ["two.json"]
+
+
+class DyingPool:
+    """A pool whose worker dies at one line, every time or once."""
+
+    def __init__(self, deadly: str, times: int) -> None:
+        self.deadly, self.times = deadly, times
+
+    def __call__(self, function, items):
+        for item in items:
+            if item.line.name == self.deadly and self.times:
+                self.times -= 1
+                item.place.work(item.line.name).mkdir(parents=True, exist_ok=True)
+                raise WorkerDied("killed")
+            yield function(item)
+
+
+def waiting(sounds: Path, settings: BatchSettings, out: Path) -> list[LineWork]:
+    place = Place(str(out), "run")
+    for name in ("receipts", "work"):
+        (place.own / name).mkdir(parents=True)
+    (place.own / "run").write_text("run")
+    return [LineWork(line, settings, "s", place) for line in read_lines(sounds, ("json",))]
+
+
+@pytest.mark.parametrize(("times", "outcome"), [(1, "done"), (2, "failed")])
+def test_a_worker_dies(sounds: Path, settings: BatchSettings, tmp_path: Path, times: int, outcome: str) -> None:
+    works = waiting(sounds, settings, tmp_path / "out")
+    records = list(run_module._finished(DyingPool("one", times), works))
+    assert {record["name"]: record["outcome"] for record in records} == {
+        "one": outcome, "three": "done", "deep/two": "done",
+    }  # fmt: skip
+    assert len(records) == 3
+
+
+def test_workers_that_never_begin_end_the_batch(sounds: Path, settings: BatchSettings, tmp_path: Path) -> None:
+    def dead(*_):
+        raise WorkerDied("no memory")
+        yield
+
+    with pytest.raises(CorpusError, match="die before they begin"):
+        list(run_module._finished(dead, waiting(sounds, settings, tmp_path / "out")))
+
+
+def test_a_line_that_another_worker_finished_is_not_done_again(
+    sounds: Path, settings: BatchSettings, tmp_path: Path
+) -> None:
+    work = waiting(sounds, settings, tmp_path / "out")[0]
+    first = finished_line(work)
+    path = tmp_path / "out" / next(iter(first["outputs"]))
+    before = path.stat().st_mtime_ns
+    assert finished_line(work) == first
+    assert path.stat().st_mtime_ns == before
+    path.unlink()  # the worker died after the receipt, before the renaming
+    assert finished_line(work)["outputs"] == first["outputs"]
+    assert path.is_file()
+
+
+def test_a_worker_of_an_earlier_run_writes_nothing(sounds: Path, settings: BatchSettings, tmp_path: Path) -> None:
+    work = waiting(sounds, settings, tmp_path / "out")[0]
+    (work.place.own / "run").write_text("a later one")
+    with pytest.raises(ExportError, match="another run of this batch has begun"):
+        finished_line(work)
+    assert contents(tmp_path / "out").keys() == {".batch/run"}
+
+
+def command(*words: object) -> list[str]:
+    return [sys.executable, "-m", "lipmotion.cli.main", "batch", *map(str, words), "--machine-readable"]
+
+
+def many(folder: Path, speech: Path, count: int) -> Path:
+    folder.mkdir()
+    for number in range(count):
+        shutil.copy(speech, folder / f"line{number:03}.wav")
+    return folder
+
+
+def events_of(process: subprocess.Popen) -> Iterator[dict]:
+    for text in process.stdout:
+        yield json.loads(text)
+
+
+@pytest.mark.long
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize("whom", ["first process", "a worker"])
+def test_kills(toy_speech: Path, settings: BatchSettings, tmp_path: Path, whom: str) -> None:
+    """The same command again gives the same files, each written once; a worker's death alone changes nothing."""
+    sounds = many(tmp_path / "sounds", toy_speech, 40)
+    batch(sounds, tmp_path / "whole", settings, jobs=1)
+    how = [sounds, "--out", tmp_path / "out", "--model", settings.model, "--recogniser", "own", "--jobs", 2]
+    with subprocess.Popen(command(*how), stdout=subprocess.PIPE, text=True) as process:
+        items = 0
+        for event in events_of(process):
+            items += event["type"] == "item"
+            if items == 10 and event["type"] == "item":
+                os.kill(process.pid if whom == "first process" else worker_of(process.pid), signal.SIGKILL)
+    if whom == "first process":
+        assert process.returncode == -signal.SIGKILL
+        assert subprocess.run(command(*how), capture_output=True, check=False).returncode == 0
+    assert contents(tmp_path / "out") == contents(tmp_path / "whole")
+    assert Counter(row["name"] for row in ledger_rows(tmp_path / "out")).most_common(1)[0][1] == 1
+    assert len(ledger_rows(tmp_path / "out")) == 40
+
+
+def worker_of(process: int) -> int:
+    """Return a worker process of a batch."""
+    listed = subprocess.run(
+        ["ps", "-o", "pid=,args=", "--ppid", str(process)], capture_output=True, text=True, check=True
+    )
+    rows = [row.split(maxsplit=1) for row in listed.stdout.splitlines()]
+    return next(int(pid) for pid, words in rows if "resource_tracker" not in words)
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen]]]:
+    """A scheduler and two workers of Dask, each a process of its own."""
+    pytest.importorskip("distributed")
+    where = tmp_path / "scheduler.json"
+    base = [sys.executable, "-m", "distributed.cli.dask_scheduler"]
+    worker = [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", str(where), "--nthreads", "1"]
+
+    def start(words: list[str]) -> subprocess.Popen:
+        return subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=tmp_path)
+
+    options = ["--port", "0", "--host", "127.0.0.1", "--no-dashboard", "--scheduler-file", str(where)]
+    processes = [start([*base, *options])]
+    processes += [start([*worker, "--no-dashboard", "--no-nanny"]) for _ in range(2)]
+    try:
+        from distributed import Client
+
+        waited = threading.Event()
+        while not where.is_file() or not where.read_text():
+            assert processes[0].poll() is None
+            waited.wait(0.1)
+        address = json.loads(where.read_text())["address"]
+        with Client(address, set_as_default=False) as client:
+            client.wait_for_workers(2, timeout=60)
+        yield address, processes
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
+
+
+@pytest.mark.long
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.filterwarnings("ignore")
+def test_a_worker_of_a_cluster_is_killed(
+    cluster: tuple[str, list[subprocess.Popen]], toy_speech: Path, settings: BatchSettings, tmp_path: Path
+) -> None:
+    """Nothing is lost, and nothing is done twice."""
+    address, processes = cluster
+    sounds = many(tmp_path / "sounds", toy_speech, 60)
+    batch(sounds, tmp_path / "whole", settings, jobs=1)
+    how = [sounds, "--out", tmp_path / "out", "--model", settings.model, "--recogniser", "own", "--cluster", address]
+    with subprocess.Popen(command(*how), stdout=subprocess.PIPE, text=True) as process:
+        items = 0
+        for event in events_of(process):
+            items += event["type"] == "item"
+            if items == 15 and event["type"] == "item":
+                processes[1].kill()
+    assert process.returncode == 0
+    assert contents(tmp_path / "out") == contents(tmp_path / "whole")
+    names = Counter(row["name"] for row in ledger_rows(tmp_path / "out"))
+    assert len(names) == 60
+    assert names.most_common(1)[0][1] == 1
+
+
+@pytest.mark.long
+@pytest.mark.filterwarnings("ignore")
+def test_no_cluster_answers(sounds: Path, settings: BatchSettings, tmp_path: Path, monkeypatch) -> None:
+    pytest.importorskip("distributed")
+    monkeypatch.setattr("lipmotion.pipeline.batch.pool.CONNECT_S", 1)
+    with pytest.raises(InputError, match="no Dask scheduler answers"):
+        batch(sounds, tmp_path / "out", settings, cluster="tcp://127.0.0.1:9")

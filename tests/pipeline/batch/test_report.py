@@ -1,0 +1,63 @@
+"""The report: doubtful lines first, nothing that a name says gets out of its field."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from lipmotion.pipeline.batch.ledger import Place, opened_ledger
+from lipmotion.pipeline.batch.lines import BatchLine
+from lipmotion.pipeline.batch.report import COLUMNS, doubt_of, write_reports
+
+GOOD = {"outcome": "done", "words": "transcript", "confidence": 1.0, "range_db": 50.0, "warnings": []}
+GOOD |= {"closures_heard": 2, "closures_made": 2, "duration_s": 1.5, "seconds": 0.1, "advice": []}
+
+
+@pytest.mark.parametrize(
+    ("worse", "better"),
+    [
+        ({"outcome": "failed"}, {"words": "no speech"}),
+        ({"words": "no speech"}, {"warnings": ["a"]}),
+        ({"warnings": ["a", "b"]}, {"warnings": ["a"]}),
+        ({"words": "words", "confidence": 0.3}, {"words": "words", "confidence": 0.6}),
+        ({"confidence": 0.5}, {"confidence": 0.9}),
+        ({"range_db": 10.0}, {}),
+        ({"closures_made": 1}, {}),
+    ],
+)
+def test_what_is_doubtful(worse: dict, better: dict) -> None:
+    assert doubt_of(GOOD | worse) > doubt_of(GOOD | better)
+    assert doubt_of(GOOD) == pytest.approx(0)
+
+
+def rows_of(page: str) -> list[list]:
+    return json.loads(page.partition('id="data">')[2].partition("</script>")[0])
+
+
+def test_both_reports_hold_all_lines(tmp_path: Path) -> None:
+    hostile = "</script><b>=1+1\u202e,\"'\n"
+    names = ["a", "b/c", "d"]
+    lines = [BatchLine(name, f"/x/{name}.wav") for name in names]
+    base = {"run": "1", "fingerprint": "f", "inputs": []}
+    with opened_ledger(Place(str(tmp_path), "1")) as ledger:
+        for line in lines[:2]:
+            outputs = {f"{line.name}.json": "0"} if line.name == "a" else {}
+            wrong = {} if line.name == "a" else {"outcome": "failed", "error": hostile}
+            ledger.append(GOOD | base | {"name": line.name, "recording": line.recording, "outputs": outputs} | wrong)
+        table, page = write_reports(lines, ledger, tmp_path)
+    with table.open(encoding="utf-8", newline="") as file:
+        read = list(csv.DictReader(file))
+    assert [row["name"] for row in read] == ["b/c", "d", "a"]
+    assert [row["outcome"] for row in read] == ["failed", "missing", "done"]
+    assert read[0]["error"] == hostile
+    assert read[2]["outputs"] == "a.json"
+    text = page.read_text(encoding="utf-8")
+    rows = rows_of(text)
+    assert [row[COLUMNS.index("error")] for row in rows] == [hostile, None, None]
+    assert rows[2][-1] == ["a.json"]
+    assert text.count("</script>") == 2
+    assert "default-src 'none'" in text
+    assert "http" not in text.replace("http-equiv", "")
