@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -139,7 +140,7 @@ def _written(work: LineWork) -> Generation:
     next(iter(staged.values())).parent.mkdir(parents=True, exist_ok=True)
     sheets = [kind for kind in settings.kinds if kind.startswith(CUES)]
     if sheets:
-        rate = {} if settings.fps is None else {"fps": settings.fps}
+        rate: dict[str, Any] = {} if settings.fps is None else {"fps": settings.fps}
         sheet = cues(generation, delivery=settings.delivery, **rate)
         for kind in sheets:
             write_cues(sheet, staged[kind], speech=line.recording, form=kind.removeprefix(CUES))
