@@ -36,7 +36,7 @@ def run_with(module: str, script: str, *arguments: object, folder: Path | None =
     assert python is not None, f"no Python with {module}"
     with (
         tempfile.TemporaryDirectory() as temporary
-    ):  # Blender writes caches, into the current folder if it has no other
+    ):  # for the caches of Blender
         own = {"PYTHONPATH": "", "BLENDER_USER_RESOURCES": str(folder or temporary)}
         return _json_of([python, str(FOLDER / script), *map(str, arguments)], {**os.environ, **own})
 
