@@ -12,13 +12,14 @@ from fuzz.readers import (
     face,
     labels,
     lexicon,
+    lines,
     model,
     transcript,
     units,
     video,
 )
 
-_MODULES = (audio, video, transcript, lexicon, units, labels, model, face, drawing, corpus, curves, character)
+_MODULES = (audio, video, transcript, lexicon, units, labels, model, face, drawing, corpus, curves, character, lines)
 READERS: dict[str, Reader] = {
     module.__name__.rpartition(".")[2]: Reader(module.__name__.rpartition(".")[2], module.seeds, module.read)
     for module in _MODULES

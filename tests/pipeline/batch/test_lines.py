@@ -80,6 +80,15 @@ def test_outputs_stay_in_their_folder(name: str) -> None:
         check_names([BatchLine(name, "a.wav")], ("json",))
 
 
+@pytest.mark.parametrize("text", ["a\0b.wav\n", "file,output\na.wav,x\ty\n", "~nobody/a.wav\n"])
+def test_names_that_no_file_has(tmp_path: Path, text: str) -> None:
+    if text.startswith("~"):  # only a shell knows homes
+        assert listed(tmp_path, text)[0].recording == str(tmp_path / "~nobody/a.wav")
+        return
+    with pytest.raises(InputError, match="control characters"):
+        listed(tmp_path, text)
+
+
 def test_the_files_of_the_batch_itself_are_no_outputs() -> None:
     check_names([BatchLine("report", "a.wav")], ("json",))
     with pytest.raises(ExportError, match="the batch itself"):

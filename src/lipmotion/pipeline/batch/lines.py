@@ -6,6 +6,7 @@ import csv
 import io
 import logging
 import os
+import re
 import unicodedata
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -27,6 +28,7 @@ OWN_FOLDER = ".batch"
 LARGEST_LIST = 1 << 27
 """Most bytes of a list: a million lines with their words."""
 MOST_NAMED = 3
+CONTROL = re.compile(r"[\x00-\x1f]")
 
 
 @dataclass(frozen=True)
@@ -68,9 +70,14 @@ def read_lines(source: Path, kinds: Sequence[str]) -> list[BatchLine]:
 
 
 def check_names(lines: Iterable[BatchLine], kinds: Sequence[str]) -> None:
-    """Raise ExportError if two outputs of a batch would be the same file, also where case does not count."""
+    """Raise ExportError if two outputs of a batch would be the same file, also where case does not count.
+
+    Raises InputError: a name holds control characters.
+    """
     taken = dict.fromkeys(OWN_FILES, "the batch itself")
     for line in lines:
+        if CONTROL.search(line.name + line.recording):
+            raise InputError(f"{line.recording!r}, {line.name!r}: control characters in a name; rename the recording")
         path = PurePosixPath(line.name)
         if path.is_absolute() or not path.name or ".." in path.parts or any(map(_is_hidden, path.parts)):
             raise ExportError(
@@ -114,7 +121,7 @@ def _in_list(source: Path, kinds: Sequence[str]) -> list[BatchLine]:
     if rows is None:
         rows = [{"file": row.strip()} for row in text.splitlines() if row.strip()]
     base = Path(os.path.abspath(source)).parent  # noqa: PTH100
-    paths = [os.path.normpath(base / Path(row["file"]).expanduser()) for row in rows]
+    paths = [os.path.normpath(base / row["file"]) for row in rows]
     names = [_output_name(row.get("output", ""), kinds) for row in rows]
     unnamed = [path for path, name in zip(paths, names, strict=True) if not name]
     shared = _shared_folder(unnamed, base)
