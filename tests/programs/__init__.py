@@ -34,9 +34,7 @@ def run_with(module: str, script: str, *arguments: object, folder: Path | None =
     """Run a script of this folder in the interpreter that has a module; return the JSON of its last line."""
     python = python_with(module)
     assert python is not None, f"no Python with {module}"
-    with (
-        tempfile.TemporaryDirectory() as temporary
-    ):  # for the caches of Blender
+    with tempfile.TemporaryDirectory() as temporary:  # for the caches of Blender
         own = {"PYTHONPATH": "", "BLENDER_USER_RESOURCES": str(folder or temporary)}
         return _json_of([python, str(FOLDER / script), *map(str, arguments)], {**os.environ, **own})
 
