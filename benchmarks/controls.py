@@ -2,7 +2,8 @@
 
     python benchmarks/controls.py
 
-Needs a synthetic voice (extra ``text``). Held poses stand beside plain sampling: every second frame of 24 a second, held twice.
+Needs a synthetic voice (extra ``text``). Held poses stand beside plain sampling: every second frame of 24 a
+second, held twice.
 """
 
 from __future__ import annotations
@@ -60,7 +61,7 @@ def held_poses(spoken: list[Generation]) -> None:
 
 
 def larger(spoken: list[Generation], intensity: float) -> None:
-    """Print how much larger the movements are, and how far closures and points leave what they must be."""
+    """Print how much larger the movements are, how far closures move, and how much more points and opening disagree."""
     ratios, closures, points = [], [], []
     for each in spoken:
         after, before = intensified(each, intensity).motion, each.motion
@@ -68,14 +69,12 @@ def larger(spoken: list[Generation], intensity: float) -> None:
         frames = closed_frames(each)
         closures.append(float(np.abs(after["opening"][frames] - before["opening"][frames]).max(initial=0.0)))
         apart = [
-            np.hypot(*(m[f"{axis}_13"] - m[f"{axis}_14"] for axis in "xy")) - m["opening"] for m in (before, after)
+            float(np.abs(np.hypot(*(m[f"{axis}_13"] - m[f"{axis}_14"] for axis in "xy")) - m["opening"]).max())
+            for m in (before, after)
         ]
-        points.append(float(np.abs(apart[1]).max() - np.abs(apart[0]).max()))
-    figures = {
-        "deviation of opening, ratio": round(float(np.mean(ratios)), 3),
-        "closures move": round(max(closures), 5),
-    }
-    print(json.dumps({"intensity": intensity, **figures, "points disagree by, more": round(max(points), 4)}))
+        points.append(apart[1] - apart[0])
+    figures = {"ratio of deviations": float(np.mean(ratios)), "closures move": max(closures), "points": max(points)}
+    print(json.dumps({"intensity": intensity, **{name: round(value, 5) for name, value in figures.items()}}))
 
 
 def shapes(voice: str) -> None:

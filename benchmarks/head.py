@@ -258,7 +258,10 @@ def sheet(path: Path) -> None:
     whole = Stage(camera_for(1200, 720))
     left = whole.picture(poses[0]._replace(turn=(-0.08, 0.0, 0.02)))[:, 300:900]
     right = whole.picture(poses[6]._replace(turn=(0.4, 0.03, -0.02), gaze=(-0.3, 0.0)))[:, 300:900]
-    Image.fromarray(np.concatenate([np.concatenate([left, right], axis=1), *rows])).save(path, optimize=True)
+    whole_sheet = Image.fromarray(np.concatenate([np.concatenate([left, right], axis=1), *rows]))
+    whole_sheet = whole_sheet.resize((1080, 1404), Image.Resampling.LANCZOS)
+    few = whole_sheet.quantize(256, method=Image.Quantize.FASTOCTREE, kmeans=2)
+    whole_sheet.quantize(palette=few, dither=Image.Dither.FLOYDSTEINBERG).save(path, optimize=True)
 
 
 def sheet_poses() -> Iterator[CharacterPose]:

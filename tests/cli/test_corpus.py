@@ -9,11 +9,13 @@ import pytest
 from cli.conftest import RunCommand, is_one_error
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import MissingDependencyError
+from lipmotion.export.sound import write_sound
 from lipmotion.export.video import write_mp4
 from lipmotion.pipeline.corpus import prepare
 from lipmotion.pipeline.corpus import sync as offset
 from lipmotion.pipeline.corpus.prepare import PrepareReport
 from lipmotion.types import Audio, Item, Progress
+from speech.recorded_twice import RATE_HZ, clap, recorded_twice, speech_like
 
 
 def test_info(run: RunCommand, toy_corpus: Corpus) -> None:
@@ -123,3 +125,16 @@ def test_videos_that_cannot_be_used(run_outside: RunCommand, here: Path, bad_spe
     done = run_outside("corpus", "prepare", "videos", "-o", "mine", "--workers", "1")
     assert (done.code, done.out, len(done.err)) == (4, [], 4)
     assert [path.name for path in here.iterdir()] == ["videos"]
+
+
+def test_offset_of_two_recordings(run: RunCommand, here: Path) -> None:
+    chance = np.random.default_rng(5)
+    scene = np.concatenate([np.zeros(RATE_HZ), speech_like(chance, 3.0)])
+    made = clap(chance)
+    scene[RATE_HZ // 2 :][: len(made)] += made
+    camera, recorder, _ = recorded_twice(scene, chance, 800, 7_200)
+    write_sound(here / "camera.wav", camera)
+    write_sound(here / "recorder.wav", recorder)
+    done = run("corpus", "offset", "camera.wav", "recorder.wav")
+    assert done.code == 0
+    assert done.out[0].startswith("--offset-ms 500.0  (by clap; levels correlate by 0.")

@@ -80,19 +80,29 @@ def test_events_go_to_standard_error_beside_motion(
     assert json.loads(kept.getvalue())["format"] == "lipmotion.motion"
 
 
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes")
-def test_a_named_pipe(run: RunCommand, toy_model_file: Path, toy_speech: Path, here: Path) -> None:
-    os.mkfifo(here / "pipe")
-    writer = threading.Thread(target=lambda: (here / "pipe").write_bytes(toy_speech.read_bytes()))
+@pytest.mark.skipif(not Path("/dev/fd").is_dir(), reason="no files of open pipes")
+@pytest.mark.parametrize("content", ["speech", ""])
+@pytest.mark.usefixtures("here")
+def test_a_pipe_that_the_shell_has_opened(
+    run: RunCommand, toy_model_file: Path, toy_speech: Path, content: str
+) -> None:
+    reading, writing = os.pipe()
+    given = toy_speech.read_bytes() if content else b""
+
+    def write() -> None:
+        with os.fdopen(writing, "wb") as file:
+            file.write(given)
+
+    writer = threading.Thread(target=write)
     writer.start()
-    assert run("animate", "pipe", "--model", toy_model_file, "-o", "a.json").code == 0
+    done = run("animate", f"/dev/fd/{reading}", "--model", toy_model_file, "-o", "a.json")
     writer.join()
-    empty = threading.Thread(target=lambda: (here / "pipe").write_bytes(b""))
-    empty.start()
-    done = run("animate", "pipe", "--model", toy_model_file, "-o", "b.json")
-    empty.join()
-    assert is_one_error(done, 3)
-    assert "nothing comes through the pipe" in done.err[0]
+    os.close(reading)
+    if content:
+        assert done == (0, ["a.json"], [])
+    else:
+        assert is_one_error(done, 3)
+        assert "nothing comes through the pipe" in done.err[0]
 
 
 def test_controls_of_files(run: RunCommand, toy_model_file: Path, toy_speech: Path, here: Path) -> None:

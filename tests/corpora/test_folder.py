@@ -162,3 +162,16 @@ def test_labels_are_kept_and_bad_ones_are_reported(tmp_path):
     assert [item.name for item in found.recordings] == ["a", "c"]
     assert [span.label.phone for span in found.recordings[0].phones] == ["t", "uw"]
     assert "line 2 starts at 0.05 s" in found.problems["b"]
+
+
+def test_a_take_of_live_link_face_is_the_motion_of_its_video(tmp_path):
+    touch(tmp_path, "take.mov", "other.mp4", "other.csv", "talk.wav", "talk.c3d")
+    (tmp_path / "take.csv").write_text("Timecode,BlendShapeCount,JawOpen\n")
+    (tmp_path / "other.csv").write_text("time_s,opening\n")
+    found = {item.name: item.motion_file and item.motion_file.file.name for item in discover(tmp_path).recordings}
+    assert found == {"take": "take.csv", "other": None, "talk": "talk.c3d"}
+
+
+def test_sounds_of_recorders_are_no_recordings(tmp_path):
+    touch(tmp_path, "a.wav", "a.csv", "a.recorder.wav", "a.recorder.csv")
+    assert [item.name for item in discover(tmp_path).recordings] == ["a"]

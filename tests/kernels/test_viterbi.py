@@ -151,3 +151,15 @@ def test_a_wide_beam_drops_nothing_and_a_narrow_one_the_better_late_path():
     path, score = viterbi.best_path(*asked(log_emission), NetworkArrays(**chain), beam=5.0)
     assert path.tolist() == [0, 0, 0]
     assert score == -30
+
+
+@pytest.mark.parametrize("beam", [None, 6.0])
+def test_arc_by_arc_gives_the_same_bits_as_run_by_run(monkeypatch, beam):
+    arrays, _ = phone_loop(seed=3)
+    log_emission = random_emission(3, 120, len(arrays["emission"]))
+    found = []
+    for least in (0.0, np.inf):
+        monkeypatch.setattr(viterbi, "LEAST_RUN", least)
+        found.append(viterbi.best_path(*asked(log_emission), NetworkArrays(**arrays), beam))
+    assert np.array_equal(found[0][0], found[1][0])
+    assert np.float64(found[0][1]).tobytes() == np.float64(found[1][1]).tobytes()

@@ -27,6 +27,15 @@ _option("an unknown --speaker", 3, ("the model tells no speakers apart", "no 'no
 _option("an unknown --recogniser", 3, ("unknown recogniser 'best'; required one of: auto",), "--recogniser", "best")
 
 
+for _value in ("nan", "inf", "-1", "4"):
+    _option(f"--intensity {_value}", 3, ("the intensity is", "required 0 to 3"), f"--intensity={_value}")
+for _value in ("nan", "2000", "-1e9"):
+    _option(f"--anticipation-ms {_value}", 3, ("the anticipation is", "required -1000"), f"--anticipation-ms={_value}")
+_option("--offset-ms nan", 3, ("the offset is nan ms",), "--offset-ms=nan")
+_option("--offset-ms that leaves nothing", 3, ("nothing is left; give a smaller one",), "--offset-ms=-1e7")
+_option("--min-hold-ms -1", 3, ("the least hold is -1 ms",), "--min-hold-ms=-1")
+
+
 def _cues(name: str, code: int, messages: tuple[str, ...], *more: object) -> None:
     @case(GROUP, f"cues {name}", code, *messages)
     def _(bench: Bench) -> list[object]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from lipmotion.cli.delivery import add_delivery_arguments, delivery_of
 from lipmotion.cli.options import add_machine_readable
 from lipmotion.cli.paths import add_input, add_output
 from lipmotion.cli.speech import add_lexicon_argument, add_model_argument, add_recogniser_argument, add_speaker_argument
@@ -18,7 +19,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     listed = "a folder of recordings, or a list: a path a line, or a table with columns file,transcript,output,speaker"
     add_input(parser, "source", what="list or folder of recordings", metavar="LIST|DIR", help=listed)
     add_output(parser, "--out", is_folder=True, required=True, metavar="DIR", help="folder of the outputs")
-    kinds = "json csv npz TextGrid mp4 webm mov cues.tsv cues.xml cues.json cues.dat, with commas (default: json)"
+    kinds = "what animate writes (json csv livelink.csv glb mp4 ...) and cues.tsv .xml .json .dat (default: json)"
     parser.add_argument("--to", default="json", metavar="KIND,KIND", help=kinds)
     parser.add_argument("--jobs", type=int, metavar="N", help="number of processes (default: one per core)")
     address = "scheduler of a Dask cluster that does the work, as tcp://HOST:8786"
@@ -35,8 +36,8 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     face = "face of videos: woman, man, cartoon, head, FILE.svg (default: portrait, the woman)"
     add_input(parser, "--face", what="face", type=str, default="portrait", metavar="NAME|FILE", help=face)
     parser.add_argument("--background", default="", metavar="COLOUR", help="of that face: transparent, or as #40a0ff")
-    add_staging_arguments(parser)
-    add_machine_readable(parser)
+    for add_arguments in (add_staging_arguments, add_delivery_arguments, add_machine_readable):
+        add_arguments(parser)
     parser.set_defaults(run=run)
 
 
@@ -46,18 +47,18 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.errors import InputError
     from lipmotion.pipeline.batch import BatchSettings, batch
 
-    text = {"recogniser": options.recogniser, "speaker": options.speaker, "curves": options.curves}
-    paths = {name: str(Path(path).absolute()) for name in ("model", "lexicon") if (path := getattr(options, name))}
+    named = {
+        name: getattr(options, name) or "" for name in ("recogniser", "speaker", "model", "lexicon", "face", "curves")
+    }
     settings = BatchSettings(
         kinds=tuple(options.to.split(",")),
-        channels=tuple((options.channels or "").split(",")) if options.channels else (),
+        channels=tuple(options.channels.split(",")) if options.channels else (),
         articulation=options.articulation,
         rate_hz=options.rate,
         fps=options.fps,
-        face=options.face,
         staging=staging_of(options),
-        **text,
-        **paths,
+        delivery=delivery_of(options),
+        **{name: str(Path(text).absolute()) if Path(text).is_file() else str(text) for name, text in named.items()},
     )
     with reporting(options) as report:
         found = batch(

@@ -14,6 +14,8 @@ from typing import IO
 from lipmotion.cli.output import write_bytes
 
 PIPE = "-"
+OPENED = ("/dev/fd/", "/dev/stdin", "/proc/self/fd/")
+"""Where pipes are that the shell has opened for this process."""
 LARGEST = 1 << 32
 """Most bytes of a recording from a pipe."""
 BLOCK = 1 << 20
@@ -26,9 +28,14 @@ def add_pipe_format(parser: argparse.ArgumentParser) -> None:
 
 
 def is_pipe(path: Path | str) -> bool:
-    """Return whether a path is ``-``, a named pipe, or one of the shell's (``/dev/stdin``, ``<(...)``)."""
+    """Return whether a path is ``-``, or a pipe that the shell has opened (``/dev/stdin``, ``<(...)``).
+
+    Not a named pipe: nobody may ever write to it.
+    """
     if str(path) == PIPE:
         return True
+    if not str(path).startswith(OPENED):
+        return False
     try:
         return stat.S_ISFIFO(Path(path).stat().st_mode)
     except (OSError, ValueError):

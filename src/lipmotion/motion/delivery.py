@@ -138,8 +138,8 @@ def intensified(generation: Generation, intensity: float, opening: Curve | None 
 
     opening : how far the lips are apart in every frame [shape=(T,)]; None: the channel ``opening``
     In every frame the whole face moves by one factor, so that distances and points agree. It is 1 where the lips touch,
-    or are no further apart than at rest (silence, p b m), and the intensity where they are open; openings beyond the largest of
-    the motion approach twice that. Weights stay between 0 and 1.
+    or are no further apart than at rest (silence, p b m), and the intensity where they are open; openings beyond the
+    largest of the motion approach twice that. Weights stay between 0 and 1.
     Without an opening the factor is the intensity everywhere.
     """
     motion = generation.motion

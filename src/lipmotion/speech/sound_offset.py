@@ -31,8 +31,8 @@ RATHER_ALIKE = 0.3
 """Where sounds around beeps correlate by this much, their waveforms are more exact than the beginnings of beeps."""
 FOR_MARKS = 0.3
 """What each of up to two marks at one offset counts, besides the correlation."""
-FINE_S, FINE_MARK_S = 0.06, 0.01
-"""How far the fine search goes around the coarse offset: of whole sounds, and of claps."""
+FINE_S, FINE_MARK_S, FINE_BEEP_S = 0.06, 0.01, 0.003
+"""How far the fine search goes around the coarse offset: of whole sounds, of claps, and of sounds around beeps."""
 FINE_WINDOW_S = 20.0
 MARK_WINDOW_S = (0.03, 0.12)
 """What is compared before and after a clap, or looked at around the beginning of a beep."""
@@ -76,12 +76,13 @@ def sound_offset(first: Audio, second: Audio) -> SoundOffset:
         alone = len(candidates) == 1 or len(pairs) > 1
         if not (certain and best > score) and (alike >= UNLIKE or alone):
             kind = pairs[0][0].kind
-            if kind == BEEP and alike >= RATHER_ALIKE:
-                return SoundOffset(_refined(first, second, late_s), kind, alike)
             at_mark = _between_beeps if kind == BEEP else _between_claps
-            return SoundOffset(float(np.median([at_mark(first, second, *pair) for pair in pairs])), kind, alike)
+            fine_s = float(np.median([at_mark(first, second, *pair) for pair in pairs]))
+            if kind == BEEP and alike >= RATHER_ALIKE:
+                fine_s = _refined(first, second, fine_s, FINE_BEEP_S)
+            return SoundOffset(fine_s, kind, alike)
     if certain:
-        return SoundOffset(_refined(first, second, best_s), ALIKE, best)
+        return SoundOffset(_refined(first, second, best_s, FINE_S), ALIKE, best)
     marks = f"{len(candidates)} offsets fit claps or beeps" if candidates else "no clap and no beep is in both"
     raise InputError(
         f"the offset of the two sounds is not clear: {marks}, and their levels correlate by {best:.2f} at most, "
@@ -176,7 +177,7 @@ def _beginning_s(audio: Audio, beep: SoundMark) -> float:
     return (begin + int(np.argmax(loudness >= 0.5 * np.median(loudness[own[0] : own[1]])))) / rate
 
 
-def _refined(first: Audio, second: Audio, late_s: float) -> float:
+def _refined(first: Audio, second: Audio, late_s: float, reach_s: float) -> float:
     """Return an offset, refined around its coarse value by the loudest part of what both have."""
     low, high = max(0.0, -late_s), min(first.duration_s, second.duration_s - late_s)
     if high - low > FINE_WINDOW_S:
@@ -186,7 +187,7 @@ def _refined(first: Audio, second: Audio, late_s: float) -> float:
         width = round(FINE_WINDOW_S / STEP_S)
         low += int((sums[width:] - sums[:-width]).argmax()) * STEP_S
         high = low + FINE_WINDOW_S
-    return _matched(first, second, (low, high), late_s, FINE_S)
+    return _matched(first, second, (low, high), late_s, reach_s)
 
 
 def _matched(first: Audio, second: Audio, span_s: tuple[float, float], late_s: float, reach_s: float) -> float:

@@ -87,3 +87,42 @@ def test_a_line_without_end_is_not_read_whole(tmp_path):
     path.write_text("time_s," + "a," * 600_000 + "b\n0,1\n")
     with pytest.raises(InputError, match="fields, required"):
         read_motion(path)
+
+
+@pytest.mark.parametrize(
+    ("head", "times"),
+    [("time", [5.0, 5.5, 6.0]), ("Timestamp", [0, 0.5, 1.0]), ("time_ms", [100, 600, 1100]), (" t ", [0, 0.5, 1])],
+)
+def test_tables_of_other_programs_begin_with_their_first_row(tmp_path, head, times):
+    path = tmp_path / "a.csv"
+    path.write_text(f"{head}, jawOpen,chin\n" + "".join(f"{t},{n},{n}\n" for n, t in enumerate(times)))
+    motion, _ = read_motion(path)
+    assert motion.rate_hz == pytest.approx(2.0)
+    assert motion.channels == (Channel("jawOpen", "weight"), Channel("chin"))
+    assert motion["chin"].tolist() == [0, 1, 2]
+
+
+def test_uneven_times_of_other_programs_are_evened_out(tmp_path):
+    chance = np.random.default_rng(4)
+    times_s = np.sort(np.arange(300) / 60 + chance.uniform(-0.004, 0.004, 300))
+    path = tmp_path / "a.csv"
+    path.write_text("time,jaw\n" + "".join(f"{t},{t - times_s[0]}\n" for t in times_s))
+    motion, _ = read_motion(path)
+    assert motion.rate_hz == 60
+    np.testing.assert_allclose(motion["jaw"][:-1], motion.time_s[:-1], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        ("0,1\n", "1 rows with values, required two or more"),
+        ("0,1\n0,2\n", "the time of row 2 is not after that of the row before"),
+        ("0,1\n1,nan\n", "values that are not finite"),
+        ("0,1\n0.01,1\n0.02,1\n0.03,1\n99,1\n", "most of the time there are none; cut the take"),
+    ],
+)
+def test_what_is_wrong_with_them_is_said(tmp_path, rows, message):
+    path = tmp_path / "a.csv"
+    path.write_text(f"time,jaw\n{rows}")
+    with pytest.raises(InputError, match=message):
+        read_motion(path)

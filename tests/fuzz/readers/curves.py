@@ -9,14 +9,19 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import require, short_speech
 from lipmotion.corpora.facegood import read_channels
 from lipmotion.corpora.source_recordings import MotionFile
 from lipmotion.corpora.store import Corpus
+from lipmotion.export.base import write_motion
+from lipmotion.export.motion.c3d_file import C3dFile
+from lipmotion.export.motion.c3d_writing import write_c3d
 from lipmotion.pipeline.corpus.supplied_motion import supplied_track
-from lipmotion.types import WEIGHT
+from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
+from rig.live_link_app import write_take
 from robustness.case import npy
 from robustness.motion_cases import GOOD
 
@@ -34,11 +39,36 @@ def seeds(_: Good) -> list[Files]:
     archive = io.BytesIO()
     np.savez(archive, values=values, document=np.array(json.dumps(document | {"values": None})))
     return [
+        *_captures(),
         {"a.csv": "\n".join(["time_s,opening,width", *rows]).encode()},
         {"a.json": json.dumps(document).encode()},
         {"a.npz": archive.getvalue()},
         {VALUES: npy(values), NAMES: npy(np.array(["opening", "width"]))},
     ]
+
+
+def _captures() -> list[Files]:
+    """Return the same second of motion as programs of motion capture write it."""
+    values = np.linspace(0, 0.3, 3 * FRAMES).reshape(FRAMES, 3)
+    names = ("x_13", "y_13", "z_13")
+    moving = _generation(values, tuple(map(Channel, names)))
+    weights = Motion(values[:, :1], RATE_HZ, (Channel("jawOpen", WEIGHT),))
+    parameters = _generation(np.rint(900 * values[:, :2]), (Channel("fap3_open_jaw", "fap"), Channel("fap4", "fap")))
+    markers = C3dFile(("EYE_L", "EYE_R", "chin"), np.stack([values + 45, values - 45, 2 * values], axis=1), RATE_HZ)
+    with tempfile.TemporaryDirectory() as made:
+        folder = Path(made)
+        write_take(folder / "a.csv", weights)
+        write_motion(folder / "a.c3d", moving, source={}, model={})
+        write_c3d(folder / "b.c3d", markers)
+        write_motion(folder / "a.fap", parameters, source={}, model={})
+        rows = [f"{1000 * n / RATE_HZ:.1f},{row[0]}" for n, row in enumerate(values)]
+        (folder / "c.csv").write_text("\n".join(["time_ms,jawOpen", *rows]))
+        return [{path.name: path.read_bytes()} for path in sorted(folder.iterdir())]
+
+
+def _generation(values: NDArray[np.float64], channels: tuple[Channel, ...]) -> Generation:
+    motion = Motion(values, RATE_HZ, channels)
+    return Generation(motion, values, Timeline(()), StateTrace(("a",), np.zeros(len(values), np.intp)))
 
 
 def read(folder: Path, good: Good) -> None:

@@ -11,13 +11,15 @@ import sys
 import threading
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import lipmotion
 from lipmotion.errors import CorpusError, ExportError, InputError
-from lipmotion.pipeline.batch import BatchSettings, Line, batch, read_lines
+from lipmotion.motion.delivery import Delivery
+from lipmotion.pipeline.batch import BatchLine, BatchSettings, batch, read_lines
 from lipmotion.pipeline.batch import run as run_module
 from lipmotion.pipeline.batch.ledger import Place
 from lipmotion.pipeline.batch.one_line import LineWork, finished_line
@@ -96,7 +98,7 @@ def test_inputs_are_never_outputs(sounds: Path, settings: BatchSettings) -> None
     with pytest.raises(ExportError, match="lies in the list or folder of recordings"):
         batch(sounds, sounds / "out", settings, jobs=1)
     with pytest.raises(ExportError, match="holds the recording"):
-        batch([Line("a", str(sounds / "one.wav"))], sounds, settings, jobs=1)
+        batch([BatchLine("a", str(sounds / "one.wav"))], sounds, settings, jobs=1)
 
 
 def test_a_mistake_in_the_settings_ends_it_before_the_first_line(sounds: Path, tmp_path: Path) -> None:
@@ -104,7 +106,25 @@ def test_a_mistake_in_the_settings_ends_it_before_the_first_line(sounds: Path, t
         batch(sounds, tmp_path / "out", BatchSettings(model="missing.lipmotion"), jobs=1)
     with pytest.raises(ExportError, match="required some of"):
         batch(sounds, tmp_path / "out", BatchSettings(("wav",)), jobs=1)
+    with pytest.raises(ExportError, match="a video has its own sound"):
+        batch(sounds, tmp_path / "out", BatchSettings(("mp4",), delivery=Delivery(offset_ms=50)), jobs=1)
     assert not (tmp_path / "out").exists()
+
+
+def test_files_that_refer_to_the_sound(sounds: Path, settings: BatchSettings, tmp_path: Path) -> None:
+    """The outputs are written under other names first; what they refer to is found from where they end."""
+    out = tmp_path / "out"
+    batch([BatchLine("deep/two", str(sounds / "deep/two.wav"))], out, replace(settings, kinds=("usda",)), jobs=1)
+    assert "@../../sounds/deep/two.wav@" in (out / "deep/two.usda").read_text()
+    assert [path.name for path in (out / "deep").iterdir()] == ["two.usda"]
+
+
+def test_what_a_killed_run_left_is_removed(sounds: Path, settings: BatchSettings, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    (out / "deep").mkdir(parents=True)
+    (out / "deep" / ".part-batch-0123-4567.json").touch()
+    batch(sounds, out, settings, jobs=1)
+    assert [path.name for path in (out / "deep").iterdir()] == ["two.json"]
 
 
 class DyingPool:

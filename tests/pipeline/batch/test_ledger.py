@@ -10,7 +10,7 @@ import pytest
 
 from lipmotion.errors import ExportError
 from lipmotion.pipeline.batch.ledger import DONE, Place, Record, opened_ledger, read_receipt, write_receipt
-from lipmotion.pipeline.batch.lines import Line
+from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.batch.settings import (
     BatchSettings,
     check_kinds,
@@ -23,7 +23,7 @@ CONTENT = b"motion"
 DIGEST = hashlib.sha256(CONTENT).hexdigest()
 
 
-def record_of(line: Line, run: str = "old") -> Record:
+def record_of(line: BatchLine, run: str = "old") -> Record:
     inputs = [vars(each) for each in input_files(line)]
     return {
         "name": line.name,
@@ -37,9 +37,9 @@ def record_of(line: Line, run: str = "old") -> Record:
 
 
 @pytest.fixture
-def line(tmp_path: Path) -> Line:
+def line(tmp_path: Path) -> BatchLine:
     (tmp_path / "a.wav").write_bytes(b"sound")
-    return Line("a", str(tmp_path / "a.wav"))
+    return BatchLine("a", str(tmp_path / "a.wav"))
 
 
 @pytest.fixture
@@ -52,7 +52,7 @@ def written(out: Path) -> list[str]:
     return [json.loads(row)["name"] for row in (out / "batch.jsonl").read_bytes().splitlines()]
 
 
-def test_a_line_is_kept_while_nothing_changes(line: Line, out: Path) -> None:
+def test_a_line_is_kept_while_nothing_changes(line: BatchLine, out: Path) -> None:
     (out / "a.json").write_bytes(CONTENT)
     with opened_ledger(Place(str(out), "1")) as ledger:
         assert ledger.kept(line, "settings", out) is None
@@ -73,7 +73,7 @@ def test_a_line_is_kept_while_nothing_changes(line: Line, out: Path) -> None:
     assert sorted(path.name for path in out.iterdir()) == ["batch.jsonl"]
 
 
-def test_a_row_that_was_cut_is_removed(line: Line, out: Path) -> None:
+def test_a_row_that_was_cut_is_removed(line: BatchLine, out: Path) -> None:
     with opened_ledger(Place(str(out), "1")) as ledger:
         ledger.append(record_of(line))
     whole = (out / "batch.jsonl").read_bytes()
@@ -83,7 +83,7 @@ def test_a_row_that_was_cut_is_removed(line: Line, out: Path) -> None:
     assert (out / "batch.jsonl").read_bytes() == whole
 
 
-def test_a_damaged_row_is_passed_over(line: Line, out: Path) -> None:
+def test_a_damaged_row_is_passed_over(line: BatchLine, out: Path) -> None:
     with opened_ledger(Place(str(out), "1")) as ledger:
         ledger.append(record_of(line))
     whole = (out / "batch.jsonl").read_bytes()
@@ -93,7 +93,7 @@ def test_a_damaged_row_is_passed_over(line: Line, out: Path) -> None:
 
 
 @pytest.mark.parametrize("in_place", [True, False])
-def test_killed_after_the_receipt(line: Line, out: Path, in_place: bool) -> None:
+def test_killed_after_the_receipt(line: BatchLine, out: Path, in_place: bool) -> None:
     """Outputs that were renamed are entered into the ledger, once; others are forgotten."""
     old = Place(str(out), "old")
     old.receipt("a").parent.mkdir(parents=True)
@@ -107,7 +107,7 @@ def test_killed_after_the_receipt(line: Line, out: Path, in_place: bool) -> None
     assert written(out) == ["a"] * in_place
 
 
-def test_killed_after_the_ledger(line: Line, out: Path) -> None:
+def test_killed_after_the_ledger(line: BatchLine, out: Path) -> None:
     """A receipt that is in the ledger already is not entered twice."""
     place = Place(str(out), "old")
     (out / "a.json").write_bytes(CONTENT)

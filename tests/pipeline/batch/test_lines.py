@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.pipeline.batch import Line, read_lines
+from lipmotion.pipeline.batch import BatchLine, read_lines
 from lipmotion.pipeline.batch.lines import check_names
 
 
-def listed(folder: Path, text: str, name: str = "list.txt", kinds: tuple[str, ...] = ("json",)) -> list[Line]:
+def listed(folder: Path, text: str, name: str = "list.txt", kinds: tuple[str, ...] = ("json",)) -> list[BatchLine]:
     path = folder / name
     path.write_text(text, encoding="utf-8")
     return read_lines(path, kinds)
@@ -47,12 +47,12 @@ def test_a_table(tmp_path: Path, name: str, mark: str, caplog: pytest.LogCapture
     ]
     with caplog.at_level(logging.WARNING):
         lines = listed(tmp_path, "\n".join(mark.join(row) for row in rows), name)
-    assert lines == [Line("act1/hello", str(tmp_path / "a.wav"), "Hello, you; there", "anna")]
+    assert lines == [BatchLine("act1/hello", str(tmp_path / "a.wav"), "Hello, you; there", "anna")]
     assert "columns that are not used: note" in caplog.text
 
 
 def test_short_rows_are_filled_and_long_ones_refused(tmp_path: Path) -> None:
-    assert listed(tmp_path, "file,transcript\na.wav\n") == [Line("a", str(tmp_path / "a.wav"))]
+    assert listed(tmp_path, "file,transcript\na.wav\n") == [BatchLine("a", str(tmp_path / "a.wav"))]
     with pytest.raises(InputError, match="row 2: 3 columns, required at most the 2"):
         listed(tmp_path, "file,transcript\na.wav,hello,you\n")
     with pytest.raises(InputError, match="row 3: no recording in the column 'file'"):
@@ -77,18 +77,18 @@ def test_two_lines_with_one_name_are_refused(tmp_path: Path, text: str) -> None:
 @pytest.mark.parametrize("name", ["../a", "/a", ".a", "a/.batch/b", ""])
 def test_outputs_stay_in_their_folder(name: str) -> None:
     with pytest.raises(ExportError, match="outside the folder"):
-        check_names([Line(name, "a.wav")], ("json",))
+        check_names([BatchLine(name, "a.wav")], ("json",))
 
 
 def test_the_files_of_the_batch_itself_are_no_outputs() -> None:
-    check_names([Line("report", "a.wav")], ("json",))
+    check_names([BatchLine("report", "a.wav")], ("json",))
     with pytest.raises(ExportError, match="the batch itself"):
-        check_names([Line("Report", "a.wav")], ("json", "csv"))
+        check_names([BatchLine("Report", "a.wav")], ("json", "csv"))
 
 
 def test_kinds_do_not_meet() -> None:
     """``a.cues`` as ``json`` is what ``a`` is as ``cues.json``."""
-    lines = [Line("a", "a.wav"), Line("a.cues", "b.wav")]
+    lines = [BatchLine("a", "a.wav"), BatchLine("a.cues", "b.wav")]
     with pytest.raises(ExportError, match="would be written for"):
         check_names(lines, ("json", "cues.json"))
     check_names(lines, ("json",))

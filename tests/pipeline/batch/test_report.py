@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from lipmotion.pipeline.batch.ledger import Place, opened_ledger
-from lipmotion.pipeline.batch.lines import Line
+from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.batch.report import COLUMNS, doubt_of, write_reports
 
 GOOD = {"outcome": "done", "words": "transcript", "confidence": 1.0, "range_db": 50.0, "warnings": []}
@@ -40,7 +40,7 @@ def rows_of(page: str) -> list[list]:
 def test_both_reports_hold_all_lines(tmp_path: Path) -> None:
     hostile = "</script><b>=1+1\u202e,\"'\n"
     names = ["a", "b/c", "d"]
-    lines = [Line(name, f"/x/{name}.wav") for name in names]
+    lines = [BatchLine(name, f"/x/{name}.wav") for name in names]
     base = {"run": "1", "fingerprint": "f", "inputs": []}
     with opened_ledger(Place(str(tmp_path), "1")) as ledger:
         for line in lines[:2]:

@@ -13,11 +13,15 @@ from lipmotion.corpora.source_recordings import MotionFile, SourceRecording
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.export.base import write_motion
+from lipmotion.export.motion.c3d_file import C3dFile
+from lipmotion.export.motion.c3d_writing import write_c3d
 from lipmotion.pipeline.corpus import prepare as module
 from lipmotion.pipeline.corpus.prepare import prepare
 from lipmotion.pipeline.corpus.supplied_motion import source_digests, supplied_phones, supplied_track
+from lipmotion.rig.live_link_table import SPEECH_CURVES
 from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 from lipmotion.units import is_silent
+from rig.live_link_app import write_take
 
 CHANNELS = (Channel("jaw", "weight"), Channel("brow", "weight"))
 
@@ -208,3 +212,25 @@ def test_labels_that_last_no_time(tmp_path):
     recording = SourceRecording("a", tmp_path / "a.wav", None, phones=Timeline((Span(1.0, 1.0, Unit("p")),) * 3))
     with pytest.raises(InputError, match="none of its 3 labels is a phone that lasts longer than 0 s"):
         supplied_phones(recording, 2.0)
+
+
+def test_a_take_of_the_app_and_markers_become_a_corpus(tmp_path):
+    takes = tmp_path / "takes"
+    takes.mkdir()
+    values = np.random.default_rng(3).uniform(size=(120, 3))
+    names = ("JawOpen", "MouthPucker", "EyeBlinkLeft")
+    write_take(takes / "a.csv", Motion(values, 60.0, tuple(Channel(name, "weight") for name in names)))
+    write_sound(takes / "a.wav")
+    places = np.random.default_rng(4).normal(0, 5, (240, 4, 3)) * [0, 0, 0]
+    places[:, 0, 0], places[:, 1, 0] = 44, -44
+    places[:, 2:] = np.random.default_rng(5).normal(0, 3, (240, 2, 3)) - [0, 70, -20]
+    write_c3d(takes / "b.c3d", C3dFile(("EYE_L", "EYE_R", "LIP_13", "LIP_14"), places, 120.0))
+    write_sound(takes / "b.wav")
+    assert prepare(takes, tmp_path / "corpus", workers=1).prepared == ("a", "b")
+    corpus = Corpus.open(tmp_path / "corpus")
+    taken, marked = (corpus.utterance(name).track.motion for name in "ab")
+    assert set(taken.names) == SPEECH_CURVES
+    np.testing.assert_allclose(taken["jawOpen"], values[:, 0], atol=1e-6)
+    assert marked.rate_hz == 120.0
+    expected = np.linalg.norm(places[:, 2] - places[:, 3], axis=1) / 88
+    np.testing.assert_allclose(marked["opening"], expected, atol=1e-6)

@@ -95,7 +95,9 @@ def _parsed(content: bytes) -> C3dFile:
     held, needed = len(content) - (block - 1) * BLOCK, frames * width * kind.itemsize
     if block < 2 or held < needed:
         raise InputError(f"cut short: {max(held, 0)} bytes of data, required {needed} for {frames} frames")
-    rows = np.frombuffer(content, kind, frames * width, (block - 1) * BLOCK).reshape(frames, width).astype(np.float64)
+    stored = np.frombuffer(content, kind, frames * width, (block - 1) * BLOCK).reshape(frames, width)
+    with np.errstate(invalid="ignore"):  # damaged numbers become NaN, as of markers that were not seen
+        rows = stored.astype(np.float64)
     return _content(found, rows, points, scale, rate_hz, samples)
 
 

@@ -23,6 +23,8 @@ RIGID = ("forehead", "head", "nasion", "nosebridge", "glabella", "temple", "ear"
 """Beginnings of names, after a side, of other markers that do not move against the skull."""
 LEAST_RIGID = 3
 LARGEST_PLACE = 1e6
+LEAST_DISTANCE = 1e-3
+"""Least distance of the eye corners in any frame, as a share of the median."""
 
 
 def in_head_frame(markers: Mapping[str, Array], unit: str) -> dict[str, Array]:
@@ -51,8 +53,9 @@ def in_head_frame(markers: Mapping[str, Array], unit: str) -> dict[str, Array]:
         places = _steadied(places, len(rigid))
     centre = places[:, :2].mean(axis=1, keepdims=True)
     across = places[:, 0] - places[:, 1]
-    distance = float(np.median(np.linalg.norm(across, axis=1)))
-    if not distance > 0:
+    distances = np.linalg.norm(across, axis=1)
+    distance = float(np.median(distances))
+    if not distances.min() > LEAST_DISTANCE * max(distance, LEAST_DISTANCE):
         raise InputError("the two eye corners are in one place, required the outer corners of both eyes")
     if len(rigid) >= LEAST_RIGID:
         across = np.broadcast_to(across.mean(axis=0), across.shape)

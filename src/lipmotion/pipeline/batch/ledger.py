@@ -1,6 +1,6 @@
 """The ledger of a batch: one JSON object for every line that was finished, appended in the order of finishing.
 
-A line is finished in three steps: its outputs are written in a folder of their own, a receipt with their digests is
+A line is finished in three steps: its outputs are written under temporary names, a receipt with their digests is
 written, and the outputs are renamed. So whatever is killed at whatever moment, the next run knows of every output
 whether it is in place: by the ledger, or by a receipt and the digests in it.
 """
@@ -10,20 +10,22 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
 from lipmotion.errors import ExportError
-from lipmotion.pipeline.batch.lines import OWN_FOLDER, Line
+from lipmotion.pipeline.batch.lines import OWN_FOLDER, BatchLine
 from lipmotion.pipeline.batch.settings import InputFile, input_paths, line_fingerprint
-from lipmotion.storage.files import locked, sha256_of, whole_file
+from lipmotion.storage.files import TEMPORARY, locked, sha256_of, whole_file
 from lipmotion.storage.json_text import as_json, from_json
 
 LEDGER, RECEIPTS, WORK, RUN = "batch.jsonl", "receipts", "work", "run"
 DONE, FAILED = "done", "failed"
+STAGED = f"{TEMPORARY}batch-"
+"""Prefix of the names of outputs that are being written."""
 Record = dict[str, Any]
 """What the ledger holds of one line; its fields are listed in docs/batch.md."""
 
@@ -49,8 +51,15 @@ class Place:
         return self.own / RECEIPTS / f"{_key(name)}.json"
 
     def work(self, name: str) -> Path:
-        """Return the folder in which the outputs of the line ``name`` are written in this run."""
+        """Return the folder that exists while the line ``name`` is being done in this run."""
         return self.own / WORK / self.run / _key(name)
+
+    def staged(self, name: str, kind: str) -> Path:
+        """Return the path at which an output is written, beside its own, before it is renamed.
+
+        Beside it, because some formats refer to the sound by its path from their folder.
+        """
+        return (Path(self.out) / name).parent / f"{STAGED}{self.run[:8]}-{_key(name)[:16]}.{kind}"
 
     def is_current(self) -> bool:
         """Return whether no later run has begun in this folder."""
@@ -129,7 +138,7 @@ class Ledger:
             ) from error
         self._last[_key(record["name"])] = record["fingerprint"], start
 
-    def kept(self, line: Line, of_settings: str, out: Path) -> Record | None:
+    def kept(self, line: BatchLine, of_settings: str, out: Path) -> Record | None:
         """Return the record of a line that need not be done again; None: it must be done.
 
         It need not if it was done with the same settings from the same files, and all its outputs exist.
@@ -166,8 +175,10 @@ def _record(content: bytes) -> Record | None:
 
 
 @contextmanager
-def opened_ledger(place: Place) -> Iterator[Ledger]:
+def opened_ledger(place: Place, lines: Iterable[BatchLine] = ()) -> Iterator[Ledger]:
     """Open the ledger of a folder of outputs for a new run, and end what an earlier one left undone.
+
+    lines : those in whose folders unfinished outputs are searched
 
     Receipts whose outputs are in place are entered into the ledger; other unfinished work is deleted.
     Raises ExportError: another process is at work on the folder, or it cannot be written.
@@ -185,6 +196,9 @@ def opened_ledger(place: Place) -> Iterator[Ledger]:
         with file:
             ledger = Ledger(path, file)
             _settle(place, ledger)
+            for folder in {(Path(place.out) / line.name).parent for line in lines}:
+                for path in folder.glob(f"{STAGED}*"):
+                    _remove(path)
             yield ledger
         shutil.rmtree(place.own / WORK, ignore_errors=True)
         for name in (RECEIPTS, RUN):

@@ -30,7 +30,7 @@ MOST_NAMED = 3
 
 
 @dataclass(frozen=True)
-class Line:
+class BatchLine:
     """One recording of a batch.
 
     name       : relative path of its outputs without their suffixes, with ``/`` between folders; unique in the batch
@@ -45,7 +45,7 @@ class Line:
     speaker: str = ""
 
 
-def read_lines(source: Path, kinds: Sequence[str]) -> list[Line]:
+def read_lines(source: Path, kinds: Sequence[str]) -> list[BatchLine]:
     """Return the lines of a folder of recordings, or of a list of them, in their order.
 
     source : a folder, which is searched with its sub-folders; or a file: a path a line, or a table (``.csv``, ``.tsv``)
@@ -67,7 +67,7 @@ def read_lines(source: Path, kinds: Sequence[str]) -> list[Line]:
     return lines
 
 
-def check_names(lines: Iterable[Line], kinds: Sequence[str]) -> None:
+def check_names(lines: Iterable[BatchLine], kinds: Sequence[str]) -> None:
     """Raise ExportError if two outputs of a batch would be the same file, also where case does not count."""
     taken = dict.fromkeys(OWN_FILES, "the batch itself")
     for line in lines:
@@ -91,7 +91,7 @@ def _is_hidden(part: str) -> bool:
     return part.startswith(".")
 
 
-def _in_folder(folder: Path) -> list[Line]:
+def _in_folder(folder: Path) -> list[BatchLine]:
     check_listable(folder)
     found = []
     for root, folders, names in os.walk(folder):
@@ -100,7 +100,7 @@ def _in_folder(folder: Path) -> list[Line]:
             path = Path(root) / name
             if not _is_hidden(name) and _is_recording(path) and path.is_file():
                 inner = path.relative_to(folder).with_suffix("").as_posix()
-                found.append(Line(inner, os.path.abspath(path)))  # noqa: PTH100 # links are not followed
+                found.append(BatchLine(inner, os.path.abspath(path)))  # noqa: PTH100 # links are not followed
     return sorted(found, key=lambda line: line.name)
 
 
@@ -108,7 +108,7 @@ def _is_recording(path: Path) -> bool:
     return path.suffix.lower() in AUDIO_SUFFIXES | VIDEO_SUFFIXES
 
 
-def _in_list(source: Path, kinds: Sequence[str]) -> list[Line]:
+def _in_list(source: Path, kinds: Sequence[str]) -> list[BatchLine]:
     text = read_text_file(source, "list of recordings", LARGEST_LIST)
     rows = _table(source, text)
     if rows is None:
@@ -119,7 +119,7 @@ def _in_list(source: Path, kinds: Sequence[str]) -> list[Line]:
     unnamed = [path for path, name in zip(paths, names, strict=True) if not name]
     shared = _shared_folder(unnamed, base)
     return [
-        Line(
+        BatchLine(
             name or Path(os.path.relpath(path, shared)).with_suffix("").as_posix(),
             path,
             row.get("transcript", ""),

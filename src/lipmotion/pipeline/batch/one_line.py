@@ -6,6 +6,7 @@ import errno
 import logging
 import os
 import shutil
+import tempfile
 import threading
 import time
 from collections.abc import Iterator
@@ -22,7 +23,7 @@ from lipmotion.faces.base import Face
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.measures.closures import CLOSED_SHARE
 from lipmotion.motion.closure import OPENING, closable_ranges
-from lipmotion.pipeline.animate import animate, opened_face, with_articulation, write
+from lipmotion.pipeline.animate import animate, check_outputs, opened_face, with_articulation, write
 from lipmotion.pipeline.batch.ledger import (
     DONE,
     FAILED,
@@ -33,9 +34,9 @@ from lipmotion.pipeline.batch.ledger import (
     read_receipt,
     write_receipt,
 )
-from lipmotion.pipeline.batch.lines import Line
+from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.batch.settings import CUES, BatchSettings, input_files, line_fingerprint
-from lipmotion.pipeline.characters import with_curves
+from lipmotion.pipeline.characters import check_curve_set
 from lipmotion.pipeline.cues import cues, write_cues
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import SpeechRequest
@@ -47,6 +48,8 @@ LOG = logging.getLogger("lipmotion")
 ONE_AT_A_TIME = threading.Lock()
 """A worker of a cluster may have several threads: warnings and the threads of matrix products belong to a process."""
 MOST_WARNINGS = 10
+CUES_FPS = 24.0
+"""Frame rate of cues where none is given."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +59,7 @@ class LineWork:
     of_settings : from ``fingerprint_of``
     """
 
-    line: Line
+    line: BatchLine
     settings: BatchSettings
     of_settings: str
     place: Place
@@ -76,12 +79,14 @@ def finished_line(work: LineWork) -> Record:
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
         try:
-            return _finished(work, folder)
+            return _finished(work)
         finally:
+            for kind in work.settings.kinds:
+                work.place.staged(work.line.name, kind).unlink(missing_ok=True)
             shutil.rmtree(folder, ignore_errors=True)
 
 
-def _finished(work: LineWork, folder: Path) -> Record:
+def _finished(work: LineWork) -> Record:
     start_s = time.perf_counter()
     record: Record = {
         "name": work.line.name,
@@ -95,7 +100,7 @@ def _finished(work: LineWork, folder: Path) -> Record:
     with _kept_warnings() as warnings:
         try:
             record["inputs"] = [asdict(each) for each in input_files(work.line)]
-            generation = _written(work, folder)
+            generation = _written(work)
             record |= _findings(generation)
         except (LipMotionError, OSError, MemoryError) as error:
             if _is_final(error):
@@ -103,7 +108,7 @@ def _finished(work: LineWork, folder: Path) -> Record:
             record |= {"outcome": FAILED, "error": str(error) or type(error).__name__}
     record |= {"warnings": warnings[:MOST_WARNINGS], "seconds": round(time.perf_counter() - start_s, 4)}
     if record["outcome"] == DONE:
-        _put_in_place(work, folder, record)
+        _put_in_place(work, record)
     return record
 
 
@@ -113,10 +118,10 @@ def _is_final(error: BaseException) -> bool:
     return isinstance(cause, OSError) and cause.errno in (errno.ENOSPC, errno.EDQUOT)
 
 
-def _put_in_place(work: LineWork, folder: Path, record: Record) -> None:
+def _put_in_place(work: LineWork, record: Record) -> None:
     """Write the receipt, and rename the outputs; one that is in place from an earlier run is left alone."""
     out = Path(work.place.out)
-    staged = {f"{work.line.name}.{kind}": _staged(folder, work.line, kind) for kind in work.settings.kinds}
+    staged = {f"{work.line.name}.{kind}": work.place.staged(work.line.name, kind) for kind in work.settings.kinds}
     record["outputs"] = {name: sha256_of(path) for name, path in staged.items()}
     if not work.place.is_current():
         raise ExportError(f"{out}: another run of this batch has begun; this one ends")
@@ -124,47 +129,40 @@ def _put_in_place(work: LineWork, folder: Path, record: Record) -> None:
     for name, path in staged.items():
         target = out / name
         if not is_in_place(target, record["outputs"][name]):
-            target.parent.mkdir(parents=True, exist_ok=True)
             path.replace(target)
 
 
-def _staged(folder: Path, line: Line, kind: str) -> Path:
-    """Return the path at which an output is written before it is renamed; formats may store the name of the file."""
-    return folder / f"{line.name.rpartition('/')[2]}.{kind}"
-
-
-def _written(work: LineWork, folder: Path) -> Generation:
-    """Write the outputs of a line into a folder; return its motion. Raises as ``animate`` and ``write``."""
+def _written(work: LineWork) -> Generation:
+    """Write the outputs of a line under temporary names; return its motion. Raises as ``animate`` and ``write``."""
     line, settings = work.line, work.settings
     model = _model(settings.model, _stamp(settings.model))
     generation = animate(_request(line, settings), model=model)
-    plain = [_staged(folder, line, kind) for kind in settings.kinds if not kind.startswith(CUES)]
-    sheets = [(kind, _staged(folder, line, kind)) for kind in settings.kinds if kind.startswith(CUES)]
+    staged = {kind: work.place.staged(line.name, kind) for kind in settings.kinds}
+    next(iter(staged.values())).parent.mkdir(parents=True, exist_ok=True)
+    sheets = [kind for kind in settings.kinds if kind.startswith(CUES)]
     if sheets:
-        sheet = cues(generation) if settings.fps is None else cues(generation, fps=settings.fps)
-        for kind, path in sheets:
-            write_cues(sheet, path, speech=line.recording, form=kind.removeprefix(CUES))
+        sheet = cues(generation, fps=settings.fps or CUES_FPS, delivery=settings.delivery)
+        for kind in sheets:
+            write_cues(sheet, staged[kind], speech=line.recording, form=kind.removeprefix(CUES))
+    plain = [path for kind, path in staged.items() if kind not in sheets]
     if plain:
-        channels = list(settings.channels) or None
-        drawn = generation
-        if settings.curves:
-            drawn, names = with_curves(generation, settings.curves)
-            channels = channels or list(names)
         write(
-            with_articulation(drawn) if settings.articulation else drawn,
+            with_articulation(generation) if settings.articulation else generation,
             plain,
             speech=line.recording,
             model=model,
-            channels=channels,
+            channels=settings.channels or None,
             rate_hz=settings.rate_hz,
             fps=settings.fps,
             face=_face(settings.face, _stamp(settings.face)),
             staging=settings.staging,
+            delivery=settings.delivery,
+            curves=settings.curves or None,
         )
     return generation
 
 
-def _request(line: Line, settings: BatchSettings) -> SpeechRequest:
+def _request(line: BatchLine, settings: BatchSettings) -> SpeechRequest:
     """Return the request of a line, with the labels beside its recording where the row has no words."""
     labels = None if line.transcript else labels_beside(Path(line.recording))
     transcript = line.transcript or (labels.transcript if labels else None)
@@ -247,8 +245,19 @@ def _face(name: str, _: int) -> Face | FilmedFace:
 def check_line_settings(settings: BatchSettings) -> None:
     """Load what all lines need, so that a mistake in it ends the batch before its first line.
 
-    Raises InputError, ModelFormatError, ExportError: as ``load_model``, ``Lexicon.from_file``, ``opened_face``.
+    Raises InputError, ModelFormatError, ExportError: as ``load_model``, ``Lexicon.from_file``, ``check_outputs``.
     """
+    anywhere = Path(tempfile.gettempdir())
+    check_outputs(
+        [anywhere / f"line.{kind}" for kind in settings.kinds if not kind.startswith(CUES)],
+        rate_hz=settings.rate_hz,
+        fps=settings.fps,
+        face=_face(settings.face, _stamp(settings.face)),
+        staging=settings.staging,
+        delivery=settings.delivery,
+        with_sound=True,
+    )
+    if settings.curves:
+        check_curve_set(settings.curves)
     _model(settings.model, _stamp(settings.model))
     _lexicon(settings.lexicon, _stamp(settings.lexicon))
-    _face(settings.face, _stamp(settings.face))

@@ -12,7 +12,7 @@ from typing import Any
 from urllib.parse import quote
 
 from lipmotion.pipeline.batch.ledger import FAILED, Ledger, Record
-from lipmotion.pipeline.batch.lines import Line
+from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.speech.recognition import NOISY_DB
 from lipmotion.storage.files import as_text, whole_file
 from lipmotion.types.generation import ALL_FITS
@@ -29,7 +29,7 @@ SURE_OF_WORDS = 0.8
 """Words that were recognised with less confidence deserve an ear."""
 
 
-def write_reports(lines: Sequence[Line], ledger: Ledger, out: Path) -> tuple[Path, Path]:
+def write_reports(lines: Sequence[BatchLine], ledger: Ledger, out: Path) -> tuple[Path, Path]:
     """Write the reports of some lines into a folder, the most doubtful line first; return their paths.
 
     Raises ExportError: they cannot be written.
@@ -71,7 +71,7 @@ def doubt_of(record: Record) -> float:
     return round(min(doubt, 99.0), 1)
 
 
-def _records(lines: Sequence[Line], ledger: Ledger, order: Sequence[int]) -> Iterator[Record]:
+def _records(lines: Sequence[BatchLine], ledger: Ledger, order: Sequence[int]) -> Iterator[Record]:
     for number in order:
         record = ledger.record_of(lines[number].name) or {"name": lines[number].name, "outcome": "missing"}
         yield record | {"doubt": doubt_of(record), "outputs": list(record.get("outputs", ()))}

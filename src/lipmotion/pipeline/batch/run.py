@@ -11,7 +11,7 @@ from pathlib import Path
 
 from lipmotion.errors import CorpusError, ExportError
 from lipmotion.pipeline.batch.ledger import FAILED, Place, Record, opened_ledger
-from lipmotion.pipeline.batch.lines import Line, check_names, read_lines
+from lipmotion.pipeline.batch.lines import BatchLine, check_names, read_lines
 from lipmotion.pipeline.batch.one_line import LineWork, check_line_settings, finished_line
 from lipmotion.pipeline.batch.pool import Pool, WorkerDied, cluster_pool, died_alone, local_pool
 from lipmotion.pipeline.batch.report import write_reports
@@ -48,7 +48,7 @@ class BatchSummary:
 
 
 def batch(
-    source: str | Path | Sequence[Line],
+    source: str | Path | Sequence[BatchLine],
     out: str | Path,
     settings: BatchSettings | None = None,
     *,
@@ -90,7 +90,7 @@ def batch(
     _check_outside(lines, place)
     check_line_settings(settings)
     of_settings = fingerprint_of(settings)
-    with opened_ledger(place) as ledger:
+    with opened_ledger(place, lines) as ledger:
         counter = _Counter(len(lines), monitor)
         waiting = []
         for line in lines:
@@ -109,7 +109,7 @@ def batch(
     return BatchSummary(counter.done, counter.kept, counter.failed, csv, html)
 
 
-def _check_outside(lines: Sequence[Line], place: Place) -> None:
+def _check_outside(lines: Sequence[BatchLine], place: Place) -> None:
     """Raise ExportError if a recording lies in the folder of the outputs, where an output could replace it."""
     inside = os.path.realpath(place.out) + os.sep
     for line in lines:

@@ -14,11 +14,13 @@ from lipmotion.corpora.labels import label_files_beside
 from lipmotion.errors import ExportError
 from lipmotion.export.base import motion_suffixes
 from lipmotion.export.cues import CUE_FORMATS
-from lipmotion.export.textgrid import TEXTGRID_SUFFIX
+from lipmotion.export.timed_labels import LABEL_SUFFIXES
 from lipmotion.faces.base import Staging
-from lipmotion.pipeline.batch.lines import Line
+from lipmotion.motion.delivery import Delivery
+from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.drawn_video import VIDEO_SUFFIXES
 from lipmotion.pipeline.model import shipped_path
+from lipmotion.pipeline.scenes import SCENE_SUFFIXES
 from lipmotion.storage.files import sha256_of
 from lipmotion.storage.json_text import as_json
 
@@ -30,19 +32,22 @@ CUES = "cues."
 class BatchSettings:
     """What is made of every recording of a batch, and how.
 
-    kinds        : suffixes of the outputs without the first dot: ``json``, ``csv``, ``npz``, ``TextGrid``, ``mp4``,
-                   ``webm``, ``mov``, ``cues.tsv``, ``cues.xml``, ``cues.json``, ``cues.dat``
+    kinds        : suffixes of the outputs without the first dot: those of ``lipmotion.write`` (``json``, ``csv``,
+                   ``livelink.csv``, ``glb``, ``TextGrid``, ``mp4`` …), and ``cues.tsv``, ``cues.xml``, ``cues.json``,
+                   ``cues.dat``
     recogniser   : of recordings without a transcript, as of ``SpeechRequest``
     speaker      : of lines that name none
     model        : path of the model file; empty: the shipped model
     lexicon      : path of a file of pronunciations; empty: none
     channels     : of motion files; empty: all of the motion
-    curves       : instead of channels: ``arkit``, ``visemes``, ``fap``, or the path of the table of a rig (``.csv``)
+    curves       : what motion files hold instead of the motion: ``arkit``, ``visemes``, ``fap``, or the path of the
+                   table of a rig (``.csv``)
     articulation : whether motion files get the articulatory channels
     rate_hz      : frames per second of motion files; None: 100
     fps          : frames per second of videos and cues; None: 25 and 24
     face         : of videos, a name or the path of a file
     staging      : of that face
+    delivery     : intensity, anticipation, offset and held poses of every output
 
     >>> BatchSettings(kinds=("json", "cues.tsv")).recogniser
     'auto'
@@ -60,11 +65,12 @@ class BatchSettings:
     fps: float | None = None
     face: str = "portrait"
     staging: Staging = field(default_factory=Staging)
+    delivery: Delivery = field(default_factory=Delivery)
 
 
 def possible_kinds() -> tuple[str, ...]:
     """Return the kinds of outputs that a batch can write, without the first dot."""
-    plain = (*motion_suffixes(), TEXTGRID_SUFFIX, *VIDEO_SUFFIXES)
+    plain = (*motion_suffixes(), *LABEL_SUFFIXES, *VIDEO_SUFFIXES, *SCENE_SUFFIXES)
     return (*(suffix.removeprefix(".") for suffix in plain), *(f"{CUES}{name}" for name in CUE_FORMATS))
 
 
@@ -98,7 +104,7 @@ def installed_version() -> str:
         return "source"
 
 
-def line_fingerprint(line: Line, of_settings: str) -> str:
+def line_fingerprint(line: BatchLine, of_settings: str) -> str:
     """Return a digest of what a line's row says, and of the settings; not of the content of its files."""
     return _digest(as_json([of_settings, line.name, line.recording, line.transcript, line.speaker]))
 
@@ -127,13 +133,13 @@ class InputFile:
             return False
 
 
-def input_paths(line: Line) -> list[Path]:
+def input_paths(line: BatchLine) -> list[Path]:
     """Return the files that are read for a line: its recording and, if the row has no words, its label files."""
     recording = Path(line.recording)
     return [recording] + ([] if line.transcript else label_files_beside(recording))
 
 
-def input_files(line: Line) -> list[InputFile]:
+def input_files(line: BatchLine) -> list[InputFile]:
     """Return the files of ``input_paths`` as they are now. Raises OSError: one cannot be read."""
     found = []
     for path in input_paths(line):

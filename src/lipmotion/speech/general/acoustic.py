@@ -64,10 +64,13 @@ class GeneralModel:
 
     def _stream(self, number: int, x: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return the log densities of frames in one stream [shape=(n, P·3)]."""
-        logs = np.concatenate([x, x * x], axis=1) @ self.forms[number] + self.constants[number]
+        logs = np.concatenate([x, x * x], axis=1) @ self.forms[number]
+        logs += self.constants[number]  # in place, here and below: new arrays of this size cost more than the sums
         logs = logs.reshape(len(x), len(PHONES), GAUSSIANS)
         best = logs.max(axis=2, keepdims=True)
-        mixed = np.matmul(np.exp(logs - best).transpose(1, 0, 2), self.weights[number]).transpose(1, 0, 2)
+        logs -= best
+        np.exp(logs, out=logs)
+        mixed = np.matmul(logs.transpose(1, 0, 2), self.weights[number]).transpose(1, 0, 2)
         return (np.log(np.maximum(mixed, np.float32(1e-30))) + best).reshape(len(x), -1)
 
 
