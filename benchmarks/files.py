@@ -23,6 +23,11 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import lipmotion
 from lipmotion.addons.blender.curves import at_frames
 from lipmotion.export.addon import write_addon
+from lipmotion.faces.character.lips import COLUMNS, VISIBLE
+from lipmotion.faces.character.performance import head_poses
+from lipmotion.faces.character.shape_fit import mouth_weights
+from lipmotion.faces.character.shapes import head_mesh
+from lipmotion.faces.character.stage import figure
 from lipmotion.pipeline.characters import with_curves
 from lipmotion.pipeline.drawn_video import prosody_heard
 from lipmotion.pipeline.scenes import character_scene, head_scene, write_scene
@@ -46,6 +51,7 @@ def main() -> None:
         sound.write_bytes((EXAMPLES / sound.name).read_bytes())
         result = lipmotion.animate(sound, transcript=EXAMPLES / "welcome.txt")
         heard = prosody_heard(sound)
+        print(json.dumps(fit(result)), flush=True)
         makers = {"head": lambda: head_scene(result, prosody=heard)}
         for path in options.characters:
             makers[path.stem] = lambda path=path: character_scene(result, driven_character(path), prosody=heard)
@@ -61,6 +67,35 @@ def main() -> None:
                 about = {"file": path.name, "bytes": path.stat().st_size, "seconds": seconds}
                 print(json.dumps(about | asked(path, scene)), flush=True)
         keyed(folder, result, sound)
+
+
+def fit(result: Generation) -> dict[str, object]:
+    """Return how far the lips of the 3D head's mesh are from where its videos show them, in eye distances."""
+    character = figure()
+    mesh = head_mesh(character)
+    poses = head_poses(result.motion, result.units, 100.0)
+    curves = mouth_weights(character, mesh, poses)
+    lips = character.skin.lip_rows()[:VISIBLE]
+    rows, ring = lips.ravel(), slice((VISIBLE - 1) * COLUMNS, VISIBLE * COLUMNS)
+    moved = mesh.displacements(rows)
+    apart, gaps, closed = [], [], []
+    for number, pose in enumerate(poses):
+        summed = mesh.vertices[rows] + sum(
+            curve[number] * moved[mesh.shape_names.index(name)] for name, curve in curves.items()
+        )
+        drawn = character.skin.places(pose)[rows]
+        both = [gap_of(each[ring]) for each in (summed, drawn)]
+        apart.append(float(np.abs(summed - drawn).max()))
+        gaps.append(abs(both[0] - both[1]))
+        closed += [both[0] - gap_of(mesh.vertices[rows][ring])] if abs(pose.gap) < 1e-9 else []
+    about = {"frames": len(poses), "lips": max(apart), "median": float(np.median(apart))}
+    return {"fit": about | {"gap": max(gaps), "closed": max(closed), "closed frames": len(closed)}}
+
+
+def gap_of(edge: np.ndarray) -> float:
+    """Return the largest gap between upper and lower lip along their edge [shape=(COLUMNS, 3)]."""
+    half = COLUMNS // 2
+    return float((edge[1:half] - edge[:half:-1])[:, 1].max())
 
 
 def size(scene: Scene) -> dict[str, int]:
@@ -87,10 +122,17 @@ def asked(path: Path, scene: Scene) -> dict[str, object]:
         about = {"version": usd["version"], "validators": usd["validators"], "errors": len(usd["errors"])}
         found["OpenUSD"] = about | {"largest_error": error}
     if python_with("bpy"):
-        blender = run_with("bpy", "blender_scene.py", path, *times_s)
-        error = largest_error(scene, times_s, blender["values"])
-        found["Blender"] = {"version": blender["version"], "largest_error": error}
+        found["Blender"] = played(path, scene, times_s)
     return found
+
+
+def played(path: Path, scene: Scene, times_s: np.ndarray) -> dict[str, object]:
+    """Return what Blender plays of a scene's file."""
+    try:
+        blender = run_with("bpy", "blender_scene.py", path, *times_s)
+    except AssertionError as refusal:
+        return {"refused": str(refusal).strip().splitlines()[-1]}
+    return {"version": blender["version"], "largest_error": largest_error(scene, times_s, blender["values"])}
 
 
 def largest_error(scene: Scene, times_s: np.ndarray, values: list[dict[str, float]]) -> float:
@@ -121,8 +163,8 @@ def keyed(folder: Path, result: Generation, sound: Path) -> None:
         user = Path(tempfile.mkdtemp(dir=folder))
         try:
             found = run_with("bpy", "blender_keys.py", *arguments, folder=user)
-        except AssertionError as error:
-            print(json.dumps({"keyed by": name, "failed": str(error)[-300:]}))
+        except AssertionError as refusal:
+            print(json.dumps({"keyed by": name, "refused": str(refusal).strip().splitlines()[-1]}))
             continue
         values = np.array([frame["face"] for frame in found["frames"]])
         error = float(np.abs(values - expected).max())

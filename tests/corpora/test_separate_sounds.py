@@ -30,6 +30,13 @@ def test_a_recorder_belongs_to_its_recording(studio):
     assert found.problems["gone"] == "in offsets.csv, but there is no such recording"
 
 
+def test_one_video_of_many_has_its_own_row(studio):
+    (studio / "offsets.csv").write_text("name,offset_ms\na,7\nothers,3\n")
+    found = with_separate_sounds(discover(studio), studio, is_whole=False)
+    assert found.recordings[0].offset_s == pytest.approx(0.007)
+    assert "others" not in found.problems
+
+
 def test_without_them_nothing_changes(studio):
     (studio / "a.recorder.flac").unlink()
     found = with_separate_sounds(discover(studio), studio)

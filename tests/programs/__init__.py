@@ -12,6 +12,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -33,8 +34,11 @@ def run_with(module: str, script: str, *arguments: object, folder: Path | None =
     """Run a script of this folder in the interpreter that has a module; return the JSON of its last line."""
     python = python_with(module)
     assert python is not None, f"no Python with {module}"
-    environment = {**os.environ, "PYTHONPATH": "", "BLENDER_USER_RESOURCES": str(folder or "")}
-    return _json_of([python, str(FOLDER / script), *map(str, arguments)], environment)
+    with (
+        tempfile.TemporaryDirectory() as temporary
+    ):  # for the caches of Blender
+        own = {"PYTHONPATH": "", "BLENDER_USER_RESOURCES": str(folder or temporary)}
+        return _json_of([python, str(FOLDER / script), *map(str, arguments)], {**os.environ, **own})
 
 
 @cache

@@ -6,9 +6,14 @@ import numpy as np
 import pytest
 
 from lipmotion.rig.blendshape_motion import REST_OPENING, arkit_weights, given_weights, is_of_blendshapes, with_mouth
+from lipmotion.rig.driven import DrivenCharacter
+from lipmotion.rig.face_shapes import face_shapes
+from lipmotion.rig.lip_placement import placed_by_shape
 from lipmotion.rig.reference_mouth import arkit_mouth
 from lipmotion.rig.shape_weights import shape_weights
-from lipmotion.types import WEIGHT, Channel, Motion
+from lipmotion.rig.surface import mesh_surface
+from lipmotion.types import WEIGHT, Channel, Motion, Timeline
+from rig.heads import head
 from rig.speech import motion, units
 
 
@@ -62,3 +67,17 @@ def test_weights_that_are_given_are_taken() -> None:
     assert given["mouthFunnel"].tolist() == [0.0, 0.0]
     assert given_weights(motion(), arkit_mouth()) is None
     assert given_weights(weights(mouthPucker=[0.1, 0.2]), arkit_mouth()) is None
+
+
+def test_a_mesh_shows_the_weights_that_are_given() -> None:
+    mesh = head()
+    placement = placed_by_shape(mesh, mesh_surface(mesh))
+    character = DrivenCharacter(mesh, placement, face_shapes(mesh, placement), None)
+    assert character.shapes is not None
+    moved = with_mouth(weights(jawOpen=[0.0, 0.25, 0.5], mouthClose=[0.0] * 3))
+    rest, half, whole = character.vertices(moved, Timeline(()), np.arange(3) / 100)
+    jaw = next(
+        shape for shape in mesh.shapes if shape.name == character.shapes.names[character.shapes.row("jawOpen") or 0]
+    )
+    assert (whole - rest)[jaw.rows] == pytest.approx(0.5 * jaw.displacements, abs=1e-9)
+    assert (half - rest)[jaw.rows] == pytest.approx(0.25 * jaw.displacements, abs=1e-9)

@@ -26,7 +26,8 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
     parser = verbs.add_parser("animate", help="turn speech into lip motion or an animated face")
     add_speech_arguments(parser, several=True)
-    add_result_arguments(parser, "FILE.mp4 .webm .mov %%05d.png .json .csv .npz .TextGrid, or several; FOLDER/; -")
+    files = "FILE.mp4 .webm .mov %%05d.png .json .csv .npz .TextGrid .vtt, ... (docs/formats.md); FOLDER/; -"
+    add_result_arguments(parser, files)
     posteriors = "draw the posterior probabilities of the chains' units over time (coupled models)"
     add_output(parser, "--posteriors", metavar="FILE.png", help=posteriors)
     for add_more in (add_kinds_argument, add_pipe_format, add_execution):

@@ -24,7 +24,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add_input(parser, "--sound", what="recording", metavar="FILE", help=sound)
     phones = "phones in time for motion without them: they move tongue and lips where the channels do not"
     add_input(parser, "--units", what="units file", replaceable=True, metavar="FILE", help=phones)
-    add_result_arguments(parser, "FILE.mp4 .webm .mov %%05d.png .json .csv .npz .TextGrid, or several")
+    add_result_arguments(parser, "FILE.mp4 .webm .mov %%05d.png .json .csv .npz .TextGrid .vtt, ... (docs/formats.md)")
     add_pipe_format(parser)
     add_machine_readable(parser)
     parser.set_defaults(run=run)

@@ -27,7 +27,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--voices", action="store_true", help="list the installed voices")
     for add_argument in (add_lexicon_argument, add_model_argument, add_speaker_argument, add_onto_arguments):
         add_argument(parser)
-    suffixes = "FILE.mp4 .webm .mov %%05d.png .wav .flac .ogg .json .csv .npz .TextGrid, or several"
+    suffixes = "FILE.mp4 .webm .mov %%05d.png .wav .flac .ogg .json .csv .npz .TextGrid .vtt, ... (docs/formats.md)"
     add_result_arguments(parser, suffixes, required=False)
     add_machine_readable(parser)
     parser.set_defaults(run=run, wrong=parser.error)

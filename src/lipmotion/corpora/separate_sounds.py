@@ -20,11 +20,13 @@ LARGEST_TABLE = 1 << 22
 LARGEST_OFFSET_S = 6 * 3600.0
 
 
-def with_separate_sounds(folder: RecordingFolder, directory: Path, offset_s: float | None = None) -> RecordingFolder:
+def with_separate_sounds(
+    folder: RecordingFolder, directory: Path, offset_s: float | None = None, *, is_whole: bool = True
+) -> RecordingFolder:
     """Return the recordings with the sounds of their recorders, and with the offsets of the table ``offsets.csv``.
 
     offset_s : by how much the sound of each recording that is not in the table is late; None: that is not known
-    Names of the table without a recording become problems.
+    is_whole : whether these are all recordings of the folder: names of the table without one then become problems
     Raises CorpusError: the table is damaged. Raises InputError: an offset that no recording has.
     """
     if offset_s is not None:
@@ -39,7 +41,9 @@ def with_separate_sounds(folder: RecordingFolder, directory: Path, offset_s: flo
             continue
         recordings.append(replace(recording, recorder=sound, offset_s=table.get(recording.name, offset_s)))
     known = {recording.name for recording in folder.recordings} | problems.keys()
-    problems |= {name: f"in {OFFSETS}, but there is no such recording" for name in table if name not in known}
+    problems |= {
+        name: f"in {OFFSETS}, but there is no such recording" for name in table if is_whole and name not in known
+    }
     return RecordingFolder(folder.kind, tuple(recordings), problems)
 
 

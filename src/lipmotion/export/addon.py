@@ -27,13 +27,13 @@ license = ["SPDX:MIT"]
 [permissions]
 files = "Reads the motion file and the sound that you choose"
 """
-"""What makes the archive an extension (Blender 4.2 and later); older ones read ``bl_info``."""
+"""What makes the archive an extension; as an add-on of the older kind, Blender reads ``bl_info``."""
 
 
 def write_addon(program: str, path: str | Path) -> None:
     """Write the add-on for a program to a file.
 
-    program : ``blender``: a ``.zip`` that Blender 3.6 and later installs from disk
+    program : ``blender``: a ``.zip`` that Blender 4.2 and later installs from disk
     Raises ExportError: no such program, another suffix, or the file cannot be written.
     """
     path = Path(path)

@@ -210,7 +210,7 @@ def write(
                 )
                 write_film(path, frames, played, mark=film.mark, monitor=monitor)
             else:
-                staged = staged_intensity(staging, delivery, shown_face)
+                staged = staged_intensity(staging, delivery, shown_face, generation, character)
                 write_drawn_face(path, seen, played, hertz, shown_face, staged, monitor)
         elif path in scenes:
             scene = scene or delivered_scene(generation, delivery, shown_face, rate_hz, staging=staging, prosody=heard)

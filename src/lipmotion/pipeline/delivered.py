@@ -57,8 +57,8 @@ def shown(
     (``staged_intensity``).
     character : whose weights are shown, if the face is a character with blendshapes
     """
-    moved = generation if isinstance(face, Stageable) else _larger(generation, delivery.intensity)
-    moved = moved_in_time(moved, delivery)
+    by_face = _enlarges(face, generation, delivery, character)
+    moved = moved_in_time(generation if by_face else _larger(generation, delivery.intensity), delivery)
     if is_of_blendshapes(moved.motion):
         moved = _with(moved, with_mouth(moved.motion))
     frames = delivery.hold_frames(fps)
@@ -107,11 +107,28 @@ def moved_prosody(prosody: Prosody, delivery: Delivery) -> Prosody:
     return Prosody(np.concatenate([quiet, prosody.level_db]), np.concatenate([quiet * np.nan, prosody.log_f0]))
 
 
-def staged_intensity(staging: Staging, delivery: Delivery, face: Face | FilmedFace) -> Staging:
-    """Return how a face is shown, with the intensity of the delivery where the face makes movements larger itself."""
-    if delivery.intensity == 1 or not isinstance(face, Stageable):
+def staged_intensity(
+    staging: Staging,
+    delivery: Delivery,
+    face: Face | FilmedFace,
+    generation: Generation,
+    character: DrivenCharacter | None = None,
+) -> Staging:
+    """Return how a face is shown, with the intensity of the delivery where the face makes movements larger itself.
+
+    generation, character : as of ``shown``
+    """
+    if delivery.intensity == 1 or not _enlarges(face, generation, delivery, character):
         return staging
     return replace(staging, intensity=staging.intensity * delivery.intensity)
+
+
+def _enlarges(
+    face: Face | FilmedFace, generation: Generation, delivery: Delivery, character: DrivenCharacter | None
+) -> bool:
+    """Return whether a face makes movements larger itself: one that can be staged, and is not moved by weights."""
+    weighed = is_of_blendshapes(generation.motion) or (character is not None and delivery.hold_ms > 0)
+    return isinstance(face, Stageable) and not weighed
 
 
 def _with(generation: Generation, motion: Motion) -> Generation:

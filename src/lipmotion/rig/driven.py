@@ -75,13 +75,16 @@ class DrivenCharacter:
         others    : weights of ARKit's blendshapes of eyes and brows, 0 to 1 [each shape=(T,)]; those that the mesh does
                     not have are left out; None: they stay at rest
         intensity : 1: movements of the mouth as spoken; more: larger. Closed lips stay closed
-        A closure between two times is shown at the nearer one.
+        A closure between two times is shown at the nearer one. Motion that has weights for the blendshapes is shown as
+        it is, without the intensity.
         Raises InputError: as ``point_motion``.
         """
         points = point_motion(motion, units).scaled(intensity)
         beside = self._beside(others or {}, len(time_s))
         if self.shapes is not None:
-            solved = shape_weights(motion, units, self.shapes, SolverOptions(intensity=intensity)).values
+            given = given_weights(motion, self.shapes)
+            solving = SolverOptions(intensity=intensity)
+            solved = (given or shape_weights(motion, units, self.shapes, solving)).values
             rows = at_times(solved.astype(np.float64), points.gap, motion.rate_hz, time_s)
             for row, other in zip(rows, beside, strict=True):
                 yield self._shaped(row @ self._displacements, other)

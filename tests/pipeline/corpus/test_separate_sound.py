@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from lipmotion.corpora.source_recordings import SourceRecording
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError
 from lipmotion.export.base import write_motion
 from lipmotion.export.sound import write_sound
+from lipmotion.pipeline.corpus import long_videos as module
 from lipmotion.pipeline.corpus.prepare import prepare
 from lipmotion.pipeline.corpus.separate_sound import SeparateSound, in_step, on_own_time
+from lipmotion.speech.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Generation, Motion, StateTrace, Timeline, Track
 from speech.recorded_twice import RATE_HZ, clap, recorded_twice, speech_like
 
@@ -59,6 +63,14 @@ def test_the_recorders_sound_is_used_from_the_right_moment(studio, tmp_path):
     assert prepare(studio, tmp_path / "corpus", workers=1).kept == ("take",)
     (studio / "take.recorder.wav").write_bytes((studio / "take.wav").read_bytes())
     assert prepare(studio, tmp_path / "corpus", workers=1).prepared == ("take",)
+
+
+def test_a_long_video_gets_the_recorders_sound_in_its_own_time(studio):
+    recording = SourceRecording("take", studio / "take.wav", None, recorder=studio / "take.recorder.wav")
+    own, placed = read_audio(studio / "take.wav"), module._sound_of(recording)
+    assert len(placed.samples) == len(own.samples)
+    assert np.abs(placed.samples).argmax() == pytest.approx(np.abs(own.samples).argmax(), abs=40)
+    assert module._sound_of(replace(recording, recorder=None)).samples.tolist() == own.samples.tolist()
 
 
 def test_a_given_offset_is_used(studio, tmp_path):

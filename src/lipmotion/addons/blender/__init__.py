@@ -10,7 +10,7 @@ bl_info = {
     "name": "lipmotion",
     "author": "lipmotion",
     "version": (0, 1, 0),
-    "blender": (3, 6, 0),
+    "blender": (4, 2, 0),
     "location": "3D View > Sidebar > lipmotion",
     "description": "Keys shape keys and bones from files of lip motion",
     "category": "Animation",

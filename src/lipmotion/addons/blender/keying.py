@@ -1,4 +1,4 @@
-"""Keys for Blender: curves become keys of shape keys, bones and custom properties. Runs inside Blender, 3.6 and later;
+"""Keys for Blender: curves become keys of shape keys, bones and custom properties. Runs inside Blender, 4.2 and later;
 no imports of lipmotion.
 """
 

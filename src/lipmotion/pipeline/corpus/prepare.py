@@ -133,7 +133,8 @@ def prepare(
         raise InputError(f"{workers} processes, required at least 1; leave it out for one a core")
     check_apart((), [Source(directory, "folder of recordings")], folders=[output])
     folder, place = _found(directory)
-    folder = with_separate_sounds(folder, place, None if offset_ms is None else offset_ms / 1000)
+    offset_s = None if offset_ms is None else offset_ms / 1000
+    folder = with_separate_sounds(folder, place, offset_s, is_whole=directory.is_dir())
     packages = package_versions() if any(item.motion_file is None for item in folder.recordings) else {}
     is_new = not is_folder(output)
     with locked(output):
