@@ -98,8 +98,8 @@ class MouthPainter:
         on.paint(top, np.minimum(top + 0.028 * (1 - 0.4 * pose.tuck), bottom), across, art.lip_shadow)
         if line := self._lips.outline:
             part = (0.8 - 0.35 * pose.tuck) * line * np.minimum((bottom - top) / 0.01, 1)
-            out = np.maximum(bottom, within.tongue_bottom) if pose.tongue > 0.6 else bottom
-            for edge in (top, out):
+            front = np.maximum(bottom, within.tongue_bottom) if pose.tongue > 0.6 else bottom
+            for edge in (top, front):
                 on.paint(edge - part / 2, edge + part / 2, across, art.outline)
 
 
