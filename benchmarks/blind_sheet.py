@@ -10,8 +10,9 @@ width and outer height in the motion are the nearest to the medians of that soun
 ``character.py``, or of the photographs of ``photographs.py``). They are shuffled, enlarged and numbered; the key says
 which sound is behind which number. The reader names one of the ten for every number, each once. ``--score`` counts
 the right ones: of the sounds, and of the visemes (p b m look alike on people, too, and so do f and v). With
-``--tokens`` that many mouths are shown, each of a random sound and a random phone of it: sounds may come twice or not at
-all, and nothing follows by elimination. For the portrait of an earlier version: PYTHONPATH=OLD/src, ``--face portrait``.
+``--tokens`` that many mouths are shown, each of a random sound and a random phone of it: sounds may come twice or not
+at all, and nothing follows by elimination. For the portrait of an earlier version: PYTHONPATH=OLD/src, ``--face
+portrait``.
 """
 
 from __future__ import annotations
