@@ -11,6 +11,7 @@ from lipmotion.export.base import motion_format, motion_suffix
 from lipmotion.faces.base import Staging
 from lipmotion.pipeline.characters import ARKIT, WHOLE_FACE, beside, curves_of
 from lipmotion.pipeline.living_curves import RADIAN, living_curves
+from lipmotion.rig.blendshape_motion import with_mouth
 from lipmotion.rig.driven import at_times
 from lipmotion.rig.facial_animation import FAP
 from lipmotion.rig.point_motion import point_motion
@@ -69,9 +70,9 @@ def _curves(generation: Generation, name: str, staging: Staging | None, prosody:
     own = _held_already(motion, name)
     if own is None:
         return curves_of(motion, units, name, staging=staging, prosody=prosody)
-    if name != WHOLE_FACE or OPENING not in motion.names:
+    if name != WHOLE_FACE:
         return own
-    living = living_curves(motion, units, staging, prosody)
+    living = living_curves(with_mouth(motion), units, staging, prosody)
     added = [column for column, name in enumerate(living.names) if name not in own.names]
     channels = tuple(living.channels[column] for column in added)
     return beside(own, Motion(living.values[:, added], motion.rate_hz, channels))

@@ -51,9 +51,10 @@ def planned_outputs(recordings: Sequence[Path], outputs: Sequence[str], kinds: S
     templates: list[str] = []
     for output in outputs:
         if not is_for_several(output):
+            example = f"{NAME}{Path(output).suffix or '.json'}"
             raise ExportError(
-                f"{output}: is one file, and there are {len(recordings)} recordings; give a folder, or {NAME} in the "
-                f"name of the file: 'out/{NAME}{Path(output).suffix}'"
+                f"{output}: is one file, and there are {len(recordings)} recordings; give a folder, with a slash at its "
+                f"end ({Path(output).with_suffix('')}/), or {NAME} in the name of the file: 'out/{example}'"
             )
         is_template = NAME in output
         templates += [output] if is_template else [str(Path(output) / f"{NAME}.{kind}") for kind in kinds]
