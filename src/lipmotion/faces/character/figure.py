@@ -28,7 +28,7 @@ Real = NDArray[np.float64]
 
 PIVOT = np.array([0.0, -0.75, -0.9])
 """The head turns about this place, the top of the neck."""
-TONGUE_LIGHT, LOWER_TEETH_LIGHT = 1.35, 0.62
+TONGUE_LIGHT, LOWER_TEETH_LIGHT = 1.35, 0.5
 """The tongue is wet, and drawn brighter than the rest of the mouth; the lower teeth lie in the shade of the upper."""
 SEAM_LIGHT = (0.90, 0.76, 0.58, 0.38, 0.24)
 """The part of the light that arrives beside the seam of closed lips, at the rings that end there: a soft line."""
@@ -184,8 +184,8 @@ class Figure:
         def inside(places: Real) -> Real:
             depth = (0.93 - 0.22 * open_) * np.clip((front - places[:, 2] - 0.10) / (0.22 + 0.8 * span), 0, 1)
             under = np.clip((top - places[:, 1] + 0.01) / 0.05, 0, 1)
-            aside = np.clip(1.35 - (places[:, 0] / half) ** 2, 0, 1)
-            return shade * (1 - depth) ** 1.5 * (0.7 + 0.3 * under) * (0.35 + 0.65 * aside)
+            aside = np.clip(1.15 - 1.15 * (places[:, 0] / half) ** 2, 0, 1)
+            return shade * (1 - depth) ** 1.5 * (0.7 + 0.3 * under) * (0.12 + 0.88 * aside)
 
         return inside
 

@@ -16,7 +16,7 @@ from lipmotion.faces.character.skin import jaw_moved
 Real = NDArray[np.float64]
 
 _UPPER_EDGES = (0.0, 0.062, 0.112, 0.155, 0.192, 0.224, 0.252, 0.274)
-_LOWER_EDGES = (0.0, 0.040, 0.082, 0.125, 0.165, 0.202, 0.235, 0.26)
+_LOWER_EDGES = (0.0, 0.036, 0.074, 0.114, 0.150, 0.183, 0.212, 0.236)
 """Where teeth touch their neighbours: distances from the middle, seen from the front."""
 LOWER_EDGE = TEETH_EDGE + 0.006
 """Height of the edge of the lower incisors, behind the upper ones, when the jaw is closed."""

@@ -21,7 +21,7 @@ COLUMNS = 2 * _UPPER - 2
 REST_HALF_WIDTH = 0.268
 TEETH_Z = -0.055
 """Front of the incisors."""
-TEETH_EDGE = MOUTH_Y - 0.008
+TEETH_EDGE = MOUTH_Y - 0.017
 """Height of the edge of the upper incisors; they belong to the skull."""
 ARCH = 1.15
 """Curvature of lips and teeth seen from above: how far they lie back, over x squared."""
