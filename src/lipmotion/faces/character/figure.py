@@ -182,7 +182,7 @@ class Figure:
         shade, open_ = 1 - 0.92 * pose.roundness**1.1, min(span / 0.25, 1.0)
 
         def inside(places: Real) -> Real:
-            depth = (0.93 - 0.22 * open_) * np.clip((front - places[:, 2] - 0.10) / (0.22 + 0.8 * span), 0, 1)
+            depth = (0.93 - 0.27 * open_) * np.clip((front - places[:, 2] - 0.10) / (0.22 + 0.8 * span), 0, 1)
             under = np.clip((top - places[:, 1] + 0.01) / 0.05, 0, 1)
             aside = np.clip(1.15 - 1.15 * (places[:, 0] / half) ** 2, 0, 1)
             return shade * (1 - depth) ** 1.5 * (0.7 + 0.3 * under) * (0.12 + 0.88 * aside)

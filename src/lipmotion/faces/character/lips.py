@@ -39,7 +39,7 @@ ROUND_DROP = 0.016
 _KNOTS = np.array([0, 0.22, 0.5, 0.72, 0.88, 0.98, 1.12, 1.4])
 _AT = np.array([0.0, 0.09, 0.2, 0.31, 0.41, 0.5, 0.58, 0.66, 0.74, 0.81, 0.88, 0.94, 1.0, 1.12, 1.4])
 _SECTION: Real = np.asarray(CubicSpline(_KNOTS, np.eye(len(_KNOTS)))(_AT))
-_WALL = ((0.3, -0.16), (0.5, -0.30), (0.8, -0.40), (1.0, -0.42))
+_WALL = ((0.10, -0.16), (0.26, -0.30), (0.7, -0.40), (1.0, -0.42))
 """Rings behind the lips: how far towards the middle of the throat, and how far back."""
 RINGS = len(_AT) + len(_WALL)
 VISIBLE = 11
