@@ -30,7 +30,7 @@ PIVOT = np.array([0.0, -0.75, -0.9])
 """The head turns about this place, the top of the neck."""
 TONGUE_LIGHT, LOWER_TEETH_LIGHT = 1.35, 0.5
 """The tongue is wet, and drawn brighter than the rest of the mouth; the lower teeth lie in the shade of the upper."""
-SEAM_LIGHT = (0.90, 0.76, 0.58, 0.38, 0.24)
+SEAM_LIGHT = (0.88, 0.72, 0.54, 0.42, 0.34)
 """The part of the light that arrives beside the seam of closed lips, at the rings that end there: a soft line."""
 RIM_LIGHT = (0.45, 0.04, 0.02)
 """The same for the rim of a round hole and the two rings behind it, which would widen the hole in grey."""

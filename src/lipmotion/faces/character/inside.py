@@ -93,7 +93,7 @@ def tongue(pose: CharacterPose) -> Real:
     root, body = np.array([0, floor - 0.05, -0.46]), np.array([0, floor + 0.060, -0.36])
     blade, tip = np.array([0, floor + 0.03, -0.22]), np.array([0, floor - 0.012, TEETH_Z - 0.085])
     points = jaw_moved(np.stack([root, body, blade, tip]), pose.jaw + PARTED_TEETH * (1 - pose.bite))
-    tooth = np.array([0, TEETH_EDGE - 0.016, TEETH_Z + 0.135])
+    tooth = np.array([0, TEETH_EDGE - 0.013, TEETH_Z + 0.135])
     ridge = np.array([0, TEETH_EDGE + 0.035, TEETH_Z - 0.075])
     for weight, to_tip, lift in ((pose.tongue_up, ridge, 0.01), (pose.tongue_out, tooth, -0.008)):
         points[3] += weight * (to_tip - points[3])
@@ -108,7 +108,7 @@ def tongue(pose: CharacterPose) -> Real:
     )
     blunt = np.sqrt(np.clip(1 - np.clip((share - 0.45) / 0.55, 0, 1) ** 2.4, 0, 1)) + 1e-3
     wide = (0.195 - 0.045 * share) * blunt * (1 - 0.12 * pose.tongue_out)
-    thick = (0.080 - 0.045 * share) * blunt**0.7
+    thick = (0.080 - (0.045 - 0.018 * pose.tongue_out) * share) * blunt**0.7
     angle = 2 * np.pi * np.arange(_TONGUE_SIDES) / _TONGUE_SIDES
     x = wide * np.cos(angle)
     groove = 0.10 * thick * np.exp(-((np.cos(angle) / 0.3) ** 2)) * (np.sin(angle) > 0)

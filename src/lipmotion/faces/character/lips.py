@@ -30,11 +30,11 @@ OVAL_SQUEEZE = 0.14
 """How much nearer to the middle the inner edge of an oval mouth lies than the corners."""
 HOLE_WIDTH = (0.008, 0.55)
 """Half the width of a round hole, round which the lips run as a ring: a length, and so much of the gap."""
-ROUND_BOW = 0.0009
+ROUND_BOW = 0.0012
 """How far the middle of a round hole is raised: its middle lies before its sides, and the camera looks down on it."""
 SEAM_GAP, SEAM_FORWARD = 0.03, 0.026
 """Below this gap the seam of the lips comes forward, at most so far: the crease between closed lips is shallow."""
-ROUND_DROP = 0.016
+ROUND_DROP = 0.025
 """How far the line between round lips sinks: the upper lip hides the teeth."""
 _KNOTS = np.array([0, 0.22, 0.5, 0.72, 0.88, 0.98, 1.12, 1.4])
 _AT = np.array([0.0, 0.09, 0.2, 0.31, 0.41, 0.5, 0.58, 0.66, 0.74, 0.81, 0.88, 0.94, 1.0, 1.12, 1.4])
@@ -101,7 +101,7 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
     up = SIDE * 1.0
     tuck = pose.tuck * np.where(upper, 0.0, 1.0) * _ENVELOPE
     contact_z = meet - 0.002 + 0.02 * belly * pose.roundness
-    contact_z = contact_z + SEAM_FORWARD * (1 - 0.65 * pose.press) * belly * closed_share(pose)
+    contact_z = contact_z + SEAM_FORWARD * (1 - 0.45 * pose.press) * belly * closed_share(pose)
     contact_z = contact_z + tuck * (teeth + 0.02 - contact_z)
     on_teeth = np.minimum(TEETH_EDGE + 0.010, inner_y + 0.08)
     inner_y = np.where(upper, inner_y, np.maximum(inner_y, inner_y + tuck * (on_teeth - inner_y)))

@@ -39,7 +39,7 @@ ROUND_GROWTH, TEETH_GAP, TONGUE_OUT_GAP, TONGUE_UP_GAP = 0.45, 0.010, -0.012, 0.
 the tongue fill the gap, to which a length is added."""
 SPREAD_RISE = 0.58
 """Part of the gap by which the upper lip rises where lips are spread: the upper teeth show more than the lower ones."""
-TONGUE_RISE = 0.005
+TONGUE_RISE = 0.002
 """How much further the upper lip rises while the tongue is between the teeth, so that they are seen."""
 BITTEN_GAP = (0.12, 0.2)
 """Teeth stay together up to the first gap, and part until the second one."""
@@ -153,7 +153,7 @@ def _articulated(gap: Curve, said: dict[str, Curve], pause: Curve) -> Curve:
 def _rise(gap: Curve, said: dict[str, Curve]) -> Curve:
     """Return how far the upper lip rises [shape=(T,)]: little in round lips; spread lips, TH and F bare the teeth."""
     rise = upper_share(gap)
-    rise = rise + np.maximum(said["wide"], 0.7 * said["bite"]) * np.maximum(
+    rise = rise + np.maximum(said["wide"], 0.9 * said["bite"]) * np.maximum(
         np.minimum(SPREAD_RISE * gap, 0.07) - rise, 0
     )
     rise = rise + TONGUE_RISE * said["tongue_out"] * np.clip(gap / 0.05, 0, 1)
