@@ -25,7 +25,7 @@ SOURCES := $(shell find src -type f -not -name '*.pyc') pyproject.toml README.md
 
 demo: $(VENV)/core
 	mkdir -p $(BUILD)
-	$(BIN)/lipmotion animate examples/welcome.flac --transcript examples/welcome.txt -o $(BUILD)/welcome.mp4 $(BUILD)/welcome.json
+	$(BIN)/lipmotion animate examples/welcome.flac --transcript examples/welcome.txt --face head -o $(BUILD)/welcome.mp4 $(BUILD)/welcome.json
 
 test: $(VENV)/dev
 	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal -m "not long"

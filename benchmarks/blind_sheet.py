@@ -2,14 +2,17 @@
 
     python benchmarks/blind_sheet.py --face head --seed 1 -o blind.png --key key.json
     python benchmarks/blind_sheet.py --photographs CORPUS --seed 1 -o blind.png --key key.json
+    python benchmarks/blind_sheet.py --face head --tokens 20 --seed 1 -o blind.png --key key.json
     python benchmarks/blind_sheet.py --score "oo p ee ..." --key key.json
 
 Of each of the sounds p b m f v th oo w aa ee one mouth is shown, in the middle of the sound: the one whose opening,
 width and outer height in the motion are the nearest to the medians of that sound (of the sentences of
 ``character.py``, or of the photographs of ``photographs.py``). They are shuffled, enlarged and numbered; the key says
 which sound is behind which number. The reader names one of the ten for every number, each once. ``--score`` counts
-the right ones: of the sounds, and of the visemes (p b m look alike on people, too, and so do f and v). For the
-portrait of an earlier version: PYTHONPATH=OLD/src, ``--face portrait``.
+the right ones: of the sounds, and of the visemes (p b m look alike on people, too, and so do f and v). With
+``--tokens`` that many mouths are shown, each of a random sound and a random phone of it: sounds may come twice or not
+at all, and nothing follows by elimination. For the portrait of an earlier version: PYTHONPATH=OLD/src, ``--face
+portrait``.
 """
 
 from __future__ import annotations
@@ -67,6 +70,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--face")
     parser.add_argument("--photographs", type=Path, metavar="CORPUS")
+    parser.add_argument("--tokens", type=int, default=0)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("-o", "--output", type=Path)
     parser.add_argument("--key", type=Path, required=True)
@@ -75,7 +79,8 @@ def main() -> None:
     if options.score is not None:
         said, right = options.score.split(), json.loads(options.key.read_text())
         same = [VISEME.get(one, one) == VISEME.get(other, other) for one, other in zip(said, right, strict=True)]
-        print(sum(one == other for one, other in zip(said, right, strict=True)), "sounds,", sum(same), "visemes of 10")
+        sounds = sum(one == other for one, other in zip(said, right, strict=True))
+        print(f"{sounds} sounds, {sum(same)} visemes of {len(right)}")
         return
     from PIL import Image, ImageDraw
 
@@ -87,14 +92,19 @@ def main() -> None:
         found = pictures_of(Corpus.open(options.photographs), 200)
     else:
         found = drawn_mouths(options.face)
-    mouths = {sound: Image.fromarray(typical(samples)) for sound, samples in found.items()}
-    order = np.random.default_rng(options.seed).permutation(list(SOUNDS)).tolist()
-    size = (HEIGHT * mouths["p"].width // mouths["p"].height, HEIGHT)
-    picture = Image.new("RGB", (5 * size[0], 2 * (HEIGHT + TITLE)), "white")
-    for number, sound in enumerate(order):
-        x, y = number % 5 * size[0], number // 5 * (HEIGHT + TITLE)
-        picture.paste(mouths[sound].resize(size, Image.Resampling.LANCZOS), (x, y + TITLE))
-        ImageDraw.Draw(picture).text((x + size[0] // 2, y + TITLE // 2), str(number + 1), fill="black", anchor="mm")
+    rng = np.random.default_rng(options.seed)
+    if options.tokens:
+        order = rng.choice(list(SOUNDS), options.tokens).tolist()
+        mouths = [found[sound][rng.integers(len(found[sound]))][1] for sound in order]
+    else:
+        order = rng.permutation(list(SOUNDS)).tolist()
+        mouths = [typical(found[sound]) for sound in order]
+    wide, high = HEIGHT * mouths[0].shape[1] // mouths[0].shape[0], HEIGHT + TITLE
+    picture = Image.new("RGB", (5 * wide, -(-len(mouths) // 5) * high), "white")
+    for number, mouth in enumerate(mouths):
+        x, y = number % 5 * wide, number // 5 * high
+        picture.paste(Image.fromarray(mouth).resize((wide, HEIGHT), Image.Resampling.LANCZOS), (x, y + TITLE))
+        ImageDraw.Draw(picture).text((x + wide // 2, y + TITLE // 2), str(number + 1), fill="black", anchor="mm")
     picture.save(options.output)
     options.key.write_text(json.dumps(order))
 

@@ -15,7 +15,7 @@ from mathutils import Vector
 from PIL import Image
 
 TIMES_S = (0.62, 0.8, 1.37, 2.2)
-LIGHTS = (((-0.6, -0.8, 0.6), 12, 0.5), ((0.8, -0.5, 0.1), 4, 0.6), ((0.2, 0.7, 0.7), 10, 0.3))
+LIGHTS = (((-0.5, -0.9, 0.4), 9, 0.4), ((0.3, -0.9, -0.1), 4, 0.4), ((0.2, 0.7, 0.7), 10, 0.3))
 """Place from the mouth in metres, power in watts, size in metres."""
 
 
@@ -35,9 +35,10 @@ def main() -> None:
         light.energy, light.size = power, size
         placed(light, middle, place)
     scene.world = bpy.data.worlds.new("world")
-    scene.world.color = (0.3, 0.36, 0.42)
+    scene.world.use_nodes = True
+    scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.55, 0.65, 0.75, 1)
     scene.render.engine = "CYCLES"
-    scene.cycles.samples = 64
+    scene.cycles.samples = 48
     scene.cycles.use_denoising = False
     scene.render.resolution_x, scene.render.resolution_y = 300, 340
     scene.view_settings.view_transform = "Standard"

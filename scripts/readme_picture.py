@@ -12,11 +12,12 @@ import numpy as np
 from matplotlib import pyplot as plt
 
 import lipmotion
-from lipmotion.faces.portrait import render
+from lipmotion.faces import Staging, staged_face
 
 ROOT = Path(__file__).parent.parent
 FPS = 25.0
 SHOWN_S = (0.45, 2.55)
+PORTRAIT_S = 1.3
 COLUMNS = 7
 
 
@@ -25,15 +26,15 @@ def main() -> None:
     mpl.use("agg")
     speech = ROOT / "examples" / "welcome.flac"
     result = lipmotion.animate(speech, transcript=(ROOT / "examples" / "welcome.txt").read_text())
-    frames = list(render(result.motion, result.units, fps=FPS))
+    frames = list(staged_face("head", Staging(size=720)).render(result.motion, result.units, fps=FPS))
     figure = plt.figure(figsize=(12, 4.2), dpi=110)
     grid = figure.add_gridspec(2, COLUMNS + 4, height_ratios=(1, 1.7), hspace=0, wspace=0.05)
     portrait = figure.add_subplot(grid[:, :4])
-    portrait.imshow(frames[round(1.5 * FPS)])
+    portrait.imshow(frames[round(PORTRAIT_S * FPS)][:, 280:1000])
     portrait.axis("off")
     for column, time_s in enumerate(telling_times(result)):
         mouth = figure.add_subplot(grid[0, 4 + column])
-        mouth.imshow(frames[round(time_s * FPS)][370:520, 230:410])
+        mouth.imshow(frames[round(time_s * FPS)][440:610, 540:740])
         mouth.axis("off")
     curve(figure.add_subplot(grid[1, 4:]), result)
     figure.savefig(ROOT / "docs" / "images" / "welcome.png", bbox_inches="tight")

@@ -43,9 +43,10 @@ def test_it_is_the_function_of_the_same_name(
     run(*basics, "--voice", "one", "-o", "command.json", "command.wav")
     model = load_model(toy_model_file)
     sound, result = speak(TEXT, voice="stand-in:one", model=model)
-    write(result, ["function.json", "function.wav"], speech=sound, model=model)
-    for suffix in ("json", "wav"):
-        assert (here / f"command.{suffix}").read_bytes() == (here / f"function.{suffix}").read_bytes()
+    (here / "function").mkdir()
+    write(result, ["function/command.json", "function/command.wav"], speech=sound, model=model)
+    for name in ("command.json", "command.wav"):
+        assert (here / name).read_bytes() == (here / "function" / name).read_bytes()
 
 
 def test_a_text_file(run: RunCommand, toy_model_file: Path, here: Path) -> None:

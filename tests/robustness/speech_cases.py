@@ -159,7 +159,7 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(bench.file("a.json", '{"format": "lipmotion.motion", "version": 1}\n' * 30))
 
 
-@case(GROUP, "a folder", 3, "is a folder; give one recording")
+@case(GROUP, "a folder", 3, "no sounds and no videos in it; give a folder of recordings")
 def _(bench: Bench) -> list[object]:
     return bench.animate(bench.folder)
 

@@ -26,7 +26,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
     parser = verbs.add_parser("animate", help="turn speech into lip motion or an animated face")
     add_speech_arguments(parser, several=True)
-    add_result_arguments(parser, "FILE.mp4 .glb .json .csv .TextGrid ... (docs/formats.md), or several; FOLDER/; -")
+    add_result_arguments(parser, "FILE.mp4 .webm .mov %%05d.png .json .csv .vtt, ... (docs/formats.md); FOLDER/; -")
     posteriors = "draw the posterior probabilities of the chains' units over time (coupled models)"
     add_output(parser, "--posteriors", metavar="FILE.png", help=posteriors)
     for add_more in (add_kinds_argument, add_pipe_format, add_execution):

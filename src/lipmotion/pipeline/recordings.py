@@ -33,8 +33,12 @@ def recordings_of(given: Sequence[Path]) -> list[Path]:
 
 
 def is_for_several(output: str) -> bool:
-    """Return whether an output is a place for many files: a folder, or a path with ``{name}``."""
-    return NAME in output or output.endswith(("/", os.sep)) or Path(output).is_dir()
+    """Return whether an output is a place for many files: a path with ``{name}``, or a folder.
+
+    A folder that is called as a file is, as ``a.json``, is one only if the path ends with a slash.
+    """
+    is_folder = os.path.isdir(output)  # noqa: PTH112 (a name that is too long is no folder, and no error here)
+    return NAME in output or output.endswith(("/", os.sep)) or (is_folder and not Path(output).suffix)
 
 
 def planned_outputs(recordings: Sequence[Path], outputs: Sequence[str], kinds: Sequence[str]) -> list[list[str]]:

@@ -24,6 +24,7 @@ from lipmotion.speech.recogniser import cached_recogniser
 from lipmotion.types import Progress
 from lipmotion.units import unit_set
 
+pytestmark = pytest.mark.long
 PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
 SMALL = ExperimentSettings(recogniser=PHONE_MODELS)
 PLAIN, SHIPPED = ENGINE_SETTINGS

@@ -32,6 +32,7 @@ from lipmotion.pipeline.training.train import train
 from lipmotion.speech.recogniser import cached_recogniser
 from lipmotion.types import Progress
 
+pytestmark = pytest.mark.long
 PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
 SMALL = ExperimentSettings(recogniser=PHONE_MODELS)
 SYSTEMS = [REFERENCE_SYSTEM, BEST_PATH, "trajectory HMM", "loudness", "mean pose"]

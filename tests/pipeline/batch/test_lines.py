@@ -9,6 +9,7 @@ import pytest
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.pipeline.batch import BatchLine, read_lines
+from lipmotion.pipeline.batch import lines as lines_module
 from lipmotion.pipeline.batch.lines import check_names
 
 
@@ -101,3 +102,10 @@ def test_kinds_do_not_meet() -> None:
     with pytest.raises(ExportError, match="would be written for"):
         check_names(lines, ("json", "cues.json"))
     check_names(lines, ("json",))
+
+
+def test_a_list_of_too_many_lines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lines_module, "MOST_LINES", 2)
+    assert len(listed(tmp_path, "a.wav\nb.wav\n")) == 2
+    with pytest.raises(InputError, match="3 lines, required at most 2"):
+        listed(tmp_path, "a.wav\nb.wav\nc.wav\n")

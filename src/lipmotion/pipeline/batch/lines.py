@@ -25,8 +25,8 @@ OWN_FILES = ("batch.jsonl", "report.csv", "report.html")
 """Files that a batch writes beside the outputs of its lines."""
 OWN_FOLDER = ".batch"
 """Folder of unfinished work in the folder of the outputs."""
-LARGEST_LIST = 1 << 27
-"""Most bytes of a list: a million lines with their words."""
+LARGEST_LIST, MOST_LINES = 1 << 27, 200_000
+"""Most bytes of a list, and most lines of a batch: the words of a very long game."""
 MOST_NAMED = 3
 CONTROL = re.compile(r"[\x00-\x1f]")
 
@@ -65,6 +65,7 @@ def read_lines(source: Path, kinds: Sequence[str]) -> list[BatchLine]:
         raise InputError(f"{source}: no such file or folder; give a list of recordings, or a folder of them")
     if not lines:
         raise InputError(f"{source}: no recordings in it; required at least one")
+    _check_count(source, len(lines))
     check_names(lines, kinds)
     return lines
 
@@ -117,17 +118,18 @@ def _is_recording(path: Path) -> bool:
 
 def _in_list(source: Path, kinds: Sequence[str]) -> list[BatchLine]:
     text = read_text_file(source, "list of recordings", LARGEST_LIST)
+    _check_count(source, max(map(text.count, "\n\r\x0b\x0c\x1c\x1d\x1e\x85\u2028\u2029")))
     rows = _table(source, text)
     if rows is None:
         rows = [{"file": row.strip()} for row in text.splitlines() if row.strip()]
-    base = Path(os.path.abspath(source)).parent  # noqa: PTH100
-    paths = [os.path.normpath(base / row["file"]) for row in rows]
+    base = os.path.dirname(os.path.abspath(source))  # noqa: PTH100, PTH120 # texts: there may be many
+    paths = [os.path.normpath(os.path.join(base, row["file"])) for row in rows]  # noqa: PTH118
     names = [_output_name(row.get("output", ""), kinds) for row in rows]
     unnamed = [path for path, name in zip(paths, names, strict=True) if not name]
     shared = _shared_folder(unnamed, base)
     return [
         BatchLine(
-            name or Path(os.path.relpath(path, shared)).with_suffix("").as_posix(),
+            name or os.path.splitext(path[len(shared) :].lstrip(os.sep))[0].replace(os.sep, "/"),  # noqa: PTH122
             path,
             row.get("transcript", ""),
             row.get("speaker", ""),
@@ -136,12 +138,17 @@ def _in_list(source: Path, kinds: Sequence[str]) -> list[BatchLine]:
     ]
 
 
-def _shared_folder(paths: Sequence[str], base: Path) -> str:
+def _check_count(source: Path, count: int) -> None:
+    if count > MOST_LINES:
+        raise InputError(f"{source}: {count} lines, required at most {MOST_LINES} in one batch; divide the list")
+
+
+def _shared_folder(paths: Sequence[str], base: str) -> str:
     """Return the folder from which the names of outputs are counted: that of the list, if it holds all recordings."""
     folders = {os.path.dirname(path) for path in paths}  # noqa: PTH120 # a hundred thousand of them
     try:
-        common = os.path.commonpath([str(base), *folders])
-        return common if common == str(base) or not folders else os.path.commonpath(list(folders))
+        common = os.path.commonpath([base, *folders])
+        return common if common == base or not folders else os.path.commonpath(list(folders))
     except ValueError as error:  # several drives
         raise InputError("the recordings are on several drives; name the outputs in a column 'output'") from error
 
