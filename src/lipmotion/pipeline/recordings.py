@@ -52,9 +52,10 @@ def planned_outputs(recordings: Sequence[Path], outputs: Sequence[str], kinds: S
     for output in outputs:
         if not is_for_several(output):
             example = f"{NAME}{Path(output).suffix or '.json'}"
+            folder = f"{Path(output).with_suffix('')}/"
             raise ExportError(
-                f"{output}: is one file, and there are {len(recordings)} recordings; give a folder, with a slash at its "
-                f"end ({Path(output).with_suffix('')}/), or {NAME} in the name of the file: 'out/{example}'"
+                f"{output}: is one file, and there are {len(recordings)} recordings; give a folder, with a slash at "
+                f"its end ({folder}), or {NAME} in the name of the file: 'out/{example}'"
             )
         is_template = NAME in output
         templates += [output] if is_template else [str(Path(output) / f"{NAME}.{kind}") for kind in kinds]

@@ -86,10 +86,9 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
 def _check_weights(names: Sequence[str], values: NDArray[np.float64]) -> None:
     """Raise InputError if there are weights far over 1, as in tables for programs that count from 0 to 100."""
     for name, curve in zip(names, values.T, strict=True):
-        if _channel(name).unit == WEIGHT and np.nanmax(curve, initial=0.0) > LARGEST_WEIGHT:
-            raise InputError(
-                f"the weight {name} goes up to {np.nanmax(curve):g}, required 0 to 1; if these are percent, divide by 100"
-            )
+        largest = np.nanmax(curve, initial=0.0)
+        if _channel(name).unit == WEIGHT and largest > LARGEST_WEIGHT:
+            raise InputError(f"the weight {name} goes up to {largest:g}, required 0 to 1; divide percent by 100")
 
 
 def _channel(name: str) -> Channel:
