@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -129,6 +130,25 @@ def test_the_sound_is_in_the_extras_of_the_scene(character: Scene, tmp_path: Pat
     assert stored["extras"] == {"audio": {"uri": "said.wav", "start_s": 0.0}}
     write_scene(tmp_path / "b.glb", character)
     assert "extras" not in read_gltf_document(tmp_path / "b.glb").items("scenes")[0]
+
+
+@pytest.mark.parametrize(
+    ("sound_s", "lines"),
+    [(0.5, ["uniform timecode startTime = 12"]),
+     (-0.5, ["uniform double mediaOffset = 0.5", "uniform timecode startTime = 0"])],
+)  # fmt: skip
+def test_a_sound_that_does_not_begin_with_the_animation(
+    sound_s: float, lines: list[str], character: Scene, tmp_path: Path
+) -> None:
+    moved = replace(character, sound_s=sound_s)
+    write_glb(tmp_path / "head.glb", head())
+    for name, scene in (("a.glb", moved), ("b.glb", replace(moved, original=None))):
+        write_scene(tmp_path / name, scene, tmp_path / "said.wav")
+        stored = read_gltf_document(tmp_path / name).items("scenes")[0]
+        assert stored["extras"] == {"audio": {"uri": "said.wav", "start_s": sound_s}}
+    write_scene(tmp_path / "a.usda", moved, tmp_path / "said.wav")
+    written = [line.strip() for line in (tmp_path / "a.usda").read_text().splitlines()]
+    assert [line for line in written if "mediaOffset" in line or "startTime " in line] == lines
 
 
 def test_the_same_scene_gives_the_same_bytes(character: Scene, tmp_path: Path) -> None:

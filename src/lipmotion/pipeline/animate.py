@@ -218,7 +218,7 @@ def write(
         elif holds_labels(path):
             write_labels(path, sound_units(generation.units, delivery, float(generation.motion.time_s[-1])))
         else:
-            _write_motion(written[path], path, recording or heard_in, model)
+            _write_motion(written[path], path, recording or heard_in, model, delivery.offset_ms / 1000)
 
 
 def check_outputs(
@@ -315,10 +315,14 @@ def _motion_files(
     return {path: held(each, delivery.hold_frames(each.motion.rate_hz), closed_s) for path, each in written.items()}
 
 
-def _write_motion(generation: Generation, path: Path, speech: str | Path | None, model: Model | None) -> None:
+def _write_motion(
+    generation: Generation, path: Path, speech: str | Path | None, model: Model | None, sound_s: float
+) -> None:
     about = model.about if model else {}
     named = {key: _text(about[key]) for key in ("name", "corpus", "licence", "attribution") if about.get(key)}
     source = {"file": as_text(Path(speech).name)} if speech else {}
+    if speech and sound_s:
+        source["start_s"] = f"{sound_s:.9g}"
     if speech and motion_format(path).names_sound:
         source["path"] = sound_reference(Path(speech), path)
     write_motion(path, generation, source=source, model=named)

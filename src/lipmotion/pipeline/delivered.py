@@ -85,6 +85,7 @@ def delivered_scene(
     if is_of_blendshapes(moved.motion):
         moved = _with(moved, with_mouth(moved.motion))
     scene = scene_of(moved, face, rate_hz, staging=staging, prosody=prosody)
+    scene = replace(scene, sound_s=delivery.offset_ms / 1000)
     weights = scene.weights
     frames = 0 if weights is None else delivery.hold_frames(weights.rate_hz)
     if weights is None or frames < 2:

@@ -17,11 +17,11 @@ from lipmotion.types import Motion
 FLOAT = 5126
 
 
-def write_animated_gltf(path: Path, original: Path, weights: Motion, sound: str = "") -> bool:
+def write_animated_gltf(path: Path, original: Path, weights: Motion, sound: str = "", *, sound_s: float = 0.0) -> bool:
     """Write a ``.glb`` or ``.vrm`` again, with the weights of its morph targets as its first animation, ``speech``.
 
     weights : channels by the names of the morph targets, in all meshes that have them
-    sound   : as of ``Scene``
+    sound, sound_s : as of ``Scene``
     Returns False, and writes nothing, where the file is no single ``.glb``, or a channel is none of its morph targets
     (an expression of a VRM file is several of them).
     Raises InputError: the original cannot be read. Raises ExportError: the file cannot be written.
@@ -52,7 +52,7 @@ def write_animated_gltf(path: Path, original: Path, weights: Motion, sound: str 
     if sound:
         scene = json["scenes"][json.get("scene", 0)]
         extras = scene.get("extras")
-        scene["extras"] = (extras if isinstance(extras, dict) else {}) | {"audio": {"uri": sound, "start_s": 0.0}}
+        scene["extras"] = (extras if isinstance(extras, dict) else {}) | {"audio": {"uri": sound, "start_s": sound_s}}
     write_container(path, json, bytes(body))
     return True
 

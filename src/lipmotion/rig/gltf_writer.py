@@ -95,7 +95,7 @@ def write_gltf_scene(path: Path, scene: Scene) -> None:
 
     Every part becomes a primitive with its own vertices; those that no blendshape moves are a mesh of their own.
     Textures are not written, colours of vertices are. A sound is named as ``extras`` of the scene, which programs that
-    do not know it pass on: ``{"audio": {"uri": ..., "start_s": 0}}``.
+    do not know it pass on: ``{"audio": {"uri": ..., "start_s": ...}}``.
     Raises ExportError: the file cannot be written.
     """
     buffer = _Buffer()
@@ -133,7 +133,7 @@ def _document(scene: Scene, buffer: _Buffer, normals: ShadingNormals) -> dict[st
         "materials": materials,
     }
     if scene.sound:
-        document["scenes"][0]["extras"] = {"audio": {"uri": scene.sound, "start_s": 0.0}}
+        document["scenes"][0]["extras"] = {"audio": {"uri": scene.sound, "start_s": scene.sound_s}}
     if scene.turn is not None:
         _add_joints(document, buffer, scene.turn)
     if scene.weights is not None and len(scene.weights.values) and (mesh.shapes or scene.turn):

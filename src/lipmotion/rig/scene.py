@@ -42,6 +42,7 @@ class Scene:
     weights : of blendshapes over time, channels by their names; shapes without a channel stay at 0; None: no animation
     turn    : of the head; None: it stands still
     sound   : the file with the sound as the scene's file names it: a path from its folder, with slashes; empty: none
+    sound_s : when the sound begins, in seconds of the animation; negative: it began before the animation
     metres  : the length of the mesh's unit in metres, for formats that say it
     original : the file that the mesh is from; a ``.glb`` of it keeps all that is in that file; None: no file
     split   : whether vertices at one place may be one: files split them along seams, which should not be seen
@@ -52,6 +53,7 @@ class Scene:
     weights: Motion | None = None
     turn: HeadTurn | None = None
     sound: str = ""
+    sound_s: float = 0.0
     metres: float = 1.0
     original: Path | None = None
     split: bool = True

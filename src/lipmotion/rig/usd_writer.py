@@ -30,7 +30,8 @@ def write_usda(path: Path, scene: Scene) -> None:
 
     Up to ``FASTEST_HZ`` keys a second, key n is time code n; of more, time codes are 24ths of a second, and keys lie
     between them: programs that ignore the rate of time codes, as Blender 5.0 does, play 24 a second.
-    The sound is a ``SpatialAudio`` that plays from time code 0, everywhere equally loud. Textures are not written.
+    The sound is a ``SpatialAudio``, everywhere equally loud; of one that began before time code 0, the rest is played.
+    Textures are not written.
     Raises ExportError: the file cannot be written.
     """
     normals = shading_normals(scene.mesh, split=scene.split)
@@ -61,8 +62,10 @@ def _sound(scene: Scene) -> Iterator[str]:
     yield 'uniform token auralMode = "nonSpatial"'
     yield f"uniform timecode endTime = {_last(scene):.9g}"
     yield f"uniform asset filePath = {asset(scene.sound)}"
+    if scene.sound_s < 0:
+        yield f"uniform double mediaOffset = {-scene.sound_s:.9g}"
     yield 'uniform token playbackMode = "onceFromStart"'
-    yield "uniform timecode startTime = 0"
+    yield f"uniform timecode startTime = {max(scene.sound_s, 0.0) * _codes_hz(scene):.9g}"
 
 
 def _skeleton(scene: Scene) -> Iterator[str]:

@@ -37,8 +37,12 @@ def key_frames(
     first: float = 1.0,
     replace: bool = True,
     sound: str = "",
+    sound_s: float = 0.0,
 ) -> tuple[int, list[str]]:
-    """Key objects from curves with one value a frame; arguments and what is returned as of ``key_objects``."""
+    """Key objects from curves with one value a frame; arguments and what is returned as of ``key_objects``.
+
+    sound_s : when the sound begins, in seconds after the first frame; negative: before it
+    """
     used: set[str] = set()
     named = {name: control(name) for name in frames}
     controls = {name: found for name, found in named.items() if found}
@@ -50,7 +54,7 @@ def key_frames(
         used |= set(key_controls(each, frames, controls, first, replace=replace))
     if used:
         show_all(scene, first + max(len(values) for values in frames.values()) - 1)
-        add_sound(scene, sound, first)
+        add_sound(scene, sound, first, sound_s)
     return len(used), [name for name in frames if name not in used]
 
 
@@ -98,8 +102,11 @@ def key_controls(
     return found
 
 
-def add_sound(scene: Any, path: str, first: float) -> bool:
-    """Add a sound to the sequencer at a frame, in place of an earlier one of its kind; return whether it is there."""
+def add_sound(scene: Any, path: str, first: float, sound_s: float = 0.0) -> bool:
+    """Add a sound to the sequencer, in place of an earlier one of its kind; return whether it is there.
+
+    sound_s : it begins so many seconds after the frame ``first``; of a sound that begins before, the rest is heard
+    """
     if not path or not os.path.isfile(path):  # noqa: PTH113
         return False
     editor = scene.sequence_editor or scene.sequence_editor_create()
@@ -109,9 +116,11 @@ def add_sound(scene: Any, path: str, first: float) -> bool:
     taken = {strip.channel for strip in strips}
     channel = next(number for number in range(1, 130) if number not in taken)
     try:
-        strips.new_sound(STRIP, path, channel, round(first))
+        strip = strips.new_sound(STRIP, path, channel, round(first + sound_s * frame_rate(scene)))
     except RuntimeError:  # no sound file, or a Blender that was built without sound
         return False
+    if sound_s < 0:
+        strip.frame_final_start = round(first)
     scene.sync_mode = "AUDIO_SYNC"
     return True
 

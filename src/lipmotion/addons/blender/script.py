@@ -11,6 +11,7 @@ from .keying import frame_rate, key_frames
 MOTION: Curves = {}
 RATE_HZ = 100.0
 SOUND = ""
+SOUND_S = 0.0
 # -- what follows is copied into scripts
 
 
@@ -23,7 +24,8 @@ def main() -> None:
     frames = at_frames(MOTION, [number / RATE_HZ for number in range(count)], frame_rate(scene))
     chosen = [each for each in scene.objects if each.select_get()]
     for objects in (chosen, list(scene.objects)):
-        used, left = key_frames(objects, frames, scene, first=scene.frame_start, sound=_sound_file(bpy))
+        options = {"first": scene.frame_start, "sound": _sound_file(bpy), "sound_s": SOUND_S}
+        used, left = key_frames(objects, frames, scene, **options)
         if used:
             print(f"lipmotion: {used} curves keyed; without a shape key or bone: {', '.join(left) or 'none'}")
             return

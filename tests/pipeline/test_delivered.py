@@ -1,0 +1,37 @@
+"""Delivery as files and videos have it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.faces import Staging
+from lipmotion.faces.registry import face_named
+from lipmotion.motion.delivery import Delivery
+from lipmotion.pipeline.animate import write
+from lipmotion.pipeline.delivered import delivered_scene
+from lipmotion.types import Generation, StateTrace
+from rig.speech import motion, units
+
+
+@pytest.fixture(scope="module")
+def generation() -> Generation:
+    moved = motion()
+    trace = StateTrace(("a",), np.zeros(len(moved.values), np.intp))
+    return Generation(moved, np.zeros(moved.values.shape), units(), trace)
+
+
+@pytest.mark.parametrize("offset_ms", [500.0, -250.0])
+def test_files_say_when_the_sound_begins(
+    generation: Generation, offset_ms: float, toy_speech: Path, tmp_path: Path
+) -> None:
+    delivery = Delivery(offset_ms=offset_ms)
+    paths = [tmp_path / "a.json", tmp_path / "a.blender.py"]
+    write(generation, paths, speech=toy_speech, delivery=delivery, curves="arkit", channels=["jawOpen"])
+    assert json.loads(paths[0].read_text())["source"] == {"file": toy_speech.name, "start_s": f"{offset_ms / 1000:g}"}
+    assert f"SOUND_S = {offset_ms / 1000!r}\n" in paths[1].read_text()
+    scene = delivered_scene(generation, delivery, face_named("head"), 12.0, staging=Staging(), prosody=None)
+    assert scene.sound_s == pytest.approx(offset_ms / 1000)
