@@ -9,11 +9,16 @@ import numpy as np
 import pytest
 
 from lipmotion.faces import Staging
+from lipmotion.faces.mesh import MeshFace
 from lipmotion.faces.registry import face_named
 from lipmotion.motion.delivery import Delivery
 from lipmotion.pipeline.animate import write
-from lipmotion.pipeline.delivered import delivered_scene
+from lipmotion.pipeline.characters import with_curves
+from lipmotion.pipeline.delivered import delivered_scene, shown, staged_intensity
+from lipmotion.rig.driven import driven_character
+from lipmotion.rig.gltf_writer import write_glb
 from lipmotion.types import Generation, StateTrace
+from rig.heads import head
 from rig.speech import motion, units
 
 
@@ -35,3 +40,16 @@ def test_files_say_when_the_sound_begins(
     assert f"SOUND_S = {offset_ms / 1000!r}\n" in paths[1].read_text()
     scene = delivered_scene(generation, delivery, face_named("head"), 12.0, staging=Staging(), prosody=None)
     assert scene.sound_s == pytest.approx(offset_ms / 1000)
+
+
+def test_weights_beside_an_opening_are_enlarged_for_the_mesh_that_has_them(
+    generation: Generation, tmp_path: Path
+) -> None:
+    write_glb(tmp_path / "head.glb", head())
+    character = driven_character(tmp_path / "head.glb")
+    face, larger = MeshFace(character), Delivery(intensity=2)
+    both = with_curves(generation, "arkit")[0]
+    assert staged_intensity(Staging(), larger, face, both, character) == Staging()
+    before, after = both.motion["jawOpen"], shown(both, larger, face, 25.0, character).motion["jawOpen"]
+    assert after.max() > 1.3 * before.max()
+    assert staged_intensity(Staging(), larger, face, generation, character).intensity == pytest.approx(2)

@@ -11,12 +11,13 @@ import numpy as np
 from lipmotion.errors import ExportError, InputError
 from lipmotion.faces.base import Face, Stageable, Staging
 from lipmotion.faces.filmed.face import FilmedFace
+from lipmotion.faces.mesh import MeshFace
 from lipmotion.motion.delivery import Delivery, closed_on_grid, closed_times, held, intensified, moved_in_time
 from lipmotion.motion.gestures import with_gestures
 from lipmotion.pipeline.characters import with_curves
 from lipmotion.pipeline.drawn_video import is_picture_sequence, shows_face
 from lipmotion.pipeline.scenes import scene_of
-from lipmotion.rig.blendshape_motion import is_of_blendshapes, with_mouth
+from lipmotion.rig.blendshape_motion import given_weights, is_of_blendshapes, with_mouth
 from lipmotion.rig.driven import DrivenCharacter
 from lipmotion.rig.scene import Scene
 from lipmotion.rig.shape_names import ARKIT_OTHERS, arkit_name
@@ -129,6 +130,8 @@ def _enlarges(
 ) -> bool:
     """Return whether a face makes movements larger itself: one that can be staged, and is not moved by weights."""
     weighed = is_of_blendshapes(generation.motion) or (character is not None and delivery.hold_ms > 0)
+    if isinstance(face, MeshFace) and face.character.shapes is not None:
+        weighed = weighed or given_weights(generation.motion, face.character.shapes) is not None
     return isinstance(face, Stageable) and not weighed
 
 
