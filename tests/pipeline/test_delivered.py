@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.faces import Staging
+from lipmotion.faces import Face, Staging
 from lipmotion.faces.mesh import MeshFace
 from lipmotion.faces.registry import face_named
 from lipmotion.motion.delivery import Delivery
@@ -17,7 +17,7 @@ from lipmotion.pipeline.characters import with_curves
 from lipmotion.pipeline.delivered import delivered_scene, shown, staged_intensity
 from lipmotion.rig.driven import driven_character
 from lipmotion.rig.gltf_writer import write_glb
-from lipmotion.types import Generation, StateTrace
+from lipmotion.types import Generation, Prosody, StateTrace
 from rig.heads import head
 from rig.speech import motion, units
 
@@ -53,3 +53,21 @@ def test_weights_beside_an_opening_are_enlarged_for_the_mesh_that_has_them(
     before, after = both.motion["jawOpen"], shown(both, larger, face, 25.0, character).motion["jawOpen"]
     assert after.max() > 1.3 * before.max()
     assert staged_intensity(Staging(), larger, face, generation, character).intensity == pytest.approx(2)
+
+
+def test_brows_and_head_of_pictures_come_later_with_the_mouth(
+    generation: Generation, toy_speech: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    heard = []
+
+    def staged(face: Face, _: Staging, prosody: Prosody | None = None) -> Face:
+        if prosody is not None:
+            heard.append(prosody.level_db)
+        return face
+
+    monkeypatch.setattr("lipmotion.pipeline.drawn_video.staged_face", staged)
+    monkeypatch.setattr("lipmotion.export.transparent.write_pictures", lambda *_: None)
+    for offset_ms in (0, 500):
+        path = tmp_path / "a%d.png"
+        write(generation, path, speech=toy_speech, fps=1, face="woman", delivery=Delivery(offset_ms=offset_ms))
+    assert heard[-1][50:] == pytest.approx(heard[0])

@@ -211,7 +211,8 @@ def write(
                 write_film(path, frames, played, mark=film.mark, monitor=monitor)
             else:
                 staged = staged_intensity(staging, delivery, shown_face, generation, character)
-                write_drawn_face(path, seen, played, hertz, shown_face, staged, monitor)
+                loudness = moved_prosody(prosody_heard(played), delivery)
+                write_drawn_face(path, seen, played, hertz, shown_face, staged, monitor, loudness)
         elif path in scenes:
             scene = scene or delivered_scene(generation, delivery, shown_face, rate_hz, staging=staging, prosody=heard)
             write_scene(path, scene, sound=heard_in)
