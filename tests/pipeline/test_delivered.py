@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from lipmotion.export.base import read_motion
 from lipmotion.faces import Face, Staging
 from lipmotion.faces.mesh import MeshFace
 from lipmotion.faces.registry import face_named
-from lipmotion.motion.delivery import Delivery
+from lipmotion.motion.delivery import Delivery, closed_frames
 from lipmotion.pipeline.animate import write
 from lipmotion.pipeline.characters import with_curves
 from lipmotion.pipeline.delivered import delivered_scene, shown, staged_intensity
@@ -71,3 +73,17 @@ def test_brows_and_head_of_pictures_come_later_with_the_mouth(
         path = tmp_path / "a%d.png"
         write(generation, path, speech=toy_speech, fps=1, face="woman", delivery=Delivery(offset_ms=offset_ms))
     assert heard[-1][50:] == pytest.approx(heard[0])
+
+
+@pytest.mark.parametrize("rate_hz", [12.0, 23.976, 24.0])
+def test_closures_between_two_frames_of_a_slow_file_are_kept(
+    generation: Generation, rate_hz: float, tmp_path: Path
+) -> None:
+    narrow = generation.motion.values.copy()
+    column, closed = generation.motion.column("opening"), closed_frames(generation)
+    narrow[50:100, column] = 0.1
+    narrow[closed, column] = 0.0
+    spiky = replace(generation, motion=replace(generation.motion, values=narrow))
+    write(spiky, tmp_path / "a.csv", rate_hz=rate_hz, channels=["opening"])
+    opening = read_motion(tmp_path / "a.csv")[0]["opening"]
+    assert opening[[round(frame / 100 * rate_hz) for frame in closed]] == pytest.approx(0.0, abs=1e-6)

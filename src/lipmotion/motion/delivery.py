@@ -202,7 +202,7 @@ def held(generation: Generation, frames: int, closed_s: Sequence[float] = ()) ->
 def closed_on_grid(generation: Generation, rate_hz: float) -> Generation:
     """Return a generation that shows every closure of p, b and m at the nearest time n / ``rate_hz`` seconds.
 
-    Held poses at that rate show them then; between two times a closure of 10 ms would be lost.
+    Motion at that rate shows them then; between two times a closure of 10 ms would be lost.
     """
     motion = generation.motion
     values = motion.values.copy()

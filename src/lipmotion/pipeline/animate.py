@@ -305,7 +305,7 @@ def _motion_files(
         generation = with_articulation(generation, channels or ())
     spoken = delivered(generation, delivery)
     closed_s = closed_times(spoken) if delivery.hold_ms else []
-    if closed_s and rate_hz is not None:
+    if rate_hz is not None and (closed_s or rate_hz < spoken.motion.rate_hz):
         spoken = closed_on_grid(spoken, rate_hz)
     if curves is not None and files:
         spoken, names = with_curves(spoken, curves, staging=staging, prosody=prosody)
