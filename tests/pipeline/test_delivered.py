@@ -16,7 +16,7 @@ from lipmotion.faces.registry import face_named
 from lipmotion.motion.delivery import Delivery, closed_frames
 from lipmotion.pipeline.animate import write
 from lipmotion.pipeline.characters import with_curves
-from lipmotion.pipeline.delivered import delivered_scene, shown, staged_intensity
+from lipmotion.pipeline.delivered import delivered_scene, held_mouth, shown, staged_intensity
 from lipmotion.rig.driven import driven_character
 from lipmotion.rig.gltf_writer import write_glb
 from lipmotion.types import Generation, Prosody, StateTrace
@@ -87,3 +87,18 @@ def test_closures_between_two_frames_of_a_slow_file_are_kept(
     write(spiky, tmp_path / "a.csv", rate_hz=rate_hz, channels=["opening"])
     opening = read_motion(tmp_path / "a.csv")[0]["opening"]
     assert opening[[round(frame / 100 * rate_hz) for frame in closed]] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_eyes_and_head_move_on_while_the_mouth_is_held(generation: Generation, tmp_path: Path) -> None:
+    smooth, delivery = with_curves(generation, "face")[0], Delivery(min_hold_ms=400)
+    assert max(np.abs(smooth.motion[name]).max() for name in ("eyeBlinkLeft", "headYaw")) > 1e-3
+    steps = held_mouth(smooth, delivery.hold_frames(100), [])
+    for name in ("eyeBlinkLeft", "headYaw", "browInnerUp"):
+        assert steps.motion[name] == pytest.approx(smooth.motion[name])
+        assert name not in steps.stepped
+    mouth = steps.motion["jawOpen"]
+    changes = np.flatnonzero(np.abs(np.diff(mouth)) > 1e-9) + 1
+    assert np.diff([0, *changes, len(mouth)]).min() >= 40
+    write(smooth, tmp_path / "a.livelink.csv", delivery=delivery, rate_hz=100)
+    assert read_motion(tmp_path / "a.livelink.csv")[0]["headYaw"] == pytest.approx(smooth.motion["headYaw"], abs=1e-5)
+    assert {"jawOpen", "opening"} <= set(steps.stepped)

@@ -16,13 +16,14 @@ from lipmotion.faces.base import Face, Staging
 from lipmotion.faces.filmed.face import SUFFIX, FilmedFace, load_face
 from lipmotion.faces.registry import FACES, face_named
 from lipmotion.kernels.threads import one_thread
-from lipmotion.motion.delivery import Delivery, closed_on_grid, closed_times, held, sound_units
+from lipmotion.motion.delivery import Delivery, closed_on_grid, closed_times, sound_units
 from lipmotion.motion.gestures import GESTURES, with_gestures
 from lipmotion.pipeline.characters import WHOLE_FACE, with_curves
 from lipmotion.pipeline.delivered import (
     check_delivery,
     delivered,
     delivered_scene,
+    held_mouth,
     moved_prosody,
     shown,
     staged_intensity,
@@ -313,7 +314,9 @@ def _motion_files(
     chosen = spoken.selected(channels) if channels is not None else spoken
     chosen = chosen if rate_hz is None else chosen.resampled(rate_hz)
     written = {path: in_format(path, spoken, chosen, rate_hz, staging, prosody) for path in files}
-    return {path: held(each, delivery.hold_frames(each.motion.rate_hz), closed_s) for path, each in written.items()}
+    return {
+        path: held_mouth(each, delivery.hold_frames(each.motion.rate_hz), closed_s) for path, each in written.items()
+    }
 
 
 def _write_motion(

@@ -72,7 +72,7 @@ def _keeps_original(path: Path, scene: Scene) -> bool:
     if path.suffix.lower() != GLTF or scene.original is None or scene.original.suffix.lower() not in KEPT:
         return False
     return scene.weights is not None and write_animated_gltf(
-        path, scene.original, scene.weights, scene.sound, sound_s=scene.sound_s
+        path, scene.original, scene.weights, scene.sound, sound_s=scene.sound_s, stepped=scene.stepped
     )
 
 

@@ -80,15 +80,16 @@ def _skeleton(scene: Scene) -> Iterator[str]:
 
 
 def _animation(scene: Scene) -> Iterator[str]:
-    table, joints = scene.table(), _joints(scene)
+    joints, (time_s, table) = _joints(scene), scene.keys()
     yield f"uniform token[] blendShapes = {tokens(scene.mesh.shape_names)}"
     if len(table):
-        yield from _samples("float[] blendShapeWeights", map(numbers, table), scene)
+        yield from _samples("float[] blendShapeWeights", map(numbers, table), time_s * _codes_hz(scene))
     else:
         yield f"float[] blendShapeWeights = {numbers(np.zeros(len(scene.mesh.shapes)))}"
     yield f"uniform token[] joints = {tokens(joints)}"
     if scene.turn is not None:
-        yield from _samples("quatf[] rotations", _rotations(scene.turn), scene)
+        codes = np.arange(len(scene.turn.rotations)) * _step(scene)
+        yield from _samples("quatf[] rotations", _rotations(scene.turn), codes)
         yield f"float3[] translations = [(0, 0, 0), {triple(scene.turn.pivot)}]"
     else:
         yield "quatf[] rotations = [(1, 0, 0, 0)]"
@@ -101,10 +102,10 @@ def _rotations(turn: HeadTurn) -> Iterator[str]:
         yield f"[(1, 0, 0, 0), ({w:.7g}, {x:.7g}, {y:.7g}, {z:.7g})]"
 
 
-def _samples(attribute: str, values: Iterable[str], scene: Scene) -> Iterator[str]:
-    step = _step(scene)
+def _samples(attribute: str, values: Iterable[str], codes: NDArray[np.float64]) -> Iterator[str]:
+    """Yield the values of an attribute at time codes [shape=(K,)]."""
     yield f"{attribute}.timeSamples = {{"
-    yield from (f"    {number * step:.9g}: {value}," for number, value in enumerate(values))
+    yield from (f"    {code:.9g}: {value}," for code, value in zip(codes.tolist(), values, strict=True))
     yield "}"
 
 
