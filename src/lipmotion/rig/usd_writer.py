@@ -88,7 +88,7 @@ def _animation(scene: Scene) -> Iterator[str]:
         yield f"float[] blendShapeWeights = {numbers(np.zeros(len(scene.mesh.shapes)))}"
     yield f"uniform token[] joints = {tokens(joints)}"
     if scene.turn is not None:
-        codes = np.arange(len(scene.turn.rotations)) * _step(scene)
+        codes = _step(scene) * np.arange(len(scene.turn.rotations), dtype=np.float64)
         yield from _samples("quatf[] rotations", _rotations(scene.turn), codes)
         yield f"float3[] translations = [(0, 0, 0), {triple(scene.turn.pivot)}]"
     else:
