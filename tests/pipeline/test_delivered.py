@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion.errors import InputError
 from lipmotion.export.base import read_motion
 from lipmotion.faces import Face, Staging
 from lipmotion.faces.mesh import MeshFace
 from lipmotion.faces.registry import face_named
 from lipmotion.motion.delivery import Delivery, closed_frames
-from lipmotion.pipeline.animate import write
+from lipmotion.pipeline.animate import check_outputs, write
 from lipmotion.pipeline.characters import with_curves
 from lipmotion.pipeline.delivered import delivered_scene, held_mouth, shown, staged_intensity
 from lipmotion.rig.driven import driven_character
@@ -102,3 +103,10 @@ def test_eyes_and_head_move_on_while_the_mouth_is_held(generation: Generation, t
     write(smooth, tmp_path / "a.livelink.csv", delivery=delivery, rate_hz=100)
     assert read_motion(tmp_path / "a.livelink.csv")[0]["headYaw"] == pytest.approx(smooth.motion["headYaw"], abs=1e-5)
     assert {"jawOpen", "opening"} <= set(steps.stepped)
+
+
+def test_intensities_that_are_too_large_together_are_found_before_the_work() -> None:
+    staging, delivery = Staging(intensity=2), Delivery(intensity=2)
+    with pytest.raises(InputError, match="staging and delivery, 2 and 2, are 4 together, required at most 3"):
+        check_outputs(["a.mp4"], "said.wav", staging=staging, delivery=delivery)
+    check_outputs(["a.json"], "said.wav", staging=staging, delivery=delivery)

@@ -246,7 +246,7 @@ def check_outputs(
     shown_face = opened_face(face)
     check_film(shown_face, film, speech)
     check_staging(shown_face, staging or Staging())
-    check_delivery(delivery or Delivery(), map(Path, outputs), shown_face)
+    check_delivery(delivery or Delivery(), map(Path, outputs), shown_face, staging or Staging())
     suffixes = (
         *motion_suffixes(),
         *VIDEO_SUFFIXES,

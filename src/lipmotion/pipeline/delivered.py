@@ -12,7 +12,15 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.faces.base import Face, Stageable, Staging
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.faces.mesh import MeshFace
-from lipmotion.motion.delivery import Delivery, closed_on_grid, closed_times, held, intensified, moved_in_time
+from lipmotion.motion.delivery import (
+    MOST_INTENSITY,
+    Delivery,
+    closed_on_grid,
+    closed_times,
+    held,
+    intensified,
+    moved_in_time,
+)
 from lipmotion.motion.gestures import with_gestures
 from lipmotion.pipeline.characters import with_curves
 from lipmotion.pipeline.drawn_video import is_picture_sequence, shows_face
@@ -25,7 +33,7 @@ from lipmotion.rig.shape_names import ARKIT_OTHERS, arkit_name
 from lipmotion.types import Generation, Motion, Prosody, StateTrace
 
 
-def check_delivery(delivery: Delivery, outputs: Iterable[Path], face: Face | FilmedFace) -> None:
+def check_delivery(delivery: Delivery, outputs: Iterable[Path], face: Face | FilmedFace, staging: Staging) -> None:
     """Raise ExportError or InputError if an output cannot be delivered so."""
     videos = [path for path in outputs if shows_face(path)]
     for path in videos:
@@ -34,6 +42,12 @@ def check_delivery(delivery: Delivery, outputs: Iterable[Path], face: Face | Fil
                 f"{path}: a video has its own sound, which begins with it; an offset is for files that are put beside "
                 "a sound: write the video without it"
             )
+    both = staging.intensity * delivery.intensity
+    if videos and isinstance(face, Stageable) and both > MOST_INTENSITY:
+        raise InputError(
+            f"the intensities of staging and delivery, {staging.intensity:g} and {delivery.intensity:g}, are "
+            f"{both:g} together, required at most {MOST_INTENSITY:g}; give one of them"
+        )
     if videos and delivery.hold_ms and isinstance(face, FilmedFace):
         raise InputError("the poses of a filmed face cannot be held; hold those of a drawn face, or of motion files")
 
