@@ -104,3 +104,10 @@ def test_lips_that_close_between_two_frames_are_closed_at_the_nearer_one() -> No
 def test_curves_that_are_no_blendshapes_have_no_closures() -> None:
     assert closures({"opening": [0.0, 0.1, 0.0]}, 3) == []
     assert at_frames({"a": []}, [], 24.0) == {"a": []}
+
+
+def test_held_curves_are_not_interpolated() -> None:
+    curves = {"browInnerUp": [0.0, 1.0, 0.0], "a": [0.0, 1.0, 0.0]}
+    found = at_frames(curves, [0.0, 0.1, 0.2], 20.0, ("a",))
+    assert found["browInnerUp"] == pytest.approx([0, 0.5, 1, 0.5, 0])
+    assert found["a"] == pytest.approx([0, 0, 1, 1, 0])

@@ -35,6 +35,9 @@ class MotionFormat:
     other_curves : whether weights and controls that the user asks for take the place of ``curves``
     names_sound  : whether the file names the recording: the description of the speech then has ``path``, the path from
                    the folder of the file
+
+    The description of the speech has ``start_s`` where the sound does not begin with the motion: seconds of the motion
+    at which it begins, as text; negative: before it.
     """
 
     write: Callable[[Path, Generation, About, About], None]

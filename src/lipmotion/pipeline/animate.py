@@ -16,13 +16,14 @@ from lipmotion.faces.base import Face, Staging
 from lipmotion.faces.filmed.face import SUFFIX, FilmedFace, load_face
 from lipmotion.faces.registry import FACES, face_named
 from lipmotion.kernels.threads import one_thread
-from lipmotion.motion.delivery import Delivery, closed_on_grid, closed_times, held, sound_units
+from lipmotion.motion.delivery import Delivery, closed_on_grid, closed_times, sound_units
 from lipmotion.motion.gestures import GESTURES, with_gestures
 from lipmotion.pipeline.characters import WHOLE_FACE, with_curves
 from lipmotion.pipeline.delivered import (
     check_delivery,
     delivered,
     delivered_scene,
+    held_mouth,
     moved_prosody,
     shown,
     staged_intensity,
@@ -211,14 +212,15 @@ def write(
                 write_film(path, frames, played, mark=film.mark, monitor=monitor)
             else:
                 staged = staged_intensity(staging, delivery, shown_face, generation, character)
-                write_drawn_face(path, seen, played, hertz, shown_face, staged, monitor)
+                loudness = moved_prosody(prosody_heard(played), delivery)
+                write_drawn_face(path, seen, played, hertz, shown_face, staged, monitor, loudness)
         elif path in scenes:
             scene = scene or delivered_scene(generation, delivery, shown_face, rate_hz, staging=staging, prosody=heard)
             write_scene(path, scene, sound=heard_in)
         elif holds_labels(path):
             write_labels(path, sound_units(generation.units, delivery, float(generation.motion.time_s[-1])))
         else:
-            _write_motion(written[path], path, recording or heard_in, model)
+            _write_motion(written[path], path, recording or heard_in, model, delivery.offset_ms / 1000)
 
 
 def check_outputs(
@@ -244,7 +246,7 @@ def check_outputs(
     shown_face = opened_face(face)
     check_film(shown_face, film, speech)
     check_staging(shown_face, staging or Staging())
-    check_delivery(delivery or Delivery(), map(Path, outputs), shown_face)
+    check_delivery(delivery or Delivery(), map(Path, outputs), shown_face, staging or Staging())
     suffixes = (
         *motion_suffixes(),
         *VIDEO_SUFFIXES,
@@ -304,7 +306,7 @@ def _motion_files(
         generation = with_articulation(generation, channels or ())
     spoken = delivered(generation, delivery)
     closed_s = closed_times(spoken) if delivery.hold_ms else []
-    if closed_s and rate_hz is not None:
+    if rate_hz is not None and (closed_s or rate_hz < spoken.motion.rate_hz):
         spoken = closed_on_grid(spoken, rate_hz)
     if curves is not None and files:
         spoken, names = with_curves(spoken, curves, staging=staging, prosody=prosody)
@@ -312,13 +314,19 @@ def _motion_files(
     chosen = spoken.selected(channels) if channels is not None else spoken
     chosen = chosen if rate_hz is None else chosen.resampled(rate_hz)
     written = {path: in_format(path, spoken, chosen, rate_hz, staging, prosody) for path in files}
-    return {path: held(each, delivery.hold_frames(each.motion.rate_hz), closed_s) for path, each in written.items()}
+    return {
+        path: held_mouth(each, delivery.hold_frames(each.motion.rate_hz), closed_s) for path, each in written.items()
+    }
 
 
-def _write_motion(generation: Generation, path: Path, speech: str | Path | None, model: Model | None) -> None:
+def _write_motion(
+    generation: Generation, path: Path, speech: str | Path | None, model: Model | None, sound_s: float
+) -> None:
     about = model.about if model else {}
     named = {key: _text(about[key]) for key in ("name", "corpus", "licence", "attribution") if about.get(key)}
     source = {"file": as_text(Path(speech).name)} if speech else {}
+    if speech and sound_s:
+        source["start_s"] = f"{sound_s:.9g}"
     if speech and motion_format(path).names_sound:
         source["path"] = sound_reference(Path(speech), path)
     write_motion(path, generation, source=source, model=named)

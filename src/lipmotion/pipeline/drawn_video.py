@@ -52,17 +52,25 @@ def check_staging(face: Face | FilmedFace, staging: Staging) -> None:
 
 
 def write_drawn_face(
-    path: Path, generation: Generation, sound: Audio, fps: float, face: Face, staging: Staging, monitor: Monitor
+    path: Path,
+    generation: Generation,
+    sound: Audio,
+    fps: float,
+    face: Face,
+    staging: Staging,
+    monitor: Monitor,
+    prosody: Prosody | None = None,
 ) -> None:
     """Write generated motion as a drawn face, in the format of the suffix; brows and head move with the sound.
 
+    prosody : loudness and pitch in the time of the motion; None: those of the sound, which begins with the motion
     monitor : receives reports of the progress
     Raises ExportError: the file cannot be written.  Raises InputError: no such face, or it cannot be staged so.
     """
     from lipmotion.export.transparent import write_pictures, write_with_alpha
     from lipmotion.export.video import write_mp4
 
-    staged, drawn = staged_face(face, staging, prosody_heard(sound)), None
+    staged, drawn = staged_face(face, staging, prosody or prosody_heard(sound)), None
     if path.suffix.lower() == OPAQUE_SUFFIX and isinstance(staged, DrawsPlanes):
         drawn = staged.render_planes(generation.motion, generation.units, fps=fps)
     if drawn is None:

@@ -77,11 +77,12 @@ def control(name: str) -> tuple[str, str, str] | None:
     return (found["bone"], "property", found["property"]) if found else None
 
 
-def at_frames(curves: Curves, times: list[float], fps: float) -> Curves:
+def at_frames(curves: Curves, times: list[float], fps: float, stepped: tuple[str, ...] = ()) -> Curves:
     """Return the values at every frame, frame n at ``n / fps`` seconds, to the last frame that begins in the motion.
 
     Between values by a straight line. Where the lips close, the curves of jaw and mouth have at the nearest frame the
     values of that moment, so that no p, b or m is lost between two frames.
+    stepped : names of curves that hold each value until the next one
     """
     if not times:
         return {name: [] for name in curves}
@@ -92,10 +93,11 @@ def at_frames(curves: Curves, times: list[float], fps: float) -> Curves:
         nearest = round((times[moment] - times[0]) * fps)
         if nearest < count:
             closed[nearest] = (moment, 0.0)
-    return {
-        name: [_between(values, *place) for place in (closed if spelling(name).startswith(MOUTH) else places)]
-        for name, values in curves.items()
-    }
+    found = {}
+    for name, values in curves.items():
+        chosen = closed if spelling(name).startswith(MOUTH) else places
+        found[name] = [_between(values, low, 0.0 if name in stepped else share) for low, share in chosen]
+    return found
 
 
 def closures(curves: Curves, count: int) -> list[int]:

@@ -39,7 +39,10 @@ def write(path: Path, generation: Generation, source: Mapping[str, str], _model:
     code, keying, main = (_IMPORT.sub("", _BEGINNING.sub("", text)) for text in texts)
     with path.open("w", encoding="utf-8", newline="\n") as file:
         file.write(_HEAD + code.strip() + "\n\n\n" + keying.strip() + "\n\n\n")
-        file.write(f"RATE_HZ = {motion.rate_hz!r}\nSOUND = {json.dumps(source.get('path', ''))}\nMOTION = {{\n")
+        file.write(f"RATE_HZ = {motion.rate_hz!r}\nSOUND = {json.dumps(source.get('path', ''))}\n")
+        file.write(f"SOUND_S = {float(source.get('start_s', 0.0))!r}\n")
+        stepped = "".join(f"{json.dumps(name)}, " for name in motion.names if name in generation.stepped)
+        file.write(f"STEPPED = ({stepped})\nMOTION = {{\n")
         for name in motion.names:
             values = ", ".join(f"{value + 0.0:.{DECIMALS}g}" for value in motion[name].tolist())
             file.write(f"    {json.dumps(name)}: [{values}],\n")
