@@ -191,6 +191,43 @@ def test_a_worker_of_an_earlier_run_writes_nothing(sounds: Path, settings: Batch
     assert contents(tmp_path / "out").keys() == {".batch/run"}
 
 
+def test_an_output_that_cannot_be_written_is_a_line_that_fails(
+    sounds: Path, settings: BatchSettings, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    (out / "one.json").mkdir(parents=True)
+    (out / "deep").touch()
+    found = batch(sounds, out, settings, jobs=1)
+    assert (found.done, found.failed) == (1, 2)
+    rows = {row["name"]: row for row in ledger_rows(out)}
+    assert "is a folder" in rows["one"]["error"]
+    assert rows["deep/two"]["outcome"] == "failed"
+    assert (out / "three.json").is_file()
+    assert sorted(path.name for path in out.iterdir() if path.name.startswith(".")) == []
+
+
+def test_an_output_that_cannot_be_renamed_is_a_line_that_fails(
+    sounds: Path, settings: BatchSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    work = waiting(sounds, settings, tmp_path / "out")[0]
+    monkeypatch.setattr("lipmotion.pipeline.batch.one_line.check_target", lambda _: None)
+    (tmp_path / "out" / f"{work.line.name}.json").mkdir(parents=True)
+    record = finished_line(work)
+    assert (record["outcome"], record["outputs"]) == ("failed", {})
+
+
+def test_a_bug_that_one_line_meets_does_not_end_the_batch(
+    sounds: Path, settings: BatchSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError("float division")
+
+    monkeypatch.setattr("lipmotion.pipeline.batch.one_line._written", broken)
+    found = batch(sounds, tmp_path / "out", settings, jobs=1)
+    assert found.failed == 3
+    assert "unexpected ZeroDivisionError: float division" in ledger_rows(tmp_path / "out")[0]["error"]
+
+
 def command(*words: object) -> list[str]:
     return [sys.executable, "-m", "lipmotion.cli.main", "batch", *map(str, words), "--machine-readable"]
 
