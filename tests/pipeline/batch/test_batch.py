@@ -18,12 +18,14 @@ import pytest
 
 import lipmotion
 from lipmotion.errors import CorpusError, ExportError, InputError
+from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.motion.delivery import Delivery
-from lipmotion.pipeline.batch import BatchLine, BatchSettings, batch, read_lines
+from lipmotion.pipeline.batch import BatchLine, BatchSettings, batch, one_line, read_lines
 from lipmotion.pipeline.batch import run as run_module
 from lipmotion.pipeline.batch.ledger import Place
 from lipmotion.pipeline.batch.one_line import LineWork, finished_line
 from lipmotion.pipeline.batch.pool import WorkerDied
+from lipmotion.pipeline.model import Model
 from lipmotion.types import Item
 
 pytest.importorskip("joblib")
@@ -77,6 +79,19 @@ def test_the_outputs_are_those_of_animate(sounds: Path, settings: BatchSettings,
     assert rows["three"]["words"] != "transcript"
     assert "not a readable recording" in rows["broken"]["error"]
     assert rows["one"]["closures_heard"] >= rows["one"]["closures_made"] >= 1
+
+
+def test_the_face_of_another_person_is_mapped_onto_once(
+    filmed_face: FilmedFace, toy_model: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mapped: list[str] = []
+    monkeypatch.setattr(one_line, "_face", lambda *_: filmed_face)
+    monkeypatch.setattr(one_line, "map_onto", lambda *_, speaker: mapped.append(speaker) or "a map")
+    other = replace(toy_model, about=toy_model.about | {"corpus": ["another"]})
+    lines = [BatchLine(name, f"/{name}.wav", "hello") for name in "ab"]
+    assert [one_line._request(line, BatchSettings(), other).onto for line in lines] == ["a map", "a map"]
+    assert mapped == [""]
+    assert one_line._request(lines[0], BatchSettings(), toy_model).onto is None
 
 
 def test_what_was_done_is_kept(sounds: Path, settings: BatchSettings, tmp_path: Path) -> None:

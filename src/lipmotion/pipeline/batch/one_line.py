@@ -23,6 +23,7 @@ from lipmotion.faces.base import Face
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.measures.closures import CLOSED_SHARE
 from lipmotion.motion.closure import OPENING, closable_ranges
+from lipmotion.motion.speakers import SpeakerMap
 from lipmotion.pipeline.animate import animate, check_outputs, opened_face, with_articulation, write
 from lipmotion.pipeline.batch.ledger import (
     DONE,
@@ -41,6 +42,7 @@ from lipmotion.pipeline.cues import cues, write_cues
 from lipmotion.pipeline.film.video import person_shown
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import SpeechRequest
+from lipmotion.pipeline.transfer import map_onto
 from lipmotion.storage.files import check_target, sha256_of
 from lipmotion.types import Generation
 from lipmotion.units import Lexicon
@@ -186,6 +188,7 @@ def _request(line: BatchLine, settings: BatchSettings, model: Model) -> SpeechRe
     Where a filmed face of another person is shown, the motion is mapped onto it, as ``lipmotion animate`` does.
     """
     speaker = line.speaker or settings.speaker
+    face = person_shown(model, _face(settings.face, _stamp(settings.face)), speaker)
     labels = None if line.transcript else labels_beside(Path(line.recording))
     transcript = line.transcript or (labels.transcript if labels else None)
     return SpeechRequest(
@@ -195,7 +198,7 @@ def _request(line: BatchLine, settings: BatchSettings, model: Model) -> SpeechRe
         lexicon=_lexicon(settings.lexicon, _stamp(settings.lexicon)),
         recogniser=settings.recogniser,
         speaker=speaker,
-        onto=person_shown(model, _face(settings.face, _stamp(settings.face)), speaker),
+        onto=None if face is None else _map_onto(model, face, speaker),
     )
 
 
@@ -263,6 +266,12 @@ def _lexicon(path: str, _: int) -> Lexicon | None:
 @lru_cache(maxsize=1)
 def _face(name: str, _: int) -> Face | FilmedFace:
     return opened_face(name)
+
+
+@lru_cache(maxsize=8)
+def _map_onto(model: Model, face: FilmedFace, speaker: str) -> SpeakerMap:
+    """Return the map of the motion of a speaker onto a face: the same for all lines, and slow to make."""
+    return map_onto(model, face, speaker=speaker)
 
 
 def check_line_settings(settings: BatchSettings) -> None:
