@@ -38,7 +38,7 @@ from lipmotion.pipeline.drawn_video import (
 )
 from lipmotion.pipeline.film.video import FILM, FilmOptions, check_film, film_of, write_film
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.motion_files import in_format, needs_prosody
+from lipmotion.pipeline.motion_files import in_format, needs_prosody, warn_of_unused
 from lipmotion.pipeline.outlook import outlook_of
 from lipmotion.pipeline.request import SpeechInput, request_of
 from lipmotion.pipeline.scenes import SCENE_SUFFIXES, is_scene, sound_reference, write_scene
@@ -306,12 +306,16 @@ def _motion_files(
     closed_s = closed_times(spoken) if delivery.hold_ms else []
     if closed_s and rate_hz is not None:
         spoken = closed_on_grid(spoken, rate_hz)
+    named, asked = channels, channels or ()
     if curves is not None and files:
         spoken, names = with_curves(spoken, curves, staging=staging, prosody=prosody)
+        asked = asked if named or isinstance(curves, DrivenCharacter) else names
         channels = names if channels is None else channels
     chosen = spoken.selected(channels) if channels is not None else spoken
     chosen = chosen if rate_hz is None else chosen.resampled(rate_hz)
-    written = {path: in_format(path, spoken, chosen, rate_hz, staging, prosody) for path in files}
+    written = {path: in_format(path, spoken, chosen, rate_hz, staging, prosody, named) for path in files}
+    for path, each in written.items():
+        warn_of_unused(path, each, asked)
     return {path: held(each, delivery.hold_frames(each.motion.rate_hz), closed_s) for path, each in written.items()}
 
 

@@ -121,4 +121,4 @@ def kept_keys(time_s: Array, values: Array, tolerance: float) -> list[int]:
     return sorted(kept)
 
 
-MOTION_FORMAT = MotionFormat(write, check=check)
+MOTION_FORMAT = MotionFormat(write, check=check, mouth=True)
