@@ -129,6 +129,7 @@ def write(
     staging: Staging | None = None,
     delivery: Delivery | None = None,
     curves: str | Path | DrivenCharacter | None = None,
+    temporary: bool = False,
     monitor: Monitor = silent_monitor,
 ) -> None:
     """Write generated motion to one or several files, each in the format of its suffix.
@@ -153,6 +154,7 @@ def write(
     delivery : intensity, anticipation, offset and held poses of every output (docs/controls.md); None: as generated
     curves   : what motion files hold instead of the motion, unless ``channels`` asks for more: ``arkit``, ``visemes``,
                ``fap``, a table of a rig (``.csv``), or a character with blendshapes (docs/meshes.md)
+    temporary : whether ``speech`` is a file that will be gone, which outputs then do not name
     monitor  : receives reports of the progress of videos
     Raises ExportError: unknown suffix, no such folder, or a file that cannot be written.
     Raises InputError: a frame rate out of its range, or an unknown channel or face.
@@ -193,7 +195,7 @@ def write(
     written = _motion_files(paths, generation, channels, curves, rate_hz, delivery, staging, heard)
     for path, each in written.items():
         check_motion(path, each.motion)
-    heard_in = next(iter(sounds), None) if recording is None else Path(recording)
+    heard_in = next(iter(sounds), None) if recording is None or temporary else Path(recording)
     scene = None
     for path in paths:
         if path in sounds and sound is not None:
@@ -218,7 +220,7 @@ def write(
         elif holds_labels(path):
             write_labels(path, sound_units(generation.units, delivery, float(generation.motion.time_s[-1])))
         else:
-            _write_motion(written[path], path, recording or heard_in, model)
+            _write_motion(written[path], path, heard_in, model)
 
 
 def check_outputs(
