@@ -67,14 +67,14 @@ def check_results(options: argparse.Namespace, speech: Path | None = None) -> No
 def write_results(
     options: argparse.Namespace,
     result: Generation,
-    speech: Path | Audio,
+    speech: Path | Audio | None,
     model: Model | None,
     report: Report,
     temporary: bool = False,
 ) -> None:
     """Write generated motion to the outputs.
 
-    speech    : the recording, or the sound
+    speech    : the recording, or the sound; None: there is none, and no output needs it
     report    : receives the progress of videos
     temporary : whether the recording is a file that will be gone
     """
