@@ -102,9 +102,10 @@ def test_standard_input_and_output(
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(toy_speech.read_bytes())))
     written = io.BytesIO()
     monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(written))
-    words = ["animate", "-", "--model", str(toy_model_file), "-o", "-", "a.csv", "--format", "csv"]
+    words = ["animate", "-", "--model", str(toy_model_file), "-o", "-", "a.csv", "a.json", "--format", "csv"]
     assert main(words) == 0
     assert written.getvalue() == (here / "a.csv").read_bytes()
+    assert json.loads((here / "a.json").read_text())["source"] == {}
 
 
 @pytest.mark.usefixtures("here")

@@ -205,3 +205,14 @@ def test_articulatory_channels_are_written_where_they_are_asked_for(
     assert more.motion.names == (*result.motion.names, *GESTURES)
     assert more.variance.shape == more.motion.values.shape
     assert not more.variance[:, -1].any()
+
+
+@pytest.mark.parametrize("temporary", [False, True])
+def test_scenes_name_no_sound_that_will_be_gone(
+    result: Generation, toy_speech: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, temporary: bool
+) -> None:
+    named = []
+    monkeypatch.setattr("lipmotion.pipeline.animate.delivered_scene", lambda *_, **__: True)
+    monkeypatch.setattr("lipmotion.pipeline.animate.write_scene", lambda *_, sound: named.append(sound))
+    write(result, [tmp_path / "a.glb"], speech=toy_speech, temporary=temporary)
+    assert named == [None if temporary else toy_speech]

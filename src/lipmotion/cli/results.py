@@ -74,12 +74,18 @@ def open_faces(options: argparse.Namespace) -> None:
 
 
 def write_results(
-    options: argparse.Namespace, result: Generation, speech: Path | Audio, model: Model | None, report: Report
+    options: argparse.Namespace,
+    result: Generation,
+    speech: Path | Audio | None,
+    model: Model | None,
+    report: Report,
+    temporary: bool = False,
 ) -> None:
     """Write generated motion to the outputs.
 
-    speech : the recording, or the sound
-    report : receives the progress of videos
+    speech    : the recording, or the sound; None: there is none, and no output needs it
+    report    : receives the progress of videos
+    temporary : whether the recording is a file that will be gone
     """
     from lipmotion.pipeline.animate import with_articulation, write
     from lipmotion.types.progress import sub_monitor
@@ -98,6 +104,7 @@ def write_results(
         film=film_options(options),
         staging=staging_of(options),
         delivery=delivery,
+        temporary=temporary,
         monitor=sub_monitor(report.receive, RECOGNITION, 1.0),
     )
 

@@ -39,7 +39,7 @@ from lipmotion.pipeline.drawn_video import (
 )
 from lipmotion.pipeline.film.video import FILM, FilmOptions, check_film, film_of, write_film
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.motion_files import in_format, needs_prosody
+from lipmotion.pipeline.motion_files import in_format, needs_prosody, warn_of_unused
 from lipmotion.pipeline.outlook import outlook_of
 from lipmotion.pipeline.request import SpeechInput, request_of
 from lipmotion.pipeline.scenes import SCENE_SUFFIXES, is_scene, sound_reference, write_scene
@@ -130,6 +130,7 @@ def write(
     staging: Staging | None = None,
     delivery: Delivery | None = None,
     curves: str | Path | DrivenCharacter | None = None,
+    temporary: bool = False,
     monitor: Monitor = silent_monitor,
 ) -> None:
     """Write generated motion to one or several files, each in the format of its suffix.
@@ -154,6 +155,7 @@ def write(
     delivery : intensity, anticipation, offset and held poses of every output (docs/controls.md); None: as generated
     curves   : what motion files hold instead of the motion, unless ``channels`` asks for more: ``arkit``, ``visemes``,
                ``fap``, a table of a rig (``.csv``), or a character with blendshapes (docs/meshes.md)
+    temporary : whether ``speech`` is a file that will be gone, which outputs then do not name
     monitor  : receives reports of the progress of videos
     Raises ExportError: unknown suffix, no such folder, or a file that cannot be written.
     Raises InputError: a frame rate out of its range, or an unknown channel or face.
@@ -194,7 +196,7 @@ def write(
     written = _motion_files(paths, generation, channels, curves, rate_hz, delivery, staging, heard)
     for path, each in written.items():
         check_motion(path, each.motion)
-    heard_in = next(iter(sounds), None) if recording is None else Path(recording)
+    heard_in = next(iter(sounds), None) if recording is None or temporary else Path(recording)
     scene = None
     for path in paths:
         if path in sounds and sound is not None:
@@ -220,7 +222,7 @@ def write(
         elif holds_labels(path):
             write_labels(path, sound_units(generation.units, delivery, float(generation.motion.time_s[-1])))
         else:
-            _write_motion(written[path], path, recording or heard_in, model, delivery.offset_ms / 1000)
+            _write_motion(written[path], path, heard_in, model, delivery.offset_ms / 1000)
 
 
 def check_outputs(
@@ -308,12 +310,16 @@ def _motion_files(
     closed_s = closed_times(spoken) if delivery.hold_ms else []
     if rate_hz is not None and (closed_s or rate_hz < spoken.motion.rate_hz):
         spoken = closed_on_grid(spoken, rate_hz)
+    named, asked = channels, channels or ()
     if curves is not None and files:
         spoken, names = with_curves(spoken, curves, staging=staging, prosody=prosody)
+        asked = asked if named or isinstance(curves, DrivenCharacter) else names
         channels = names if channels is None else channels
     chosen = spoken.selected(channels) if channels is not None else spoken
     chosen = chosen if rate_hz is None else chosen.resampled(rate_hz)
-    written = {path: in_format(path, spoken, chosen, rate_hz, staging, prosody) for path in files}
+    written = {path: in_format(path, spoken, chosen, rate_hz, staging, prosody, named) for path in files}
+    for path, each in written.items():
+        warn_of_unused(path, each, asked)
     return {
         path: held_mouth(each, delivery.hold_frames(each.motion.rate_hz), closed_s) for path, each in written.items()
     }

@@ -16,6 +16,7 @@ from lipmotion.kernels.choice import numba_works
 from lipmotion.pipeline.film.video import RENDERING
 from lipmotion.speech.audio_files import SPEECH_RATE_HZ, read_audio
 from lipmotion.speech.decimation import decimated
+from lipmotion.speech.mfcc import WINDOW
 from lipmotion.speech.prosody import prosody_of
 from lipmotion.types import Audio, Channel, Generation, Monitor, Motion, Prosody, Timeline
 from lipmotion.types.progress import with_reports
@@ -96,6 +97,8 @@ def load_drawing(face: Face) -> None:
 def prosody_heard(speech: str | Path | Audio) -> Prosody:
     """Return loudness and pitch of a recording or a sound, for movements of brows and head.
 
+    A sound that is shorter than one frame of speech is followed by silence.
+
     Raises InputError: the recording cannot be read.
     """
     sound = speech if isinstance(speech, Audio) else read_audio(Path(speech), SPEECH_RATE_HZ, warn=False)
@@ -107,4 +110,5 @@ def prosody_heard(speech: str | Path | Audio) -> Prosody:
         from scipy.signal import resample_poly
 
         samples = resample_poly(samples, ratio.numerator, ratio.denominator).astype(np.float32)
-    return prosody_of(Audio(samples, SPEECH_RATE_HZ))
+    missing = max(WINDOW - len(samples), 0)
+    return prosody_of(Audio(np.pad(samples, (0, missing)), SPEECH_RATE_HZ))

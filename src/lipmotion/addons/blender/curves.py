@@ -10,10 +10,10 @@ import math
 import re
 from bisect import bisect_left
 
+from .takes import read_take
+
 Curves = dict[str, list[float]]
 
-TICKS_HZ = 60.0
-"""The frames of a Live Link Face timecode are 60ths of a second, unless more than 60 of them are counted."""
 OPEN_BELOW, NEAR = 0.02, 3
 """Lips are held to be closed where the shapes that part them add up to less than this, and to less than in this many
 frames before and after."""
@@ -41,13 +41,11 @@ def read_motion(path: str) -> tuple[Curves, list[float]]:
         rows = [row for row in csv.reader(file) if row]
     if not rows or rows[0][0].lower() not in {"time_s", "timecode"}:
         raise ValueError("the first column is neither 'time_s' (lipmotion) nor 'Timecode' (Live Link Face)")
-    first = 1 if rows[0][0].lower() == "time_s" else 2
-    if first == 1:
-        times = [float(row[0]) for row in rows[1:]]
-    else:
-        rows = [rows[0], *(row for row in rows[1:] if len(row) == len(rows[0]))]
-        times = _seconds([row[0] for row in rows[1:]])
-    return _columns(rows[0][first:], [list(map(float, row[first:])) for row in rows[1:]]), times
+    if rows[0][0].lower() == "timecode":
+        names, times, values = read_take(rows)
+        return _columns(names, values), times
+    times = [float(row[0]) for row in rows[1:]]
+    return _columns(rows[0][1:], [list(map(float, row[1:])) for row in rows[1:]]), times
 
 
 def spelling(name: str) -> str:
@@ -132,12 +130,3 @@ def _place(times: list[float], time_s: float) -> tuple[int, float]:
 
 def _columns(names: list[str], rows: list[list[float]]) -> Curves:
     return {name: [row[column] for row in rows] for column, name in enumerate(names)}
-
-
-def _seconds(timecodes: list[str]) -> list[float]:
-    """Return the times of timecodes ``HH:MM:SS:FF.mmm`` from the first one, in seconds."""
-    parts = [list(map(float, code.split(":"))) for code in timecodes]
-    most = max((frames for *_, frames in parts), default=0.0)
-    rate = TICKS_HZ if most < TICKS_HZ else float(math.ceil(most))
-    seconds = [hours * 3600 + minutes * 60 + seconds + frames / rate for hours, minutes, seconds, frames in parts]
-    return [time_s - seconds[0] for time_s in seconds]

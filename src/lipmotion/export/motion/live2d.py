@@ -130,4 +130,4 @@ def changes(values: Array) -> list[int]:
     return sorted({0, *(np.flatnonzero(np.diff(values)) + 1).tolist(), len(values) - 1})
 
 
-MOTION_FORMAT = MotionFormat(write, check=check)
+MOTION_FORMAT = MotionFormat(write, check=check, mouth=True)
