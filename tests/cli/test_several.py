@@ -18,6 +18,7 @@ from lipmotion.cli.main import main
 from lipmotion.export.base import read_motion
 from lipmotion.rig.driven import DrivenCharacter, driven_character
 from lipmotion.rig.gltf_writer import write_glb
+from lipmotion.testing.toy import ToySentence
 from rig.heads import head
 
 
@@ -34,6 +35,15 @@ def test_a_folder_of_recordings(run: RunCommand, takes: Path, toy_model_file: Pa
     done = run("animate", takes, "--model", toy_model_file, "-o", "out/", "{name}.TextGrid", "--to", "json,csv")
     assert done == (0, ["out/a.json", "out/a.csv", "a.TextGrid", "out/b.json", "out/b.csv", "b.TextGrid"], [])
     assert (here / "out" / "a.csv").read_bytes() == (here / "out" / "b.csv").read_bytes()
+
+
+def test_words_beside_recordings_are_used(
+    run: RunCommand, takes: Path, toy_model_file: Path, toy_sentence: ToySentence, here: Path
+) -> None:
+    (takes / "a.txt").write_text(" ".join(toy_sentence.words))
+    assert run("animate", takes, "--model", toy_model_file, "-o", "out/").code == 0
+    documents = [json.loads((here / "out" / f"{name}.json").read_text()) for name in ("a", "b")]
+    assert [document["outlook"]["words"] == "transcript" for document in documents] == [True, False]
 
 
 def test_what_fails_does_not_stop_the_others(run: RunCommand, takes: Path, toy_model_file: Path) -> None:

@@ -30,7 +30,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add_output(parser, "--posteriors", metavar="FILE.png", help="draw the posteriors of units over time (coupled)")
     for add_more in (add_kinds_argument, add_pipe_format, add_execution):
         add_more(parser)
-    parser.set_defaults(run=run, piped=False)
+    parser.set_defaults(run=run, piped=False, words_beside=False)
 
 
 def run(options: argparse.Namespace) -> None:
@@ -58,7 +58,7 @@ def _animate(load: Callable[[], Model], options: argparse.Namespace, report: Rep
     check_results(options, options.speech)
     if options.posteriors:
         check_picture(options.posteriors, options.speech)
-    request, model = spoken_request(options), load()
+    request, model = spoken_request(options, options.words_beside), load()
     if request.onto is None:
         request = replace(request, onto=person_shown(model, options.face, options.speaker))
     if options.posteriors:

@@ -53,6 +53,7 @@ def animated_one_by_one(
 def _one_by_one(options: argparse.Namespace, recordings: Sequence[Path]) -> list[argparse.Namespace]:
     """Return the options of each recording, its outputs instead of folders and templates; make the folders.
 
+    Words and phones in files beside a recording are used, where none are given, as a corpus and a batch use them.
     Faces and characters are opened once, for all recordings. What cannot be leaves no new folders.
     """
     from lipmotion.cli.results import check_results, open_faces
@@ -65,8 +66,9 @@ def _one_by_one(options: argparse.Namespace, recordings: Sequence[Path]) -> list
             raise InputError(f"--{name} belongs to one recording, and there are {len(recordings)}; animate each alone")
     planned = planned_outputs(recordings, options.output, options.to.split(","))
     open_faces(options)
+    shared = {**vars(options), "words_beside": True}
     pairs = zip(recordings, planned, strict=True)
-    jobs = [argparse.Namespace(**{**vars(options), "speech": speech, "output": files}) for speech, files in pairs]
+    jobs = [argparse.Namespace(**{**shared, "speech": speech, "output": files}) for speech, files in pairs]
     with made_folders({Path(file).parent for files in planned for file in files}):
         for job in jobs:
             check_results(job, job.speech)

@@ -104,17 +104,26 @@ def model_loader(options: argparse.Namespace) -> Callable[[], Model]:
     return load
 
 
-def spoken_request(options: argparse.Namespace) -> SpeechRequest:
-    """Return the request of the arguments of ``add_speech_arguments``, files read."""
+def spoken_request(options: argparse.Namespace, words_beside: bool = False) -> SpeechRequest:
+    """Return the request of the arguments of ``add_speech_arguments``, files read.
+
+    words_beside : use the text, subtitles or labels beside the recording, where no words and no phones are given
+    """
     from lipmotion.cli.texts import text_or_file_content
+    from lipmotion.corpora.labels import labels_beside
     from lipmotion.pipeline.given_units import read_units
     from lipmotion.pipeline.request import SpeechRequest
     from lipmotion.units import Lexicon
 
+    transcript = text_or_file_content(options.transcript) if options.transcript is not None else None
+    units = read_units(options.units) if options.units else None
+    labels = labels_beside(options.speech) if words_beside and transcript is None and units is None else None
+    if labels is not None:
+        transcript, units = labels.transcript, labels.phones if labels.transcript is None else None
     return SpeechRequest(
         options.speech,
-        transcript=text_or_file_content(options.transcript) if options.transcript is not None else None,
-        units=read_units(options.units) if options.units else None,
+        transcript=transcript,
+        units=units,
         lexicon=Lexicon.from_file(options.lexicon) if options.lexicon else None,
         recogniser=options.recogniser,
         speaker=options.speaker,
