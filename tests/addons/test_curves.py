@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from lipmotion.addons.blender.curves import at_frames, closures, control, matched, read_motion, spelling
+from lipmotion.export.base import read_motion as read_library_motion
 from lipmotion.export.base import write_motion
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
 
@@ -40,6 +41,54 @@ def test_a_take_at_30_frames_keeps_its_time(tmp_path: Path) -> None:
     curves, times = read_motion(str(tmp_path / "take.csv"))
     assert times == pytest.approx([number / 30 for number in range(6)])
     assert len(curves["JawOpen"]) == 6
+
+
+def _drop_frame(number: int) -> str:
+    """Return the drop-frame timecode of a frame after 00:00:59;00: after 00:00:59;29 comes 00:01:00;02."""
+    return f"00:00:59;{number:02d}" if number < 30 else f"00:01:{(number - 28) // 30:02d};{(number - 28) % 30:02d}"
+
+
+@pytest.mark.parametrize(
+    "codes",
+    [
+        [f"10:00:{n // 30:02d}:{n % 30:02d}.000" for n in range(90)],
+        [f"10:00:{n // 24:02d}:{n % 24:02d}" for n in range(60)],
+        [f"23:59:59:{n:02d}.500" for n in range(60)] + [f"00:00:00:{n:02d}.500" for n in range(30)],
+        [_drop_frame(n) for n in range(80)],
+        [f"10:00:0{n // 50}.{n % 50 * 20:03d}" for n in range(80)],
+        [f"10:00:00:{n:02d}.000" for n in range(10, 21)],
+    ],
+    ids=["30 a second", "24 a second", "midnight", "drop-frame", "parts of a second", "less than a second"],
+)
+@pytest.mark.parametrize("head", ["Timecode,BlendShapeCount,JawOpen,TongueOut", "Timecode,JawOpen,TongueOut"])
+def test_a_take_is_read_as_the_library_reads_it(tmp_path: Path, codes: list[str], head: str) -> None:
+    """Also with a row without a face, empty or of the count 0, which is bridged by a straight line."""
+    count = "61," if "Count" in head else ""
+    lines = [f"{code},{count}{number / 100},{number % 2}" for number, code in enumerate(codes)]
+    lines[5] = f"{codes[5]},0" if count else f"{codes[5]},,"
+    path = tmp_path / "take.csv"
+    path.write_text("\n".join([head, *lines]) + "\n")
+    curves, times = read_motion(str(path))
+    library = read_library_motion(path)[0]
+    assert times[-1] == pytest.approx(float(library.time_s[-1]), abs=0.5 / library.rate_hz)
+    for name, other in (("JawOpen", "jawOpen"), ("TongueOut", "tongueOut")):
+        assert np.interp(library.time_s, times, curves[name]) == pytest.approx(library[other], abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("soon,61,0.5", "'soon' is no timecode"),
+        ("10:00:00:02.000,61", "no rows with values"),
+        ("09:59:50:00.000,61,0.5", r"row 3 goes back by 10.00 s"),
+        ("10:00:00:02.000,61,0.5,0.5", "row 3 has 2 curves, required 1"),
+    ],
+)
+def test_a_take_that_is_damaged_is_refused(tmp_path: Path, line: str, message: str) -> None:
+    first = "10:00:00:00.000,61,0.5" if "no rows" not in message else "10:00:00:00.000,0,0"
+    (tmp_path / "take.csv").write_text(f"Timecode,BlendShapeCount,JawOpen\n{first}\n{line}\n")
+    with pytest.raises(ValueError, match=message):
+        read_motion(str(tmp_path / "take.csv"))
 
 
 @pytest.mark.parametrize("text", ["", "frame,a\n1,2\n", "{}", json.dumps({"format": "other"})])
@@ -104,3 +153,10 @@ def test_lips_that_close_between_two_frames_are_closed_at_the_nearer_one() -> No
 def test_curves_that_are_no_blendshapes_have_no_closures() -> None:
     assert closures({"opening": [0.0, 0.1, 0.0]}, 3) == []
     assert at_frames({"a": []}, [], 24.0) == {"a": []}
+
+
+def test_held_curves_are_not_interpolated() -> None:
+    curves = {"browInnerUp": [0.0, 1.0, 0.0], "a": [0.0, 1.0, 0.0]}
+    found = at_frames(curves, [0.0, 0.1, 0.2], 20.0, ("a",))
+    assert found["browInnerUp"] == pytest.approx([0, 0.5, 1, 0.5, 0])
+    assert found["a"] == pytest.approx([0, 0, 1, 1, 0])

@@ -32,6 +32,14 @@ def test_a_folder(run: RunCommand, sounds: Path, toy_model_file: Path, here: Pat
     }  # fmt: skip
 
 
+def test_the_frame_rate_is_that_of_animate(run: RunCommand, sounds: Path, toy_model_file: Path, here: Path) -> None:
+    (sounds / "b.wav").unlink()
+    basics = ["--model", toy_model_file, "--fps", "30", "--recogniser", "own"]
+    assert run("batch", sounds, "--out", "out", *basics, "--jobs", "1").code == 0
+    assert run("animate", sounds / "a.wav", "-o", "a.json", *basics).code == 0
+    assert (here / "out" / "a.json").read_bytes() == (here / "a.json").read_bytes()
+
+
 def test_a_line_that_fails_is_told_by_the_exit_code(
     run: RunCommand, sounds: Path, toy_model_file: Path, here: Path
 ) -> None:

@@ -1,12 +1,15 @@
 from __future__ import annotations
 
+import io
 import json
 import logging
+import sys
 from pathlib import Path
 
 import pytest
 
 from cli.conftest import Done, RunCommand, is_one_error
+from lipmotion.cli.main import main
 from lipmotion.pipeline.animate import animate
 from lipmotion.pipeline.cues import cue_text, cues, write_cues
 from lipmotion.pipeline.model import load_model
@@ -151,3 +154,13 @@ def test_other_processes_can_read_it(run_outside: RunCommand, basics: tuple[obje
 def test_a_wrong_command_line(run: RunCommand, basics: tuple[object, ...], here: Path, options: list[str]) -> None:
     assert run(*basics, *options).code == 2
     assert list(here.iterdir()) == []
+
+
+def test_sound_from_a_pipe_is_not_named(
+    here: Path, toy_speech: Path, toy_model_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its file is temporary, and gone when the cues are opened."""
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(toy_speech.read_bytes())))
+    assert main(["cues", "-", "--model", str(toy_model_file), "-o", "a.json", "a.xml"]) == 0
+    assert json.loads((here / "a.json").read_text())["metadata"]["soundFile"] == ""
+    assert "<soundFile></soundFile>" in (here / "a.xml").read_text()

@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from cli.conftest import RunCommand, is_one_error
+from lipmotion.errors import InputError
 from lipmotion.export.base import read_motion
+from lipmotion.pipeline.motion_input import read_generation
 
 
 @pytest.fixture
@@ -79,3 +81,41 @@ def test_what_cannot_be_drawn(run: RunCommand, here: Path, options: list[str], c
     done = run("render", *options)
     assert is_one_error(done, code)
     assert words in done.err[0]
+
+
+@pytest.mark.parametrize(
+    ("last_s", "words"),
+    [
+        ("999999", "1e-06 frames a second, required 1 to 10000; export it again"),
+        ("1e-6", "1e+06 frames a second, required 1 to 10000"),
+    ],
+)
+def test_unlikely_rates_are_refused(run: RunCommand, here: Path, last_s: str, words: str) -> None:
+    (here / "rate.csv").write_text(f"time_s,opening\n0,0.1\n{last_s},0.2\n")
+    done = run("render", "rate.csv", "-o", "a.json")
+    assert is_one_error(done, 3)
+    assert words in done.err[0]
+
+
+def test_motion_of_more_than_a_day_is_refused(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("lipmotion.pipeline.motion_input.LONGEST_S", 4.0)
+    (here / "long.csv").write_text("time_s,opening\n0,0.1\n1,0\n2,0\n3,0\n4,0\n5,0\n")
+    with pytest.raises(InputError, match="lasts 5 s, required at most 4; cut it"):
+        read_generation(here / "long.csv")
+
+
+def test_files_without_sound_get_no_silence(run: RunCommand, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    heard = []
+    monkeypatch.setattr("lipmotion.cli.render.write_results", lambda *given: heard.append(given[2]))
+    (here / "rig.csv").write_text("time_s,opening\n0,0\n0.1,0.1\n")
+    for name in ("a.json", "a.mp4"):
+        assert run("render", "rig.csv", "-o", name).code == 0
+    assert heard[0] is None
+    assert len(heard[1].samples) == 1600
+
+
+@pytest.mark.parametrize("name", ["a.livelink.csv", "a.mp4", "a%05d.png"])
+def test_a_single_pose_is_written(run: RunCommand, here: Path, name: str) -> None:
+    (here / "pose.csv").write_text("time_s,opening\n0,0.1\n0.01,0.1\n")
+    assert run("render", "pose.csv", "-o", name, "--size", "128").code == 0
+    assert (here / name.replace("%05d", "00000")).is_file() or len(list(here.glob("a*.png"))) == 1

@@ -16,6 +16,9 @@ import pytest
 from cli.conftest import RunCommand, is_one_error
 from lipmotion.cli.main import main
 from lipmotion.export.base import read_motion
+from lipmotion.rig.driven import DrivenCharacter, driven_character
+from lipmotion.rig.gltf_writer import write_glb
+from rig.heads import head
 
 
 @pytest.fixture
@@ -57,15 +60,52 @@ def test_what_belongs_to_one_recording(run: RunCommand, takes: Path, toy_model_f
     assert not (here / "out").exists()
 
 
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        (["-", "-o", "out/"], 3, "comes through a pipe has no name"),
+        (["takes/a.wav", "-", "-o", "out/"], 3, "comes through a pipe has no name"),
+        (["takes/a.wav", "-o", "out/", "b.json"], 7, "b.json: is one file, and files do not mix with folders"),
+        (["takes/a.wav", "-o", "out/", "-"], 7, "-: is one file, and files do not mix with folders"),
+        (["takes", "-o", "out/in/", "--to", "jsn"], 7, "unknown format '.jsn'"),
+    ],
+)
+def test_places_that_cannot_be(
+    run: RunCommand, takes: Path, toy_model_file: Path, words: list[str], code: int, message: str
+) -> None:
+    done = run("animate", *words, "--model", toy_model_file)
+    assert is_one_error(done, code)
+    assert message in done.err[0]
+    assert not (takes.parent / "out").exists()
+
+
+def test_a_character_is_opened_once(
+    run: RunCommand, takes: Path, toy_model_file: Path, here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_glb(here / "head.glb", head())
+    opened: list[Path] = []
+
+    def counted(path: Path, **how: object) -> DrivenCharacter:
+        opened.append(path)
+        return driven_character(path, **how)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("lipmotion.rig.driven.driven_character", counted)
+    done = run("animate", takes, "--model", toy_model_file, "-o", "out/", "--character", "head.glb")
+    assert done == (0, ["out/a.json", "out/b.json"], [])
+    assert opened == [Path("head.glb")]
+    assert read_motion(here / "out" / "b.json")[0].names[0] == "jawOpen"
+
+
 def test_standard_input_and_output(
     toy_model_file: Path, toy_speech: Path, here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(toy_speech.read_bytes())))
     written = io.BytesIO()
     monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(written))
-    words = ["animate", "-", "--model", str(toy_model_file), "-o", "-", "a.csv", "--format", "csv"]
+    words = ["animate", "-", "--model", str(toy_model_file), "-o", "-", "a.csv", "a.json", "--format", "csv"]
     assert main(words) == 0
     assert written.getvalue() == (here / "a.csv").read_bytes()
+    assert json.loads((here / "a.json").read_text())["source"] == {}
 
 
 @pytest.mark.usefixtures("here")

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from lipmotion.corpora.labels import read_labels
+from lipmotion.export.textgrid import write_textgrid
 from lipmotion.export.timed_labels import holds_labels, write_labels
 from lipmotion.export.webvtt import write_webvtt
 from lipmotion.types import Span, Timeline, Unit
@@ -58,3 +59,11 @@ def test_which_names_are_those_of_labels() -> None:
     assert [holds_labels(Path(name)) for name in ("a.TEXTGRID", "a.vtt", "a.phones.vtt", "a.csv")] == [True] * 3 + [
         False
     ]
+
+
+def test_a_word_that_is_said_twice_is_written_twice(tmp_path: Path) -> None:
+    big = tuple(Span(n / 10, (n + 1) / 10, Unit(phone, word="big")) for n, phone in enumerate("b ih g b ih g".split()))
+    write_webvtt(tmp_path / "a.vtt", Timeline(big))
+    assert (tmp_path / "a.vtt").read_text().count("big") == 2
+    write_textgrid(tmp_path / "a.TextGrid", Timeline(big))
+    assert (tmp_path / "a.TextGrid").read_text().count('"big"') == 2

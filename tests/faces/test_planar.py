@@ -20,6 +20,8 @@ POSES = (
     FacePose(MouthPose(gap=0.0)),
     FacePose(MouthPose(gap=0.15, jaw=0.12, tongue=0.5), gaze_x=0.03, brows=0.02, head=HeadPlacement(0.02, 0.01, 0.03)),
     FacePose(MouthPose(gap=0.08, width=0.75, protrusion=1.0), lids=0.6, head=HeadPlacement(yaw=0.03, pitch=-0.02)),
+    FacePose(MouthPose(gap=0.044, tuck=1.0)),
+    FacePose(MouthPose(gap=0.08, tongue=1.0, jaw=0.03)),
 )
 
 

@@ -4,6 +4,7 @@ import pytest
 from lipmotion.errors import InputError
 from lipmotion.faces.portrait.pose import (
     CLOSED_BELOW,
+    LIP_SPEED,
     PARTED,
     PURSED_GAP,
     TUCKED_GAP,
@@ -263,3 +264,18 @@ def test_without_intensity_the_lips_stay_closed(phone: str) -> None:
     opening = np.full(101, 0.1)
     poses = mouth_poses(motion(100.0, opening=opening), said((0.3, 0.6, phone)), 25.0, intensity=0.0)
     assert max(pose.gap for pose in poses) < 1e-9
+
+
+@pytest.mark.parametrize("fps", [25.0, 100.0])
+def test_beside_f_the_lip_moves_no_faster_than_lips_do(fps: float) -> None:
+    units = said((0, 0.3, "aa"), (0.3, 0.4, "f"), (0.4, 0.8, "aa"))
+    poses = mouth_poses(motion(100.0, opening=np.full(81, 0.2)), units, fps)
+    gaps, tucks = (np.array([getattr(pose, name) for pose in poses]) for name in ("gap", "tuck"))
+    leaving = np.abs(np.diff(gaps))[(tucks[:-1] > 0.5) != (tucks[1:] > 0.5)]
+    assert len(leaving) == 2
+    assert leaving.max() <= LIP_SPEED / fps + 1e-9
+    assert gaps.max() > 0.2
+
+
+def test_the_chin_rises_for_f() -> None:
+    assert middle_pose("f").jaw < 0.6 * middle_pose("s", 0.03).jaw

@@ -3,6 +3,8 @@ import pytest
 
 from lipmotion.errors import InputError
 from lipmotion.faces import FACES, Staging, staged_face
+from lipmotion.faces.portrait.pose import MouthPose
+from lipmotion.faces.portrait.rasteriser import FacePose, Rasteriser
 from lipmotion.faces.portrait.view import View
 from lipmotion.faces.portrait.woman import WOMAN
 from lipmotion.testing import check_face
@@ -91,6 +93,18 @@ def test_f_shows_teeth_where_closed_lips_show_none():
         return float(frame[area].min(axis=2).max())
 
     assert brightest(drawn[5]) > brightest(drawn[15]) + 60
+
+
+@pytest.mark.parametrize(("gap", "teeth"), [(0.06, 0.2), (0.06, 0.25), (0.09, 0.05), (0.09, 0.1), (0.09, 0.2)])
+def test_teeth_that_are_hardly_seen_are_covered_but_not_grey(gap: float, teeth: float) -> None:
+    """Down the middle there are pixels of dark and of teeth, and hardly any between the two but in the lip's shadow."""
+    size = 1200
+    drawer = Rasteriser(WOMAN, size)
+    picture = drawer.picture(FacePose(MouthPose(gap, teeth=teeth)), drawer.canvas())
+    area = View(size).window(-0.004, LINE_Y - 0.06, 0.004, LINE_Y + 0.12).area
+    column = picture[area].astype(float).mean(axis=1)
+    grey = (np.ptp(column, axis=1) < 45) & (column.max(axis=1) > 80) & (column.max(axis=1) < 190)
+    assert grey.sum() <= 5
 
 
 def test_eyes_blink_and_nothing_else_moves():

@@ -20,10 +20,14 @@ def error(rows: NDArray[np.float64], borders: list[int], fixed: list[int]) -> fl
 
 
 def least_error(rows: NDArray[np.float64], hold: int, fixed: list[int]) -> float:
-    """Return the least error of all divisions into poses of ``hold`` to 2 · ``hold`` − 1 frames, one after another."""
+    """Return the least error of all divisions into poses of ``hold`` frames or more, one after another.
+
+    With fixed frames, of those into poses of ``hold`` to 2 · ``hold`` − 1 frames.
+    """
+    longest = 2 * hold - 1 if fixed else len(rows)
     best = {0: 0.0}
     for stop in range(1, len(rows) + 1):
-        starts = [first for first in best if hold <= stop - first < 2 * hold]
+        starts = [first for first in best if hold <= stop - first <= longest]
         if starts:
             best[stop] = min(best[first] + error(rows, [first, stop], fixed) for first in starts)
     return best[len(rows)]

@@ -19,7 +19,7 @@ from lipmotion.motion.delivery import (
     moved_in_time,
     sound_units,
 )
-from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace
+from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
 from rig.speech import motion, units
 
 
@@ -36,7 +36,7 @@ def said() -> Generation:
         ({"intensity": 3.5}, "the intensity is 3.5, required 0 to 3"),
         ({"intensity": float("nan")}, "the intensity is nan"),
         ({"anticipation_ms": 2000}, "the anticipation is 2000 ms, required -1000 to 1000 ms"),
-        ({"offset_ms": 1e9}, "the offset is 1e\\+09 ms"),
+        ({"offset_ms": 3_600_000}, "the offset is 3.6e\\+06 ms, required -600000 to 600000 ms"),
         ({"min_hold_ms": -1}, "the least hold is -1 ms, required 0 to 10000 ms"),
     ],
 )
@@ -67,6 +67,16 @@ def test_everything_comes_later(said: Generation) -> None:
     assert late.motion["opening"][:50] == pytest.approx(said.motion["opening"][0])
     assert (late.units[0].start_s, late.units[1].start_s) == (0, 1.0)
     assert sound_units(said.units, Delivery(offset_ms=500, anticipation_ms=80), 2.0) == late.units
+
+
+@pytest.mark.parametrize("offset_ms", [1000.0, -250.0])
+def test_phones_that_end_after_the_last_frame_are_not_cut(said: Generation, offset_ms: float) -> None:
+    last = len(said.units) - 1
+    spans = [*list(said.units)[:-1], replace(said.units[last], end_s=2.005)]
+    longer = replace(said, units=Timeline(tuple(spans)))
+    delivery, end_s = Delivery(offset_ms=offset_ms), pytest.approx(2.005 + offset_ms / 1000)
+    assert moved_in_time(longer, delivery).units[last].end_s == end_s
+    assert sound_units(longer.units, delivery, 2.0)[last].end_s == end_s
 
 
 def test_what_is_before_the_beginning_is_cut(said: Generation) -> None:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from lipmotion.faces import Staging
+from lipmotion.pipeline.animate import write
 from lipmotion.pipeline.characters import curves_of
 from lipmotion.pipeline.living_curves import HEAD, living_curves
 from lipmotion.pipeline.motion_files import in_format, needs_prosody
@@ -61,7 +63,9 @@ def test_blendshapes_that_the_motion_has_are_kept(generation: Generation) -> Non
         assert held[name] == pytest.approx(values[:, column])
     assert "eyeBlinkRight" in held.names
     alone = edited.selected(["head.jawOpen", "mouthSmile_L"])
-    assert in_format(TAKE, alone, alone, 100.0).motion.names == ("jawOpen", "mouthSmileLeft")
+    held = in_format(TAKE, alone, alone, 100.0).motion
+    assert held.names[:2] == ("jawOpen", "mouthSmileLeft")
+    assert {"eyeBlinkLeft", "browInnerUp", *HEAD} < set(held.names)
 
 
 def test_the_script_takes_controls_that_were_asked_for(generation: Generation) -> None:
@@ -90,3 +94,44 @@ def test_eyes_look_to_one_side_together(generation: Generation) -> None:
     assert moving["eyeLookOutLeft"] == pytest.approx(moving["eyeLookInRight"])
     assert moving["eyeLookInLeft"] == pytest.approx(moving["eyeLookOutRight"])
     assert np.abs(moving["eyeLookOutLeft"] * moving["eyeLookInLeft"]).max() < 1e-12
+
+
+def written(folder: Path, generation: Generation, name: str, **asked: Any) -> list[str]:
+    """Return the lines of a motion file."""
+    write(generation, folder / name, **asked)
+    return (folder / name).read_text(encoding="utf-8").splitlines()
+
+
+def test_channels_choose_among_the_curves_of_a_format(generation: Generation, tmp_path: Path) -> None:
+    lines = written(tmp_path, generation, "a.livelink.csv", curves="arkit", channels=["jawOpen", "opening"])
+    moved = np.array([line.split(",")[2:] for line in lines[1:]], float).any(axis=0)
+    assert [name for name, moves in zip(lines[0].split(",")[2:], moved, strict=True) if moves] == ["JawOpen"]
+
+
+@pytest.mark.parametrize(
+    ("name", "asked", "warned"),
+    [
+        ("a.livelink.csv", {"channels": ["opening"]}, True),
+        ("a.blender.py", {"channels": ["opening"]}, True),
+        ("a.fap", {"curves": "visemes"}, True),
+        ("a.bvh", {"channels": ["width"]}, True),
+        ("a.livelink.csv", {"curves": "arkit"}, False),
+        ("a.blender.py", {"curves": "visemes"}, False),
+        ("a.csv", {"channels": ["opening"]}, False),
+        ("a.bvh", {"channels": ["opening"]}, False),
+    ],
+)
+def test_what_a_format_cannot_hold_is_said(
+    generation: Generation, tmp_path: Path, caplog: pytest.LogCaptureFixture, name: str, asked: Any, warned: bool
+) -> None:
+    assert written(tmp_path, generation, name, **asked)
+    assert ("holds channels of its own, none of those" in caplog.text) == warned
+
+
+@pytest.mark.parametrize("name", ["a.bvh", "a.motion3.json"])
+@pytest.mark.parametrize("rate_hz", [None, 24.0])
+def test_formats_of_the_mouth_do_not_depend_on_curves(
+    generation: Generation, tmp_path: Path, name: str, rate_hz: float | None
+) -> None:
+    plain = written(tmp_path, generation, name, rate_hz=rate_hz)
+    assert written(tmp_path, generation, name, rate_hz=rate_hz, curves="visemes") == plain

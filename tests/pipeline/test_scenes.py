@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from lipmotion.faces.character.shapes import head_mesh
 from lipmotion.faces.character.stage import figure
 from lipmotion.pipeline.scenes import character_scene, head_scene, is_scene, sound_reference, write_scene
 from lipmotion.rig.driven import driven_character
+from lipmotion.rig.gltf_accessors import GltfArrays
 from lipmotion.rig.gltf_container import read_gltf_document
 from lipmotion.rig.gltf_writer import write_glb
 from lipmotion.rig.scene import Scene
@@ -129,6 +131,45 @@ def test_the_sound_is_in_the_extras_of_the_scene(character: Scene, tmp_path: Pat
     assert stored["extras"] == {"audio": {"uri": "said.wav", "start_s": 0.0}}
     write_scene(tmp_path / "b.glb", character)
     assert "extras" not in read_gltf_document(tmp_path / "b.glb").items("scenes")[0]
+
+
+@pytest.mark.parametrize(
+    ("sound_s", "lines"),
+    [(0.5, ["uniform timecode startTime = 12"]),
+     (-0.5, ["uniform double mediaOffset = 0.5", "uniform timecode startTime = 0"])],
+)  # fmt: skip
+def test_a_sound_that_does_not_begin_with_the_animation(
+    sound_s: float, lines: list[str], character: Scene, tmp_path: Path
+) -> None:
+    moved = replace(character, sound_s=sound_s)
+    write_glb(tmp_path / "head.glb", head())
+    for name, scene in (("a.glb", moved), ("b.glb", replace(moved, original=None))):
+        write_scene(tmp_path / name, scene, tmp_path / "said.wav")
+        stored = read_gltf_document(tmp_path / name).items("scenes")[0]
+        assert stored["extras"] == {"audio": {"uri": "said.wav", "start_s": sound_s}}
+    write_scene(tmp_path / "a.usda", moved, tmp_path / "said.wav")
+    written = [line.strip() for line in (tmp_path / "a.usda").read_text().splitlines()]
+    assert [line for line in written if "mediaOffset" in line or "startTime " in line] == lines
+
+
+def test_held_weights_change_at_once_and_others_do_not(character: Scene, tmp_path: Path) -> None:
+    assert character.weights is not None
+    names, mesh = ("jawOpen", "eyeBlinkLeft"), character.mesh
+    channels = tuple(Channel(name, "weight") for name in names)
+    weights = Motion(np.array([[0, 0], [0, 0.5], [1, 1], [1, 0]], float), 10.0, channels)
+    mesh = replace(mesh, shapes=tuple(replace(mesh.shapes[0], name=name) for name in names))
+    scene = Scene(mesh, weights, stepped=("jawOpen",))
+    time_s, table = scene.keys()
+    assert time_s == pytest.approx([0, 0.1, 0.199, 0.2, 0.3])
+    assert table[:, 0] == pytest.approx([0, 0, 0, 1, 1])
+    assert table[:, 1] == pytest.approx([0, 0.5, 0.995, 1, 0])
+    write_scene(tmp_path / "a.usda", scene)
+    assert "        1.99: [0, 0.995]," in (tmp_path / "a.usda").read_text()
+    write_scene(tmp_path / "a.glb", scene)
+    (sampler,) = read_gltf_document(tmp_path / "a.glb").items("animations")[0]["samplers"]
+    stored = GltfArrays(read_gltf_document(tmp_path / "a.glb"))
+    assert stored.floats(sampler["input"], 1)[:, 0] == pytest.approx(time_s)
+    assert stored.floats(sampler["output"], 1)[:, 0] == pytest.approx(table.reshape(-1))
 
 
 def test_the_same_scene_gives_the_same_bytes(character: Scene, tmp_path: Path) -> None:

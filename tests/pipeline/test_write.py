@@ -15,6 +15,7 @@ import pytest
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import read_motion
 from lipmotion.faces import Staging
+from lipmotion.motion.delivery import closed_on_grid
 from lipmotion.motion.gestures import GESTURES
 from lipmotion.pipeline.animate import animate, with_articulation, write
 from lipmotion.pipeline.model import Model
@@ -73,7 +74,7 @@ def test_another_rate(result: Generation, toy_model: Model, tmp_path: Path) -> N
     for name in ("a.json", "a.csv"):
         motion, _ = read_motion(tmp_path / name)
         assert motion.rate_hz == 30
-        assert motion.values == pytest.approx(result.motion.resampled(30).values, abs=1e-5)
+        assert motion.values == pytest.approx(closed_on_grid(result, 30).motion.resampled(30).values, abs=1e-5)
 
 
 def test_a_video_with_its_sound(result: Generation, toy_speech: Path, tmp_path: Path) -> None:
@@ -204,3 +205,14 @@ def test_articulatory_channels_are_written_where_they_are_asked_for(
     assert more.motion.names == (*result.motion.names, *GESTURES)
     assert more.variance.shape == more.motion.values.shape
     assert not more.variance[:, -1].any()
+
+
+@pytest.mark.parametrize("temporary", [False, True])
+def test_scenes_name_no_sound_that_will_be_gone(
+    result: Generation, toy_speech: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, temporary: bool
+) -> None:
+    named = []
+    monkeypatch.setattr("lipmotion.pipeline.animate.delivered_scene", lambda *_, **__: True)
+    monkeypatch.setattr("lipmotion.pipeline.animate.write_scene", lambda *_, sound: named.append(sound))
+    write(result, [tmp_path / "a.glb"], speech=toy_speech, temporary=temporary)
+    assert named == [None if temporary else toy_speech]

@@ -69,6 +69,16 @@ def test_the_animation_has_the_weights(original: Path, tmp_path: Path) -> None:
         assert stored[:, column] == pytest.approx(wanted, abs=1e-6)
 
 
+def test_held_weights_change_at_once(original: Path, tmp_path: Path) -> None:
+    moved = Motion(np.array([[0.0], [0.0], [1.0]]), 10.0, (Channel("jawOpen", WEIGHT),))
+    assert write_animated_gltf(tmp_path / "a.glb", original, moved, stepped=["jawOpen"])
+    document = read_gltf_document(tmp_path / "a.glb")
+    sampler = document.items("animations")[0]["samplers"][0]
+    assert GltfArrays(document).floats(sampler["input"], 1)[:, 0] == pytest.approx([0, 0.1, 0.199, 0.2])
+    stored = GltfArrays(document).floats(sampler["output"], 1).reshape(4, -1)
+    assert stored[:, head().shape_names.index("jawOpen")] == pytest.approx([0, 0, 0, 1])
+
+
 def test_weights_of_what_is_no_morph_target_are_left_to_another_writer(original: Path, tmp_path: Path) -> None:
     assert not write_animated_gltf(tmp_path / "a.glb", original, weights("jawOpen", "vowel_aa"))
     assert not (tmp_path / "a.glb").exists()

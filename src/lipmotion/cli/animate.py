@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from lipmotion.cli.options import add_execution
 from lipmotion.cli.output import print_note
 from lipmotion.cli.paths import add_output
-from lipmotion.cli.pipes import add_pipe_format, read_pipe, written_pipe
+from lipmotion.cli.pipes import add_pipe_format, is_pipe, read_pipe, written_pipe
 from lipmotion.cli.results import add_result_arguments, check_results, work_of, write_results
 from lipmotion.cli.several import add_kinds_argument, animated_one_by_one
 from lipmotion.cli.speech import add_speech_arguments, model_loader, spoken_request
@@ -27,11 +27,10 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = verbs.add_parser("animate", help="turn speech into lip motion or an animated face")
     add_speech_arguments(parser, several=True)
     add_result_arguments(parser, "FILE.mp4 .webm .mov %%05d.png .json .csv .vtt, ... (docs/formats.md); FOLDER/; -")
-    posteriors = "draw the posterior probabilities of the chains' units over time (coupled models)"
-    add_output(parser, "--posteriors", metavar="FILE.png", help=posteriors)
+    add_output(parser, "--posteriors", metavar="FILE.png", help="draw the posteriors of units over time (coupled)")
     for add_more in (add_kinds_argument, add_pipe_format, add_execution):
         add_more(parser)
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, piped=False)
 
 
 def run(options: argparse.Namespace) -> None:
@@ -42,6 +41,7 @@ def run(options: argparse.Namespace) -> None:
     with reporting(options) as report:
         if animated_one_by_one(options, report, partial(_animate, load)):
             return
+        options.piped = is_pipe(options.speech[0])
         with read_pipe(options.speech[0]) as options.speech, written_pipe(options) as pipe:
             note = _animate(load, options, report)
         written = [str(path) for path in (*options.output, options.posteriors) if path and not pipe]
@@ -66,5 +66,5 @@ def _animate(load: Callable[[], Model], options: argparse.Namespace, report: Rep
         write_posteriors(options.posteriors, result, posteriors)
     else:
         result = animate(request, model=model, **work_of(options, report))
-    write_results(options, result, options.speech, model, report)
+    write_results(options, result, options.speech, model, report, options.piped)
     return result.outlook.text if result.outlook is not None else ""

@@ -22,11 +22,10 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     kinds = "what animate writes (json csv livelink.csv glb mp4 ...) and cues.tsv .xml .json .dat (default: json)"
     parser.add_argument("--to", default="json", metavar="KIND,KIND", help=kinds)
     parser.add_argument("--jobs", type=int, metavar="N", help="number of processes (default: one per core)")
-    address = "scheduler of a Dask cluster that does the work, as tcp://HOST:8786"
-    parser.add_argument("--cluster", default="", metavar="ADDRESS", help=address)
+    parser.add_argument("--cluster", default="", metavar="ADDRESS", help="Dask scheduler, as tcp://HOST:8786")
     for add_argument in (add_recogniser_argument, add_model_argument, add_lexicon_argument, add_speaker_argument):
         add_argument(parser)
-    parser.add_argument("--rate", type=float, metavar="HZ", help="frames per second of motion files (default: 100)")
+    parser.add_argument("--rate", type=float, metavar="HZ", help="rate of motion files (default: --fps, or 100)")
     parser.add_argument("--fps", type=float, help="frames per second of videos (default: 25) and of cues (24)")
     parser.add_argument("--channels", metavar="NAME,NAME", help="write only these to motion files: opening,width,...")
     curves = "what motion files hold: arkit, visemes, fap, or the controls of a rig (FILE.csv)"
@@ -44,6 +43,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> None:
     """Call ``batch``; print how many lines were done, and the report. Raises InputError: some lines failed."""
     from lipmotion.cli.progress import reporting
+    from lipmotion.cli.results import rate_of
     from lipmotion.errors import InputError
     from lipmotion.pipeline.batch import BatchSettings, batch
 
@@ -54,7 +54,7 @@ def run(options: argparse.Namespace) -> None:
         kinds=tuple(options.to.split(",")),
         channels=tuple(options.channels.split(",")) if options.channels else (),
         articulation=options.articulation,
-        rate_hz=options.rate,
+        rate_hz=rate_of(options),
         fps=options.fps,
         staging=staging_of(options),
         delivery=delivery_of(options),

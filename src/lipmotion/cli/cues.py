@@ -9,7 +9,7 @@ from typing import Any
 from lipmotion.cli.delivery import add_delivery_arguments, delivery_of
 from lipmotion.cli.output import flush_output, print_line, print_lines
 from lipmotion.cli.paths import add_output
-from lipmotion.cli.pipes import read_pipe
+from lipmotion.cli.pipes import is_pipe, read_pipe
 from lipmotion.cli.speech import add_speech_arguments, request_and_model
 from lipmotion.cli.status import status_lines
 
@@ -43,6 +43,7 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.pipeline.cues import check_cue_options, check_cue_outputs, cue_text, cues, write_cues
 
     status = status_lines(options) if options.machine_readable else nullcontext(lambda _: None)
+    piped = is_pipe(options.speech)
     with status as set_progress, read_pipe(options.speech) as options.speech:
         delivery = delivery_of(options)
         check_cue_options(options.fps, options.hold, options.shapes)
@@ -53,10 +54,11 @@ def run(options: argparse.Namespace) -> None:
         result = animate(request, model=model)
         set_progress(0.9)
         sheet = cues(result, fps=options.fps, hold_frames=options.hold, shapes=options.shapes, delivery=delivery)
-        write_cues(sheet, options.output, speech=options.speech, form=options.format)
+        heard_in = "" if piped else options.speech
+        write_cues(sheet, options.output, speech=heard_in, form=options.format)
         set_progress(1.0)
         for path in options.output:
             print_line(path)
         if not options.output:
-            print_lines(cue_text(sheet, speech=options.speech, form=options.format or "tsv").removesuffix("\n"))
+            print_lines(cue_text(sheet, speech=heard_in, form=options.format or "tsv").removesuffix("\n"))
         flush_output()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lipmotion.cli.options import add_machine_readable
@@ -44,18 +45,20 @@ def run(options: argparse.Namespace) -> None:
 def _render(options: argparse.Namespace, report: Report) -> None:
     import numpy as np
 
+    from lipmotion.pipeline.drawn_video import shows_face
     from lipmotion.pipeline.motion_input import as_long_as, read_generation
     from lipmotion.speech.audio_files import read_audio
     from lipmotion.types import Audio
 
     check_results(options, options.sound)
     generation = read_generation(options.motion, options.units)
-    if options.sound is None:
+    sound = options.sound
+    if sound is not None:
+        generation = as_long_as(generation, read_audio(sound).duration_s)
+    elif any(map(shows_face, map(Path, options.output))):
         samples = round(float(generation.motion.time_s[-1]) * SILENT_HZ)
-        write_results(options, generation, Audio(np.zeros(samples, np.float32), SILENT_HZ), None, report)
-    else:
-        generation = as_long_as(generation, read_audio(options.sound).duration_s)
-        write_results(options, generation, options.sound, None, report)
+        sound = Audio(np.zeros(samples, np.float32), SILENT_HZ)
+    write_results(options, generation, sound, None, report)
 
 
 SILENT_HZ = 16_000

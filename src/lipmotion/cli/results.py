@@ -53,24 +53,39 @@ def add_result_arguments(parser: argparse.ArgumentParser, files: str, *, require
 def check_results(options: argparse.Namespace, speech: Path | None = None) -> None:
     """Raise ExportError or InputError if an output cannot be written; replace the name of a face by the face.
 
+    A face and a character that are open already stay so: several recordings share them.
     speech : the recording (None: there will be a sound that is in no file)
     """
-    from lipmotion.pipeline.animate import check_outputs, opened_face
+    from lipmotion.pipeline.animate import check_outputs
 
-    open_character(options)
-    options.face = opened_face(options.face)
+    open_faces(options)
     checked = {"rate_hz": options.rate, "fps": options.fps, "face": options.face, "film": film_options(options)}
     checked["delivery"] = delivery_of(options)
     check_outputs(options.output, speech, **checked, staging=staging_of(options), with_sound=speech is None)
 
 
+def open_faces(options: argparse.Namespace) -> None:
+    """Replace the name of a face by the face, or by the character that was asked for; once."""
+    from lipmotion.pipeline.animate import opened_face
+
+    if getattr(options, "driven", None) is None:
+        open_character(options)
+    options.face = opened_face(options.face)
+
+
 def write_results(
-    options: argparse.Namespace, result: Generation, speech: Path | Audio, model: Model | None, report: Report
+    options: argparse.Namespace,
+    result: Generation,
+    speech: Path | Audio | None,
+    model: Model | None,
+    report: Report,
+    temporary: bool = False,
 ) -> None:
     """Write generated motion to the outputs.
 
-    speech : the recording, or the sound
-    report : receives the progress of videos
+    speech    : the recording, or the sound; None: there is none, and no output needs it
+    report    : receives the progress of videos
+    temporary : whether the recording is a file that will be gone
     """
     from lipmotion.pipeline.animate import with_articulation, write
     from lipmotion.types.progress import sub_monitor
@@ -89,6 +104,7 @@ def write_results(
         film=film_options(options),
         staging=staging_of(options),
         delivery=delivery,
+        temporary=temporary,
         monitor=sub_monitor(report.receive, RECOGNITION, 1.0),
     )
 

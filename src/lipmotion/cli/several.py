@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from lipmotion.cli.outcome import outcome
 from lipmotion.cli.output import print_lines
+from lipmotion.cli.pipes import is_pipe
 from lipmotion.printable import printable
 
 if TYPE_CHECKING:
@@ -31,33 +32,44 @@ def animated_one_by_one(
     Each recording is reported; at the end the paths that were written are printed.
     Returns False, and does nothing, where there is one recording and its outputs are files.
     Raises ExportError: outputs that are not for several recordings, or that clash.
-    Raises InputError: a transcript, units or a picture of posteriors, which belong to one recording.
+    Raises InputError: a transcript, units or a picture of posteriors, which belong to one recording; or a pipe.
     Raises the error of the highest exit code among those that occurred, with the number of recordings that failed.
     """
+    from lipmotion.errors import InputError
     from lipmotion.pipeline.recordings import is_for_several, recordings_of
 
-    if len(options.speech) == 1 and not (options.speech[0].is_dir() or all(map(is_for_several, options.output))):
+    if len(options.speech) == 1 and not (options.speech[0].is_dir() or any(map(is_for_several, options.output))):
         return False
+    for speech in options.speech:
+        if is_pipe(speech):
+            raise InputError(
+                f"{speech}: what comes through a pipe has no name for a file in a folder; animate it alone, with the "
+                "name of a file: -o FILE.json"
+            )
     _animate_each(_one_by_one(options, recordings_of(options.speech)), report, animate_one)
     return True
 
 
 def _one_by_one(options: argparse.Namespace, recordings: Sequence[Path]) -> list[argparse.Namespace]:
-    """Return the options of each recording, its outputs instead of folders and templates; make the folders."""
-    from lipmotion.cli.results import check_results
+    """Return the options of each recording, its outputs instead of folders and templates; make the folders.
+
+    Faces and characters are opened once, for all recordings. What cannot be leaves no new folders.
+    """
+    from lipmotion.cli.results import check_results, open_faces
     from lipmotion.errors import InputError
     from lipmotion.pipeline.recordings import planned_outputs
+    from lipmotion.storage.files import made_folders
 
     for name in ("transcript", "units", "posteriors"):
         if getattr(options, name) is not None and len(recordings) > 1:
             raise InputError(f"--{name} belongs to one recording, and there are {len(recordings)}; animate each alone")
     planned = planned_outputs(recordings, options.output, options.to.split(","))
-    for folder in {Path(file).parent for files in planned for file in files}:
-        folder.mkdir(parents=True, exist_ok=True)
+    open_faces(options)
     pairs = zip(recordings, planned, strict=True)
     jobs = [argparse.Namespace(**{**vars(options), "speech": speech, "output": files}) for speech, files in pairs]
-    for job in jobs:
-        check_results(job, job.speech)
+    with made_folders({Path(file).parent for files in planned for file in files}):
+        for job in jobs:
+            check_results(job, job.speech)
     return jobs
 
 

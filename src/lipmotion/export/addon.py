@@ -11,7 +11,7 @@ from lipmotion.storage.files import check_target, whole_file
 
 PROGRAMS = ("blender",)
 FOLDER = "lipmotion_blender"
-MODULES = ("__init__.py", "curves.py", "keying.py", "panel.py")
+MODULES = ("__init__.py", "curves.py", "keying.py", "panel.py", "takes.py")
 OLDEST = (1980, 1, 1, 0, 0, 0)
 """The time of every file in an archive: the same version gives the same bytes."""
 MANIFEST = """schema_version = "1.0.0"

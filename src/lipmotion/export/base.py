@@ -32,9 +32,14 @@ class MotionFormat:
     curves  : the set of curves that such a file holds, as of ``pipeline.characters.curves_of`` (``arkit``, for
               instance): the pipeline computes them from the motion; empty: the channels of the motion
     rate_hz : frames per second where the user asks for none; None: those of the motion
+    mouth   : whether the file shows how the mouth itself moves: the pipeline keeps the channel ``opening`` for it,
+              whatever channels or curves the user asks for
     other_curves : whether weights and controls that the user asks for take the place of ``curves``
     names_sound  : whether the file names the recording: the description of the speech then has ``path``, the path from
                    the folder of the file
+
+    The description of the speech has ``start_s`` where the sound does not begin with the motion: seconds of the motion
+    at which it begins, as text; negative: before it.
     """
 
     write: Callable[[Path, Generation, About, About], None]
@@ -45,6 +50,7 @@ class MotionFormat:
     rate_hz: float | None = None
     other_curves: bool = False
     names_sound: bool = False
+    mouth: bool = False
 
 
 MOTION_FORMATS: Registry[MotionFormat] = Registry(

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from itertools import groupby
 from pathlib import Path
 
 from lipmotion.storage.files import whole_file
 from lipmotion.types import Timeline, Unit
+from lipmotion.units import words_in_time
 
 TEXTGRID_SUFFIX = ".TextGrid"
 """As Praat writes it; case does not matter."""
@@ -18,15 +18,12 @@ def write_textgrid(path: Path, units: Timeline[Unit]) -> None:
     """Write phones in time to a TextGrid in long text form, with the tiers ``phones`` and ``words``.
 
     units : the phones; where a label has no phone, the name of its unit is written
-    Equal neighbours in the tier ``words`` are one interval. After a failure there is no partial file.
+    Words are those of ``units.words_in_time``. After a failure there is no partial file.
     Raises ExportError: the file cannot be written.
     Source: Praat manual, "TextGrid file formats".
     """
     phones = [(span.start_s, span.end_s, span.label.phone or span.label.unit) for span in units]
-    words = []
-    for word, spans in groupby(units, key=lambda span: span.label.word):
-        run = list(spans)
-        words.append((run[0].start_s, run[-1].end_s, word))
+    words = [(span.start_s, span.end_s, span.label) for span in words_in_time(units)]
     end_s = max((span.end_s for span in units), default=0.0)
     lines = ['File type = "ooTextFile"', 'Object class = "TextGrid"', "", "xmin = 0", f"xmax = {end_s:.9g}"]
     lines += ["tiers? <exists>", "size = 2", "item []:"]

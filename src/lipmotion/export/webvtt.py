@@ -5,12 +5,11 @@ Source: W3C, "WebVTT: The Web Video Text Tracks Format".
 
 from __future__ import annotations
 
-from itertools import groupby
 from pathlib import Path
 
 from lipmotion.storage.files import whole_file
 from lipmotion.types import Timeline, Unit
-from lipmotion.units import is_silent
+from lipmotion.units import is_silent, words_in_time
 
 VTT_SUFFIX = ".vtt"
 PHONES_VTT_SUFFIX = ".phones.vtt"
@@ -21,15 +20,14 @@ _ESCAPES = {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
 def write_webvtt(path: Path, units: Timeline[Unit]) -> None:
     """Write the words in time, or the phones where the name ends with ``.phones.vtt``, one a cue; silence has none.
 
-    Equal neighbours in the same word are one cue. After a failure there is no partial file.
+    Words are those of ``units.words_in_time``. After a failure there is no partial file.
     Raises ExportError: the file cannot be written.
     """
     if path.name.lower().endswith(PHONES_VTT_SUFFIX):
         spoken = [span for span in units if not is_silent(span.label.phone)]
         cues = [(span.start_s, span.end_s, span.label.phone or span.label.unit) for span in spoken]
     else:
-        words = [(word, list(spans)) for word, spans in groupby(units, key=lambda span: span.label.word)]
-        cues = [(spans[0].start_s, spans[-1].end_s, word) for word, spans in words if word]
+        cues = [(span.start_s, span.end_s, span.label) for span in words_in_time(units) if span.label]
     lines = ["WEBVTT", ""]
     for start_s, end_s, text in cues:
         lines += [f"{_time(start_s)} --> {_time(end_s)}", "".join(_ESCAPES.get(letter, letter) for letter in text), ""]

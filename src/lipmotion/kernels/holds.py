@@ -14,9 +14,10 @@ def best_holds(rows: NDArray[np.float64], hold: int, fixed: Sequence[int] = ()) 
     rows  : curves over time, scaled so that their differences count alike [shape=(T, D)]
     hold  : least frames of a pose, > 0; with fewer frames in all, one pose has them all
     fixed : frames whose pose must be shown: the pose that has one is that frame's, of several the mean of these
-    Every other pose is the mean of its frames. The sum of squared differences between curves and poses is the least
-    that is possible (dynamic programming, no approximation). No pose lasts 2 · ``hold`` frames or more: two poses
-    instead of it are never worse, unless they part several fixed frames of one pose.
+    Every other pose is the mean of its frames. Of all divisions into poses of ``hold`` to 2 · ``hold`` - 1 frames, the
+    one with the least sum of squared differences between curves and poses (dynamic programming, no approximation).
+    Without fixed frames no other division is better: two poses are never worse than one of 2 · ``hold`` frames or
+    more. With them a longer pose can be: it shows the mean of several fixed frames, where two show each more exactly.
     Cost: O(T · hold · D) time, O(T · D) memory.
     """
     frames = len(rows)

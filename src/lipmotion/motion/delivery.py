@@ -23,7 +23,7 @@ Curve = NDArray[np.float64]
 MOST_INTENSITY = 3.0
 MOST_ANTICIPATION_MS = 1000.0
 MOST_HOLD_MS = 10_000.0
-MOST_OFFSET_MS = 24 * 3600 * 1000.0
+MOST_OFFSET_MS = 600_000.0
 USUAL_HOLD_MS = 2000 / 24
 """Held poses last as long as two frames of an animation at 24 frames a second, if nothing else is asked for."""
 CLOSED_BELOW = 0.012
@@ -114,7 +114,9 @@ def moved_in_time(generation: Generation, delivery: Delivery) -> Generation:
         generation,
         motion=Motion(values, rate_hz, motion.channels),
         spread=spread,
-        units=moved_units(generation.units, by_s, duration_s),
+        units=moved_units(
+            generation.units, by_s, max(duration_s, _end_s(generation.units) + delivery.offset_ms / 1000)
+        ),
         trace=StateTrace(generation.trace.states, generation.trace.frames[nearest]),
     )
 
@@ -200,7 +202,7 @@ def held(generation: Generation, frames: int, closed_s: Sequence[float] = ()) ->
 def closed_on_grid(generation: Generation, rate_hz: float) -> Generation:
     """Return a generation that shows every closure of p, b and m at the nearest time n / ``rate_hz`` seconds.
 
-    Held poses at that rate show them then; between two times a closure of 10 ms would be lost.
+    Motion at that rate shows them then; between two times a closure of 10 ms would be lost.
     """
     motion = generation.motion
     values = motion.values.copy()
@@ -287,8 +289,10 @@ def _scaled(spread: NDArray[np.floating] | ReducedVariance, factor: Curve) -> ND
 
 def sound_units(units: Timeline[Unit], delivery: Delivery, end_s: float) -> Timeline[Unit]:
     """Return the phones in time of the sound, for label files: later by the offset, whatever the mouth anticipates."""
-    return (
-        moved_units(units, delivery.offset_ms / 1000, end_s + delivery.offset_ms / 1000)
-        if delivery.offset_ms
-        else units
-    )
+    later_s = delivery.offset_ms / 1000
+    return moved_units(units, later_s, max(_end_s(units), end_s) + later_s) if later_s else units
+
+
+def _end_s(units: Timeline[Unit]) -> float:
+    """Return the end of the last phone, which may be after the last frame; 0: there are none."""
+    return max((span.end_s for span in units), default=0.0)

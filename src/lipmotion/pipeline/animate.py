@@ -16,13 +16,14 @@ from lipmotion.faces.base import Face, Staging
 from lipmotion.faces.filmed.face import SUFFIX, FilmedFace, load_face
 from lipmotion.faces.registry import FACES, face_named
 from lipmotion.kernels.threads import one_thread
-from lipmotion.motion.delivery import Delivery, closed_on_grid, closed_times, held, sound_units
+from lipmotion.motion.delivery import Delivery, closed_on_grid, closed_times, sound_units
 from lipmotion.motion.gestures import GESTURES, with_gestures
 from lipmotion.pipeline.characters import WHOLE_FACE, with_curves
 from lipmotion.pipeline.delivered import (
     check_delivery,
     delivered,
     delivered_scene,
+    held_mouth,
     moved_prosody,
     shown,
     staged_intensity,
@@ -38,7 +39,7 @@ from lipmotion.pipeline.drawn_video import (
 )
 from lipmotion.pipeline.film.video import FILM, FilmOptions, check_film, film_of, write_film
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.motion_files import in_format, needs_prosody
+from lipmotion.pipeline.motion_files import in_format, needs_prosody, warn_of_unused
 from lipmotion.pipeline.outlook import outlook_of
 from lipmotion.pipeline.request import SpeechInput, request_of
 from lipmotion.pipeline.scenes import SCENE_SUFFIXES, is_scene, sound_reference, write_scene
@@ -129,6 +130,7 @@ def write(
     staging: Staging | None = None,
     delivery: Delivery | None = None,
     curves: str | Path | DrivenCharacter | None = None,
+    temporary: bool = False,
     monitor: Monitor = silent_monitor,
 ) -> None:
     """Write generated motion to one or several files, each in the format of its suffix.
@@ -153,6 +155,7 @@ def write(
     delivery : intensity, anticipation, offset and held poses of every output (docs/controls.md); None: as generated
     curves   : what motion files hold instead of the motion, unless ``channels`` asks for more: ``arkit``, ``visemes``,
                ``fap``, a table of a rig (``.csv``), or a character with blendshapes (docs/meshes.md)
+    temporary : whether ``speech`` is a file that will be gone, which outputs then do not name
     monitor  : receives reports of the progress of videos
     Raises ExportError: unknown suffix, no such folder, or a file that cannot be written.
     Raises InputError: a frame rate out of its range, or an unknown channel or face.
@@ -193,7 +196,7 @@ def write(
     written = _motion_files(paths, generation, channels, curves, rate_hz, delivery, staging, heard)
     for path, each in written.items():
         check_motion(path, each.motion)
-    heard_in = next(iter(sounds), None) if recording is None else Path(recording)
+    heard_in = next(iter(sounds), None) if recording is None or temporary else Path(recording)
     scene = None
     for path in paths:
         if path in sounds and sound is not None:
@@ -211,14 +214,15 @@ def write(
                 write_film(path, frames, played, mark=film.mark, monitor=monitor)
             else:
                 staged = staged_intensity(staging, delivery, shown_face, generation, character)
-                write_drawn_face(path, seen, played, hertz, shown_face, staged, monitor)
+                loudness = moved_prosody(prosody_heard(played), delivery)
+                write_drawn_face(path, seen, played, hertz, shown_face, staged, monitor, loudness)
         elif path in scenes:
             scene = scene or delivered_scene(generation, delivery, shown_face, rate_hz, staging=staging, prosody=heard)
             write_scene(path, scene, sound=heard_in)
         elif holds_labels(path):
             write_labels(path, sound_units(generation.units, delivery, float(generation.motion.time_s[-1])))
         else:
-            _write_motion(written[path], path, recording or heard_in, model)
+            _write_motion(written[path], path, heard_in, model, delivery.offset_ms / 1000)
 
 
 def check_outputs(
@@ -244,7 +248,7 @@ def check_outputs(
     shown_face = opened_face(face)
     check_film(shown_face, film, speech)
     check_staging(shown_face, staging or Staging())
-    check_delivery(delivery or Delivery(), map(Path, outputs), shown_face)
+    check_delivery(delivery or Delivery(), map(Path, outputs), shown_face, staging or Staging())
     suffixes = (
         *motion_suffixes(),
         *VIDEO_SUFFIXES,
@@ -304,21 +308,31 @@ def _motion_files(
         generation = with_articulation(generation, channels or ())
     spoken = delivered(generation, delivery)
     closed_s = closed_times(spoken) if delivery.hold_ms else []
-    if closed_s and rate_hz is not None:
+    if rate_hz is not None and (closed_s or rate_hz < spoken.motion.rate_hz):
         spoken = closed_on_grid(spoken, rate_hz)
+    named, asked = channels, channels or ()
     if curves is not None and files:
         spoken, names = with_curves(spoken, curves, staging=staging, prosody=prosody)
+        asked = asked if named or isinstance(curves, DrivenCharacter) else names
         channels = names if channels is None else channels
     chosen = spoken.selected(channels) if channels is not None else spoken
     chosen = chosen if rate_hz is None else chosen.resampled(rate_hz)
-    written = {path: in_format(path, spoken, chosen, rate_hz, staging, prosody) for path in files}
-    return {path: held(each, delivery.hold_frames(each.motion.rate_hz), closed_s) for path, each in written.items()}
+    written = {path: in_format(path, spoken, chosen, rate_hz, staging, prosody, named) for path in files}
+    for path, each in written.items():
+        warn_of_unused(path, each, asked)
+    return {
+        path: held_mouth(each, delivery.hold_frames(each.motion.rate_hz), closed_s) for path, each in written.items()
+    }
 
 
-def _write_motion(generation: Generation, path: Path, speech: str | Path | None, model: Model | None) -> None:
+def _write_motion(
+    generation: Generation, path: Path, speech: str | Path | None, model: Model | None, sound_s: float
+) -> None:
     about = model.about if model else {}
     named = {key: _text(about[key]) for key in ("name", "corpus", "licence", "attribution") if about.get(key)}
     source = {"file": as_text(Path(speech).name)} if speech else {}
+    if speech and sound_s:
+        source["start_s"] = f"{sound_s:.9g}"
     if speech and motion_format(path).names_sound:
         source["path"] = sound_reference(Path(speech), path)
     write_motion(path, generation, source=source, model=named)

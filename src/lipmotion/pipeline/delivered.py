@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,19 +11,29 @@ import numpy as np
 from lipmotion.errors import ExportError, InputError
 from lipmotion.faces.base import Face, Stageable, Staging
 from lipmotion.faces.filmed.face import FilmedFace
-from lipmotion.motion.delivery import Delivery, closed_on_grid, closed_times, held, intensified, moved_in_time
+from lipmotion.faces.mesh import MeshFace
+from lipmotion.motion.delivery import (
+    MOST_INTENSITY,
+    Delivery,
+    closed_on_grid,
+    closed_times,
+    held,
+    intensified,
+    moved_in_time,
+)
 from lipmotion.motion.gestures import with_gestures
 from lipmotion.pipeline.characters import with_curves
 from lipmotion.pipeline.drawn_video import is_picture_sequence, shows_face
+from lipmotion.pipeline.living_curves import RADIAN
 from lipmotion.pipeline.scenes import scene_of
-from lipmotion.rig.blendshape_motion import is_of_blendshapes, with_mouth
+from lipmotion.rig.blendshape_motion import given_weights, is_of_blendshapes, with_mouth
 from lipmotion.rig.driven import DrivenCharacter
 from lipmotion.rig.scene import Scene
 from lipmotion.rig.shape_names import ARKIT_OTHERS, arkit_name
 from lipmotion.types import Generation, Motion, Prosody, StateTrace
 
 
-def check_delivery(delivery: Delivery, outputs: Iterable[Path], face: Face | FilmedFace) -> None:
+def check_delivery(delivery: Delivery, outputs: Iterable[Path], face: Face | FilmedFace, staging: Staging) -> None:
     """Raise ExportError or InputError if an output cannot be delivered so."""
     videos = [path for path in outputs if shows_face(path)]
     for path in videos:
@@ -32,6 +42,12 @@ def check_delivery(delivery: Delivery, outputs: Iterable[Path], face: Face | Fil
                 f"{path}: a video has its own sound, which begins with it; an offset is for files that are put beside "
                 "a sound: write the video without it"
             )
+    both = staging.intensity * delivery.intensity
+    if videos and isinstance(face, Stageable) and both > MOST_INTENSITY:
+        raise InputError(
+            f"the intensities of staging and delivery, {staging.intensity:g} and {delivery.intensity:g}, are "
+            f"{both:g} together, required at most {MOST_INTENSITY:g}; give one of them"
+        )
     if videos and delivery.hold_ms and isinstance(face, FilmedFace):
         raise InputError("the poses of a filmed face cannot be held; hold those of a drawn face, or of motion files")
 
@@ -68,7 +84,7 @@ def shown(
     closed_s, moved = closed_times(moved), closed_on_grid(moved, fps)
     if character is not None and character.shapes is not None:
         moved = with_curves(moved, character)[0]
-    return held(moved.resampled(fps), frames, closed_s)
+    return held_mouth(moved.resampled(fps), frames, closed_s)
 
 
 def delivered_scene(
@@ -85,17 +101,36 @@ def delivered_scene(
     if is_of_blendshapes(moved.motion):
         moved = _with(moved, with_mouth(moved.motion))
     scene = scene_of(moved, face, rate_hz, staging=staging, prosody=prosody)
+    scene = replace(scene, sound_s=delivery.offset_ms / 1000)
     weights = scene.weights
-    frames = 0 if weights is None else delivery.hold_frames(weights.rate_hz)
-    if weights is None or frames < 2:
+    if weights is None or not delivery.hold_ms:
         return scene
-    mouth = [name for name in weights.names if arkit_name(name) not in ARKIT_OTHERS]
     states = StateTrace(("",), np.zeros(len(weights.values), np.intp))
     whole = Generation(weights, np.zeros(weights.values.shape), moved.units, states)
-    steps = held(whole.selected(mouth), frames, closed_times(moved)).motion
-    values = weights.values.astype(np.float64)
-    values[:, [weights.column(name) for name in mouth]] = steps.values
-    return replace(scene, weights=replace(weights, values=values))
+    steps = held_mouth(whole, delivery.hold_frames(weights.rate_hz), closed_times(moved))
+    return replace(scene, weights=steps.motion, stepped=steps.stepped)
+
+
+def held_mouth(generation: Generation, frames: int, closed_s: Sequence[float]) -> Generation:
+    """Return a generation whose mouth is held (``held``); eyes, brows, cheeks and head move as before.
+
+    frames : 0: everything moves as before; 1: every frame is a pose, which formats that can say so hold
+    """
+    motion = generation.motion
+    names = tuple(
+        channel.name
+        for channel in motion.channels
+        if channel.unit != RADIAN and arkit_name(channel.name) not in ARKIT_OTHERS
+    )
+    if not frames or not names:
+        return generation
+    mouth = replace(held(generation.selected(names), frames, closed_s), stepped=names)
+    if names == motion.names:
+        return mouth
+    columns = [motion.column(name) for name in names]
+    values, variance = motion.values.astype(np.float64), np.array(generation.variance)
+    values[:, columns], variance[:, columns] = mouth.motion.values, mouth.variance
+    return replace(mouth, motion=replace(motion, values=values), spread=variance)
 
 
 def moved_prosody(prosody: Prosody, delivery: Delivery) -> Prosody:
@@ -128,6 +163,8 @@ def _enlarges(
 ) -> bool:
     """Return whether a face makes movements larger itself: one that can be staged, and is not moved by weights."""
     weighed = is_of_blendshapes(generation.motion) or (character is not None and delivery.hold_ms > 0)
+    if isinstance(face, MeshFace) and face.character.shapes is not None:
+        weighed = weighed or given_weights(generation.motion, face.character.shapes) is not None
     return isinstance(face, Stageable) and not weighed
 
 

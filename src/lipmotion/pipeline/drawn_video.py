@@ -16,6 +16,7 @@ from lipmotion.kernels.choice import numba_works
 from lipmotion.pipeline.film.video import RENDERING
 from lipmotion.speech.audio_files import SPEECH_RATE_HZ, read_audio
 from lipmotion.speech.decimation import decimated
+from lipmotion.speech.mfcc import WINDOW
 from lipmotion.speech.prosody import prosody_of
 from lipmotion.types import Audio, Channel, Generation, Monitor, Motion, Prosody, Timeline
 from lipmotion.types.progress import with_reports
@@ -52,17 +53,25 @@ def check_staging(face: Face | FilmedFace, staging: Staging) -> None:
 
 
 def write_drawn_face(
-    path: Path, generation: Generation, sound: Audio, fps: float, face: Face, staging: Staging, monitor: Monitor
+    path: Path,
+    generation: Generation,
+    sound: Audio,
+    fps: float,
+    face: Face,
+    staging: Staging,
+    monitor: Monitor,
+    prosody: Prosody | None = None,
 ) -> None:
     """Write generated motion as a drawn face, in the format of the suffix; brows and head move with the sound.
 
+    prosody : loudness and pitch in the time of the motion; None: those of the sound, which begins with the motion
     monitor : receives reports of the progress
     Raises ExportError: the file cannot be written.  Raises InputError: no such face, or it cannot be staged so.
     """
     from lipmotion.export.transparent import write_pictures, write_with_alpha
     from lipmotion.export.video import write_mp4
 
-    staged, drawn = staged_face(face, staging, prosody_heard(sound)), None
+    staged, drawn = staged_face(face, staging, prosody or prosody_heard(sound)), None
     if path.suffix.lower() == OPAQUE_SUFFIX and isinstance(staged, DrawsPlanes):
         drawn = staged.render_planes(generation.motion, generation.units, fps=fps)
     if drawn is None:
@@ -88,6 +97,8 @@ def load_drawing(face: Face) -> None:
 def prosody_heard(speech: str | Path | Audio) -> Prosody:
     """Return loudness and pitch of a recording or a sound, for movements of brows and head.
 
+    A sound that is shorter than one frame of speech is followed by silence.
+
     Raises InputError: the recording cannot be read.
     """
     sound = speech if isinstance(speech, Audio) else read_audio(Path(speech), SPEECH_RATE_HZ, warn=False)
@@ -99,4 +110,5 @@ def prosody_heard(speech: str | Path | Audio) -> Prosody:
         from scipy.signal import resample_poly
 
         samples = resample_poly(samples, ratio.numerator, ratio.denominator).astype(np.float32)
-    return prosody_of(Audio(samples, SPEECH_RATE_HZ))
+    missing = max(WINDOW - len(samples), 0)
+    return prosody_of(Audio(np.pad(samples, (0, missing)), SPEECH_RATE_HZ))

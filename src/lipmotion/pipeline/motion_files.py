@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +13,7 @@ from lipmotion.export.base import motion_format, motion_suffix
 from lipmotion.faces.base import Staging
 from lipmotion.pipeline.characters import ARKIT, WHOLE_FACE, beside, curves_of
 from lipmotion.pipeline.living_curves import RADIAN, living_curves
+from lipmotion.rig.blendshape_motion import with_mouth
 from lipmotion.rig.driven import at_times
 from lipmotion.rig.facial_animation import FAP
 from lipmotion.rig.point_motion import point_motion
@@ -18,6 +21,7 @@ from lipmotion.rig.rig_tables import CONTROL
 from lipmotion.rig.shape_names import arkit_name
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Prosody
 
+LOG = logging.getLogger("lipmotion")
 CURVES = (WEIGHT, CONTROL, RADIAN)
 """The units of curves that drive a character."""
 SAME_HZ = 1e-6
@@ -31,12 +35,15 @@ def in_format(
     rate_hz: float | None,
     staging: Staging | None = None,
     prosody: Prosody | None = None,
+    channels: Sequence[str] | None = None,
 ) -> Generation:
     """Return a generation as a motion file of that name holds it.
 
     chosen  : the generation with the channels, and at the rate, that the user asked for: what most formats hold
     rate_hz : the rate that the user asked for; None: that of the format, or else that of the motion
     staging, prosody : of what moves on its own, in formats that hold a whole face; None: everything moves; not known
+    channels : those that the user asked for by name: of a format's own curves only these are held, if any of them is
+               one; None: all
     Where the lips close between two frames of curves, the nearer one shows it. Blendshapes that the motion has
     already, by any spelling of ARKit's names, are taken as they are.
     Raises ExportError: unknown suffix. Raises InputError: curves that cannot be computed.
@@ -47,15 +54,31 @@ def in_format(
     if form.curves and not others:
         curves = _curves(generation, form.curves, staging, prosody)
         held = replace(generation, motion=curves, spread=np.zeros(curves.values.shape))
+        own = [name for name in channels or () if name in curves.names]
+        held = held.selected(own) if own else held
+    elif form.mouth and OPENING not in held.motion.names:
+        held = generation
     hertz = rate_hz or form.rate_hz
     if hertz is None or abs(hertz - held.motion.rate_hz) < SAME_HZ:
         return held
     resampled = held.resampled(hertz)
-    if held is chosen or OPENING not in generation.motion.names:
+    if held is chosen or held is generation or OPENING not in generation.motion.names:
         return resampled
     gap = point_motion(generation.motion, generation.units).gap
     rows = at_times(held.motion.values.astype(np.float64), gap, held.motion.rate_hz, resampled.motion.time_s)
     return replace(resampled, motion=replace(resampled.motion, values=rows))
+
+
+def warn_of_unused(path: Path, held: Generation, asked: Sequence[str]) -> None:
+    """Log a warning if a motion file holds none of the channels that were asked for: its format says what it holds.
+
+    asked : the channels, or the curves, that the user named
+    """
+    names = held.motion.names
+    replaced = motion_format(path).mouth and OPENING in names and OPENING not in asked
+    if asked and (replaced or not {*asked} & {*names}):
+        kind = motion_suffix(path)
+        LOG.warning("%s: %s holds channels of its own, none of those that were asked for", path.name, kind)
 
 
 def needs_prosody(path: Path) -> bool:
@@ -69,9 +92,9 @@ def _curves(generation: Generation, name: str, staging: Staging | None, prosody:
     own = _held_already(motion, name)
     if own is None:
         return curves_of(motion, units, name, staging=staging, prosody=prosody)
-    if name != WHOLE_FACE or OPENING not in motion.names:
+    if name != WHOLE_FACE:
         return own
-    living = living_curves(motion, units, staging, prosody)
+    living = living_curves(with_mouth(motion), units, staging, prosody)
     added = [column for column, name in enumerate(living.names) if name not in own.names]
     channels = tuple(living.channels[column] for column in added)
     return beside(own, Motion(living.values[:, added], motion.rate_hz, channels))

@@ -17,6 +17,10 @@ from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Generation, Motion, S
 LOG = logging.getLogger("lipmotion")
 TOLERATED_S = 0.1
 """Sound and motion may differ so much in length without a warning."""
+SLOWEST_HZ, FASTEST_HZ = 1.0, 10_000.0
+"""Smallest and largest frame rate of motion that is read: a mistyped one must not fill the memory."""
+LONGEST_S = 86_400.0
+"""Longest motion that is read."""
 STATE = "file"
 """The state of every frame of motion that was read."""
 
@@ -27,11 +31,17 @@ def read_generation(path: str | Path, units: str | Path | None = None) -> Genera
     path  : ``.json``, ``.csv``, ``.npz``, or another motion file that can be read
     units : a file with phones in time (``read_units``), for motion files that have none; None: those of the motion file
     Blendshapes, visemes and vowels count as weights, whatever unit the file gives them.
-    Raises InputError: a file that cannot be read, or motion without frames.
+    Raises InputError: a file that cannot be read, motion without frames, of an unlikely rate, or of more than a day.
     """
     motion, found = read_motion(path)
     if not len(motion.values):
         raise InputError(f"{path}: the motion has no frames; export it again")
+    if not SLOWEST_HZ <= motion.rate_hz <= FASTEST_HZ:
+        required = f"required {SLOWEST_HZ:.0f} to {FASTEST_HZ:.0f}; export it again"
+        raise InputError(f"{path}: {motion.rate_hz:g} frames a second, {required}")
+    lasts_s = (len(motion.values) - 1) / motion.rate_hz
+    if lasts_s > LONGEST_S:
+        raise InputError(f"{path}: the motion lasts {lasts_s:.0f} s, required at most {LONGEST_S:.0f}; cut it")
     phones = found if units is None else read_units(units)
     channels = tuple(
         Channel(each.name, WEIGHT) if each.unit == EYE_DISTANCE and is_known(each.name) else each

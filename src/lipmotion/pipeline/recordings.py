@@ -51,9 +51,11 @@ def planned_outputs(recordings: Sequence[Path], outputs: Sequence[str], kinds: S
     templates: list[str] = []
     for output in outputs:
         if not is_for_several(output):
+            several = f"there are {len(recordings)} recordings"
+            mixed = f"files do not mix with folders, nor with names with {NAME}"
             raise ExportError(
-                f"{output}: is one file, and there are {len(recordings)} recordings; give a folder, or {NAME} in the "
-                f"name of the file: 'out/{NAME}{Path(output).suffix}'"
+                f"{output}: is one file, and {several if len(recordings) > 1 else mixed}; give a folder, with a slash "
+                f"at its end, or {NAME} in the name of the file: 'out/{NAME}{Path(output).suffix or '.json'}'"
             )
         is_template = NAME in output
         templates += [output] if is_template else [str(Path(output) / f"{NAME}.{kind}") for kind in kinds]

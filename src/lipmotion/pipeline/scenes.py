@@ -71,7 +71,9 @@ def _keeps_original(path: Path, scene: Scene) -> bool:
     """Write the user's file with its animation, and return whether that was possible."""
     if path.suffix.lower() != GLTF or scene.original is None or scene.original.suffix.lower() not in KEPT:
         return False
-    return scene.weights is not None and write_animated_gltf(path, scene.original, scene.weights, scene.sound)
+    return scene.weights is not None and write_animated_gltf(
+        path, scene.original, scene.weights, scene.sound, sound_s=scene.sound_s, stepped=scene.stepped
+    )
 
 
 def head_scene(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -12,16 +13,25 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.rig.gltf_container import GltfDocument, read_gltf_document, write_container
 from lipmotion.rig.gltf_scene import target_names
+from lipmotion.rig.scene import with_jumps
 from lipmotion.types import Motion
 
 FLOAT = 5126
 
 
-def write_animated_gltf(path: Path, original: Path, weights: Motion, sound: str = "") -> bool:
+def write_animated_gltf(
+    path: Path,
+    original: Path,
+    weights: Motion,
+    sound: str = "",
+    *,
+    sound_s: float = 0.0,
+    stepped: Collection[str] = (),
+) -> bool:
     """Write a ``.glb`` or ``.vrm`` again, with the weights of its morph targets as its first animation, ``speech``.
 
     weights : channels by the names of the morph targets, in all meshes that have them
-    sound   : as of ``Scene``
+    sound, sound_s, stepped : as of ``Scene``
     Returns False, and writes nothing, where the file is no single ``.glb``, or a channel is none of its morph targets
     (an expression of a VRM file is several of them).
     Raises InputError: the original cannot be read. Raises ExportError: the file cannot be written.
@@ -36,14 +46,16 @@ def write_animated_gltf(path: Path, original: Path, weights: Motion, sound: str 
         return False
     json = copy.deepcopy(dict(document.json))
     body = bytearray(binary[: json["buffers"][0].get("byteLength", len(binary))])
-    times = _added(json, body, weights.time_s, limits=True)
+    chosen = [name in stepped for name in weights.names]
+    time_s, rows = with_jumps(weights.time_s, weights.values.astype(np.float64), chosen)
+    times = _added(json, body, time_s, limits=True)
     samplers: list[dict[str, Any]] = []
     channels: list[dict[str, Any]] = []
     for node, names in moved:
-        table = np.zeros((len(weights.values), len(names)))
+        table = np.zeros((len(rows), len(names)))
         for column, name in enumerate(names):
             if name in weights.names:
-                table[:, column] = weights[name]
+                table[:, column] = rows[:, weights.column(name)]
         channels.append({"sampler": len(samplers), "target": {"node": node, "path": "weights"}})
         output = _added(json, body, table.reshape(-1))
         samplers.append({"input": times, "output": output, "interpolation": "LINEAR"})
@@ -52,7 +64,7 @@ def write_animated_gltf(path: Path, original: Path, weights: Motion, sound: str 
     if sound:
         scene = json["scenes"][json.get("scene", 0)]
         extras = scene.get("extras")
-        scene["extras"] = (extras if isinstance(extras, dict) else {}) | {"audio": {"uri": sound, "start_s": 0.0}}
+        scene["extras"] = (extras if isinstance(extras, dict) else {}) | {"audio": {"uri": sound, "start_s": sound_s}}
     write_container(path, json, bytes(body))
     return True
 

@@ -95,7 +95,7 @@ def write_gltf_scene(path: Path, scene: Scene) -> None:
 
     Every part becomes a primitive with its own vertices; those that no blendshape moves are a mesh of their own.
     Textures are not written, colours of vertices are. A sound is named as ``extras`` of the scene, which programs that
-    do not know it pass on: ``{"audio": {"uri": ..., "start_s": 0}}``.
+    do not know it pass on: ``{"audio": {"uri": ..., "start_s": ...}}``.
     Raises ExportError: the file cannot be written.
     """
     buffer = _Buffer()
@@ -133,7 +133,7 @@ def _document(scene: Scene, buffer: _Buffer, normals: ShadingNormals) -> dict[st
         "materials": materials,
     }
     if scene.sound:
-        document["scenes"][0]["extras"] = {"audio": {"uri": scene.sound, "start_s": 0.0}}
+        document["scenes"][0]["extras"] = {"audio": {"uri": scene.sound, "start_s": scene.sound_s}}
     if scene.turn is not None:
         _add_joints(document, buffer, scene.turn)
     if scene.weights is not None and len(scene.weights.values) and (mesh.shapes or scene.turn):
@@ -217,18 +217,23 @@ def _add_joints(document: dict[str, Any], buffer: _Buffer, turn: HeadTurn) -> No
 
 def _animation(buffer: _Buffer, scene: Scene, head: int) -> dict[str, Any]:
     """Return the animation of the weights of node 0, and of the rotation of the node of the head."""
-    times = buffer.add(scene.weights.time_s if scene.weights else np.zeros(0), "SCALAR", limits=True)
-    curves: list[tuple[int, str, int]] = []
+    time_s, table = scene.keys()
+    frames_s = scene.weights.time_s if scene.weights else np.zeros(0)
+    times = buffer.add(time_s, "SCALAR", limits=True)
+    curves: list[tuple[int, str, int, int]] = []
     if scene.mesh.shapes:
-        curves.append((0, "weights", buffer.add(scene.table().reshape(-1), "SCALAR")))
+        curves.append((0, "weights", times, buffer.add(table.reshape(-1), "SCALAR")))
     if scene.turn is not None:
-        curves.append((head, "rotation", buffer.add(scene.turn.rotations, "VEC4")))
+        if len(frames_s) < len(time_s):
+            times = buffer.add(frames_s, "SCALAR", limits=True)
+        curves.append((head, "rotation", times, buffer.add(scene.turn.rotations, "VEC4")))
     return {
         "name": "speech",
         "channels": [
-            {"sampler": number, "target": {"node": node, "path": path}} for number, (node, path, _) in enumerate(curves)
+            {"sampler": number, "target": {"node": node, "path": path}}
+            for number, (node, path, *_) in enumerate(curves)
         ],
-        "samplers": [{"input": times, "output": output, "interpolation": "LINEAR"} for *_, output in curves],
+        "samplers": [{"input": times, "output": output, "interpolation": "LINEAR"} for *_, times, output in curves],
     }
 
 

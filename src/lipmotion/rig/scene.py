@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +18,8 @@ from lipmotion.types import Motion
 
 Array = NDArray[np.float64]
 
+JUMP_S = 1e-3
+"""How long a change at once may last, in seconds."""
 LEAST_TURN = 1e-3
 """Normals that a blendshape turns by less than this are left out of it."""
 
@@ -43,8 +46,10 @@ class Scene:
     weights : of blendshapes over time, channels by their names; shapes without a channel stay at 0; None: no animation
     turn    : of the head; None: it stands still
     sound   : the file with the sound as the scene's file names it: a path from its folder, with slashes; empty: none
+    sound_s : when the sound begins, in seconds of the animation; negative: it began before the animation
     metres  : the length of the mesh's unit in metres, for formats that say it
     original : the file that the mesh is from; a ``.glb`` of it keeps all that is in that file; None: no file
+    stepped : names of weights that change at once from one held value to the next
     split   : whether vertices at one place may be one: files split them along seams, which should not be seen
     Raises ExportError: a channel that is no blendshape. Raises InputError: a turn that does not fit the mesh.
     """
@@ -53,9 +58,11 @@ class Scene:
     weights: Motion | None = None
     turn: HeadTurn | None = None
     sound: str = ""
+    sound_s: float = 0.0
     metres: float = 1.0
     original: Path | None = None
     split: bool = True
+    stepped: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name in self.weights.names if self.weights else ():
@@ -79,6 +86,31 @@ class Scene:
         for column, name in enumerate(weights.names):
             table[:, names.index(name)] = weights.values[:, column]
         return table
+
+    def keys(self) -> tuple[Array, Array]:
+        """Return times in seconds [shape=(K,)], and the weights of all blendshapes at these [shape=(K, S)].
+
+        Between two keys weights lie on a straight line: where some are stepped, there is a key just before a change.
+        """
+        time_s = self.weights.time_s if self.weights else np.zeros(0)
+        return with_jumps(time_s, self.table(), [name in self.stepped for name in self.mesh.shape_names])
+
+
+def with_jumps(time_s: Array, rows: Array, stepped: Sequence[bool]) -> tuple[Array, Array]:
+    """Return evenly spaced keys with those added that let some curves change at once between straight lines.
+
+    time_s  : seconds [shape=(T,)]; rows : of curves [shape=(T, N)]; stepped : which curves change at once [N values]
+    An added key is ``JUMP_S`` before a change, or a tenth of the time between two keys, whichever is shorter.
+    """
+    chosen = np.array(stepped, bool)
+    changed = np.flatnonzero(np.diff(rows[:, chosen], axis=0).any(axis=1)) + 1
+    if not len(changed):
+        return time_s, rows
+    step_s = float(time_s[1] - time_s[0])
+    early_s = min(JUMP_S, step_s / 10)
+    before = rows[changed] - early_s / step_s * (rows[changed] - rows[changed - 1])
+    before[:, chosen] = rows[changed - 1][:, chosen]
+    return np.insert(time_s, changed, time_s[changed] - early_s), np.insert(rows, changed, before, axis=0)
 
 
 @dataclass(frozen=True, eq=False)

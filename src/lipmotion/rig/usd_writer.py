@@ -30,7 +30,8 @@ def write_usda(path: Path, scene: Scene) -> None:
 
     Up to ``FASTEST_HZ`` keys a second, key n is time code n; of more, time codes are 24ths of a second, and keys lie
     between them: programs that ignore the rate of time codes, as Blender 5.0 does, play 24 a second.
-    The sound is a ``SpatialAudio`` that plays from time code 0, everywhere equally loud. Textures are not written.
+    The sound is a ``SpatialAudio``, everywhere equally loud; of one that began before time code 0, the rest is played.
+    Textures are not written.
     Raises ExportError: the file cannot be written.
     """
     normals = shading_normals(scene.mesh, split=scene.split)
@@ -61,8 +62,10 @@ def _sound(scene: Scene) -> Iterator[str]:
     yield 'uniform token auralMode = "nonSpatial"'
     yield f"uniform timecode endTime = {_last(scene):.9g}"
     yield f"uniform asset filePath = {asset(scene.sound)}"
+    if scene.sound_s < 0:
+        yield f"uniform double mediaOffset = {-scene.sound_s:.9g}"
     yield 'uniform token playbackMode = "onceFromStart"'
-    yield "uniform timecode startTime = 0"
+    yield f"uniform timecode startTime = {max(scene.sound_s, 0.0) * _codes_hz(scene):.9g}"
 
 
 def _skeleton(scene: Scene) -> Iterator[str]:
@@ -77,15 +80,16 @@ def _skeleton(scene: Scene) -> Iterator[str]:
 
 
 def _animation(scene: Scene) -> Iterator[str]:
-    table, joints = scene.table(), _joints(scene)
+    joints, (time_s, table) = _joints(scene), scene.keys()
     yield f"uniform token[] blendShapes = {tokens(scene.mesh.shape_names)}"
     if len(table):
-        yield from _samples("float[] blendShapeWeights", map(numbers, table), scene)
+        yield from _samples("float[] blendShapeWeights", map(numbers, table), time_s * _codes_hz(scene))
     else:
         yield f"float[] blendShapeWeights = {numbers(np.zeros(len(scene.mesh.shapes)))}"
     yield f"uniform token[] joints = {tokens(joints)}"
     if scene.turn is not None:
-        yield from _samples("quatf[] rotations", _rotations(scene.turn), scene)
+        codes = _step(scene) * np.arange(len(scene.turn.rotations), dtype=np.float64)
+        yield from _samples("quatf[] rotations", _rotations(scene.turn), codes)
         yield f"float3[] translations = [(0, 0, 0), {triple(scene.turn.pivot)}]"
     else:
         yield "quatf[] rotations = [(1, 0, 0, 0)]"
@@ -98,10 +102,10 @@ def _rotations(turn: HeadTurn) -> Iterator[str]:
         yield f"[(1, 0, 0, 0), ({w:.7g}, {x:.7g}, {y:.7g}, {z:.7g})]"
 
 
-def _samples(attribute: str, values: Iterable[str], scene: Scene) -> Iterator[str]:
-    step = _step(scene)
+def _samples(attribute: str, values: Iterable[str], codes: NDArray[np.float64]) -> Iterator[str]:
+    """Yield the values of an attribute at time codes [shape=(K,)]."""
     yield f"{attribute}.timeSamples = {{"
-    yield from (f"    {number * step:.9g}: {value}," for number, value in enumerate(values))
+    yield from (f"    {code:.9g}: {value}," for code, value in zip(codes.tolist(), values, strict=True))
     yield "}"
 
 

@@ -12,7 +12,7 @@ import platform
 import shutil
 import sys
 import uuid
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
@@ -203,6 +203,30 @@ def whole_folder(target: Path) -> Iterator[Path]:
         raise _refused(target, error) from error
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
+
+
+@contextmanager
+def made_folders(folders: Iterable[Path]) -> Iterator[None]:
+    """Create folders, with those that hold them; if the block fails, remove those that were not there before.
+
+    Raises ExportError: a folder cannot be created.
+    """
+    made: list[Path] = []
+    try:
+        for folder in sorted(folders):
+            missing = [each for each in (folder, *folder.parents) if not each.exists()]
+            try:
+                folder.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                raise _refused(folder, error) from error
+            finally:
+                made += reversed(missing)
+        yield
+    except BaseException:
+        for folder in reversed(made):
+            with suppress(OSError):  # it was not made, or something else is in it by now
+                folder.rmdir()
+        raise
 
 
 def _refused(target: Path, error: OSError) -> ExportError:

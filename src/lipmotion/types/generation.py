@@ -192,6 +192,7 @@ class Generation:
     units  : the phones in time from which the motion was generated; edit them and generate again
     trace  : the state of the model in every frame
     outlook : how well the model knew words and voice (None: not from ``animate``)
+    stepped : channels of held poses, which change at once: formats that can say so do
 
     >>> import lipmotion
     >>> result = lipmotion.animate("examples/welcome.flac")
@@ -206,6 +207,7 @@ class Generation:
     units: Timeline[Unit]
     trace: StateTrace
     outlook: Outlook | None = None
+    stepped: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         frames, channels = self.motion.values.shape

@@ -19,6 +19,7 @@ from lipmotion.units.transcript import words_in, words_of
 from lipmotion.units.unit_set import UnitSet
 from lipmotion.units.unit_sets import UNIT_SETS, unit_set
 from lipmotion.units.visemes import VISEME_OF, VISEMES
+from lipmotion.units.word_spans import words_in_time
 
 __all__ = [
     "LIP_CLOSING",
@@ -45,5 +46,6 @@ __all__ = [
     "with_reduced_vowels",
     "without_gaps",
     "words_in",
+    "words_in_time",
     "words_of",
 ]

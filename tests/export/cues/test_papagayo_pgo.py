@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from itertools import pairwise
 
@@ -103,3 +104,15 @@ def test_a_character_without_rest_has_no_gaps() -> None:
     sheet = choose_cues(spoken("b aa b"), optional="")
     _, phrases = read(CUE_FORMATS["pgo"](sheet, ""))
     assert {shown(phrases, frame) for frame in range(20)} <= {shape.blair for shape in SHAPES.values()} - {"rest"}
+
+
+@pytest.mark.parametrize(("fps", "whole"), [(29.97, 30), (23.976, 24), (12.5, 13)])
+def test_times_stay_at_a_rate_that_is_not_whole(fps: float, whole: int) -> None:
+    """After ten minutes, 29.97 frames a second would be 18 frames behind 30."""
+    times_s = [frame / fps for frame in (0, 1, *range(int(600 * fps), int(600 * fps) + 6))]
+    starts = [math.ceil(time_s * 100) / 100 for time_s in times_s]
+    spans = [Span(start, end, "XADAXADA"[n]) for n, (start, end) in enumerate(pairwise([*starts, 601.0]))]
+    about, phrases = read(CUE_FORMATS["pgo"](CueSheet(Timeline(tuple(spans)), fps, "ABCDEFX"), "a.wav"))
+    assert about["fps"] == str(whole)
+    for span in spans:
+        assert shown(phrases, int(span.start_s * whole)) == SHAPES[span.label].blair

@@ -24,8 +24,10 @@ def run(path: Path) -> dict[str, Any]:
 def path(tmp_path: Path) -> Path:
     names = ("jawOpen", 'odd "name"\\')
     moved = Motion(np.random.default_rng(5).random((7, 2)), 100.0, tuple(Channel(name, WEIGHT) for name in names))
-    made = Generation(moved, np.zeros((7, 2)), Timeline(()), StateTrace(("a",), np.zeros(7, np.intp)))
-    write_motion(tmp_path / "a.blender.py", made, source={"file": "a.wav", "path": "../a 'b'.wav"}, model={})
+    trace = StateTrace(("a",), np.zeros(7, np.intp))
+    made = Generation(moved, np.zeros((7, 2)), Timeline(()), trace, stepped=("jawOpen", "width"))
+    source = {"file": "a.wav", "path": "../a 'b'.wav", "start_s": "0.25"}
+    write_motion(tmp_path / "a.blender.py", made, source=source, model={})
     return tmp_path / "a.blender.py"
 
 
@@ -33,6 +35,8 @@ def test_it_holds_curves_rate_and_sound(path: Path) -> None:
     names = run(path)
     assert names["RATE_HZ"] == pytest.approx(100.0)
     assert names["SOUND"] == "../a 'b'.wav"
+    assert names["STEPPED"] == ("jawOpen",)
+    assert names["SOUND_S"] == pytest.approx(0.25)
     assert list(names["MOTION"]) == ["jawOpen", 'odd "name"\\']
     assert names["MOTION"]["jawOpen"] == pytest.approx(np.random.default_rng(5).random((7, 2))[:, 0].tolist(), abs=1e-5)
 

@@ -39,7 +39,6 @@ def read(path: Path) -> tuple[dict, dict[str, tuple[np.ndarray, np.ndarray]]]:
         keys = [(numbers[0], numbers[1])]
         while at < len(numbers):
             count = points_of[numbers[at]]
-            assert numbers[at] == 0
             keys += [(numbers[at + 1], numbers[at + 2])]
             at += 1 + 2 * count
             segments, points = segments + 1, points + count
@@ -67,6 +66,19 @@ def test_curves_through_the_keys_are_those_of_the_mouth(tmp_path, talking):
         assert np.diff(times_s).min() > 0
         assert len(keys) < 0.6 * FRAMES
         assert np.abs(np.interp(talking.motion.time_s, times_s, keys) - values).max() <= TOLERANCE + 5.1e-4
+
+
+def test_held_poses_change_at_once(tmp_path, talking):
+    values = np.repeat([[0.01, 0.6], [0.16, 0.6], [0.01, 0.65]], 100, axis=0)
+    steps = replace(talking, motion=replace(talking.motion, values=values), stepped=("opening", "width"))
+    write_motion(tmp_path / "a.motion3.json", steps, source={}, model={})
+    _, curves = read(tmp_path / "a.motion3.json")
+    assert curves["ParamMouthOpenY"][0].tolist() == [0, 1, 2, 2.99]
+    document = json.loads((tmp_path / "a.motion3.json").read_text())
+    assert document["Curves"][0]["Segments"][2::3] == [2, 2, 2]
+    write_motion(tmp_path / "b.motion3.json", replace(steps, stepped=()), source={}, model={})
+    smooth = json.loads((tmp_path / "b.motion3.json").read_text())
+    assert set(smooth["Curves"][0]["Segments"][2::3]) == {0}
 
 
 def test_the_mouth_rests_opens_and_is_wide(talking):

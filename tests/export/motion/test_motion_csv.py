@@ -42,6 +42,8 @@ def test_a_table_saved_by_a_spreadsheet_is_read(tmp_path):
         ("time_s,opening\n0,1\n0.1,1\n0.3,1\n", "even steps"),
         ("time_s,opening\n0,1\n0,1\n", "even steps"),
         ("time_s,opening,opening\n0,1,1\n0.1,1,1\n", "names repeat"),
+        ("time_s,jawOpen\n0,0\n0.1,55\n", "jawOpen goes up to 55, required 0 to 1; divide percent by 100"),
+        ("time,JawOpen\n0,0\n0.1,55\n", "JawOpen goes up to 55, required 0 to 1"),
     ],
 )
 def test_what_is_wrong_is_said(tmp_path, text, message):

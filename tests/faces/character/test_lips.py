@@ -12,6 +12,7 @@ from lipmotion.faces.character.lips import (
     SIDE,
     TEETH_EDGE,
     TEETH_Z,
+    VISIBLE,
     lip_surface,
     section_points,
 )
@@ -133,3 +134,21 @@ def test_the_surface_has_its_rings_and_columns():
     assert surface.shape == (RINGS, COLUMNS, 3)
     assert np.ptp(surface[-1], axis=0) == pytest.approx([0, 0, 0], abs=1e-9)  # the throat is closed
     assert ACROSS[0] == pytest.approx(-1)
+
+
+def test_the_corners_of_closed_lips_are_level_with_their_middle():
+    for pose in (CharacterPose(), CharacterPose(press=1), CharacterPose(width=1.1, press=1)):
+        assert np.ptp(contact(pose)[:, 1]) < 0.015
+
+
+@pytest.mark.parametrize("gap", [0.028, 0.04, 0.06, 0.1])
+def test_a_round_hole_is_an_ellipse_that_nothing_behind_it_narrows(gap):
+    pose = CharacterPose(gap=gap, upper_rise=0.48 * gap, width=0.75, roundness=1, protrusion=0.08)
+    surface = lip_surface(section_points(pose, figure().skin.base_z))
+    rim = surface[VISIBLE - 1]
+    line = np.interp(np.abs(rim[:, 0]), rim[20:41, 0], 0.5 * (rim[20:41, 1] + rim[60 - np.arange(21), 1]))
+    half_width, half_height = rim[:, 0].max(), 0.5 * (rim[20, 1] - rim[60, 1])
+    away = np.hypot(rim[:, 0] / half_width, (rim[:, 1] - line) / half_height)
+    assert np.abs(away - 1).max() < 0.06
+    behind = surface[VISIBLE : VISIBLE + 4]
+    assert behind[:, :, 0].max(axis=1).min() >= half_width - 1e-9

@@ -8,7 +8,7 @@ import pytest
 from faces.character.motions import said
 from lipmotion.faces.character.performance import HELD_GAP, head_poses
 from lipmotion.faces.character.pose import CharacterPose
-from lipmotion.faces.character.stage import Stage
+from lipmotion.faces.character.stage import Stage, camera_for
 from lipmotion.rig.rasteriser import Camera
 from lipmotion.types import Channel, Motion
 
@@ -113,3 +113,28 @@ def test_pressed_lips_of_the_motion_come_before_the_phones():
     names = ("opening", "lip_press")
     motion = Motion(np.tile([0.0, 1.0], (41, 1)), 100.0, tuple(map(Channel, names)))
     assert head_poses(motion, said("ah"), 25.0)[5].press == pytest.approx(1.0)
+
+
+def test_upper_teeth_dominate_in_ee(mouths):
+    ee = mouths["iy"]
+    assert 0 < ee.seen["teeth"] < 0.5 * ee.seen["upper teeth"]
+
+
+def test_the_tongue_of_th_is_seen_and_is_narrower_than_the_mouth():
+    masks = Stage(Camera(*STAGE_SIZE, (0.0, -0.68), 0.8)).parts_seen(pose_of("th", 0.05))
+    inside = size(np.logical_or.reduce([mask for name, mask in masks.items() if name != "lips"]))
+    tongue = masks["tongue"]
+    assert 0.25 * inside[0] < size(tongue)[0] < 0.6 * inside[0]
+    rows = np.flatnonzero(tongue.any(axis=1))
+    top, middle = tongue[rows[1]].sum(), tongue[rows[len(rows) // 2]].sum()
+    assert top < 0.85 * middle  # rounded, not a slab
+    assert masks["upper teeth"].sum() > 0
+
+
+@pytest.mark.parametrize("pose", [CharacterPose(), CharacterPose(press=1, bite=1)])
+def test_the_seam_of_closed_lips_is_a_smooth_line(pose):
+    """The darkest pixel of each column changes little from column to column, in a picture of 720 lines."""
+    mouth = Stage(camera_for(1280, 720)).picture(pose)[490:540, 600:680].mean(axis=2)
+    darkest = mouth.min(axis=0)
+    assert np.abs(np.diff(darkest)).mean() < 3.0
+    assert darkest.mean() < 0.75 * mouth.mean()

@@ -18,12 +18,14 @@ import pytest
 
 import lipmotion
 from lipmotion.errors import CorpusError, ExportError, InputError
+from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.motion.delivery import Delivery
-from lipmotion.pipeline.batch import BatchLine, BatchSettings, batch, read_lines
+from lipmotion.pipeline.batch import BatchLine, BatchSettings, batch, one_line, read_lines
 from lipmotion.pipeline.batch import run as run_module
 from lipmotion.pipeline.batch.ledger import Place
 from lipmotion.pipeline.batch.one_line import LineWork, finished_line
 from lipmotion.pipeline.batch.pool import WorkerDied
+from lipmotion.pipeline.model import Model
 from lipmotion.types import Item
 
 pytest.importorskip("joblib")
@@ -77,6 +79,19 @@ def test_the_outputs_are_those_of_animate(sounds: Path, settings: BatchSettings,
     assert rows["three"]["words"] != "transcript"
     assert "not a readable recording" in rows["broken"]["error"]
     assert rows["one"]["closures_heard"] >= rows["one"]["closures_made"] >= 1
+
+
+def test_the_face_of_another_person_is_mapped_onto_once(
+    filmed_face: FilmedFace, toy_model: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mapped: list[str] = []
+    monkeypatch.setattr(one_line, "_face", lambda *_: filmed_face)
+    monkeypatch.setattr(one_line, "map_onto", lambda *_, speaker: mapped.append(speaker) or "a map")
+    other = replace(toy_model, about=toy_model.about | {"corpus": ["another"]})
+    lines = [BatchLine(name, f"/{name}.wav", "hello") for name in "ab"]
+    assert [one_line._request(line, BatchSettings(), other).onto for line in lines] == ["a map", "a map"]
+    assert mapped == [""]
+    assert one_line._request(lines[0], BatchSettings(), toy_model).onto is None
 
 
 def test_what_was_done_is_kept(sounds: Path, settings: BatchSettings, tmp_path: Path) -> None:
@@ -189,6 +204,43 @@ def test_a_worker_of_an_earlier_run_writes_nothing(sounds: Path, settings: Batch
     with pytest.raises(ExportError, match="another run of this batch has begun"):
         finished_line(work)
     assert contents(tmp_path / "out").keys() == {".batch/run"}
+
+
+def test_an_output_that_cannot_be_written_is_a_line_that_fails(
+    sounds: Path, settings: BatchSettings, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    (out / "one.json").mkdir(parents=True)
+    (out / "deep").touch()
+    found = batch(sounds, out, settings, jobs=1)
+    assert (found.done, found.failed) == (1, 2)
+    rows = {row["name"]: row for row in ledger_rows(out)}
+    assert "is a folder" in rows["one"]["error"]
+    assert rows["deep/two"]["outcome"] == "failed"
+    assert (out / "three.json").is_file()
+    assert sorted(path.name for path in out.iterdir() if path.name.startswith(".")) == []
+
+
+def test_an_output_that_cannot_be_renamed_is_a_line_that_fails(
+    sounds: Path, settings: BatchSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    work = waiting(sounds, settings, tmp_path / "out")[0]
+    monkeypatch.setattr("lipmotion.pipeline.batch.one_line.check_target", lambda _: None)
+    (tmp_path / "out" / f"{work.line.name}.json").mkdir(parents=True)
+    record = finished_line(work)
+    assert (record["outcome"], record["outputs"]) == ("failed", {})
+
+
+def test_a_bug_that_one_line_meets_does_not_end_the_batch(
+    sounds: Path, settings: BatchSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError("float division")
+
+    monkeypatch.setattr("lipmotion.pipeline.batch.one_line._written", broken)
+    found = batch(sounds, tmp_path / "out", settings, jobs=1)
+    assert found.failed == 3
+    assert "unexpected ZeroDivisionError: float division" in ledger_rows(tmp_path / "out")[0]["error"]
 
 
 def command(*words: object) -> list[str]:

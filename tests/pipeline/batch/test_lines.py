@@ -109,3 +109,25 @@ def test_a_list_of_too_many_lines(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert len(listed(tmp_path, "a.wav\nb.wav\n")) == 2
     with pytest.raises(InputError, match="3 lines, required at most 2"):
         listed(tmp_path, "a.wav\nb.wav\nc.wav\n")
+
+
+@pytest.mark.parametrize(
+    ("names", "message"),
+    [
+        (["a", "a.json/b"], "be the folder of"),
+        (["B.JSON/b", "b"], "be the folder of"),
+        (["report.csv/b"], "be the folder of"),
+        (["x" * 251], "more than 255 bytes"),
+        (["é" * 130 + "/x"], "more than 255 bytes"),
+        (["take.LiveLink"], "would be called as .livelink.csv"),
+    ],
+)
+def test_names_that_cannot_be_files_together(names: list[str], message: str) -> None:
+    with pytest.raises(ExportError, match=message):
+        check_names([BatchLine(name, f"/{number}.wav") for number, name in enumerate(names)], ("json", "csv"))
+
+
+def test_names_that_are_only_alike() -> None:
+    names = ["a", "a.jso/b", "a/b", "x" * 240, "take.1", "take.livelink.2"]
+    check_names([BatchLine(name, f"/{name}.wav") for name in names], ("json", "csv", "livelink.csv"))
+    check_names([BatchLine("take.livelink", "/a.wav")], ("json",))

@@ -10,10 +10,10 @@ import math
 import re
 from bisect import bisect_left
 
+from .takes import read_take
+
 Curves = dict[str, list[float]]
 
-TICKS_HZ = 60.0
-"""The frames of a Live Link Face timecode are 60ths of a second, unless more than 60 of them are counted."""
 OPEN_BELOW, NEAR = 0.02, 3
 """Lips are held to be closed where the shapes that part them add up to less than this, and to less than in this many
 frames before and after."""
@@ -41,13 +41,11 @@ def read_motion(path: str) -> tuple[Curves, list[float]]:
         rows = [row for row in csv.reader(file) if row]
     if not rows or rows[0][0].lower() not in {"time_s", "timecode"}:
         raise ValueError("the first column is neither 'time_s' (lipmotion) nor 'Timecode' (Live Link Face)")
-    first = 1 if rows[0][0].lower() == "time_s" else 2
-    if first == 1:
-        times = [float(row[0]) for row in rows[1:]]
-    else:
-        rows = [rows[0], *(row for row in rows[1:] if len(row) == len(rows[0]))]
-        times = _seconds([row[0] for row in rows[1:]])
-    return _columns(rows[0][first:], [list(map(float, row[first:])) for row in rows[1:]]), times
+    if rows[0][0].lower() == "timecode":
+        names, times, values = read_take(rows)
+        return _columns(names, values), times
+    times = [float(row[0]) for row in rows[1:]]
+    return _columns(rows[0][1:], [list(map(float, row[1:])) for row in rows[1:]]), times
 
 
 def spelling(name: str) -> str:
@@ -77,11 +75,12 @@ def control(name: str) -> tuple[str, str, str] | None:
     return (found["bone"], "property", found["property"]) if found else None
 
 
-def at_frames(curves: Curves, times: list[float], fps: float) -> Curves:
+def at_frames(curves: Curves, times: list[float], fps: float, stepped: tuple[str, ...] = ()) -> Curves:
     """Return the values at every frame, frame n at ``n / fps`` seconds, to the last frame that begins in the motion.
 
     Between values by a straight line. Where the lips close, the curves of jaw and mouth have at the nearest frame the
     values of that moment, so that no p, b or m is lost between two frames.
+    stepped : names of curves that hold each value until the next one
     """
     if not times:
         return {name: [] for name in curves}
@@ -92,10 +91,11 @@ def at_frames(curves: Curves, times: list[float], fps: float) -> Curves:
         nearest = round((times[moment] - times[0]) * fps)
         if nearest < count:
             closed[nearest] = (moment, 0.0)
-    return {
-        name: [_between(values, *place) for place in (closed if spelling(name).startswith(MOUTH) else places)]
-        for name, values in curves.items()
-    }
+    found = {}
+    for name, values in curves.items():
+        chosen = closed if spelling(name).startswith(MOUTH) else places
+        found[name] = [_between(values, low, 0.0 if name in stepped else share) for low, share in chosen]
+    return found
 
 
 def closures(curves: Curves, count: int) -> list[int]:
@@ -130,12 +130,3 @@ def _place(times: list[float], time_s: float) -> tuple[int, float]:
 
 def _columns(names: list[str], rows: list[list[float]]) -> Curves:
     return {name: [row[column] for row in rows] for column, name in enumerate(names)}
-
-
-def _seconds(timecodes: list[str]) -> list[float]:
-    """Return the times of timecodes ``HH:MM:SS:FF.mmm`` from the first one, in seconds."""
-    parts = [list(map(float, code.split(":"))) for code in timecodes]
-    most = max((frames for *_, frames in parts), default=0.0)
-    rate = TICKS_HZ if most < TICKS_HZ else float(math.ceil(most))
-    seconds = [hours * 3600 + minutes * 60 + seconds + frames / rate for hours, minutes, seconds, frames in parts]
-    return [time_s - seconds[0] for time_s in seconds]

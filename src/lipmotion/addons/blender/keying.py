@@ -37,36 +37,52 @@ def key_frames(
     first: float = 1.0,
     replace: bool = True,
     sound: str = "",
+    sound_s: float = 0.0,
+    stepped: tuple[str, ...] = (),
 ) -> tuple[int, list[str]]:
-    """Key objects from curves with one value a frame; arguments and what is returned as of ``key_objects``."""
+    """Key objects from curves with one value a frame; arguments and what is returned as of ``key_objects``.
+
+    sound_s : when the sound begins, in seconds after the first frame; negative: before it
+    stepped : names of curves that hold each value until the next one
+    """
     used: set[str] = set()
     named = {name: control(name) for name in frames}
     controls = {name: found for name, found in named.items() if found}
     for each in objects:
         if getattr(each.data, "shape_keys", None):
             keys = matched(list(frames), [block.name for block in each.data.shape_keys.key_blocks[1:]])
-            key_shapes(each, frames, keys, first, replace=replace)
+            key_shapes(each, frames, keys, first, replace=replace, stepped=stepped)
             used |= set(keys)
-        used |= set(key_controls(each, frames, controls, first, replace=replace))
+        used |= set(key_controls(each, frames, controls, first, replace=replace, stepped=stepped))
     if used:
         show_all(scene, first + max(len(values) for values in frames.values()) - 1)
-        add_sound(scene, sound, first)
+        add_sound(scene, sound, first, sound_s)
     return len(used), [name for name in frames if name not in used]
 
 
-def key_shapes(mesh: Any, curves: Curves, keys: dict[str, str], first: float, *, replace: bool = True) -> int:
+def key_shapes(
+    mesh: Any,
+    curves: Curves,
+    keys: dict[str, str],
+    first: float,
+    *,
+    replace: bool = True,
+    stepped: tuple[str, ...] = (),
+) -> int:
     """Key shape keys of an object, one key a frame; return how many are keyed.
 
     curves  : by name, one value a frame, the first at the frame ``first``
     keys    : the shape key of each curve, as of ``matched``
     replace : delete all earlier keys of these shape keys; otherwise only those between the first and the last frame
+    stepped : names of curves that hold each value until the next one
     """
     shapes = mesh.data.shape_keys
     fcurves = _fcurves(shapes, f"{mesh.name} speech") if keys else None
     for name, key in keys.items():
         shapes.key_blocks[key].slider_min = min(shapes.key_blocks[key].slider_min, min(curves[name], default=0.0))
         shapes.key_blocks[key].slider_max = max(shapes.key_blocks[key].slider_max, max(curves[name], default=0.0))
-        _key(fcurves, f'key_blocks["{_escaped(key)}"].value', -1, curves[name], first, replace)
+        kind = "CONSTANT" if name in stepped else "LINEAR"
+        _key(fcurves, f'key_blocks["{_escaped(key)}"].value', -1, curves[name], first, replace, kind)
     return len(keys)
 
 
@@ -77,10 +93,12 @@ def key_controls(
     first: float,
     *,
     replace: bool = True,
+    stepped: tuple[str, ...] = (),
 ) -> list[str]:
     """Key bones and custom properties of an object, one key a frame; return the curves that found their control.
 
     controls : of each curve, as of ``control``; rotations are in degrees
+    stepped  : names of curves that hold each value until the next one
     """
     found = []
     fcurves = None
@@ -93,13 +111,16 @@ def key_controls(
         if kind == "rotation":
             rig.pose.bones[bone].rotation_mode = "XYZ"
             values = [math.radians(value) for value in values]
-        _key(fcurves, *place, values, first, replace)
+        _key(fcurves, *place, values, first, replace, "CONSTANT" if name in stepped else "LINEAR")
         found.append(name)
     return found
 
 
-def add_sound(scene: Any, path: str, first: float) -> bool:
-    """Add a sound to the sequencer at a frame, in place of an earlier one of its kind; return whether it is there."""
+def add_sound(scene: Any, path: str, first: float, sound_s: float = 0.0) -> bool:
+    """Add a sound to the sequencer, in place of an earlier one of its kind; return whether it is there.
+
+    sound_s : it begins so many seconds after the frame ``first``; of a sound that begins before, the rest is heard
+    """
     if not path or not os.path.isfile(path):  # noqa: PTH113
         return False
     editor = scene.sequence_editor or scene.sequence_editor_create()
@@ -109,9 +130,11 @@ def add_sound(scene: Any, path: str, first: float) -> bool:
     taken = {strip.channel for strip in strips}
     channel = next(number for number in range(1, 130) if number not in taken)
     try:
-        strips.new_sound(STRIP, path, channel, round(first))
+        strip = strips.new_sound(STRIP, path, channel, round(first + sound_s * frame_rate(scene)))
     except RuntimeError:  # no sound file, or a Blender that was built without sound
         return False
+    if sound_s < 0:
+        strip.frame_final_start = round(first)
     scene.sync_mode = "AUDIO_SYNC"
     return True
 
@@ -154,7 +177,9 @@ def _fcurves(owner: Any, name: str) -> Any:
     return strip.channelbag(data.action_slot, ensure=True).fcurves
 
 
-def _key(fcurves: Any, path: str, index: int, values: list[float], first: float, replace: bool) -> None:
+def _key(
+    fcurves: Any, path: str, index: int, values: list[float], first: float, replace: bool, interpolation: str
+) -> None:
     """Write one key a frame."""
     where = {"index": index} if index >= 0 else {}
     curve = fcurves.find(path, **where) or fcurves.new(path, **where)
@@ -164,12 +189,12 @@ def _key(fcurves: Any, path: str, index: int, values: list[float], first: float,
         for point in curve.keyframe_points
         if not replace and not first - 0.5 < point.co[0] < last + 0.5
     ]
-    points = sorted([*kept, *((first + number, value, "LINEAR") for number, value in enumerate(values))])
+    points = sorted([*kept, *((first + number, value, interpolation) for number, value in enumerate(values))])
     curve.keyframe_points.clear()
     curve.keyframe_points.add(len(points))
     curve.keyframe_points.foreach_set("co", [number for point in points for number in point[:2]])
-    for point, (_, _, interpolation) in zip(curve.keyframe_points, points):  # noqa: B905
-        point.interpolation = interpolation
+    for point, (_, _, kind) in zip(curve.keyframe_points, points):  # noqa: B905
+        point.interpolation = kind
     curve.update()
 
 

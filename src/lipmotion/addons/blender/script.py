@@ -11,6 +11,8 @@ from .keying import frame_rate, key_frames
 MOTION: Curves = {}
 RATE_HZ = 100.0
 SOUND = ""
+SOUND_S = 0.0
+STEPPED: tuple[str, ...] = ()
 # -- what follows is copied into scripts
 
 
@@ -20,10 +22,11 @@ def main() -> None:
 
     scene = bpy.context.scene
     count = max((len(values) for values in MOTION.values()), default=0)
-    frames = at_frames(MOTION, [number / RATE_HZ for number in range(count)], frame_rate(scene))
+    frames = at_frames(MOTION, [number / RATE_HZ for number in range(count)], frame_rate(scene), STEPPED)
     chosen = [each for each in scene.objects if each.select_get()]
     for objects in (chosen, list(scene.objects)):
-        used, left = key_frames(objects, frames, scene, first=scene.frame_start, sound=_sound_file(bpy))
+        options = {"first": scene.frame_start, "sound": _sound_file(bpy), "sound_s": SOUND_S, "stepped": STEPPED}
+        used, left = key_frames(objects, frames, scene, **options)
         if used:
             print(f"lipmotion: {used} curves keyed; without a shape key or bone: {', '.join(left) or 'none'}")
             return

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,8 @@ from lipmotion.export.cues.costs import frame_costs
 from lipmotion.export.cues.shapes import OPTIONAL, SHAPES, drawn_shape
 from lipmotion.export.cues.sheet import CueSheet, cue_frame_count, cue_sheet, drawn_shapes
 from lipmotion.kernels.segments import best_segments
-from lipmotion.types import Generation, Span, Timeline, Unit
+from lipmotion.types import Generation, Timeline
+from lipmotion.units import words_in_time
 
 CHANGE = 0.35
 """Cost of a change of shape, in the unit of ``costs``."""
@@ -48,13 +48,7 @@ def choose_cues(
         cost = _costs_of_drawn_shapes(frame_costs(generation, frames, fps, intensity), drawn)
     segments = best_segments(cost, hold_frames or default_hold_frames(fps), CHANGE)
     sheet = cue_sheet([(frame, drawn[label]) for frame, label in segments], duration_s, fps, drawn)
-    return replace(sheet, words=_words(generation.units))
-
-
-def _words(units: Timeline[Unit]) -> Timeline[str]:
-    """Return the words in time; equal neighbours are one."""
-    runs = [(word, list(spans)) for word, spans in groupby(units, key=lambda span: span.label.word)]
-    return Timeline(tuple(Span(spans[0].start_s, spans[-1].end_s, word) for word, spans in runs if word))
+    return replace(sheet, words=Timeline(tuple(span for span in words_in_time(generation.units) if span.label)))
 
 
 def _costs_of_drawn_shapes(cost: NDArray[np.float64], drawn: str) -> NDArray[np.float64]:

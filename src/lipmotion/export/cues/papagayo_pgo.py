@@ -6,12 +6,16 @@ to the word's last frame, which is included; outside of words the mouth is at re
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_left
+from dataclasses import replace
 from itertools import islice, takewhile
 
 from lipmotion.export.cues.shapes import REST, SHAPES
 from lipmotion.export.cues.sheet import CueSheet
 
+NEARLY_WHOLE = 0.01
+"""A rate that is so little over a whole one counts as that."""
 UNKNOWN = "speech"
 """The text of speech without known words."""
 Part = tuple[int, int, str]
@@ -19,11 +23,16 @@ Part = tuple[int, int, str]
 
 
 def text(sheet: CueSheet, sound_file: str) -> str:
-    """Return the content of the file: one voice; a phrase lasts from rest to rest."""
+    """Return the content of the file: one voice; a phrase lasts from rest to rest.
+
+    Papagayo knows whole frame rates alone: of another one, frames are those of the next larger whole rate (30 for
+    29.97) at the same times, so that they do not drift from the sound.
+    """
+    sheet = replace(sheet, fps=float(math.ceil(sheet.fps - NEARLY_WHOLE)))
     shown = shown_shapes(sheet)
     phrases = [words_of_run(sheet, first, last) for first, last in _runs(shown)]
     said = [" ".join(word for *_, word in phrase) for phrase in phrases]
-    lines = ["lipsync version 1", " ".join(sound_file.split()) or "sound.wav", f"{round(sheet.fps)}", f"{len(shown)}"]
+    lines = ["lipsync version 1", " ".join(sound_file.split()) or "sound.wav", f"{sheet.fps:.0f}", f"{len(shown)}"]
     lines += ["1", "\tVoice 1", f"\t{'|'.join(said)}", f"\t{len(phrases)}"]
     for phrase, words in zip(phrases, said, strict=True):
         lines += [f"\t\t{words}", f"\t\t{phrase[0][0]}", f"\t\t{phrase[-1][1]}", f"\t\t{len(phrase)}"]

@@ -11,7 +11,7 @@ from pathlib import Path
 from lipmotion.export.base import MotionFormat
 from lipmotion.types import Generation
 
-MODULES = ("curves.py", "keying.py", "script.py")
+MODULES = ("takes.py", "curves.py", "keying.py", "script.py")
 """The modules of the add-on that a script holds, one after another."""
 COPIED = "# -- what follows is copied into scripts\n"
 DECIMALS = 5
@@ -36,10 +36,13 @@ def write(path: Path, generation: Generation, source: Mapping[str, str], _model:
     motion = generation.motion
     folder = resources.files("lipmotion.addons.blender")
     texts = [folder.joinpath(name).read_text(encoding="utf-8") for name in MODULES]
-    code, keying, main = (_IMPORT.sub("", _BEGINNING.sub("", text)) for text in texts)
+    *code, main = (_IMPORT.sub("", _BEGINNING.sub("", text)) for text in texts)
     with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(_HEAD + code.strip() + "\n\n\n" + keying.strip() + "\n\n\n")
-        file.write(f"RATE_HZ = {motion.rate_hz!r}\nSOUND = {json.dumps(source.get('path', ''))}\nMOTION = {{\n")
+        file.write(_HEAD + "".join(each.strip() + "\n\n\n" for each in code))
+        file.write(f"RATE_HZ = {motion.rate_hz!r}\nSOUND = {json.dumps(source.get('path', ''))}\n")
+        file.write(f"SOUND_S = {float(source.get('start_s', 0.0))!r}\n")
+        stepped = "".join(f"{json.dumps(name)}, " for name in motion.names if name in generation.stepped)
+        file.write(f"STEPPED = ({stepped})\nMOTION = {{\n")
         for name in motion.names:
             values = ", ".join(f"{value + 0.0:.{DECIMALS}g}" for value in motion[name].tolist())
             file.write(f"    {json.dumps(name)}: [{values}],\n")

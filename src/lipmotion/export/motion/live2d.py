@@ -1,7 +1,7 @@
 """``.motion3.json``: a motion of Live2D Cubism: how far the mouth is open, and whether it is wide or puckered.
 
 Source: Live2D, Cubism specifications, "motion3.json". Curves are straight lines between keys (segment type 0); keys
-that a straight line between others replaces are left out.
+that a straight line between others replaces are left out. Held poses change at once (segment type 2).
 """
 
 from __future__ import annotations
@@ -33,25 +33,29 @@ FPS = 30.0
 TOLERANCE = 0.005
 """Largest error of a curve through the keys that are kept."""
 DECIMALS = 3
+LINEAR, STEPPED = 0, 2
+"""Types of segments: straight to the next key, or held until it."""
+SHOWING = frozenset(("opening", "jawOpen"))
+"""Channels that say how far the mouth is open."""
 
 
 def check(motion: Motion) -> None:
     """Raise ExportError if motion shows neither an opening nor an open jaw, or has fewer than two frames."""
-    if not {"opening", "jawOpen"} & set(motion.names) or len(motion.values) < 2:
+    if not SHOWING & set(motion.names) or len(motion.values) < 2:
         raise ExportError("the motion has no channel 'opening' or 'jawOpen', or no two frames; write .json or .csv")
 
 
 def write(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
     """Write two curves, and how many keys they have."""
     motion = generation.motion
-    curves = []
+    curves, steps = [], bool(SHOWING & set(generation.stepped))
     for name, values in ((OPEN, mouth_open(generation)), (FORM, mouth_form(generation))):
         rounded = np.round(values, DECIMALS) + 0.0
-        kept = kept_keys(motion.time_s, rounded, TOLERANCE)
+        kept = changes(rounded) if steps else kept_keys(motion.time_s, rounded, TOLERANCE)
         keys = [(round(float(motion.time_s[frame]), 6), float(rounded[frame])) for frame in kept]
         segments: list[float] = [*keys[0]]
         for time_s, value in keys[1:]:
-            segments += [0, time_s, value]
+            segments += [STEPPED if steps else LINEAR, time_s, value]
         curves.append({"Target": "Parameter", "Id": name, "Segments": segments, "Points": len(keys)})
     points = [int(curve.pop("Points")) for curve in curves]  # type: ignore[call-overload]
     meta = {
@@ -121,4 +125,9 @@ def kept_keys(time_s: Array, values: Array, tolerance: float) -> list[int]:
     return sorted(kept)
 
 
-MOTION_FORMAT = MotionFormat(write, check=check)
+def changes(values: Array) -> list[int]:
+    """Return the frames in which values differ from the frame before, with the first and the last frame."""
+    return sorted({0, *(np.flatnonzero(np.diff(values)) + 1).tolist(), len(values) - 1})
+
+
+MOTION_FORMAT = MotionFormat(write, check=check, mouth=True)

@@ -56,4 +56,4 @@ def _point(place: Array) -> str:
     return " ".join(f"{value:.5f}" for value in place * CENTIMETRES)
 
 
-MOTION_FORMAT = MotionFormat(write, check=check)
+MOTION_FORMAT = MotionFormat(write, check=check, mouth=True)

@@ -6,7 +6,7 @@ Tables of Live Link Face and of other programs are read as well.
 from __future__ import annotations
 
 from array import array
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TextIO
@@ -29,6 +29,8 @@ LONGEST_S = 1e6
 OTHER_TIMES = {"time": 1.0, "t": 1.0, "seconds": 1.0, "timestamp": 1.0, "time_ms": 0.001, "milliseconds": 0.001}
 """Names of a first column that holds the time in tables of other programs, and its unit in seconds. Their times need
 not be even, nor begin at 0: the first row is the start."""
+LARGEST_WEIGHT = 4.0
+"""Largest weight of a blendshape that is read; captures and sculpted faces go a little over 1."""
 WEIGHTS = frozenset((*ARKIT_MOUTH, *ARKIT_OTHERS))
 """Channels of these names are blendshapes, whose unit a table need not say."""
 
@@ -55,7 +57,7 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
 
     Channels with ARKit's names are weights, all others are eye distances. A table of Live Link Face is read as the app
     writes it (``live_link_table``).
-    Raises InputError: not a table of numbers with a header, or times that are not even.
+    Raises InputError: not a table of numbers with a header, times that are not even, or weights in percent.
     """
     try:
         with path.open(encoding="utf-8-sig") as file:
@@ -72,11 +74,21 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
             raise
         raise InputError(f"not a table of numbers under a header ({error}); export it again") from error
     if scale is None:
+        _check_weights(names, table[:, 1:])
         return Motion(table[:, 1:], _rate(table[:, 0]), tuple(map(_channel, names))), Timeline(())
     if not np.isfinite(table).all():
         raise InputError("there are values that are not finite; interpolate them first")
+    _check_weights([name.strip() for name in names], table[:, 1:])
     rows, rate_hz = steady_rows(table[:, 0] * scale, table[:, 1:])
     return Motion(rows, rate_hz, tuple(_channel(name.strip()) for name in names)), Timeline(())
+
+
+def _check_weights(names: Sequence[str], values: NDArray[np.float64]) -> None:
+    """Raise InputError if there are weights far over 1, as in tables for programs that count from 0 to 100."""
+    for name, curve in zip(names, values.T, strict=True):
+        largest = np.nanmax(curve, initial=0.0)
+        if _channel(name).unit == WEIGHT and largest > LARGEST_WEIGHT:
+            raise InputError(f"the weight {name} goes up to {largest:g}, required 0 to 1; divide percent by 100")
 
 
 def _channel(name: str) -> Channel:

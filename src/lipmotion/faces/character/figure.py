@@ -14,10 +14,10 @@ from lipmotion.faces.character.eyes import LASHES, brow, catchlights, eyeball, l
 from lipmotion.faces.character.forms import EYE
 from lipmotion.faces.character.hair import hair
 from lipmotion.faces.character.inside import lower_drop, lower_teeth, tongue, tongue_triangles, upper_teeth
-from lipmotion.faces.character.lips import RINGS, VISIBLE
+from lipmotion.faces.character.lips import RINGS, VISIBLE, closed_share
 from lipmotion.faces.character.part import part
 from lipmotion.faces.character.pose import CharacterPose
-from lipmotion.faces.character.skin import REST, Skin, jaw_moved
+from lipmotion.faces.character.skin import AT_CORNER, REST, Skin, jaw_moved
 from lipmotion.faces.character.tint import skin_colours
 from lipmotion.faces.liveliness import turned
 from lipmotion.rig.lighting import Lighting
@@ -28,8 +28,14 @@ Real = NDArray[np.float64]
 
 PIVOT = np.array([0.0, -0.75, -0.9])
 """The head turns about this place, the top of the neck."""
-TONGUE_LIGHT, LOWER_TEETH_LIGHT = 1.35, 0.62
+TONGUE_LIGHT, LOWER_TEETH_LIGHT = 1.35, 0.5
 """The tongue is wet, and drawn brighter than the rest of the mouth; the lower teeth lie in the shade of the upper."""
+SEAM_LIGHT = (0.88, 0.72, 0.54, 0.42, 0.34)
+"""The part of the light that arrives beside the seam of closed lips, at the rings that end there: a soft line."""
+RIM_LIGHT = (0.45, 0.04, 0.02)
+"""The same for the rim of a round hole and the two rings behind it, which would widen the hole in grey."""
+CORNER_SHADE = 0.6
+"""How far the corners of any mouth are shaded as a seam."""
 _EYES = ((1.0, ""), (-1.0, "right "))
 _MIDDLE, _LAST = 20, 60
 """Columns of the lips in the middle of the upper and of the lower lip."""
@@ -160,6 +166,11 @@ class Figure:
         arrives[self.rows["tongue"]] = np.minimum(
             1.0, TONGUE_LIGHT * (1 - 0.35 * pose.tongue_up) * arrives[self.rows["tongue"]]
         )
+        lips, closed = self.skin.lip_rows(), closed_share(pose)
+        for ring, part_of in enumerate(SEAM_LIGHT, VISIBLE - len(SEAM_LIGHT)):
+            arrives[lips[ring]] *= 1 - (1 - part_of) * np.maximum(closed, CORNER_SHADE * AT_CORNER)
+        for ring, part_of in enumerate(RIM_LIGHT, VISIBLE - 1):
+            arrives[lips[ring]] *= 1 - (1 - part_of) * pose.roundness
         arrives[self.rows["teeth"]] *= LOWER_TEETH_LIGHT
         return colours, arrives
 
@@ -171,10 +182,10 @@ class Figure:
         shade, open_ = 1 - 0.92 * pose.roundness**1.1, min(span / 0.25, 1.0)
 
         def inside(places: Real) -> Real:
-            depth = (0.93 - 0.22 * open_) * np.clip((front - places[:, 2] - 0.10) / (0.22 + 0.8 * span), 0, 1)
+            depth = (0.93 - 0.27 * open_) * np.clip((front - places[:, 2] - 0.10) / (0.22 + 0.8 * span), 0, 1)
             under = np.clip((top - places[:, 1] + 0.01) / 0.05, 0, 1)
-            aside = np.clip(1.35 - (places[:, 0] / half) ** 2, 0, 1)
-            return shade * (1 - depth) ** 1.5 * (0.7 + 0.3 * under) * (0.35 + 0.65 * aside)
+            aside = np.clip(1.15 - 1.15 * (places[:, 0] / half) ** 2, 0, 1)
+            return shade * (1 - depth) ** 1.5 * (0.7 + 0.3 * under) * (0.12 + 0.88 * aside)
 
         return inside
 

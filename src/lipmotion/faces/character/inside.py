@@ -16,7 +16,7 @@ from lipmotion.faces.character.skin import jaw_moved
 Real = NDArray[np.float64]
 
 _UPPER_EDGES = (0.0, 0.062, 0.112, 0.155, 0.192, 0.224, 0.252, 0.274)
-_LOWER_EDGES = (0.0, 0.040, 0.082, 0.125, 0.165, 0.202, 0.235, 0.26)
+_LOWER_EDGES = (0.0, 0.036, 0.074, 0.114, 0.150, 0.183, 0.212, 0.236)
 """Where teeth touch their neighbours: distances from the middle, seen from the front."""
 LOWER_EDGE = TEETH_EDGE + 0.006
 """Height of the edge of the lower incisors, behind the upper ones, when the jaw is closed."""
@@ -90,28 +90,28 @@ def tongue_triangles() -> NDArray[np.int32]:
 def tongue(pose: CharacterPose) -> Real:
     """Return the places of the tongue from root to tip [shape=(V, 3)], the head not turned."""
     floor = LOWER_EDGE - 0.075
-    root, body = np.array([0, floor - 0.05, -0.46]), np.array([0, floor + 0.075, -0.36])
-    blade, tip = np.array([0, floor + 0.02, -0.22]), np.array([0, floor - 0.012, TEETH_Z - 0.085])
+    root, body = np.array([0, floor - 0.05, -0.46]), np.array([0, floor + 0.060, -0.36])
+    blade, tip = np.array([0, floor + 0.03, -0.22]), np.array([0, floor - 0.012, TEETH_Z - 0.085])
     points = jaw_moved(np.stack([root, body, blade, tip]), pose.jaw + PARTED_TEETH * (1 - pose.bite))
-    tooth = np.array([0, TEETH_EDGE - 0.014, TEETH_Z + 0.080])
+    tooth = np.array([0, TEETH_EDGE - 0.013, TEETH_Z + 0.135])
     ridge = np.array([0, TEETH_EDGE + 0.035, TEETH_Z - 0.075])
     for weight, to_tip, lift in ((pose.tongue_up, ridge, 0.01), (pose.tongue_out, tooth, -0.008)):
         points[3] += weight * (to_tip - points[3])
         points[2] += weight * (to_tip + np.array([0, lift - 0.035, -0.15]) - points[2])
         points[1, 1] += weight * 0.35 * max(to_tip[1] - 0.1 - points[1, 1], 0.0)
-    share = np.linspace(0, 1, _TONGUE_RINGS)[:, None]
+    share = np.sin(np.linspace(0, np.pi / 2, _TONGUE_RINGS))[:, None]
     spine = (
         (1 - share) ** 3 * points[0]
         + 3 * share * (1 - share) ** 2 * points[1]
         + 3 * share**2 * (1 - share) * points[2]
         + share**3 * points[3]
     )
-    blunt = np.sqrt(np.clip(1 - np.clip((share - 0.72) / 0.28, 0, 1) ** 2, 0, 1)) + 1e-3
-    wide = (0.165 - 0.045 * share) * blunt
-    thick = (0.085 - 0.052 * share) * blunt**0.7
+    blunt = np.sqrt(np.clip(1 - np.clip((share - 0.45) / 0.55, 0, 1) ** 2.4, 0, 1)) + 1e-3
+    wide = (0.195 - 0.045 * share) * blunt * (1 - 0.12 * pose.tongue_out)
+    thick = (0.080 - (0.045 - 0.018 * pose.tongue_out) * share) * blunt**0.7
     angle = 2 * np.pi * np.arange(_TONGUE_SIDES) / _TONGUE_SIDES
     x = wide * np.cos(angle)
-    groove = 0.16 * thick * np.exp(-((np.cos(angle) / 0.3) ** 2)) * (np.sin(angle) > 0)
+    groove = 0.10 * thick * np.exp(-((np.cos(angle) / 0.3) ** 2)) * (np.sin(angle) > 0)
     along = np.gradient(spine, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     up = np.stack([np.zeros(len(along)), along[:, 2], -along[:, 1]], axis=1)

@@ -21,21 +21,25 @@ COLUMNS = 2 * _UPPER - 2
 REST_HALF_WIDTH = 0.268
 TEETH_Z = -0.055
 """Front of the incisors."""
-TEETH_EDGE = MOUTH_Y - 0.008
+TEETH_EDGE = MOUTH_Y - 0.017
 """Height of the edge of the upper incisors; they belong to the skull."""
 ARCH = 1.15
 """Curvature of lips and teeth seen from above: how far they lie back, over x squared."""
 _UPPER_LIP, _LOWER_LIP = 0.076, 0.106
 OVAL_SQUEEZE = 0.14
 """How much nearer to the middle the inner edge of an oval mouth lies than the corners."""
-HOLE_WIDTH = (0.021, 0.58)
+HOLE_WIDTH = (0.008, 0.55)
 """Half the width of a round hole, round which the lips run as a ring: a length, and so much of the gap."""
-ROUND_DROP = 0.016
+ROUND_BOW = 0.0012
+"""How far the middle of a round hole is raised: its middle lies before its sides, and the camera looks down on it."""
+SEAM_GAP, SEAM_FORWARD = 0.03, 0.026
+"""Below this gap the seam of the lips comes forward, at most so far: the crease between closed lips is shallow."""
+ROUND_DROP = 0.025
 """How far the line between round lips sinks: the upper lip hides the teeth."""
 _KNOTS = np.array([0, 0.22, 0.5, 0.72, 0.88, 0.98, 1.12, 1.4])
 _AT = np.array([0.0, 0.09, 0.2, 0.31, 0.41, 0.5, 0.58, 0.66, 0.74, 0.81, 0.88, 0.94, 1.0, 1.12, 1.4])
 _SECTION: Real = np.asarray(CubicSpline(_KNOTS, np.eye(len(_KNOTS)))(_AT))
-_WALL = ((0.3, -0.16), (0.5, -0.30), (0.8, -0.40), (1.0, -0.42))
+_WALL = ((0.10, -0.16), (0.26, -0.30), (0.7, -0.40), (1.0, -0.42))
 """Rings behind the lips: how far towards the middle of the throat, and how far back."""
 RINGS = len(_AT) + len(_WALL)
 VISIBLE = 11
@@ -59,7 +63,7 @@ def _smooth(knots: list[tuple[float, float]]) -> Real:
 
 _BOW = _smooth([(0, 0.80), (0.2, 0.97), (0.36, 0.93), (0.62, 0.66), (0.85, 0.3), (1, 0)])
 _BELOW = _smooth([(0, 1.0), (0.25, 0.97), (0.5, 0.83), (0.72, 0.58), (0.89, 0.27), (1, 0)])
-_LINE = _smooth([(0, -0.009), (0.15, -0.005), (0.4, 0.004), (0.7, 0.016), (1, 0.044)])
+_LINE = _smooth([(0, -0.004), (0.15, -0.002), (0.4, 0.003), (0.7, 0.005), (1, 0.004)])
 _ENVELOPE = np.sqrt(np.maximum(1 - ACROSS**2, 0))
 _FULL = np.where(SIDE > 0, _BOW, _BELOW)
 
@@ -97,6 +101,7 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
     up = SIDE * 1.0
     tuck = pose.tuck * np.where(upper, 0.0, 1.0) * _ENVELOPE
     contact_z = meet - 0.002 + 0.02 * belly * pose.roundness
+    contact_z = contact_z + SEAM_FORWARD * (1 - 0.45 * pose.press) * belly * closed_share(pose)
     contact_z = contact_z + tuck * (teeth + 0.02 - contact_z)
     on_teeth = np.minimum(TEETH_EDGE + 0.010, inner_y + 0.08)
     inner_y = np.where(upper, inner_y, np.maximum(inner_y, inner_y + tuck * (on_teeth - inner_y)))
@@ -109,20 +114,27 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
         (x, y, z),
         (x * (1 - 0.2 * squeeze), inner_y + 0.76 * (y - inner_y), outer_z + 0.5 * (crest - outer_z)),
         (x * (1 - 0.5 * squeeze), crest_y, crest),
-        (x * (1 - 0.88 * squeeze), inner_y + 0.31 * (crest_y - inner_y), contact_z + 0.66 * (crest - contact_z)),
+        (x * (1 - 0.85 * squeeze), inner_y + 0.31 * (crest_y - inner_y), contact_z + 0.66 * (crest - contact_z)),
         (inner_x, inner_y, contact_z),
-        (inner_x, inner_y + up * 0.014 * _ENVELOPE, 0.5 * (contact_z + behind)),
-        (x, inner_y + up * (0.05 * _ENVELOPE + 0.002), behind),
+        (x * (1 - 0.88 * squeeze), inner_y + up * 0.014 * _ENVELOPE, 0.5 * (contact_z + behind)),
+        (x * (1 - 0.45 * squeeze), inner_y + up * (0.05 * _ENVELOPE + 0.002), behind),
         (1.12 * x, inner_y + up * (0.13 * _ENVELOPE + 0.012), behind - 0.01),
     ]
     return np.stack([np.stack(row, axis=1) for row in rows])
+
+
+def closed_share(pose: CharacterPose) -> float:
+    """Return how nearly the lips are closed: 1 where they touch, 0 from ``SEAM_GAP`` on."""
+    share = min(max(1 - pose.gap / SEAM_GAP, 0.0), 1.0)
+    return share * share * (3 - 2 * share)
 
 
 def _between(pose: CharacterPose) -> Real:
     """Return the height of the line between the lips, closed, at every column [shape=(COLUMNS,)]."""
     line = (1 - 0.8 * pose.roundness - 0.6 * pose.spread) * _LINE
     raised = (pose.smile - 0.22 * pose.gap * (1 - 0.6 * pose.spread)) * ACROSS**2
-    return np.asarray(MOUTH_Y + line + raised - (ROUND_DROP + 0.2 * pose.gap) * pose.roundness)
+    bowed = ROUND_BOW * (1 - ACROSS**2) - ROUND_DROP - 0.2 * pose.gap
+    return np.asarray(MOUTH_Y + line + raised + bowed * pose.roundness)
 
 
 def _opposite(base_z: Real) -> Real:

@@ -37,6 +37,10 @@ OVAL_GROWTH = 0.04
 ROUND_GROWTH, TEETH_GAP, TONGUE_OUT_GAP, TONGUE_UP_GAP = 0.45, 0.010, -0.012, 0.02
 """Trackers read more of round lips, so that their gap grows so much less than that of others, and less where teeth or
 the tongue fill the gap, to which a length is added."""
+SPREAD_RISE = 0.58
+"""Part of the gap by which the upper lip rises where lips are spread: the upper teeth show more than the lower ones."""
+TONGUE_RISE = 0.002
+"""How much further the upper lip rises while the tongue is between the teeth, so that they are seen."""
 BITTEN_GAP = (0.12, 0.2)
 """Teeth stay together up to the first gap, and part until the second one."""
 PAUSED_GAP = 0.03
@@ -147,9 +151,12 @@ def _articulated(gap: Curve, said: dict[str, Curve], pause: Curve) -> Curve:
 
 
 def _rise(gap: Curve, said: dict[str, Curve]) -> Curve:
-    """Return how far the upper lip rises [shape=(T,)]: little in round lips, and spread lips and F bare the teeth."""
+    """Return how far the upper lip rises [shape=(T,)]: little in round lips; spread lips, TH and F bare the teeth."""
     rise = upper_share(gap)
-    rise = rise + np.maximum(said["wide"], 0.7 * said["bite"]) * np.maximum(np.minimum(0.42 * gap, 0.05) - rise, 0)
+    rise = rise + np.maximum(said["wide"], 0.9 * said["bite"]) * np.maximum(
+        np.minimum(SPREAD_RISE * gap, 0.07) - rise, 0
+    )
+    rise = rise + TONGUE_RISE * said["tongue_out"] * np.clip(gap / 0.05, 0, 1)
     rise = rise + said["roundness"] * (0.48 * gap - rise)
     return np.minimum(rise + said["tuck"] * np.maximum(TUCKED_GAP - rise, 0), gap)
 

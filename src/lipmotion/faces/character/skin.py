@@ -9,7 +9,16 @@ from scipy.spatial import Delaunay, cKDTree
 from lipmotion.faces.character import palette
 from lipmotion.faces.character.eyelids import LID_COLUMNS, LID_RINGS, Eyelids
 from lipmotion.faces.character.forms import MIDDLE, MOUTH_Y, head, outward, seen_from_front, seen_from_middle
-from lipmotion.faces.character.lips import ACROSS, COLUMNS, RINGS, SIDE, VISIBLE, lip_surface, section_points
+from lipmotion.faces.character.lips import (
+    ACROSS,
+    COLUMNS,
+    RINGS,
+    SIDE,
+    VISIBLE,
+    closed_share,
+    lip_surface,
+    section_points,
+)
 from lipmotion.faces.character.part import Part
 from lipmotion.faces.character.pose import CharacterPose
 from lipmotion.rig.rasteriser import normals_of
@@ -25,6 +34,15 @@ REST = CharacterPose()
 CHEEKS_SPREAD, CHEEKS_ROUND = 0.035, 0.025
 """How far cheeks come forward beside spread lips, and sink beside round ones."""
 _LEFT_CORNER = 40
+_OPPOSITE = -np.arange(COLUMNS) % COLUMNS
+"""For every column of the lips the one of the other lip that it meets."""
+_JOINED = {VISIBLE - 1: 0.3}
+"""By rings of the lips: how far the light on both sides of the seam is the same."""
+AT_CORNER = (np.clip((np.abs(ACROSS) - 0.72) / 0.28, 0, 1) ** 2)[:, None]
+"""How near each column of the lips is to a corner, 0 to 1 [shape=(COLUMNS, 1)]."""
+_NEAR_CORNER = np.clip((np.abs(ACROSS) - 0.5) / 0.5, 0, 1)[:, None]
+CORNER_JOINED, CORNER_FLAT = 0.6, 0.75
+"""How far the light at the corners is the same on both lips, and that of the skin before them."""
 CALM_RADIUS = 0.035
 """Round the corners of the lips, where the surface folds, the shading changes less than the surface."""
 
@@ -67,6 +85,7 @@ class Skin:
         self.normals = meshed.copy()
         self.normals[len(contour) + len(edges) : len(self.face)] = outward(head, fill)
         self._meshed_rest = meshed
+        self._before_lips = outward(head, contour)
         corners = self.rest[[0, _LEFT_CORNER]]
         beside = np.linalg.norm(self.rest[: len(self.face), None] - corners, axis=2).min(axis=1)
         self._calm = np.ones((len(self.rest), 1))
@@ -93,7 +112,23 @@ class Skin:
         places = self.places(pose)
         change = normals_of(places, self.triangles) - self._meshed_rest
         normals = self.normals + self._calm * change
+        self._join_lips(normals, pose)
         return places, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+
+    def _join_lips(self, normals: Real, pose: CharacterPose) -> None:
+        """Turn normals beside the seam of closed lips, and at the corners, to those of the other lip.
+
+        What meets there has no edge of light between its two sides then.
+        """
+        rows, closed = self.lip_rows(), closed_share(pose)
+        normals[rows[VISIBLE - 1]] += closed * (normals[rows[VISIBLE - 2]] - normals[rows[VISIBLE - 1]])
+        beside = AT_CORNER * CORNER_JOINED
+        for ring in range(1, VISIBLE):
+            own = normals[rows[ring]]
+            share = np.maximum(closed * _JOINED.get(ring, 0.0), beside)
+            normals[rows[ring]] += 0.5 * share * (own[_OPPOSITE] - own)
+        outer = rows[1:VISIBLE]
+        normals[outer] += CORNER_FLAT * (1 - pose.roundness) * _NEAR_CORNER * (self._before_lips - normals[outer])
 
     def _bind(self, contour: Real) -> None:
         """Bind every vertex of the face to two columns of the lips, and to the jaw."""

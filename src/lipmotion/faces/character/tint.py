@@ -7,11 +7,13 @@ from numpy.typing import NDArray
 
 from lipmotion.faces.character import palette
 from lipmotion.faces.character.eyelids import LID_SIDE
-from lipmotion.faces.character.lips import VISIBLE
+from lipmotion.faces.character.lips import ACROSS, VISIBLE
 from lipmotion.faces.character.skin import Skin
 from lipmotion.rig.lighting import linear
 
 Real = NDArray[np.float64]
+FADED = 0.4
+"""How far the colour of the lips fades to that of the skin towards the corners."""
 
 
 def skin_colours(skin: Skin) -> Real:
@@ -43,9 +45,12 @@ def skin_colours(skin: Skin) -> Real:
 
 def _lips(skin: Skin, colour: Real) -> None:
     lips = skin.lip_rows()
+    bare = colour[lips[0]]
     colour[lips[1]] = 0.45 * colour[lips[1]] + 0.55 * np.array(palette.LIP)
     colour[lips[2 : VISIBLE - 1].ravel()] = palette.LIP
     for ring in range(VISIBLE - 2, VISIBLE + 1):
         share = 0.3 * (ring - VISIBLE + 3)
         colour[lips[ring]] = (1 - share) * np.array(palette.LIP) + share * np.array(palette.LIP_DEEP)
+    faded = (FADED * np.clip((np.abs(ACROSS) - 0.8) / 0.2, 0, 1) ** 2)[:, None]
+    colour[lips[1:VISIBLE]] += faded * (bare - colour[lips[1:VISIBLE]])
     colour[lips[VISIBLE + 1 :].ravel()] = palette.MOUTH

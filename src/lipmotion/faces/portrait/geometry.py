@@ -19,9 +19,6 @@ Heights = NDArray[np.float64]
 
 TEETH_EDGE = 0.024
 """The upper incisors end this far below the line of the closed lips; they belong to the skull."""
-TUCK_OVERLAP = 0.012
-"""So far the upper teeth stand in front of the lower lip that is tucked under them."""
-
 _LINE = [(0, 0.006), (0.16, 0.005), (0.4, -0.005), (0.72, -0.004), (1, 0.004)]
 _CUPIDS_BOW = [(0, 0.82), (0.08, 0.87), (0.22, 1.0), (0.36, 0.94), (0.62, 0.66), (0.85, 0.29), (1, 0)]
 _LOWER = [(0, 1), (0.25, 0.975), (0.5, 0.855), (0.72, 0.61), (0.89, 0.29), (1, 0)]
@@ -50,8 +47,8 @@ class LipOutlines:
 class MouthInterior:
     """Heights of the teeth and the tongue over columns [shape=(C, ...)], cut by the inner lips.
 
-    Upper teeth reach down to ``teeth_upper``, lower teeth up to ``teeth_lower``. Where the lip is tucked, or the tongue
-    is between the teeth, these reach a little over the lower lip.
+    Upper teeth reach down to ``teeth_upper``, lower teeth up to ``teeth_lower``. A tongue between the teeth reaches a
+    little over the lower lip.
     """
 
     teeth_upper: Heights
@@ -66,21 +63,24 @@ def lip_outlines(lips: LipDesign, pose: MouthPose, x: Heights) -> LipOutlines:
     u = np.minimum(np.abs(x) / half_width, 1)
     out, wide = pose.protrusion, pose.spread
     rise = float(upper_share(pose.gap))
-    rise += pose.tuck * (1 - out) * max(min(0.6 * pose.gap, 0.036) - rise, 0) + out * (0.45 * pose.gap - rise)
+    rise += pose.tuck * (1 - out) * max(min(0.8 * pose.gap, 0.036) - rise, 0) + out * (0.42 * pose.gap - rise)
     drop = pose.gap - rise
-    middle = lips.line_y + pose.tuck * max(TEETH_EDGE - 0.01 - drop, -0.03) - 0.008 * out
+    middle = lips.line_y + pose.tuck * max(TEETH_EDGE - 0.018 - drop, -0.03) - 0.008 * out
     sag = (0.5 - 0.3 * wide) * drop * (1 - pose.tuck) + 0.018 * out - 0.012 * wide * (1 - pose.press)
     sag += pose.oval * (0.5 * (drop - rise) - sag) + 0.014 * pose.tuck
     bend = sag * u * u
     line = middle + (1 - 0.7 * out) * _on("line", u) + lips.smile * u**3 + bend
-    inner_share = _inner_share(pose, half_width)
+    inner_share = _inner_share(pose)
     inner = u / inner_share
     open_share = min(pose.gap / 0.05, 1)
-    upper_inner = line - rise * _arch(inner, 0.7 - 0.22 * open_share * max(out, 1 - wide) - 0.26 * wide)
-    lower_inner = line + drop * _arch(inner, 0.6 - 0.12 * max(out, pose.oval) - 0.26 * max(wide, pose.tuck))
+    free = wide * (1 - pose.tuck)
+    upper_power = 0.7 - 0.22 * open_share * max(out, 1 - wide) - 0.26 * free
+    lower_power = 0.6 - 0.12 * max(out, pose.oval) - 0.26 * free
+    upper_inner = line - rise * _arch(inner, upper_power + pose.tuck * (0.85 - upper_power))
+    lower_inner = line + drop * _arch(inner, lower_power + pose.tuck * (0.85 - lower_power))
     thin = 1 - 0.28 * pose.press * (1 - out)
-    upper = lips.upper * pose.fullness * thin * (1 - 0.12 * pose.tuck + 0.22 * out - 0.14 * wide)
-    lower = lips.lower * pose.fullness * thin * (1 - 0.48 * pose.tuck + 0.12 * out - 0.16 * wide)
+    upper = lips.upper * pose.fullness * thin * (1 - 0.12 * pose.tuck - 0.02 * out - 0.14 * wide)
+    lower = lips.lower * pose.fullness * thin * (1 - 0.5 * pose.tuck + 0.1 * out - 0.16 * wide * (1 - pose.tuck))
     follow = 0.85 * (1 - 0.35 * out)
     return LipOutlines(
         half_width=half_width,
@@ -92,7 +92,7 @@ def lip_outlines(lips: LipDesign, pose: MouthPose, x: Heights) -> LipOutlines:
         lower_outer=np.maximum(
             line + drop * _arch(u, 0.62 - 0.15 * wide) + lower * _thickness("lower", u, out), lower_inner
         ),
-        seam=lips.seam * (1 - u**4) * (1 + 0.2 * pose.press),
+        seam=lips.seam * (1 - u**4) * (1 + 0.2 * pose.press) * _seam_beside(pose, u, inner_share),
     )
 
 
@@ -104,17 +104,17 @@ def mouth_interior(lips: LipDesign, pose: MouthPose, x: Heights, outlines: LipOu
     edge = lips.line_y + TEETH_EDGE
     upper_edge = edge - 0.05 * pose.protrusion - 0.05 * max(0.5 - pose.teeth, 0) * (1 - far_open(pose))
     upper = upper_edge - 0.35 * x * x
-    reveal = min(max(2.5 * pose.teeth - 1.25, 0), 1)
+    reveal = min(max(2.8 * pose.teeth - 1.4, 0), 1) * (1 - pose.tuck)
     low_lip = float(outlines.lower_inner.max())
     below_lip = low_lip + 0.012 - 0.1 * pose.gap
-    met = upper_edge + 0.002 + 0.1 * pose.jaw + max(0.93 - pose.teeth, 0) * (0.1 + 3 * max(pose.gap - 0.07, 0))
+    met = upper_edge + 0.004 + 0.05 * pose.jaw + 0.6 * max(pose.gap - 0.14, 0)
+    met += max(0.86 - pose.teeth, 0) * (0.1 + 3 * max(pose.gap - 0.07, 0))
     lower = below_lip + reveal * (min(met, below_lip) - below_lip) + (0.2 - 0.55 * reveal) * x * x
     top, bottom = _tongue(pose, x, edge, low_lip)
-    over = max(pose.tongue - 0.6, 0) / 0.4 * 0.03 * _arch(x / min(0.15, 0.9 * outlines.inner_half_width), 0.5)
-    tucked = TUCK_OVERLAP * pose.tuck * _arch(x / outlines.inner_half_width, 0.5)
+    over = max(pose.tongue - 0.6, 0) / 0.4 * 0.03 * _arch(x / min(0.13, 0.9 * outlines.inner_half_width), 0.5)
     cut = outlines.upper_inner, outlines.lower_inner
     return MouthInterior(
-        np.clip(upper, cut[0], cut[1] + tucked),
+        np.clip(upper, cut[0], cut[1]),
         np.clip(np.maximum(lower, upper), *cut),
         np.clip(top, *cut),
         np.clip(np.maximum(top, bottom), cut[0], cut[1] + over),
@@ -140,15 +140,22 @@ def _arch(u: Heights, power: float) -> Heights:
     return np.maximum(1 - u * u, 0) ** power
 
 
-def _inner_share(pose: MouthPose, half_width: float) -> float:
+def _inner_share(pose: MouthPose) -> float:
     """Return the share of the mouth's width along which the lips are apart; it grows with the gap.
 
     The hole of protruded lips is round, that above a tucked lip is as wide as the teeth that show in it.
     """
     gap, wide = pose.gap, pose.spread
-    share = min(0.72 + 0.2 * min(gap / 0.12, 1) + 0.1 * wide * min(gap / 0.05, 1), 0.95) * (1 - 0.26 * pose.tuck)
-    hole = min((0.012 + 0.62 * gap) / half_width, share)
-    return share + min(pose.protrusion / 0.85, 1) * (hole - share)
+    share = min(0.72 + 0.2 * min(gap / 0.12, 1) + 0.1 * wide * min(gap / 0.05, 1), 0.95)
+    share += pose.tuck * (0.64 - share)
+    hole = 0.05 + 0.28 * np.sqrt(min(gap / 0.05, 1)) + 5 * min(max(gap - 0.05, 0), 0.04) + max(gap - 0.09, 0)
+    return float(share + min(pose.protrusion / 0.85, 1) * (min(hole, share) - share))
+
+
+def _seam_beside(pose: MouthPose, u: Heights, inner_share: float) -> Heights:
+    """Return how thick the line is where the lips touch beside a round hole, 0..1: it fades towards the corners."""
+    beyond = np.clip((u - inner_share) / (0.55 * (1 - inner_share)), 0, 1)
+    return 1 - pose.protrusion * min(pose.gap / 0.03, 1) * beyond**0.7
 
 
 def _tongue(pose: MouthPose, x: Heights, edge: float, low_lip: float) -> tuple[Heights, Heights]:
@@ -156,7 +163,7 @@ def _tongue(pose: MouthPose, x: Heights, edge: float, low_lip: float) -> tuple[H
     up, out = min(pose.tongue / 0.6, 1), max(pose.tongue - 0.6, 0) / 0.4
     rest = max(low_lip - (0.3 * pose.gap + 0.012) * (1 - pose.protrusion) + 0.02 * pose.protrusion, edge - 0.01)
     top = rest + up * (min(edge - 0.01, rest) - rest) + 0.004 * out
-    half_width = 0.2 - 0.085 * up + 0.025 * out
+    half_width = 0.2 - 0.085 * up + 0.015 * out
     across = (x / half_width) ** 2
     bulge = (1 - up) * 0.05 * (across + across**2) + up * 0.05 * across**2 * (0.5 + 0.5 * across)
     return top + bulge, low_lip + 0.03 - 0.03 * across

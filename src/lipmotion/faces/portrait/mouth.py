@@ -50,7 +50,7 @@ class MouthPainter:
         within = mouth_interior(self._lips, pose, x, shape) if pose.gap > 0 else None
         if within is not None:
             self._inside(on, shape, within, pose, x, on_lips)
-        self._lips_around(on, shape, on_lips)
+        self._lips_around(on, shape, pose, on_lips)
         if within is not None:
             self._in_front(on, shape, within, pose, x)
 
@@ -58,13 +58,16 @@ class MouthPainter:
         art = self._textures
         depth = 0.085 + 0.03 * pose.protrusion
         on.paint(shape.lower_outer, shape.lower_outer + depth, on_lips, art.under_lip)
+        on.paint(shape.lower_outer, shape.lower_outer + 0.7 * depth, on_lips, art.under_lip, pose.tuck)
         corner = np.full_like(x, shape.corner_y)
         on.paint(corner - 0.06, corner + 0.06, _place(x, shape.half_width * CORNER_REACH), art.corners)
 
-    def _lips_around(self, on: _Columns, shape: LipOutlines, on_lips: Heights) -> None:
+    def _lips_around(self, on: _Columns, shape: LipOutlines, pose: MouthPose, on_lips: Heights) -> None:
         art = self._textures
         on.paint(shape.upper_outer, shape.upper_inner, on_lips, art.upper_lip)
         on.paint(shape.lower_inner, shape.lower_outer, on_lips, art.lower_lip)
+        on.paint(shape.upper_outer, shape.upper_inner, on_lips, art.pucker, pose.protrusion**2)
+        on.paint(shape.lower_inner, shape.lower_outer, on_lips, art.pucker[::-1], pose.protrusion**2)
         closed = shape.lower_inner - shape.upper_inner < 2 * shape.seam
         middle = (shape.upper_inner + shape.lower_inner) / 2
         thick = np.where(closed, shape.seam, 0)
@@ -86,24 +89,24 @@ class MouthPainter:
         top, bottom = shape.upper_inner, shape.lower_inner
         across = _place(x, SPAN)
         if pose.tongue > 0.6:
-            on.paint(within.tongue_top, within.tongue_bottom, across, art.tongue, (pose.tongue - 0.6) / 0.4)
-        on.paint(
-            top, within.teeth_upper, across, art.upper_teeth, max(min(2.5 * pose.teeth, 1), far_open(pose)) * _lit(pose)
-        )
-        on.paint(top, np.minimum(top + 0.028, bottom), across, art.lip_shadow)
-        if pose.tuck > 0:  # the teeth stand on the lip, and throw a shadow on it
-            edge = within.teeth_upper
-            on.paint(edge, np.where(edge > top, edge + 0.02, edge), across, art.lip_shadow, pose.tuck)
+            tip, out = within.tongue_bottom, (pose.tongue - 0.6) / 0.4
+            on.paint(tip, np.where(tip > bottom, tip + 0.022, tip), across, art.lip_shadow, out)
+            on.paint(within.tongue_top, tip, across, art.tongue_tip, out)
+        seen = _seen(pose)  # teeth that are hardly seen are covered by the lip, from above; they are never grey
+        low = top + min(1.2 * seen, 1) * (within.teeth_upper - top)
+        on.paint(top, low, across, art.upper_teeth, min(5 * seen, 1))
+        on.paint(top, np.minimum(top + 0.028 * (1 - 0.4 * pose.tuck), bottom), across, art.lip_shadow)
         if line := self._lips.outline:
-            part = 0.8 * line * np.minimum((bottom - top) / 0.01, 1)
-            out = np.maximum(bottom, within.tongue_bottom) if pose.tongue > 0.6 else bottom
-            for edge in (top, out):
+            part = (0.8 - 0.35 * pose.tuck) * line * np.minimum((bottom - top) / 0.01, 1)
+            front = np.maximum(bottom, within.tongue_bottom) if pose.tongue > 0.6 else bottom
+            for edge in (top, front):
                 on.paint(edge - part / 2, edge + part / 2, across, art.outline)
 
 
-def _lit(pose: MouthPose) -> float:
-    """Return how well the upper teeth are lit, 0..1: less behind lips that hardly part, unless the sound shows them."""
-    return float(max(min(max((pose.gap - 0.015) / 0.04, 0.15), 1), pose.tuck, 2 * pose.teeth - 1))
+def _seen(pose: MouthPose) -> float:
+    """Return how much of the upper teeth is seen, 0..1: less behind lips that hardly part, unless the sound asks it."""
+    asked = max(min(2.5 * pose.teeth, 1), far_open(pose), pose.tuck)
+    return float(asked * max(min(max((pose.gap - 0.015) / 0.04, 0), 1), pose.tuck, 2 * pose.teeth - 1))
 
 
 class _Columns(NamedTuple):

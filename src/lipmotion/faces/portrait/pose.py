@@ -27,17 +27,23 @@ WIDEST = 0.45
 """Largest drawn gap; openings of speech stay below 0.35."""
 WIDTH_GAIN, WIDTH_REACH = 2.0, 0.32
 """Changes of width are exaggerated: small ones by the factor, none beyond the reach."""
-ROUNDED, PURSED_MORE, STRETCHED = 0.1, 0.06, 0.04
+ROUNDED, PURSED_MORE, STRETCHED = 0.12, 0.06, 0.04
 """So much narrower are protruded lips, pursed ones beyond that, and so much wider spread ones, than was measured."""
 ROUNDED_UNMEASURED = 0.2
 """``ROUNDED`` for a motion without ``width``."""
-TUCKED_GAP = (0.06, 0.07)
+TUCKED_GAP = (0.038, 0.05)
 """Range of the gap while the lower lip is on the teeth: enough to show them."""
-TONGUE_GAP, TEETH_GAP, ROUND_GAP = 0.085, 0.05, 0.08
-"""Least gap while the tongue is between the teeth, while both rows of teeth are shown, and of protruded lips."""
+TONGUE_GAP = (0.068, 0.085)
+"""Range of the gap while the tongue is between the teeth."""
+TEETH_GAP, ROUND_GAP = 0.05, 0.074
+"""Least gap while both rows of teeth are shown, and of protruded lips."""
 PURSED_GAP = (0.045, 0.055)
 """Range of the gap of pursed lips: the hole of w is small, but seen."""
-TEETH_FILL, ROUND_FILL = 0.012, 0.012
+TUCKED_CHIN = 0.6
+"""Share of its drop by which the chin rises while the lower lip is on the teeth."""
+LIP_SPEED = 2.2
+"""The gap changes no faster beside f and v, in eye distances a second (20 cm/s on a face)."""
+TEETH_FILL, ROUND_FILL = 0.012, 0.005
 """Openings look smaller where teeth fill them, or where they are small holes; they are drawn so much larger."""
 FLAT = 0.1
 """Share by which the slot of spread lips is lower than an opening without phones."""
@@ -105,17 +111,18 @@ def mouth_poses(motion: Motion, units: Timeline[Unit], fps: float, intensity: fl
     gap *= 1 - FLAT * spread * np.clip((gap - 0.08) / 0.05, 0, 1)
     gap += pursed * parted * (np.clip(gap, *PURSED_GAP) - gap)
     between = parted * np.clip((tongue - TIP_UP) / (TIP_OUT - TIP_UP), 0, 1)
-    gap += between * (np.maximum(gap, TONGUE_GAP) - gap)
+    gap += between * (np.clip(gap, *TONGUE_GAP) - gap)
     oval = _oval(units, time_s) * np.clip((gap - OVAL_GAPS[0]) / (OVAL_GAPS[1] - OVAL_GAPS[0]), 0, 1)
     gap *= 1 + OVAL_TALLER * oval
     gap *= 1 - pause_curve(units, time_s, PAUSE_S, blend_s=0.1, after_s=0.08, before_s=0.2)
+    gap = np.minimum(gap, _most_beside_tucks(gap, tuck, time_s, LIP_SPEED * max(intensity, 1)))
     width = _at(motion, _width(motion, rest, intensity), time_s)
     narrower = (ROUNDED if "width" in motion.names else ROUNDED_UNMEASURED) * protrusion + PURSED_MORE * pursed
     width += intensity * (STRETCHED * spread - narrower)
     width -= OVAL_NARROWER * oval
     width = np.clip(width, 0.5, 1.35)
     fullness = _at(motion, _fullness(motion, rest), time_s)
-    jaw = _jaw(motion, rest, gap, time_s)
+    jaw = _jaw(motion, rest, gap, time_s) * (1 - TUCKED_CHIN * tuck)
     curves = gap, width, fullness, jaw, tongue, tuck, protrusion, spread, press, teeth, oval
     return [MouthPose(*row) for row in np.stack(curves, axis=1).tolist()]
 
@@ -165,6 +172,14 @@ def _gestures(motion: Motion, units: Timeline[Unit], time_s: Curve, intensity: f
     for name in ("protrusion", "spread"):  # grows with the intensity, without a corner at 1
         curves[name] = 1 - (1 - curves[name]) ** np.sqrt(intensity)
     return [curves[name] for name in GESTURES]
+
+
+def _most_beside_tucks(gap: Curve, tuck: Curve, time_s: Curve, speed: float) -> Curve:
+    """Return the largest gap from which the lip can reach every tucked frame at a speed [shape=(T,)]; inf: any."""
+    at_tucks = np.where(tuck > 0.5, gap, np.inf)
+    after = np.minimum.accumulate(at_tucks - speed * time_s) + speed * time_s
+    before = np.minimum.accumulate((at_tucks + speed * time_s)[::-1])[::-1] - speed * time_s
+    return np.minimum(after, before)
 
 
 def _oval(units: Timeline[Unit], time_s: Curve) -> Curve:

@@ -33,6 +33,8 @@ class MouthTextures:
     upper_teeth: Texture
     lower_teeth: Texture
     tongue: Texture
+    tongue_tip: Texture
+    pucker: Texture
     lip_shadow: Texture
     under_lip: Texture
     corners: Texture
@@ -52,6 +54,8 @@ def mouth_textures(design: Design) -> MouthTextures:
             upper_teeth=_flat(colours.tooth),
             lower_teeth=_flat(colours.lower_tooth),
             tongue=_flat(colours.tongue),
+            tongue_tip=_flat_tip(colours.tongue),
+            pucker=clear,
             lip_shadow=clear,
             under_lip=_under_lip(colours.skin_shade, 0.5),
             corners=clear,
@@ -65,6 +69,8 @@ def mouth_textures(design: Design) -> MouthTextures:
         upper_teeth=_teeth(colours.tooth, colours.mouth_shadow, UPPER_TOOTH_GAPS, 0.3),
         lower_teeth=_teeth(colours.lower_tooth, colours.mouth_shadow, LOWER_TOOTH_GAPS, 0.45)[::-1].copy(),
         tongue=_tongue(colours.tongue, colours.cavity),
+        tongue_tip=_tongue_tip(colours.tongue, colours.lower_lip_light, colours.cavity),
+        pucker=_pucker(colours.upper_lip_dark, colours.seam),
         lip_shadow=_lip_shadow(colours.cavity),
         under_lip=_under_lip(colours.mouth_shadow, 0.42),
         corners=_corners(colours.mouth_shadow),
@@ -148,6 +154,33 @@ def _tongue(colour: Colour, dark: Colour) -> Texture:
     paint = _mix(paint, light, 0.6 * np.exp(-(((depth - 0.22) / 0.2) ** 2) - ((np.abs(away) - 0.045) / 0.045) ** 2))
     paint = _mix(paint, dark, 0.25 * np.exp(-((away / 0.012) ** 2)) * (0.2 + 0.8 * depth))
     return _texture(paint, np.exp(-((away / 0.2) ** 6)) + 0 * depth)
+
+
+def _tongue_tip(colour: Colour, lip: Colour, dark: Colour) -> Texture:
+    """Return the tip between the teeth: in the shadow of the upper ones, round, moist at its edge."""
+    depth, x = _grid(24, 65)
+    away = x * SPAN
+    flesh = 0.6 * np.array(colour) + 0.4 * np.array(lip) + 8
+    light = np.array(colour) + (255 - np.array(colour)) * 0.75
+    paint = _mix(flesh, dark, 0.45 * (1 - depth) ** 2.5 + 0.35 * (np.abs(away) / 0.11) ** 3 + 0.4 * depth**8)
+    paint = _mix(paint, light, 0.9 * np.exp(-(((depth - 0.66) / 0.09) ** 2) - ((away + 0.018) / 0.03) ** 2))
+    return _texture(paint, 1.0)
+
+
+def _flat_tip(colour: Colour) -> Texture:
+    """Return the tip between the teeth in one colour, with one patch of light."""
+    depth, x = _grid(24, 65)
+    light = np.array(colour) + (255 - np.array(colour)) * 0.45
+    patch = 1 - np.clip((((depth - 0.55) / 0.14) ** 2 + ((x * SPAN + 0.015) / 0.05) ** 2 - 1) / 0.5, 0, 1)
+    return _texture(_mix(colour, light, patch), 1.0)
+
+
+def _pucker(colour: Colour, deep: Colour) -> Texture:
+    """Return the folds of protruded lips, from their outer edge to the hole, and the shade of their corners."""
+    depth, x = _grid(24, 129)
+    folds = np.abs(np.sin(np.pi * 6.5 * (np.abs(x) + 0.035 * np.sin(9 * x)))) ** 5 * (1 - x**4)
+    strength = 0.34 * folds * np.sin(np.pi * np.clip(0.15 + 0.9 * depth, 0, 1)) * np.clip(np.abs(x) / 0.1, 0, 1)
+    return _texture(_mix(colour, deep, 0.25 + 0 * depth * x), strength)
 
 
 def _lip_shadow(colour: Colour) -> Texture:

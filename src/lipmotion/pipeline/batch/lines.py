@@ -14,6 +14,7 @@ from pathlib import Path, PurePosixPath
 
 from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES, VIDEO_SUFFIXES
 from lipmotion.errors import ExportError, InputError, shortened
+from lipmotion.export.base import motion_suffixes
 from lipmotion.storage.files import check_listable, read_text_file
 
 LOG = logging.getLogger("lipmotion")
@@ -27,6 +28,8 @@ OWN_FOLDER = ".batch"
 """Folder of unfinished work in the folder of the outputs."""
 LARGEST_LIST, MOST_LINES = 1 << 27, 200_000
 """Most bytes of a list, and most lines of a batch: the words of a very long game."""
+LONGEST_PART = 255
+"""Most bytes of the name of a file or a folder, on the usual file systems."""
 MOST_NAMED = 3
 CONTROL = re.compile(r"[\x00-\x1f]")
 
@@ -73,9 +76,13 @@ def read_lines(source: Path, kinds: Sequence[str]) -> list[BatchLine]:
 def check_names(lines: Iterable[BatchLine], kinds: Sequence[str]) -> None:
     """Raise ExportError if two outputs of a batch would be the same file, also where case does not count.
 
+    Also if one would be the folder of another, if a name is too long for a file system, or if it makes a file one of
+    another format: ``take.livelink`` with the kind ``csv``.
     Raises InputError: a name holds control characters.
     """
     taken = dict.fromkeys(OWN_FILES, "the batch itself")
+    folders: dict[str, str] = {}
+    longer = {kind: [each for each in motion_suffixes() if each[1:].endswith(f".{kind}")] for kind in kinds}
     for line in lines:
         if CONTROL.search(line.name + line.recording):
             raise InputError(f"{line.recording!r}, {line.name!r}: control characters in a name; rename the recording")
@@ -85,14 +92,38 @@ def check_names(lines: Iterable[BatchLine], kinds: Sequence[str]) -> None:
                 f"{line.recording}: the output {line.name!r} lies outside the folder of the outputs, or is hidden; "
                 "give a relative name without '..' and without names that begin with a dot"
             )
+        for folder in path.parents[:-1]:
+            folders[_key(str(folder))] = line.recording
         for kind in kinds:
-            key = unicodedata.normalize("NFC", f"{line.name}.{kind}").casefold()
+            file = f"{line.name}.{kind}"
+            if any(len(os.fsencode(part)) > LONGEST_PART for part in file.split("/")):
+                raise ExportError(
+                    f"{line.recording}: the output {shortened(file)!r} has a part of more than {LONGEST_PART} bytes; "
+                    "give a shorter name in a column 'output' of the list"
+                )
+            other = next((each for each in longer[kind] if file.lower().endswith(each)), None)
+            if other is not None:
+                raise ExportError(
+                    f"{line.recording}: the output {file!r} would be called as {other} and hold {kind}; give "
+                    f"{other[1:]} as the kind, or another name in a column 'output' of the list"
+                )
+            key = _key(file)
             if key in taken:
                 raise ExportError(
                     f"{line.name}.{kind}: would be written for {taken[key]} and for {line.recording}; rename one of "
                     "them, or name the outputs in a column 'output' of the list"
                 )
             taken[key] = line.recording
+    for key in folders.keys() & taken.keys():
+        raise ExportError(
+            f"{key}: would be written for {taken[key]}, and be the folder of the output of {folders[key]}; give one of "
+            "them another name in a column 'output' of the list"
+        )
+
+
+def _key(name: str) -> str:
+    """Return what two names share where neither case nor the form of accents counts."""
+    return unicodedata.normalize("NFC", name).casefold()
 
 
 def _is_hidden(part: str) -> bool:

@@ -10,7 +10,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -23,6 +23,7 @@ from lipmotion.faces.base import Face
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.measures.closures import CLOSED_SHARE
 from lipmotion.motion.closure import OPENING, closable_ranges
+from lipmotion.motion.speakers import SpeakerMap
 from lipmotion.pipeline.animate import animate, check_outputs, opened_face, with_articulation, write
 from lipmotion.pipeline.batch.ledger import (
     DONE,
@@ -38,9 +39,11 @@ from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.batch.settings import CUES, BatchSettings, input_files, line_fingerprint
 from lipmotion.pipeline.characters import check_curve_set
 from lipmotion.pipeline.cues import cues, write_cues
+from lipmotion.pipeline.film.video import person_shown
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import SpeechRequest
-from lipmotion.storage.files import sha256_of
+from lipmotion.pipeline.transfer import map_onto
+from lipmotion.storage.files import check_target, sha256_of
 from lipmotion.types import Generation
 from lipmotion.units import Lexicon
 
@@ -65,6 +68,10 @@ class LineWork:
     place: Place
 
 
+class RunReplacedError(ExportError):
+    """A later run has begun in the same folder."""
+
+
 def finished_line(work: LineWork) -> Record:
     """Return the record of a line, whose outputs are in place; or that of an error, without outputs.
 
@@ -82,7 +89,8 @@ def finished_line(work: LineWork) -> Record:
             return _finished(work)
         finally:
             for kind in work.settings.kinds:
-                work.place.staged(work.line.name, kind).unlink(missing_ok=True)
+                with suppress(OSError):  # there is none, or its folder is none
+                    work.place.staged(work.line.name, kind).unlink()
             shutil.rmtree(folder, ignore_errors=True)
 
 
@@ -101,19 +109,29 @@ def _finished(work: LineWork) -> Record:
         try:
             record["inputs"] = [asdict(each) for each in input_files(work.line)]
             generation = _written(work)
-            record |= _findings(generation)
-        except (LipMotionError, OSError, MemoryError) as error:
+            record |= _findings(generation) | _taken(start_s, warnings)
+            _put_in_place(work, record)
+        except Exception as error:  # also a bug that one recording meets: the other lines go on
             if _is_final(error):
                 raise
-            record |= {"outcome": FAILED, "error": str(error) or type(error).__name__}
-    record |= {"warnings": warnings[:MOST_WARNINGS], "seconds": round(time.perf_counter() - start_s, 4)}
-    if record["outcome"] == DONE:
-        _put_in_place(work, record)
+            record |= {"outcome": FAILED, "outputs": {}, "error": _reason(error)} | _taken(start_s, warnings)
     return record
 
 
+def _taken(start_s: float, warnings: list[str]) -> Record:
+    return {"warnings": warnings[:MOST_WARNINGS], "seconds": round(time.perf_counter() - start_s, 4)}
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, LipMotionError | OSError | MemoryError):
+        return str(error) or type(error).__name__
+    return f"unexpected {type(error).__name__}: {error}; this is a bug of lipmotion: please report it"
+
+
 def _is_final(error: BaseException) -> bool:
-    """Return whether an error would befall every line that follows: a full disk."""
+    """Return whether an error would befall every line that follows: a full disk, or the end of the run."""
+    if isinstance(error, RunReplacedError):
+        return True
     cause = error if isinstance(error, OSError) else error.__cause__
     return isinstance(cause, OSError) and cause.errno in (errno.ENOSPC, errno.EDQUOT)
 
@@ -124,7 +142,7 @@ def _put_in_place(work: LineWork, record: Record) -> None:
     staged = {f"{work.line.name}.{kind}": work.place.staged(work.line.name, kind) for kind in work.settings.kinds}
     record["outputs"] = {name: sha256_of(path) for name, path in staged.items()}
     if not work.place.is_current():
-        raise ExportError(f"{out}: another run of this batch has begun; this one ends")
+        raise RunReplacedError(f"{out}: another run of this batch has begun; this one ends")
     write_receipt(work.place.receipt(work.line.name), record)
     for name, path in staged.items():
         target = out / name
@@ -135,10 +153,12 @@ def _put_in_place(work: LineWork, record: Record) -> None:
 def _written(work: LineWork) -> Generation:
     """Write the outputs of a line under temporary names; return its motion. Raises as ``animate`` and ``write``."""
     line, settings = work.line, work.settings
-    model = _model(settings.model, _stamp(settings.model))
-    generation = animate(_request(line, settings), model=model)
     staged = {kind: work.place.staged(line.name, kind) for kind in settings.kinds}
     next(iter(staged.values())).parent.mkdir(parents=True, exist_ok=True)
+    for kind in settings.kinds:
+        check_target(Path(work.place.out) / f"{line.name}.{kind}")
+    model = _model(settings.model, _stamp(settings.model))
+    generation = animate(_request(line, settings, model), model=model)
     sheets = [kind for kind in settings.kinds if kind.startswith(CUES)]
     if sheets:
         sheet = cues(generation, fps=settings.fps or CUES_FPS, delivery=settings.delivery)
@@ -162,8 +182,13 @@ def _written(work: LineWork) -> Generation:
     return generation
 
 
-def _request(line: BatchLine, settings: BatchSettings) -> SpeechRequest:
-    """Return the request of a line, with the labels beside its recording where the row has no words."""
+def _request(line: BatchLine, settings: BatchSettings, model: Model) -> SpeechRequest:
+    """Return the request of a line, with the labels beside its recording where the row has no words.
+
+    Where a filmed face of another person is shown, the motion is mapped onto it, as ``lipmotion animate`` does.
+    """
+    speaker = line.speaker or settings.speaker
+    face = person_shown(model, _face(settings.face, _stamp(settings.face)), speaker)
     labels = None if line.transcript else labels_beside(Path(line.recording))
     transcript = line.transcript or (labels.transcript if labels else None)
     return SpeechRequest(
@@ -172,7 +197,8 @@ def _request(line: BatchLine, settings: BatchSettings) -> SpeechRequest:
         units=labels.phones if labels and transcript is None else None,
         lexicon=_lexicon(settings.lexicon, _stamp(settings.lexicon)),
         recogniser=settings.recogniser,
-        speaker=line.speaker or settings.speaker,
+        speaker=speaker,
+        onto=None if face is None else _map_onto(model, face, speaker),
     )
 
 
@@ -240,6 +266,12 @@ def _lexicon(path: str, _: int) -> Lexicon | None:
 @lru_cache(maxsize=1)
 def _face(name: str, _: int) -> Face | FilmedFace:
     return opened_face(name)
+
+
+@lru_cache(maxsize=8)
+def _map_onto(model: Model, face: FilmedFace, speaker: str) -> SpeakerMap:
+    """Return the map of the motion of a speaker onto a face: the same for all lines, and slow to make."""
+    return map_onto(model, face, speaker=speaker)
 
 
 def check_line_settings(settings: BatchSettings) -> None:

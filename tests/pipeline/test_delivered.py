@@ -1,0 +1,112 @@
+"""Delivery as files and videos have it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.errors import InputError
+from lipmotion.export.base import read_motion
+from lipmotion.faces import Face, Staging
+from lipmotion.faces.mesh import MeshFace
+from lipmotion.faces.registry import face_named
+from lipmotion.motion.delivery import Delivery, closed_frames
+from lipmotion.pipeline.animate import check_outputs, write
+from lipmotion.pipeline.characters import with_curves
+from lipmotion.pipeline.delivered import delivered_scene, held_mouth, shown, staged_intensity
+from lipmotion.rig.driven import driven_character
+from lipmotion.rig.gltf_writer import write_glb
+from lipmotion.types import Generation, Prosody, StateTrace
+from rig.heads import head
+from rig.speech import motion, units
+
+
+@pytest.fixture(scope="module")
+def generation() -> Generation:
+    moved = motion()
+    trace = StateTrace(("a",), np.zeros(len(moved.values), np.intp))
+    return Generation(moved, np.zeros(moved.values.shape), units(), trace)
+
+
+@pytest.mark.parametrize("offset_ms", [500.0, -250.0])
+def test_files_say_when_the_sound_begins(
+    generation: Generation, offset_ms: float, toy_speech: Path, tmp_path: Path
+) -> None:
+    delivery = Delivery(offset_ms=offset_ms)
+    paths = [tmp_path / "a.json", tmp_path / "a.blender.py"]
+    write(generation, paths, speech=toy_speech, delivery=delivery, curves="arkit", channels=["jawOpen"])
+    assert json.loads(paths[0].read_text())["source"] == {"file": toy_speech.name, "start_s": f"{offset_ms / 1000:g}"}
+    assert f"SOUND_S = {offset_ms / 1000!r}\n" in paths[1].read_text()
+    scene = delivered_scene(generation, delivery, face_named("head"), 12.0, staging=Staging(), prosody=None)
+    assert scene.sound_s == pytest.approx(offset_ms / 1000)
+
+
+def test_weights_beside_an_opening_are_enlarged_for_the_mesh_that_has_them(
+    generation: Generation, tmp_path: Path
+) -> None:
+    write_glb(tmp_path / "head.glb", head())
+    character = driven_character(tmp_path / "head.glb")
+    face, larger = MeshFace(character), Delivery(intensity=2)
+    both = with_curves(generation, "arkit")[0]
+    assert staged_intensity(Staging(), larger, face, both, character) == Staging()
+    before, after = both.motion["jawOpen"], shown(both, larger, face, 25.0, character).motion["jawOpen"]
+    assert after.max() > 1.3 * before.max()
+    assert staged_intensity(Staging(), larger, face, generation, character).intensity == pytest.approx(2)
+
+
+def test_brows_and_head_of_pictures_come_later_with_the_mouth(
+    generation: Generation, toy_speech: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    heard = []
+
+    def staged(face: Face, _: Staging, prosody: Prosody | None = None) -> Face:
+        if prosody is not None:
+            heard.append(prosody.level_db)
+        return face
+
+    monkeypatch.setattr("lipmotion.pipeline.drawn_video.staged_face", staged)
+    monkeypatch.setattr("lipmotion.export.transparent.write_pictures", lambda *_: None)
+    for offset_ms in (0, 500):
+        path = tmp_path / "a%d.png"
+        write(generation, path, speech=toy_speech, fps=1, face="woman", delivery=Delivery(offset_ms=offset_ms))
+    assert heard[-1][50:] == pytest.approx(heard[0])
+
+
+@pytest.mark.parametrize("rate_hz", [12.0, 23.976, 24.0])
+def test_closures_between_two_frames_of_a_slow_file_are_kept(
+    generation: Generation, rate_hz: float, tmp_path: Path
+) -> None:
+    narrow = generation.motion.values.copy()
+    column, closed = generation.motion.column("opening"), closed_frames(generation)
+    narrow[50:100, column] = 0.1
+    narrow[closed, column] = 0.0
+    spiky = replace(generation, motion=replace(generation.motion, values=narrow))
+    write(spiky, tmp_path / "a.csv", rate_hz=rate_hz, channels=["opening"])
+    opening = read_motion(tmp_path / "a.csv")[0]["opening"]
+    assert opening[[round(frame / 100 * rate_hz) for frame in closed]] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_eyes_and_head_move_on_while_the_mouth_is_held(generation: Generation, tmp_path: Path) -> None:
+    smooth, delivery = with_curves(generation, "face")[0], Delivery(min_hold_ms=400)
+    assert max(np.abs(smooth.motion[name]).max() for name in ("eyeBlinkLeft", "headYaw")) > 1e-3
+    steps = held_mouth(smooth, delivery.hold_frames(100), [])
+    for name in ("eyeBlinkLeft", "headYaw", "browInnerUp"):
+        assert steps.motion[name] == pytest.approx(smooth.motion[name])
+        assert name not in steps.stepped
+    mouth = steps.motion["jawOpen"]
+    changes = np.flatnonzero(np.abs(np.diff(mouth)) > 1e-9) + 1
+    assert np.diff([0, *changes, len(mouth)]).min() >= 40
+    write(smooth, tmp_path / "a.livelink.csv", delivery=delivery, rate_hz=100)
+    assert read_motion(tmp_path / "a.livelink.csv")[0]["headYaw"] == pytest.approx(smooth.motion["headYaw"], abs=1e-5)
+    assert {"jawOpen", "opening"} <= set(steps.stepped)
+
+
+def test_intensities_that_are_too_large_together_are_found_before_the_work() -> None:
+    staging, delivery = Staging(intensity=2), Delivery(intensity=2)
+    with pytest.raises(InputError, match="staging and delivery, 2 and 2, are 4 together, required at most 3"):
+        check_outputs(["a.mp4"], "said.wav", staging=staging, delivery=delivery)
+    check_outputs(["a.json"], "said.wav", staging=staging, delivery=delivery)

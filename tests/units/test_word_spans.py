@@ -1,0 +1,48 @@
+"""Words in time, of phones in time."""
+
+from __future__ import annotations
+
+import pytest
+
+from lipmotion.types import Span, Timeline, Unit
+from lipmotion.units import words_in_time
+
+
+def said(*words: tuple[str, str]) -> list[tuple[float, float, str]]:
+    """Return the words in time of words with their phones, each phone a second long."""
+    phones = [Unit(phone, word=word) for word, text in words for phone in text.split()]
+    units = Timeline(tuple(Span(float(n), n + 1.0, unit) for n, unit in enumerate(phones)))
+    return [(span.start_s, span.end_s, span.label) for span in words_in_time(units)]
+
+
+@pytest.mark.parametrize(
+    ("word", "phones", "starts"),
+    [
+        ("big", "b ih g b ih g", [0, 3]),
+        ("Big", "b ih g b ih g b ih g", [0, 3, 6]),
+        ("the", "dh ax dh iy", [0, 2]),
+        ("tutu", "t uw t uw", [0]),
+        ("tutu", "t uw t uw t uw t uw", [0, 4]),
+        ("mama", "m aa m ax", [0]),
+        ("bigbig", "b ih g b ih g", [0]),
+        ("big", "b ih b ih", [0]),
+        ("", "b ih g b ih g", [0]),
+    ],
+)
+def test_a_word_that_is_said_again_is_another_one(word: str, phones: str, starts: list[int]) -> None:
+    ends = [*starts[1:], len(phones.split())]
+    assert said((word, phones)) == list(zip(starts, ends, [word] * len(starts), strict=True))
+
+
+def test_other_words_and_silence_are_apart() -> None:
+    assert said(("", "sil"), ("big", "b ih g"), ("", "sp"), ("big", "b ih g"), ("boat", "b ow t")) == [
+        (0, 1, ""),
+        (1, 4, "big"),
+        (4, 5, ""),
+        (5, 8, "big"),
+        (8, 11, "boat"),
+    ]
+
+
+def test_no_words_are_none() -> None:
+    assert said() == []
