@@ -58,6 +58,22 @@ def textured_document(picture: bytes, material=None, extension=None) -> tuple[di
     return content, binary + UV.tobytes() + picture
 
 
+def with_colours(content: dict, binary: bytes, colours: np.ndarray, *, normalised: bool = False) -> tuple[dict, bytes]:
+    """A document whose first primitive has colours of its vertices [shape=(4, 3 or 4)]."""
+    width = colours.shape[1]
+    step = -(-width * colours.itemsize // 4) * 4
+    padded = np.zeros((4, step), np.uint8)
+    padded[:, : width * colours.itemsize] = np.ascontiguousarray(colours).view(np.uint8).reshape(4, -1)
+    binary += b"\0" * (-len(binary) % 4)
+    view = {"buffer": 0, "byteOffset": len(binary), "byteLength": padded.nbytes, "byteStride": step}
+    kind = {"f4": 5126, "u1": 5121, "u2": 5123, "i2": 5122}[colours.dtype.str[1:]]
+    content["bufferViews"].append(view)
+    accessor = {"bufferView": len(content["bufferViews"]) - 1, "componentType": kind, "count": 4, "type": f"VEC{width}"}
+    content["accessors"].append(accessor | ({"normalized": True} if normalised else {}))
+    content["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = len(content["accessors"]) - 1
+    return content, binary + padded.tobytes()
+
+
 def glb(content: dict, binary: bytes) -> bytes:
     """A document and its bytes as GLB."""
     text = json.dumps(content).encode()

@@ -14,7 +14,9 @@ if TYPE_CHECKING:
 
 def add_face_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the face of videos, and how a filmed face is shown."""
-    face = "face that videos show: woman, man, cartoon, a drawing, or a filmed face (default: portrait, the woman)"
+    face = (
+        "face that videos show: woman, man, head, cartoon, a drawing, or a filmed face (default: portrait, the woman)"
+    )
     drawn: dict[str, Any] = {"type": str, "default": "portrait", "metavar": "NAME|FILE.svg|FILE.face", "help": face}
     add_input(parser, "--face", what="face", **drawn)
     shown = "footage of the same person (default: that in its file); of a drawn face: transparent, or as #40a0ff"

@@ -119,7 +119,22 @@ def _looks(
                 least, most = _opacities(material, material.texture, downwards[mine], halvings)
                 hides, seen = (material.cutoff, material.cutoff) if kind == CUT else (HIDES, SEEN)
                 looks[mine, 1] = np.where(least >= hides, SOLID, np.where(most < seen, NOTHING, kind))
+        if mesh.tints is not None and material.alpha in (MASK, BLEND):
+            _thin(material, mesh.tints[mesh.triangles[numbers[mine]], 3].mean(axis=1), mine, looks, alphas)
     return TexturedTriangles(np.zeros((0, 3), np.int32), downwards, looks, alphas, table.texels, table.levels)
+
+
+def _thin(material: Material, opacity: Array, mine: NDArray[np.bool_], looks: NDArray[np.int32], alphas: Array) -> None:
+    """Multiply the opacity of a part's triangles by that of their vertices, the mean of each triangle's, in place.
+
+    opacity : of the triangles of the part [shape=(N,)];  mine : which ones these are [shape=(F,)]
+    """
+    kind, hides, seen = (CUT, material.cutoff, material.cutoff) if material.alpha == MASK else (CLEAR, HIDES, SEEN)
+    whole = material.opacity * opacity
+    kinds, bare = looks[mine, 1], looks[mine, 0] < 0
+    lowered = np.where(whole < seen, NOTHING, np.where((whole < hides) | ~bare & (opacity < 1), kind, kinds))
+    looks[mine, 1] = np.where(kinds == NOTHING, NOTHING, lowered)
+    alphas[mine] = np.stack([np.full(len(whole), material.cutoff), whole], axis=1)
 
 
 def _opacities(material: Material, texture: Texture, uv: Array, halvings: NDArray[np.int32]) -> Extremes:
@@ -135,6 +150,8 @@ def _colours(mesh: Mesh, materials: list[Material], rows: Rows, kinds: Rows) -> 
     """Return the reflection of drawn vertices; those of textures have the colour of the material alone."""
     own = np.array([linear(material.colour) for material in materials])[kinds]
     textured = np.array([material.texture is not None for material in materials])[kinds]
+    if mesh.tints is not None:
+        own = own * mesh.tints[rows, :3]
     if mesh.colours is None:
         return own
     return np.where(textured[:, None], own, linear(mesh.colours[rows]))

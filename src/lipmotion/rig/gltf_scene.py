@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError, shortened
 from lipmotion.rig.bones import Bone, merged_bones
 from lipmotion.rig.gltf_accessors import GltfArrays
+from lipmotion.rig.gltf_colours import WHITE, counted, tinted, vertex_tints
 from lipmotion.rig.gltf_container import GltfDocument, read_gltf_document
 from lipmotion.rig.gltf_skins import head_bones, held_bones, kinds_of_nodes, skin_weights
 from lipmotion.rig.gltf_textures import GltfMaterials
@@ -45,6 +46,8 @@ class _Surface:
     uv: list[Matrix] = field(default_factory=list)
     mapped: bool = False
     colours: list[Matrix] = field(default_factory=list)
+    tints: list[Matrix] = field(default_factory=list)
+    tinted: bool = False
     parts: list[tuple[str, Material]] = field(default_factory=list)
     moved: dict[str, list[tuple[NDArray[np.int64], Matrix]]] = field(default_factory=dict)
     targets: dict[tuple[int, int], str] = field(default_factory=dict)
@@ -100,6 +103,7 @@ def _mesh(document: GltfDocument, arrays: GltfArrays) -> Mesh:
         np.concatenate(surface.uv) if surface.mapped else None,
         np.concatenate(surface.colours),
         tuple(replace(bone, place=bone.place * turn) for bone in merged_bones(surface.bones)),
+        np.concatenate(surface.tints) if surface.tinted else None,
     )
 
 
@@ -135,7 +139,8 @@ def _add_primitive(
     targets = primitive.get("targets", [])
     if not isinstance(targets, list) or not all(isinstance(target, dict) for target in targets):
         raise InputError("morph targets that are no list of objects; export it again")
-    shared = (id(node), attributes.get("POSITION"), tuple(target.get("POSITION") for target in targets))
+    moved = tuple(target.get("POSITION") for target in targets)
+    shared = (id(node), attributes.get("POSITION"), attributes.get("COLOR_0"), moved)
     if shared not in surface.first:
         surface.first[shared], surface.blocks[shared] = surface.count, len(surface.vertices)
         _add_vertices(surface, document, arrays, node, primitive, owner[0], matrix, places)
@@ -147,6 +152,12 @@ def _add_primitive(
     material = surface.materials.material(primitive.get("material"))
     check_count("triangles", sum(map(len, surface.triangles)) + corners.size // 3, MOST_TRIANGLES)
     used, block = np.unique(corners), surface.colours[surface.blocks[shared]]
+    tints = None
+    if "COLOR_0" in attributes:
+        material = material if "material" in primitive else replace(material, colour=WHITE)
+        tints = counted(vertex_tints(document, arrays, attributes["COLOR_0"], count)[used], material)
+        surface.tints[surface.blocks[shared]][used] = tints
+        surface.tinted = True
     block[used] = material.colour
     mapped = np.zeros((corners.size // 3, 3, 2))
     if "TEXCOORD_0" in attributes:
@@ -158,6 +169,8 @@ def _add_primitive(
         surface.mapped = True
         if material.texture is not None:
             block[used] = material.texture.at(in_texture[used])[:, :3] * material.colour
+    if tints is not None:
+        block[used] = tinted(block[used], tints)
     if corners.size:
         surface.triangles.append(corners.reshape(-1, 3) + first)
         surface.parts.append((_unused(owner[1], material.name, surface), material))
@@ -201,6 +214,7 @@ def _add_vertices(
         surface.moved.setdefault(name, []).append((rows + surface.count, moved[rows]))
     colour = surface.materials.material(primitive.get("material")).colour
     surface.colours.append(np.tile(colour, (len(vertices), 1)))
+    surface.tints.append(np.ones((len(vertices), 4)))
     surface.count += len(vertices)
 
 

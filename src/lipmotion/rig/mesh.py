@@ -91,6 +91,8 @@ class Mesh:
     uv        : the place of each triangle's corners in a texture, 0 to 1, v upwards [shape=(F, 3, 2)], or None
     colours   : of every vertex, sRGB, 0 to 1, in place of the materials' [shape=(V, 3)], or None
     bones     : of head, neck, jaw and eyes, where a file has a skeleton; at most one of each kind
+    tints     : of every vertex, the light (linear) and the opacity by which those of textures and materials are
+                multiplied, 0 to 1 [shape=(V, 4)], or None; ``colours`` are multiplied by it already
     Raises InputError: shapes of arrays that do not fit, values that are not finite, a triangle or a blendshape of a
     vertex that does not exist, parts that do not follow one another, or two blendshapes of one name.
     """
@@ -102,6 +104,7 @@ class Mesh:
     uv: NDArray[np.float64] | None = None
     colours: NDArray[np.float64] | None = None
     bones: tuple[Bone, ...] = ()
+    tints: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         _check_places("vertices", self.vertices)
@@ -112,6 +115,8 @@ class Mesh:
             raise InputError(f"uv has shape {self.uv.shape}, required {(*self.triangles.shape, 2)}")
         if self.colours is not None and self.colours.shape != self.vertices.shape:
             raise InputError(f"colours have shape {self.colours.shape}, required {self.vertices.shape}")
+        if self.tints is not None and self.tints.shape != (len(self.vertices), 4):
+            raise InputError(f"tints have shape {self.tints.shape}, required {(len(self.vertices), 4)}")
         if not self.parts:
             object.__setattr__(self, "parts", (MeshPart("", 0, len(self.triangles)),))
         self._check_parts()

@@ -27,6 +27,7 @@ MOST_CORNERS = 1000
 """Most corners of a polygon."""
 OPAQUE_FROM = 250
 """A texture with pixels of a lower opacity than this, of 255, has holes."""
+_NO_COLOUR = [b"nan"] * 3
 _SHININESS = 60.0
 """A specular exponent (``Ns``) of so much is a gloss of 1/2."""
 
@@ -58,12 +59,14 @@ class _Faces:
 def read_obj(path: Path) -> Mesh:
     """Return the mesh of an OBJ file; polygons become triangles, materials become parts.
 
-    Vertices keep their numbers, counted from 0. Colours and textures (``map_Kd``) come from files in the same folder,
-    where there are some. Lines, curves and normals are ignored.
+    Vertices keep their numbers, counted from 0. Their colours (``v x y z r g b``: sRGB, 0 to 1; 0 to 255 where one is
+    above 1) replace those of materials without a texture, unless all are white. Colours of materials and textures
+    (``map_Kd``) come from files in the same folder, where there are some. Lines, curves and normals are ignored.
     Raises InputError: no such file, too large, no triangles, or a damaged line, whose number is named.
     """
     content = file_bytes(path, "mesh")
     places: list[list[bytes]] = []
+    colours: list[list[bytes]] = []
     textures: list[list[bytes]] = []
     faces, library, number = _Faces(), "", 0
     try:
@@ -75,6 +78,7 @@ def read_obj(path: Path) -> Mesh:
             kind = words[0]
             if kind == b"v":
                 places.append(words[1:4])
+                colours.append(words[4:7] if len(words) == 7 else _NO_COLOUR)
             elif kind == b"vt":
                 textures.append([*words[1:3], b"0"][:2])
             elif kind == b"f":
@@ -89,12 +93,13 @@ def read_obj(path: Path) -> Mesh:
         number = 0
         vertices = _numbers(places, 3)
         uv = _numbers(textures, 2)
+        painted = None if all(each is _NO_COLOUR for each in colours) else _numbers(colours, 3, missing=True)
     except (InputError, ValueError, IndexError, OverflowError) as error:
         where = f" in line {number}" if number else ""
         raise InputError(f"{path}: {shortened(str(error))}{where}; export the mesh as OBJ again") from error
     if not faces.corners:
         raise InputError(f"{path}: there are no polygons in it, required a mesh; export the surface, not points alone")
-    return _mesh(vertices, uv, faces, _materials(path.parent, library))
+    return _mesh(vertices, uv, painted, faces, _materials(path.parent, library))
 
 
 def read_obj_folder(folder: Path, wanted: Callable[[str], bool] = lambda _: True) -> Mesh:
@@ -124,7 +129,7 @@ def read_obj_folder(folder: Path, wanted: Callable[[str], bool] = lambda _: True
                 "move other meshes to another folder"
             )
         shapes.append(Blendshape.between(path.stem, mesh.vertices, vertices, least=least))
-    return Mesh(mesh.vertices, mesh.triangles, mesh.parts, tuple(shapes), mesh.uv)
+    return replace(mesh, shapes=tuple(shapes))
 
 
 def write_obj(path: Path, mesh: Mesh, vertices: NDArray[np.float64] | None = None) -> None:
@@ -147,7 +152,11 @@ def write_obj(path: Path, mesh: Mesh, vertices: NDArray[np.float64] | None = Non
 
 
 def _mesh(
-    vertices: NDArray[np.float64], uv: NDArray[np.float64], faces: _Faces, materials: dict[str, Material]
+    vertices: NDArray[np.float64],
+    uv: NDArray[np.float64],
+    painted: NDArray[np.float64] | None,
+    faces: _Faces,
+    materials: dict[str, Material],
 ) -> Mesh:
     part = np.array(faces.parts)
     order = np.argsort(part, kind="stable")
@@ -158,7 +167,26 @@ def _mesh(
     )
     textures = np.array(faces.textures)[order]
     mapped = np.where(textures[..., None] >= 0, uv[textures], 0.0) if len(uv) else None
-    return Mesh(vertices, np.array(faces.corners, np.int32)[order], parts, uv=mapped)
+    triangles = np.array(faces.corners, np.int32)[order]
+    colours = _colours(painted, triangles, parts)
+    return Mesh(vertices, triangles, parts, uv=mapped, colours=colours)
+
+
+def _colours(
+    painted: NDArray[np.float64] | None, triangles: NDArray[np.int32], parts: tuple[MeshPart, ...]
+) -> NDArray[np.float64] | None:
+    """Return colours of all vertices, 0 to 1 [shape=(V, 3)]; those without one have that of their material.
+
+    None: there are none, or all are white, as programs write them that have none.
+    """
+    if painted is None or not (painted < 1).any():
+        return None
+    colours = painted / 255 if (painted > 1).any() else painted
+    for part in parts:
+        rows = np.unique(triangles[part.first : part.stop])
+        bare = rows[np.isnan(colours[rows, 0])]
+        colours[bare] = part.material.colour
+    return np.clip(np.nan_to_num(colours), 0, 1)
 
 
 def _vertices_of(path: Path) -> NDArray[np.float64]:
@@ -171,12 +199,12 @@ def _vertices_of(path: Path) -> NDArray[np.float64]:
         raise InputError(f"{path}: {shortened(str(error))}; export the mesh as OBJ again") from error
 
 
-def _numbers(rows: list[list[bytes]], width: int) -> NDArray[np.float64]:
+def _numbers(rows: list[list[bytes]], width: int, *, missing: bool = False) -> NDArray[np.float64]:
     wrong = next((row for row in rows if len(row) != width), None)
     if wrong is not None:
         raise ValueError(f"{_text(wrong)!r} is no vertex of {width} numbers")
     values = np.array(rows, dtype="S32").reshape(-1, width).astype(np.float64)
-    if not (np.abs(values) <= LARGEST_NUMBER).all():
+    if not ((np.abs(values) <= LARGEST_NUMBER) | (missing & np.isnan(values))).all():
         raise ValueError(f"a vertex has numbers that are not finite, or beyond ±{LARGEST_NUMBER:g}")
     return values
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import ExportError, InputError
 from lipmotion.rig.mesh import Mesh
 from lipmotion.rig.rasteriser import normals_of
+from lipmotion.rig.single_sided import single_sided
 from lipmotion.rig.surface import mesh_surface
 from lipmotion.types import Motion
 
@@ -125,6 +126,7 @@ class ShadingNormals:
 
 def shading_normals(mesh: Mesh, *, split: bool = True) -> ShadingNormals:
     """Return smooth normals of a mesh and of its blendshapes; ``split`` as of ``Scene``."""
+    mesh = single_sided(mesh)
     joined = mesh_surface(mesh).places if split else np.arange(len(mesh.vertices))
     triangles = joined[mesh.triangles].astype(np.int32)
     count = int(joined.max(initial=-1)) + 1

@@ -11,6 +11,7 @@ from lipmotion.rig.drawn_surface import drawn_surface
 from lipmotion.rig.driven import DrivenCharacter
 from lipmotion.rig.mouth_template import LEFT_CORNER, RIGHT_CORNER
 from lipmotion.rig.rasteriser import Camera, flat, normals_of
+from lipmotion.rig.single_sided import single_sided
 from lipmotion.rig.surface import mesh_surface
 from lipmotion.rig.textured_canvas import TexturedCanvas
 
@@ -47,7 +48,8 @@ class MeshStage:
     def __init__(
         self, character: DrivenCharacter, width: int, height: int, colour: tuple[int, int, int] | None = None
     ) -> None:
-        mesh, placement, surface = character.mesh, character.placement, mesh_surface(character.mesh)
+        mesh, placement = single_sided(character.mesh), character.placement
+        surface = mesh_surface(mesh)
         corners = placement.vertices[[placement.row(RIGHT_CORNER), placement.row(LEFT_CORNER)]]
         self._centre = mesh.vertices[corners].mean(axis=0)
         self._turn = placement.axes / placement.scale
