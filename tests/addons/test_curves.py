@@ -160,3 +160,9 @@ def test_held_curves_are_not_interpolated() -> None:
     found = at_frames(curves, [0.0, 0.1, 0.2], 20.0, ("a",))
     assert found["browInnerUp"] == pytest.approx([0, 0.5, 1, 0.5, 0])
     assert found["a"] == pytest.approx([0, 0, 1, 1, 0])
+
+
+def test_held_poses_last_as_long_at_other_frames() -> None:
+    jaw = np.repeat([0.3, 0.0, 0.4], [10, 10, 10]).tolist()
+    found = at_frames({"jawOpen": jaw}, (np.arange(30) / 100).tolist(), 24.0, ("jawOpen",))
+    assert found["jawOpen"] == pytest.approx([0.3, 0.3, 0.3, 0.0, 0.0, 0.4, 0.4])

@@ -80,7 +80,7 @@ def at_frames(curves: Curves, times: list[float], fps: float, stepped: tuple[str
 
     Between values by a straight line. Where the lips close, the curves of jaw and mouth have at the nearest frame the
     values of that moment, so that no p, b or m is lost between two frames.
-    stepped : names of curves that hold each value until the next one
+    stepped : names of curves that hold each value until the next one: a frame has the value that is held at its time
     """
     if not times:
         return {name: [] for name in curves}
@@ -93,8 +93,11 @@ def at_frames(curves: Curves, times: list[float], fps: float, stepped: tuple[str
             closed[nearest] = (moment, 0.0)
     found = {}
     for name, values in curves.items():
+        if name in stepped:
+            found[name] = [values[low] for low, _ in places]
+            continue
         chosen = closed if spelling(name).startswith(MOUTH) else places
-        found[name] = [_between(values, low, 0.0 if name in stepped else share) for low, share in chosen]
+        found[name] = [_between(values, *place) for place in chosen]
     return found
 
 
