@@ -18,6 +18,7 @@ import pytest
 
 import lipmotion
 from lipmotion.errors import CorpusError, ExportError, InputError
+from lipmotion.export.base import motion_suffixes
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.motion.delivery import Delivery
 from lipmotion.pipeline.batch import BatchLine, BatchSettings, batch, one_line, read_lines
@@ -124,6 +125,36 @@ def test_a_mistake_in_the_settings_ends_it_before_the_first_line(sounds: Path, t
     with pytest.raises(ExportError, match="a video has its own sound"):
         batch(sounds, tmp_path / "out", BatchSettings(("mp4",), delivery=Delivery(offset_ms=50)), jobs=1)
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"kinds": ("cues.tsv",), "fps": 120.0}, "frame rate is 120"),
+        ({"channels": ("nope",)}, "nope"),
+        ({"kinds": ("bvh", "json"), "curves": "arkit"}, "opening"),
+        ({"speaker": "nobody"}, "nobody"),
+    ],
+)
+def test_what_no_line_could_do_ends_it_before_the_first_line(
+    sounds: Path, settings: BatchSettings, tmp_path: Path, wrong: dict, message: str
+) -> None:
+    with pytest.raises((InputError, ExportError), match=message):
+        batch(sounds, tmp_path / "out", replace(settings, **wrong), jobs=1)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("jobs", [0, -3])
+def test_a_number_of_processes(sounds: Path, settings: BatchSettings, tmp_path: Path, jobs: int) -> None:
+    with pytest.raises(InputError, match="processes, required 1 or more"):
+        batch(sounds, tmp_path / "out", settings, jobs=jobs)
+
+
+def test_silence_can_have_every_form_that_speech_can(settings: BatchSettings) -> None:
+    kinds = tuple(suffix.removeprefix(".") for suffix in motion_suffixes())
+    late = Delivery(offset_ms=-5000, stepped=True)
+    one_line.check_line_settings(replace(settings, kinds=kinds, articulation=True, delivery=late))
+    one_line.check_line_settings(replace(settings, kinds=("json",), curves="face", rate_hz=30.0))
 
 
 def test_files_that_refer_to_the_sound(sounds: Path, settings: BatchSettings, tmp_path: Path) -> None:

@@ -61,3 +61,17 @@ def test_both_reports_hold_all_lines(tmp_path: Path) -> None:
     assert text.count("</script>") == 2
     assert "default-src 'none'" in text
     assert "http" not in text.replace("http-equiv", "")
+
+
+@pytest.mark.parametrize("name", ["=1+1", "+a", "-a", "@a"])
+def test_no_text_is_a_formula(tmp_path: Path, name: str) -> None:
+    lines = [BatchLine(name, f"/x/{name}.wav")]
+    record = GOOD | {"run": "1", "fingerprint": "f", "inputs": [], "name": name, "outputs": {f"{name}.json": "0"}}
+    with opened_ledger(Place(str(tmp_path), "1")) as ledger:
+        ledger.append(record | {"recording": lines[0].recording, "range_db": -3.0, "warnings": [name, "a"]})
+        table, page = write_reports(lines, ledger, tmp_path)
+    with table.open(encoding="utf-8", newline="") as file:
+        row = next(csv.DictReader(file))
+    assert (row["name"], row["outputs"], row["warnings"]) == (f"'{name}", f"'{name}.json", f"'{name} | a")
+    assert row["range_db"] == "-3.0"
+    assert rows_of(page.read_text(encoding="utf-8"))[0][0] == name

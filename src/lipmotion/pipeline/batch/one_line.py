@@ -11,7 +11,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -19,6 +19,8 @@ import numpy as np
 
 from lipmotion.corpora.labels import labels_beside
 from lipmotion.errors import ExportError, LipMotionError
+from lipmotion.export.base import motion_suffix
+from lipmotion.export.cues import OPTIONAL
 from lipmotion.faces.base import Face
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.measures.closures import CLOSED_SHARE
@@ -38,13 +40,14 @@ from lipmotion.pipeline.batch.ledger import (
 from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.batch.settings import CUES, BatchSettings, input_files, line_fingerprint
 from lipmotion.pipeline.characters import check_curve_set
-from lipmotion.pipeline.cues import cues, write_cues
-from lipmotion.pipeline.film.video import person_shown
+from lipmotion.pipeline.cues import check_cue_options, cues, write_cues
+from lipmotion.pipeline.film.video import is_person_of, person_shown
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.request import SpeechRequest
 from lipmotion.pipeline.transfer import map_onto
+from lipmotion.speech.audio_files import SPEECH_RATE_HZ
 from lipmotion.storage.files import check_target, sha256_of
-from lipmotion.types import Generation
+from lipmotion.types import Audio, Generation, Span, Timeline, Unit
 from lipmotion.units import Lexicon
 
 LOG = logging.getLogger("lipmotion")
@@ -53,6 +56,8 @@ ONE_AT_A_TIME = threading.Lock()
 MOST_WARNINGS = 10
 CUES_FPS = 24.0
 """Frame rate of cues where none is given."""
+SILENCE_S = 0.5
+"""Seconds of silence with which the settings are tried out."""
 
 
 @dataclass(frozen=True)
@@ -277,7 +282,9 @@ def _map_onto(model: Model, face: FilmedFace, speaker: str) -> SpeakerMap:
 def check_line_settings(settings: BatchSettings) -> None:
     """Load what all lines need, so that a mistake in it ends the batch before its first line.
 
-    Raises InputError, ModelFormatError, ExportError: as ``load_model``, ``Lexicon.from_file``, ``check_outputs``.
+    Motion files of a moment of silence are made and deleted, so that channels, curves and formats are tried out.
+    Raises InputError, ModelFormatError, ExportError: as ``load_model``, ``Lexicon.from_file``, ``check_outputs``,
+    ``cues``, ``write``.
     """
     anywhere = Path(tempfile.gettempdir())
     check_outputs(
@@ -291,5 +298,31 @@ def check_line_settings(settings: BatchSettings) -> None:
     )
     if settings.curves:
         check_curve_set(settings.curves)
-    _model(settings.model, _stamp(settings.model))
+    if any(kind.startswith(CUES) for kind in settings.kinds):
+        check_cue_options(settings.fps or CUES_FPS, None, OPTIONAL)
     _lexicon(settings.lexicon, _stamp(settings.lexicon))
+    _try_out(settings, _model(settings.model, _stamp(settings.model)))
+
+
+def _try_out(settings: BatchSettings, model: Model) -> None:
+    """Write the motion files of a moment of silence into a folder that is deleted. Raises as ``animate``, ``write``."""
+    kinds = [kind for kind in settings.kinds if motion_suffix(Path(f"line.{kind}"))]
+    kinds = [kind for kind in kinds if not kind.startswith(CUES)]
+    face = _face(settings.face, _stamp(settings.face))
+    if not kinds or (isinstance(face, FilmedFace) and not is_person_of(model, face, settings.speaker)):
+        return
+    silence = Audio(np.zeros(round(SPEECH_RATE_HZ * SILENCE_S), np.float32), SPEECH_RATE_HZ)
+    units = Timeline((Span(0.0, SILENCE_S, Unit("sil")),))
+    request = SpeechRequest(silence, units=units, speaker=settings.speaker)
+    with tempfile.TemporaryDirectory(prefix="lipmotion-") as folder:
+        generation = animate(request, model=model)
+        write(
+            with_articulation(generation) if settings.articulation else generation,
+            [Path(folder) / f"line.{kind}" for kind in kinds],
+            speech=silence,
+            channels=settings.channels or None,
+            rate_hz=settings.rate_hz,
+            staging=settings.staging,
+            delivery=replace(settings.delivery, offset_ms=0.0),
+            curves=settings.curves or None,
+        )

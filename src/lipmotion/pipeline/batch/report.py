@@ -25,6 +25,8 @@ COLUMNS = (
 """Columns of the table, in order; docs/batch.md says what they mean."""
 ROWS, BETWEEN = "/*ROWS*/", " | "
 """Where the page has its rows; what stands between several texts in a field of the CSV file."""
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""What makes a field a formula for spreadsheets, at its beginning."""
 SURE_OF_WORDS = 0.8
 """Words that were recognised with less confidence deserve an ear."""
 
@@ -78,10 +80,13 @@ def _records(lines: Sequence[BatchLine], ledger: Ledger, order: Sequence[int]) -
 
 
 def _field(value: Any) -> str:
-    """Return a value as a field of the CSV file."""
+    """Return a value as a field of the CSV file; a text that a spreadsheet would compute gets an apostrophe first."""
     if value is None:
         return ""
-    return as_text(BETWEEN.join(value) if isinstance(value, list) else str(value))
+    if not isinstance(value, list | str):
+        return str(value)
+    text = as_text(BETWEEN.join(value) if isinstance(value, list) else value)
+    return f"'{text}" if text.startswith(FORMULA) else text
 
 
 def _for_page(record: Record, values: Sequence[Any]) -> str:

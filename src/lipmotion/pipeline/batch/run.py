@@ -9,7 +9,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from lipmotion.errors import CorpusError, ExportError
+from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.pipeline.batch.ledger import FAILED, Place, Record, opened_ledger
 from lipmotion.pipeline.batch.lines import BatchLine, check_names, read_lines
 from lipmotion.pipeline.batch.one_line import LineWork, check_line_settings, finished_line
@@ -80,6 +80,8 @@ def batch(
     """
     settings = settings or BatchSettings()
     check_kinds(settings.kinds)
+    if jobs is not None and jobs < 1:
+        raise InputError(f"{jobs} processes, required 1 or more; leave the number out for one a core")
     place = Place(os.path.abspath(out), uuid.uuid4().hex)  # noqa: PTH100
     if isinstance(source, str | Path):
         lines = read_lines(Path(source), settings.kinds)
@@ -98,7 +100,8 @@ def batch(
                 waiting.append(LineWork(line, settings, of_settings, place))
             else:
                 counter.count(line.name, "kept")
-        pool = cluster_pool(cluster, Path(place.out)) if cluster else local_pool(jobs or os.cpu_count() or 1)
+        processes = jobs or os.cpu_count() or 1
+        pool = cluster_pool(cluster, Path(place.out)) if cluster else local_pool(processes)
         if waiting:
             with pool as each, closing(_finished(each, waiting)) as records:
                 for record in records:
