@@ -27,8 +27,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = verbs.add_parser("animate", help="turn speech into lip motion or an animated face")
     add_speech_arguments(parser, several=True)
     add_result_arguments(parser, "FILE.mp4 .webm .mov %%05d.png .json .csv .vtt, ... (docs/formats.md); FOLDER/; -")
-    posteriors = "draw the posterior probabilities of the chains' units over time (coupled models)"
-    add_output(parser, "--posteriors", metavar="FILE.png", help=posteriors)
+    add_output(parser, "--posteriors", metavar="FILE.png", help="draw the posteriors of units over time (coupled)")
     for add_more in (add_kinds_argument, add_pipe_format, add_execution):
         add_more(parser)
     parser.set_defaults(run=run, piped=False)
