@@ -16,6 +16,16 @@ from typing import Generic, TypeVar
 from lipmotion.errors import InputError
 
 ExtensionT = TypeVar("ExtensionT")
+SOURCE = "source"
+"""What stands for the version where lipmotion is not installed."""
+
+
+def installed_version() -> str:
+    """Return the version of lipmotion; ``source`` where it is not installed."""
+    try:
+        return metadata.version("lipmotion")
+    except metadata.PackageNotFoundError:
+        return SOURCE
 
 
 @dataclass(frozen=True)

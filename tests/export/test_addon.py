@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import zipfile
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -45,3 +46,18 @@ def test_what_cannot_be_written_is_said(tmp_path: Path, program: str, name: str,
     with pytest.raises(ExportError, match=message):
         write_addon(program, tmp_path / name)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("installed", "version"), [(None, "0.0.0"), ("1.2.3", "1.2.3"), ("1.2.3.dev4", "1.2.3")])
+def test_the_version_is_three_numbers_also_where_nothing_is_installed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, installed: str | None, version: str
+) -> None:
+    def found(name: str) -> str:
+        if installed is None:
+            raise metadata.PackageNotFoundError(name)
+        return installed
+
+    monkeypatch.setattr(metadata, "version", found)
+    write_addon("blender", tmp_path / "a.zip")
+    with zipfile.ZipFile(tmp_path / "a.zip") as archive:
+        assert f'\nversion = "{version}"\n' in archive.read("lipmotion_blender/blender_manifest.toml").decode()

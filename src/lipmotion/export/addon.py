@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import zipfile
-from importlib import metadata, resources
+from importlib import resources
 from pathlib import Path
 
 from lipmotion.errors import ExportError
+from lipmotion.extensions import installed_version
 from lipmotion.storage.files import check_target, whole_file
 
 PROGRAMS = ("blender",)
@@ -14,6 +16,8 @@ FOLDER = "lipmotion_blender"
 MODULES = ("__init__.py", "curves.py", "keying.py", "panel.py", "takes.py")
 OLDEST = (1980, 1, 1, 0, 0, 0)
 """The time of every file in an archive: the same version gives the same bytes."""
+NO_VERSION = "0.0.0"
+"""Of lipmotion that is not installed; Blender takes three numbers."""
 MANIFEST = """schema_version = "1.0.0"
 id = "lipmotion"
 version = "{version}"
@@ -44,7 +48,8 @@ def write_addon(program: str, path: str | Path) -> None:
     check_target(path)
     source = resources.files("lipmotion.addons.blender")
     texts = {name: source.joinpath(name).read_text(encoding="utf-8") for name in MODULES}
-    texts["blender_manifest.toml"] = MANIFEST.format(version=metadata.version("lipmotion"))
+    version = re.match(r"\d+\.\d+\.\d+", installed_version())
+    texts["blender_manifest.toml"] = MANIFEST.format(version=version[0] if version else NO_VERSION)
     with whole_file(path) as unfinished, zipfile.ZipFile(unfinished, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, text in texts.items():
             archive.writestr(zipfile.ZipInfo(f"{FOLDER}/{name}", OLDEST), text.encode(), zipfile.ZIP_DEFLATED)

@@ -115,7 +115,7 @@ def cluster_pool(address: str, out: Path) -> Iterator[Pool]:
 
 def _check_workers(client: Any, address: str, out: Path) -> None:
     """Raise InputError unless there are workers, and all of them can do the work."""
-    from lipmotion.pipeline.batch.settings import installed_version
+    from lipmotion.extensions import installed_version
 
     try:
         found = client.run(_ability, str(out), on_error="return")
@@ -136,7 +136,7 @@ def _check_workers(client: Any, address: str, out: Path) -> None:
 
 
 def _ability(out: str) -> tuple[str, bool]:
-    from lipmotion.pipeline.batch.settings import installed_version
+    from lipmotion.extensions import installed_version
 
     return installed_version(), os.path.isdir(out)  # noqa: PTH112
 

@@ -6,7 +6,6 @@ import hashlib
 import os
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ from lipmotion.errors import ExportError
 from lipmotion.export.base import motion_suffixes
 from lipmotion.export.cues import CUE_FORMATS
 from lipmotion.export.timed_labels import LABEL_SUFFIXES
+from lipmotion.extensions import installed_version
 from lipmotion.faces.base import Staging
 from lipmotion.motion.delivery import Delivery
 from lipmotion.pipeline.batch.lines import BatchLine
@@ -94,14 +94,6 @@ def fingerprint_of(settings: BatchSettings) -> str:
     named: dict[str, Any] = asdict(settings) | {"model": "", "lexicon": ""}
     named["lipmotion"] = installed_version()
     return _digest(as_json([named, digests], sort_keys=True))
-
-
-def installed_version() -> str:
-    """Return the version of lipmotion; ``source`` where it is not installed."""
-    try:
-        return version("lipmotion")
-    except PackageNotFoundError:
-        return "source"
 
 
 def line_fingerprint(line: BatchLine, of_settings: str) -> str:
