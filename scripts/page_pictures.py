@@ -30,7 +30,7 @@ def main() -> None:
     _, spoken = lipmotion.speak(SENTENCE)
     sheet = lipmotion.cues(spoken, fps=FPS)
     cartoon = drawn("cartoon", spoken, 480)
-    mouths = shapes(sheet, cartoon)
+    mouths = shapes(sheet, cartoon, spoken.motion)
     strip(sheet, mouths)
     curves(spoken, drawn("head", spoken, 480))
 
@@ -47,11 +47,16 @@ def mouth(frame: Frame) -> Frame:
     return frame[int(0.53 * high) : int(0.83 * high), int(0.34 * wide) : int(0.66 * wide)]
 
 
-def shapes(sheet: lipmotion.CueSheet, frames: list[Frame]) -> dict[str, Frame]:
-    """Draw and return the mouth in the middle of the longest cue of every shape."""
+def shapes(sheet: lipmotion.CueSheet, frames: list[Frame], motion: lipmotion.Motion) -> dict[str, Frame]:
+    """Draw and return the mouth in the middle of the longest cue of every shape; of C and D, where it opens most."""
     mouths = {}
+    opening = motion.resampled(FPS)["opening"]
     for cue in sorted(sheet.cues, key=lambda cue: cue.duration_s):
-        mouths[cue.label] = mouth(frames[int((cue.start_s + cue.end_s) / 2 * FPS)])
+        shown = int((cue.start_s + cue.end_s) / 2 * FPS)
+        if cue.label in "CD":
+            held = [n for each in sheet.cues if each.label == cue.label for n in frames_of(each)]
+            shown = max(held, key=lambda n: float(opening[n]))
+        mouths[cue.label] = mouth(frames[shown])
     figure, row = plt.subplots(1, len(SHAPES), figsize=(12, 1.5), dpi=100)
     for axes, shape in zip(row, SHAPES, strict=True):
         axes.imshow(mouths[shape])
@@ -59,6 +64,11 @@ def shapes(sheet: lipmotion.CueSheet, frames: list[Frame]) -> dict[str, Frame]:
         axes.axis("off")
     figure.savefig(IMAGES / "for-rhubarb.png", bbox_inches="tight")
     return mouths
+
+
+def frames_of(cue: lipmotion.Span[str]) -> range:
+    """Return the frames in which a cue is held."""
+    return range(int(cue.start_s * FPS), int(cue.end_s * FPS))
 
 
 def strip(sheet: lipmotion.CueSheet, mouths: dict[str, Frame]) -> None:
