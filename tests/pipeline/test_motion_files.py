@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import wave
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,8 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lipmotion.errors import ExportError
 from lipmotion.faces import Staging
-from lipmotion.pipeline.animate import write
+from lipmotion.motion.delivery import Delivery
+from lipmotion.pipeline.animate import check_outputs, write
 from lipmotion.pipeline.characters import curves_of
 from lipmotion.pipeline.living_curves import HEAD, living_curves
 from lipmotion.pipeline.motion_files import in_format, needs_prosody
@@ -135,3 +139,21 @@ def test_formats_of_the_mouth_do_not_depend_on_curves(
 ) -> None:
     plain = written(tmp_path, generation, name, rate_hz=rate_hz)
     assert written(tmp_path, generation, name, rate_hz=rate_hz, curves="visemes") == plain
+
+
+@pytest.mark.parametrize(
+    ("name", "rate_hz", "fits"), [("a.c3d", None, False), ("a.c3d", 50.0, True), ("a.csv", None, True)]
+)
+def test_a_recording_that_is_too_long_is_refused_before_the_work(
+    tmp_path: Path, name: str, rate_hz: float | None, fits: bool
+) -> None:
+    with wave.open(str(tmp_path / "a.wav"), "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(1)
+        file.setframerate(8000)
+        file.writeframes(bytes(8000 * 700))
+    message = r"about 70000 frames, required at most 65535 in \.c3d; give a lower --rate"
+    with nullcontext() if fits else pytest.raises(ExportError, match=message):
+        check_outputs([tmp_path / name], tmp_path / "a.wav", rate_hz=rate_hz)
+    earlier = Delivery(offset_ms=-60_000)
+    check_outputs([tmp_path / name], tmp_path / "a.wav", rate_hz=rate_hz, delivery=earlier)

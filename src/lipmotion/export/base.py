@@ -34,6 +34,7 @@ class MotionFormat:
     rate_hz : frames per second where the user asks for none; None: those of the motion
     mouth   : whether the file shows how the mouth itself moves: the pipeline keeps the channel ``opening`` for it,
               whatever channels or curves the user asks for
+    most_frames : number of frames that such a file can hold; None: any number
     other_curves : whether weights and controls that the user asks for take the place of ``curves``
     names_sound  : whether the file names the recording: the description of the speech then has ``path``, the path from
                    the folder of the file
@@ -51,6 +52,7 @@ class MotionFormat:
     other_curves: bool = False
     names_sound: bool = False
     mouth: bool = False
+    most_frames: int | None = None
 
 
 MOTION_FORMATS: Registry[MotionFormat] = Registry(

@@ -39,7 +39,7 @@ from lipmotion.pipeline.drawn_video import (
 )
 from lipmotion.pipeline.film.video import FILM, FilmOptions, check_film, film_of, write_film
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.motion_files import in_format, needs_prosody, warn_of_unused
+from lipmotion.pipeline.motion_files import check_length, in_format, needs_prosody, warn_of_unused
 from lipmotion.pipeline.outlook import outlook_of
 from lipmotion.pipeline.request import SpeechInput, request_of
 from lipmotion.pipeline.scenes import SCENE_SUFFIXES, is_scene, sound_reference, write_scene
@@ -261,6 +261,8 @@ def check_outputs(
         if not (motion_suffix(path) or path.suffix.lower() in map(str.lower, suffixes) or shows_face(path)):
             raise ExportError(f"{path}: unknown format {path.suffix!r}; required one of: {' '.join(suffixes)} %05d.png")
         check_target(path, speech)
+        if motion_suffix(path) and speech is not None:
+            check_length(path, Path(speech), rate_hz, (delivery or Delivery()).offset_ms / 1000)
         check_background(path, staging or Staging())
         if isinstance(shown_face, FilmedFace) and shows_face(path) and path.suffix.lower() != OPAQUE_SUFFIX:
             raise ExportError(f"{path}: filmed faces are written as {OPAQUE_SUFFIX}; name the output so")

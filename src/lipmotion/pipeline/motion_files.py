@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lipmotion.errors import ExportError
 from lipmotion.export.base import motion_format, motion_suffix
 from lipmotion.faces.base import Staging
 from lipmotion.pipeline.characters import ARKIT, WHOLE_FACE, beside, curves_of
@@ -19,11 +20,14 @@ from lipmotion.rig.facial_animation import FAP
 from lipmotion.rig.point_motion import point_motion
 from lipmotion.rig.rig_tables import CONTROL
 from lipmotion.rig.shape_names import arkit_name
+from lipmotion.speech.audio_files import stated_length_s
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Prosody
 
 LOG = logging.getLogger("lipmotion")
 CURVES = (WEIGHT, CONTROL, RADIAN)
 """The units of curves that drive a character."""
+MODEL_HZ = 100
+"""Frames per second of generated motion."""
 SAME_HZ = 1e-6
 OPENING = "opening"
 
@@ -79,6 +83,22 @@ def warn_of_unused(path: Path, held: Generation, asked: Sequence[str]) -> None:
     if asked and (replaced or not {*asked} & {*names}):
         kind = motion_suffix(path)
         LOG.warning("%s: %s holds channels of its own, none of those that were asked for", path.name, kind)
+
+
+def check_length(path: Path, speech: Path, rate_hz: float | None, later_s: float = 0.0) -> None:
+    """Raise ExportError if a motion file has no room for all frames of a recording, by the length that this states.
+
+    rate_hz : the rate that the user asked for; None: that of the format, or else ``MODEL_HZ``
+    later_s : how much later than the recording the motion ends, by its offset; negative: earlier
+    """
+    form = motion_format(path)
+    if form.most_frames is None:
+        return
+    frames = int((stated_length_s(speech) + later_s) * (rate_hz or form.rate_hz or MODEL_HZ))
+    if frames > form.most_frames + MODEL_HZ:  # a second less may be said than stated
+        kind = motion_suffix(path)
+        required = f"required at most {form.most_frames} in {kind}; give a lower --rate"
+        raise ExportError(f"{path}: about {frames} frames, {required}")
 
 
 def needs_prosody(path: Path) -> bool:

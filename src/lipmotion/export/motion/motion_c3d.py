@@ -145,4 +145,4 @@ def _as_written(content: C3dFile) -> Motion:
     return Motion(values, content.rate_hz, tuple(channels))
 
 
-MOTION_FORMAT = MotionFormat(write, read, check)
+MOTION_FORMAT = MotionFormat(write, read, check, most_frames=MOST_FRAMES)
