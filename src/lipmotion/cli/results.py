@@ -59,7 +59,7 @@ def check_results(options: argparse.Namespace, speech: Path | None = None) -> No
     from lipmotion.pipeline.animate import check_outputs
 
     open_faces(options)
-    checked = {"rate_hz": options.rate, "fps": options.fps, "face": options.face, "film": film_options(options)}
+    checked = {"rate_hz": rate_of(options), "fps": options.fps, "face": options.face, "film": film_options(options)}
     checked["delivery"] = delivery_of(options)
     check_outputs(options.output, speech, **checked, staging=staging_of(options), with_sound=speech is None)
 
