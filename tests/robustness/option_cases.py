@@ -32,7 +32,7 @@ for _value in ("nan", "inf", "-1", "4"):
 for _value in ("nan", "2000", "-1e9"):
     _option(f"--anticipation-ms {_value}", 3, ("the anticipation is", "required -1000"), f"--anticipation-ms={_value}")
 _option("--offset-ms nan", 3, ("the offset is nan ms",), "--offset-ms=nan")
-_option("--offset-ms that leaves nothing", 3, ("nothing is left; give a smaller one",), "--offset-ms=-1e7")
+_option("--offset-ms that leaves nothing", 3, ("nothing is left; give a smaller one",), "--offset-ms=-60000")
 _option("--min-hold-ms -1", 3, ("the least hold is -1 ms",), "--min-hold-ms=-1")
 
 

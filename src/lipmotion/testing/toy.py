@@ -23,6 +23,7 @@ from lipmotion.speech.mfcc import mfcc
 from lipmotion.storage.files import whole_file
 from lipmotion.testing.toy_mouth import toy_mouths
 from lipmotion.types import Audio, Channel, Motion, Timeline, Track, Unit, Utterance
+from lipmotion.units import is_silent
 
 WORDS: dict[str, tuple[str, ...]] = {
     "baby": ("b", "ey", "b", "iy"),
@@ -171,7 +172,8 @@ def write_toy_recordings(directory: Path, *, sentences: int = 12, seed: int = 0,
     face = Woman(Staging(size=FACE_HEIGHT, blinks=False, gaze=False, brows=False, head=False))
     for sentence, video in zip(spoken, videos, strict=True):
         motion = toy_motion(sentence.units, _MOTION_HZ)
-        write_mp4(video, face.render(motion, sentence.units, fps=fps), fps=fps, audio=sentence.audio)
+        silence = Timeline(tuple(span for span in sentence.units if is_silent(span.label.phone)))  # no shapes of phones
+        write_mp4(video, face.render(motion, silence, fps=fps), fps=fps, audio=sentence.audio)
         _write_lines(video.with_suffix(".txt"), [" ".join(sentence.words)])
     for split in ("train", "val", "test"):
         _write_lines(directory / f"{split}.txt", [sentence.name for sentence in spoken if sentence.split == split])

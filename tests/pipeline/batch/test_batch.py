@@ -132,7 +132,6 @@ def test_a_mistake_in_the_settings_ends_it_before_the_first_line(sounds: Path, t
     [
         ({"kinds": ("cues.tsv",), "fps": 120.0}, "frame rate is 120"),
         ({"channels": ("nope",)}, "nope"),
-        ({"kinds": ("bvh", "json"), "curves": "arkit"}, "opening"),
         ({"speaker": "nobody"}, "nobody"),
     ],
 )
