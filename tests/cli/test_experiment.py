@@ -55,6 +55,7 @@ def test_the_learning_curve_of_a_list(run: RunCommand, toy_corpus: Corpus, here:
     assert [row["names"] for row in figures["rows"]] == [3, 8]
 
 
+@pytest.mark.long
 def test_folds_of_the_training_list(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
     done = run("experiment", "folds", toy_corpus.path, "--folds", "2", "-o", "a.json", "--workers", "1")
     assert (done.code, done.err) == (0, [])

@@ -28,6 +28,7 @@ def test_a_model_and_what_it_was_made_of(run: RunCommand, toy_corpus: Corpus, he
     assert (here / "mine.lipmotion").read_bytes() == (here / "function.lipmotion").read_bytes()
 
 
+@pytest.mark.long
 def test_all_of_a_corpus(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
     assert run("train", toy_corpus.path, "-o", "all.lipmotion", "--split", "all").code == 0
     assert load_model(here / "all.lipmotion").about["split"] == "all"
