@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError
 from lipmotion.faces.character import gestures
 from lipmotion.faces.character.pose import CharacterPose
+from lipmotion.faces.drawn_motion import check_drawn, gap_in_pictures
 from lipmotion.faces.liveliness import SEED, accent_of, liveliness
 from lipmotion.motion.rest import against_rest, rest_frames
 from lipmotion.types import Motion, Prosody, Timeline, Unit
@@ -71,7 +71,7 @@ def head_poses(
     which they are closed.
     Raises InputError: no channel ``opening``, no frames, a value that is not finite, or fps not positive.
     """
-    _check(motion, fps)
+    check_drawn(motion, fps, DRAWN)
     time_s = np.arange(int(np.floor((len(motion.values) - 1) / motion.rate_hz * fps + 1e-9)) + 1) / fps
     rest = rest_frames(motion, units)
     said = _said(motion, units, time_s)
@@ -87,7 +87,8 @@ def head_poses(
     roundness = np.maximum(said["round"], 0.4 * narrow)
     wide = np.clip(np.maximum(said["spread"], np.clip(change / 0.12, 0, 1)) - roundness, 0, 1)
     said |= {"roundness": roundness, "wide": wide, "pucker": said["pucker"] * roundness}
-    gap = _articulated(np.minimum(intensity * _gap(motion, time_s, fps), WIDEST), said, pause)
+    parted = gap_in_pictures(motion, drawn_gap(motion["opening"].astype(float)), time_s, fps)
+    gap = _articulated(np.minimum(intensity * parted, WIDEST), said, pause)
     gap = _closed(gap, units, time_s)
     bite = np.maximum(said["bite"], said["spread"] ** 1.5) * np.clip((BITTEN_GAP[1] - gap) / np.ptp(BITTEN_GAP), 0, 1)
     alive = liveliness(gap, pause, fps, seed=seed, accent=accent_of(prosody, time_s))
@@ -173,31 +174,8 @@ def upper_share(gap: Curve) -> Curve:
     return np.asarray(0.055 * (1 - np.exp(-5.5 * gap)))
 
 
-def _check(motion: Motion, fps: float) -> None:
-    if not 0 < fps < np.inf:
-        raise InputError(f"the frame rate is {fps}, required more than 0")
-    if "opening" not in motion.names:
-        names = ", ".join(motion.names[:6]) + (", ..." if len(motion.names) > 6 else "") or "no channels"
-        raise InputError(f"no channel 'opening' to draw a face from; the motion has: {names}")
-    if not len(motion.values):
-        raise InputError("the motion has no frames; there is nothing to draw")
-    for name in {*DRAWN} & {*motion.names}:
-        if not np.isfinite(motion[name]).all():
-            raise InputError(
-                f"the channel {name!r} has values that are not finite; interpolate the missing frames first"
-            )
-
-
 def _at(motion: Motion, curve: Curve, time_s: Curve) -> Curve:
     return np.interp(time_s, motion.time_s, curve)
-
-
-def _gap(motion: Motion, time_s: Curve, fps: float) -> Curve:
-    gap = drawn_gap(motion["opening"].astype(float))
-    gap_at_frames = _at(motion, gap, time_s)
-    nearest = np.rint(motion.time_s[gap == 0] * fps).astype(int)
-    gap_at_frames[nearest[nearest < len(gap_at_frames)]] = 0
-    return gap_at_frames
 
 
 def _closed(gap: Curve, units: Timeline[Unit], time_s: Curve) -> Curve:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError
+from lipmotion.faces.drawn_motion import check_drawn, gap_in_pictures
 from lipmotion.motion.gestures import GESTURES, OVAL, PURSED, TIP_OUT, TIP_UP, gesture_curves, pause_curve
 from lipmotion.motion.rest import against_rest, rest_frames
 from lipmotion.types import Motion, Timeline, Unit
@@ -94,11 +94,11 @@ def mouth_poses(motion: Motion, units: Timeline[Unit], fps: float, intensity: fl
     Lips that close between two video frames are drawn closed in the nearer one.
     Raises InputError: no channel ``opening``, no frames, a value that is not finite, or fps not positive.
     """
-    _check(motion, fps)
+    check_drawn(motion, fps, DRAWN)
     time_s = frame_times(motion, fps)
     rest = rest_frames(motion, units)
     tongue, tuck, protrusion, spread, press, teeth = _gestures(motion, units, time_s, intensity)
-    gap = _gap(motion, time_s, fps, intensity)
+    gap = gap_in_pictures(motion, drawn_gap(motion["opening"].astype(float), intensity), time_s, fps)
     free = (1 - press) * np.clip(gap / 0.05, 0, 1)
     pursed = np.minimum(press / (0.8 * PURSED), 1) * protrusion
     gap += min(intensity, 1) * np.maximum(tuck - press, 0) * (np.clip(gap, *TUCKED_GAP) - gap)
@@ -150,21 +150,6 @@ def jaw_drop(gap: Curve | float) -> Curve:
     return 0.85 * (np.asarray(gap) - upper_share(gap))
 
 
-def _check(motion: Motion, fps: float) -> None:
-    if not 0 < fps < np.inf:
-        raise InputError(f"the frame rate is {fps}, required more than 0")
-    if "opening" not in motion.names:
-        names = ", ".join(motion.names[:6]) + (", ..." if len(motion.names) > 6 else "") or "no channels"
-        raise InputError(f"no channel 'opening' to draw a face from; the motion has: {names}")
-    if not len(motion.values):
-        raise InputError("the motion has no frames; there is nothing to draw")
-    for name in {*DRAWN} & {*motion.names}:
-        if not np.isfinite(motion[name]).all():
-            raise InputError(
-                f"the channel {name!r} has values that are not finite; interpolate the missing frames first"
-            )
-
-
 def _gestures(motion: Motion, units: Timeline[Unit], time_s: Curve, intensity: float) -> list[Curve]:
     curves = gesture_curves(units, time_s, [name for name in GESTURES if name not in motion.names])
     for name in {*GESTURES} & {*motion.names}:
@@ -188,14 +173,6 @@ def _oval(units: Timeline[Unit], time_s: Curve) -> Curve:
 
 def _at(motion: Motion, curve: Curve, time_s: Curve) -> Curve:
     return np.interp(time_s, motion.time_s, curve)
-
-
-def _gap(motion: Motion, time_s: Curve, fps: float, intensity: float) -> Curve:
-    gap = drawn_gap(motion["opening"].astype(float), intensity)
-    gap_at_frames = _at(motion, gap, time_s)
-    nearest = np.rint(motion.time_s[gap == 0] * fps).astype(int)
-    gap_at_frames[nearest[nearest < len(gap_at_frames)]] = 0
-    return gap_at_frames
 
 
 def _width(motion: Motion, rest: NDArray[np.bool_], intensity: float) -> Curve:
