@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import itertools
 import os
 import subprocess
 import sys
@@ -12,7 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
-from portable.settings import BEFORE_AVX, CORES, different_cores, environment, kernels
+from portable.settings import BEFORE_AVX, CORES, different_cores, environment, kernels, possible_cores
 
 TESTS = Path(__file__).parents[1]
 NUMERIC = (
@@ -39,14 +40,13 @@ class Outcome(NamedTuple):
 
 
 def settings() -> dict[str, dict[str, str]]:
-    """Return the variables of every setting by its name: each kind of kernels with one thread and with two."""
+    """Return the variables of every setting by its name: each kind of kernels, in turn with one thread and with two."""
     found = {
-        f"{core}, {threads} {'thread' if threads == 1 else 'threads'}": {
+        f"{core}, {threads} thread{'s' * (threads > 1)}": {
             "OPENBLAS_CORETYPE": core,
             "OPENBLAS_NUM_THREADS": str(threads),
         }
-        for core in different_cores()
-        for threads in (1, 2)
+        for core, threads in zip(different_cores(), itertools.cycle((1, 2)))  # noqa: B905 - one of them is endless
     }
     return found | {"no AVX, in NumPy neither": BEFORE_AVX}
 
@@ -71,7 +71,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     options = parser.parse_args(arguments)
     for core in CORES:
-        print(f"{core}: {kernels(core)}", flush=True)
+        able = core in possible_cores()
+        print(f"{core}: {kernels(core) if able else 'left out: this processor lacks its instructions'}", flush=True)
     with ThreadPoolExecutor(options.jobs) as pool:
         jobs = [pool.submit(tested, name, changes, options.tests) for name, changes in settings().items()]
         outcomes = [job.result() for job in jobs]

@@ -7,8 +7,15 @@ import subprocess
 import sys
 from functools import cache
 
-CORES = ("Haswell", "Zen", "SkylakeX", "Sandybridge", "Prescott")
-"""Values of ``OPENBLAS_CORETYPE``: the processor whose matrix products are used."""
+CORES = {
+    "Haswell": {"AVX2", "FMA3"},
+    "Zen": {"AVX2", "FMA3"},
+    "SkylakeX": {"AVX512_SKX"},
+    "Sandybridge": {"AVX"},
+    "Prescott": {"SSE3"},
+}
+"""Values of ``OPENBLAS_CORETYPE``, the processor whose matrix products are used, and the features, by NumPy's names, that
+its instructions need: elsewhere a process ends at the first of them."""
 BEFORE_AVX = {"OPENBLAS_CORETYPE": "Prescott", "NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX512_ICL AVX512_SPR"}
 """A processor without AVX, also in NumPy's own loops."""
 KERNELS = "from lipmotion.kernels.threads import blas_kernels; print('; '.join(blas_kernels()))"
@@ -39,10 +46,15 @@ def kernels(core: str) -> str:
     return found.stdout.strip()
 
 
-def different_cores() -> dict[str, str]:
-    """Return the kernels of the core types, without repetitions: a build may contain few of them."""
-    found: dict[str, str] = {}
-    for core in CORES:
-        if kernels(core) not in found.values():
-            found[core] = kernels(core)
-    return found
+def possible_cores() -> list[str]:
+    """Return the core types whose instructions this processor has; ``NPY_DISABLE_CPU_FEATURES=X86_V4`` hides AVX-512."""
+    import numpy as np
+
+    features = np._core._multiarray_umath.__cpu_features__  # type: ignore[attr-defined]
+    return [core for core, needed in CORES.items() if all(features.get(name) for name in needed)]
+
+
+def different_cores() -> list[str]:
+    """Return the possible core types without those whose kernels an earlier one has: a build may contain few."""
+    found = {kernels(core): core for core in reversed(possible_cores())}
+    return [core for core in possible_cores() if core in found.values()]
