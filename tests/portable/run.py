@@ -46,7 +46,7 @@ def settings() -> dict[str, dict[str, str]]:
             "OPENBLAS_CORETYPE": core,
             "OPENBLAS_NUM_THREADS": str(threads),
         }
-        for core, threads in zip(different_cores(), itertools.cycle((1, 2)))  # noqa: B905 - one of them is endless
+        for core, threads in zip(different_cores(), itertools.cycle((1, 2)))
     }
     return found | {"no AVX, in NumPy neither": BEFORE_AVX}
 

@@ -14,8 +14,9 @@ CORES = {
     "Sandybridge": {"AVX"},
     "Prescott": {"SSE3"},
 }
-"""Values of ``OPENBLAS_CORETYPE``, the processor whose matrix products are used, and the features, by NumPy's names, that
-its instructions need: elsewhere a process ends at the first of them."""
+"""Values of ``OPENBLAS_CORETYPE``, the processor whose matrix products are used, and the features that these need.
+
+Features have NumPy's names. On a processor without them a process ends at the first such instruction."""
 BEFORE_AVX = {"OPENBLAS_CORETYPE": "Prescott", "NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX512_ICL AVX512_SPR"}
 """A processor without AVX, also in NumPy's own loops."""
 KERNELS = "from lipmotion.kernels.threads import blas_kernels; print('; '.join(blas_kernels()))"
@@ -47,7 +48,7 @@ def kernels(core: str) -> str:
 
 
 def possible_cores() -> list[str]:
-    """Return the core types whose instructions this processor has; ``NPY_DISABLE_CPU_FEATURES=X86_V4`` hides AVX-512."""
+    """Return the core types whose features this processor has; ``NPY_DISABLE_CPU_FEATURES=X86_V4`` hides AVX-512."""
     import numpy as np
 
     features = np._core._multiarray_umath.__cpu_features__  # type: ignore[attr-defined]
