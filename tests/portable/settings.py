@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
 import sys
 from functools import cache
+
+import children
 
 CORES = {
     "Haswell": {"AVX2", "FMA3"},
@@ -30,21 +30,14 @@ def environment(changes: dict[str, str]) -> dict[str, str]:
     changes = dict(changes)
     if wanted := changes.get("NPY_DISABLE_CPU_FEATURES"):
         changes["NPY_DISABLE_CPU_FEATURES"] = " ".join(name for name in wanted.split() if name in known)
-    return {name: value for name, value in os.environ.items() if not name.startswith("OPENBLAS_")} | changes
+    return {name: value for name, value in children.environment().items() if not name.startswith("OPENBLAS_")} | changes
 
 
 @cache
 def kernels(core: str) -> str:
     """Return the kernels that a process actually uses with the core type ``core``."""
-    found = subprocess.run(
-        [sys.executable, "-c", KERNELS],
-        env=environment({"OPENBLAS_CORETYPE": core}),
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=120,
-    )
-    return found.stdout.strip()
+    changed = environment({"OPENBLAS_CORETYPE": core})
+    return children.run_child([sys.executable, "-c", KERNELS], variables=changed, check=True).stdout.strip()
 
 
 def possible_cores() -> list[str]:
