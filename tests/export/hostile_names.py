@@ -198,10 +198,12 @@ def _usd_tokens(text: str, attribute: str) -> list[str]:
 
 def _glb(folder: Path, name: str) -> None:
     path = folder / "a.glb"
-    write_gltf_scene(path, Scene(mesh(name), Motion(np.zeros((2, 1)), 25.0, (Channel(name, WEIGHT),)), sound=name))
+    write_gltf_scene(
+        path, Scene(mesh(name), Motion(np.zeros((2, 1)), 25.0, (Channel(name, WEIGHT),)), sound=f"x{name}")
+    )
     document = read_gltf_document(path).json
     assert document["meshes"][0]["extras"]["targetNames"] == [name]
-    assert document["scenes"][0]["extras"]["audio"]["uri"] == name
+    assert document["scenes"][0]["extras"]["audio"]["uri"] == f"x{name}"
     assert document["materials"][0]["name"] == (name or "part")
 
 
