@@ -39,7 +39,9 @@ def model_citations(header: Mapping[str, Any]) -> str:
     """
     engine = str(header.get("engine"))
     attribution = header.get("attribution") or []
-    owners = [str(owner) for owner in attribution] if isinstance(attribution, list) else [str(attribution)]
+    owners = [
+        " ".join(str(owner).split()) for owner in (attribution if isinstance(attribution, list) else [attribution])
+    ]
     others = [owner for owner in owners if "GRID corpus" not in owner]
     keys = [LIPMOTION, *ENGINE_KEYS.get(engine, ())]
     if header.get("visual", "geometry") != "geometry":

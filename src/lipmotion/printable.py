@@ -5,11 +5,20 @@ from __future__ import annotations
 import re
 
 _UNPRINTABLE = re.compile(
-    "[\x00-\x1f\x7f-\x9f\xad\u061c\u180e\u200b\u200e\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\ud800-\udfff"
+    "[\x00-\x1f\x7f-\x9f\xad\u061c\u180e\u200b\u200e\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\ufffe\uffff\ud800-\udfff"
     "\U000e0000-\U000e0fff]"
 )
 """Characters that control a terminal or are invisible: both sets of control characters, line ends, changes of
 direction, surrogates. The joiners that some scripts and emoji need are not among them."""
+
+_NOT_IN_LINES = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff\ufffe\uffff]")
+"""Characters that a line of a text file cannot hold: control characters, line ends, surrogates and no characters."""
+
+
+def is_line(text: str) -> bool:
+    """Return whether text files of any format can hold a text in one line; marks of direction and joiners may be in
+    it."""
+    return not _NOT_IN_LINES.search(text)
 
 
 def printable(text: object) -> str:

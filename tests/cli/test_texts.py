@@ -10,7 +10,23 @@ from lipmotion.types import TimedTranscript
 
 
 @pytest.mark.usefixtures("here")
-@pytest.mark.parametrize("text", ["hello there", "see p. 3", "", "α" * 3000, "a/b/c", "the file words.txt", "..", "\n"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "hello there",
+        "see p. 3",
+        "",
+        "α" * 3000,
+        "a/b/c",
+        "the file words.txt",
+        "..",
+        "\n",
+        "é" * 130,
+        "é" * 130 + ".abc",
+        "你好.世界",
+        "a" * 300 + ".txt",
+    ],
+)
 def test_a_text_is_itself(text: str) -> None:
     assert text_or_file_content(text) == text
 

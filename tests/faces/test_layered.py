@@ -1,3 +1,4 @@
+import gzip
 from itertools import pairwise
 from pathlib import Path
 
@@ -45,6 +46,7 @@ def test_the_example_keeps_the_contract():
         ('<polygon points="5,5 25,5 25,25"/>', 200),
         ('<path d="M5 5h20v10H5z"/>', 200),
         ('<path d="M10 20a10 10 0 1 1 20 0a10 10 0 1 1-20 0z"/>', np.pi * 100),
+        ('<path d="M10 20a10 10 0 1120 0a10 10 0 11-20 0z"/>', np.pi * 100),
         ('<path d="M10 10 C10 10 30 10 30 10 S30 30 30 30 Q20 30 10 30 z"/>', 400),
         ('<path d="M5 5H35V35H5zM15 15V25H25V15z"/>', 800),
         ('<path fill-rule="evenodd" d="M5 5H35V35H5zM15 15H25V25H15z"/>', 800),
@@ -92,6 +94,12 @@ def test_colours_and_order():
         ('<path d="M0 0L1e9 1"/>', "numbers up to"),
         ('<rect width="1" height="1" transform="scale(1e200)"/>', "transform"),
         ('<g transform="scale(1e5)"><g transform="scale(1e5)"><rect width="1" height="1"/></g></g>', "enlarge"),
+        ('<rect width="nan" height="1"/>', "width is 'nan'"),
+        ('<rect width="1" height="1e999"/>', "inf in '1e999'"),
+        ('<g stroke-width="' + " " * 200 + '1"/>', "required a number"),
+        ('<path d="M0 0a1 1 0 2 1 1 1"/>', "cannot be read at"),
+        ('<path d="M0 0"><animate/></path>', "in a shape"),
+        ("&a;", "undefined entity"),
     ],
 )
 def test_what_is_unsafe_or_would_be_drawn_wrongly_is_refused(inside, words):
@@ -105,11 +113,51 @@ def test_what_is_unsafe_or_would_be_drawn_wrongly_is_refused(inside, words):
         b"", b"not xml", b"<html/>", b"<svg", b"\xff\xfe\x00", b'<svg viewBox="0 0 0 0"><rect/></svg>',
         b'<svg viewBox="0 0 900000 4"><rect/></svg>',
         b'<!DOCTYPE svg [<!ENTITY a "b">]><svg>&a;</svg>', b'<!DOCTYPE svg [ <!ENTITY % x SYSTEM "file:///x"> ]><svg/>',
+        b'<!DOCTYPE svg SYSTEM "file:///x"><svg>&a;</svg>', b'<?xml-stylesheet href="a.css"?><svg/>',
     ],
 )  # fmt: skip
 def test_what_is_no_drawing_is_refused(data):
     with pytest.raises(InputError):
         drawing_of(data)
+
+
+def test_a_drawing_is_utf_8_whatever_it_declares():
+    entities = '<!DOCTYPE svg [<!ENTITY a "b">]><svg id="&a;"/>'
+    plain = svg(f'<g id="é">{MOUTH_ONLY}</g>')
+    doctype = b'<!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" "http://www.w3.org/Graphics/SVG/1.1/DTD/svg11.dtd">'
+    for before in (b"", b"\xef\xbb\xbf", b'<?xml version="1.0" encoding="iso-8859-1"?>', doctype):
+        assert drawing_of(before + plain).shapes[0][0] == ("", "é", "mouth-rest")
+    for coding in ("utf-16", "utf-16-le", "utf-16-be", "utf-32", "cp037"):
+        for text in (entities, plain.decode()):
+            declared = f'<?xml version="1.0" encoding="{coding}"?>{text}'
+            with pytest.raises(InputError, match=r"not text in UTF-8|not an SVG|entities"):
+                drawing_of(declared.encode(coding))
+    with pytest.raises(InputError, match="compressed"):
+        drawing_of(gzip.compress(plain))
+
+
+def test_a_drawing_has_limits_as_a_whole(monkeypatch):
+    square = '<rect width="40" height="40"/>'
+    for inside, words in {
+        square * 201: "cover more than 200 times",
+        '<path stroke="red" stroke-width="40" d="M0 0' + "h1" * 300 + '"/>': "cover more than 200 times",
+        square * 150 + f'<path d="M0 0{"L1 40L2 0" * 2_600}"/>': "cover more than 200 times",
+        "<metadata>" + "<a/>" * 20_000 + "</metadata>": "more than 20000 elements",
+        "<metadata>" * 100_000: "more than 60 deep",
+        f'<g transform="{"a" * 2_000_000}"/>': "transform 'a+...' cannot be read",
+        f'<g transform="{"scale(1)" * 21}"/>': "at most 20",
+        f'<path d="{"M" * 2_000_000}"/>': "ends within",
+    }.items():
+        with pytest.raises(InputError, match=words):
+            drawing_of(svg(inside))
+    with pytest.raises(InputError, match="not an SVG"):
+        drawing_of(b"<!DOCTYPE svg " * 300_000)
+    monkeypatch.setattr("lipmotion.faces.portrait.svg_document.MOST_POINTS", 120)
+    arcs = '<path d="M0 0a1 1 0 011 1"/>'
+    assert len(drawing_of(svg(arcs * 2)).shapes) == 2
+    for inside in (arcs * 3, arcs + '<path d="M0 0' + "z" * 80 + '"/>', arcs * 2 + '<circle r="1"/>'):
+        with pytest.raises(InputError, match="points in all its lines"):
+            drawing_of(svg(inside))
 
 
 @settings(max_examples=150)

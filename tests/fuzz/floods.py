@@ -17,6 +17,10 @@ def _units(count: int) -> Files:
     return {"a.json": json.dumps(GOOD | {"units": units}).encode()}
 
 
+def _drawing(inside: str) -> Files:
+    return {"face.svg": f'<svg viewBox="0 0 9 9">{inside}<g id="mouth-rest"><path d="M0 0h1z"/></g></svg>'.encode()}
+
+
 FLOODS: dict[tuple[str, str], Callable[[], Files]] = {
     ("transcript", "digits"): lambda: {"said.txt": b"9" * 20_000_000},
     ("transcript", "numbers"): lambda: {"said.txt": b"9," * 1_500_000},
@@ -27,6 +31,12 @@ FLOODS: dict[tuple[str, str], Callable[[], Files]] = {
     ("lexicon", "pronunciations of one word"): lambda: {"words.dict": b"baby B EY1 B IY0\n" * 40_000},
     ("lexicon", "phones of one word"): lambda: {"words.dict": b"baby" + b" B" * 1_000_000},
     ("lexicon", "a phone of many letters"): lambda: {"words.dict": b"baby " + b"p," * 10_000},
+    ("drawing", "letters of a transform"): lambda: _drawing(f'<g transform="{"a" * 2_000_000}"/>'),
+    ("drawing", "document types"): lambda: {"face.svg": b"<!DOCTYPE svg [" * 300_000},
+    ("drawing", "arcs of many paths"): lambda: _drawing(f'<path d="M0 0{"a1 1 0 0 1 1 1" * 24_000}"/>' * 20),
+    ("drawing", "points of one path"): lambda: _drawing(f'<path stroke="red" d="M0 0{"h1" * 399_000}"/>'),
+    ("drawing", "subpaths over the picture"): lambda: _drawing(f'<path d="{"M0 0L9 9L9 0z" * 90_000}"/>'),
+    ("drawing", "wide lines"): lambda: _drawing(f'<path stroke="red" stroke-width="99" d="M0 0{"h1" * 99_000}"/>'),
     ("units", "units"): lambda: _units(60_000),
     ("labels", "a word time of many letters"): lambda: {"grid.align": b"0 1 sil\n" + b"9," * 100_000},
     ("labels", "a tier's kind of many letters"): lambda: {"a.TextGrid": TIER % (b"9" * 100_000)},

@@ -28,6 +28,7 @@ MOVIE = bytes.fromhex(
 SAMPLES = {
     **{"a.json": DOCUMENT, "a.npy": ARRAY, "a.npz": ZIP, "a.wav": SOUND, "a.mp4": MOVIE, "a.csv": b"time_s,a\n0,1\n"},
     **{"a.txt": b"Hello, 42 people.\n", "a.flac": b"fLaC" + bytes(40), "empty.json": b"", "empty.txt": b""},
+    **{"a.svg": b'<svg viewBox="0 0 4 4"><path d="M0 0h1v1z"/></svg>', "empty.svg": b""},
     **{"empty.wav": b"", "empty.npy": b"", "empty.npz": b"", "empty.mp4": b""},
 }
 

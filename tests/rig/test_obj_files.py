@@ -104,3 +104,13 @@ def test_a_shape_of_other_vertices_is_refused(tmp_path):
 def test_other_files_are_refused(tmp_path, name):
     with pytest.raises(InputError, match=r"one of \.glb \.gltf \.vrm \.obj"):
         read_character(_obj(tmp_path, QUAD, name))
+
+
+def test_names_that_no_file_has_are_as_missing_ones(tmp_path):
+    for name in ("", "é" * 200, "a" * 5000, "..", "."):
+        mesh = read_obj(_obj(tmp_path, QUAD.replace("look.mtl", name)))
+        assert [part.name for part in mesh.parts] == ["skin"]
+    for name in ("é" * 200, "a" * 5000, ".."):
+        (tmp_path / "look.mtl").write_text(f"newmtl skin\nmap_Kd {name}\nmap_Kd\n", encoding="utf-8")
+        with pytest.warns(UserWarning, match="not in the same folder"):
+            assert read_obj(_obj(tmp_path, QUAD)).parts[0].material.texture is None

@@ -11,6 +11,7 @@ from lipmotion.cli.paths import add_input
 from lipmotion.cli.results import add_result_arguments, check_results, write_results
 from lipmotion.cli.speech import add_lexicon_argument, add_model_argument, add_onto_arguments, add_speaker_argument
 from lipmotion.printable import printable
+from lipmotion.storage.sources import is_file
 
 if TYPE_CHECKING:
     from lipmotion.cli.progress import Report
@@ -39,7 +40,7 @@ def run(options: argparse.Namespace) -> None:
         options.wrong("required: -o FILE, or --voices")
     if not options.voices and (options.words is None) == (options.text is None):
         options.wrong("required: a text, or --text FILE, not both")
-    if options.words is not None and len(options.words) < 256 and Path(options.words).is_file():
+    if options.words is not None and is_file(Path(options.words)):
         options.wrong(f"{options.words} is the name of a file; to say what is in it: --text {options.words}")
     from lipmotion.cli.progress import reporting
     from lipmotion.cli.voices import list_voices

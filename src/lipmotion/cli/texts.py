@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from lipmotion.pipeline.transcribe import read_transcript
 from lipmotion.types import TimedTranscript
+
+LONGEST_NAME, LONGEST_PATH = 255, 1000
+"""Most bytes of the name of a file on any usual system; most letters of an argument that may be a path."""
+_SUFFIX = re.compile(r"\.[A-Za-z]{1,10}")
 
 
 def text_or_file_content(argument: str) -> str | TimedTranscript:
@@ -14,8 +19,19 @@ def text_or_file_content(argument: str) -> str | TimedTranscript:
     Raises InputError: the argument looks like a file name but no such file exists, or the file cannot be read.
     """
     path = Path(argument)
-    looks_like_path = " " not in argument and (path.suffix[1:].isalpha() or _is_in_a_folder(argument))
+    looks_like_path = _may_be_name(argument) and (_SUFFIX.fullmatch(path.suffix) or _is_in_a_folder(argument))
     return read_transcript(path) if looks_like_path or _file_exists(path) else argument
+
+
+def _may_be_name(argument: str) -> bool:
+    """Return whether the system may have a file of that name: no blank in it, and no part too long."""
+    parts = argument.encode("utf-8", "surrogatepass").split(b"/")
+    return (
+        " " not in argument
+        and "\0" not in argument
+        and max(map(len, parts)) <= LONGEST_NAME
+        and len(argument) < LONGEST_PATH
+    )
 
 
 def _is_in_a_folder(argument: str) -> bool:

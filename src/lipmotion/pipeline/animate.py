@@ -42,7 +42,7 @@ from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.motion_files import check_length, in_format, needs_prosody, warn_of_unused
 from lipmotion.pipeline.outlook import outlook_of
 from lipmotion.pipeline.request import SpeechInput, request_of
-from lipmotion.pipeline.scenes import SCENE_SUFFIXES, is_scene, sound_reference, write_scene
+from lipmotion.pipeline.scenes import SCENE_SUFFIXES, check_sound_name, is_scene, sound_reference, write_scene
 from lipmotion.pipeline.speakers import generate_for
 from lipmotion.pipeline.transfer import person_of
 from lipmotion.pipeline.understand import understood_speech
@@ -51,6 +51,7 @@ from lipmotion.rig.blendshape_motion import is_of_blendshapes
 from lipmotion.rig.driven import DrivenCharacter
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.storage.files import as_text, check_distinct, check_target
+from lipmotion.storage.sources import is_file
 from lipmotion.types import (
     Audio,
     Constraints,
@@ -263,6 +264,8 @@ def check_outputs(
         check_target(path, speech)
         if motion_suffix(path) and speech is not None:
             check_length(path, Path(speech), rate_hz, (delivery or Delivery()).offset_ms / 1000)
+        if is_scene(path) and speech is not None:
+            check_sound_name(path, Path(speech))
         check_background(path, staging or Staging())
         if isinstance(shown_face, FilmedFace) and shows_face(path) and path.suffix.lower() != OPAQUE_SUFFIX:
             raise ExportError(f"{path}: filmed faces are written as {OPAQUE_SUFFIX}; name the output so")
@@ -289,7 +292,7 @@ def opened_face(face: str | Path | Face | FilmedFace) -> Face | FilmedFace:
     if Path(face).suffix.lower() == SUFFIX:
         return load_face(face)
     beside = Path(f"{face}{SUFFIX}")
-    if str(face) not in FACES.names and beside.is_file():
+    if str(face) not in FACES.names and is_file(beside):
         raise InputError(f"no drawn face {str(face)!r}; for the filmed face give its file: {beside}")
     return face_named(str(face))
 

@@ -19,6 +19,7 @@ from lipmotion.rig.mesh import Blendshape
 from lipmotion.rig.point_motion import point_motion
 from lipmotion.rig.scene import HeadTurn, Scene
 from lipmotion.rig.shape_names import by_arkit_name
+from lipmotion.rig.usd_text import asset
 from lipmotion.rig.usd_writer import write_usda
 from lipmotion.storage.files import as_text
 from lipmotion.types import Channel, Generation, Motion, Prosody
@@ -151,6 +152,12 @@ def _continued(rotations: NDArray[np.float64]) -> NDArray[np.float64]:
     same = np.einsum("tq,tq->t", rotations[1:], rotations[:-1]) >= 0
     signs = np.concatenate([[1.0], np.cumprod(np.where(same, 1.0, -1.0))])
     return rotations * signs[:, None]
+
+
+def check_sound_name(path: Path, sound: Path) -> None:
+    """Raise ExportError if a scene cannot refer to a sound: its name holds what ``.usda`` cannot."""
+    if path.suffix.lower() == USD:
+        asset(sound_reference(sound, path))
 
 
 def sound_reference(sound: Path, path: Path) -> str:

@@ -25,6 +25,7 @@ from lipmotion.speech.f0 import log_f0
 from lipmotion.speech.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
 from lipmotion.speech.recogniser import RECOGNISER_KINDS, Recogniser, cached_recogniser
 from lipmotion.speech.recognition import Recognition, level_range_db
+from lipmotion.storage.sources import is_file
 from lipmotion.types import (
     Audio,
     Features,
@@ -209,7 +210,7 @@ def _words(
     text = read_transcript(transcript) if isinstance(transcript, Path) else transcript
     if text is None or isinstance(text, TimedTranscript):
         return text
-    if text is transcript and "." in text and not any(map(str.isspace, text)) and Path(text).is_file():
+    if text is transcript and "." in text and not any(map(str.isspace, text)) and is_file(Path(text)):
         raise InputError(f"the transcript {text!r} is the name of a file; give Path({text!r}), or the words themselves")
     check_text(text, duration_s)
     return words_of(text)

@@ -14,7 +14,8 @@ from lipmotion.errors import InputError, shortened
 from lipmotion.rig.limits import MOST_DISPLACEMENTS, MOST_SHAPES, MOST_TRIANGLES, MOST_VERTICES, check_count, file_bytes
 from lipmotion.rig.mesh import MASK, OPAQUE, Blendshape, Material, Mesh, MeshPart
 from lipmotion.rig.textures import read_texture
-from lipmotion.storage.files import whole_file
+from lipmotion.storage.files import as_text, whole_file
+from lipmotion.storage.sources import is_file
 
 NEUTRAL = "neutral"
 """The file of a folder with this word in its name, in any case, is the mesh; the others are its blendshapes."""
@@ -227,12 +228,12 @@ def _text(words: list[bytes]) -> str:
 
 
 def _one_line(text: str) -> str:
-    return " ".join(text.split()) or "part"
+    return as_text(" ".join(text.split())).rstrip("\\") or "part"  # a backslash at the end continues the line
 
 
 def _materials(folder: Path, library: str) -> dict[str, Material]:
     """Return the materials of an MTL file in a folder; none if the name leads elsewhere, or there is no such file."""
-    if not library or Path(library).name != library or not (folder / library).is_file():
+    if not library or Path(library).name != library or not is_file(folder / library):
         return {}
     if (folder / library).stat().st_size > LARGEST_LIBRARY:
         return {}
@@ -259,7 +260,7 @@ def _materials(folder: Path, library: str) -> dict[str, Material]:
 def _with_texture(material: Material, folder: Path, name: str) -> Material:
     """Return a material with the picture of a name, in the same folder; where its pixels are clear, there are holes."""
     texture = None
-    if Path(name).name == name and "\0" not in name and (folder / name).is_file():
+    if Path(name).name == name and is_file(folder / name):
         texture = read_texture(file_bytes(folder / name, "picture"))
     if texture is None:
         warnings.warn(

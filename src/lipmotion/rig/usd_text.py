@@ -9,7 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.errors import ExportError, shortened
+from lipmotion.printable import is_line
+from lipmotion.storage.files import as_text
+
 INDENT = "    "
+_CONTROL = re.compile("[\x00-\x1f\x7f]")
 
 
 def prim(schema: str, name: str, inside: Iterable[str], *, schemas: Sequence[str] = (), **about: str) -> Iterator[str]:
@@ -59,20 +64,32 @@ def prim_names(names: Iterable[str]) -> list[str]:
 
 
 def tokens(names: Iterable[str]) -> str:
-    """Return names as an array of tokens."""
-    escaped = (name.replace("\\", "\\\\").replace('"', '\\"') for name in names)
-    return "[" + ", ".join(f'"{name}"' for name in escaped) + "]"
+    """Return names as an array of tokens; control characters are escaped, surrogates as in Python.
+
+    >>> print(tokens(['a"b', "c\\nd"]))
+    ["a\\"b", "c\\x0ad"]
+    """
+    escaped = (as_text(name).replace("\\", "\\\\").replace('"', '\\"') for name in names)
+    return "[" + ", ".join(f'"{_CONTROL.sub(_hexadecimal, name)}"' for name in escaped) + "]"
+
+
+def _hexadecimal(found: re.Match[str]) -> str:
+    return f"\\x{ord(found[0]):02x}"
 
 
 def asset(path: str) -> str:
     """Return a path from the folder of the file, with slashes, as a reference to a file.
 
-    >>> asset("welcome.flac"), asset("../a@b.wav")
-    ('@./welcome.flac@', '@@@../a@b.wav@@@')
+    Raises ExportError: a name with a line end or another control character, which USD cannot refer to.
+
+    >>> asset("welcome.flac"), asset("../a@b.wav"), asset("a@@@b.wav")
+    ('@./welcome.flac@', '@@@../a@b.wav@@@', '@@@./a\\\\@@@b.wav@@@')
     """
+    if not is_line(path):
+        raise ExportError(f"the name {shortened(path)!r} has a character that .usda cannot refer to; rename the file")
     mark = "@@@" if "@" in path else "@"
     absolute = path.startswith(("/", "../")) or ":" in path
-    return f"{mark}{path if absolute else './' + path}{mark}"
+    return mark + ("" if absolute else "./") + path.replace("@@@", "\\@@@") + mark
 
 
 def whole(values: NDArray[Any]) -> str:

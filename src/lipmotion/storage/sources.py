@@ -75,6 +75,12 @@ def is_folder(path: Path) -> bool:
     return status is not None and stat.S_ISDIR(status.st_mode)
 
 
+def is_file(path: Path) -> bool:
+    """Return whether a file exists; False also for names that are not valid, as empty ones and those too long."""
+    status = _status(path)
+    return status is not None and stat.S_ISREG(status.st_mode)
+
+
 def is_same(path: str | Path, other: str | Path) -> bool:
     """Return whether two names, links followed, are of one existing file or folder."""
     one, two = _status(path), _status(other)

@@ -7,7 +7,7 @@ from pathlib import PurePosixPath
 from random import Random
 
 from fuzz.inputs import Files
-from fuzz.mutators import arrays, boxes, json_text, raw, riff, text, zips
+from fuzz.mutators import arrays, boxes, json_text, raw, riff, text, xml_text, zips
 
 Mutate = Callable[[Random, bytes], bytes]
 
@@ -27,7 +27,7 @@ FORMS: dict[str, tuple[Mutate, ...]] = {
     ".align": (text.change, text.change, text.change),
     ".lab": (text.change, text.change, text.change),
     ".TextGrid": (text.change, text.change, text.change),
-    ".svg": (text.change, text.change, text.change),
+    ".svg": (xml_text.change, xml_text.change, text.change),
     ".dict": (text.change, text.change, text.change),
 }
 """By suffix; the bytes of any file are changed as well."""

@@ -13,6 +13,7 @@ from itertools import islice, takewhile
 
 from lipmotion.export.cues.shapes import REST, SHAPES
 from lipmotion.export.cues.sheet import CueSheet
+from lipmotion.printable import is_line, printable
 
 NEARLY_WHOLE = 0.01
 """A rate that is so little over a whole one counts as that."""
@@ -32,7 +33,12 @@ def text(sheet: CueSheet, sound_file: str) -> str:
     shown = shown_shapes(sheet)
     phrases = [words_of_run(sheet, first, last) for first, last in _runs(shown)]
     said = [" ".join(word for *_, word in phrase) for phrase in phrases]
-    lines = ["lipsync version 1", " ".join(sound_file.split()) or "sound.wav", f"{sheet.fps:.0f}", f"{len(shown)}"]
+    lines = [
+        "lipsync version 1",
+        _one_line(" ".join(sound_file.split())) or "sound.wav",
+        f"{sheet.fps:.0f}",
+        f"{len(shown)}",
+    ]
     lines += ["1", "\tVoice 1", f"\t{'|'.join(said)}", f"\t{len(phrases)}"]
     for phrase, words in zip(phrases, said, strict=True):
         lines += [f"\t\t{words}", f"\t\t{phrase[0][0]}", f"\t\t{phrase[-1][1]}", f"\t\t{len(phrase)}"]
@@ -64,7 +70,7 @@ def words_of_run(sheet: CueSheet, first: int, last: int) -> list[Part]:
     for span in takewhile(lambda span: int(span.start_s * sheet.fps) <= last, islice(spans, begin, None)):
         start = int(span.start_s * sheet.fps)
         start = first if not parts else max(start, first)
-        word = "".join(span.label.split()) or UNKNOWN
+        word = _one_line("".join(span.label.split())) or UNKNOWN
         if parts and start <= parts[-1][0]:
             parts[-1] = (parts[-1][0], last, f"{parts[-1][2]}-{word}")
             continue
@@ -72,6 +78,12 @@ def words_of_run(sheet: CueSheet, first: int, last: int) -> list[Part]:
             parts[-1] = (parts[-1][0], start - 1, parts[-1][2])
         parts.append((start, last, word))
     return parts or [(first, last, UNKNOWN)]
+
+
+def _one_line(text: str) -> str:
+    """Return a text without what ends a line here: ``|``, or control characters, which are shown as escapes."""
+    text = text.replace("|", "/")
+    return text if is_line(text) else printable(text)
 
 
 def _runs(shown: list[str]) -> list[tuple[int, int]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping
 from importlib import resources
@@ -32,20 +31,20 @@ from __future__ import annotations
 
 
 def write(path: Path, generation: Generation, source: Mapping[str, str], _model: Mapping[str, str]) -> None:
-    """Write the code of the add-on, the curves, and a call that keys them."""
+    """Write the code of the add-on, the curves, and a call that keys them; names are literals of Python in ASCII."""
     motion = generation.motion
     folder = resources.files("lipmotion.addons.blender")
     texts = [folder.joinpath(name).read_text(encoding="utf-8") for name in MODULES]
     *code, main = (_IMPORT.sub("", _BEGINNING.sub("", text)) for text in texts)
     with path.open("w", encoding="utf-8", newline="\n") as file:
         file.write(_HEAD + "".join(each.strip() + "\n\n\n" for each in code))
-        file.write(f"RATE_HZ = {motion.rate_hz!r}\nSOUND = {json.dumps(source.get('path', ''))}\n")
+        file.write(f"RATE_HZ = {motion.rate_hz!r}\nSOUND = {source.get('path', '')!a}\n")
         file.write(f"SOUND_S = {float(source.get('start_s', 0.0))!r}\n")
-        stepped = "".join(f"{json.dumps(name)}, " for name in motion.names if name in generation.stepped)
+        stepped = "".join(f"{name!a}, " for name in motion.names if name in generation.stepped)
         file.write(f"STEPPED = ({stepped})\nMOTION = {{\n")
         for name in motion.names:
             values = ", ".join(f"{value + 0.0:.{DECIMALS}g}" for value in motion[name].tolist())
-            file.write(f"    {json.dumps(name)}: [{values}],\n")
+            file.write(f"    {name!a}: [{values}],\n")
         file.write("}\n" + main.split(COPIED)[1] + '\n\nif __name__ == "__main__":\n    main()\n')
 
 

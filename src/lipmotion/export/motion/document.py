@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, shortened
+from lipmotion.printable import is_line
 from lipmotion.types import Channel, Generation, Motion, Span, Timeline, Unit
 
 FORMAT = "lipmotion.motion"
@@ -95,6 +96,9 @@ def _row(span: Span[Unit]) -> dict[str, Any]:
 def _span(row: Any) -> Span[Unit]:
     start_s, end_s = float(row["start_s"]), float(row["end_s"])
     span = Span(start_s, end_s, Unit(str(row["phone"]), str(row.get("unit", "")), str(row.get("word", ""))))
+    if not is_line(span.label.phone + span.label.unit + span.label.word):
+        label = shortened(repr(span.label))
+        raise InputError(f"{label} has a line end, a control character or half a character in it; correct it")
     if not span.start_s >= 0 or span.end_s == float("inf"):
         raise InputError(
             f"the unit {span.label.phone!r} lasts from {span.start_s} to {span.end_s} s, required: finite times from 0"

@@ -41,10 +41,13 @@ def check(motion: Motion) -> None:
         raise ExportError(f"{len(motion.values)} frames, required at most {MOST_FRAMES} in .c3d; write a lower --rate")
     if not len(motion.values):
         raise ExportError("the motion has no frames, required at least one in .c3d")
-    for name in motion.names:
-        if not (name.isascii() and name.isprintable() and len(name) <= LONGEST_LABEL):
+    if "" in motion.names:
+        raise ExportError("a channel has no name, required one in .c3d; write .json or .npz")
+    for text in [text for channel in motion.channels for text in (channel.name, channel.unit)]:
+        if not (text.isascii() and text.isprintable() and text == text.strip() and len(text) <= LONGEST_LABEL):
             raise ExportError(
-                f"the channel name {name[:60]!r} does not fit into .c3d, required up to 64 ASCII characters"
+                f"the name or unit {text[:60]!r} of a channel does not fit into .c3d, required up to 64 ASCII "
+                "characters, without blanks at its ends"
             )
     points = len(_points(motion))
     if max(len(motion.names) - 3 * points, points + len(EYES)) > MOST_CURVES:

@@ -40,6 +40,8 @@ def check(motion: Motion) -> None:
     for name in motion.names:
         if set(name) & set(',;"') or not name.isprintable():
             raise ExportError(f"the channel name {shortened(name)!r} does not fit in a table; write .json or .npz")
+    if len(",".join(["time_s", *motion.names])) >= LONGEST_HEAD:
+        raise ExportError(f"the channel names do not fit in a line of {LONGEST_HEAD} letters; write .json or .npz")
 
 
 def write(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:

@@ -33,7 +33,9 @@ def check(motion: Motion) -> None:
     """Raise ExportError if motion holds anything but these parameters."""
     others = [name for name in motion.names if _number(name) is None]
     if others or not motion.names:
-        raise ExportError(f"no parameters of MPEG-4 but {', '.join(others[:4]) or 'nothing'}; write .json")
+        raise ExportError(f"no parameters of MPEG-4 but {shortened(', '.join(others[:4])) or 'nothing'}; write .json")
+    if len({_number(name) for name in motion.names}) < len(motion.names):
+        raise ExportError("two channels are the same parameter of MPEG-4, required each once; write .json")
 
 
 def write(path: Path, generation: Generation, source: Mapping[str, str], _model: Mapping[str, str]) -> None:
@@ -98,7 +100,9 @@ def _frames(lines: Iterator[str], count: int) -> tuple[NDArray[np.int32], NDArra
 def _number(name: str) -> int | None:
     """Return the number of a parameter by the name of its channel, or None."""
     digits = name.removeprefix("fap").partition("_")[0]
-    fitting = name.startswith("fap") and digits.isdecimal() and len(MANY_VALUES) < int(digits) <= COUNT
+    fitting = (
+        name.startswith("fap") and digits.isascii() and digits.isdecimal() and len(MANY_VALUES) < int(digits) <= COUNT
+    )
     return int(digits) if fitting else None
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from copy import copy
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple, final
@@ -10,7 +11,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, shortened
 from lipmotion.faces.base import SCENE, TRANSPARENT, Face, Staging
 from lipmotion.faces.portrait.frames import face_poses
 from lipmotion.faces.portrait.movement import PIVOT_Y, HeadPlacement
@@ -70,13 +71,15 @@ class LayeredFace(Face):
         unknown = sorted(name for name in names if name.startswith(MOUTH) and name[len(MOUTH) :] not in MOUTHS)
         if unknown:
             known = ", ".join(MOUTH + name for name in MOUTHS)
-            raise InputError(f"{path}: unknown layer {unknown[0]!r}; the mouths are: {known}")
+            raise InputError(f"{path}: unknown layer {shortened(unknown[0])!r}; the mouths are: {known}")
         if "rest" not in self.mouths:
             raise InputError(f"{path}: no layer {MOUTH}rest; name the group of the closed mouth so")
 
     def staged(self, staging: Staging, prosody: Prosody | None = None) -> LayeredFace:
         """Return the same drawing with other settings; ``prosody`` is of the speech that will be rendered."""
-        return LayeredFace(self.path, staging, prosody)
+        other = copy(self)
+        other.staging, other.prosody = staging, prosody
+        return other
 
     def render(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> Iterator[NDArray[np.uint8]]:  # noqa: D102
         poses = face_poses(motion, units, fps, self.staging, self.prosody)

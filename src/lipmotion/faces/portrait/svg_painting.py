@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,8 @@ from lipmotion.faces.portrait.svg_document import Shape
 
 Pixels = NDArray[np.float32]
 """Premultiplied colour 0..255 and cover 0..1 [shape=(H, W, 4)]."""
+Lines = Sequence[tuple[NDArray[np.float64], bool]]
+"""Points in pixels [shape=(N, 2)], and whether each line returns to its beginning."""
 SUPERSAMPLING = 3
 
 
@@ -30,9 +33,11 @@ def painted(
             for line in shape.lines
         ]
         if shape.fill is not None and shape.opacities[0] > 0:
-            _lay(layer, _filled(lines, shape.even_odd, width, height), shape.fill, shape.opacities[0])
+            _lay(layer, lines, partial(_filled, even_odd=shape.even_odd), shape.fill, shape.opacities[0])
         if shape.stroke is not None and shape.opacities[1] > 0 and shape.width > 0:
-            _lay(layer, _stroked(lines, shape.width * scale, width, height), shape.stroke, shape.opacities[1])
+            thickness = min(shape.width * scale, 2 * height)
+            drawn = partial(_stroked, thickness=thickness)
+            _lay(layer, lines, drawn, shape.stroke, shape.opacities[1], margin=thickness / 2)
     return layer
 
 
@@ -41,33 +46,58 @@ def over(above: Pixels, below: Pixels) -> Pixels:
     return np.asarray(above + (1 - above[..., 3:]) * below, np.float32)
 
 
-def _lay(layer: Pixels, mask: Pixels, colour: tuple[int, int, int], opacity: float) -> None:
-    cover = opacity * mask[..., None]
-    layer += cover * (np.array([*colour, 1], np.float32) - layer)
+def _lay(
+    layer: Pixels,
+    lines: Lines,
+    drawn: Callable[[Lines, int, int], Pixels],
+    colour: tuple[int, int, int],
+    opacity: float,
+    margin: float = 0.0,
+) -> None:
+    """Paint lines on a layer, with how ``drawn`` covers a window around them that is ``margin`` pixels wider."""
+    if not lines:
+        return
+    height, width = layer.shape[:2]
+    left, top, right, bottom = _window(np.vstack([points for points, _ in lines]), margin, width, height)
+    if left < right and top < bottom:
+        part = layer[top:bottom, left:right]
+        inside = [(points - (left, top), closed) for points, closed in lines]
+        cover = opacity * drawn(inside, right - left, bottom - top)[..., None]
+        part += cover * (np.array([*colour, 1], np.float32) - part)
 
 
-def _filled(lines: Sequence[tuple[NDArray[np.float64], bool]], even_odd: bool, width: int, height: int) -> Pixels:
+def _window(points: NDArray[np.float64], margin: float, width: int, height: int) -> tuple[int, int, int, int]:
+    """Return the whole pixels around points that are in a picture: left, top, right, bottom."""
+    left, top = np.floor(points.min(axis=0) - margin - 1)
+    right, bottom = np.ceil(points.max(axis=0) + margin + 1)
+    return max(int(left), 0), max(int(top), 0), min(int(right), width), min(int(bottom), height)
+
+
+def _filled(lines: Lines, width: int, height: int, *, even_odd: bool) -> Pixels:
     """Return the cover of the inside of subpaths, 0..1 [shape=(height, width)]."""
     from PIL import Image, ImageDraw
 
     winding = np.zeros((height * SUPERSAMPLING, width * SUPERSAMPLING), np.int16)
     for points, _ in lines:
-        if len(points) > 2:
-            large = Image.new("L", winding.shape[::-1])
-            ImageDraw.Draw(large).polygon([tuple(p) for p in (points * SUPERSAMPLING - 0.5).tolist()], fill=1)
+        left, top, right, bottom = _window(points, 0.0, width, height)
+        if len(points) > 2 and left < right and top < bottom:
+            large = Image.new("L", ((right - left) * SUPERSAMPLING, (bottom - top) * SUPERSAMPLING))
+            corners = ((points - (left, top)) * SUPERSAMPLING - 0.5).tolist()
+            ImageDraw.Draw(large).polygon([tuple(p) for p in corners], fill=1)
             x, y = points.T
             turns = 1 if np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) >= 0 else -1
-            winding += turns * np.asarray(large, np.int16)
+            rows, columns = (slice(a * SUPERSAMPLING, b * SUPERSAMPLING) for a, b in ((top, bottom), (left, right)))
+            winding[rows, columns] += turns * np.asarray(large, np.int16)
     inside = winding % 2 != 0 if even_odd else winding != 0
     return _reduced(inside)
 
 
-def _stroked(lines: Sequence[tuple[NDArray[np.float64], bool]], thickness: float, width: int, height: int) -> Pixels:
+def _stroked(lines: Lines, width: int, height: int, *, thickness: float) -> Pixels:
     """Return the cover of lines with round ends and corners, 0..1 [shape=(height, width)]."""
     from PIL import Image, ImageDraw
 
     large = Image.new("L", (width * SUPERSAMPLING, height * SUPERSAMPLING))
-    draw, thick = ImageDraw.Draw(large), max(1, round(min(thickness, 2 * height) * SUPERSAMPLING))
+    draw, thick = ImageDraw.Draw(large), max(1, round(thickness * SUPERSAMPLING))
     for points, closed in lines:
         path = np.vstack([points, points[:1]]) if closed else points
         at = [tuple(p) for p in (path * SUPERSAMPLING - 0.5).tolist()]

@@ -1,8 +1,9 @@
-"""Paths and transforms of SVG as arrays of points."""
+"""Paths, points and transforms of SVG as arrays, each read in one pass."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
@@ -13,17 +14,24 @@ from lipmotion.errors import InputError, shortened
 Points = NDArray[np.float64]
 STEPS = 12
 """Points for each Bézier curve, and for a quarter of an ellipse."""
-MOST_NUMBERS = 200_000
+MOST_POINTS = 400_000
+"""Most points of all lines of a drawing; a curve has ``STEPS``, an arc four times as many."""
+MOST_TRANSFORMS = 20
+"""Most transforms one after another in one attribute."""
 LARGEST = 1e6
 """Largest magnitude of a number in a drawing."""
-_TOKEN = re.compile(r"([MmLlHhVvCcSsQqTtAaZz])|([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")
+_NUMBER = re.compile(r"[\s,]*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)")
+_FLAG = re.compile(r"[\s,]*([01])")
+_LETTER = re.compile(r"[\s,]*([MmLlHhVvCcSsQqTtAaZz])")
+_BLANK = re.compile(r"[\s,]*")
 _COUNTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
+_POINTS = {"C": STEPS, "S": STEPS, "Q": STEPS, "T": STEPS, "A": 4 * STEPS}
 
 
-def path_lines(text: str) -> list[tuple[Points, bool]]:
+def path_lines(text: str, most: int = MOST_POINTS) -> list[tuple[Points, bool]]:
     """Return the subpaths of a path's ``d``: points [shape=(N, 2)], and whether each returns to its beginning.
 
-    Raises InputError: not a path.
+    Raises InputError: not a path, or one of more than ``most`` points.
     """
     lines: list[tuple[Points, bool]] = []
     current: list[Points] = []
@@ -37,6 +45,8 @@ def path_lines(text: str) -> list[tuple[Points, bool]]:
 
     for letter, numbers in _commands(text):
         kind, relative = letter.upper(), letter.islower()
+        most -= _POINTS.get(kind, 1)
+        check_points(most)
         if kind == "Z":
             finish(True)
             at = start
@@ -75,29 +85,43 @@ def path_lines(text: str) -> list[tuple[Points, bool]]:
     return lines
 
 
-def _commands(text: str) -> list[tuple[str, list[float]]]:
-    tokens = _TOKEN.findall(text)
-    if len(tokens) > MOST_NUMBERS or re.sub(r"[\s,]", "", _TOKEN.sub("", text)):
-        raise InputError(f"a path of {len(tokens)} parts cannot be read: {shortened(text)!r}")
-    commands: list[tuple[str, list[float]]] = []
-    letter, numbers = "", []
-    for name, number in [*tokens, ("Z", "")]:
-        if number:
-            numbers.append(within(float(number), text))
-            if letter and letter not in "Zz" and len(numbers) == _COUNTS[letter.upper()]:
-                commands.append((letter, numbers))
-                letter, numbers = {"M": "L", "m": "l"}.get(letter, letter), []
-            elif not letter or letter in "Zz":
-                raise InputError(f"a path has a number without a command: {shortened(text)!r}")
-            continue
-        if numbers:
-            raise InputError(f"a path ends within a command: {shortened(text)!r}")
-        letter = name
-        if letter in "Zz":
-            commands.append((letter, []))
-    if commands and commands[0][0] not in "Mm" and len(commands) > 1:
-        raise InputError(f"a path does not begin with M: {shortened(text)!r}")
-    return commands[:-1]
+def check_points(left: int) -> None:
+    """Raise InputError if so many more points are fewer than none."""
+    if left < 0:
+        raise InputError(f"more than {MOST_POINTS} points in all its lines; simplify the paths")
+
+
+def _commands(text: str) -> Iterator[tuple[str, list[float]]]:
+    """Yield the commands of a path with their numbers; a repeated one has its letter again."""
+    letter, place = "", _end_of_blanks(text, 0)
+    while place < len(text):
+        found = _LETTER.match(text, place)
+        if found:
+            if not letter and found[1] not in "Mm":
+                raise InputError(f"a path does not begin with M: {shortened(text)!r}")
+            letter, place = found[1], found.end()
+        elif not letter or letter in "Zz":
+            what = "a number without a command" if _NUMBER.match(text, place) else "what cannot be read"
+            raise InputError(f"a path has {what}: {shortened(text[place:])!r}")
+        else:
+            letter = {"M": "L", "m": "l"}.get(letter, letter)
+        numbers = []
+        for n in range(_COUNTS[letter.upper()]):
+            pattern = _FLAG if letter in "Aa" and n in (3, 4) else _NUMBER
+            found = pattern.match(text, place)
+            if not found:
+                rest = text[_end_of_blanks(text, place) :]
+                wrong = f"cannot be read at {shortened(rest)!r}" if rest and not _LETTER.match(rest) else ""
+                raise InputError(f"a path {wrong or f'ends within a command: {shortened(text)!r}'}")
+            numbers.append(within(float(found[1]), text))
+            place = found.end()
+        yield letter, numbers
+        place = _end_of_blanks(text, place)
+
+
+def _end_of_blanks(text: str, place: int) -> int:
+    found = _BLANK.match(text, place)
+    return found.end() if found else place
 
 
 def _controls(kind: str, points: Points, smooth: Points) -> list[Points]:
@@ -146,14 +170,23 @@ def within(number: float, text: str) -> float:
     return number
 
 
-def points_of(text: str) -> Points:
-    """Return the points of a polygon [shape=(N, 2)]. Raises InputError: an odd count, or no numbers."""
-    try:
-        numbers = [float(part) for part in re.split(r"[\s,]+", text.strip()) if part]
-    except ValueError as error:
-        raise InputError(f"points are {shortened(text)!r}, required numbers") from error
-    for number in numbers:
-        within(number, text)
+def numbers_of(text: str, most: int, name: str) -> list[float]:
+    """Return the numbers of a list. Raises InputError, with its name: not numbers, or more than ``most``."""
+    numbers: list[float] = []
+    place = 0
+    while found := _NUMBER.match(text, place):
+        if len(numbers) == most:
+            raise InputError(f"{name} is {shortened(text)!r}, required at most {most} numbers")
+        numbers.append(within(float(found[1]), text))
+        place = found.end()
+    if _end_of_blanks(text, place) < len(text):
+        raise InputError(f"{name} is {shortened(text)!r}, required numbers")
+    return numbers
+
+
+def points_of(text: str, most: int = MOST_POINTS) -> Points:
+    """Return the points of a polygon [shape=(N, 2)]. Raises InputError: an odd count, no numbers, or too many."""
+    numbers = numbers_of(text, 2 * most, "points")
     if len(numbers) % 2 or len(numbers) < 4:
         raise InputError(f"points have {len(numbers)} numbers, required pairs, two at least")
     return np.array(numbers).reshape(-1, 2)
@@ -168,6 +201,8 @@ def circle(x: float, y: float, radius_x: float, radius_y: float) -> Points:
 def rectangle(x: float, y: float, width: float, height: float, radius: float) -> Points:
     """Return a rectangle with round corners [shape=(N, 2)]."""
     radius = min(max(radius, 0), width / 2, height / 2)
+    if radius <= 0:
+        return np.array([[x + width, y + height], [x, y + height], [x, y], [x + width, y]])
     corners = [(x + width - radius, y + height - radius), (x + radius, y + height - radius), (x + radius, y + radius)]
     corners.append((x + width - radius, y + radius))
     quarter = np.linspace(0, np.pi / 2, STEPS + 1)
@@ -179,14 +214,26 @@ def rectangle(x: float, y: float, width: float, height: float, radius: float) ->
 
 
 def transform_of(text: str) -> Points:
-    """Return the matrix of a ``transform`` [shape=(3, 3)]. Raises InputError: not a transform."""
+    """Return the matrix of a ``transform`` [shape=(3, 3)]. Raises InputError: not a transform, or what enlarges more
+    than ``LARGEST`` times."""
     matrix = np.eye(3)
-    for name, inside in re.findall(r"(\w+)\s*\(([^)]*)\)", text):
+    *calls, rest = text.split(")", MOST_TRANSFORMS)
+    if rest.strip():
+        raise InputError(f"the transform {shortened(rest)!r} cannot be read, required at most {MOST_TRANSFORMS}")
+    for call in calls:
+        name, _, inside = call.strip(", \t\r\n").partition("(")
         try:
-            numbers = [within(float(part), text) for part in re.split(r"[\s,]+", inside.strip()) if part]
-            matrix = matrix @ _transform(name, numbers)
+            one = _transform(name.rstrip(), numbers_of(inside, 6, name))
         except (ValueError, IndexError, KeyError) as error:
-            raise InputError(f"the transform {shortened(f'{name}({inside})')!r} cannot be read") from error
+            raise InputError(f"the transform {shortened(call + ')')!r} cannot be read") from error
+        matrix = bounded(matrix @ one)
+    return matrix
+
+
+def bounded(matrix: Points) -> Points:
+    """Return a matrix of transforms. Raises InputError: it enlarges or moves beyond ``LARGEST``."""
+    if not np.abs(matrix).max() <= LARGEST:
+        raise InputError(f"transforms in one another enlarge beyond {LARGEST:g} times")
     return matrix
 
 
@@ -201,8 +248,7 @@ def _transform(name: str, n: list[float]) -> Points:
     if name == "rotate":
         cos, sin = np.cos(np.radians(n[0])), np.sin(np.radians(n[0]))
         x, y = n[1:3] if len(n) > 2 else (0.0, 0.0)
-        turned = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]])
-        return _transform("translate", [x, y]) @ turned @ _transform("translate", [-x, -y])
+        return np.array([[cos, -sin, x - cos * x + sin * y], [sin, cos, y - sin * x - cos * y], [0, 0, 1]])
     skews = {"skewX": (0, 1), "skewY": (1, 0)}
     matrix = np.eye(3)
     matrix[skews[name]] = np.tan(np.radians(n[0]))
