@@ -32,13 +32,12 @@ def citations(name: str) -> str:
     from lipmotion.engines import ENGINES
     from lipmotion.errors import InputError
     from lipmotion.pipeline.model import read_header
-    from lipmotion.storage.sources import is_file
 
     if name in ENGINES.names:
         return engine_citations(name)
     if name in bibliography():
         return bibliography()[name]
-    if not is_file(Path(name)):
+    if not Path(name).exists():
         known = ", ".join((*ENGINES.names, *bibliography()))
         raise InputError(f"nothing to cite is called {name!r}; give a model file, or one of: {known}")
     return model_citations(read_header(Path(name)))
