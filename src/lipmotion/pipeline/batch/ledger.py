@@ -221,8 +221,9 @@ def _name_in(row: bytes) -> str | None:
 
 def _check_own(place: Place) -> None:
     """Raise ExportError if what a batch writes for itself would be written elsewhere, or into what is no file."""
-    if place.own.is_symlink():
-        raise ExportError(f"{place.own}: is a link, required a folder; remove it, or give another folder")
+    for path in (place.own, *(place.own.iterdir() if place.own.is_dir() else ())):
+        if path.is_symlink():
+            raise ExportError(f"{path}: is a link, where a batch keeps its unfinished work; remove it")
     for path in (Path(place.out) / name for name in OWN_FILES):
         if path.is_symlink() or (path.exists() and not path.is_file()):
             raise ExportError(
