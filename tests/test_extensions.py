@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import re
+import sys
+from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
 
 import pytest
 
+from lipmotion.cli.outcome import outcome
 from lipmotion.corpora.discover import READERS
 from lipmotion.engines import ENGINES, Engine, engine_named
 from lipmotion.errors import ExportError, InputError
@@ -37,7 +41,7 @@ def test_names_and_loading(installed: None) -> None:  # noqa: ARG001
     with pytest.raises(InputError, match="no thing 'other'; there are: built, broken, text"):
         registry.load("other")
     with pytest.raises(
-        InputError, match=r"'broken' of the package 'no_such_module_at_all' cannot be imported: No module"
+        InputError, match=r"'broken' cannot be imported from the package .*_at_all:x of kind\): .*No mod"
     ):
         registry.load("broken")
 
@@ -62,3 +66,69 @@ def test_what_is_of_another_kind_is_refused(tmp_path: Path, monkeypatch: pytest.
         face_named("wrong")
     with pytest.raises(ExportError, match=r"cannot write motion as '\.wrong'"):
         check_motion(tmp_path / "a.wrong", example(("aa",)).motion)
+
+
+PLUGINS = {
+    "quits": "import sys; sys.exit()",
+    "quits well": "import sys; sys.exit(0)",
+    "stops": "raise SystemExit('no licence')",
+    "raises": "1 / 0",
+    "is closed": "raise GeneratorExit",
+    "is no Python": "def",
+    "is empty": "",
+}
+
+
+@pytest.fixture
+def plugin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str, str], Registry[object]]:
+    """Returns a registry of one installed package, whose module ``odd_plugin`` holds a text."""
+
+    def install(text: str, value: str = "odd_plugin:x") -> Registry[object]:
+        (tmp_path / "odd_plugin.py").write_text(text)
+        (tmp_path / "odd_name-1.0.dist-info").mkdir(exist_ok=True)
+        (tmp_path / "odd_name-1.0.dist-info" / "METADATA").write_text(
+            "Metadata-Version: 2.1\nName: odd-name\nVersion: 1.0\n"
+        )
+        (tmp_path / "odd_name-1.0.dist-info" / "entry_points.txt").write_text(f"[lipmotion.faces]\nodd = {value}\n")
+        monkeypatch.syspath_prepend(tmp_path)
+        monkeypatch.setattr(sys, "dont_write_bytecode", True)
+        monkeypatch.delitem(sys.modules, "odd_plugin", raising=False)
+        return Registry("face", "lipmotion.faces", {})
+
+    return install
+
+
+def test_whatever_a_package_does_when_it_is_imported_is_one_error(plugin) -> None:
+    for what, text in PLUGINS.items():
+        with pytest.raises(InputError, match=r"package 'odd-name' \(entry point odd = odd_plugin:x of lipm.*remove it"):
+            pytest.fail(f"{what}: {plugin(text).load('odd')}")
+    with pytest.raises(KeyboardInterrupt):
+        plugin("raise KeyboardInterrupt").load("odd")
+
+
+def test_malformed_entry_points_are_named(plugin) -> None:
+    for value in ("", "::", "odd plugin", "odd_plugin:x y", "odd_plugin:", "1/0", "odd_plugin:x.y"):
+        with pytest.raises(
+            InputError, match=rf"'odd-name' \(entry point odd = {re.escape(value)} of lipmotion.faces\)"
+        ):
+            pytest.fail(f"{value}: {plugin('x = 1', value).load('odd')}")
+    with pytest.raises(InputError, match=r"entry_points.txt of the package 'odd-name' cannot be read: .*install the"):
+        pytest.fail(str(plugin("x = 1", "odd_plugin:x\nno equals sign").names))
+
+
+def test_what_a_package_prints_is_no_output(plugin, capsys: pytest.CaptureFixture[str]) -> None:
+    assert plugin("print('hello'); x = 1").load("odd") == 1
+    assert capsys.readouterr() == ("", "hello\n")
+
+
+def test_what_fails_in_a_package_is_told_from_a_bug(plugin) -> None:
+    called = plugin("import sys\ndef x(how):\n    return 1 / 0 if how else sys.exit()\n").load("odd")
+    for how, said in ((1, "ZeroDivisionError: division by zero"), (0, "SystemExit")):
+        with pytest.raises((ZeroDivisionError, SystemExit)) as caught:
+            called(how)  # type: ignore[operator]
+        code, message = outcome(caught.value) or (0, "")
+        assert code == 3
+        assert re.search(rf"'odd-name' .* failed: {said} \(.*odd_plugin.py, line 3\); tell its authors", message)
+    with pytest.raises(ZeroDivisionError) as own:
+        1 / 0  # noqa: B018
+    assert outcome(own.value) is None

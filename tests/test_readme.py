@@ -34,7 +34,7 @@ def needs_training(command: list[str]) -> bool:
 def run(command: list[str], folder: Path) -> str:
     if command[0] == "lipmotion":
         command = [*LIPMOTION, *command[1:]]
-    return run_child(command, folder=folder, check=True, limit_s=300).stdout
+    return run_child(command, folder=folder, check=True).stdout
 
 
 @pytest.fixture

@@ -7,15 +7,21 @@ the name can be used wherever the name of a built-in engine can be used.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import redirect_stdout
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module, metadata
+from traceback import walk_tb
 from typing import Generic, TypeVar
 
 from lipmotion.errors import InputError
 
 ExtensionT = TypeVar("ExtensionT")
+GROUPS = ("lipmotion.engines", "lipmotion.faces", "lipmotion.exporters", "lipmotion.corpus_readers")
+"""Every group of entry points that is read."""
+OWN = {"lipmotion", "argparse"}
 SOURCE = "source"
 """What stands for the version where lipmotion is not installed."""
 
@@ -47,7 +53,7 @@ class Registry(Generic[ExtensionT]):
         return (*self.built_in, *sorted(set(self._installed) - set(self.built_in)))
 
     def load(self, name: str) -> ExtensionT:
-        """Import an extension and return it.
+        """Import an extension and return it; what it prints meanwhile goes to standard error.
 
         Raises InputError: no extension has this name, or the package that adds it cannot be imported.
         """
@@ -59,15 +65,61 @@ class Registry(Generic[ExtensionT]):
             raise InputError(f"no {self.kind} {name!r}; there are: {', '.join(self.names)}")
         entry = self._installed[name]
         try:
-            added: ExtensionT = entry.load()
-        except Exception as error:
-            package = entry.dist.name if entry.dist is not None else entry.module
+            with redirect_stdout(sys.stderr):
+                added: ExtensionT = entry.load()
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # also sys.exit(), which would end the program without a word
             raise InputError(
-                f"the {self.kind} {name!r} of the package {package!r} cannot be imported: {error}; install a version "
-                "of the package that works with this lipmotion, or remove it"
+                f"the {self.kind} {name!r} cannot be imported from the {_origin(entry)}: {_said(error)}; install a "
+                "version of the package that works with this lipmotion, or remove it"
             ) from error
         return added
 
     @cached_property
     def _installed(self) -> Mapping[str, metadata.EntryPoint]:
-        return {entry.name: entry for entry in metadata.entry_points(group=self.group)}
+        return {entry.name: entry for entry in _entries(self.group)}
+
+
+def failed_extension(error: BaseException) -> str | None:
+    """Return a message for an error that came out of the code of an extension; None: it did not.
+
+    An extension is recognised by the first part of its module's name.
+    """
+    frames = [
+        (str(frame.f_globals.get("__name__")).partition(".")[0], frame.f_code.co_filename, line)
+        for frame, line in walk_tb(error.__traceback__)
+    ]
+    modules = {module for module, _, _ in frames} - OWN
+    for entry in (entry for group in GROUPS if modules for entry in _entries(group)):
+        package = entry.value.partition(":")[0].partition(".")[0].strip()
+        if package in modules:
+            _, file, line = next(frame for frame in reversed(frames) if frame[0] == package)
+            return f"the {_origin(entry)} failed: {_said(error)} ({file}, line {line}); tell its authors, or remove it"
+    return None
+
+
+def _entries(group: str) -> Iterator[metadata.EntryPoint]:
+    """Yield the entry points of a group. Raises InputError: those of a package cannot be read."""
+    try:
+        yield from metadata.entry_points(group=group)
+    except Exception as error:  # what importlib says does not name the package
+        for distribution in metadata.distributions():
+            try:
+                list(distribution.entry_points)
+            except Exception as reason:
+                raise InputError(
+                    f"entry_points.txt of the package {distribution.metadata['Name']!r} cannot be read: "
+                    f"{_said(reason)}; install the package again, or remove it"
+                ) from error
+        raise
+
+
+def _origin(entry: metadata.EntryPoint) -> str:
+    """Return what tells an entry point from all others: its package, its name and its value."""
+    package = "" if entry.dist is None else f" {entry.dist.metadata['Name']!r}"
+    return f"package{package} (entry point {entry.name} = {entry.value} of {entry.group})"
+
+
+def _said(error: BaseException) -> str:
+    return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import os
+import shlex
 import sys
 from argparse import Namespace
 from contextlib import suppress
@@ -146,7 +147,10 @@ def test_an_error_on_the_command_line_is_a_failure_too(run: RunCommand) -> None:
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no /dev/full here")  # noqa: PTH110
-@pytest.mark.parametrize("arguments", [["info"], ["train", "CORPUS", "-o", "m", "--machine-readable"]])
+@pytest.mark.parametrize(
+    "arguments",
+    [["info"], ["--help"], ["cues", "--help"], ["--version"], ["train", "CORPUS", "-o", "m", "--machine-readable"]],
+)
 def test_output_that_is_full(toy_corpus: Corpus, here: Path, arguments: list[str]) -> None:
     command = [str(toy_corpus.path) if argument == "CORPUS" else argument for argument in arguments]
     for unbuffered in ("", "1"):
@@ -155,6 +159,30 @@ def test_output_that_is_full(toy_corpus: Corpus, here: Path, arguments: list[str
         assert done.returncode == 7
         assert done.stderr == "lipmotion: error: standard output cannot be written: No space left on device\n"
     assert list(here.iterdir()) == []
+
+
+CLOSED = "standard {} is closed"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="streams are closed as POSIX shells do")
+def test_streams_that_are_closed(toy_speech: Path, toy_model_file: Path, here: Path) -> None:
+    """No file that is opened takes the number of a standard stream."""
+    own = shlex.join([str(toy_speech), "--model", str(toy_model_file), "--recogniser", "own"])
+    for line, code, said in (
+        ("info >&-", 7, CLOSED.format("output")),
+        ("--help >&-", 7, CLOSED.format("output")),
+        (f"evaluate m {here} --machine-readable >&-", 7, CLOSED.format("output")),
+        (f"animate - --model {toy_model_file} -o a.json <&-", 3, CLOSED.format("input")),
+        (f"cues {own} --machine-readable 2>&-", 7, ""),
+        ("info nothing 2>&-", 3, ""),
+        ("info nothing 2>/dev/full", 3, ""),
+        (f"animate {own} -o a.json <&- 2>&-", 0, ""),
+    ):
+        done = run_child(["sh", "-c", f"{shlex.join(LIPMOTION)} {line}"])
+        assert (done.returncode, done.stderr.count("\n")) == (code, 1 if said else 0), (line, done)
+        assert said in done.stderr
+        assert done.stdout == ("a.json\n" if code == 0 else "")
+    assert json.loads((here / "a.json").read_text())
 
 
 @pytest.mark.usefixtures("ordinary_signals")

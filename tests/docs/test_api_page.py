@@ -25,7 +25,6 @@ def test_every_block_of_the_page_runs(toy_corpus: Corpus, tmp_path: Path) -> Non
         [sys.executable, "-W", "error", "-c", "\n".join(BLOCKS)],
         folder=tmp_path,
         variables=environment(NUMBA_DISABLE_PERFORMANCE_WARNINGS="1"),
-        limit_s=600,
         check=True,
     )
     assert len(done.stdout.splitlines()) > len(BLOCKS)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import errno
 import io
 import logging
 import sys
 import warnings
 from collections.abc import Sequence
 from difflib import get_close_matches
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from lipmotion.cli import (
     adapt,
@@ -32,9 +31,10 @@ from lipmotion.cli import (
     words,
 )
 from lipmotion.cli.events import Events
-from lipmotion.cli.output import flush_output, output_error, print_line, with_program_name
+from lipmotion.cli.output import flush_output, print_line, print_usage, with_program_name
 from lipmotion.cli.paths import check_paths
 from lipmotion.cli.stop import Stopper
+from lipmotion.errors import ExportError
 from lipmotion.printable import printable
 
 VERBS = (
@@ -51,6 +51,8 @@ def run(arguments: Sequence[str] | None, stopper: Stopper, events: Events) -> No
     arguments : words of the command line without the program's name; None: those of the process
     Raises whatever the command raises; SystemExit: help was asked for, or the command line is wrong.
     """
+    if sys.stdout is None:
+        raise ExportError("standard output is closed; open it, or send it to a file or to /dev/null")
     _log_warnings_as_lines()
     show_before, warnings.showwarning = warnings.showwarning, _log_warning
     if isinstance(sys.stdout, io.TextIOWrapper):
@@ -61,10 +63,6 @@ def run(arguments: Sequence[str] | None, stopper: Stopper, events: Events) -> No
         check_paths(options)
         options.run(options)
         stopper.settle()
-    except OSError as error:
-        if error.errno == errno.ENOSPC and error.filename is None:
-            raise output_error(error) from error
-        raise
     finally:
         warnings.showwarning = show_before
         flush_output()
@@ -110,10 +108,13 @@ def _option_strings(parser: argparse.ArgumentParser, verb: str = "") -> list[str
 
 
 class _Parser(argparse.ArgumentParser):
-    """Reports a wrong command line as printable text."""
+    """Reports a wrong command line as printable text, and help that cannot be printed."""
 
     def error(self, message: str) -> NoReturn:
         super().error(printable(message))
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        print_usage(message, is_wanted=file is sys.stdout)
 
 
 class _Version(argparse.Action):

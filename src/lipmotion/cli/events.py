@@ -54,10 +54,14 @@ class JsonLines(Events):
         if self._ended:
             return
         from lipmotion.cli.output import output_error, print_error_json, print_json
+        from lipmotion.errors import ExportError
 
         try:
             (print_error_json if self._on_error else print_json)({"type": kind, **fields})
-        except OSError as error:  # a full disk, or a reader that has gone: nobody would receive the result
+        except ExportError:  # a full disk: nobody would receive the result
+            self._ended = True
+            raise
+        except BrokenPipeError as error:  # nor if the reader has gone
             self._ended = True
             raise output_error(error) from error
 
@@ -101,7 +105,9 @@ class RhubarbStatus(Events):
         self._ended = True
 
     def fail(self, reason: str, code: int) -> None:  # noqa: D102, ARG002
-        with suppress(OSError):  # nobody reads standard error
+        from lipmotion.errors import ExportError
+
+        with suppress(ExportError):  # nobody reads standard error
             self.emit("failure", "Fatal", f"Application terminating with error: {reason}", reason=reason)
         self._ended = True
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 
 from lipmotion.cli.events import Events, events_of
@@ -17,6 +18,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     arguments : words of the command line; None: those of the process, which is then expected to end with this call
     """
+    if arguments is None:
+        _occupy_closed_streams()
     stopper, events = Stopper(), events_of(sys.argv[1:] if arguments is None else arguments)
     try:
         try:
@@ -26,6 +29,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return _report_failure(events, stopper.code or 130, MESSAGE)
     finally:
         stopper.stop_listening(process_ends=arguments is None)
+
+
+def _occupy_closed_streams() -> None:
+    """Open nothing in the place of a standard stream that is closed: else a file of ours would take its number."""
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)
 
 
 def _run(arguments: Sequence[str] | None, stopper: Stopper, events: Events) -> int:
@@ -49,8 +61,14 @@ def _run(arguments: Sequence[str] | None, stopper: Stopper, events: Events) -> i
             raise
         code, reason = known
         return _report_failure(events, code, f"error: {reason}")
-    except SystemExit as end:  # argparse: help, version, a wrong command line
+    except SystemExit as end:  # argparse: help, version, a wrong command line; or an extension
+        from lipmotion.cli.outcome import outcome
+
+        known = outcome(end)
         stopper.settle()
+        if known is not None:
+            code, reason = known
+            return _report_failure(events, code, f"error: {reason}")
         code = int(end.code or 0)
         if code:
             events.fail("wrong command line", code)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from lipmotion.errors import InputError, LipMotionError
+from lipmotion.extensions import failed_extension
 from lipmotion.printable import printable
 
 BEGIN, END = 700, 300
@@ -10,14 +11,15 @@ BEGIN, END = 700, 300
 
 
 def outcome(error: BaseException) -> tuple[int, str] | None:
-    """Return the exit code and the one-line message of an expected error; None: the error is a bug."""
+    """Return the exit code and the one-line message of an expected error, or one of an extension; None: a bug."""
     if isinstance(error, LipMotionError):
         return error.exit_code, _cut(printable(error))
     if isinstance(error, MemoryError):
         return InputError.exit_code, f"not enough memory ({error}); give a shorter recording or a smaller file"
     if isinstance(error, OSError):  # what the operating system refuses: no permission, a name too long
         return InputError.exit_code, _cut(printable(error))
-    return None
+    failed = failed_extension(error)
+    return None if failed is None else (InputError.exit_code, _cut(printable(failed)))
 
 
 def _cut(line: str) -> str:

@@ -8,9 +8,10 @@ from __future__ import annotations
 import os
 import shutil
 import sys
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from lipmotion.errors import ExportError
 from lipmotion.printable import printable
@@ -22,32 +23,40 @@ LINE_START = "\r\x1b[K"
 
 def print_line(text: object) -> None:
     """Print one line on standard output."""
-    print(printable(text))
+    with _failure_reported():
+        print(printable(text))
 
 
 def print_lines(text: str) -> None:
     """Print lines on standard output, line ends and tabs kept; other control characters are escaped."""
-    print("\n".join("\t".join(map(printable, line.split("\t"))) for line in text.split("\n")))
+    with _failure_reported():
+        print("\n".join("\t".join(map(printable, line.split("\t"))) for line in text.split("\n")))
 
 
 def write_bytes(path: Path) -> None:
     """Write the content of a file to standard output as it is. Raises ExportError: it cannot be written."""
     flush_output()
-    try:
-        with path.open("rb") as file:
-            shutil.copyfileobj(file, sys.stdout.buffer)
+    with path.open("rb") as file, _failure_reported():
+        shutil.copyfileobj(file, sys.stdout.buffer)
         sys.stdout.buffer.flush()
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        raise output_error(error) from error
 
 
 def print_error(text: object) -> None:
-    """Print one line with the program's name on standard error, if standard error is open."""
-    with suppress(OSError):
-        if sys.stderr is not None:
-            print(f"{LINE_START if sys.stderr.isatty() else ''}{with_program_name(text)}", file=sys.stderr)
+    """Print one line with the program's name on standard error, if standard error is open and takes it."""
+    if sys.stderr is not None:
+        print_usage(f"{LINE_START if sys.stderr.isatty() else ''}{with_program_name(text)}\n", is_wanted=False)
+
+
+def print_usage(text: str, *, is_wanted: bool) -> None:
+    """Print text of the program itself as it is: on standard output, where it was asked for; else on standard error."""
+    if is_wanted:
+        with _failure_reported():
+            print(text, end="", flush=True)
+    elif sys.stderr is not None:
+        try:
+            print(text, end="", file=sys.stderr, flush=True)
+        except OSError:
+            _discard_pending(sys.stderr)  # nobody can be told
 
 
 def print_note(text: object) -> None:
@@ -65,20 +74,34 @@ def with_program_name(text: object) -> str:
 
 
 def print_json(document: Any) -> None:
-    """Print a JSON document as one line of ASCII on standard output."""
-    print(as_json(nan_as_null(document)), flush=True)
+    """Print a JSON document as one line of ASCII on standard output. Raises ExportError: it cannot be written."""
+    with _failure_reported():
+        print(as_json(nan_as_null(document)), flush=True)
 
 
 def print_error_json(document: Any) -> None:
-    """Print a JSON document as one line of ASCII on standard error."""
-    print(as_json(nan_as_null(document)), file=sys.stderr, flush=True)
+    """Print a JSON document as one line of ASCII on standard error. Raises ExportError: it cannot be written."""
+    if sys.stderr is None:
+        raise ExportError("standard error is closed; open it, or leave out what asks for messages there")
+    try:
+        print(as_json(nan_as_null(document)), file=sys.stderr, flush=True)
+    except OSError as error:
+        _discard_pending(sys.stderr)
+        raise ExportError(f"standard error cannot be written: {error.strerror or error}") from error
 
 
 def flush_output() -> None:
     """Flush standard output now: when Python ends, a failure could not be reported. Raises ExportError: it failed."""
-    try:
+    with _failure_reported():
         if sys.stdout is not None:
             sys.stdout.flush()
+
+
+@contextmanager
+def _failure_reported() -> Iterator[None]:
+    """Raise ExportError if standard output cannot be written; BrokenPipeError: its reader has gone."""
+    try:
+        yield
     except BrokenPipeError:
         raise
     except OSError as error:
@@ -87,7 +110,11 @@ def flush_output() -> None:
 
 def discard_pending_output() -> None:
     """Discard buffered output, which Python would otherwise try to write again when it ends."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    _discard_pending(sys.stdout)
+
+
+def _discard_pending(stream: TextIO) -> None:
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def output_error(error: OSError) -> ExportError:

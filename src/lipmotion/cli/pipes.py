@@ -55,7 +55,7 @@ def read_pipe(path: Path) -> Iterator[Path]:
         kept = Path(folder) / "standard-input"
         with kept.open("wb") as file:
             if str(path) == PIPE:
-                _copy(sys.stdin.buffer, file)
+                _copy(_standard_input(), file)
             else:
                 with path.open("rb") as source:
                     _copy(source, file)
@@ -76,6 +76,14 @@ def written_pipe(options: argparse.Namespace) -> Iterator[bool]:
         options.output = [str(kept) if output == PIPE else output for output in options.output]
         yield True
         write_bytes(kept)
+
+
+def _standard_input() -> IO[bytes]:
+    from lipmotion.errors import InputError
+
+    if sys.stdin is None:
+        raise InputError("standard input is closed; required: a recording, as of 'ffmpeg ... -f wav -'")
+    return sys.stdin.buffer
 
 
 def _copy(source: IO[bytes], target: IO[bytes]) -> None:

@@ -47,7 +47,8 @@ def check_source(path: Path, kind: str) -> None:
 
 
 def sha256_of(path: Path) -> str:
-    """Return the SHA-256 digest of a file's content, in hexadecimal."""
+    """Return the SHA-256 digest of a file's content, in hexadecimal. Raises InputError: it is no file."""
+    check_regular(path, "file")
     digest = hashlib.sha256()
     with path.open("rb") as file:
         while block := file.read(1 << 20):

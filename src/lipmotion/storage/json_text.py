@@ -37,8 +37,14 @@ def nan_as_null(content: Any) -> Any:
 
 
 def from_json(text: str | bytes) -> Any:
-    """Return the content of JSON text. Raises ValueError: not JSON, a key twice, or a number that is not finite."""
-    return json.loads(text, object_pairs_hook=_distinct_keys, parse_constant=_refused, parse_float=_finite)
+    """Return the content of JSON text.
+
+    Raises ValueError: it is none, has a key twice, is nested too deeply, or holds a number that is not finite.
+    """
+    try:
+        return json.loads(text, object_pairs_hook=_distinct_keys, parse_constant=_refused, parse_float=_finite)
+    except RecursionError as error:
+        raise ValueError("nested too deeply") from error
 
 
 def _distinct_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -273,6 +273,46 @@ def test_a_bug_that_one_line_meets_does_not_end_the_batch(
     assert "unexpected ZeroDivisionError: float division" in ledger_rows(tmp_path / "out")[0]["error"]
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="devices, pipes and links as POSIX has them")
+def test_lines_that_would_wait_or_lead_elsewhere_fail_and_the_others_go_on(
+    toy_speech: Path, settings: BatchSettings, tmp_path: Path
+) -> None:
+    out, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (out / "deep").mkdir(parents=True)
+    (out / "linked").symlink_to(elsewhere)
+    (out / "deep" / "inside").symlink_to(out)
+    (out / "two.json").symlink_to(elsewhere / "kept.json")
+    (elsewhere / "kept.json").write_text("precious")
+    os.mkfifo(tmp_path / "pipe.wav")
+    (tmp_path / "to a pipe.wav").symlink_to(tmp_path / "pipe.wav")
+    (tmp_path / "empty.wav").touch()
+    sounds = {
+        "zero": "/dev/zero",
+        "pipe": "pipe.wav",
+        "link": "to a pipe.wav",
+        "folder": ".",
+        "empty": "empty.wav",
+        "nothing": "nothing.wav",
+        "linked/one": toy_speech,
+        "deep/inside/one": toy_speech,
+        "two": toy_speech,
+    }
+    table = tmp_path / "lines.csv"
+    table.write_text("file,output\n" + "".join(f"{sound},{name}\n" for name, sound in sounds.items()))
+    found = batch(table, out, settings, jobs=1)
+    said = {row["name"]: row.get("error", "") for row in ledger_rows(out)}
+    assert (found.done, found.failed) == (1, 8)
+    for name, words in {
+        **dict.fromkeys(("zero", "pipe", "link"), "is a pipe or a device, required a file; save the recording first"),
+        **{"folder": "is a folder; give one recording", "empty": "the file is empty", "nothing": "no such file"},
+        **dict.fromkeys(("linked/one", "deep/inside/one"), "is a link, required a folder: a batch writes nowhere but"),
+    }.items():
+        assert words in said[name], (name, said[name])
+    assert {path.name: path.read_text() for path in elsewhere.iterdir()} == {"kept.json": "precious"}
+    assert not (out / "two.json").is_symlink()  # replaced, not what it points to
+
+
 def command(*words: object) -> list[str]:
     return [*LIPMOTION, "batch", *map(str, words), "--machine-readable"]
 
@@ -332,7 +372,7 @@ def cluster(tmp_path: Path) -> Iterator[tuple[str, list[Child]]]:
     with ExitStack() as all_of_them:
 
         def start(words: list[str]) -> Child:
-            return all_of_them.enter_context(child(words, stdout=NOWHERE, stderr=NOWHERE, folder=tmp_path, limit_s=600))
+            return all_of_them.enter_context(child(words, stdout=NOWHERE, stderr=NOWHERE, folder=tmp_path))
 
         processes = [start([*base, *options])]
         processes += [start([*worker, "--no-dashboard", "--no-nanny"]) for _ in range(2)]
@@ -356,7 +396,7 @@ def test_a_worker_of_a_cluster_is_killed(
     sounds = many(tmp_path / "sounds", toy_speech, 60)
     batch(sounds, tmp_path / "whole", settings, jobs=1)
     how = [sounds, "--out", tmp_path / "out", "--model", settings.model, "--recogniser", "own", "--cluster", address]
-    with child(command(*how), limit_s=300) as process:
+    with child(command(*how)) as process:
         items = 0
         for event in events_of(process):
             items += event["type"] == "item"

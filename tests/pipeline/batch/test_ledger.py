@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
+import sys
 from pathlib import Path
 
 import pytest
 
 from lipmotion.errors import ExportError
-from lipmotion.pipeline.batch.ledger import DONE, Place, Record, opened_ledger, read_receipt, write_receipt
-from lipmotion.pipeline.batch.lines import BatchLine
+from lipmotion.pipeline.batch.ledger import RECEIPTS, RUN, WORK, Place, opened_ledger, read_receipt, write_receipt
+from lipmotion.pipeline.batch.lines import OWN_FILES, OWN_FOLDER, BatchLine
+from lipmotion.pipeline.batch.record import DONE, LARGEST_RECORD, Record
+from lipmotion.pipeline.batch.report import write_reports
 from lipmotion.pipeline.batch.settings import (
     BatchSettings,
     check_kinds,
@@ -18,6 +22,7 @@ from lipmotion.pipeline.batch.settings import (
     input_files,
     line_fingerprint,
 )
+from lipmotion.storage.files import LOCK
 
 CONTENT = b"motion"
 DIGEST = hashlib.sha256(CONTENT).hexdigest()
@@ -54,10 +59,10 @@ def written(out: Path) -> list[str]:
 
 def test_a_line_is_kept_while_nothing_changes(line: BatchLine, out: Path) -> None:
     (out / "a.json").write_bytes(CONTENT)
-    with opened_ledger(Place(str(out), "1")) as ledger:
+    with opened_ledger(Place(str(out), "1"), [line]) as ledger:
         assert ledger.kept(line, "settings", out) is None
         ledger.append(record_of(line))
-    with opened_ledger(Place(str(out), "2")) as ledger:
+    with opened_ledger(Place(str(out), "2"), [line]) as ledger:
         assert ledger.kept(line, "settings", out) == record_of(line)
         assert ledger.kept(line, "other settings", out) is None
         Path(line.recording).touch()  # a new time, the same content
@@ -74,22 +79,101 @@ def test_a_line_is_kept_while_nothing_changes(line: BatchLine, out: Path) -> Non
 
 
 def test_a_row_that_was_cut_is_removed(line: BatchLine, out: Path) -> None:
-    with opened_ledger(Place(str(out), "1")) as ledger:
+    with opened_ledger(Place(str(out), "1"), [line]) as ledger:
         ledger.append(record_of(line))
     whole = (out / "batch.jsonl").read_bytes()
     (out / "batch.jsonl").write_bytes(whole + whole[:-40])
-    with opened_ledger(Place(str(out), "2")) as ledger:
+    with opened_ledger(Place(str(out), "2"), [line]) as ledger:
         assert ledger.record_of("a") == record_of(line)
     assert (out / "batch.jsonl").read_bytes() == whole
 
 
-def test_a_damaged_row_is_passed_over(line: BatchLine, out: Path) -> None:
-    with opened_ledger(Place(str(out), "1")) as ledger:
-        ledger.append(record_of(line))
-    whole = (out / "batch.jsonl").read_bytes()
-    (out / "batch.jsonl").write_bytes(b'{"name": 3}\nnot JSON\n' + whole)
-    with opened_ledger(Place(str(out), "2")) as ledger:
-        assert ledger.record_of("a") == record_of(line)
+def damaged(record: Record) -> dict[str, bytes]:
+    """Return rows that are nearly the record's."""
+    changes: dict[str, dict[str, object]] = {
+        "a name that is a number": {"name": 1},
+        "a name with a line end": {"name": "a\nb", "outputs": {"a\nb.json": "0"}},
+        "inputs that are a number": {"inputs": 5},
+        "inputs that are texts": {"inputs": ["a"]},
+        "an input with one field": {"inputs": [{"path": "a"}]},
+        "an input whose size is a text": {"inputs": [{**record["inputs"][0], "size": "5"}]},
+        "outputs that are null": {"outputs": None},
+        "outputs that are a list": {"outputs": ["a.json"]},
+        "an output elsewhere": {"outputs": {"/dev/zero": "0"}},
+        "an output whose digest is a number": {"outputs": {"a.json": 1}},
+        "a fingerprint that is a list": {"fingerprint": []},
+        "another outcome": {"outcome": "perhaps"},
+        "an outcome that is a list": {"outcome": []},
+        "warnings that are a number": {"warnings": 3},
+        "a range that is a text": {"range_db": "loud"},
+        "a huge number": {"widest": 10**400},
+        "words without confidence": {"words": "words"},
+        "closures heard, none made": {"closures_heard": 2},
+    }
+    rows = {what: json.dumps(record | change).encode() for what, change in changes.items()}
+    row, name = json.dumps(record).encode(), b'{"name": "a", '
+    return rows | {
+        "nothing": b"",
+        "no JSON": b"not JSON",
+        "a list": b"[]",
+        "a name alone": b'{"name": "a"}',
+        "deep nesting": name + b'"outputs": ' + b"[" * 100_000,
+        "a number of 5000 digits": name + b'"seconds": ' + b"1" * 5000 + b"}",
+        "not finite": name + b'"seconds": 1e999}',
+        "not UTF-8": row.replace(b'"done"', b'"d\xffne"'),
+        "NUL": row.replace(b'"done"', b'"d\0ne"'),
+        "its first half": row[: len(row) // 2],
+        "its second half": row[len(row) // 2 :],
+        "two in one": row + row,
+        "a key twice": row.replace(b'"run"', b'"name"'),
+        "too long": row + b" " * LARGEST_RECORD,
+        "half an escape": row.replace(b'"old"', b'"\\ud8"'),
+    }
+
+
+def test_damaged_rows_are_said_once_and_their_lines_done_again(
+    line: BatchLine, out: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    (out / "a.json").write_bytes(CONTENT)
+    good = json.dumps(record_of(line)).encode() + b"\n"
+    for what, row in damaged(record_of(line)).items():
+        for others in (b"", good.replace(b'"a', b'"b') * 2):
+            (out / "batch.jsonl").write_bytes(others + row + b"\n")
+            caplog.clear()
+            with opened_ledger(Place(str(out), "2"), [line]) as ledger:
+                assert ledger.kept(line, "settings", out) is None, what
+                write_reports([line], ledger, out)
+                ledger.append(record_of(line))
+                assert ledger.kept(line, "settings", out) == record_of(line), what
+            if "a line end" not in what:  # it is of a line that this batch has not: nobody looks at it
+                assert [said.getMessage().split("batch.jsonl: ")[1] for said in caplog.records] == [
+                    "1 damaged rows are passed over; what they say was done is done again"
+                ], what
+            assert (out / "batch.jsonl").read_bytes() == others + row + b"\n" + good, what
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links, pipes and devices as POSIX has them")
+def test_what_is_no_file_of_a_batch_is_refused(line: BatchLine, out: Path) -> None:
+    """A batch writes into its folder alone, and waits for nobody."""
+    elsewhere = out.parent / "elsewhere"
+    (elsewhere / "work").mkdir(parents=True)
+    (elsewhere / "file").write_bytes(b"precious")
+    aims = [elsewhere, elsewhere / "file", elsewhere / "nothing", Path("/dev/zero"), Path("itself")]
+    for name in (*OWN_FILES, OWN_FOLDER, *(f"{OWN_FOLDER}/{name}" for name in (LOCK, RECEIPTS, RUN, WORK))):
+        path = out / name
+        path.parent.mkdir(exist_ok=True)
+        for aim in [*aims, None]:
+            if aim is None:
+                if path.parent.name == OWN_FOLDER:
+                    continue
+                os.mkfifo(path)
+            else:
+                path.symlink_to(path if aim.name == "itself" else aim)
+            with pytest.raises(ExportError, match=rf"{name}: is a (link|file)"):
+                opened_ledger(Place(str(out), "1"), [line]).__enter__()
+            path.unlink()
+    assert (elsewhere / "file").read_bytes() == b"precious"
+    assert sorted(path.name for path in elsewhere.iterdir()) == ["file", "work"]
 
 
 @pytest.mark.parametrize("in_place", [True, False])
@@ -100,7 +184,7 @@ def test_killed_after_the_receipt(line: BatchLine, out: Path, in_place: bool) ->
     old.work("a").mkdir(parents=True)
     write_receipt(old.receipt("a"), record_of(line))
     (out / "a.json").write_bytes(CONTENT if in_place else b"of an earlier batch")
-    with opened_ledger(Place(str(out), "new")) as ledger:
+    with opened_ledger(Place(str(out), "new"), [line]) as ledger:
         assert (ledger.kept(line, "settings", out) is not None) == in_place
         assert not old.work("a").exists()
         assert read_receipt(old.receipt("a")) is None
@@ -111,23 +195,23 @@ def test_killed_after_the_ledger(line: BatchLine, out: Path) -> None:
     """A receipt that is in the ledger already is not entered twice."""
     place = Place(str(out), "old")
     (out / "a.json").write_bytes(CONTENT)
-    with opened_ledger(place) as ledger:
+    with opened_ledger(place, [line]) as ledger:
         ledger.append(record_of(line))
     place.receipt("a").parent.mkdir(parents=True)
     write_receipt(place.receipt("a"), record_of(line))
-    with opened_ledger(Place(str(out), "new")):
+    with opened_ledger(Place(str(out), "new"), [line]):
         pass
     assert written(out) == ["a"]
 
 
 def test_a_later_run_ends_the_earlier_one(out: Path) -> None:
     first, second = Place(str(out), "1"), Place(str(out), "2")
-    with opened_ledger(first):
+    with opened_ledger(first, []):
         assert first.is_current()
-        with pytest.raises(ExportError, match="at work on it"), opened_ledger(second):
+        with pytest.raises(ExportError, match="at work on it"), opened_ledger(second, []):
             pass
         assert first.is_current()
-    with opened_ledger(second):
+    with opened_ledger(second, []):
         assert not first.is_current()
 
 

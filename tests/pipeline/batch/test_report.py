@@ -42,7 +42,7 @@ def test_both_reports_hold_all_lines(tmp_path: Path) -> None:
     names = ["a", "b/c", "d"]
     lines = [BatchLine(name, f"/x/{name}.wav") for name in names]
     base = {"run": "1", "fingerprint": "f", "inputs": []}
-    with opened_ledger(Place(str(tmp_path), "1")) as ledger:
+    with opened_ledger(Place(str(tmp_path), "1"), lines) as ledger:
         for line in lines[:2]:
             outputs = {f"{line.name}.json": "0"} if line.name == "a" else {}
             wrong = {} if line.name == "a" else {"outcome": "failed", "error": hostile}
@@ -67,7 +67,7 @@ def test_both_reports_hold_all_lines(tmp_path: Path) -> None:
 def test_no_text_is_a_formula(tmp_path: Path, name: str) -> None:
     lines = [BatchLine(name, f"/x/{name}.wav")]
     record = GOOD | {"run": "1", "fingerprint": "f", "inputs": [], "name": name, "outputs": {f"{name}.json": "0"}}
-    with opened_ledger(Place(str(tmp_path), "1")) as ledger:
+    with opened_ledger(Place(str(tmp_path), "1"), lines) as ledger:
         ledger.append(record | {"recording": lines[0].recording, "range_db": -3.0, "warnings": [name, "a"]})
         table, page = write_reports(lines, ledger, tmp_path)
     with table.open(encoding="utf-8", newline="") as file:

@@ -8,26 +8,30 @@ whether it is in place: by the ledger, or by a receipt and the digests in it.
 from __future__ import annotations
 
 import hashlib
+import json
+import logging
 import os
+import re
 import shutil
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import IO, Any
 
-from lipmotion.errors import ExportError
-from lipmotion.pipeline.batch.lines import OWN_FOLDER, BatchLine
+from lipmotion.errors import ExportError, InputError
+from lipmotion.pipeline.batch.lines import OWN_FILES, OWN_FOLDER, BatchLine
+from lipmotion.pipeline.batch.record import DONE, LARGEST_RECORD, Record, read_record
 from lipmotion.pipeline.batch.settings import InputFile, input_paths, line_fingerprint
 from lipmotion.storage.files import TEMPORARY, locked, sha256_of, whole_file
-from lipmotion.storage.json_text import as_json, from_json
+from lipmotion.storage.json_text import as_json
 
+LOG = logging.getLogger("lipmotion")
 LEDGER, RECEIPTS, WORK, RUN = "batch.jsonl", "receipts", "work", "run"
-DONE, FAILED = "done", "failed"
 STAGED = f"{TEMPORARY}batch-"
 """Prefix of the names of outputs that are being written."""
-Record = dict[str, Any]
-"""What the ledger holds of one line; its fields are listed in docs/batch.md."""
+NAME = re.compile(rb'\{"name": ("(?:[^"\\]|\\.)*")')
+"""How every row begins."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,30 @@ class Place:
         """
         return (Path(self.out) / name).parent / f"{STAGED}{self.run[:8]}-{_key(name)[:16]}.{kind}"
 
+    def link_on_the_way(self, name: str) -> Path | None:
+        """Return the first folder of the line ``name`` that is a link; None: there is none."""
+        folder = Path(self.out)
+        for part in PurePosixPath(name).parts[:-1]:
+            folder /= part
+            if folder.is_symlink():
+                return folder
+        return None
+
+    def made_folder(self, name: str) -> Path:
+        """Return the folder of the outputs of the line ``name``, created if needed.
+
+        Raises ExportError: a folder on the way is a link. OSError: it cannot be created.
+        """
+        link = self.link_on_the_way(name)
+        if link is not None:
+            raise ExportError(
+                f"{link}: is a link, required a folder: a batch writes nowhere but into {self.out}; remove the link, "
+                "or give the line another name in a column 'output' of the list"
+            )
+        folder = (Path(self.out) / name).parent
+        folder.mkdir(parents=True, exist_ok=True)
+        return folder
+
     def is_current(self) -> bool:
         """Return whether no later run has begun in this folder."""
         try:
@@ -76,7 +104,8 @@ def _key(name: str) -> str:
 def read_receipt(path: Path) -> Record | None:
     """Return the record in a receipt; None: there is none, or it is damaged."""
     try:
-        return _record(path.read_bytes())
+        is_one = path.is_file() and path.stat().st_size <= LARGEST_RECORD
+        return read_record(path.read_bytes()) if is_one else None
     except OSError:
         return None
 
@@ -96,34 +125,48 @@ def is_in_place(path: Path, digest: str) -> bool:
     """Return whether a file exists and has a digest."""
     try:
         return sha256_of(path) == digest
-    except OSError:
+    except (OSError, InputError):  # there is none, or a folder or a pipe in its place
         return False
 
 
 class Ledger:
     """The ledger of a folder of outputs, open for appending; of every line, where its last record is.
 
-    Only the digest and the position of each record are kept in memory.
+    Only the fingerprint and the position of each record are kept in memory, and only of the lines of this batch.
+    Rows that are damaged count as if they were not there; a warning says how many they are.
     """
 
-    def __init__(self, path: Path, file: IO[bytes]) -> None:
+    def __init__(self, path: Path, file: IO[bytes], lines: Iterable[BatchLine]) -> None:
         self._path, self._file = path, file
-        self._last: dict[str, tuple[str, int]] = {}
-        whole = 0
-        for start, content in _whole_lines(file):
-            whole = start + len(content)
-            record = _record(content)
-            if record is not None:
-                self._last[_key(record["name"])] = record["fingerprint"], start
+        ours = {_key(line.name) for line in lines}
+        places: dict[str, int] = {}
+        whole = damaged = 0
+        for start, row in _whole_rows(file):
+            whole = file.tell()
+            name = _name_in(row)
+            damaged += name is None
+            if name is not None and _key(name) in ours:
+                places[_key(name)] = start
         file.seek(whole)
-        file.truncate()  # a line that was being written when the run was killed
+        file.truncate()  # a row that was being written when the run was killed
+        self._last: dict[str, tuple[str, int]] = {}
+        for key, start in places.items():
+            record = self._record_at(start)
+            damaged += record is None
+            if record is not None:
+                self._last[key] = record["fingerprint"], start
+        if damaged:
+            LOG.warning("%s: %d damaged rows are passed over; what they say was done is done again", path, damaged)
 
     def record_of(self, name: str) -> Record | None:
         """Return the last record of a line; None: it has none."""
         if _key(name) not in self._last:
             return None
-        self._file.seek(self._last[_key(name)][1])
-        return _record(self._file.readline())
+        return self._record_at(self._last[_key(name)][1])
+
+    def _record_at(self, start: int) -> Record | None:
+        self._file.seek(start)
+        return read_record(self._file.readline(LARGEST_RECORD))
 
     def append(self, record: Record) -> None:
         """Append a record. Raises ExportError: it cannot be written."""
@@ -155,34 +198,50 @@ class Ledger:
         return record if same and there and all(each.is_unchanged() for each in inputs) else None
 
 
-def _whole_lines(file: IO[bytes]) -> Iterator[tuple[int, bytes]]:
-    """Yield position and content of every line that has an end."""
+def _whole_rows(file: IO[bytes]) -> Iterator[tuple[int, bytes]]:
+    """Yield position and content of every row that has an end; of a row that is too long, nothing as its content."""
     start = file.seek(0)
-    for content in file:
-        if content.endswith(b"\n"):
-            yield start, content
-            start += len(content)
+    while row := file.readline(LARGEST_RECORD):
+        is_long = not row.endswith(b"\n")
+        while row and not row.endswith(b"\n"):
+            row = file.readline(LARGEST_RECORD)
+        if row:
+            yield start, b"" if is_long else row
+        start = file.tell()
 
 
-def _record(content: bytes) -> Record | None:
-    """Return the record in a line of a ledger; None: it is damaged."""
+def _name_in(row: bytes) -> str | None:
+    """Return the name of the line that a row is of; None: it begins as no row does."""
+    found = NAME.match(row)
     try:
-        record = from_json(content)
+        return str(json.loads(found[1])) if found else None
     except ValueError:
         return None
-    is_whole = isinstance(record, dict) and {"name", "fingerprint", "outcome", "inputs", "outputs"} <= record.keys()
-    return record if is_whole else None
+
+
+def _check_own(place: Place) -> None:
+    """Raise ExportError if what a batch writes for itself would be written elsewhere, or into what is no file."""
+    for path in (place.own, *(place.own.iterdir() if place.own.is_dir() else ())):
+        if path.is_symlink():
+            raise ExportError(f"{path}: is a link, where a batch keeps its unfinished work; remove it")
+    for path in (Path(place.out) / name for name in OWN_FILES):
+        if path.is_symlink() or (path.exists() and not path.is_file()):
+            raise ExportError(
+                f"{path}: is a link, a folder, a pipe or a device, required a file that the batch writes itself; "
+                "remove it, or give another folder"
+            )
 
 
 @contextmanager
-def opened_ledger(place: Place, lines: Iterable[BatchLine] = ()) -> Iterator[Ledger]:
+def opened_ledger(place: Place, lines: Sequence[BatchLine]) -> Iterator[Ledger]:
     """Open the ledger of a folder of outputs for a new run, and end what an earlier one left undone.
 
-    lines : those in whose folders unfinished outputs are searched
+    lines : those of the batch: what earlier runs did of others stays in the ledger and is not looked at
 
     Receipts whose outputs are in place are entered into the ledger; other unfinished work is deleted.
     Raises ExportError: another process is at work on the folder, or it cannot be written.
     """
+    _check_own(place)
     with locked(place.own):
         for folder in (place.own / RECEIPTS, place.own / WORK):
             folder.mkdir(exist_ok=True)
@@ -194,11 +253,12 @@ def opened_ledger(place: Place, lines: Iterable[BatchLine] = ()) -> Iterator[Led
         except OSError as error:
             raise ExportError(f"{path}: cannot be written: {error.strerror or error}") from error
         with file:
-            ledger = Ledger(path, file)
+            ledger = Ledger(path, file, lines)
             _settle(place, ledger)
-            for folder in {(Path(place.out) / line.name).parent for line in lines}:
-                for path in folder.glob(f"{STAGED}*"):
-                    _remove(path)
+            for inner in {PurePosixPath(line.name).parent for line in lines}:
+                if place.link_on_the_way(f"{inner}/line") is None:
+                    for path in (Path(place.out) / inner).glob(f"{STAGED}*"):
+                        _remove(path)
             yield ledger
         shutil.rmtree(place.own / WORK, ignore_errors=True)
         for name in (RECEIPTS, RUN):

@@ -62,7 +62,7 @@ def read_lines(source: Path, kinds: Sequence[str]) -> list[BatchLine]:
     """
     if source.is_dir():
         lines = _in_folder(source)
-    elif source.is_file():
+    elif source.exists():
         lines = _in_list(source, kinds)
     else:
         raise InputError(f"{source}: no such file or folder; give a list of recordings, or a folder of them")
@@ -87,10 +87,11 @@ def check_names(lines: Iterable[BatchLine], kinds: Sequence[str]) -> None:
         if CONTROL.search(line.name + line.recording):
             raise InputError(f"{line.recording!r}, {line.name!r}: control characters in a name; rename the recording")
         path = PurePosixPath(line.name)
-        if path.is_absolute() or not path.name or ".." in path.parts or any(map(_is_hidden, path.parts)):
+        is_inside = path.name and not path.is_absolute() and ".." not in path.parts
+        if not is_inside or str(path) != line.name or any(map(_is_hidden, path.parts)):
             raise ExportError(
                 f"{line.recording}: the output {line.name!r} lies outside the folder of the outputs, or is hidden; "
-                "give a relative name without '..' and without names that begin with a dot"
+                "give a relative name without '..' and '//' and without names that begin with a dot"
             )
         for folder in path.parents[:-1]:
             folders[_key(str(folder))] = line.recording
@@ -123,7 +124,7 @@ def check_names(lines: Iterable[BatchLine], kinds: Sequence[str]) -> None:
 
 def _key(name: str) -> str:
     """Return what two names share where neither case nor the form of accents counts."""
-    return unicodedata.normalize("NFC", name).casefold()
+    return unicodedata.normalize("NFD", unicodedata.normalize("NFD", name).casefold())
 
 
 def _is_hidden(part: str) -> bool:
@@ -188,7 +189,8 @@ def _output_name(text: str, kinds: Sequence[str]) -> str:
     """Return the name of an output without the suffix, if it has that of one of the outputs."""
     name = text.strip().replace("\\", "/")
     suffix = next((f".{kind}" for kind in sorted(kinds, key=len, reverse=True) if name.endswith(f".{kind}")), "")
-    return name.removesuffix(suffix)
+    name = name.removesuffix(suffix)
+    return str(PurePosixPath(name)) if name else ""
 
 
 def _table(source: Path, text: str) -> list[dict[str, str]] | None:

@@ -21,6 +21,7 @@ from lipmotion.corpora.labels import labels_beside
 from lipmotion.errors import ExportError, LipMotionError
 from lipmotion.export.base import motion_suffix
 from lipmotion.export.cues import OPTIONAL
+from lipmotion.extensions import failed_extension
 from lipmotion.faces.base import Face
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.measures.closures import CLOSED_SHARE
@@ -28,16 +29,14 @@ from lipmotion.motion.closure import OPENING, closable_ranges
 from lipmotion.motion.speakers import SpeakerMap
 from lipmotion.pipeline.animate import animate, check_outputs, opened_face, with_articulation, write
 from lipmotion.pipeline.batch.ledger import (
-    DONE,
-    FAILED,
     Place,
-    Record,
     are_in_place,
     is_in_place,
     read_receipt,
     write_receipt,
 )
 from lipmotion.pipeline.batch.lines import BatchLine
+from lipmotion.pipeline.batch.record import DONE, FAILED, Record
 from lipmotion.pipeline.batch.settings import CUES, BatchSettings, input_files, line_fingerprint
 from lipmotion.pipeline.characters import check_curve_set
 from lipmotion.pipeline.cues import check_cue_options, cues, write_cues
@@ -116,7 +115,7 @@ def _finished(work: LineWork) -> Record:
             generation = _written(work)
             record |= _findings(generation) | _taken(start_s, warnings)
             _put_in_place(work, record)
-        except Exception as error:  # also a bug that one recording meets: the other lines go on
+        except (Exception, SystemExit) as error:  # also a bug that one recording meets: the other lines go on
             if _is_final(error):
                 raise
             record |= {"outcome": FAILED, "outputs": {}, "error": _reason(error)} | _taken(start_s, warnings)
@@ -127,10 +126,11 @@ def _taken(start_s: float, warnings: list[str]) -> Record:
     return {"warnings": warnings[:MOST_WARNINGS], "seconds": round(time.perf_counter() - start_s, 4)}
 
 
-def _reason(error: Exception) -> str:
+def _reason(error: BaseException) -> str:
     if isinstance(error, LipMotionError | OSError | MemoryError):
         return str(error) or type(error).__name__
-    return f"unexpected {type(error).__name__}: {error}; this is a bug of lipmotion: please report it"
+    unexpected = f"unexpected {type(error).__name__}: {error}; this is a bug of lipmotion: please report it"
+    return failed_extension(error) or unexpected
 
 
 def _is_final(error: BaseException) -> bool:
@@ -158,8 +158,8 @@ def _put_in_place(work: LineWork, record: Record) -> None:
 def _written(work: LineWork) -> Generation:
     """Write the outputs of a line under temporary names; return its motion. Raises as ``animate`` and ``write``."""
     line, settings = work.line, work.settings
+    work.place.made_folder(line.name)
     staged = {kind: work.place.staged(line.name, kind) for kind in settings.kinds}
-    next(iter(staged.values())).parent.mkdir(parents=True, exist_ok=True)
     for kind in settings.kinds:
         check_target(Path(work.place.out) / f"{line.name}.{kind}")
     model = _model(settings.model, _stamp(settings.model))

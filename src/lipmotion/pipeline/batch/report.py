@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from lipmotion.pipeline.batch.ledger import FAILED, Ledger, Record
+from lipmotion.pipeline.batch.ledger import Ledger
 from lipmotion.pipeline.batch.lines import BatchLine
+from lipmotion.pipeline.batch.record import FAILED, Record
 from lipmotion.speech.recognition import NOISY_DB
 from lipmotion.storage.files import as_text, whole_file
 from lipmotion.types.generation import ALL_FITS

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lipmotion.errors import CorpusError, ExportError, InputError
-from lipmotion.pipeline.batch.ledger import FAILED, Place, Record, opened_ledger
+from lipmotion.pipeline.batch.ledger import Place, opened_ledger
 from lipmotion.pipeline.batch.lines import BatchLine, check_names, read_lines
 from lipmotion.pipeline.batch.one_line import LineWork, check_line_settings, finished_line
 from lipmotion.pipeline.batch.pool import Pool, WorkerDied, cluster_pool, died_alone, local_pool
+from lipmotion.pipeline.batch.record import FAILED, Record
 from lipmotion.pipeline.batch.report import write_reports
 from lipmotion.pipeline.batch.settings import BatchSettings, check_kinds, fingerprint_of, line_fingerprint
 from lipmotion.storage.sources import Source, check_apart

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from lipmotion.corpora.labels import label_files_beside
-from lipmotion.errors import ExportError
+from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import motion_suffixes
 from lipmotion.export.cues import CUE_FORMATS
 from lipmotion.export.timed_labels import LABEL_SUFFIXES
@@ -21,7 +21,7 @@ from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.drawn_video import VIDEO_SUFFIXES
 from lipmotion.pipeline.model import shipped_path
 from lipmotion.pipeline.scenes import SCENE_SUFFIXES
-from lipmotion.storage.files import sha256_of
+from lipmotion.storage.files import check_source, sha256_of
 from lipmotion.storage.json_text import as_json
 
 CUES = "cues."
@@ -121,7 +121,7 @@ class InputFile:
             if (status.st_size, status.st_mtime_ns) == (self.size, self.changed_ns):
                 return True
             return status.st_size == self.size and sha256_of(Path(self.path)) == self.sha256
-        except OSError:
+        except (OSError, InputError):
             return False
 
 
@@ -132,7 +132,11 @@ def input_paths(line: BatchLine) -> list[Path]:
 
 
 def input_files(line: BatchLine) -> list[InputFile]:
-    """Return the files of ``input_paths`` as they are now. Raises OSError: one cannot be read."""
+    """Return the files of ``input_paths`` as they are now.
+
+    Raises InputError: the recording is missing, empty, a folder, a pipe or a device. OSError: one cannot be read.
+    """
+    check_source(Path(line.recording), "recording")
     found = []
     for path in input_paths(line):
         status = path.stat()
