@@ -2,12 +2,10 @@
 
     python benchmarks/enumeration.py [--cases 1000] [--only NAME ...] [--numpy]
 
-For every recursion and spread of log densities (nats): the number of random cases (``tests/kernels/extremes.py``: normal,
-ties, states that take turns, -inf; every other case has arcs, beginnings and ends down to e^-1000 or forbidden), how many
-results were wrong, and how many were computed in logarithms. Posteriors may be off by 1e-9 + 1e-14 times the spread,
-log likelihoods by as much and 1e-14 of themselves, counts by one such tolerance for every frame; in single precision by
-5e-4, and 1e-6 of themselves. The log probability of a best path may be lower than that of the best of all by the rounding of
-single precision.
+For every recursion and spread of log densities (nats): how many of the random cases were wrong, and in brackets how
+many were computed in logarithms. Cases are normal, have ties or states that take turns, and -inf; every other case has
+arcs, beginnings and ends down to e^-1000 or forbidden (``tests/kernels/extremes.py``). Tolerances are those of
+``tests/kernels/enumeration.py``. The numbers of cases that were wrong go to standard error.
 """
 
 from __future__ import annotations
@@ -18,182 +16,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from kernels import extremes
+from kernels.enumeration import RECURSIONS, SPREADS, is_right
 from lipmotion.kernels import factorial, forward_backward, network, viterbi, windowed_viterbi
-from lipmotion.kernels.arcs import NetworkArrays
-from lipmotion.kernels.factorial_path import factorial_best_path
-from lipmotion.kernels.sampling import sample_paths
-from lipmotion.kernels.trellis import cheapest_arrivals, trace_back
-from oracles import chains, networks, paths, trellis
-from oracles import factorial as factorial_oracle
 
-SPREADS = (30.0, 100.0, 300.0, 1e3, 1e4, 1e5)
-Draw = np.random.Generator
-Case = Callable[[Draw, float, bool], bool]
-"""Draws a case of a spread, extreme or not; returns whether the result is right."""
 in_logs = [0]
-
-
-def near(found: Any, wanted: Any, spread: float, single: bool = False, times: int = 1) -> bool:
-    """Return whether numbers agree."""
-    found, wanted = np.asarray(found, float), np.asarray(wanted, float)
-    infinite = np.isneginf(wanted)
-    if not np.array_equal(np.isneginf(found), infinite):
-        return False
-    absolute, relative = (5e-4, 1e-6) if single else (1e-9 + 1e-14 * spread, 1e-14)
-    off = np.abs(found[~infinite] - wanted[~infinite])
-    return bool((off <= times * absolute + relative * np.abs(wanted[~infinite])).all())
-
-
-def of_network(draw: Draw, spread: float, extreme: bool, kind: type = np.float64, chains_of: int = 1) -> bool:
-    """Forward–backward of a network; densities are products of one or more chains'."""
-    frames, states = int(draw.integers(1, 6)), int(draw.integers(1, 5))
-    arrays, arcs = extremes.network(draw, states, extreme, draw.choice([0.0, 0.4, 1.0]))
-    prepared = network.ForwardBackwardNetwork.of(**arrays)
-    sizes = draw.integers(1, 4, chains_of)
-    logs = [extremes.log_densities(draw, frames, size, spread).astype(kind) for size in sizes]
-    columns = [draw.integers(size, size=states) for size in sizes]
-    order, place = prepared.layout.order, prepared.layout.place
-    found = prepared.product_posteriors(logs, [column[order] for column in columns], np.array([frames]))
-    joint = sum(log.astype(np.longdouble)[:, column] for log, column in zip(logs, columns, strict=True))
-    ends = arrays["log_initial"], arrays["log_final"]
-    posterior, counts, log_likelihood = networks.posteriors(joint, np.arange(states), arcs, *ends)
-    ordered = [counts[arc] for arc in sorted(arcs, key=lambda arc: arc[1])]
-    single = kind is np.float32
-    return (
-        near(found.posterior[:, place], posterior, spread, single)
-        and near(found.counts, ordered, spread, single, frames)
-        and near(found.log_likelihood[0], log_likelihood, spread, single)
-    )
-
-
-def of_factorial(draw: Draw, spread: float, extreme: bool, kind: type = np.float64) -> bool:
-    """Forward–backward of two loops."""
-    frames = int(draw.integers(1, 5))
-    audio, visual, logs = extremes.factorial_model(draw, frames, spread, extreme)
-    logs = logs._replace(**{name: getattr(logs, name).astype(kind) for name in ("audio", "visual", "pair")})
-    found = factorial.factorial_posteriors(audio, visual, logs, stretch=int(draw.integers(1, 5)))
-    joint, counts, log_likelihood = factorial_oracle.posteriors(audio, visual, logs)
-    single = kind is np.float32
-    right = near(found.log_likelihood, log_likelihood, spread, single)
-    right &= near(found.audio, joint.sum(axis=2), spread, single)
-    right &= near(found.visual, joint.sum(axis=1), spread, single)
-    right &= near(found.pair, joint[:, logs.pairs[:, 0], logs.pairs[:, 1]], spread, single)
-    for mine, wanted in zip((found.audio_counts, found.visual_counts), counts, strict=True):
-        right &= all(near(getattr(mine, name), wanted[name], spread, single, frames) for name in wanted)
-    return bool(right)
-
-
-def of_factorial_path(draw: Draw, spread: float, extreme: bool) -> bool:
-    """The best path of two loops."""
-    frames = int(draw.integers(1, 4))
-    audio, visual, logs = extremes.factorial_model(draw, frames, spread, extreme)
-    one, other, score = factorial_best_path(audio, visual, logs, stretch=int(draw.integers(1, 4)))
-    log_density, *ends = factorial_oracle.joint_logs(audio, visual, logs)
-    ways = factorial_oracle.best_arcs(audio, visual)
-    states = np.arange(log_density.shape[1])
-    _, best = paths.best_path(log_density, states, ways, *ends)
-    path = one * visual.stay.size + other
-    return near(score, best, spread) and (
-        np.isneginf(best) or near(paths.path_score(path, log_density, states, ways, *ends), best, spread)
-    )
-
-
-def of_chains(draw: Draw, spread: float, extreme: bool) -> bool:
-    """Forward–backward of chains without skips, two of them padded to one size."""
-    sizes = [(int(draw.integers(1, 7)), int(draw.integers(1, 5))) for _ in range(2)]
-    alone = [extremes.chain(draw, *size, spread, extreme) for size in sizes]
-    frames, states = np.array(sizes).T
-    log_emission = np.zeros((frames.max(), 2, states.max()))
-    stay, move = np.zeros((2, 2, states.max()))
-    for u, (emission, *moves) in enumerate(alone):
-        log_emission[: frames[u], u, : states[u]] = emission
-        stay[u, : states[u]], move[u, : states[u]] = moves
-    posterior, kept, log_likelihood = forward_backward.chain_posteriors(log_emission, stay, move, frames, states)
-    right = True
-    for u, case in enumerate(alone):
-        wanted, wanted_kept, wanted_log_likelihood = chains.chain_posteriors(*case)
-        found = log_likelihood[u] if log_likelihood[u] > forward_backward.IMPOSSIBLE / 2 else -np.inf
-        right &= near(found, wanted_log_likelihood, spread)
-        right &= near(posterior[: frames[u], u, : states[u]], wanted, spread)
-        right &= near(kept[u, : states[u]], wanted_kept, spread, times=int(frames[u]))
-    return bool(right)
-
-
-def of_path(draw: Draw, spread: float, extreme: bool, windowed: bool = False) -> bool:
-    """The best path through a network, which is searched in single precision."""
-    frames, states = int(draw.integers(1, 6)), int(draw.integers(1, 5))
-    arrays, arcs = extremes.network(draw, states, extreme, draw.choice([0.0, 0.4, 1.0]))
-    arrays = {n: a.astype(np.float32) if a.dtype == float else a for n, a in arrays.items()}
-    columns, log_emission = draw.integers(3, size=states), extremes.log_densities(draw, frames, 3, spread)
-    log_emission = log_emission.astype(np.float32)
-    given = NetworkArrays(emission=columns, **arrays)
-    of_states = log_emission[:, columns].astype(float)
-    if windowed:
-        first, end = np.sort(draw.integers(0, frames, states)), np.sort(draw.integers(1, frames + 1, states))
-        windows = windowed_viterbi.Windows(first, end)
-        path, score = windowed_viterbi.best_path_within(lambda a, b: log_emission[a:b], frames, given, windows)
-        moments = np.arange(frames)[:, None]
-        of_states[(moments < first) | (moments >= end)] = -np.inf
-    else:
-        path, score = viterbi.best_path(lambda a, b: log_emission[a:b], frames, given)
-    single = {arc: float(np.float32(log)) for arc, log in arcs.items()}
-    ends = arrays["log_initial"].astype(float), arrays["log_final"].astype(float)
-    _, best = paths.best_path(of_states, np.arange(states), single, *ends)
-    if np.isneginf(best):
-        return score == -np.inf
-    own = paths.path_score(path, of_states, np.arange(states), single, *ends)
-    finite = [abs(part[np.isfinite(part)]).max(initial=1) for part in (of_states, arrays["arc_log"], *ends)]
-    rounding = 4 * frames**2 * sum(finite) * np.finfo(np.float32).eps
-    return bool(abs(own - best) <= rounding and abs(score - best) <= rounding)
-
-
-def of_sampling(draw: Draw, spread: float, extreme: bool) -> bool:
-    """Paths drawn from the posterior: their log likelihood, and that each is possible and not improbable."""
-    frames, states = int(draw.integers(1, 6)), int(draw.integers(1, 5))
-    arrays, arcs = extremes.network(draw, states, extreme, draw.choice([0.0, 0.4, 1.0]))
-    columns, log_emission = draw.integers(3, size=states), extremes.log_densities(draw, frames, 3, spread)
-    given = NetworkArrays(emission=columns, **arrays)
-    drawn, log_likelihood = sample_paths(log_emission, given, draw.random((3, frames)))
-    ends = arrays["log_initial"], arrays["log_final"]
-    _, _, wanted = networks.posteriors(log_emission, columns, arcs, *ends)
-    scores = [paths.path_score(path, log_emission, columns, arcs, *ends) for path in drawn]
-    return near(log_likelihood, wanted, spread) and (np.isneginf(wanted) or min(scores) > wanted - 40)
-
-
-def of_trellis(draw: Draw, spread: float, extreme: bool) -> bool:
-    """The cheapest path through a trellis."""
-    states, frames = int(draw.integers(1, 4)), int(draw.integers(1, 6))
-    steps = -extremes.log_densities(draw, frames * states, states, spread).reshape(frames, states, states)
-    steps = np.ascontiguousarray(steps.transpose(1, 2, 0))
-    steps[range(states), range(states)] = np.minimum(steps[range(states), range(states)], 10 * spread)
-    start = -extremes.log_probabilities(draw, states, extreme)
-    start[0] = 0.0
-    arrival, pointers = cheapest_arrivals(start, steps)
-    path, best = trellis.cheapest_path(start, steps)
-    first = int(pointers[0, trace_back(pointers, int(arrival.argmin()))[0]])
-    own = trellis.path_cost([first, *trace_back(pointers, int(arrival.argmin()))], start, steps)
-    return near(arrival.min(), best, spread) and near(own, best, spread)
-
-
-RECURSIONS: dict[str, Case] = {
-    "network, double": of_network,
-    "network, single": lambda *case: of_network(*case, np.float32),
-    "products of 2 chains, double": lambda *case: of_network(*case, np.float64, 2),
-    "products of 2 chains, single": lambda *case: of_network(*case, np.float32, 2),
-    "factorial, double": of_factorial,
-    "factorial, single": lambda *case: of_factorial(*case, np.float32),
-    "factorial, best path": of_factorial_path,
-    "chains": of_chains,
-    "best path": of_path,
-    "best path in windows": lambda *case: of_path(*case, True),
-    "sampled paths": of_sampling,
-    "trellis": of_trellis,
-}
 
 
 def counted(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -204,18 +32,6 @@ def counted(function: Callable[..., Any]) -> Callable[..., Any]:
         return function(*arguments)
 
     return counting
-
-
-def tried(name: str, spread: float, cases: int) -> tuple[list[int], int]:
-    """Return the numbers of the cases that were wrong, and how many were computed in logarithms."""
-    in_logs[0] = 0
-    wrong = []
-    for number in range(cases):
-        draw = np.random.default_rng([number, int(spread), list(RECURSIONS).index(name)])
-        with np.errstate(all="ignore"):
-            if not RECURSIONS[name](draw, spread, number % 2 == 1):
-                wrong.append(number)
-    return wrong, in_logs[0]
 
 
 def main() -> None:
@@ -236,8 +52,9 @@ def main() -> None:
     for name in options.only:
         cells = []
         for spread in SPREADS:
-            wrong, logs = tried(name, spread, options.cases)
-            cells.append(f"{len(wrong)} ({logs})")
+            in_logs[0] = 0
+            wrong = [number for number in range(options.cases) if not is_right(name, spread, number)]
+            cells.append(f"{len(wrong)} ({in_logs[0]})")
             if wrong:
                 print(f"{name}, {spread:g}: wrong {wrong[:8]}", file=sys.stderr)
         print(f"| {name} | " + " | ".join(cells) + " |", flush=True)

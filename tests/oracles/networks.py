@@ -1,9 +1,11 @@
 """Posteriors of networks by enumeration of all state paths."""
 
+from itertools import pairwise
+
 import numpy as np
 
 
-def every_path(states: int, frames: int) -> np.ndarray:
+def every_path(states, frames):
     """Return every sequence of states [shape=(T, S^T)]."""
     return np.indices((states,) * frames).reshape(frames, -1)
 
@@ -22,7 +24,7 @@ def posteriors(log_emission, emission, arcs, log_initial, log_final):
     scores = np.asarray(log_initial, np.longdouble)[paths[0]] + np.asarray(log_final, np.longdouble)[paths[-1]]
     for row, states_then in zip(np.asarray(log_emission, np.longdouble), paths, strict=True):
         scores += row[emission][states_then]
-    for before, after in zip(paths[:-1], paths[1:], strict=True):
+    for before, after in pairwise(paths):
         scores += arc_log[before, after]
     posterior, counts = np.zeros((frames, states)), np.zeros(states * states)
     best = scores.max()
@@ -31,8 +33,8 @@ def posteriors(log_emission, emission, arcs, log_initial, log_final):
     weights = np.exp(scores - best)
     log_likelihood = best + np.log(weights.sum())
     weights = (weights / weights.sum()).astype(float)
-    for row, states_then in zip(posterior, paths, strict=True):
-        row += np.bincount(states_then, weights, states)
-    for before, after in zip(paths[:-1], paths[1:], strict=True):
+    for frame, states_then in enumerate(paths):
+        posterior[frame] = np.bincount(states_then, weights, states)
+    for before, after in pairwise(paths):
         counts += np.bincount(before * states + after, weights, states * states)
     return posterior, {(a, b): counts[a * states + b] for a, b in arcs}, float(log_likelihood)

@@ -57,7 +57,8 @@ def factorial_posteriors(
     loss), which takes half the time. Where double precision may lose paths that count, because they were some 250 nats
     below a frame's best, the recording is processed in logarithms (``factorial_logs``).
     Source: Ghahramani & Jordan (1997), "Factorial hidden Markov models", appendix B. Forward and backward probabilities
-    are never less than a least one, and so upper bounds; what may come of raising them follows from each frame's overlap.
+    are raised to a least one, never set to 0, and so are upper bounds; how much may come of that follows from the
+    overlap of both in each frame.
     Cost: time O(T·Na·Nv·(Ua + Uv)), memory O(stretch + T/stretch) times Na·Nv.
     """
     order = np.lexsort(logs.pairs.T[::-1])
@@ -142,9 +143,9 @@ class _ForwardBackward(NamedTuple):
 
     @property
     def _least_overlap(self) -> float:
-        """The least overlap of forward and backward probabilities, both of sum 1, of which what is raised is no more
-        than ``OFF``: in every frame 1 / whole² at most, forward and backward, of every joint state, times what leads
-        there or from there, at most (U + 2) of each loop, which is 3 N or less.
+        """The least overlap of forward and backward probabilities, both of sum 1, with which what was raised makes no
+        more than ``OFF`` of the likelihood over all frames. In a frame that is 1 / whole² at most for each joint state,
+        forward and backward, times the sum of all that leads to a state or from it: up to U + 2 ≤ 3 U in each loop.
         """
         kind, states = self.room.dtype, self.room[0].size
         return 2 * len(self.logs.audio) * 9 * states / factorial_steps.WHOLE[kind] ** 2 / OFF[kind]

@@ -14,8 +14,8 @@ from lipmotion.kernels.loops import FrameDensity, LoopTransitions
 LEAST = {np.dtype(np.float32): 1e-37, np.dtype(np.float64): 1e-300}
 """By precision: smaller products of probabilities and densities are set to 0."""
 LEAST_TOTAL = {np.dtype(np.float32): 1e-20, np.dtype(np.float64): 1e-150}
-"""By precision: least sum of these products, as a share of the whole. With such a sum, what was set to 0 or has underflown
-is less than probabilities are raised to; with a smaller one, double precision computes products in logarithms."""
+"""By precision: least sum of these products, as a share of the whole. With such a sum, what was set to 0 or underflowed
+is less than what probabilities are raised to; with a smaller one, double precision computes products in logarithms."""
 
 
 def forward_step(

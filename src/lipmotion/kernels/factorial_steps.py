@@ -14,7 +14,7 @@ Joint = NDArray[np.floating[Any]]
 WHOLE = {np.dtype(np.float32): 1e16, np.dtype(np.float64): 1e70}
 """By precision: the sum of the probabilities of a frame. They are raised to 1 divided by this where they are less."""
 LEAST_TOTAL = 1e-150
-"""Least sum of probabilities times densities, as a share of the whole; smaller sums are computed again in logarithms."""
+"""Least sum of probabilities times densities, as a share of the whole; smaller ones are computed in logarithms."""
 
 
 class FramePosteriors(NamedTuple):

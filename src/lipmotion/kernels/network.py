@@ -101,19 +101,17 @@ class ForwardBackwardNetwork(NamedTuple):
     ) -> ForwardBackwardNetwork:
         """Return a network prepared for forward–backward; parameters as in ``kernels.arcs.NetworkArrays``."""
         layout = arc_layout(arc_from, arc_start)
-        arc_log, log_initial, log_final = (log.astype(np.float64) for log in (arc_log, log_initial, log_final))
-        return cls(arc_from, arc_log, arc_start, log_initial, log_final, layout, *_weighted(layout, arc_log))
+        logs, initial, final = (log.astype(np.float64) for log in (arc_log, log_initial, log_final))
+        return cls(arc_from, logs, arc_start, initial, final, layout, *_weighted(layout, logs))
 
     def with_arcs(
         self, arc_log: NDArray[np.floating[Any]], log_initial: NDArray[np.floating[Any]]
     ) -> ForwardBackwardNetwork:
         """Return the network with other probabilities of arcs [shape=(E,)] and of beginnings [shape=(S,)]."""
-        arc_log, log_initial = arc_log.astype(np.float64), log_initial.astype(np.float64)
-        best_arc, weights, transposed, chunks = _weighted(self.layout, arc_log)
-        return self._replace(
-            arc_log=arc_log, log_initial=log_initial, best_arc=best_arc, weights=weights, transposed=transposed,
-            chunks=chunks,
-        )  # fmt: skip
+        logs, initial = arc_log.astype(np.float64), log_initial.astype(np.float64)
+        best_arc, weights, transposed, chunks = _weighted(self.layout, logs)
+        changed = self._replace(best_arc=best_arc, weights=weights, transposed=transposed, chunks=chunks)
+        return changed._replace(arc_log=logs, log_initial=initial)
 
     def posteriors(self, log_emission: NDArray[np.floating[Any]], columns: Index, frames: Index) -> NetworkPosteriors:
         """Return the posteriors of recordings, which are concatenated in ``log_emission``.
@@ -206,9 +204,7 @@ class ForwardBackwardNetwork(NamedTuple):
             onward = self.arc_log + (log_emission[t + 1] + beta[t + 1])[arc_to]
             beta[t, sources] = np.logaddexp.reduceat(onward[by_source], source_start)
             counts += np.exp(alpha[t, arc_from] + onward - log_likelihood)
-        return NetworkPosteriors(
-            np.exp(alpha + beta - log_likelihood)[:, order], counts, np.array([log_likelihood])
-        )
+        return NetworkPosteriors(np.exp(alpha + beta - log_likelihood)[:, order], counts, np.array([log_likelihood]))
 
 
 def _roots(log_density: NDArray[np.floating[Any]]) -> tuple[NDArray[Any], NDArray[Any]]:

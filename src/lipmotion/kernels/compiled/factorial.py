@@ -1,10 +1,10 @@
 """Steps of factorial hidden Markov models, compiled: few passes over the joint states.
 
 Densities are multiplied in double precision, and products under a least value are set to 0: none is denormal, which
-would be many times slower. Probabilities of a frame sum to ``whole``, and are raised to 1 / ``whole`` where they are less
-(``kernels.factorial``): so products of two of them are no denormal either.  Arrays with suffix ``_0`` or ``_1`` belong to that axis; U is the number of units of an
-axis. Functions take their arrays as separate arguments, more than eight in places: numba compiles that to the fastest
-code.
+would be many times slower. Probabilities of a frame sum to ``whole``, and are raised to 1 / ``whole`` where they are
+less (``kernels.factorial``): so products of two of them are no denormal either.
+Arrays with suffix ``_0`` or ``_1`` belong to that axis; U is the number of units of an axis. Functions take their
+arrays as separate arguments, more than eight in places: numba compiles that to the fastest code.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from lipmotion.kernels.compiled.compiler import compiled_to_rounding
 
 Array = NDArray[Any]
 Index = NDArray[np.intp]
+
 
 @compiled_to_rounding
 def moved_to_last(before: Array, stay: Array, onward: Array, entering: Array, count: int) -> Array:

@@ -1,14 +1,20 @@
 """Forward–backward through networks, compiled, with scaled probabilities.
 
-All is in one precision, single or double, but for the products and sums that are marked. Probabilities under a least one
-are raised to it, never set to 0: no product is denormal, which would be many times slower, and forward probabilities are
-upper bounds. Write N_t for the sum over states of forward times backward probabilities of frame t, divided by the
-likelihood that was computed, so that the last one is 1. From each frame to the one before, and from the first one to the probabilities of beginnings
-times all that follows, N changes by what was raised backward times the forward probabilities, which is negligible, as
-those sum to a scale of no more than ``MOST_SCALE``; minus what was raised forward times the backward ones; minus the
-forward ones times what was lost backward. So if no N is less than 1 − δ, the sums of all these are at most δ, and then the likelihood is too great by a
-share of δ at most, and the errors of the posteriors of a frame sum to 3 δ at most, but for rounding. Otherwise the
-recording is left to the caller.
+All is in one precision, single or double, but for products and sums that are followed by a division. Probabilities
+under a least one are raised to it, never set to 0: so no product is denormal, which would be many times slower, and
+forward probabilities are upper bounds.
+
+Let N be the sum over the states of a frame of forward times backward probabilities, divided by the likelihood that was
+computed: in the last frame it is 1. From each frame to the one before, and from the first frame to the beginning (whose
+forward probabilities are the initial ones), N changes by
+
+    + what was raised backward, times the forward probabilities: negligible, as these sum to ``MOST_SCALE`` at most
+    − what was raised forward, times the backward probabilities
+    − what was lost backward (where blocks are multiplied, or an arc underflows), times the forward probabilities
+
+So if no N is under 1 − δ, the last two sum to δ at most, over all frames. They bound what is wrong: the likelihood is
+too great by a share of δ at most, and the errors of the posteriors of a frame sum to 3 δ at most, but for rounding. A
+recording with a smaller N is left to the caller.
 
 Functions take their arrays as separate arguments, more than eight in places: numba compiles that to the fastest code.
 """
