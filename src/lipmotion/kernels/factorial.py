@@ -20,6 +20,8 @@ ROOM_BYTES = 2**27
 """Memory for the forward probabilities that are stored at once: of as many frames as fit in, but of √T at least."""
 OFF: dict[np.dtype[Any], float] = {np.dtype(np.float32): 1e-4, np.dtype(np.float64): 1e-10}
 """By precision: the largest share of the likelihood that may come of probabilities that were raised."""
+LEAST_POSTERIOR = 1e-20
+"""Smaller posteriors and counts are set to 0, as those of states that cannot be are not quite 0."""
 LEAST_PROBABILITY = 1e-100
 """Least probability of a transition, or of beginning or ending in a state: products of smaller ones may underflow."""
 
@@ -31,6 +33,7 @@ class FactorialPosteriors(NamedTuple):
     pair          : [shape=(T, P)], posteriors of the joint states with densities of their own
     audio_counts, visual_counts : expected counts of the transitions of each loop
     log_likelihood : -inf where there is no path: then everything else is 0
+    Posteriors and counts under 1e-20 are 0.
 
     Guaranteed but for rounding, however improbable a path is at first: the likelihood is right to a share of δ, and the
     errors of the posteriors of a frame, or of the counts of a step from frame to frame, sum to 3 δ at most: δ is 1e-4
@@ -199,6 +202,8 @@ class _Accumulator(NamedTuple):
             _counted(loops[0], self.audio, self.audio_entered),
             _counted(loops[1], self.visual, self.visual_entered),
         )
+        for part in (self.audio, self.visual, self.pair, *counts[0], *counts[1]):
+            part[part < LEAST_POSTERIOR] = 0
         return FactorialPosteriors(self.audio, self.visual, self.pair, *counts, log_likelihood)
 
 
