@@ -183,6 +183,18 @@ def test_a_unit_far_behind_comes_back_in_single_precision(third):
     assert found.audio[:, ::3].sum(axis=1) == pytest.approx(np.ones(40), abs=1e-4)
 
 
+@pytest.mark.parametrize(("kind", "ends", "middle"), [(np.float64, 360, 1000), (np.float32, 90, 300)])
+def test_a_path_is_found_that_is_far_behind_both_forward_and_backward(kind, ends, middle):
+    """One unit is better at the beginning and at the end, the other in between, and by more."""
+    half = np.full((1, 2), 0.5)
+    audio = Loop(half, half[:0], half[0], np.eye(2), half, half + 0.5)
+    visual = Loop(np.ones((1, 1)), np.ones((0, 1)), np.zeros(1), *np.ones((3, 1, 1)))
+    log_density = np.repeat([[0, -ends], [-middle, 0], [0, -ends]], 3, axis=0).astype(kind) / 3
+    found = factorial_posteriors(audio, visual, FactorialLogLikelihoods.of(log_density, np.zeros((9, 1), kind)))
+    assert found.audio[:, 1] == pytest.approx(np.ones(9), abs=1e-4)
+    assert found.log_likelihood == pytest.approx(np.log(0.5) - 2 * ends, abs=1e-4)
+
+
 @given(seed=SEEDS, frames=st.integers(1, 4), stretch=st.integers(1, 5))
 @SHARED
 def test_the_best_path_is_the_best_of_all(seed, frames, stretch):

@@ -25,10 +25,10 @@ def chain_posteriors(log_emission, log_stay, log_move):
     frames, states = log_emission.shape
     paths = list(chain_paths(frames, states))
     posterior, stay = np.zeros((frames, states)), np.zeros(states)
-    if not paths:
-        return posterior, stay, -np.inf
     scores = np.array([path_log_probability(path, log_emission, log_stay, log_move) for path in paths])
-    log_likelihood = np.logaddexp.reduce(scores)
+    log_likelihood = np.logaddexp.reduce(scores, initial=-np.inf)
+    if np.isneginf(log_likelihood):
+        return posterior, stay, -np.inf
     for path, weight in zip(paths, np.exp(scores - log_likelihood), strict=True):
         for frame, state in enumerate(path):
             posterior[frame, state] += weight

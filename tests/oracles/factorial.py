@@ -29,6 +29,17 @@ def joint_arcs(audio, visual):
     return arcs
 
 
+def best_arcs(audio, visual):
+    """Return the log probability of the best transition between joint states by source and target."""
+    ways, wide = {}, visual.stay.size
+    with np.errstate(divide="ignore"):
+        moves = [[(a, b, float(np.log(p))) for a, b, *_, p in steps(loop)] for loop in (audio, visual)]
+    for (a, b, p), (c, d, q) in product(*moves):
+        arc = a * wide + c, b * wide + d
+        ways[arc] = max(ways.get(arc, -np.inf), p + q)
+    return ways
+
+
 def joint_logs(audio, visual, logs):
     """Return log densities [shape=(T, Na·Nv)] and log probabilities of beginning and ending in joint states."""
     log_density = logs.audio[:, :, None].astype(float) + logs.visual[:, None, :]

@@ -18,8 +18,12 @@ from lipmotion.kernels.loops import Array, FactorialLogLikelihoods, FrameDensity
 
 ROOM_BYTES = 2**27
 """Memory for the forward probabilities that are stored at once: of as many frames as fit in, but of √T at least."""
-LEAST_OVERLAP: dict[np.dtype[Any], float] = {np.dtype(np.float32): 1e-20, np.dtype(np.float64): 1e-110}
-"""By precision: least sum of forward times backward probabilities, each of sum 1; below, values set to 0 may count."""
+OFF: dict[np.dtype[Any], float] = {np.dtype(np.float32): 1e-4, np.dtype(np.float64): 1e-10}
+"""By precision: the largest share of the likelihood that may come of probabilities that were raised."""
+LEAST_POSTERIOR = 1e-20
+"""Smaller posteriors and counts are set to 0, as those of states that cannot be are not quite 0."""
+LEAST_PROBABILITY = 1e-100
+"""Least probability of a transition, or of beginning or ending in a state: products of smaller ones may underflow."""
 
 
 class FactorialPosteriors(NamedTuple):
@@ -29,6 +33,11 @@ class FactorialPosteriors(NamedTuple):
     pair          : [shape=(T, P)], posteriors of the joint states with densities of their own
     audio_counts, visual_counts : expected counts of the transitions of each loop
     log_likelihood : -inf where there is no path: then everything else is 0
+    Posteriors and counts under 1e-20 are 0.
+
+    Guaranteed but for rounding, however improbable a path is at first: the likelihood is right to a share of δ, and the
+    errors of the posteriors of a frame, or of the counts of a step from frame to frame, sum to 3 δ at most: δ is 1e-4
+    for log densities in single precision, 1e-10 for those in double precision (``OFF``).
     """
 
     audio: Array
@@ -48,17 +57,20 @@ def factorial_posteriors(
     stretch : frames whose forward probabilities are stored at once; those of the others are computed twice;
         None: √T, or as many as ``ROOM_BYTES`` hold
     Log densities in single precision are processed in single precision where that is possible (compiled, and without
-    loss), which takes half the time. Where double precision loses paths that count, because they were some 320 nats
+    loss), which takes half the time. Where double precision may lose paths that count, because they were some 250 nats
     below a frame's best, the recording is processed in logarithms (``factorial_logs``).
-    Source: Ghahramani & Jordan (1997), "Factorial hidden Markov models", appendix B.
+    Source: Ghahramani & Jordan (1997), "Factorial hidden Markov models", appendix B. Forward and backward probabilities
+    are raised to a least one, never set to 0, and so are upper bounds; how much may come of that follows from the
+    overlap of both in each frame.
     Cost: time O(T·Na·Nv·(Ua + Uv)), memory O(stretch + T/stretch) times Na·Nv.
     """
     order = np.lexsort(logs.pairs.T[::-1])
     logs = logs._replace(pair=logs.pair[:, order], pairs=logs.pairs[order])
     result = None
-    for kind, least_overlap in LEAST_OVERLAP.items():
-        if result is None and (kind == np.float64 or (logs.audio.dtype == kind and numba_works())):
-            result = _ForwardBackward.of(audio, visual, logs, stretch, kind).posteriors(least_overlap)
+    if min(_least_probability(loop) for loop in (audio, visual)) >= LEAST_PROBABILITY:
+        for kind in OFF:
+            if result is None and (kind == np.float64 or (logs.audio.dtype == kind and numba_works())):
+                result = _ForwardBackward.of(audio, visual, logs, stretch, kind).posteriors()
     result = result or _posteriors_in_logs(audio, visual, logs) or _zero_posteriors(audio, visual, logs)
     return result._replace(pair=result.pair[:, np.argsort(order)])
 
@@ -99,9 +111,10 @@ class _ForwardBackward(NamedTuple):
             from lipmotion.kernels import factorial_fused as steps
         return cls((audio, visual), moves, logs, stretch, room, leaving, [], steps)
 
-    def posteriors(self, least_overlap: float) -> FactorialPosteriors | None:
-        """Return the posteriors; None: there is no path, or ``least_overlap`` was not reached in every frame."""
+    def posteriors(self) -> FactorialPosteriors | None:
+        """Return the posteriors; None: there is no path, or the precision is not enough."""
         starts = range(0, len(self.logs.audio), self.stretch)
+        kind, least_overlap = self.room.dtype, self._least_overlap
         befores: list[NDArray[Any]] = []
         log_likelihood, last = 0.0, self.room[:0]
         for start in starts:
@@ -110,12 +123,12 @@ class _ForwardBackward(NamedTuple):
             if log_likelihood == -np.inf:
                 return None
             last = self.room[self._stop(start) - start - 1].copy()
-        final = np.multiply.outer(*(loop.final.ravel() for loop in self.loops)).astype(last.dtype)
+        final = self._ends("final")
         totals = _Accumulator.of(self.loops, self.logs)
         last_frame = factorial_steps.frame_posteriors(last, final, self.densities[-1])
         if not totals.store(len(self.logs.audio) - 1, last_frame, least_overlap):
             return None
-        backward, _ = factorial_steps.times_density(final, self.densities[-1])
+        backward, _ = factorial_steps.times_density(final, self.densities[-1], kind)
         for start, before in zip(reversed(starts), reversed(befores), strict=True):
             if start != starts[-1]:
                 self._forward(start, before)
@@ -131,6 +144,20 @@ class _ForwardBackward(NamedTuple):
                 backward = step.backward
         return totals.result(self.loops, float(log_likelihood) + math.log(last_frame.overlap))
 
+    @property
+    def _least_overlap(self) -> float:
+        """The least overlap of forward and backward probabilities, both of sum 1, with which what was raised makes no
+        more than ``OFF`` of the likelihood over all frames. In a frame that is 1 / whole² at most for each joint state,
+        forward and backward, times the sum of all that leads to a state or from it: up to U + 2 ≤ 3 U in each loop.
+        """
+        kind, states = self.room.dtype, self.room[0].size
+        return 2 * len(self.logs.audio) * 9 * states / factorial_steps.WHOLE[kind] ** 2 / OFF[kind]
+
+    def _ends(self, name: str) -> Array:
+        """Return the probabilities of beginning (``initial``) or ending (``final``) in joint states, of the whole."""
+        product = np.multiply.outer(*(getattr(loop, name).ravel() for loop in self.loops))
+        return np.asarray(product * factorial_steps.WHOLE[self.room.dtype])
+
     def _stop(self, start: int) -> int:
         return min(start + self.stretch, len(self.logs.audio))
 
@@ -140,8 +167,7 @@ class _ForwardBackward(NamedTuple):
         self.densities[:] = self.logs.densities(start, self._stop(start))
         for t, density in enumerate(self.densities, start):
             if t == 0:
-                initial = np.multiply.outer(*(loop.initial.ravel() for loop in self.loops)).astype(self.room.dtype)
-                self.room[0], log = factorial_steps.times_density(initial, density)
+                self.room[0], log = factorial_steps.times_density(self._ends("initial"), density, self.room.dtype)
             else:
                 self.room[t - start], self.leaving[t - start], log = self.steps.forward_step(
                     before, *self.moves, density
@@ -176,6 +202,8 @@ class _Accumulator(NamedTuple):
             _counted(loops[0], self.audio, self.audio_entered),
             _counted(loops[1], self.visual, self.visual_entered),
         )
+        for part in (self.audio, self.visual, self.pair, *counts[0], *counts[1]):
+            part[part < LEAST_POSTERIOR] = 0
         return FactorialPosteriors(self.audio, self.visual, self.pair, *counts, log_likelihood)
 
 
@@ -235,6 +263,12 @@ def _counted(loop: Loop, posterior: Array, entered: Array) -> LoopCounts:
     left = np.maximum(enter.sum(axis=1) + after, 0)
     stay = np.maximum(frames[:-1].sum(axis=0) - left, 0)
     return LoopCounts(stay, left[:-1], enter, frames[0])
+
+
+def _least_probability(loop: Loop) -> float:
+    """Return the least probability of a loop that is not 0."""
+    parts = (loop.stay, loop.onward, loop.leave[:, None] * loop.enter, loop.initial, loop.final)
+    return min(float(part.min(where=part > 0, initial=1.0)) for part in parts)
 
 
 def _zero_posteriors(audio: Loop, visual: Loop, logs: FactorialLogLikelihoods) -> FactorialPosteriors:

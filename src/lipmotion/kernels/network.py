@@ -19,14 +19,24 @@ FRAMES_AT_ONCE = 256
 """Frames whose roots are taken at once: they stay in the cache."""
 LOWEST_ROOT = -80.0
 """Least logarithm of a density's eighth root: exp of less is denormal in single precision, which is slow."""
+LEAST_JOINT = 1e-4
+"""Least root of a frame's best joint density, relative to the product of the chains' best ones: where it is less, joint
+densities are computed from sums of logarithms, as factors under e^LOWEST_ROOT may count."""
+LIMITS = {np.dtype(np.float32): (1e-24, 1e-12, 1e-4), np.dtype(np.float64): (1e-140, 1e-100, 1e-10)}
+"""By precision: ``least``, ``least_scale`` and ``off`` of the compiled kernel."""
 
 
 class NetworkPosteriors(NamedTuple):
     """Posteriors of recordings in a network.
 
-    posterior      : [shape=(T, S)], of the states by place (``kernels.arcs``), all recordings concatenated
+    posterior      : [shape=(T, S)], of the states by place (``kernels.arcs``), all recordings concatenated; those under
+        1e-12 may be 0
     counts         : [shape=(E,)], expected number of times that each arc is followed, over all recordings
     log_likelihood : [shape=(U,)], of each recording; -inf where there is no path: then its posteriors are 0
+
+    Guaranteed but for rounding, however improbable a path is at first: a likelihood is right to a share of δ, and the
+    errors of the posteriors of a frame, or of the counts of a step from frame to frame, sum to 3 δ at most: δ is 1e-4
+    for log densities in single precision, 1e-10 for those in double precision (``LIMITS``).
     """
 
     posterior: NDArray[Any]
@@ -63,7 +73,8 @@ class ForwardBackwardNetwork(NamedTuple):
 
     arc_from, arc_log, arc_start, log_initial, log_final : as in ``kernels.arcs.NetworkArrays``
     layout     : of the arcs
-    weights    : the probabilities of arcs, in the layout
+    best_arc   : logarithm of the greatest probability of an arc
+    weights    : the probabilities of arcs relative to that, in the layout
     transposed : those of blocks, targets as rows, sources as columns
     chunks     : those of runs
     """
@@ -74,6 +85,7 @@ class ForwardBackwardNetwork(NamedTuple):
     log_initial: Array
     log_final: Array
     layout: ArcLayout
+    best_arc: float
     weights: ArcWeights
     transposed: Array
     chunks: Chunks
@@ -89,17 +101,17 @@ class ForwardBackwardNetwork(NamedTuple):
     ) -> ForwardBackwardNetwork:
         """Return a network prepared for forward–backward; parameters as in ``kernels.arcs.NetworkArrays``."""
         layout = arc_layout(arc_from, arc_start)
-        weights, transposed, chunks = _weighted(layout, arc_log)
-        arc_log, log_initial, log_final = (log.astype(np.float64) for log in (arc_log, log_initial, log_final))
-        return cls(arc_from, arc_log, arc_start, log_initial, log_final, layout, weights, transposed, chunks)
+        logs, initial, final = (log.astype(np.float64) for log in (arc_log, log_initial, log_final))
+        return cls(arc_from, logs, arc_start, initial, final, layout, *_weighted(layout, logs))
 
     def with_arcs(
         self, arc_log: NDArray[np.floating[Any]], log_initial: NDArray[np.floating[Any]]
     ) -> ForwardBackwardNetwork:
         """Return the network with other probabilities of arcs [shape=(E,)] and of beginnings [shape=(S,)]."""
-        weights, transposed, chunks = _weighted(self.layout, arc_log)
-        changed = self._replace(weights=weights, transposed=transposed, chunks=chunks)
-        return changed._replace(arc_log=arc_log.astype(np.float64), log_initial=log_initial.astype(np.float64))
+        logs, initial = arc_log.astype(np.float64), log_initial.astype(np.float64)
+        best_arc, weights, transposed, chunks = _weighted(self.layout, logs)
+        changed = self._replace(best_arc=best_arc, weights=weights, transposed=transposed, chunks=chunks)
+        return changed._replace(arc_log=logs, log_initial=initial)
 
     def posteriors(self, log_emission: NDArray[np.floating[Any]], columns: Index, frames: Index) -> NetworkPosteriors:
         """Return the posteriors of recordings, which are concatenated in ``log_emission``.
@@ -107,100 +119,75 @@ class ForwardBackwardNetwork(NamedTuple):
         log_emission : [shape=(T, G)], finite or -inf; the posteriors have the same precision
         columns      : [shape=(S,)], the density of the state at each place
         frames       : [shape=(U,)], number of frames of each recording
-        Source: the standard recursions.  Compiled, paths 320 nats below a frame's best are left out, unless none is
-        left then, and posteriors under 1e-12 are 0.
-        Cost: O(T·E); in NumPy some fifty times slower.
+        Cost: as ``product_posteriors``.
         """
-        if not numba_works():
-            return self._completed([log_emission], [columns], frames, None)
-        root, best = _roots(log_emission)
-        if not np.array_equal(columns, np.arange(root.shape[1])):
-            root = root.take(columns, axis=1)
-        return self._completed([log_emission], [columns], frames, self._compiled(root, best, frames))
+        return self.product_posteriors([log_emission], [columns], frames)
 
     def product_posteriors(
         self, log_emissions: Sequence[NDArray[np.floating[Any]]], columns: Sequence[Index], frames: Index
     ) -> NetworkPosteriors:
         """Return the posteriors of recordings whose densities are products of one factor from each chain.
 
-        log_emissions : one or more [shape=(T, G_c)], all of one precision; the log density of the state at place s is
-            the sum over chains of ``log_emissions[c][:, columns[c][s]]``
+        log_emissions : one or more [shape=(T, G_c)], all of one precision, finite or -inf; the log density of the state
+            at place s is the sum over chains of ``log_emissions[c][:, columns[c][s]]``
         columns       : of each chain [shape=(S,)]
         frames        : [shape=(U,)], number of frames of each recording
-        Cost: as ``posteriors``, but exponentials are taken of the chains' densities only.
+        Source: the standard recursions, compiled, in the precision of ``log_emissions``; for recordings of which that
+        would lose what counts, in double precision, and at last in logarithms by NumPy.
+        Cost: O(T·E), and exponentials of the chains' densities; in double precision twice, in logarithms some fifty
+        times as slow.
         """
-        if not numba_works():
-            return self._completed(log_emissions, columns, frames, None)
-        single = log_emissions[0].dtype == np.float32
-        expected = self._compiled(*_products(log_emissions, columns), frames, single)
-        edges = np.append(0, np.cumsum(frames))
-        for u in np.flatnonzero(np.isneginf(expected.log_likelihood)) if single else []:
-            of_recording = slice(edges[u], edges[u + 1])
-            again = self._compiled(*_products([log[of_recording] for log in log_emissions], columns), frames[u : u + 1])
-            expected.posterior[of_recording], expected.log_likelihood[u] = again.posterior, again.log_likelihood[0]
-            expected.counts[:] += again.counts
-        return self._completed(log_emissions, columns, frames, expected)
-
-    def _completed(
-        self,
-        log_emissions: Sequence[NDArray[np.floating[Any]]],
-        columns: Sequence[Index],
-        frames: Index,
-        expected: NetworkPosteriors | None,
-    ) -> NetworkPosteriors:
-        """Return the posteriors; those of recordings without a path in ``expected`` are computed in logarithms.
-
-        expected : the compiled result; None: there is none, all are computed in logarithms
-        """
-        if expected is None:
-            posterior = np.zeros((len(log_emissions[0]), len(columns[0])), log_emissions[0].dtype)
+        precision = log_emissions[0].dtype
+        if numba_works():
+            expected = self._compiled(log_emissions, columns, frames)
+        else:
+            posterior = np.zeros((len(log_emissions[0]), len(columns[0])), precision)
             expected = NetworkPosteriors(posterior, np.zeros(len(self.arc_log)), np.full(len(frames), -np.inf))
         edges = np.append(0, np.cumsum(frames))
         for u in np.flatnonzero(np.isneginf(expected.log_likelihood)):
             of_recording = slice(edges[u], edges[u + 1])
-            log_emission = sum(
-                log[of_recording, column[self.layout.place]].astype(np.float64)
-                for log, column in zip(log_emissions, columns, strict=True)
-            )
-            posterior, counts, expected.log_likelihood[u] = self._in_logs(np.asarray(log_emission))
-            expected.posterior[of_recording] = posterior[:, self.layout.order]
-            expected.counts[:] += counts
+            logs = [log[of_recording].astype(np.float64) for log in log_emissions]
+            again = None
+            if numba_works() and precision == np.float32:
+                again = self._compiled(logs, columns, frames[u : u + 1])
+            if again is None or np.isneginf(again.log_likelihood[0]):
+                again = self._in_logs(_joint(logs, columns))
+            expected.posterior[of_recording], expected.log_likelihood[u] = again.posterior, again.log_likelihood[0]
+            expected.counts[:] += again.counts
         return expected
 
     def _compiled(
-        self, root: NDArray[Any], best: NDArray[Any], frames: Index, single: bool = False
+        self, log_emissions: Sequence[NDArray[np.floating[Any]]], columns: Sequence[Index], frames: Index
     ) -> NetworkPosteriors:
-        """Return the posteriors of recordings by the compiled kernels; without a path in their range, 0 and -inf.
+        """Return the posteriors of recordings by the compiled kernel, in the precision of ``log_emissions``.
 
-        root : [shape=(T, S)], by place, the eighth roots of densities relative to ``best``; overwritten by posteriors
-        best : [shape=(T,)], logarithms
-        single : whether probabilities may be in single precision; a recording for which that is not enough gets 0, -inf
+        A recording for which that is not enough has a log likelihood of -inf, no counts, and no posteriors.
         """
         from lipmotion.kernels.compiled import network
 
-        run_weight: NDArray[Any] = self.chunks.weight.astype(np.float32 if single else np.float64)
-        kernel = network.forward_backward_single if single else network.forward_backward
+        root, best = _products(log_emissions, columns)
         layout, edges = self.layout, np.append(0, np.cumsum(frames))
         (initial, first), (final, last) = (
             _probabilities(log[layout.order]) for log in (self.log_initial, self.log_final)
         )
-        run_counts, leaving, entering, scales, ends = kernel(
-            root, edges, initial, final, self.chunks.runs, run_weight,
+        run_counts, leaving, entering, scales, ends = network.forward_backward(
+            root, edges, initial, final, self.chunks.runs, self.chunks.weight.astype(root.dtype),
             layout.blocks.astype(np.uintp), layout.block_sources.astype(np.uintp),
-            self.weights.blocks.astype(root.dtype), self.transposed.astype(root.dtype),
+            self.weights.blocks.astype(root.dtype), self.transposed.astype(root.dtype), *LIMITS[root.dtype],
         )  # fmt: skip
         counts = np.zeros(len(self.arc_log))
         counts[layout.run_arcs] = run_counts[self.chunks.arcs] * self.weights.runs
         _count_blocks(counts, layout, self.weights, leaving, entering)
         with np.errstate(divide="ignore"):
             log_likelihood = np.add.reduceat(np.log(scales) + best, edges[:-1]) + (np.log(ends) + first + last)
-        return NetworkPosteriors(root, counts, log_likelihood)
+        return NetworkPosteriors(root, counts, log_likelihood + (frames - 1) * self.best_arc)
 
-    def _in_logs(self, log_emission: Array) -> tuple[Array, Array, float]:
-        """Return posteriors, counts and log likelihood of one recording by NumPy, in logarithms, without underflow.
+    def _in_logs(self, log_density: Array) -> NetworkPosteriors:
+        """Return the posteriors of one recording by NumPy, in logarithms, without underflow.
 
-        log_emission : [shape=(T, S)], of the states in their own order
+        log_density : [shape=(T, S)], by place
         """
+        order, log_emission = self.layout.order, log_density[:, self.layout.place]
         (T, states), arc_from = log_emission.shape, self.arc_from
         arc_to = np.repeat(np.arange(states), np.diff(self.arc_start, append=len(arc_from)))
         by_source = np.argsort(arc_from, kind="stable")
@@ -211,13 +198,13 @@ class ForwardBackwardNetwork(NamedTuple):
             alpha[t] = np.logaddexp.reduceat(alpha[t - 1, arc_from] + self.arc_log, self.arc_start) + log_emission[t]
         log_likelihood = float(np.logaddexp.reduce(alpha[-1] + self.log_final))
         if not np.isfinite(log_likelihood):
-            return np.zeros((T, states)), counts, -np.inf
+            return NetworkPosteriors(np.zeros((T, states)), counts, np.array([-np.inf]))
         beta[-1] = self.log_final
         for t in range(T - 2, -1, -1):
             onward = self.arc_log + (log_emission[t + 1] + beta[t + 1])[arc_to]
             beta[t, sources] = np.logaddexp.reduceat(onward[by_source], source_start)
             counts += np.exp(alpha[t, arc_from] + onward - log_likelihood)
-        return np.exp(alpha + beta - log_likelihood), counts, log_likelihood
+        return NetworkPosteriors(np.exp(alpha + beta - log_likelihood)[:, order], counts, np.array([log_likelihood]))
 
 
 def _roots(log_density: NDArray[np.floating[Any]]) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -235,7 +222,10 @@ def _roots(log_density: NDArray[np.floating[Any]]) -> tuple[NDArray[Any], NDArra
 def _products(
     log_densities: Sequence[NDArray[np.floating[Any]]], columns: Sequence[Index]
 ) -> tuple[NDArray[Any], Array]:
-    """Return the roots of joint densities, by place, relative to each frame's best, and the logarithm of the best."""
+    """Return the roots of joint densities, by place, relative to each frame's best, and the logarithm of the best.
+
+    Densities lower than the best by some 560 nats may be 0; where all are, the logarithm is -inf.
+    """
     from lipmotion.kernels.compiled import network
 
     firsts = np.cumsum([0, *(log.shape[1] for log in log_densities[:-1])])
@@ -244,11 +234,23 @@ def _products(
     joint, best = np.empty((frames, shifted.shape[1]), log_densities[0].dtype), np.empty(frames)
     for start in range(0, frames, FRAMES_AT_ONCE):
         of_recording = slice(start, start + FRAMES_AT_ONCE)
+        if len(log_densities) == 1:
+            joint[of_recording], best[of_recording] = _roots(log_densities[0][of_recording].take(columns[0], axis=1))
+            continue
         roots, bests = zip(*(_roots(log[of_recording]) for log in log_densities), strict=True)
         network.products(np.hstack(roots), shifted, joint[of_recording], best[of_recording])
+        far = start + np.flatnonzero(best[of_recording] < LEAST_JOINT)
         with np.errstate(divide="ignore"):
             best[of_recording] = 8 * np.log(best[of_recording]) + np.sum(bests, axis=0, dtype=np.float64)
+        if len(far):
+            joint[far], best[far] = _roots(_joint([log[far] for log in log_densities], columns))
     return joint, best
+
+
+def _joint(log_densities: Sequence[NDArray[np.floating[Any]]], columns: Sequence[Index]) -> Array:
+    """Return joint log densities [shape=(T, S)], by place."""
+    factors = (log[:, column].astype(np.float64) for log, column in zip(log_densities, columns, strict=True))
+    return np.asarray(sum(factors))
 
 
 def _probabilities(log: Array) -> tuple[Array, float]:
@@ -258,10 +260,15 @@ def _probabilities(log: Array) -> tuple[Array, float]:
     return np.exp(log - best), best
 
 
-def _weighted(layout: ArcLayout, arc_log: NDArray[np.floating[Any]]) -> tuple[ArcWeights, Array, Chunks]:
-    """Return the probabilities of arcs, given as logarithms [shape=(E,)], in all forms that the kernels take."""
-    weights = arc_weights(layout, np.exp(arc_log.astype(np.float64)), 0.0)
-    return weights, _transposed(layout, weights), Chunks.of(layout, weights)
+def _weighted(layout: ArcLayout, arc_log: Array) -> tuple[float, ArcWeights, Array, Chunks]:
+    """Return the logarithm of the greatest probability of an arc, and the probabilities relative to that, in all forms
+    that the kernels take.
+
+    arc_log : logarithms of probabilities [shape=(E,)]
+    """
+    relative, best = _probabilities(arc_log)
+    weights = arc_weights(layout, relative, 0.0)
+    return best, weights, _transposed(layout, weights), Chunks.of(layout, weights)
 
 
 def _transposed(layout: ArcLayout, weights: ArcWeights) -> Array:

@@ -39,7 +39,8 @@ def best_path(
     beam         : states with a score lower than the best of the frame by more than this are dropped: that is faster,
                    but may miss the best path, or every path; None: exact
     layout       : returns the layout of the arcs, where it is kept from search to search
-    Returns the states of the path [shape=(T,)], and its score.
+    Returns the states of the path [shape=(T,)], and its score. Scores are relative to the best of their frame and in
+    single precision: no path is lost, but one may be preferred to another that is better by less than their rounding.
     Cost: O(T·E) time, O((T / BLOCK + BLOCK)·(S + G)) memory.
     """
     emission, widest = network.emission, np.inf if beam is None else beam

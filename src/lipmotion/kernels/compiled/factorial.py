@@ -1,9 +1,10 @@
 """Steps of factorial hidden Markov models, compiled: few passes over the joint states.
 
 Densities are multiplied in double precision, and products under a least value are set to 0: none is denormal, which
-would be many times slower.  Arrays with suffix ``_0`` or ``_1`` belong to that axis; U is the number of units of an
-axis. Functions take their arrays as separate arguments, more than eight in places: numba compiles that to the fastest
-code.
+would be many times slower. Probabilities of a frame sum to ``whole``, and are raised to 1 / ``whole`` where they are
+less (``kernels.factorial``): so products of two of them are no denormal either.
+Arrays with suffix ``_0`` or ``_1`` belong to that axis; U is the number of units of an axis. Functions take their
+arrays as separate arguments, more than eight in places: numba compiles that to the fastest code.
 """
 
 from __future__ import annotations
@@ -17,8 +18,6 @@ from lipmotion.kernels.compiled.compiler import compiled_to_rounding
 
 Array = NDArray[Any]
 Index = NDArray[np.intp]
-LEAST_TOTAL = 1e-7
-"""Least sum of the products of a frame: with a smaller sum they are computed again from larger densities."""
 
 
 @compiled_to_rounding
@@ -56,69 +55,60 @@ def moved_back(after: Array, stay: Array, onward: Array, left: Array) -> Array:
 @compiled_to_rounding
 def forward(
     before: Array, stay_0: Array, onward_0: Array, entering_0: Array, stay_1: Array, onward_1: Array, entering_1: Array,
-    density_0: Array, density_1: Array, pair_0: Index, pair_1: Index, pair: Array, least: float, kept: float,
+    density_0: Array, density_1: Array, pair_0: Index, pair_1: Index, pair: Array, least: float, whole: float,
     after: Array,
 ) -> float:  # fmt: skip
-    """Fill in joint probabilities one frame on along both axes, times densities, normalised; return their sum before.
+    """Fill in joint probabilities one frame on along both axes, times densities, normalised; return their sum before
+    as a share of the whole.
 
     entering_0, entering_1 : [shapes=(U, M), (N, U)], probabilities of entering the first states
     pair_0 ... pair : the two states of each pair, sorted by the first, and the densities of pairs
-    least, kept : smaller products, and smaller shares of the sum, are set to 0
+    least : smaller products are set to 0
     """
     moved, prior = np.empty(before.shape[1], before.dtype), np.empty(before.shape[1], before.dtype)
-    boost, total = 1.0, 0.0
-    for _ in range(2):
-        total, p = 0.0, 0
-        for i in range(len(before)):
-            _move(before, stay_0, onward_0, entering_0, i, moved)
-            _move_along(moved, stay_1, onward_1, entering_1[i], prior)
-            _emit(prior, density_0[i] * boost, density_1, least, after[i])
-            p = _emit_pairs(prior, i, p, pair_0, pair_1, pair, boost, least, after[i])
-            total += _sum(after[i])
-        if total >= LEAST_TOTAL or total <= 0:
-            break
-        boost /= total
-    _share(after, total, kept)
-    return total / boost
+    total, p = 0.0, 0
+    for i in range(len(before)):
+        _move(before, stay_0, onward_0, entering_0, i, moved)
+        _move_along(moved, stay_1, onward_1, entering_1[i], prior)
+        _emit(prior, density_0[i], density_1, least, after[i])
+        p = _emit_pairs(prior, i, p, pair_0, pair_1, pair, least, after[i])
+        total += _sum(after[i])
+    _share(after, total, whole)
+    return total / whole
 
 
 @compiled_to_rounding
 def backward(
     before: Array, moved: Array, stay: Array, onward: Array, left: Array,
-    density_0: Array, density_1: Array, pair_0: Index, pair_1: Index, pair: Array, least: float, kept: float,
+    density_0: Array, density_1: Array, pair_0: Index, pair_1: Index, pair: Array, least: float, whole: float,
     after: Array, posterior_0: Array, posterior_1: Array, posterior_pair: Array,
 ) -> float:  # fmt: skip
     """Fill in backward probabilities times densities, normalised, and posteriors, not normalised; return the sum of the
-    former before.
+    former before, as a share of the whole.
 
     before : forward probabilities
     moved  : backward probabilities that were moved back along axis 1; they are moved along axis 0 here
     left   : [shape=(U, M)], those of leaving the last states
     """
     beta = np.empty(before.shape[1], before.dtype)
-    units, boost, total = len(left), 1.0, 0.0
+    units, total, p = len(left), 0.0, 0
     inner = len(before) - units
-    for _ in range(2):
-        total, p = 0.0, 0
-        posterior_1[:] = 0
-        for i in range(len(before)):
-            if i < inner:
-                _combine(moved[i], stay[i], moved[i + units], onward[i], beta)
-            else:
-                _combine(moved[i], stay[i], left[i - inner], 1.0, beta)
-            posterior_0[i] = _meet(before[i], beta, posterior_1)
-            q = p
-            while q < len(pair_0) and pair_0[q] == i:
-                posterior_pair[q] = np.float64(before[i, pair_1[q]]) * beta[pair_1[q]]
-                q += 1
-            _emit(beta, density_0[i] * boost, density_1, least, after[i])
-            p = _emit_pairs(beta, i, p, pair_0, pair_1, pair, boost, least, after[i])
-            total += _sum(after[i])
-        if total >= LEAST_TOTAL or total <= 0:
-            break
-        boost /= total
-    _share(after, total, kept)
-    return total / boost
+    posterior_1[:] = 0
+    for i in range(len(before)):
+        if i < inner:
+            _combine(moved[i], stay[i], moved[i + units], onward[i], beta)
+        else:
+            _combine(moved[i], stay[i], left[i - inner], 1.0, beta)
+        posterior_0[i] = _meet(before[i], beta, posterior_1)
+        q = p
+        while q < len(pair_0) and pair_0[q] == i:
+            posterior_pair[q] = np.float64(before[i, pair_1[q]]) * beta[pair_1[q]]
+            q += 1
+        _emit(beta, density_0[i], density_1, least, after[i])
+        p = _emit_pairs(beta, i, p, pair_0, pair_1, pair, least, after[i])
+        total += _sum(after[i])
+    _share(after, total, whole)
+    return total / whole
 
 
 @compiled_to_rounding
@@ -161,11 +151,11 @@ def _emit(prior: Array, own: float, density: Array, least: float, into: Array) -
 
 @compiled_to_rounding
 def _emit_pairs(
-    prior: Array, i: int, p: int, pair_0: Index, pair_1: Index, pair: Array, boost: float, least: float, into: Array
+    prior: Array, i: int, p: int, pair_0: Index, pair_1: Index, pair: Array, least: float, into: Array
 ) -> int:
     """Multiply the pairs of row i, from pair p on, by their own densities; return the first pair of the next row."""
     while p < len(pair_0) and pair_0[p] == i:
-        product = np.float64(prior[pair_1[p]]) * (pair[p] * boost)
+        product = np.float64(prior[pair_1[p]]) * pair[p]
         into[pair_1[p]] = product if product > least else 0.0
         p += 1
     return p
@@ -191,10 +181,10 @@ def _meet(one: Array, other: Array, sums: Array) -> float:
 
 
 @compiled_to_rounding
-def _share(joint: Array, total: float, kept: float) -> None:
-    """Divide joint probabilities by their sum; set shares of less than ``kept`` to 0."""
+def _share(joint: Array, total: float, whole: float) -> None:
+    """Make joint probabilities sum to ``whole``; raise the least of them to 1 / ``whole``."""
     flat = joint.reshape(joint.size)
-    scale = 1 / total if total > 0 else 0.0
+    scale, least = whole / total if total > 0 else 0.0, 1 / whole
     for j in range(len(flat)):
         share = flat[j] * scale
-        flat[j] = share if share > kept else 0.0
+        flat[j] = share if share > least else least
