@@ -30,7 +30,7 @@ def test_chains_name_states_in_context_and_fall_back_where_unseen():
         assert hmm.table.names[plain] == name.split("<")[0].split(">")[0]
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_no_segmentation_is_better(seed):
     hmm = random_hmm(seed, contexts=4)
     features = np.random.default_rng(seed).normal(0, 1.5, (10, 2)).astype(np.float32)
@@ -74,9 +74,7 @@ def test_too_short_a_recording_says_so():
 WORDS = ((("a",), ("b", "c")), (("d",),), (("c", "e"), ("b",), ("e", "e")))
 
 
-@pytest.mark.parametrize("first", [0, 1])
-@pytest.mark.parametrize("last", [0, 1, 2])
-@pytest.mark.parametrize("pauses", [(), (1,), (2,), (1, 2)])
+@pytest.mark.parametrize(("first", "last", "pauses"), [(0, 0, ()), (0, 2, (1,)), (1, 1, (2,)), (1, 2, (1, 2))])
 def test_the_pronunciation_and_the_pauses_that_were_said_are_chosen(first, last, pauses):
     who = speaker()
     wanted = [(-1, 0, (SILENCE,))]
@@ -86,24 +84,6 @@ def test_the_pronunciation_and_the_pauses_that_were_said_are_chosen(first, last,
     wanted.append((-1, 0, (SILENCE,)))
     features, _ = who.say(np.random.default_rng(first + 2 * last), [unit for part in wanted for unit in part[2]])
     assert choose_pronunciations(known_hmm(who), log_likelihoods_of(known_hmm(who), features), WORDS, PAUSE) == wanted
-
-
-def test_order_of_the_variants_changes_nothing():
-    who = speaker()
-    features, _ = who.say(np.random.default_rng(5), (SILENCE, "b", "c", "d", "e", "e", SILENCE))
-    straight = choose_pronunciations(known_hmm(who), log_likelihoods_of(known_hmm(who), features), WORDS, PAUSE)
-    back = choose_pronunciations(
-        known_hmm(who), log_likelihoods_of(known_hmm(who), features), [word[::-1] for word in WORDS], PAUSE
-    )
-    assert [part.units for part in back] == [part.units for part in straight]
-
-
-def test_words_that_do_not_fit_say_so():
-    who = speaker()
-    with pytest.raises(AlignmentError, match="too short"):
-        choose_pronunciations(
-            known_hmm(who), log_likelihoods_of(known_hmm(who), np.zeros((14, 4), np.float32)), WORDS, PAUSE
-        )
 
 
 def test_no_words_are_silence():

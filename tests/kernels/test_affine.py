@@ -31,7 +31,7 @@ def form(request, monkeypatch) -> None:
 
 @pytest.mark.usefixtures("form")
 @pytest.mark.parametrize("kind", ["linear", "cubic"])
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 def test_every_pixel_is_that_of_the_definition(seed, kind):
     picture, to_source = noise((9, 13, 3), seed), random_map(seed, 9) if seed else TURNED
     made = affine.resample(picture[None], to_source, (10, 8), kind)
@@ -41,7 +41,7 @@ def test_every_pixel_is_that_of_the_definition(seed, kind):
 
 @pytest.mark.usefixtures("form")
 @pytest.mark.parametrize("kind", ["linear", "cubic"])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_every_blended_pixel_is_that_of_the_definition(seed, kind):
     frame, patch = noise((14, 15, 3), seed), noise((9, 11, 3), seed + 10)
     weight = np.random.default_rng(seed).uniform(0, 1, (9, 11)).astype(np.float32)
@@ -55,7 +55,7 @@ def test_every_blended_pixel_is_that_of_the_definition(seed, kind):
 
 
 @given(seed=st.integers(0, 2**32 - 1), as_floats=st.booleans())
-@settings(deadline=None, max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(deadline=None, max_examples=20, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_both_forms_give_the_same_bits(seed, as_floats, monkeypatch):
     pytest.importorskip("numba")
     picture, to_source = noise((21, 17, 3), seed), random_map(seed, 20)

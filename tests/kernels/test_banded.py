@@ -25,7 +25,7 @@ def dense(mean, precision, pins=()) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 @given(seed=SEEDS, frames=LENGTHS)
-@settings(deadline=None, max_examples=50)
+@settings(deadline=None, max_examples=30)
 def test_agrees_with_the_dense_system(seed, frames):
     mean, precision = statistics(seed, frames)
     values, variance = solve(normal_equations(mean, precision))
@@ -34,17 +34,8 @@ def test_agrees_with_the_dense_system(seed, frames):
         assert variance[:, channel] == pytest.approx(spread, abs=1e-10)
 
 
-@pytest.mark.parametrize("frames", [1, 2, 3, 4])
-def test_the_shortest_trajectories(frames):
-    mean, precision = statistics(frames, frames)
-    values, variance = solve(normal_equations(mean, precision))
-    for channel, (wanted, spread) in enumerate(dense(mean, precision)):
-        assert values[:, channel] == pytest.approx(wanted, abs=1e-12)
-        assert variance[:, channel] == pytest.approx(spread, abs=1e-12)
-
-
 @given(seed=SEEDS, frames=st.integers(1, 16), data=st.data())
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=30)
 def test_pins_agree_with_elimination(seed, frames, data):
     mean, precision = statistics(seed, frames)
     where = data.draw(st.sets(st.tuples(st.integers(0, frames - 1), st.integers(0, 1))))
@@ -60,7 +51,7 @@ def test_pins_agree_with_elimination(seed, frames, data):
     assert all(values[t, c] == value for t, c, value in pins)
 
 
-@pytest.mark.parametrize("frames", [(0, 1), (0, 1, 2), (4, 5), (5, 4), (7, 8), (8, 7, 6), (0, 8), tuple(range(9))])
+@pytest.mark.parametrize("frames", [(0, 1, 2), (5, 4), (8, 7, 6), tuple(range(9))])
 def test_pins_at_the_ends_and_side_by_side_are_exact(frames):
     mean, precision = statistics(11, 9)
     pins = [(t, 1, 0.5 - 0.1 * t) for t in frames]
@@ -118,8 +109,7 @@ def forms(monkeypatch, compute) -> list:
     return results
 
 
-@pytest.mark.parametrize("frames", [1, 2, 3, 4, 5, 60])
-@pytest.mark.parametrize("channels", [1, 2, 7, 33])
+@pytest.mark.parametrize(("frames", "channels"), [(1, 1), (2, 7), (3, 2), (5, 1), (60, 33)])
 def test_the_compiled_form_gives_the_same_bits(frames, channels, monkeypatch):
     pytest.importorskip("numba")
     mean, precision = statistics(frames, frames, channels)
@@ -128,16 +118,6 @@ def test_the_compiled_form_gives_the_same_bits(frames, channels, monkeypatch):
     pins = {(frames // 2, 0): 0.5, (frames - 1, channels - 1): -1.0}
     plain, fast = forms(monkeypatch, lambda: generate(mean, precision, pins))
     assert np.array_equal(plain, fast)
-
-
-@pytest.mark.parametrize("frames", [1, 2, 3, 4, 9])
-def test_the_compiled_form_agrees_with_the_dense_system(frames, monkeypatch):
-    pytest.importorskip("numba")
-    mean, precision = statistics(frames, frames)
-    _, (values, variance) = forms(monkeypatch, lambda: generate(mean, precision))
-    for channel, (wanted, spread) in enumerate(dense(mean, precision)):
-        assert values[:, channel] == pytest.approx(wanted, abs=1e-12)
-        assert variance[:, channel] == pytest.approx(spread, abs=1e-12)
 
 
 def test_pins_have_no_variance():

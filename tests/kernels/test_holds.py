@@ -33,7 +33,7 @@ def least_error(rows: NDArray[np.float64], hold: int, fixed: list[int]) -> float
     return best[len(rows)]
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(10))
 def test_no_division_is_nearer(seed: int) -> None:
     rng = np.random.default_rng(seed)
     hold = int(rng.integers(1, 6))
@@ -53,6 +53,6 @@ def test_a_curve_of_steps_is_found_again() -> None:
     assert error(rows, borders, []) == pytest.approx(0, abs=1e-12)
 
 
-@pytest.mark.parametrize(("frames", "borders"), [(0, [0]), (1, [0, 1]), (7, [0, 7])])
-def test_few_frames_are_one_pose(frames: int, borders: list[int]) -> None:
-    assert best_holds(np.arange(frames, dtype=float)[:, None], 4) == borders
+def test_few_frames_are_one_pose() -> None:
+    for frames, borders in ((0, [0]), (1, [0, 1]), (7, [0, 7])):
+        assert best_holds(np.arange(frames, dtype=float)[:, None], 4) == borders

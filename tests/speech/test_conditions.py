@@ -41,7 +41,7 @@ def test_the_length_follows_the_tempo(voices: list[Audio]) -> None:
 
 
 def test_conditions_leave_speech_recognisable_and_finite(voices: list[Audio]) -> None:
-    found = [in_condition(voices[0], voices, np.random.default_rng(seed)) for seed in range(40)]
+    found = [in_condition(voices[0], voices, np.random.default_rng(seed)) for seed in range(20)]
     assert all(np.isfinite(audio.samples).all() and len(audio.samples) == len(voices[0].samples) for audio, _ in found)
     distortions = np.array([distortion for _, distortion in found])
     assert distortions.min() == 0

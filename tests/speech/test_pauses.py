@@ -65,7 +65,7 @@ def test_levels_at_any_time():
     assert found == pytest.approx([levels[0], levels[0], levels[100], levels[100:102].mean(), levels[-1]])
 
 
-@pytest.mark.parametrize("samples", [0, 1, 159])
-def test_sound_of_less_than_a_step_is_quiet(samples: int):
-    found = levels_db_at(Audio(np.ones(samples, np.float32), RATE), np.arange(3.0))
-    assert found == pytest.approx([QUIETEST_DB] * 3)
+def test_sound_of_less_than_a_step_is_quiet():
+    for samples in (0, 159):
+        found = levels_db_at(Audio(np.ones(samples, np.float32), RATE), np.arange(3.0))
+        assert found == pytest.approx([QUIETEST_DB] * 3)

@@ -25,10 +25,6 @@ ALIGNED = AlignedWords(
 )
 
 
-def test_nothing_is_replaced() -> None:
-    assert spliced(BASE, [], 100) == BASE
-
-
 def test_a_stretch_is_replaced() -> None:
     part = (Stretch(30, 60), [LabelledFrames(30, "b", 0), LabelledFrames(45, "iy", 0)])
     assert spliced(BASE, [part], 100) == [
@@ -41,7 +37,8 @@ def test_a_stretch_is_replaced() -> None:
     ]
 
 
-def test_all_is_replaced() -> None:
+def test_nothing_or_all_is_replaced() -> None:
+    assert spliced(BASE, [], 100) == BASE
     whole = [LabelledFrames(0, "b", 0)]
     assert spliced(BASE, [(Stretch(0, 100), whole)], 100) == whole
 
@@ -52,7 +49,7 @@ def test_slivers_are_dropped() -> None:
     assert [label.phone for label in spliced(BASE, [part], 100)] == ["sil", "b", "sil"]
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(5))
 def test_every_frame_has_one_label(seed: int) -> None:
     draw = np.random.default_rng(seed)
     frames = 200
@@ -81,9 +78,6 @@ def test_labels_of_one_word_that_is_believed() -> None:
     ((frames, labels),) = labels_of_words(ALIGNED, Stretch(100, 180), np.array([False, True]), 0)
     assert frames == Stretch(122, 160)
     assert [label.phone for label in labels] == ["b", "ow", "t"]
-
-
-def test_no_word_is_believed() -> None:
     assert not list(labels_of_words(ALIGNED, Stretch(100, 180), np.array([False, False]), 0))
 
 

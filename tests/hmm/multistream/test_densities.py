@@ -14,8 +14,7 @@ from lipmotion.stats.mixture import Mixtures
 from oracles import joint as slow
 
 
-@pytest.mark.parametrize("components", [1, 3])
-@pytest.mark.parametrize("name", STREAMS)
+@pytest.mark.parametrize(("name", "components"), [*((name, 3) for name in STREAMS), ("f0", 1)])
 def test_densities_are_those_of_the_formulas(name, components):
     hmm = random_joint(1, components=components)
     model, data = hmm.models[name], observed(np.random.default_rng(2), 12)
@@ -28,11 +27,10 @@ def test_densities_are_those_of_the_formulas(name, components):
     assert found == pytest.approx(np.array(expected), abs=1e-3)
 
 
-@pytest.mark.parametrize("components", [1, 2])
-def test_voiced_and_unvoiced_together_are_everything(components):
-    hmm = random_joint(3, components=components)
+def test_voiced_and_unvoiced_together_are_everything():
+    hmm = random_joint(3, components=2)
     model = hmm.models["f0"]
-    grid = np.linspace(-40, 40, 200_001)
+    grid = np.linspace(-40, 40, 20_001)
     leaves = np.arange(model.forest.size)
 
     def density(values, known):

@@ -54,7 +54,7 @@ def candidates(hmm, frames):
     return sequences([unit for unit in hmm.inventory.names if unit != "sp"], counts, frames)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize(("states", "frames"), [(2, 7), (3, 8)])
 def test_nothing_else_is_more_probable(seed, states, frames):
     hmm = random_joint(seed, states=states, components=1 + seed % 2)
@@ -119,14 +119,6 @@ def test_a_wide_beam_changes_nothing():
     hmm, data = random_joint(3), observed(np.random.default_rng(5), 40)
     recogniser = JointRecogniser(hmm)
     assert recogniser.recognise(data, beam=1e4) == recogniser.recognise(data)
-
-
-def test_the_same_seed_draws_the_same():
-    hmm = random_joint(6, bigram_weight=0.3, insertion=2.0)
-    data = observed(np.random.default_rng(7), 20)
-    recogniser = JointRecogniser(hmm, SOFT)
-    assert sampled_units(recogniser, data, 5, 1) == sampled_units(recogniser, data, 5, 1)
-    assert sampled_units(recogniser, data, 5, 1) != sampled_units(recogniser, data, 5, 2)
 
 
 def test_speech_alone_is_the_plain_model():
