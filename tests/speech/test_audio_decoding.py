@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import subprocess
 import sys
 import tracemalloc
 import wave
@@ -17,6 +16,7 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
+from children import run_child
 from lipmotion.errors import InputError
 from lipmotion.speech.audio_decoding import _TrackDecoder
 from lipmotion.speech.audio_files import read_audio
@@ -301,7 +301,7 @@ STAMPS_S = {
 
 def peak(path: Path) -> tuple[str, int]:
     """Return what a process of its own says when it reads a recording, and how many MB it has taken."""
-    done = subprocess.run([sys.executable, "-c", PEAK, path], capture_output=True, text=True, check=True, timeout=120)
+    done = run_child([sys.executable, "-c", PEAK, path], check=True)
     *said, taken_mb = done.stdout.splitlines()
     return " ".join(said), int(taken_mb)
 

@@ -30,7 +30,7 @@ def test_a_unit_without_a_frame_is_left_out():
     assert bounds.tolist() == [0, 4, 6]
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(lengths=st.lists(st.integers(1, 9), min_size=1, max_size=9))
 def test_there_and_back(lengths):
     firsts = np.cumsum([0, *lengths]).tolist()
