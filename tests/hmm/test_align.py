@@ -30,13 +30,13 @@ def test_chains_name_states_in_context_and_fall_back_where_unseen():
         assert hmm.table.names[plain] == name.split("<")[0].split(">")[0]
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_no_segmentation_is_better(seed):
-    hmm = random_hmm(seed, contexts=4)
-    features = np.random.default_rng(seed).normal(0, 1.5, (10, 2)).astype(np.float32)
-    units = ("sil", "b") if seed % 2 else ("a", "b")
-    _, wanted, _ = sequences.best(hmm, features, [units])
-    assert align_units(hmm, log_likelihoods_of(hmm, features), units).tolist() == wanted
+def test_no_segmentation_is_better():
+    for seed in range(2):
+        hmm = random_hmm(seed, contexts=4)
+        features = np.random.default_rng(seed).normal(0, 1.5, (10, 2)).astype(np.float32)
+        units = ("sil", "b") if seed % 2 else ("a", "b")
+        _, wanted, _ = sequences.best(hmm, features, [units])
+        assert align_units(hmm, log_likelihoods_of(hmm, features), units).tolist() == wanted
 
 
 def test_known_boundaries_are_found():
@@ -74,16 +74,18 @@ def test_too_short_a_recording_says_so():
 WORDS = ((("a",), ("b", "c")), (("d",),), (("c", "e"), ("b",), ("e", "e")))
 
 
-@pytest.mark.parametrize(("first", "last", "pauses"), [(0, 0, ()), (0, 2, (1,)), (1, 1, (2,)), (1, 2, (1, 2))])
-def test_the_pronunciation_and_the_pauses_that_were_said_are_chosen(first, last, pauses):
-    who = speaker()
-    wanted = [(-1, 0, (SILENCE,))]
-    for word, variant in enumerate((first, 0, last)):
-        wanted += [(-1, 0, (PAUSE,))] * (word in pauses)
-        wanted.append((word, variant, WORDS[word][variant]))
-    wanted.append((-1, 0, (SILENCE,)))
-    features, _ = who.say(np.random.default_rng(first + 2 * last), [unit for part in wanted for unit in part[2]])
-    assert choose_pronunciations(known_hmm(who), log_likelihoods_of(known_hmm(who), features), WORDS, PAUSE) == wanted
+def test_the_pronunciation_and_the_pauses_that_were_said_are_chosen():
+    for first, last, pauses in ((0, 0, ()), (0, 2, (1,)), (1, 1, (2,)), (1, 2, (1, 2))):
+        who = speaker()
+        wanted = [(-1, 0, (SILENCE,))]
+        for word, variant in enumerate((first, 0, last)):
+            wanted += [(-1, 0, (PAUSE,))] * (word in pauses)
+            wanted.append((word, variant, WORDS[word][variant]))
+        wanted.append((-1, 0, (SILENCE,)))
+        features, _ = who.say(np.random.default_rng(first + 2 * last), [unit for part in wanted for unit in part[2]])
+        assert (
+            choose_pronunciations(known_hmm(who), log_likelihoods_of(known_hmm(who), features), WORDS, PAUSE) == wanted
+        )
 
 
 def test_no_words_are_silence():

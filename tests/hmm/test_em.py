@@ -34,19 +34,19 @@ def disturbed(seed: int, spread: float):
     return replace(hmm, mixtures=mixtures), [utterance.features for utterance in transcribed], said
 
 
-@pytest.mark.parametrize(("seed", "spread"), [(0, 0.4), (1, 2.0)])
-def test_no_iteration_lowers_the_likelihood(seed, spread):
+def test_no_iteration_lowers_the_likelihood():
     """The tolerance, per frame, is for single precision and for posteriors that are left out."""
-    hmm, data, said = disturbed(seed, spread)
-    for _ in range(3):  # 1, 2 and 4 Gaussians
-        figures = []
-        for _ in range(5):
-            hmm, log_likelihood = step(hmm, data, said)
-            figures.append(log_likelihood)
-        assert all(after > before - 1e-5 for before, after in pairwise(figures))
-        assert figures[-1] > figures[0] + 0.01
-        assert np.isfinite(hmm.mixtures.log_weights).all()  # none was switched off: these were true steps of EM
-        hmm = replace(hmm, mixtures=hmm.mixtures.split())
+    for seed, spread in ((0, 0.4), (1, 2.0)):
+        hmm, data, said = disturbed(seed, spread)
+        for _ in range(3):  # 1, 2 and 4 Gaussians
+            figures = []
+            for _ in range(5):
+                hmm, log_likelihood = step(hmm, data, said)
+                figures.append(log_likelihood)
+            assert all(after > before - 1e-5 for before, after in pairwise(figures))
+            assert figures[-1] > figures[0] + 0.01
+            assert np.isfinite(hmm.mixtures.log_weights).all()  # none was switched off: these were true steps of EM
+            hmm = replace(hmm, mixtures=hmm.mixtures.split())
 
 
 def test_a_high_variance_floor_does_not_break_the_rise():

@@ -86,10 +86,10 @@ def test_clips_together_know_better_than_each() -> None:
     assert found == pooled_offset(clips, RATE_HZ)
 
 
-@pytest.mark.parametrize("count", [1, 5, 30, 40, 50, 80])
-def test_clips_shorter_than_the_shifts(count: int) -> None:
-    curve = wave(0, count)
-    found = shift_scores(curve, curve, np.ones(count, bool), REACH)
-    assert found.shape == (2 * REACH + 1,)
-    assert found[: max(REACH - count // 2, 0)] == pytest.approx(0)
-    assert found[REACH] == pytest.approx(1 if count > 1 else 0)
+def test_clips_shorter_than_the_shifts() -> None:
+    for count in (1, 5, 30, 40, 50, 80):
+        curve = wave(0, count)
+        found = shift_scores(curve, curve, np.ones(count, bool), REACH)
+        assert found.shape == (2 * REACH + 1,)
+        assert found[: max(REACH - count // 2, 0)] == pytest.approx(0)
+        assert found[REACH] == pytest.approx(1 if count > 1 else 0)

@@ -266,9 +266,8 @@ def test_maps_are_stored() -> None:
         assert np.array_equal(array, same)
 
 
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
+def test_damaged_maps_are_refused() -> None:
+    for name, value in (
         ("gain", np.full((2, 3), 5.0)),
         ("gain", np.full((2, 3), np.nan)),
         ("gain", np.ones((3, 3))),
@@ -281,20 +280,18 @@ def test_maps_are_stored() -> None:
         ("names", np.array([1, 2])),
         ("channels", np.array([["a", "b"]] * 3)),
         ("more", np.ones(2)),
-    ],
-)
-def test_damaged_maps_are_refused(name: str, value: np.ndarray) -> None:
-    arrays = speaker_arrays(both(anna(), ben())[1])
-    with pytest.raises(ModelFormatError, match="table of speakers"):
-        speakers_from_arrays(arrays | {name: value})
+    ):
+        arrays = speaker_arrays(both(anna(2), ben(2))[1])
+        with pytest.raises(ModelFormatError, match="table of speakers"):
+            speakers_from_arrays(arrays | {name: value})
 
 
-@pytest.mark.parametrize("name", ["channels", "names", "gain", "offset", "rest", "habits", "lips"])
-def test_missing_arrays_are_refused(name: str) -> None:
-    arrays = speaker_arrays(both(anna(), ben())[1])
-    del arrays[name]
-    with pytest.raises(ModelFormatError, match=name):
-        speakers_from_arrays(arrays)
+def test_missing_arrays_are_refused() -> None:
+    for name in ("channels", "names", "gain", "offset", "rest", "habits", "lips"):
+        arrays = speaker_arrays(both(anna(2), ben(2))[1])
+        del arrays[name]
+        with pytest.raises(ModelFormatError, match=name):
+            speakers_from_arrays(arrays)
 
 
 def test_wrong_phones_of_one_clip_do_not_keep_the_lips_of_a_person_open() -> None:

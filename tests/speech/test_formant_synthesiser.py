@@ -54,17 +54,17 @@ def test_the_parts_of_a_phone_fill_it() -> None:
         assert sum(part.share for part in PHONE_TARGETS[phone]) == pytest.approx(1)
 
 
-@pytest.mark.parametrize("rate_hz", [16000, 44100])
-def test_times_are_exact(rate_hz: int) -> None:
-    phones = [("sil", 0.25), ("m", 0.0831), ("aa", 0.2), ("sil", 0.001)]
-    audio, timeline = synthesise(phones, rate_hz=rate_hz)
-    assert [span.label.phone for span in timeline] == [phone for phone, _ in phones]
-    assert [span.duration_s for span in timeline] == pytest.approx([duration for _, duration in phones])
-    assert timeline.spans[0].start_s == 0
-    assert all(a.end_s == b.start_s for a, b in pairwise(timeline.spans))
-    assert audio.rate_hz == rate_hz
-    assert len(audio.samples) == round(sum(duration for _, duration in phones) * rate_hz)
-    assert audio.samples.dtype == np.float32
+def test_times_are_exact() -> None:
+    for rate_hz in (16000, 44100):
+        phones = [("sil", 0.25), ("m", 0.0831), ("aa", 0.2), ("sil", 0.001)]
+        audio, timeline = synthesise(phones, rate_hz=rate_hz)
+        assert [span.label.phone for span in timeline] == [phone for phone, _ in phones]
+        assert [span.duration_s for span in timeline] == pytest.approx([duration for _, duration in phones])
+        assert timeline.spans[0].start_s == 0
+        assert all(a.end_s == b.start_s for a, b in pairwise(timeline.spans))
+        assert audio.rate_hz == rate_hz
+        assert len(audio.samples) == round(sum(duration for _, duration in phones) * rate_hz)
+        assert audio.samples.dtype == np.float32
 
 
 def test_the_sound_begins_and_ends_with_its_phone() -> None:
@@ -104,14 +104,14 @@ def test_diphthongs_move() -> None:
     assert measured_formants(samples[-2400:-800])[1] > 1800
 
 
-@pytest.mark.parametrize("pitch_hz", [90.0, 210.0])
-def test_pitch(pitch_hz: float) -> None:
-    audio, _ = synthesise([("aa", 0.5)], pitch_hz=pitch_hz)
-    middle = audio.samples[3200:4800].astype(float)
-    correlation = np.correlate(middle, middle, "full")[len(middle) - 1 :]
-    shortest = RATE_HZ // 400
-    period = shortest + np.argmax(correlation[shortest : RATE_HZ // 60])
-    assert RATE_HZ / period == pytest.approx(pitch_hz, rel=0.03)
+def test_pitch() -> None:
+    for pitch_hz in (90.0, 210.0):
+        audio, _ = synthesise([("aa", 0.5)], pitch_hz=pitch_hz)
+        middle = audio.samples[3200:4800].astype(float)
+        correlation = np.correlate(middle, middle, "full")[len(middle) - 1 :]
+        shortest = RATE_HZ // 400
+        period = shortest + np.argmax(correlation[shortest : RATE_HZ // 60])
+        assert RATE_HZ / period == pytest.approx(pitch_hz, rel=0.03)
 
 
 def test_voice_tells_twins_apart() -> None:

@@ -30,12 +30,12 @@ def added(clean: Audio, dirty: Audio) -> NDArray[np.float64]:
     return dirty.samples.astype(float) - clean.samples
 
 
-@pytest.mark.parametrize("kind", NOISE_KINDS)
-def test_the_ratio_is_as_asked(kind: str) -> None:
-    clean, talkers = talker(0, 0.3), [talker(1), talker(2), talker(3)]
-    for snr_db in (-10.0, 12.5):
-        dirty = noisy_audio(clean, kind, snr_db, talkers, seed=4)
-        assert ratio_db(clean.samples, added(clean, dirty)) == pytest.approx(snr_db, abs=0.02)
+def test_the_ratio_is_as_asked() -> None:
+    for kind in NOISE_KINDS:
+        clean, talkers = talker(0, 0.3), [talker(1), talker(2), talker(3)]
+        for snr_db in (-10.0, 12.5):
+            dirty = noisy_audio(clean, kind, snr_db, talkers, seed=4)
+            assert ratio_db(clean.samples, added(clean, dirty)) == pytest.approx(snr_db, abs=0.02)
 
 
 def test_the_level_of_the_noise_given_does_not_matter() -> None:
@@ -102,7 +102,7 @@ def test_it_says_what_is_wrong() -> None:
         ("white", 10, Audio(np.full(16_000, np.nan, np.float32), RATE_HZ), [], "finite"),
         ("babble", 10, one, [two], "babble of 1"),
         ("babble", 10, one, [two, SILENT], "silent"),
-        ("babble", 10, one, [two, Audio(one.samples, 44_100)], "44100 Hz"),
+        ("babble", 10, one, [two, Audio(talker(2).samples, 44_100)], "44100 Hz"),
         ("babble", 10, one, [two, one], "own babble"),
     ):
         with pytest.raises(InputError, match=message):

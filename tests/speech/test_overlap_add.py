@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from lipmotion.speech.overlap_add import REACH_S, overlapped
 
@@ -28,13 +27,13 @@ def test_successive_pieces_of_one_recording_join_without_a_trace() -> None:
     assert joined.starts == [0, 3200, 6400]
 
 
-@pytest.mark.parametrize("phase", [1.0, 4.5])
-def test_a_tone_goes_on_in_phase(phase: float) -> None:
-    joined = overlapped([tone(140, 0.5), tone(140, 0.5, phase)], [(0.0, 0.25), (0.25, 0.5)], RATE_HZ)
-    spectrum = np.abs(np.fft.rfft(joined.samples[:7000] * np.hanning(7000)))
-    frequencies = np.fft.rfftfreq(7000, 1 / RATE_HZ)
-    assert spectrum[np.abs(frequencies - 140) > 30].max() < 0.02 * spectrum.max()
-    assert abs(len(joined.samples) - 8000) <= REACH_S * RATE_HZ + 1
+def test_a_tone_goes_on_in_phase() -> None:
+    for phase in (1.0, 4.5):
+        joined = overlapped([tone(140, 0.5), tone(140, 0.5, phase)], [(0.0, 0.25), (0.25, 0.5)], RATE_HZ)
+        spectrum = np.abs(np.fft.rfft(joined.samples[:7000] * np.hanning(7000)))
+        frequencies = np.fft.rfftfreq(7000, 1 / RATE_HZ)
+        assert spectrum[np.abs(frequencies - 140) > 30].max() < 0.02 * spectrum.max()
+        assert abs(len(joined.samples) - 8000) <= REACH_S * RATE_HZ + 1
 
 
 def test_a_shifted_piece_says_so() -> None:

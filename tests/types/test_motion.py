@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -31,21 +29,18 @@ def test_an_unknown_channel_is_named_with_those_there_are() -> None:
         _ = motion()["width"]
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
+def test_it_says_what_does_not_fit() -> None:
+    for changes, message in (
         ({"values": np.zeros((3, 1))}, r"shape \(3, 1\), required \(T, 2\)"),
         ({"values": np.zeros(3)}, r"shape \(3,\), required \(T, 2\)"),
         ({"rate_hz": 0.0}, "rate is 0.0 Hz, required more than 0"),
         ({"rate_hz": -1.0}, "rate is -1.0 Hz"),
         ({"rate_hz": float("nan")}, "rate is nan Hz"),
         ({"channels": (Channel("opening"), Channel("opening", "mm"))}, "names repeat: opening, opening"),
-    ],
-)
-def test_it_says_what_does_not_fit(changes: dict[str, Any], message: str) -> None:
-    good = {"values": np.zeros((3, 2)), "rate_hz": 25.0, "channels": CHANNELS}
-    with pytest.raises(InputError, match=message):
-        Motion(**(good | changes))
+    ):
+        good = {"values": np.zeros((3, 2)), "rate_hz": 25.0, "channels": CHANNELS}
+        with pytest.raises(InputError, match=message):
+            Motion(**(good | changes))
 
 
 def test_between_frames_it_is_linear_and_beyond_the_ends_constant() -> None:
@@ -91,23 +86,21 @@ def test_nothing_resampled_is_nothing() -> None:
     assert motion(0).resampled(100.0).values.shape == (0, 2)
 
 
-@pytest.mark.parametrize("rate_hz", [0.0, -25.0, float("nan"), float("inf")])
-def test_an_impossible_rate_is_refused(rate_hz: float) -> None:
-    with pytest.raises(InputError, match=f"motion rate is {rate_hz} Hz"):
-        motion().resampled(rate_hz)
+def test_an_impossible_rate_is_refused() -> None:
+    for rate_hz in (0.0, -25.0, float("nan"), float("inf")):
+        with pytest.raises(InputError, match=f"motion rate is {rate_hz} Hz"):
+            motion().resampled(rate_hz)
 
 
-@pytest.mark.parametrize(
-    "name", ["=1+1", "+1", "-2+3", "@SUM(A1)", "\t=1", "\r=1", " =1", "＝1", "\u3000＠x", "-x" * 500]
-)
-def test_a_name_is_no_formula_of_a_spreadsheet(name: str) -> None:
-    with pytest.raises(InputError, match=r"begins as a spreadsheet's formula, required another beginning") as caught:
-        Channel(name)
-    assert len(str(caught.value)) < 250
+def test_a_name_is_no_formula_of_a_spreadsheet() -> None:
+    for name in ("=1+1", "+1", "-2+3", "@SUM(A1)", "\t=1", "\r=1", " =1", "＝1", "\u3000＠x", "-x" * 500):
+        with pytest.raises(
+            InputError, match=r"begins as a spreadsheet's formula, required another beginning"
+        ) as caught:
+            Channel(name)
+        assert len(str(caught.value)) < 250
 
 
-@pytest.mark.parametrize(
-    "name", ["opening", "p12.x", "jaw-open", "Mouth Open (L)", "blendShape1.a=b", "öffnen", "", "_x", "|a|b"]
-)
-def test_other_names_are_names(name: str) -> None:
-    assert Channel(name).name == name
+def test_other_names_are_names() -> None:
+    for name in ("opening", "p12.x", "jaw-open", "Mouth Open (L)", "blendShape1.a=b", "öffnen", "", "_x", "|a|b"):
+        assert Channel(name).name == name

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -8,7 +7,6 @@ from lipmotion.units import PAUSE, PHONES, SILENCE, SIMILAR_PHONES, VISEME_OF, i
 
 SPOKEN = tuple(phone for phone in PHONES if not is_silent(phone))
 VOWELS = frozenset("aa ae ah ao aw ax axr ay eh er ey ih ix iy ow oy uh uw el em en".split())
-CONSONANTS = frozenset(SPOKEN) - VOWELS
 UNSAID_IN_GRID = ("er", "hh", "ng", "oy", "sh", "uh", "zh")
 """What a model of GRID's speaker s1 must borrow."""
 
@@ -51,7 +49,7 @@ def steps_to(phone: str) -> dict[str, int]:
     return steps
 
 
-@settings(max_examples=100)
+@settings(max_examples=40)
 @given(st.sampled_from(SPOKEN), st.sets(st.sampled_from(SPOKEN), min_size=1, max_size=8))
 def test_the_nearest_known_relative_stands_in(phone: str, known: set[str]) -> None:
     chosen, steps = most_similar_phone(phone, known), steps_to(phone)
@@ -60,13 +58,13 @@ def test_the_nearest_known_relative_stands_in(phone: str, known: set[str]) -> No
     assert steps.get(chosen, 99) == min(steps.get(other, 99) for other in known)  # nobody nearer is passed over
 
 
-@pytest.mark.parametrize("phone", UNSAID_IN_GRID)
-def test_vowels_stand_in_for_vowels(phone: str) -> None:
-    chosen = most_similar_phone(phone, [other for other in SPOKEN if other not in UNSAID_IN_GRID])
-    assert (chosen in VOWELS) == (phone in VOWELS)
+def test_vowels_stand_in_for_vowels() -> None:
+    for phone in UNSAID_IN_GRID:
+        chosen = most_similar_phone(phone, [other for other in SPOKEN if other not in UNSAID_IN_GRID])
+        assert (chosen in VOWELS) == (phone in VOWELS)
 
 
-@pytest.mark.parametrize(("phone", "closest"), [("p", "b"), ("b", "p"), ("v", "f"), ("zh", "jh"), ("er", "axr")])
-def test_what_looks_alike_stands_in(phone: str, closest: str) -> None:
-    assert most_similar_phone(phone, [other for other in SPOKEN if other != phone]) == closest
-    assert VISEME_OF[closest] == VISEME_OF[phone] or closest in SIMILAR_PHONES[phone]
+def test_what_looks_alike_stands_in() -> None:
+    for phone, closest in (("p", "b"), ("b", "p"), ("v", "f"), ("zh", "jh"), ("er", "axr")):
+        assert most_similar_phone(phone, [other for other in SPOKEN if other != phone]) == closest
+        assert VISEME_OF[closest] == VISEME_OF[phone] or closest in SIMILAR_PHONES[phone]

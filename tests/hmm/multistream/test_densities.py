@@ -14,17 +14,17 @@ from lipmotion.stats.mixture import Mixtures
 from oracles import joint as slow
 
 
-@pytest.mark.parametrize(("name", "components"), [*((name, 3) for name in STREAMS), ("f0", 1)])
-def test_densities_are_those_of_the_formulas(name, components):
-    hmm = random_joint(1, components=components)
-    model, data = hmm.models[name], observed(np.random.default_rng(2), 12)
-    leaves = np.array([2, 0, 2, 1])
-    found = model.tied.log_density(model.scale.standardise(data.streams[name]), leaves, model.scale.log_determinant)
-    stream = data.streams[name]
-    expected = [
-        [slow.stream_density(model, leaf, stream.values[t], stream.known[t]) for leaf in leaves] for t in range(12)
-    ]
-    assert found == pytest.approx(np.array(expected), abs=1e-3)
+def test_densities_are_those_of_the_formulas():
+    for name, components in (*((name, 3) for name in STREAMS), ("f0", 1)):
+        hmm = random_joint(1, components=components)
+        model, data = hmm.models[name], observed(np.random.default_rng(2), 12)
+        leaves = np.array([2, 0, 2, 1])
+        found = model.tied.log_density(model.scale.standardise(data.streams[name]), leaves, model.scale.log_determinant)
+        stream = data.streams[name]
+        expected = [
+            [slow.stream_density(model, leaf, stream.values[t], stream.known[t]) for leaf in leaves] for t in range(12)
+        ]
+        assert found == pytest.approx(np.array(expected), abs=1e-3)
 
 
 def test_voiced_and_unvoiced_together_are_everything():
