@@ -7,7 +7,6 @@ from lipmotion.hmm.align import (
     align_units,
     choose_pronunciations,
     place_words,
-    state_path,
     state_sequence,
     unit_windows,
 )
@@ -48,14 +47,6 @@ def test_known_boundaries_are_found():
         ) == pytest.approx(where, abs=1)
 
 
-def test_the_path_moves_one_state_at_a_time():
-    hmm = random_hmm(6)
-    features = np.random.default_rng(6).normal(0, 1.5, (40, 2)).astype(np.float32)
-    names, path = state_path(hmm, log_likelihoods_of(hmm, features), ("sil", "a", "b", "sil"))
-    assert (path[0], path[-1]) == (0, len(names) - 1)
-    assert set(np.diff(path)) <= {0, 1}
-
-
 def test_too_short_a_recording_says_so():
     hmm = random_hmm(7)
     with pytest.raises(AlignmentError, match="12 states in 11 frames"):
@@ -86,15 +77,6 @@ def test_the_pronunciation_and_the_pauses_that_were_said_are_chosen():
         assert (
             choose_pronunciations(known_hmm(who), log_likelihoods_of(known_hmm(who), features), WORDS, PAUSE) == wanted
         )
-
-
-def test_no_words_are_silence():
-    who = speaker()
-    features, _ = who.say(np.random.default_rng(5), (SILENCE,))
-    assert [
-        part.units
-        for part in choose_pronunciations(known_hmm(who), log_likelihoods_of(known_hmm(who), features), (), PAUSE)
-    ] == [(SILENCE,)] * 2
 
 
 def test_pronunciations_without_number_are_refused_before_a_network_is_built():

@@ -40,10 +40,3 @@ def test_a_missing_array_and_one_of_the_wrong_shape_are_a_damaged_model():
     for name in ("means", "variances", "names", "log_weights", "log_stay", "bigram", "counts"):
         with pytest.raises(ModelFormatError, match="damaged"):
             hmm_from_arrays(whole | {name: whole[name][:-1]}, hmm.config)
-
-
-def test_staying_and_moving_sum_to_one():
-    hmm = random_hmm(6, contexts=4)
-    for unit in ("sil", "a", "b"):
-        for state in range(3):
-            assert np.exp(hmm.stay(unit, state)) + np.exp(hmm.move(unit, state)) == pytest.approx(1)

@@ -82,16 +82,6 @@ def test_new_sentences_are_recognised(trained):
         assert bounds == pytest.approx(edges, abs=2)
 
 
-def test_the_order_of_utterances_changes_nothing_that_matters():
-    transcribed, said, _ = recordings(2, 14, speaker(2))
-    straight = train_hmm(transcribed, INVENTORY, CONFIG, silent_monitor)
-    back = train_hmm(transcribed[::-1], INVENTORY, CONFIG, silent_monitor)
-    assert back.table == straight.table
-    for utterance, units in zip(transcribed, said, strict=True):
-        bounds = align_units(straight, log_likelihoods_of(straight, utterance.features), units)
-        assert np.array_equal(align_units(back, log_likelihoods_of(back, utterance.features), units), bounds)
-
-
 def test_the_pronunciation_said_is_learned():
     """Half of the time a word is not pronounced as the first variant of the lexicon."""
     who, draw = speaker(5), np.random.default_rng(5)

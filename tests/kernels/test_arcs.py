@@ -3,7 +3,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kernels.networks import phone_loop, random_network
-from lipmotion.kernels.arcs import arc_layout, arc_weights
+from lipmotion.kernels.arcs import arc_layout
 
 
 def arcs_in(layout):
@@ -42,10 +42,3 @@ def test_a_loop_of_phones_is_one_block_and_few_runs():
     layout = arc_layout(arrays["arc_from"], arrays["arc_start"])
     assert [tuple(block[[1, 3]]) for block in layout.blocks] == [(20, 21)]
     assert len(layout.runs) == 5
-
-
-def test_padding_has_the_weight_of_nothing():
-    arrays, _ = phone_loop(1)
-    layout = arc_layout(arrays["arc_from"], arrays["arc_start"])
-    weights = arc_weights(layout, np.ones(len(arrays["arc_from"])), 0.0)
-    assert weights.blocks.sum() == np.prod(layout.blocks[:, [1, 3]])

@@ -89,23 +89,6 @@ def test_agrees_with_the_network_of_all_joint_states():
         assert found.log_likelihood == pytest.approx(log_likelihood, rel=1e-9 if precision is np.float64 else 1e-6)
 
 
-def test_beside_a_single_state_a_loop_is_a_plain_hidden_markov_model():
-    audio, visual, logs = random_model(3, 30, ((3, 4), (1, 1)), pairs=0)
-    visual = Loop(*(np.ones_like(part) for part in visual))._replace(leave=np.zeros(1))
-    found = factorial_posteriors(audio, visual, logs)
-    arcs = {}
-    for source, target, *_, probability in oracle.steps(audio):
-        arcs[target, source] = arcs.get((target, source), 0.0) + probability
-    (targets, sources), arc_logs = np.array(sorted(arcs)).T, np.log([arcs[arc] for arc in sorted(arcs)])
-    states = np.arange(12)
-    ends = np.log(audio.initial).ravel(), np.log(audio.final).ravel()
-    starts = np.searchsorted(targets, states)
-    posterior, _, log_likelihood = network_posteriors(logs.audio, states, sources, arc_logs, starts, *ends)
-    assert found.audio == pytest.approx(posterior, abs=1e-10)
-    assert found.visual == pytest.approx(np.ones((30, 1)))
-    assert found.log_likelihood == pytest.approx(log_likelihood + logs.visual.sum(), abs=1e-8)
-
-
 def test_posteriors_sum_to_one_and_counts_are_as_many_as_steps():
     audio, visual, logs = random_model(4, 150, ((3, 6), (3, 4)), 20.0, 10)
     logs = FactorialLogLikelihoods(*(part.astype(np.float32) for part in logs[:3]), logs.pairs)

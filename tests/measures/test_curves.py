@@ -28,10 +28,6 @@ def column(*values: float) -> np.ndarray:
     return np.array(values, float)[:, None]
 
 
-def test_correlation_by_hand():
-    assert correlation(column(1, 2, 3), column(1, 3, 2))[0] == pytest.approx(0.5)
-
-
 @given(seed=SEEDS, gain=st.floats(0.1, 10), offset=st.floats(-5, 5))
 @settings(max_examples=25)
 def test_correlation_is_one_with_itself_whatever_the_scale(seed, gain, offset):

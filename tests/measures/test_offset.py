@@ -71,11 +71,6 @@ def test_a_repeating_curve_is_not_known() -> None:
     assert not found.known
 
 
-def test_constant_curves_are_not_known() -> None:
-    found = best_offset(shift_scores(np.ones(300), wave(0), np.ones(300, bool), REACH), RATE_HZ)
-    assert (found.score, found.known) == (0, False)
-
-
 def test_clips_together_know_better_than_each() -> None:
     clips = [scores(6.0, seed, noise=12.0) for seed in range(30)]
     found = pooled_offset(clips, RATE_HZ)

@@ -117,10 +117,3 @@ def test_lips_that_a_wrong_phone_shows_open_are_closed_as_far_as_the_frames_say(
     assert closed_opening([0.126], frames + 0.1, frames) == closed_opening([0.126], frames)
     assert closed_opening([-0.02], frames) == 0
     assert closed_opening([], np.empty(0)) == 0
-
-
-def test_a_closure_of_one_clip_with_wrong_phones():
-    opening = np.concatenate([np.zeros(20), np.full(80, 0.1)])[:, None]
-    units = Timeline((Span(0.0, 0.5, Unit("aa")), Span(0.5, 0.6, Unit("m")), Span(0.6, 1.0, Unit("aa"))))
-    found = closure_from_motion([opening], [np.ones(100, bool)], [units], 0)
-    assert found.closed == 0

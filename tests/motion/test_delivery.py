@@ -41,12 +41,6 @@ def test_values_out_of_their_ranges() -> None:
             Delivery(**wrong)
 
 
-def test_nothing_asked_for_changes_nothing(said: Generation) -> None:
-    assert moved_in_time(said, Delivery()) is said
-    assert intensified(said, 1.0) is said
-    assert held(said, Delivery().hold_frames(100)) is said
-
-
 def test_the_mouth_moves_earlier_and_the_phones_with_it(said: Generation) -> None:
     early = moved_in_time(said, Delivery(anticipation_ms=40))
     assert early.motion["opening"][:-4] == pytest.approx(said.motion["opening"][4:])
@@ -105,15 +99,6 @@ def test_movements_grow_and_closures_stay(said: Generation, intensity: float) ->
     points = larger.motion["y_13"] - larger.motion["y_14"]
     rest = said.motion["y_13"][0] - said.motion["y_14"][0]
     assert points - rest == pytest.approx(after - after[0], abs=0.01)
-
-
-def test_twice_the_movement_below_the_largest(said: Generation) -> None:
-    small = said.motion["opening"] < 0.1
-    wide = small & (said.motion["opening"] > 0.05)
-    assert wide.any()
-    twice = intensified(said, 2.0)
-    assert twice.motion["opening"][wide] - 0.005 == pytest.approx(2 * (said.motion["opening"][wide] - 0.005), rel=0.01)
-    assert np.asarray(twice.variance)[wide, 0] == pytest.approx(0.04, rel=0.01)
 
 
 def test_weights_stay_between_0_and_1(said: Generation) -> None:

@@ -54,15 +54,6 @@ def test_teeth_are_hidden_in_pauses():
         assert middle(("s", pause, "s"), 1, "teeth") < 0.1
 
 
-def test_curves_are_smooth_and_in_range():
-    curves = gesture_curves(said("f", "m", "th", "uw", "s", "w", "l", "sil"), TIME_S)
-    assert tuple(curves) == GESTURES
-    for curve in curves.values():
-        assert (curve >= 0).all()
-        assert (curve <= 1).all()
-        assert np.abs(np.diff(curve)).max() < 0.4
-
-
 def test_without_phones_there_is_the_pose_of_speech():
     curves = gesture_curves(Timeline(()), TIME_S)
     assert curves.pop("teeth") == pytest.approx(np.full(len(TIME_S), 0.5))

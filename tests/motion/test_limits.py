@@ -56,11 +56,6 @@ def test_dimensions_that_do_not_move() -> None:
     check_rest(np.full(2, 0.5), still)
 
 
-def test_plausible_poses() -> None:
-    check_poses(REACH, FACE, CLOSURE)
-    check_poses(MotionLimits(REACH.low * 100, REACH.high * 100), FACE, None)  # millimetres of a table without units
-
-
 def test_poses_of_no_face() -> None:
     for low, high, closed in (
         ([-40.0, 0.5], [60.0, 0.6], 0.0),

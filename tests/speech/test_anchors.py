@@ -19,7 +19,6 @@ from lipmotion.speech.anchors import (
     anchors_of,
     feasible_windows,
     fitted,
-    group_fits,
     lateness_s,
     pressed_words,
     windows_of,
@@ -111,11 +110,6 @@ def test_words_that_begin_or_end_with_their_window_are_pressed():
     assert pressed_words(found_words(20, 120, 250), windows, 500).tolist() == [False, False, False]
     assert pressed_words(found_words(20, 100, 250), windows, 500).tolist() == [False, True, False]
     assert pressed_words(found_words(20, 150, 300), windows, 500).tolist() == [True, True, False]
-
-
-def test_the_fit_of_a_time_is_that_of_its_frames():
-    placed = found_words(10, 20, 50, fits=[-1.0, -4.0, -2.0])
-    assert group_fits(placed, np.array([0, 0, 1]), 60).tolist() == pytest.approx([-3.25, -2.0])
 
 
 class Search:

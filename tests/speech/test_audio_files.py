@@ -99,10 +99,6 @@ def test_a_recording_cut_short_is_shorter_or_refused(tmp_path: Path) -> None:
                 assert read_audio(tmp_path / name).duration_s < 1.1
 
 
-def test_a_tenth_of_a_second_is_enough(tmp_path: Path) -> None:
-    assert read_audio(silence(tmp_path / "a.wav", 0.1)).duration_s == pytest.approx(0.1)
-
-
 @pytest.mark.recordings
 def test_real_recordings_of_many_kinds(recordings: Path) -> None:
     folder = recordings / "speech-open"

@@ -48,10 +48,6 @@ def test_loudness_may_change_in_an_hour():
     np.testing.assert_allclose([span for span in found if span[0] % 60 < 5], expected, atol=0.05)
 
 
-def test_without_pauses_all_is_speech():
-    assert spoken_spans(levels_db(spoken([], 4.0))) == [(0.0, 4.0)]
-
-
 def test_the_quietest_place():
     levels = levels_db(spoken([(0.0, 1.0), (1.1, 2.0)], 2.0))
     assert quietest_s(levels, 0.5, 1.8) == pytest.approx(1.05, abs=0.06)

@@ -108,9 +108,3 @@ def test_what_was_recognised() -> None:
     assert found.reliability == pytest.approx(1)
     doubtful = recognition_of(units, labels, [HeardWord("bee", 0.3)], -7.0)
     assert doubtful.reliability == pytest.approx(0)
-
-
-def test_the_same_word_twice_is_two_words() -> None:
-    labels = [LabelledFrames(0, "b", 0), LabelledFrames(10, "b", 1)]
-    units = Timeline((Span(0.0, 0.1, Unit("b", word="b")), Span(0.1, 0.2, Unit("b", word="b"))))
-    assert len(recognition_of(units, labels, [HeardWord("b", 0.5)] * 2, None).words) == 2

@@ -123,12 +123,6 @@ def test_noise_has_no_words() -> None:
     assert found.word_s < 0.3
 
 
-def test_silence_has_no_words() -> None:
-    found = recognition(Audio(np.zeros(16_000, np.float32), 16_000))
-    assert [span.label.phone for span in found.units] == ["sil"]
-    assert texts(found) == []
-
-
 @pytest.mark.recordings
 def test_a_voice_and_words_that_the_model_knows_are_left_to_its_phones(recordings: Path) -> None:
     """The speaker and the words of the training: no language model of English expects "bin blue at f two now"."""

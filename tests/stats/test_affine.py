@@ -98,16 +98,6 @@ def test_no_row_lowers_the_objective(seed: int, frames: int) -> None:
     assert (np.diff(values) >= -1e-8 * np.abs(values[1:])).all()
 
 
-def test_at_the_end_nothing_rises_any_more() -> None:
-    draw = np.random.default_rng(8)
-    mixtures = random_mixtures(draw)
-    features, densities = spoken(draw, mixtures, 200)
-    statistics, _ = transform_statistics(mixtures, features, densities, identity(SIZE))
-    best = improved_transform(identity(SIZE), statistics, ALL, sweeps=50)
-    assert np.abs(gradient(statistics, best)).max() < 1e-2
-    assert np.abs(gradient(statistics, identity(SIZE))).max() > 1
-
-
 def test_the_likelihood_never_falls() -> None:
     """Of the frames and of the prior together, over all steps of EM."""
     draw = np.random.default_rng(2)
@@ -160,15 +150,6 @@ def test_own_statistics_are_those_of_many_frames_drawn() -> None:
     expected = prior_statistics(mixtures, np.arange(2)).times(10_000)
     np.testing.assert_allclose(found.quadratic / 10_000, expected.quadratic / 10_000, atol=0.3)
     np.testing.assert_allclose(found.linear / 10_000, expected.linear / 10_000, atol=0.3)
-
-
-def test_switched_off_gaussians_say_nothing() -> None:
-    mixtures = random_mixtures(np.random.default_rng(4))
-    mixtures.log_weights[:] = [0, -np.inf]
-    alone = Mixtures(mixtures.log_weights[:, :1], mixtures.means[:, :1], mixtures.variances[:, :1])
-    found, wanted = (prior_statistics(one, np.arange(4)) for one in (mixtures, alone))
-    np.testing.assert_allclose(found.quadratic, wanted.quadratic)
-    np.testing.assert_allclose(found.linear, wanted.linear)
 
 
 def test_a_prior_holds_a_transform_of_few_frames_back() -> None:

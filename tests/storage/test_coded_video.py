@@ -10,7 +10,6 @@ import pytest
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.storage.archive import read_archive, write_archive
 from lipmotion.storage.coded_video import (
-    GROUP,
     decode_pictures,
     encode_pictures,
     encode_video,
@@ -74,16 +73,6 @@ def test_odd_sizes():
         assert psnr_db(pictures, frames) > 40
 
 
-def test_groups_are_shorter_than_the_video(stored):
-    groups = stored.groups()
-    groups.frame(20)
-    assert groups.nbytes <= GROUP * 48 * 64 * 3
-
-
-def test_the_same_frames_give_the_same_bytes(stored):
-    np.testing.assert_array_equal(encode_video(film(), 25.0).data, stored.data)
-
-
 def test_a_smaller_factor_is_better():
     sizes = [len(encode_video(film(), 25.0, crf=crf).data) for crf in (10, 20, 30)]
     assert sizes == sorted(sizes, reverse=True)
@@ -104,11 +93,6 @@ def test_pictures_keep_their_colours():
     assert psnr_db(decode_pictures(encode_pictures(pictures, crf=8)), pictures) > 40
 
 
-def test_one_picture():
-    picture = film(1)
-    assert psnr_db(decode_pictures(encode_pictures(picture)), picture) > 40
-
-
 def test_what_is_no_video_is_refused():
     for frames, told in (
         ([], "no frames"),
@@ -117,7 +101,7 @@ def test_what_is_no_video_is_refused():
         ([np.zeros((32, 32, 3))], "frame 0 is float64"),
     ):
         with pytest.raises(InputError, match=told):
-            encode_video(frames, 25.0)
+            encode_video(frames, 25.0)  # type: ignore[arg-type]
 
 
 def test_options_out_of_range_are_refused():

@@ -8,7 +8,6 @@ from lipmotion.storage.schema import (
     NEGATIVE,
     POSITIVE,
     ArraySpec,
-    arrays_under,
     check_index,
     checked_arrays,
     refuse_undeclared,
@@ -107,10 +106,6 @@ def test_arrays_that_no_table_has() -> None:
     refuse_undeclared(good(), TABLE, ["other"])
     with pytest.raises(ValueError, match="undeclared 'other'"):
         refuse_undeclared([*good(), "other"], TABLE)
-
-
-def test_parts_have_names_of_their_own() -> None:
-    assert list(arrays_under({"a/x": np.zeros(1), "ab/y": np.zeros(1), "a/b/z": np.zeros(1)}, "a/")) == ["x", "b/z"]
 
 
 def test_numbers_of_what_there_is() -> None:

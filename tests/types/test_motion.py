@@ -71,19 +71,10 @@ def test_resampling_keeps_the_duration_and_the_values(rows: int, rate_hz: float,
     assert again["opening"] == pytest.approx(np.minimum(again.time_s * rate_hz, rows - 1), abs=1e-6)
 
 
-def test_the_same_rate_changes_nothing() -> None:
-    curves = Motion(np.random.default_rng(0).normal(size=(277, 2)), 100.0, CHANNELS)
-    assert curves.resampled(100.0).values == pytest.approx(curves.values, abs=1e-9)
-
-
 def test_whole_multiples_keep_the_last_frame() -> None:
     for rows in range(1, 200):
         assert len(motion(rows, 100.0).resampled(50.0).values) == (rows - 1) // 2 + 1
         assert len(motion(rows, 25.0).resampled(100.0).values) == 4 * (rows - 1) + 1
-
-
-def test_nothing_resampled_is_nothing() -> None:
-    assert motion(0).resampled(100.0).values.shape == (0, 2)
 
 
 def test_an_impossible_rate_is_refused() -> None:

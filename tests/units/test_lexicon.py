@@ -54,16 +54,6 @@ def test_the_whole_dictionary_maps_into_the_inventory() -> None:
         assert all(set(variant) <= set(PHONES) for variant in Lexicon().pronunciations(word))
 
 
-def test_an_unknown_word_is_guessed() -> None:
-    assert not Lexicon().known("xyzzyq")
-    assert len(said("xyzzyq")) == 1
-
-
-def test_what_is_no_word_is_not_known() -> None:
-    for word in ("", " ", "a b", "(2)", "\n"):
-        assert not Lexicon().known(word)
-
-
 def test_a_users_file(lexicon_file: Path) -> None:
     lexicon_file.write_text(
         "# my words\n\n"
@@ -99,11 +89,6 @@ def test_unstressed_vowels_of_a_users_file_are_reduced(lexicon_file: Path) -> No
 def test_files_of_other_systems(lexicon_file: Path, text: str) -> None:
     lexicon_file.write_bytes(text.encode())
     assert set(Lexicon.from_file(lexicon_file).user) == {"bim", "bam"}
-
-
-def test_an_empty_file_adds_nothing(lexicon_file: Path) -> None:
-    lexicon_file.write_text("# nothing yet\n")
-    assert Lexicon.from_file(lexicon_file) == Lexicon()
 
 
 @pytest.mark.parametrize(
@@ -167,14 +152,6 @@ def test_what_no_lexicon_holds_is_refused(lexicon_file: Path, text: str, message
     lexicon_file.write_text(text)
     with pytest.raises(InputError, match=message):
         Lexicon.from_file(lexicon_file)
-
-
-def test_the_most_that_a_lexicon_holds_is_read(lexicon_file: Path) -> None:
-    line = "bim B" + " B" * ((LONGEST_LINE - 5) // 2)
-    lexicon_file.write_text(f"{line}\n" + "bam B AE M\n" * MOST_VARIANTS)
-    found = Lexicon.from_file(lexicon_file).user
-    assert len(found["bim"][0]) == 1 + (LONGEST_LINE - 5) // 2
-    assert len(found["bam"]) == MOST_VARIANTS
 
 
 @pytest.mark.long

@@ -77,10 +77,6 @@ def test_numbers() -> None:
         assert " ".join(number_words(digits)) == words
 
 
-def test_a_number_of_any_length_is_read_digit_by_digit() -> None:
-    assert number_words("9" * 5000) == ["nine"] * 5000
-
-
 @settings(max_examples=60)
 @given(st.integers(0, 10**12 - 1))
 def test_a_number_comes_back_from_its_words(number: int) -> None:

@@ -7,7 +7,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
-from lipmotion.export.cues.shapes import SHAPES
 from lipmotion.types import Unit
 from lipmotion.units import LIP_CLOSING, PHONES, UNIT_SETS, UnitSet, is_silent, phone_classes, unit_set
 from lipmotion.units.unit_sets import GROUPS
@@ -86,14 +85,6 @@ def test_the_extended_set_breaks_the_simple_one_down() -> None:
             assert len({unit_set(coarse).unit(phone) for phone in speech}) <= 1
 
 
-def test_preston_blair_has_the_same_names_everywhere() -> None:
-    assert {shape.blair for shape in SHAPES.values()} == set(unit_set("pbVis").units) - {"WQ"}
-
-
-def test_classes_of_single_phones_are_the_phone_classes_in_order() -> None:
-    assert list(unit_set("phone").classes().items()) == list(phone_classes().items())
-
-
 def check_classes(found: UnitSet) -> None:
     """By the definition, set by set."""
     whole = frozenset(found.units)
@@ -158,13 +149,6 @@ def test_a_wrong_table_is_refused(case: str, tmp_path: Path) -> None:
         unit_set(written(tmp_path, text))
 
 
-def test_silence_may_be_closed_lips(tmp_path: Path) -> None:
-    text = GOOD.replace("silence sil sp\n", "").replace("bilabial p b m em", "closed p b m em sil sp")
-    found = unit_set(written(tmp_path, text))
-    assert found.silence == ("closed",)
-    assert not found.silent("closed")
-
-
 def test_neither_a_name_nor_a_file(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"'evis'; there are: 2vis, sVis, pbVis, eVis, phone"):
         unit_set("evis")
@@ -181,13 +165,6 @@ def test_a_unit_is_a_word() -> None:
     for unit in ("", "a b", " a", "a\n"):
         with pytest.raises(InputError, match="not a word"):
             UnitSet("mine", {**unit_set("phone").unit_of_phone, "zh": unit})
-
-
-def test_an_unknown_phone_has_no_unit() -> None:
-    with pytest.raises(InputError, match="'xx'; the phones: aa"):
-        unit_set("eVis").unit("xx")
-    with pytest.raises(InputError, match="unknown xx"):
-        UnitSet("mine", {**unit_set("phone").unit_of_phone, "xx": "xx"})
 
 
 def test_the_document_says_what_the_tables_say() -> None:
@@ -239,9 +216,3 @@ def test_a_unit_alone_tells_its_phone_only_where_it_has_one() -> None:
     ]
     assert UNIT_SETS["2vis"].label("closed") == Unit("", "closed")
     assert UNIT_SETS["phone"].label("sp") == Unit("sp", "sp")
-
-
-def test_units_within_a_class_of_phones() -> None:
-    assert UNIT_SETS["pbVis"].units_within(LIP_CLOSING) == ("MBP",)
-    assert UNIT_SETS["2vis"].units_within(LIP_CLOSING) == ()
-    assert sorted(UNIT_SETS["phone"].units_within(LIP_CLOSING)) == ["b", "em", "m", "p"]

@@ -37,7 +37,3 @@ def test_other_words_and_silence_are_apart() -> None:
         (5, 8, "big"),
         (8, 11, "boat"),
     ]
-
-
-def test_no_words_are_none() -> None:
-    assert said() == []

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from lipmotion.engines import engine_named
-from lipmotion.engines.trajectory.engine import TrajectoryConfig
 from lipmotion.errors import InputError
 from lipmotion.testing.examples import CHANNELS, OPENINGS, examples, speech, timeline
 from lipmotion.types import WEIGHT, Channel, Constraints, Pin
@@ -33,13 +32,6 @@ def test_any_odd_number_of_states_works():
         model = engine.fit(examples(4), silent_monitor).model
         values = engine.generate(model, speech(timeline(("p", "aa", "m")))).motion.values
         assert np.isfinite(values).all()
-
-
-def test_configuration_and_model_are_different_things():
-    assert ENGINE.config == TrajectoryConfig(silent_states=7, articulation=False)
-    fit = ENGINE.fit(examples(3), silent_monitor)
-    assert fit.figures["frames"] == sum(int(e.valid.sum()) for e in examples(3))
-    assert fit.figures["leaves"] == len(fit.model.emission.means)
 
 
 def test_the_mouth_rests_in_silence():
@@ -77,11 +69,6 @@ def test_points_cannot_be_pinned_and_the_error_says_what_can():
 def test_a_mouth_cannot_be_pinned_further_than_shut():
     with pytest.raises(InputError, match="at least 0"):
         ENGINE.generate(MODEL, speech(timeline(("aa",))), Constraints((Pin(0.5, "opening", -0.1),)))
-
-
-def test_units_are_named_by_their_neighbours():
-    units = ENGINE.generate(MODEL, speech(timeline(("aa", "p")))).units
-    assert [span.label.unit for span in units] == ["sil-sil+aa", "sil-aa+p", "aa-p+sil", "p-sil+sil"]
 
 
 def test_an_edited_unit_changes_the_motion_around_it_only():

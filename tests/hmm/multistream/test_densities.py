@@ -69,13 +69,6 @@ def test_one_gaussian_takes_the_mean_and_variance_of_its_frames():
     assert better.variances[0, 0] == pytest.approx(np.average((values - mean) ** 2, axis=0, weights=share), rel=1e-4)
 
 
-def test_what_has_too_little_data_stays_as_it_is():
-    before = standard_normal_densities(1, 2, True, 0.3)
-    after = before.reestimated(sums_of(np.ones((1, 2)), np.ones(1)), 1e-3)
-    assert np.array_equal(after.mixtures.means, before.mixtures.means)
-    assert after.voiced == pytest.approx([0.3])
-
-
 def test_variances_have_a_floor_and_voicing_is_never_certain():
     after = standard_normal_densities(1, 2, True).reestimated(sums_of(np.ones((50, 2)), np.ones(50)), 0.02)
     assert after.mixtures.variances[0, 0] == pytest.approx([0.02, 0.02])

@@ -33,14 +33,6 @@ def random_densities(seed, frames, components, dimensions=2):
     )
 
 
-def test_static_values_alone_are_the_means():
-    densities = random_densities(0, 12, 1)
-    densities.precisions[:, :, 1:] = 0
-    found = generate(densities)
-    assert found.values == pytest.approx(densities.means[:, 0, 0], abs=1e-12)
-    assert found.variance == pytest.approx(1 / densities.precisions[:, 0, 0])
-
-
 @settings(max_examples=30)
 @given(frames=st.integers(1, 12), seed=st.integers(0, 50), pinned=st.booleans())
 def test_one_gaussian_has_the_closed_form(frames, seed, pinned):
@@ -111,16 +103,6 @@ def test_the_densities_are_those_of_the_leaves_in_units_of_the_motion():
     variance = model.tied.mixtures.variances[leaves[middle]] * model.scale.deviation**2
     assert found.precisions[middle] == pytest.approx(1 / variance.reshape(components, 3, 2), rel=1e-6)
     assert (found.precisions[[0, -1], :, 1:] == 0).all()
-
-
-def test_a_path_that_is_certain_is_that_path():
-    hmm = random_joint(3, components=1)
-    path = align(hmm, observed(np.random.default_rng(4), 20), ("sil", "a", "b", "sil"))
-    leaves = hmm.models[MOTION].forest.leaves(path.states.triphones)
-    one = np.eye(len(leaves))[path.frames]
-    assert generate(densities_of_posterior(hmm, leaves, one)).values == pytest.approx(
-        generate(densities_of_path(hmm, path)).values, abs=1e-9
-    )
 
 
 def test_all_paths_together_maximise_the_expected_density():

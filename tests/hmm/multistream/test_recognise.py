@@ -10,7 +10,6 @@ from lipmotion.hmm.decode import decode_units, unit_loop
 from lipmotion.hmm.log_likelihoods import log_likelihoods_of
 from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.hmm.multistream.inventory import triphone_states
-from lipmotion.hmm.multistream.model import ACOUSTIC_ONLY
 from lipmotion.hmm.multistream.recognise import JointRecogniser
 from lipmotion.hmm.multistream.streams import SPEECH, StreamObservations, StreamWeights
 from lipmotion.hmm.states import StateTable
@@ -115,12 +114,6 @@ def test_paths_that_are_drawn_go_through_the_states_of_their_units():
     assert drawn == pytest.approx(state_posteriors(recogniser, data), abs=0.13)
 
 
-def test_a_wide_beam_changes_nothing():
-    hmm, data = random_joint(3), observed(np.random.default_rng(5), 40)
-    recogniser = JointRecogniser(hmm)
-    assert recogniser.recognise(data, beam=1e4) == recogniser.recognise(data)
-
-
 def test_speech_alone_is_the_plain_model():
     """The densities of all contexts, by name, in plain unit models."""
     hmm = random_joint(8, streams=(SPEECH,))
@@ -146,13 +139,6 @@ def test_speech_alone_is_the_plain_model():
     said = JointRecogniser(hmm).recognise(data)
     assert tuple(s.unit for s in said) == units
     assert [s.first for s in said] == bounds[:-1].tolist()
-
-
-def test_streams_that_are_missing_say_nothing():
-    hmm, data = random_joint(10), observed(np.random.default_rng(11), 20)
-    only = StreamObservations({SPEECH: data.streams[SPEECH]})
-    found = JointRecogniser(hmm, ACOUSTIC_ONLY).recognise(only)
-    assert found == JointRecogniser(hmm, StreamWeights(1, 0, 0, 0, 0)).recognise(data)
 
 
 def test_what_cannot_be_recognised():

@@ -9,7 +9,6 @@ from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.multistream import densities
 from lipmotion.hmm.multistream.align import align
 from lipmotion.hmm.multistream.em import accumulate_statistics, prepare_utterances, reestimated_hmm, state_posteriors
-from lipmotion.hmm.multistream.inventory import Inventory
 from lipmotion.hmm.multistream.model import MOTION_ONLY
 from lipmotion.hmm.multistream.recognise import JointRecogniser
 from lipmotion.hmm.multistream.streams import STREAMS, StreamObservations, StreamWeights
@@ -149,27 +148,12 @@ def test_streams_and_units_that_are_missing_here_and_there():
     assert np.isfinite(hmm.durations).all()
 
 
-def test_progress_ends_with_everything_done(usual):
-    shares = [event.share for event in usual[1]]
-    assert shares == sorted(shares)
-    assert shares[-1] == 1
-    assert sum(event.stage == "trees" for event in usual[1]) == len(STREAMS)
-
-
 def test_nothing_that_is_switched_on_was_observed():
     deaf = [replace(u, observed=StreamObservations({"speech": u.observed.streams["speech"]})) for u in TRAIN[:3]]
     with pytest.raises(InputError, match="switched on are motion"):
         trained(deaf, training=MOTION_ONLY)
     hmm, _ = trained([*TRAIN[:6], deaf[0]], training=MOTION_ONLY)  # utterances without motion change nothing
     assert np.isfinite(hmm.durations).all()
-
-
-def test_any_other_units_can_be_modelled():
-    shapes = {"sil": "closed", "a": "open", "b": "closed", "c": "open", "d": "open"}
-    data = [replace(u, units=tuple(shapes[unit] for unit in u.units)) for u in TRAIN[:12]]
-    known = Inventory(("closed", "open"), ("closed",), 3)
-    hmm, _ = trained(data, classes={}, known=known)
-    assert {s.unit for s in JointRecogniser(hmm).recognise(HELD_OUT[0].observed)} == {"closed", "open"}
 
 
 def test_too_short_for_its_units():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import closing
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -136,14 +135,6 @@ def test_voices_by_name() -> None:
             voice_named(name)
     with pytest.raises(InputError, match="no voice 'rms' here; it has: kal16, slt"):
         speak_sentence("Hello", SyntheticVoice("rms", "flite", "rms"))
-
-
-@pytest.mark.usefixtures("faked")
-def test_a_name_of_several_voices(monkeypatch: pytest.MonkeyPatch) -> None:
-    twice = replace(SYNTHESISERS["festival"], voices=SYNTHESISERS["flite"].voices)
-    monkeypatch.setitem(SYNTHESISERS, "festival", twice)
-    with pytest.raises(InputError, match="several voices are called 'slt'; give one of: flite:slt, flite:slt"):
-        voice_named("slt")
 
 
 @pytest.mark.usefixtures("bare")

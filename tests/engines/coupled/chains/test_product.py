@@ -123,12 +123,6 @@ def test_one_chain_is_the_hmm_of_its_units():
     assert len(reached.arc_from) == 9 + 6 + 9  # stay, move within, enter
 
 
-def test_units_that_correspond_to_the_same_visual_unit_stand_together():
-    of = structure(states=2)
-    corresponding = of.corresponding_units[1]
-    assert sorted(corresponding) == list(corresponding)
-
-
 def test_structures_that_do_not_fit_together():
     for kind, chains, limit, message in (
         ("ring", (THREE,), 1, "ring"),
@@ -146,11 +140,3 @@ def test_too_many_joint_states_to_list():
     of = structure_of(FACTORIAL, "phone phone", 5, -1, True)
     with pytest.raises(InputError, match="limit the asynchrony"):
         even(of)
-
-
-def test_three_chains():
-    of = structure(COUPLED, (THREE, TWO, TWO), states=2, limit=1)
-    reached = even(of)
-    assert reached.moves.shape[0] == 3
-    assert np.abs(reached.lead).max() == 1
-    assert len(set(reached.joint_states)) == len(reached.joint_states)

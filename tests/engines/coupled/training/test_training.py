@@ -90,14 +90,6 @@ def test_a_stream_that_was_not_observed_is_not_reestimated():
     assert not np.array_equal(better.groups[0].mixtures.means, model.groups[0].mixtures.means)
 
 
-def test_streams_that_are_not_reestimated_stay():
-    model, data = chains(), observations(12)
-    statistics = e_step(model, [LatticeUtterance(data, model.full_lattice)])
-    better = m_step(model, statistics, FLOORS, streams=(0,), transitions=False)
-    assert better.groups[1] is model.groups[1]
-    assert better.transitions is model.transitions
-
-
 def test_no_recording_has_a_path():
     model = chains()
     data = observations(3)

@@ -189,15 +189,6 @@ def test_visual_densities_and_transitions_stay(kind: str) -> None:
     )
 
 
-def test_motion_of_the_first_stage_is_ignored() -> None:
-    own, others = aligned(examples(3)), speech_alone(examples(3, seed=9))
-    elsewhere = [
-        replace(one, observations=one.observations.with_stream(1, one.observations.streams[1][::-1])) for one in own
-    ]
-    found = [train_on_speech(trained(), given, others, SpeechOnlySchedule(2, 2, 1.0)) for given in (own, elsewhere)]
-    assert found[0].groups[0].mixtures.means.tobytes() == found[1].groups[0].mixtures.means.tobytes()
-
-
 def test_a_weight_is_how_often_an_utterance_counts() -> None:
     chains, (one,) = trained(), aligned(examples(1))
     twice = e_step(chains, [lattice_utterance(chains, one)] * 2)
@@ -218,12 +209,6 @@ def fitted(sentences: Sequence[Example], **options: object) -> tuple[CoupledEngi
 def arrays(sentences: Sequence[Example], **options: object) -> list[bytes]:
     engine, model = fitted(sentences, **PLAIN | options)
     return [array.tobytes() for array in engine.to_arrays(model).values()]
-
-
-def test_without_more_speech_there_is_one_stage() -> None:
-    assert arrays(examples(4)) == arrays(
-        examples(4), speech_only_mixtures=8, speech_only_weight=0.1, speech_only_steps=1
-    )
 
 
 def test_motion_that_was_not_observed_is_ignored_wherever_the_example_stands() -> None:
