@@ -81,10 +81,15 @@ def test_formats_that_break_it() -> None:
         motion, units = npz.read(path)  # type: ignore[misc]
         return replace(motion, values=motion.values + 0.01), units
 
+    def slower(path: Path) -> Any:
+        motion, units = npz.read(path)  # type: ignore[misc]
+        return replace(motion, rate_hz=motion.rate_hz / 2), units
+
     for broken, words in (
         (MotionFormat(nothing), "no file, or an empty one"),
         (MotionFormat(by_chance), "other bytes"),
         (MotionFormat(npz.write, wrong), "values come back that differ"),
+        (MotionFormat(npz.write, slower), "Hz come back"),
     ):
         with pytest.raises(ContractError, match=words):
             check_exporter(broken)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import pytest
+
 from lipmotion.types import Span, Timeline, Unit
-from lipmotion.units import words_in_time
+from lipmotion.units import Lexicon, word_spans, words_in_time
 
 
 def said(*words: tuple[str, str]) -> list[tuple[float, float, str]]:
@@ -27,6 +29,13 @@ def test_a_word_that_is_said_again_is_another_one() -> None:
     ):
         ends = [*starts[1:], len(phones.split())]
         assert said((word, phones)) == list(zip(starts, ends, [word] * len(starts), strict=True))
+
+
+def test_a_word_is_said_as_few_times_as_can_be(monkeypatch: pytest.MonkeyPatch) -> None:
+    both = Lexicon({"dodo": (("d", "ow"), ("d", "ow", "d", "ow"))})
+    monkeypatch.setattr(word_spans, "Lexicon", lambda: both)
+    assert said(("dodo", "d ow d ow")) == [(0, 4, "dodo")]
+    assert said(("dodo", "d ow d ow d ow")) in ([(0, 2, "dodo"), (2, 6, "dodo")], [(0, 4, "dodo"), (4, 6, "dodo")])
 
 
 def test_other_words_and_silence_are_apart() -> None:
