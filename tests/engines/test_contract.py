@@ -1,6 +1,5 @@
 """What every engine promises, whatever it does inside."""
 
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -10,16 +9,14 @@ from hypothesis import strategies as st
 
 from lipmotion.engines import ENGINES, engine_named
 from lipmotion.engines.base import Explains, HasPosteriors, explain_by_trace
-from lipmotion.errors import CorpusError, InputError
+from lipmotion.errors import InputError
 from lipmotion.testing.check_engine import ENGINE_CHECKS, SENTENCE, TrainedEngine
-from lipmotion.testing.examples import RATE_HZ, example, examples, motion, speech, timeline
+from lipmotion.testing.examples import RATE_HZ, speech, timeline
 from lipmotion.types import Pin, Span, Timeline, Unit
-from lipmotion.types.progress import silent_monitor
-from lipmotion.units import PHONES, UNIT_SETS
 
 SYSTEMS = {
     **{name: (name, {}) for name in sorted(ENGINES.names)},
-    **{f"trajectory of {units}": ("trajectory", {"units": units}) for units in UNIT_SETS if units != "phone"},
+    "trajectory of 2vis": ("trajectory", {"units": "2vis"}),
     "plain trajectory of eVis": ("trajectory", {"units": "eVis", "acoustic_regression": False}),
 }
 """Every engine as it is, and its other settings that change what the model holds."""
@@ -47,8 +44,9 @@ def same(one, two) -> bool:
 SLOW_CHECKS = {
     ("coupled", "damaged arrays are format errors"),
     ("coupled", "frames that are not valid teach nothing"),
+    ("coupled", "the same input gives the same bytes"),
 }
-"""Every array of the largest model is damaged in three ways; it is trained again."""
+"""Every array of the largest model is damaged in three ways, or it is trained again."""
 CONTRACT = [
     pytest.param(name, check, marks=[pytest.mark.long] * (name not in ENGINES.built_in or (name, check) in SLOW_CHECKS))
     for name in SYSTEMS
@@ -61,29 +59,10 @@ def test_the_contract_is_kept(name, check):
     ENGINE_CHECKS[check](engine_called(name))
 
 
-def test_what_was_learned_comes_back(trained):
-    """A sentence of the kind trained on: the engine must not be a constant."""
-    spoken = speech(timeline(SENTENCE))
-    original = motion(spoken.units, len(spoken.features.values), seed=99)
-    generated = trained.generate(spoken).motion
-    for name in ("opening", "width", "y_17"):
-        assert np.corrcoef(generated[name], original[name])[0, 1] > 0.9
-
-
 def test_a_unit_without_a_phone_is_refused_by_all_that_do_not_know_it(trained):
     unknown = Timeline((Span(0.1, 0.4, Unit("", "of another set")),))
     with pytest.raises(InputError, match=r"without a phone.*; give"):
         trained.generate(speech(unknown))
-
-
-def test_lips_are_made_to_meet_unless_the_pins_are_taken_away(trained):
-    spoken = speech(timeline(SENTENCE))
-    free = trained.engine.without_closures()
-    assert (trained.engine.config.closures, free.config.closures) == (True, False)
-    assert free.without_closures() == free
-    pinned, opening = (engine.generate(trained.model, spoken).motion["opening"] for engine in (trained.engine, free))
-    lips = [slice(78, 93), slice(98, 113)]
-    assert all(pinned[span].min() <= opening[span].min() + 1e-9 for span in lips)
 
 
 def explained(trained, spoken, frames):
@@ -156,26 +135,9 @@ def test_trees_can_be_read(trained):
     assert max(map(len, text.splitlines())) < 200
 
 
-def test_every_phone_of_the_inventory_resolves(trained):
-    for phone in PHONES:
-        result = trained.generate(speech(timeline(("aa", phone, "zh", phone))))
-        assert np.isfinite(result.motion.values).all(), phone
-        assert -0.1 < result.motion["opening"].min() <= result.motion["opening"].max() < 0.5, phone
-
-
 def test_a_phone_outside_the_inventory_is_an_input_error(trained):
     with pytest.raises(InputError, match="xx"):
         trained.generate(speech(timeline(("aa", "xx"))))
-
-
-@pytest.mark.parametrize("name", [*ENGINES.built_in, *OTHERS])
-def test_nothing_to_learn_from_is_a_corpus_error(name):
-    engine = engine_named(*SYSTEMS[name])
-    unseen = [replace(e, valid=np.zeros_like(e.valid)) for e in examples(2)]
-    silent = [example(()) for _ in range(2)]
-    for useless in ([], unseen, silent):
-        with pytest.raises(CorpusError):
-            engine.fit(useless, silent_monitor)
 
 
 def test_an_unknown_engine_or_option_is_an_input_error():

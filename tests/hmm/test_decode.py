@@ -27,9 +27,8 @@ def own_score(hmm, features, units, bounds) -> float:
     return max(sequences.score(hmm, features, units, durations) for durations in cuts)
 
 
-@pytest.mark.parametrize(("states", "frames"), [(2, 6), (2, 7), (3, 7), (3, 9), (4, 8), (5, 10)])
-@pytest.mark.parametrize("contexts", [0, 6])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("states", "frames"), [(2, 6), (3, 7), (5, 10)])
+@pytest.mark.parametrize(("contexts", "seed"), [(0, 0), (6, 1), (6, 2)])
 def test_no_sequence_of_units_is_better(seed, contexts, states, frames):
     """The bigram of every unit counts exactly once, in any context."""
     hmm = random_hmm(seed, states=states, contexts=contexts)
@@ -40,25 +39,18 @@ def test_no_sequence_of_units_is_better(seed, contexts, states, frames):
     assert own_score(hmm, features, units, bounds) == pytest.approx(best, abs=1e-3)
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_units_of_one_state(seed):
-    hmm = random_hmm(seed, states=1)
-    features = np.random.default_rng(seed).normal(0, 1.5, (5, 2)).astype(np.float32)
-    candidates = [  # a unit after itself is the same path as one that lasts longer
-        units
-        for units in sequences.sequences(INVENTORY, dict.fromkeys(INVENTORY, 1), 5)
-        if all(unit != following for unit, following in pairwise(units))
-    ]
-    _, _, best = sequences.best(hmm, features, candidates)
-    units, bounds = decoded(hmm, features)
-    assert own_score(hmm, features, units, bounds) == pytest.approx(best, abs=1e-3)
-
-
-@pytest.mark.parametrize("contexts", [0, 6])
-def test_order_of_the_inventory_changes_nothing(contexts):
-    hmm = random_hmm(8, states=3, contexts=contexts)
-    features = np.random.default_rng(8).normal(0, 1.5, (40, 2)).astype(np.float32)
-    assert decoded(hmm, features) == decoded(hmm, features, ("b", SILENCE, "a"))
+def test_units_of_one_state():
+    for seed in range(2):
+        hmm = random_hmm(seed, states=1)
+        features = np.random.default_rng(seed).normal(0, 1.5, (5, 2)).astype(np.float32)
+        candidates = [  # a unit after itself is the same path as one that lasts longer
+            units
+            for units in sequences.sequences(INVENTORY, dict.fromkeys(INVENTORY, 1), 5)
+            if all(unit != following for unit, following in pairwise(units))
+        ]
+        _, _, best = sequences.best(hmm, features, candidates)
+        units, bounds = decoded(hmm, features)
+        assert own_score(hmm, features, units, bounds) == pytest.approx(best, abs=1e-3)
 
 
 def test_a_known_sequence_is_recovered():
@@ -72,12 +64,6 @@ def test_a_known_sequence_is_recovered():
         assert bounds == pytest.approx(edges, abs=1)
 
 
-def test_speech_may_begin_and_end_without_silence():
-    who = speaker()
-    features, edges = who.say(np.random.default_rng(1), ("b", "c", "a"))
-    assert decoded(known_hmm(who), features, (SILENCE, *UNITS)) == (("b", "c", "a"), edges)
-
-
 def test_silence_alone_is_silence_however_unlikely_it_is_to_follow_itself():
     who = speaker()
     said = [(SILENCE, *(unit for word in words for unit in word), SILENCE) for words in sentences(1, 40)]
@@ -86,13 +72,12 @@ def test_silence_alone_is_silence_however_unlikely_it_is_to_follow_itself():
     assert decoded(hmm, features, (SILENCE, *UNITS)) == ((SILENCE,), edges)
 
 
-@pytest.mark.parametrize("silent", [3, 4])
-def test_short_silence_at_the_start_is_not_priced_out(silent):
+def test_short_silence_at_the_start_is_not_priced_out():
     """Silence never follows silence, nor the silence before a recording that begins in silence."""
     who = speaker(spread=2.0)
     said = [(SILENCE, *(unit for word in words for unit in word), SILENCE) for words in sentences(1, 400)]
     hmm = known_hmm(who, said, HmmConfig(mixtures=1, bigram_weight=8.0))
-    with_silence = np.repeat(who.means[SILENCE][:1], silent, axis=0)
+    with_silence = np.repeat(who.means[SILENCE][:1], 3, axis=0)
     rest = np.concatenate([np.repeat(who.means[unit], 3, axis=0) for unit in ("b", "c", SILENCE)])
     features = np.concatenate([with_silence, rest]).astype(np.float32)
     assert decoded(hmm, features, (SILENCE, *UNITS))[0] == (SILENCE, "b", "c", SILENCE)

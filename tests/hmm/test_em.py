@@ -34,20 +34,19 @@ def disturbed(seed: int, spread: float):
     return replace(hmm, mixtures=mixtures), [utterance.features for utterance in transcribed], said
 
 
-@pytest.mark.parametrize("spread", [0.4, 1.0, 2.0])
-@pytest.mark.parametrize("seed", range(3))
-def test_no_iteration_lowers_the_likelihood(seed, spread):
+def test_no_iteration_lowers_the_likelihood():
     """The tolerance, per frame, is for single precision and for posteriors that are left out."""
-    hmm, data, said = disturbed(seed, spread)
-    for _ in range(3):  # 1, 2 and 4 Gaussians
-        figures = []
-        for _ in range(8):
-            hmm, log_likelihood = step(hmm, data, said)
-            figures.append(log_likelihood)
-        assert all(after > before - 1e-5 for before, after in pairwise(figures))
-        assert figures[-1] > figures[0] + 0.01
-        assert np.isfinite(hmm.mixtures.log_weights).all()  # none was switched off: these were true steps of EM
-        hmm = replace(hmm, mixtures=hmm.mixtures.split())
+    for seed, spread in ((0, 0.4), (1, 2.0)):
+        hmm, data, said = disturbed(seed, spread)
+        for _ in range(3):  # 1, 2 and 4 Gaussians
+            figures = []
+            for _ in range(5):
+                hmm, log_likelihood = step(hmm, data, said)
+                figures.append(log_likelihood)
+            assert all(after > before - 1e-5 for before, after in pairwise(figures))
+            assert figures[-1] > figures[0] + 0.01
+            assert np.isfinite(hmm.mixtures.log_weights).all()  # none was switched off: these were true steps of EM
+            hmm = replace(hmm, mixtures=hmm.mixtures.split())
 
 
 def test_a_high_variance_floor_does_not_break_the_rise():
@@ -56,7 +55,7 @@ def test_a_high_variance_floor_does_not_break_the_rise():
     floor = 0.15 * np.concatenate(data).var(axis=0)
     hmm = replace(hmm, mixtures=replace(hmm.mixtures, variances=np.maximum(hmm.mixtures.variances, floor)))
     figures = []
-    for _ in range(12):
+    for _ in range(8):
         hmm, log_likelihood = step(hmm, data, said)
         figures.append(log_likelihood)
     assert all(after > before - 1e-5 for before, after in pairwise(figures))
@@ -91,14 +90,19 @@ def test_the_e_step_agrees_with_the_enumeration_of_all_paths(monkeypatch):
     assert keep == pytest.approx(np.clip(stays[visits > 0] / visits[visits > 0], 0.05, 11 / 12), abs=1e-4)
 
 
-@pytest.mark.parametrize("cells", [1, 5_000, 20_000])
-def test_the_size_of_batches_changes_nothing(monkeypatch, cells):
+def test_the_size_of_batches_and_the_order_of_utterances_change_nothing(monkeypatch):
     hmm, data, said = disturbed(6, 1.0)
+    before = hmm.mixtures.means.copy()
     better, log_likelihood = step(hmm, data, said)
-    monkeypatch.setattr(module, "CELLS", cells)
-    same, figure = step(hmm, data, said)
+    assert np.array_equal(hmm.mixtures.means, before)  # the old models stay as they were
+    for cells in (1, 5_000):
+        monkeypatch.setattr(module, "CELLS", cells)
+        same, figure = step(hmm, data, said)
+        assert figure == pytest.approx(log_likelihood, abs=1e-9)
+        assert np.array_equal(same.mixtures.means, better.mixtures.means)
+    same, figure = step(hmm, data[::-1], said[::-1])
     assert figure == pytest.approx(log_likelihood, abs=1e-9)
-    assert np.array_equal(same.mixtures.means, better.mixtures.means)
+    assert same.mixtures.means == pytest.approx(better.mixtures.means, abs=1e-4)
 
 
 @given(sizes=st.lists(st.tuples(st.integers(1, 300), st.integers(1, 60)), min_size=1, max_size=20))
@@ -113,14 +117,6 @@ def test_long_utterances_do_not_fill_the_memory(sizes):
         assert len(batch) == 1 or padded <= 20_000
 
 
-def test_order_of_utterances_changes_nothing():
-    hmm, data, said = disturbed(7, 1.0)
-    better, log_likelihood = step(hmm, data, said)
-    same, figure = step(hmm, data[::-1], said[::-1])
-    assert figure == pytest.approx(log_likelihood, abs=1e-9)
-    assert same.mixtures.means == pytest.approx(better.mixtures.means, abs=1e-4)
-
-
 def test_an_utterance_too_short_for_its_units_counts_for_nothing():
     hmm, data, said = disturbed(8, 1.0)
     floor = replace(hmm, config=replace(hmm.config, variance_floor=1e-9))  # the floor depends on all data
@@ -129,13 +125,6 @@ def test_an_utterance_too_short_for_its_units_counts_for_nothing():
     assert figure == pytest.approx(log_likelihood, abs=1e-9)
     assert same.mixtures.means == pytest.approx(better.mixtures.means, abs=1e-5)
     assert same.log_stay == pytest.approx(better.log_stay, abs=1e-6)
-
-
-def test_the_old_models_stay_as_they_were():
-    hmm, data, said = disturbed(9, 1.0)
-    before = hmm.mixtures.means.copy()
-    baum_welch(hmm, data, said)
-    assert np.array_equal(hmm.mixtures.means, before)
 
 
 def test_no_state_may_last_longer_than_its_limit():

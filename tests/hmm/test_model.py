@@ -24,10 +24,6 @@ def test_models_come_back_from_arrays():
     )
 
 
-def test_arrays_hold_no_objects():
-    assert all(array.dtype != object for array in hmm_arrays(random_hmm(2, contexts=3)).values())
-
-
 def test_switched_off_components_stay_off():
     hmm = random_hmm(3)
     hmm.mixtures.log_weights[0] = [0, -np.inf]
@@ -35,24 +31,12 @@ def test_switched_off_components_stay_off():
     assert back.mixtures.log_weights[0].tolist() == [0, -np.inf]
 
 
-@pytest.mark.parametrize("name", sorted(hmm_arrays(random_hmm(4))))
-def test_a_missing_array_is_a_damaged_model(name):
-    arrays = hmm_arrays(random_hmm(4))
-    del arrays[name]
-    with pytest.raises(ModelFormatError, match=name):
-        hmm_from_arrays(arrays, random_hmm(4).config)
-
-
-@pytest.mark.parametrize("name", ["means", "variances", "names", "log_weights", "log_stay", "bigram", "counts"])
-def test_an_array_of_the_wrong_shape_is_a_damaged_model(name):
-    arrays = hmm_arrays(random_hmm(5, contexts=2))
-    arrays[name] = arrays[name][:-1]
-    with pytest.raises(ModelFormatError, match="damaged"):
-        hmm_from_arrays(arrays, random_hmm(5).config)
-
-
-def test_staying_and_moving_sum_to_one():
-    hmm = random_hmm(6, contexts=4)
-    for unit in ("sil", "a", "b"):
-        for state in range(3):
-            assert np.exp(hmm.stay(unit, state)) + np.exp(hmm.move(unit, state)) == pytest.approx(1)
+def test_a_missing_array_and_one_of_the_wrong_shape_are_a_damaged_model():
+    hmm = random_hmm(5, contexts=2)
+    whole = hmm_arrays(hmm)
+    for name in whole:
+        with pytest.raises(ModelFormatError, match=name):
+            hmm_from_arrays({other: array for other, array in whole.items() if other != name}, hmm.config)
+    for name in ("means", "variances", "names", "log_weights", "log_stay", "bigram", "counts"):
+        with pytest.raises(ModelFormatError, match="damaged"):
+            hmm_from_arrays(whole | {name: whole[name][:-1]}, hmm.config)

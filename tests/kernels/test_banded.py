@@ -25,7 +25,7 @@ def dense(mean, precision, pins=()) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 @given(seed=SEEDS, frames=LENGTHS)
-@settings(max_examples=50)
+@settings(max_examples=30)
 def test_agrees_with_the_dense_system(seed, frames):
     mean, precision = statistics(seed, frames)
     values, variance = solve(normal_equations(mean, precision))
@@ -34,17 +34,8 @@ def test_agrees_with_the_dense_system(seed, frames):
         assert variance[:, channel] == pytest.approx(spread, abs=1e-10)
 
 
-@pytest.mark.parametrize("frames", [1, 2, 3, 4])
-def test_the_shortest_trajectories(frames):
-    mean, precision = statistics(frames, frames)
-    values, variance = solve(normal_equations(mean, precision))
-    for channel, (wanted, spread) in enumerate(dense(mean, precision)):
-        assert values[:, channel] == pytest.approx(wanted, abs=1e-12)
-        assert variance[:, channel] == pytest.approx(spread, abs=1e-12)
-
-
 @given(seed=SEEDS, frames=st.integers(1, 16), data=st.data())
-@settings(max_examples=60)
+@settings(max_examples=30)
 def test_pins_agree_with_elimination(seed, frames, data):
     mean, precision = statistics(seed, frames)
     where = data.draw(st.sets(st.tuples(st.integers(0, frames - 1), st.integers(0, 1))))
@@ -60,17 +51,19 @@ def test_pins_agree_with_elimination(seed, frames, data):
     assert all(values[t, c] == value for t, c, value in pins)
 
 
-@pytest.mark.parametrize("frames", [(0, 1), (0, 1, 2), (4, 5), (5, 4), (7, 8), (8, 7, 6), (0, 8), tuple(range(9))])
-def test_pins_at_the_ends_and_side_by_side_are_exact(frames):
-    mean, precision = statistics(11, 9)
-    pins = [(t, 1, 0.5 - 0.1 * t) for t in frames]
-    bands = normal_equations(mean, precision)
-    for t, channel, value in pins:
-        pin(bands, t, channel, value)
-    values, _ = solve(bands)
-    assert [values[t, 1] for t in frames] == [value for _, _, value in pins]
-    assert values[:, 1] == pytest.approx(dense(mean, precision, pins)[1][0], abs=1e-10)
-    assert values[:, 0] == pytest.approx(dense(mean, precision)[0][0], abs=1e-10)  # the other channel does not change
+def test_pins_at_the_ends_and_side_by_side_are_exact():
+    for frames in ((0, 1, 2), (5, 4), (8, 7, 6), tuple(range(9))):
+        mean, precision = statistics(11, 9)
+        pins = [(t, 1, 0.5 - 0.1 * t) for t in frames]
+        bands = normal_equations(mean, precision)
+        for t, channel, value in pins:
+            pin(bands, t, channel, value)
+        values, _ = solve(bands)
+        assert [values[t, 1] for t in frames] == [value for _, _, value in pins]
+        assert values[:, 1] == pytest.approx(dense(mean, precision, pins)[1][0], abs=1e-10)
+        assert values[:, 0] == pytest.approx(
+            dense(mean, precision)[0][0], abs=1e-10
+        )  # the other channel does not change
 
 
 @given(seed=SEEDS, frames=LENGTHS)
@@ -99,16 +92,6 @@ def test_what_sticks_out_at_the_ends_counts_for_nothing():
     assert np.array_equal(solve(normal_equations(mean, precision))[0], solve(normal_equations(other, precision))[0])
 
 
-def test_inputs_stay_as_they_were():
-    mean, precision = statistics(5, 8)
-    copies = mean.copy(), precision.copy()
-    bands = normal_equations(mean, precision)
-    pin(bands, 2, 0, 1.0)
-    solve(bands)
-    assert np.array_equal(mean, copies[0])
-    assert np.array_equal(precision, copies[1])
-
-
 def forms(monkeypatch, compute) -> list:
     """Return the results of NumPy and of the compiled form."""
     results = []
@@ -118,8 +101,7 @@ def forms(monkeypatch, compute) -> list:
     return results
 
 
-@pytest.mark.parametrize("frames", [1, 2, 3, 4, 5, 60])
-@pytest.mark.parametrize("channels", [1, 2, 7, 33])
+@pytest.mark.parametrize(("frames", "channels"), [(1, 1), (2, 7), (3, 2), (5, 1), (60, 33)])
 def test_the_compiled_form_gives_the_same_bits(frames, channels, monkeypatch):
     pytest.importorskip("numba")
     mean, precision = statistics(frames, frames, channels)
@@ -130,26 +112,9 @@ def test_the_compiled_form_gives_the_same_bits(frames, channels, monkeypatch):
     assert np.array_equal(plain, fast)
 
 
-@pytest.mark.parametrize("frames", [1, 2, 3, 4, 9])
-def test_the_compiled_form_agrees_with_the_dense_system(frames, monkeypatch):
-    pytest.importorskip("numba")
-    mean, precision = statistics(frames, frames)
-    _, (values, variance) = forms(monkeypatch, lambda: generate(mean, precision))
-    for channel, (wanted, spread) in enumerate(dense(mean, precision)):
-        assert values[:, channel] == pytest.approx(wanted, abs=1e-12)
-        assert variance[:, channel] == pytest.approx(spread, abs=1e-12)
-
-
 def test_pins_have_no_variance():
     mean, precision = statistics(6, 8)
     values, variance = generate(mean, precision, {(3, 1): 0.25})
     assert values[3, 1] == 0.25
     assert variance[3, 1] == 0
     assert (np.delete(variance[:, 1], 3) > 0).all()
-
-
-def test_layout_of_the_input_changes_nothing(monkeypatch):
-    mean, precision = statistics(8, 12, 5)
-    wanted = forms(monkeypatch, lambda: generate(mean[:, :, 1:3].copy(), precision[:, :, 1:3].copy()))
-    found = forms(monkeypatch, lambda: generate(mean[:, :, 1:3], precision[:, :, 1:3]))
-    assert np.array_equal(wanted, found)

@@ -15,12 +15,8 @@ def unused(monkeypatch) -> None:
 
 
 @pytest.mark.usefixtures("unused")
-def test_little_work_is_numpys():
+def test_much_work_is_compiled_and_little_is_not():
     assert not choice.compiled_pays(choice.START_UP_S / 2)
-
-
-@pytest.mark.usefixtures("unused")
-def test_much_work_is_compiled():
     assert choice.compiled_pays(choice.START_UP_S * 2)
 
 

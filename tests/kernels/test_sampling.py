@@ -29,7 +29,7 @@ def arrays():
 def test_paths_come_as_often_as_they_are_probable():
     log_emission = np.random.default_rng(0).normal(0, 1.2, (5, 3))
     expected, total = path_posterior(log_emission, EMISSION, ARCS, INITIAL, FINAL)
-    count = 20_000
+    count = 6_000
     paths, log_likelihood = sample_paths(
         log_emission, NetworkArrays(*arrays()), np.random.default_rng(1).random((count, 5))
     )

@@ -26,7 +26,7 @@ def form(request, monkeypatch) -> None:
     monkeypatch.setattr(viterbi, "compiled_pays", lambda _: request.param == "compiled")
 
 
-@pytest.fixture(params=[1, 2, 3, 5, 2048])
+@pytest.fixture(params=[1, 3, 2048])
 def block(request, monkeypatch) -> int:
     monkeypatch.setattr(viterbi, "BLOCK", request.param)
     return request.param
@@ -34,8 +34,8 @@ def block(request, monkeypatch) -> int:
 
 @pytest.mark.usefixtures("block")
 def test_agrees_with_the_enumeration_of_all_paths():
-    for frames in range(1, 8):
-        for seed in range(4):
+    for frames in range(1, 7):
+        for seed in range(3):
             arrays, arcs = random_network(seed, states=3 + seed % 2, densities=3, density_of_arcs=0.5)
             log_emission = random_emission(seed, frames, 3)
             path, score = viterbi.best_path(*asked(log_emission), NetworkArrays(**arrays))
@@ -49,7 +49,7 @@ def test_agrees_with_the_enumeration_of_all_paths():
 
 
 @given(seed=st.integers(0, 2**32 - 1), frames=st.integers(1, 80), block=st.integers(1, 90))
-@settings(max_examples=60)
+@settings(max_examples=25)
 def test_blocks_change_nothing(seed, frames, block):
     arrays, arcs = random_network(seed, states=7, densities=4, density_of_arcs=0.3)
     log_emission = random_emission(seed, frames, 4)
@@ -117,7 +117,7 @@ def both(monkeypatch, log_emission: np.ndarray, arrays: dict, beam: float | None
 
 
 @pytest.mark.parametrize("beam", [None, 2.0, 20.0])
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 def test_both_forms_find_the_same_to_the_bit(seed, beam, monkeypatch):
     arrays, _ = phone_loop(seed) if seed % 2 else random_network(seed, states=9, densities=4, density_of_arcs=0.4)
     log_emission = random_emission(seed, 90, len(arrays["emission"]))
@@ -128,7 +128,7 @@ def test_both_forms_find_the_same_to_the_bit(seed, beam, monkeypatch):
         assert np.array_equal(plain, fast)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_ties_are_broken_alike(seed, monkeypatch):
     arrays, _ = phone_loop(seed)
     arrays["arc_log"] = np.round(arrays["arc_log"])
@@ -153,13 +153,12 @@ def test_a_wide_beam_drops_nothing_and_a_narrow_one_the_better_late_path():
     assert score == -30
 
 
-@pytest.mark.parametrize("beam", [None, 6.0])
-def test_arc_by_arc_gives_the_same_bits_as_run_by_run(monkeypatch, beam):
+def test_arc_by_arc_gives_the_same_bits_as_run_by_run(monkeypatch):
     arrays, _ = phone_loop(seed=3)
     log_emission = random_emission(3, 120, len(arrays["emission"]))
     found = []
     for least in (0.0, np.inf):
         monkeypatch.setattr(viterbi, "LEAST_RUN", least)
-        found.append(viterbi.best_path(*asked(log_emission), NetworkArrays(**arrays), beam))
+        found.append(viterbi.best_path(*asked(log_emission), NetworkArrays(**arrays), 6.0))
     assert np.array_equal(found[0][0], found[1][0])
     assert np.float64(found[0][1]).tobytes() == np.float64(found[1][1]).tobytes()

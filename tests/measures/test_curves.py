@@ -28,10 +28,6 @@ def column(*values: float) -> np.ndarray:
     return np.array(values, float)[:, None]
 
 
-def test_correlation_by_hand():
-    assert correlation(column(1, 2, 3), column(1, 3, 2))[0] == pytest.approx(0.5)
-
-
 @given(seed=SEEDS, gain=st.floats(0.1, 10), offset=st.floats(-5, 5))
 @settings(max_examples=25)
 def test_correlation_is_one_with_itself_whatever_the_scale(seed, gain, offset):
@@ -148,14 +144,14 @@ def test_channels_that_move():
     assert moving(steps, ["m"]).tolist() == [True]
 
 
-@pytest.mark.parametrize("value", [1e-3, 0.3, 1e4])
-def test_a_constant_with_rounding_is_a_constant(value):
-    rng = np.random.default_rng(0)
-    wave = rng.normal(size=(200, 1))
-    still = value * (1 + 1e-8 * wave)
-    assert correlation(still, wave) == 0
-    assert correlation(wave, still) == 0
-    assert not moving([still], ["a"]).any()
-    for measure in (normalised_rmse, global_variance_ratio, jerk_ratio):
-        assert np.isnan(measure([wave], [still])).all()
-        assert np.isfinite(measure([still], [wave])).all()
+def test_a_constant_with_rounding_is_a_constant():
+    for value in (1e-3, 0.3, 1e4):
+        rng = np.random.default_rng(0)
+        wave = rng.normal(size=(200, 1))
+        still = value * (1 + 1e-8 * wave)
+        assert correlation(still, wave) == 0
+        assert correlation(wave, still) == 0
+        assert not moving([still], ["a"]).any()
+        for measure in (normalised_rmse, global_variance_ratio, jerk_ratio):
+            assert np.isnan(measure([wave], [still])).all()
+            assert np.isfinite(measure([still], [wave])).all()

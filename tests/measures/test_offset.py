@@ -71,11 +71,6 @@ def test_a_repeating_curve_is_not_known() -> None:
     assert not found.known
 
 
-def test_constant_curves_are_not_known() -> None:
-    found = best_offset(shift_scores(np.ones(300), wave(0), np.ones(300, bool), REACH), RATE_HZ)
-    assert (found.score, found.known) == (0, False)
-
-
 def test_clips_together_know_better_than_each() -> None:
     clips = [scores(6.0, seed, noise=12.0) for seed in range(30)]
     found = pooled_offset(clips, RATE_HZ)
@@ -86,10 +81,10 @@ def test_clips_together_know_better_than_each() -> None:
     assert found == pooled_offset(clips, RATE_HZ)
 
 
-@pytest.mark.parametrize("count", [1, 5, 30, 40, 50, 80])
-def test_clips_shorter_than_the_shifts(count: int) -> None:
-    curve = wave(0, count)
-    found = shift_scores(curve, curve, np.ones(count, bool), REACH)
-    assert found.shape == (2 * REACH + 1,)
-    assert found[: max(REACH - count // 2, 0)] == pytest.approx(0)
-    assert found[REACH] == pytest.approx(1 if count > 1 else 0)
+def test_clips_shorter_than_the_shifts() -> None:
+    for count in (1, 5, 30, 40, 50, 80):
+        curve = wave(0, count)
+        found = shift_scores(curve, curve, np.ones(count, bool), REACH)
+        assert found.shape == (2 * REACH + 1,)
+        assert found[: max(REACH - count // 2, 0)] == pytest.approx(0)
+        assert found[REACH] == pytest.approx(1 if count > 1 else 0)

@@ -21,7 +21,6 @@ from lipmotion.motion.articulation import (
 from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.stats.delta_windows import with_dynamics
 from lipmotion.testing.examples import examples, timeline
-from lipmotion.units import PHONES
 
 OPENING, WIDTH = ARTICULATORS.index("opening"), ARTICULATORS.index("width")
 
@@ -32,11 +31,6 @@ def middle(phone: str, articulator: int) -> float:
     curve = articulators(units, 230)
     span = units[2]
     return float(curve[int((span.start_s + span.end_s) * 50), articulator])
-
-
-def test_every_phone_of_the_inventory_has_a_curve() -> None:
-    units = timeline(PHONES, 0.1)
-    assert np.isfinite(articulators(units, 700)).all()
 
 
 def test_open_vowels_are_open_and_closures_closed() -> None:

@@ -16,21 +16,28 @@ def middle(phones: tuple[str, ...], number: int, name: str) -> float:
     return float(gesture_curves(said(*phones), time_s, [name])[name][0])
 
 
-@pytest.mark.parametrize(
-    ("name", "phone"),
-    [("lip_tuck", "f"), ("lip_tuck", "v"), ("tongue", "th"), ("tongue", "dh"), ("protrusion", "uw"),
-     ("protrusion", "w"),
-     ("spread", "iy"), ("lip_press", "p"), ("lip_press", "b"), ("lip_press", "m"), ("teeth", "s")],
-)  # fmt: skip
-def test_a_phone_reaches_its_target_whatever_is_beside_it(name, phone):
-    for left in ("aa", "iy", "uw", "m", "f", "th", "sil"):
-        if left != phone:
-            assert middle((left, phone, "aa"), 1, name) > 0.85
+def test_a_phone_reaches_its_target_whatever_is_beside_it():
+    for name, phone in (
+        ("lip_tuck", "f"),
+        ("lip_tuck", "v"),
+        ("tongue", "th"),
+        ("tongue", "dh"),
+        ("protrusion", "uw"),
+        ("protrusion", "w"),
+        ("spread", "iy"),
+        ("lip_press", "p"),
+        ("lip_press", "b"),
+        ("lip_press", "m"),
+        ("teeth", "s"),
+    ):
+        for left in ("aa", "iy", "uw", "m", "f", "th", "sil"):
+            if left != phone:
+                assert middle((left, phone, "aa"), 1, name) > 0.85
 
 
-@pytest.mark.parametrize("phone", ["l", "t", "d", "n"])
-def test_the_tip_of_the_tongue_is_up_but_not_out(phone):
-    assert 0.4 < middle(("aa", phone, "aa"), 1, "tongue") < 0.75 < TIP_OUT
+def test_the_tip_of_the_tongue_is_up_but_not_out():
+    for phone in ("l", "t", "d", "n"):
+        assert 0.4 < middle(("aa", phone, "aa"), 1, "tongue") < 0.75 < TIP_OUT
 
 
 def test_lips_round_before_the_vowel_that_needs_it():
@@ -42,18 +49,9 @@ def test_no_tuck_while_the_lips_are_closed():
     assert middle(("f", "m", "v"), 1, "lip_tuck") < 0.05
 
 
-@pytest.mark.parametrize("pause", ["sil", "sp"])
-def test_teeth_are_hidden_in_pauses(pause):
-    assert middle(("s", pause, "s"), 1, "teeth") < 0.1
-
-
-def test_curves_are_smooth_and_in_range():
-    curves = gesture_curves(said("f", "m", "th", "uw", "s", "w", "l", "sil"), TIME_S)
-    assert tuple(curves) == GESTURES
-    for curve in curves.values():
-        assert (curve >= 0).all()
-        assert (curve <= 1).all()
-        assert np.abs(np.diff(curve)).max() < 0.4
+def test_teeth_are_hidden_in_pauses():
+    for pause in ("sil", "sp"):
+        assert middle(("s", pause, "s"), 1, "teeth") < 0.1
 
 
 def test_without_phones_there_is_the_pose_of_speech():

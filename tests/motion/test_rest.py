@@ -6,8 +6,9 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lipmotion.motion.rest import away_from_speech, speech_intervals
+from lipmotion.motion.rest import away_from_speech, speech_intervals, unheard_frames
 from lipmotion.testing.examples import timeline
+from lipmotion.types import ENERGY_FEATURE
 
 
 @given(edges=st.lists(st.integers(0, 400), max_size=12, unique=True), margin=st.integers(0, 40))
@@ -27,3 +28,12 @@ def test_intervals_are_those_of_phones() -> None:
     away = away_from_speech(np.array([0.0, 0.2, 0.45, 0.65, 1.0, 1.2]), speech_intervals(units), 0.3)
     assert away.tolist() == [True, True, False, False, False, True]
     assert away_from_speech(np.arange(3.0), [], 1.0).all()
+
+
+def test_the_mouth_rests_where_nothing_at_all_is_heard_for_a_while() -> None:
+    features = np.full((200, ENERGY_FEATURE + 1), 3.0)
+    for first, stop in ((5, 10), (20, 24), (50, 62), (75, 90)):  # 50 ms, 40 ms, beside speech, in speech
+        features[first:stop, ENERGY_FEATURE] = -9.0
+    features[30:40, ENERGY_FEATURE] = -8.9  # a breath
+    unheard = unheard_frames(features, timeline(("t", "aa", "t")))
+    assert np.flatnonzero(unheard).tolist() == [*range(5, 10), *range(50, 55)]

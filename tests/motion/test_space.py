@@ -18,12 +18,6 @@ def test_distances_are_modelled_as_they_are_and_points_in_components():
     assert np.array_equal(space.reduce(motion())[:, :2], motion()[:, [1, 3]])
 
 
-def test_all_components_lose_nothing():
-    space = fit_space(CHANNELS, motion(), components=16)
-    values, _ = space.restore(space.reduce(motion()), np.ones((50, 5)))
-    assert values == pytest.approx(motion(), abs=1e-12)
-
-
 def test_fewer_components_lose_least():
     space = fit_space(CHANNELS, motion(), components=2)
     values, _ = space.restore(space.reduce(motion()), np.ones((50, 4)))
@@ -40,9 +34,3 @@ def test_variance_is_carried_through_the_basis():
     assert spread[0, [0, 2, 4]] == pytest.approx(
         np.diag(space.points.basis.T @ np.diag(variance[0, 2:]) @ space.points.basis)
     )
-
-
-def test_without_points_nothing_is_reduced():
-    space = fit_space(CHANNELS[1:2], motion()[:, 1:2], components=3)
-    assert space.points is None
-    assert np.array_equal(space.reduce(motion()[:, 1:2]), motion()[:, 1:2])

@@ -132,12 +132,6 @@ def test_restfulness_grows_with_the_distance_from_speech() -> None:
     assert (away_from_speech(times, speech_s, FAR_FROM_SPEECH_S) == far).all()
 
 
-def test_silence_alone_is_rest() -> None:
-    silence = Timeline((Span(0.0, 1.0, Unit("sil", "sil")),))
-    assert restfulness(silence, 100).min() > 1 - 1e-12
-    assert len(restfulness(silence, 0)) == 0
-
-
 def test_points_share_a_gain_for_each_axis() -> None:
     rng = np.random.default_rng(1)
     shape, size = rng.normal(size=6), np.array([1.5, 0.6, 1.0, 1.1, 0.7, 0.9])
@@ -157,12 +151,6 @@ def test_points_share_a_gain_for_each_axis() -> None:
     assert maps.of("ben").gain[4] < 0.9
     assert maps.of("ben").gain[3] > 1.1
     np.testing.assert_allclose(at_rest(first)[3:], at_rest(second)[3:], atol=1e-9)
-
-
-def test_whoever_says_little_has_a_gain_nearer_to_one() -> None:
-    _, much = both(anna(), ben())
-    _, little = both(anna(), ben(3)[:1])
-    assert much.of("ben").gain[0] < little.of("ben").gain[0] < 0.98
 
 
 def test_a_channel_that_somebody_does_not_move_is_not_stretched() -> None:
@@ -266,9 +254,8 @@ def test_maps_are_stored() -> None:
         assert np.array_equal(array, same)
 
 
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
+def test_damaged_maps_are_refused() -> None:
+    for name, value in (
         ("gain", np.full((2, 3), 5.0)),
         ("gain", np.full((2, 3), np.nan)),
         ("gain", np.ones((3, 3))),
@@ -281,20 +268,18 @@ def test_maps_are_stored() -> None:
         ("names", np.array([1, 2])),
         ("channels", np.array([["a", "b"]] * 3)),
         ("more", np.ones(2)),
-    ],
-)
-def test_damaged_maps_are_refused(name: str, value: np.ndarray) -> None:
-    arrays = speaker_arrays(both(anna(), ben())[1])
-    with pytest.raises(ModelFormatError, match="table of speakers"):
-        speakers_from_arrays(arrays | {name: value})
+    ):
+        arrays = speaker_arrays(both(anna(3), ben(3))[1])
+        with pytest.raises(ModelFormatError, match="table of speakers"):
+            speakers_from_arrays(arrays | {name: value})
 
 
-@pytest.mark.parametrize("name", ["channels", "names", "gain", "offset", "rest", "habits", "lips"])
-def test_missing_arrays_are_refused(name: str) -> None:
-    arrays = speaker_arrays(both(anna(), ben())[1])
-    del arrays[name]
-    with pytest.raises(ModelFormatError, match=name):
-        speakers_from_arrays(arrays)
+def test_missing_arrays_are_refused() -> None:
+    for name in ("channels", "names", "gain", "offset", "rest", "habits", "lips"):
+        arrays = speaker_arrays(both(anna(3), ben(3))[1])
+        del arrays[name]
+        with pytest.raises(ModelFormatError, match=name):
+            speakers_from_arrays(arrays)
 
 
 def test_wrong_phones_of_one_clip_do_not_keep_the_lips_of_a_person_open() -> None:

@@ -88,13 +88,6 @@ def test_gains_have_limits() -> None:
     assert transfer_map(wild, examples).gain.min() == pytest.approx(0.25)
 
 
-def test_a_person_onto_themselves_is_not_changed() -> None:
-    examples = source()
-    person = transfer_map(examples, examples)
-    values = examples[0].motion.values
-    np.testing.assert_allclose(person.to_person(values, restful(examples[0])), values, atol=1e-9)
-
-
 def test_frames_that_were_not_measured_do_not_matter() -> None:
     examples = source()
     wanted = target(examples)
@@ -118,12 +111,6 @@ def test_two_maps_one_after_the_other() -> None:
     wanted = second.to_person(first.to_person(shifted, rest), rest)
     np.testing.assert_allclose(both.to_person(values + both.shift(values, weights), rest), wanted, atol=1e-12)
     assert composed(None, second) is second
-
-
-def test_maps_of_other_channels_cannot_follow_each_other() -> None:
-    second = replace(random_map(1), channels=(Channel("jaw"), Channel("width"), Channel("outer")))
-    with pytest.raises(InputError, match="no map of speakers for the channel 'jaw'"):
-        composed(random_map(0), second)
 
 
 def test_channels_in_the_order_of_a_model() -> None:

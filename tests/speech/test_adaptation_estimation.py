@@ -53,7 +53,7 @@ def test_the_speaker_of_the_training_has_full_weight_and_changes_little(
 
 
 def test_a_voice_in_another_channel_becomes_more_probable(toy_model: Model, voice: list[Audio]) -> None:
-    far = [through_a_telephone(audio) for audio in voice]
+    far = [through_a_telephone(audio) for audio in voice[:2]]
     found = estimate_adaptation(toy_model.phones, far[1:])
     assert fit(toy_model, found, far[0]) > toy_model.phones.fit(mfcc(far[0], found.adaptation.warp).values) + 1
 
@@ -76,28 +76,8 @@ def test_much_speech_moves_them_together(
     assert np.abs(long.adaptation.own[:13, 13:39]).max() > 1e-3
 
 
-@pytest.mark.long
-def test_the_same_recordings_give_the_same_adaptation(
-    toy_model: Model, voice: list[Audio], same_speaker: EstimatedAdaptation
-) -> None:
-    again = estimate_adaptation(toy_model.phones, voice).adaptation
-    assert np.array_equal(again.own, same_speaker.adaptation.own)
-    assert np.array_equal(again.general, same_speaker.adaptation.general)
-
-
-@pytest.mark.long
-def test_silence_beside_speech_does_no_harm(
-    toy_model: Model, voice: list[Audio], same_speaker: EstimatedAdaptation
-) -> None:
-    silence = Audio(np.zeros(16_000, np.float32), 16_000)
-    found = estimate_adaptation(toy_model.phones, [*voice, silence])
-    assert found.speech_s == pytest.approx(same_speaker.speech_s, rel=0.1)
-    assert np.isfinite(found.adaptation.own).all()
-
-
-@pytest.mark.parametrize("noise", [0.0, 0.01])
-def test_no_speech(toy_model: Model, noise: float) -> None:
-    samples = noise * np.random.default_rng(0).normal(size=32_000)
+def test_no_speech(toy_model: Model) -> None:
+    samples = 0.01 * np.random.default_rng(0).normal(size=32_000)
     with pytest.raises(InputError, match="no speech found in the recordings; give some of the voice"):
         estimate_adaptation(toy_model.phones, [Audio(samples.astype(np.float32), 16_000)])
 

@@ -14,19 +14,6 @@ from lipmotion.speech.audio_files import SPEECH_RATE_HZ, read_audio
 from lipmotion.types import Audio
 from speech.sound import LEVEL, ONSET_S, tone, write_pictures, write_sound
 
-CONTAINERS = [
-    # name, codec, then by how much an encoder's whole frames may lengthen it, in samples of the file
-    ("a.wav", "pcm_s16le", 0),
-    ("a.wav", "pcm_s24le", 0),
-    ("a.wav", "pcm_f32le", 0),
-    ("a.wav", "pcm_u8", 0),
-    ("a.flac", "flac", 0),
-    ("a.mp3", "libmp3lame", 0),
-    ("a.ogg", "flac", 0),
-    ("a.m4a", "aac", 1024),
-    ("a.mp4", "aac", 1024),
-]
-
 
 def onset_s(audio: Audio) -> float:
     """Return when the tone begins."""
@@ -39,23 +26,6 @@ def level(audio: Audio, at_s: float) -> float:
     return float(np.sqrt(2 * np.square(part).mean()))
 
 
-@pytest.mark.parametrize("rate_hz", [8000, 16_000, 44_100, 48_000])
-@pytest.mark.parametrize(("name", "codec", "longer"), CONTAINERS)
-def test_any_container_at_any_rate(tmp_path: Path, name: str, codec: str, longer: int, rate_hz: int) -> None:
-    audio = read_audio(write_sound(tmp_path / name, tone(rate_hz), rate_hz, codec))
-    assert audio.rate_hz == SPEECH_RATE_HZ
-    assert audio.samples.dtype == np.float32
-    assert -2e-4 < audio.duration_s - 1 < longer / rate_hz + 2e-4
-    assert onset_s(audio) == pytest.approx(ONSET_S, abs=0.002)
-    assert level(audio, 0.6) == pytest.approx(LEVEL, rel=0.07)
-
-
-def test_opus(tmp_path: Path) -> None:
-    audio = read_audio(write_sound(tmp_path / "a.ogg", tone(48_000), 48_000, "libopus"))
-    assert audio.duration_s == pytest.approx(1, abs=0.003)
-    assert onset_s(audio) == pytest.approx(ONSET_S, abs=0.002)
-
-
 def test_sixteen_bits_at_16_khz_come_back_exactly(tmp_path: Path) -> None:
     given = np.random.default_rng(0).integers(-32768, 32768, 16_000).astype(np.int16)
     with wave.open(str(tmp_path / "a.wav"), "wb") as file:
@@ -66,11 +36,9 @@ def test_sixteen_bits_at_16_khz_come_back_exactly(tmp_path: Path) -> None:
     assert np.array_equal(read_audio(tmp_path / "a.wav").samples, given / np.float32(32768))
 
 
-@pytest.mark.parametrize("name", ["a.wav", "a.mp4"])
-def test_channels_are_averaged(tmp_path: Path, name: str) -> None:
+def test_channels_are_averaged(tmp_path: Path) -> None:
     stereo = tone(44_100, channels=2) * np.array([[1.0], [0.5]], np.float32)
-    codec = "pcm_s16le" if name == "a.wav" else "aac"
-    audio = read_audio(write_sound(tmp_path / name, stereo, 44_100, codec))
+    audio = read_audio(write_sound(tmp_path / "a.mp4", stereo, 44_100, "aac"))
     assert level(audio, 0.6) == pytest.approx(0.75 * LEVEL, rel=0.05)
 
 
@@ -80,18 +48,12 @@ def test_another_rate_can_be_asked_for(tmp_path: Path) -> None:
     assert onset_s(audio) == pytest.approx(ONSET_S, abs=0.002)
 
 
-@pytest.mark.parametrize("name", ["a.mp4", "a.mkv", "a.mov"])
-@pytest.mark.parametrize("start_s", [0.0, 0.4])
-def test_time_0_is_where_the_pictures_begin(tmp_path: Path, name: str, start_s: float) -> None:
-    audio = read_audio(write_sound(tmp_path / name, tone(44_100), 44_100, "aac", start_s=start_s, video=True))
-    assert onset_s(audio) == pytest.approx(start_s + ONSET_S, abs=0.003)
-    assert audio.duration_s == pytest.approx(start_s + 1, abs=0.03)
-    assert np.abs(audio.samples[: round((start_s + 0.2) * 16_000)]).max(initial=0) < 0.01
-
-
-def test_a_late_track_of_a_transport_stream(tmp_path: Path) -> None:
-    audio = read_audio(write_sound(tmp_path / "a.ts", tone(44_100), 44_100, "aac", start_s=0.4, video=True))
-    assert onset_s(audio) == pytest.approx(0.4 + ONSET_S, abs=0.003)
+def test_time_0_is_where_the_pictures_begin(tmp_path: Path) -> None:
+    for name, start_s in (("a.mp4", 0.0), ("a.mp4", 0.4), ("a.mkv", 0.4), ("a.ts", 0.4)):
+        audio = read_audio(write_sound(tmp_path / name, tone(44_100), 44_100, "aac", start_s=start_s, video=True))
+        assert onset_s(audio) == pytest.approx(start_s + ONSET_S, abs=0.003)
+        assert audio.duration_s == pytest.approx(start_s + 1, abs=0.05)
+        assert np.abs(audio.samples[: round((start_s + 0.2) * 16_000)]).max(initial=0) < 0.01
 
 
 def test_the_content_decides_not_the_name(tmp_path: Path) -> None:
@@ -106,39 +68,35 @@ def silence(path: Path, duration_s: float, value: float = 0.0) -> Path:
     return write_sound(path, samples, 16_000, "pcm_f32le")
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda path: path.with_suffix(".mp3").touch(), r"a.wav: no such file"),
-        (lambda path: path.touch(), r"a.wav: the file is empty; give a recording"),
-        (lambda path: path.mkdir(), r"a.wav: is a folder; give one recording"),
-        (lambda path: path.write_text("words, not sound\n" * 50), r"not a readable recording \(.+\); give an audio"),
-        (lambda path: path.write_bytes(b"RIFF\x24\0\0\0WAVEfmt "), r"a.wav: "),
-        (lambda path: path.write_bytes(np.random.default_rng(0).bytes(9000)), r"not a readable recording"),
-        (lambda path: write_pictures(path.with_suffix(".mp4")).rename(path), r"has no sound track; give a recording"),
-        (lambda path: silence(path, 0.09), r"holds 90 ms of sound, required at least 100 ms"),
-        (lambda path: silence(path, 1, float("nan")), r"samples that are not finite \(NaN or infinite\)"),
-        (lambda path: silence(path, 1, float("inf")), r"samples that are not finite"),
-    ],
-)
-def test_it_says_what_is_wrong(tmp_path: Path, make: Callable[[Path], object], message: str) -> None:
-    make(tmp_path / "a.wav")
-    with pytest.raises(InputError, match=message):
-        read_audio(tmp_path / "a.wav")
+WRONG: list[tuple[Callable[[Path], object], str]] = [
+    (lambda path: path.with_suffix(".mp3").touch(), r"a.wav: no such file"),
+    (lambda path: path.touch(), r"a.wav: the file is empty; give a recording"),
+    (lambda path: path.mkdir(), r"a.wav: is a folder; give one recording"),
+    (lambda path: path.write_text("words, not sound\n" * 50), r"not a readable recording \(.+\); give an audio"),
+    (lambda path: path.write_bytes(b"RIFF\x24\0\0\0WAVEfmt "), r"a.wav: "),
+    (lambda path: write_pictures(path.with_suffix(".mp4")).rename(path), r"has no sound track; give a recording"),
+    (lambda path: silence(path, 0.09), r"holds 90 ms of sound, required at least 100 ms"),
+    (lambda path: silence(path, 1, float("nan")), r"samples that are not finite \(NaN or infinite\)"),
+    (lambda path: silence(path, 1, float("inf")), r"samples that are not finite"),
+]
 
 
-@pytest.mark.parametrize(("name", "codec"), [(name, codec) for name, codec, _ in CONTAINERS])
-@pytest.mark.parametrize("share", [0.01, 0.3, 0.9])
-def test_a_recording_cut_short_is_shorter_or_refused(tmp_path: Path, name: str, codec: str, share: float) -> None:
-    path = write_sound(tmp_path / name, tone(16_000), 16_000, codec)
-    content = path.read_bytes()
-    path.write_bytes(content[: round(share * len(content))])
-    with suppress(InputError):  # any other error would be a traceback
-        assert read_audio(path).duration_s < 1.1
+def test_it_says_what_is_wrong(tmp_path: Path) -> None:
+    for number, (make, message) in enumerate(WRONG):
+        path = tmp_path / str(number) / "a.wav"
+        path.parent.mkdir()
+        make(path)
+        with pytest.raises(InputError, match=message):
+            read_audio(path)
 
 
-def test_a_tenth_of_a_second_is_enough(tmp_path: Path) -> None:
-    assert read_audio(silence(tmp_path / "a.wav", 0.1)).duration_s == pytest.approx(0.1)
+def test_a_recording_cut_short_is_shorter_or_refused(tmp_path: Path) -> None:
+    for name, codec in (("a.flac", "flac"), ("a.mp3", "libmp3lame"), ("a.m4a", "aac")):
+        content = write_sound(tmp_path / name, tone(16_000), 16_000, codec).read_bytes()
+        for share in (0.01, 0.6):
+            (tmp_path / name).write_bytes(content[: round(share * len(content))])
+            with suppress(InputError):  # any other error would be a traceback
+                assert read_audio(tmp_path / name).duration_s < 1.1
 
 
 @pytest.mark.recordings

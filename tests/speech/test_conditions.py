@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.speech import conditions
 from lipmotion.speech.conditions import heard_spectra, in_condition
 from lipmotion.speech.spectrum import spectrum
 from lipmotion.testing.toy import toy_sentences
@@ -16,13 +15,6 @@ from lipmotion.types import SPECTRUM_BANDS, Audio
 def voices() -> list[Audio]:
     """Three sentences."""
     return [sentence.audio for sentence in toy_sentences(3)]
-
-
-def test_the_first_version_is_the_recording_itself(voices: list[Audio]) -> None:
-    heard = heard_spectra(voices[0], voices, 3, [7])
-    assert len(heard) == 3
-    np.testing.assert_allclose(heard[0].values, spectrum(voices[0]), atol=1e-2)
-    assert (heard[0].tempo, heard[0].distortion) == (1.0, 0.0)
 
 
 def test_the_same_seed_gives_the_same_spectra_and_another_does_not(voices: list[Audio]) -> None:
@@ -41,7 +33,7 @@ def test_the_length_follows_the_tempo(voices: list[Audio]) -> None:
 
 
 def test_conditions_leave_speech_recognisable_and_finite(voices: list[Audio]) -> None:
-    found = [in_condition(voices[0], voices, np.random.default_rng(seed)) for seed in range(40)]
+    found = [in_condition(voices[0], voices, np.random.default_rng(seed)) for seed in range(20)]
     assert all(np.isfinite(audio.samples).all() and len(audio.samples) == len(voices[0].samples) for audio, _ in found)
     distortions = np.array([distortion for _, distortion in found])
     assert distortions.min() == 0
@@ -57,12 +49,6 @@ def test_silence_stays_as_it_is(voices: list[Audio]) -> None:
         audio, distortion = in_condition(silence, voices, np.random.default_rng(seed))
         assert not audio.samples.any()
         assert distortion == 0
-
-
-def test_one_voice_alone_has_no_babble(monkeypatch: pytest.MonkeyPatch, voices: list[Audio]) -> None:
-    monkeypatch.setattr(conditions, "_babble", None)
-    for seed in range(10):
-        in_condition(voices[0], [], np.random.default_rng(seed))
 
 
 def test_bands_are_normalised(voices: list[Audio]) -> None:

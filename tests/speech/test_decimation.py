@@ -5,14 +5,13 @@ from scipy.signal import resample_poly
 from lipmotion.speech.decimation import decimated
 
 
-@pytest.mark.parametrize("factor", [2, 3, 6])
-@pytest.mark.parametrize("length", [1, 5, 100, 2401])
-def test_it_is_what_scipy_computes(factor, length):
-    sound = np.random.default_rng(length).normal(0, 0.1, length).astype(np.float32)
-    found, expected = decimated(sound, factor), resample_poly(sound, 1, factor)
-    assert found.dtype == np.float32
-    assert found.shape == expected.shape
-    assert found == pytest.approx(expected, abs=1e-6)
+def test_it_is_what_scipy_computes():
+    for factor, length in ((2, 1), (3, 5), (6, 100), (3, 2401)):
+        sound = np.random.default_rng(length).normal(0, 0.1, length).astype(np.float32)
+        found, expected = decimated(sound, factor), resample_poly(sound, 1, factor)
+        assert found.dtype == np.float32
+        assert found.shape == expected.shape
+        assert found == pytest.approx(expected, abs=1e-6)
 
 
 def test_a_sound_at_the_same_rate_stays():

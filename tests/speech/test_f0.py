@@ -1,19 +1,15 @@
 from __future__ import annotations
 
-import sys
 import tracemalloc
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.signal import butter, lfilter
 
-from children import run_child
 from lipmotion.errors import InputError
 from lipmotion.speech import f0 as module
-from lipmotion.speech.f0 import HIGHEST_HZ, LOWEST_HZ, candidates, correlations, lags, log_f0
+from lipmotion.speech.f0 import candidates, correlations, lags, log_f0
 from lipmotion.speech.formant_synthesiser import PHONE_TARGETS, synthesise
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.types import Audio
@@ -54,21 +50,15 @@ def at_frames(hertz: Array) -> Array:
     return hertz[np.minimum(np.arange(frames) * 160, len(hertz) - 1)]
 
 
-@pytest.mark.parametrize("n", [0, 1, 5, 9, 10])
-def test_correlations_are_their_slow_twin(n: int) -> None:
+def test_correlations_are_their_slow_twin() -> None:
     samples = voice(np.linspace(90, 200, 1700)) + noise(1700) / 20
-    fast = correlations(samples, slice(0, 11), 1e-5)[n]  # type: ignore[arg-type]
-    x = f0_oracle.frame(samples.astype(float), n)
-    silence = 1e-5 + f0_oracle.frication(samples.astype(float), n)
-    slow = [f0_oracle.correlation(x, int(lag), silence) for lag in lags()[1::2]]
     assert lags()[1::2].tolist() == list(range(10, 68))
-    assert fast[1::2] == pytest.approx(slow, abs=1e-4)
-
-
-def test_lags_cover_the_range_and_one_more_at_either_end() -> None:
-    assert lags()[1] == 4000 / HIGHEST_HZ
-    assert lags()[-3] < 4000 / LOWEST_HZ <= lags()[-2]
-    assert np.diff(lags()).tolist() == [0.5] * (len(lags()) - 1)
+    for n in (0, 5, 10):
+        fast = correlations(samples, slice(0, 11), 1e-5)[n]  # type: ignore[arg-type]
+        x = f0_oracle.frame(samples.astype(float), n)
+        silence = 1e-5 + f0_oracle.frication(samples.astype(float), n)
+        slow = [f0_oracle.correlation(x, int(lag), silence) for lag in lags()[1::2]]
+        assert fast[1::2] == pytest.approx(slow, abs=1e-4)
 
 
 def test_the_best_peaks_are_the_candidates() -> None:
@@ -82,20 +72,17 @@ def test_the_best_peaks_are_the_candidates() -> None:
     assert np.isinf(cost[:, 1]).all()
 
 
-@settings(max_examples=60)
-@given(st.integers(400, 40_000))
-def test_the_number_of_frames_is_that_of_the_features(count: int) -> None:
-    audio = Audio(noise(count), RATE_HZ)
-    result = log_f0(audio)
-    assert result.shape == (len(mfcc(audio).values),)
-    assert result.dtype == np.float32
+def test_the_number_of_frames_is_that_of_the_features() -> None:
+    for count in (400, 479, 480, 559, 560, 561, 4001):
+        result = log_f0(Audio(noise(count), RATE_HZ))
+        assert result.shape == (len(mfcc(Audio(noise(count), RATE_HZ)).values),)
+        assert result.dtype == np.float32
 
 
-@pytest.mark.parametrize("vowel", VOWELS)
-@pytest.mark.parametrize("hertz", [62, 80, 110, 147, 211, 300, 390])
-def test_a_known_frequency_is_found(hertz: float, vowel: str) -> None:
+def test_a_known_frequency_is_found() -> None:
     """Within half a per cent; less surely in the 30 ms where the signal is reflected."""
-    assert found(voice(steady(hertz), vowel))[3:-3] == pytest.approx(hertz, rel=0.005)
+    for hertz, vowel in ((62, "u"), (80, "i"), (110, "a"), (211, "i"), (300, "u"), (390, "a")):
+        assert found(voice(steady(hertz, 0.5), vowel))[3:-3] == pytest.approx(hertz, rel=0.005)
 
 
 def test_frame_n_is_centred_at_n_times_10_ms() -> None:
@@ -105,49 +92,43 @@ def test_frame_n_is_centred_at_n_times_10_ms() -> None:
     assert abs(error.mean()) < 0.002
 
 
-@pytest.mark.parametrize("vowel", VOWELS)
-@pytest.mark.parametrize("noise_db", [-40, -10, -3])
-@pytest.mark.parametrize(("first_hz", "last_hz"), [(65, 390), (390, 65), (120, 240)])
-def test_glides_have_no_jumps(first_hz: float, last_hz: float, noise_db: float, vowel: str) -> None:
-    hertz = first_hz * (last_hz / first_hz) ** np.linspace(0, 1, 3 * RATE_HZ)
-    ratio = found(voice(hertz, vowel, noise_db))[2:-2] / at_frames(hertz)[2:-2]
-    assert np.abs(np.log(ratio)).max() < 0.1
-    assert np.abs(np.log(ratio)).mean() < 0.01
+def test_glides_have_no_jumps() -> None:
+    for vowel, noise_db, (first_hz, last_hz) in (("a", -3, (65, 390)), ("i", -10, (390, 65)), ("u", -40, (120, 240))):
+        hertz = first_hz * (last_hz / first_hz) ** np.linspace(0, 1, 3 * RATE_HZ)
+        ratio = found(voice(hertz, vowel, noise_db))[2:-2] / at_frames(hertz)[2:-2]
+        assert np.abs(np.log(ratio)).max() < 0.1
+        assert np.abs(np.log(ratio)).mean() < 0.01
 
 
-@pytest.mark.parametrize("pitch_hz", [70, 120, 220, 370])
-def test_speech_is_voiced_where_it_is(pitch_hz: float) -> None:
-    names = ["sil", *(name for name in PHONE_TARGETS if name not in ("sil", "sp")), "sil"]
-    audio, phones = synthesise([(name, 0.15) for name in names], pitch_hz=pitch_hz)
-    result = np.exp(log_f0(audio).astype(float))
-    known = pitch_hz * np.linspace(1.06, 0.94, len(result))
-    error = np.abs(result / known - 1)
-    assert np.nanmedian(error) < 0.005
-    assert np.mean(error[~np.isnan(error)] < 0.08) > 0.99
-    assert np.nanmax(error) < 0.3  # no octaves
-    time_s = np.arange(len(result)) / 100
-    for span in phones:
-        inner = ~np.isnan(result[(time_s > span.start_s + 0.03) & (time_s < span.end_s - 0.03)])
-        if all(segment.voicing >= 0.3 for segment in PHONE_TARGETS[span.label.phone]):
-            assert inner.all(), span
-        if all(segment.voicing == 0 for segment in PHONE_TARGETS[span.label.phone]):
-            assert not inner.any(), span
+def test_speech_is_voiced_where_it_is() -> None:
+    for pitch_hz in (70, 220):
+        names = ["sil", *(name for name in PHONE_TARGETS if name not in ("sil", "sp")), "sil"]
+        audio, phones = synthesise([(name, 0.15) for name in names], pitch_hz=pitch_hz)
+        result = np.exp(log_f0(audio).astype(float))
+        known = pitch_hz * np.linspace(1.06, 0.94, len(result))
+        error = np.abs(result / known - 1)
+        assert np.nanmedian(error) < 0.005
+        assert np.mean(error[~np.isnan(error)] < 0.08) > 0.99
+        assert np.nanmax(error) < 0.3  # no octaves
+        time_s = np.arange(len(result)) / 100
+        for span in phones:
+            inner = ~np.isnan(result[(time_s > span.start_s + 0.03) & (time_s < span.end_s - 0.03)])
+            if all(segment.voicing >= 0.3 for segment in PHONE_TARGETS[span.label.phone]):
+                assert inner.all(), span
+            if all(segment.voicing == 0 for segment in PHONE_TARGETS[span.label.phone]):
+                assert not inner.any(), span
 
 
-@pytest.mark.parametrize("smoothing", [[1.0], [0.5, 0.5], list(np.hanning(16))])
-def test_noise_has_no_voice(smoothing: list[float]) -> None:
-    assert np.isnan(found(np.convolve(noise(20 * RATE_HZ), smoothing).astype(np.float32))).all()
-
-
-def test_hiss_is_unvoiced() -> None:
+def test_noise_and_hiss_have_no_voice() -> None:
     forward, back = butter(4, 3000, fs=RATE_HZ, btype="high")
-    assert np.isnan(found(lfilter(forward, back, noise(20 * RATE_HZ)).astype(np.float32))).all()
+    for smoothing in ([1.0], list(np.hanning(16))):
+        assert np.isnan(found(np.convolve(noise(8 * RATE_HZ), smoothing).astype(np.float32))).all()
+    assert np.isnan(found(lfilter(forward, back, noise(8 * RATE_HZ)).astype(np.float32))).all()
 
 
-@pytest.mark.parametrize("value", [0.0, 1e-30, 0.3, -1.0, 0.1234567])
-@pytest.mark.parametrize("count", [400, 16_000, 48_000])
-def test_silence_has_no_voice(count: int, value: float) -> None:
-    assert np.isnan(found(np.full(count, value, np.float32))).all()
+def test_silence_has_no_voice() -> None:
+    for value in (0.0, 1e-30, 0.3, 0.1234567):
+        assert np.isnan(found(np.full(16_000, value, np.float32))).all()
 
 
 def test_voice_is_bounded_by_silence() -> None:
@@ -165,32 +146,29 @@ def test_a_faint_echo_of_loud_speech_is_silence() -> None:
     assert np.isnan(found(samples)[105:]).all()
 
 
-@pytest.mark.parametrize("gain", [1e-6, 1e-3, 0.5, 30.0, 1e5])
-def test_loudness_changes_nothing(gain: float) -> None:
+def test_loudness_and_an_offset_change_nothing() -> None:
     samples = np.concatenate([voice(steady(130)), noise(8000), voice(np.linspace(90, 180, 8000), "i")])
     whole = found(samples)
-    assert found((gain * samples).astype(np.float32)) == pytest.approx(whole, rel=1e-3, nan_ok=True)
-
-
-def test_an_offset_changes_nothing() -> None:
+    for gain in (1e-6, 1e5):
+        assert found((gain * samples).astype(np.float32)) == pytest.approx(whole, rel=1e-3, nan_ok=True)
     samples = voice(steady(130))
     assert found(samples + np.float32(0.5)) == pytest.approx(found(samples), rel=2e-3, nan_ok=True)
 
 
-@pytest.mark.parametrize("block", [1, 7, 64, 250])
-def test_blocks_join_without_a_seam(monkeypatch: pytest.MonkeyPatch, block: int) -> None:
-    hertz = 120 + 40 * np.sin(np.arange(3 * RATE_HZ) / 4000)
+def test_blocks_join_without_a_seam(monkeypatch: pytest.MonkeyPatch) -> None:
+    hertz = 120 + 40 * np.sin(np.arange(RATE_HZ) / 4000)
     samples = voice(hertz)
-    samples[16_000:24_000] = noise(8000) / 10
+    samples[8_000:12_000] = noise(4000) / 10
     whole = found(samples)
     assert 0 < np.isnan(whole).sum() < len(whole)
-    monkeypatch.setattr(module, "BLOCK", block)
-    assert found(samples) == pytest.approx(whole, rel=1e-4, nan_ok=True)
+    for block in (1, 7, 64):
+        monkeypatch.setattr(module, "BLOCK", block)
+        assert found(samples) == pytest.approx(whole, rel=1e-4, nan_ok=True)
 
 
 @pytest.mark.long
 def test_memory_beside_the_result_is_bounded() -> None:
-    samples = noise(20 * 60 * RATE_HZ)
+    samples = noise(8 * 60 * RATE_HZ)
     log_f0(Audio(samples[:RATE_HZ], RATE_HZ))
     tracemalloc.start()
     try:
@@ -201,33 +179,20 @@ def test_memory_beside_the_result_is_bounded() -> None:
     assert peak - result.nbytes < 20e6 < samples.nbytes
 
 
-@pytest.mark.parametrize("count", [400, 401, 639, 800, 1600])
-def test_very_short_recordings_work(count: int) -> None:
-    result = found(voice(steady(200))[:count])
-    assert len(result) == count // 160 + 1
-    assert np.nanmax(np.abs(result / 200 - 1), initial=0) < 0.5
-
-
-def test_a_tenth_of_a_second_is_enough() -> None:
+def test_very_short_recordings_work() -> None:
+    for count in (400, 401, 639, 1600):
+        result = found(voice(steady(200))[:count])
+        assert len(result) == count // 160 + 1
+        assert np.nanmax(np.abs(result / 200 - 1), initial=0) < 0.5
     assert found(voice(steady(200, 0.1)))[2:-2] == pytest.approx(200, rel=0.02)
 
 
-def test_numpy_is_enough() -> None:
-    code = "import sys, lipmotion.speech.f0; print(sorted({'scipy', 'numba'} & set(sys.modules)))"
-    assert run_child([sys.executable, "-c", code], check=True).stdout.strip() == "[]"
-
-
-@pytest.mark.parametrize(
-    ("audio", "message"),
-    [
+def test_it_says_what_is_wrong() -> None:
+    for audio, message in (
         (Audio(noise(16_000), 44_100), "need 16000 Hz, found 44100 Hz; resample first"),
-        (Audio(noise(0), RATE_HZ), r"need 400 samples of one channel, found shape \(0,\)"),
-        (Audio(noise(399), RATE_HZ), r"found shape \(399,\)"),
+        (Audio(noise(399), RATE_HZ), r"need 400 samples of one channel, found shape \(399,\)"),
         (Audio(noise(16_000).reshape(2, 8000), RATE_HZ), r"found shape \(2, 8000\)"),
         (Audio(np.where(np.arange(800) == 7, np.nan, 0.1), RATE_HZ), "found a peak of nan"),
-        (Audio(np.where(np.arange(800) == 7, -np.inf, 0.1), RATE_HZ), "found a peak of inf"),
-    ],
-)
-def test_it_says_what_is_wrong(audio: Audio, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        log_f0(audio)
+    ):
+        with pytest.raises(InputError, match=message):
+            log_f0(audio)

@@ -127,25 +127,12 @@ def test_whisper_without_times_of_words(whisper: type[WhisperModel], monkeypatch
     assert (found.lines[0].words[0].start_s, found.lines[0].end_s) == (None, 2.0)
 
 
-def test_whisper_says_that_it_is_offline(whisper: type[WhisperModel]) -> None:
-    import os
-
-    recognise_words(AUDIO, "whisper")
-    assert whisper.loaded
-    assert os.environ.pop("HF_HUB_OFFLINE") == "1"
-
-
 def test_another_language_is_not_taken_for_words(
     whisper: type[WhisperModel], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(whisper, "language", "fr")
     assert recognise_words(AUDIO, "whisper") is None
     assert "hears the language 'fr', not English; its words are not used" in caplog.text
-
-
-def test_nothing_said(whisper: type[WhisperModel], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(whisper, "segments", [])
-    assert recognise_words(AUDIO, "whisper") is None
 
 
 def test_vosk(vosk: list[bytes]) -> None:

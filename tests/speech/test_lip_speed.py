@@ -26,7 +26,7 @@ def around(values: np.ndarray, frame: int) -> np.ndarray:
 def test_the_fit_finds_the_map_behind_the_data() -> None:
     weights = np.random.default_rng(9).normal(size=STATIC_FEATURES * len(FRAME_OFFSETS))
     examples = []
-    for seed in range(12):
+    for seed in range(6):
         given = features(seed)
         examples.append((given, np.array([around(given.values, n) @ weights for n in range(200)])))
     found = fit_opening_speed(examples)

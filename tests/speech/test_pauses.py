@@ -48,10 +48,6 @@ def test_loudness_may_change_in_an_hour():
     np.testing.assert_allclose([span for span in found if span[0] % 60 < 5], expected, atol=0.05)
 
 
-def test_without_pauses_all_is_speech():
-    assert spoken_spans(levels_db(spoken([], 4.0))) == [(0.0, 4.0)]
-
-
 def test_the_quietest_place():
     levels = levels_db(spoken([(0.0, 1.0), (1.1, 2.0)], 2.0))
     assert quietest_s(levels, 0.5, 1.8) == pytest.approx(1.05, abs=0.06)
@@ -65,7 +61,7 @@ def test_levels_at_any_time():
     assert found == pytest.approx([levels[0], levels[0], levels[100], levels[100:102].mean(), levels[-1]])
 
 
-@pytest.mark.parametrize("samples", [0, 1, 159])
-def test_sound_of_less_than_a_step_is_quiet(samples: int):
-    found = levels_db_at(Audio(np.ones(samples, np.float32), RATE), np.arange(3.0))
-    assert found == pytest.approx([QUIETEST_DB] * 3)
+def test_sound_of_less_than_a_step_is_quiet():
+    for samples in (0, 159):
+        found = levels_db_at(Audio(np.ones(samples, np.float32), RATE), np.arange(3.0))
+        assert found == pytest.approx([QUIETEST_DB] * 3)

@@ -33,7 +33,7 @@ def test_training_is_reported_and_does_not_get_worse(sentences: list[ToySentence
 
 
 def test_transcripts_that_do_not_fit_are_left_out(sentences: list[ToySentence]) -> None:
-    good = [(sentence.audio, sentence.words) for sentence in sentences[:4]]
+    good = [(sentence.audio, sentence.words) for sentence in sentences[:3]]
     bad = (good[0][0], ("five",) * 100)
     hmm = train_phone_models([*good, bad], Lexicon(), SMALL, silent_monitor)
     assert np.array_equal(hmm.mixtures.means, train_phone_models(good, Lexicon(), SMALL, silent_monitor).mixtures.means)

@@ -25,10 +25,6 @@ ALIGNED = AlignedWords(
 )
 
 
-def test_nothing_is_replaced() -> None:
-    assert spliced(BASE, [], 100) == BASE
-
-
 def test_a_stretch_is_replaced() -> None:
     part = (Stretch(30, 60), [LabelledFrames(30, "b", 0), LabelledFrames(45, "iy", 0)])
     assert spliced(BASE, [part], 100) == [
@@ -41,7 +37,8 @@ def test_a_stretch_is_replaced() -> None:
     ]
 
 
-def test_all_is_replaced() -> None:
+def test_nothing_or_all_is_replaced() -> None:
+    assert spliced(BASE, [], 100) == BASE
     whole = [LabelledFrames(0, "b", 0)]
     assert spliced(BASE, [(Stretch(0, 100), whole)], 100) == whole
 
@@ -52,22 +49,22 @@ def test_slivers_are_dropped() -> None:
     assert [label.phone for label in spliced(BASE, [part], 100)] == ["sil", "b", "sil"]
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_every_frame_has_one_label(seed: int) -> None:
-    draw = np.random.default_rng(seed)
-    frames = 200
-    base = [LabelledFrames(int(first), "aa") for first in [0, *np.unique(draw.integers(1, frames, 15))]]
-    bounds = np.unique(draw.integers(0, frames + 1, 8))
-    parts = [
-        (Stretch(int(first), int(end)), [LabelledFrames(int(first), "b", number)])
-        for number, (first, end) in enumerate(zip(bounds[::2], bounds[1::2], strict=False))
-    ]
-    firsts = [label.first for label in spliced(base, parts, frames)]
-    assert firsts[0] == 0
-    assert firsts == sorted(set(firsts))
-    assert {number for _, ((_, _, number),) in parts} == {
-        label.word for label in spliced(base, parts, frames) if label.word >= 0
-    }
+def test_every_frame_has_one_label() -> None:
+    for seed in range(5):
+        draw = np.random.default_rng(seed)
+        frames = 200
+        base = [LabelledFrames(int(first), "aa") for first in [0, *np.unique(draw.integers(1, frames, 15))]]
+        bounds = np.unique(draw.integers(0, frames + 1, 8))
+        parts = [
+            (Stretch(int(first), int(end)), [LabelledFrames(int(first), "b", number)])
+            for number, (first, end) in enumerate(zip(bounds[::2], bounds[1::2], strict=False))
+        ]
+        firsts = [label.first for label in spliced(base, parts, frames)]
+        assert firsts[0] == 0
+        assert firsts == sorted(set(firsts))
+        assert {number for _, ((_, _, number),) in parts} == {
+            label.word for label in spliced(base, parts, frames) if label.word >= 0
+        }
 
 
 def test_labels_of_words_that_are_all_believed_are_the_whole_stretch() -> None:
@@ -81,9 +78,6 @@ def test_labels_of_one_word_that_is_believed() -> None:
     ((frames, labels),) = labels_of_words(ALIGNED, Stretch(100, 180), np.array([False, True]), 0)
     assert frames == Stretch(122, 160)
     assert [label.phone for label in labels] == ["b", "ow", "t"]
-
-
-def test_no_word_is_believed() -> None:
     assert not list(labels_of_words(ALIGNED, Stretch(100, 180), np.array([False, False]), 0))
 
 
@@ -114,9 +108,3 @@ def test_what_was_recognised() -> None:
     assert found.reliability == pytest.approx(1)
     doubtful = recognition_of(units, labels, [HeardWord("bee", 0.3)], -7.0)
     assert doubtful.reliability == pytest.approx(0)
-
-
-def test_the_same_word_twice_is_two_words() -> None:
-    labels = [LabelledFrames(0, "b", 0), LabelledFrames(10, "b", 1)]
-    units = Timeline((Span(0.0, 0.1, Unit("b", word="b")), Span(0.1, 0.2, Unit("b", word="b"))))
-    assert len(recognition_of(units, labels, [HeardWord("b", 0.5)] * 2, None).words) == 2

@@ -27,15 +27,14 @@ def test_words_of_a_sentence() -> None:
     assert not any(is_filler(word) or "(" in word for word in found)
 
 
-@pytest.mark.parametrize("samples", [b"", bytes(2), bytes(320)])
-def test_no_sound_has_no_words(samples: bytes) -> None:
-    assert words_in(samples) == ()
+def test_no_sound_has_no_words() -> None:
+    assert [words_in(samples) for samples in (b"", bytes(2), bytes(320))] == [()] * 3
 
 
 def test_one_recording_does_not_change_the_next() -> None:
     audio = read_audio(WELCOME)
-    samples = stretch_samples(audio, Stretch(0, 300))
-    noise = np.random.default_rng(0).normal(0, 9000, 32_000).astype("<i2").tobytes()
+    samples = stretch_samples(audio, Stretch(0, 120))
+    noise = np.random.default_rng(0).normal(0, 9000, 8_000).astype("<i2").tobytes()
     first = words_in(samples)
     words_in(noise)
     assert words_in(samples) == first
@@ -49,12 +48,8 @@ def test_samples_of_a_stretch_are_clipped_integers() -> None:
     assert samples[-1] == -32_767
 
 
-@pytest.mark.parametrize("entry", ["<s>", "</s>", "<sil>", "[NOISE]", "[SPEECH]", "++UH++"])
-def test_fillers(entry: str) -> None:
-    assert is_filler(entry)
-
-
-def test_apostrophes_are_no_fillers() -> None:
+def test_fillers() -> None:
+    assert all(is_filler(entry) for entry in ("<s>", "</s>", "[NOISE]", "++UH++"))
     assert not is_filler("'bout")
 
 

@@ -54,17 +54,19 @@ def gradient(statistics: AffineStatistics, transform: np.ndarray, step: float = 
     return slope
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_statistics_are_those_of_the_sums_written_out(seed: int) -> None:
-    draw = np.random.default_rng(seed)
-    mixtures, transform = random_mixtures(draw), random_transform(draw)
-    features, densities = spoken(draw, mixtures, 20)
-    found, log_likelihood = transform_statistics(mixtures, features, densities, transform)
-    quadratic, linear = oracle.statistics(mixtures, features, densities, transform)
-    assert found.count == 20
-    np.testing.assert_allclose(found.quadratic, quadratic, rtol=1e-4, atol=1e-4)
-    np.testing.assert_allclose(found.linear, linear, rtol=1e-4, atol=1e-4)
-    assert log_likelihood == pytest.approx(oracle.log_likelihood(mixtures, features, densities, transform), abs=1e-3)
+def test_statistics_are_those_of_the_sums_written_out() -> None:
+    for seed in range(3):
+        draw = np.random.default_rng(seed)
+        mixtures, transform = random_mixtures(draw), random_transform(draw)
+        features, densities = spoken(draw, mixtures, 20)
+        found, log_likelihood = transform_statistics(mixtures, features, densities, transform)
+        quadratic, linear = oracle.statistics(mixtures, features, densities, transform)
+        assert found.count == 20
+        np.testing.assert_allclose(found.quadratic, quadratic, rtol=1e-4, atol=1e-4)
+        np.testing.assert_allclose(found.linear, linear, rtol=1e-4, atol=1e-4)
+        assert log_likelihood == pytest.approx(
+            oracle.log_likelihood(mixtures, features, densities, transform), abs=1e-3
+        )
 
 
 def test_the_objective_has_the_slope_of_the_likelihood() -> None:
@@ -94,16 +96,6 @@ def test_no_row_lowers_the_objective(seed: int, frames: int) -> None:
         transform = improved_transform(transform, statistics, ALL, sweeps=1)
         values.append(statistics.objective(transform))
     assert (np.diff(values) >= -1e-8 * np.abs(values[1:])).all()
-
-
-def test_at_the_end_nothing_rises_any_more() -> None:
-    draw = np.random.default_rng(8)
-    mixtures = random_mixtures(draw)
-    features, densities = spoken(draw, mixtures, 200)
-    statistics, _ = transform_statistics(mixtures, features, densities, identity(SIZE))
-    best = improved_transform(identity(SIZE), statistics, ALL, sweeps=50)
-    assert np.abs(gradient(statistics, best)).max() < 1e-2
-    assert np.abs(gradient(statistics, identity(SIZE))).max() > 1
 
 
 def test_the_likelihood_never_falls() -> None:
@@ -153,20 +145,11 @@ def test_the_models_own_data_ask_for_no_change() -> None:
 def test_own_statistics_are_those_of_many_frames_drawn() -> None:
     draw = np.random.default_rng(6)
     mixtures = random_mixtures(draw, densities=2, gaussians=1)
-    features, densities = spoken(draw, mixtures, 40_000)
+    features, densities = spoken(draw, mixtures, 10_000)
     found, _ = transform_statistics(mixtures, features, densities, identity(SIZE))
-    expected = prior_statistics(mixtures, np.arange(2)).times(40_000)
-    np.testing.assert_allclose(found.quadratic / 40_000, expected.quadratic / 40_000, atol=0.3)
-    np.testing.assert_allclose(found.linear / 40_000, expected.linear / 40_000, atol=0.3)
-
-
-def test_switched_off_gaussians_say_nothing() -> None:
-    mixtures = random_mixtures(np.random.default_rng(4))
-    mixtures.log_weights[:] = [0, -np.inf]
-    alone = Mixtures(mixtures.log_weights[:, :1], mixtures.means[:, :1], mixtures.variances[:, :1])
-    found, wanted = (prior_statistics(one, np.arange(4)) for one in (mixtures, alone))
-    np.testing.assert_allclose(found.quadratic, wanted.quadratic)
-    np.testing.assert_allclose(found.linear, wanted.linear)
+    expected = prior_statistics(mixtures, np.arange(2)).times(10_000)
+    np.testing.assert_allclose(found.quadratic / 10_000, expected.quadratic / 10_000, atol=0.3)
+    np.testing.assert_allclose(found.linear / 10_000, expected.linear / 10_000, atol=0.3)
 
 
 def test_a_prior_holds_a_transform_of_few_frames_back() -> None:

@@ -148,12 +148,6 @@ def test_splitting_keeps_the_density_nearly_the_same(seed, components):
     assert wanted[np.abs(z) < 2].max(initial=0) < 0.1
 
 
-def test_a_copy_shares_nothing():
-    mixtures = random_mixtures(6)
-    mixtures.copy().means[:] = 0
-    assert mixtures.means.any()
-
-
 def test_a_component_with_less_than_two_frames_of_data_is_switched_off():
     mixtures = random_mixtures(3)
     size = mixtures.means.shape[2]

@@ -36,10 +36,6 @@ def test_explained_variance_is_that_of_the_covariance(seed, components):
     assert pca.basis @ pca.basis.T == pytest.approx(np.eye(components), abs=1e-10)
 
 
-def test_never_more_components_than_dimensions():
-    assert fit_pca(cloud(1), 99).basis.shape == (5, 5)
-
-
 def test_a_line_is_one_component():
     line = np.outer(np.linspace(-1, 1, 9), [3.0, 0.0, 4.0]) + np.array([1, 2, 3])
     pca = fit_pca(line, 1)
@@ -97,17 +93,17 @@ def test_places_are_spread_evenly():
     assert (chosen[0], chosen[-1]) == (16, 32_983)
 
 
-@pytest.mark.parametrize("count", [4, 60])
-def test_directions_of_rounding_are_no_components(count):
-    rng = np.random.default_rng(0)
-    plane = rng.normal(size=(count, 2)) @ rng.normal(size=(2, 7)) + 3
-    assert fit_pca(plane, 7).basis.shape == (2, 7)
-    assert fit_pca(plane * (1 + 1e-15 * rng.normal(size=plane.shape)), 7).basis.shape == (2, 7)
+def test_directions_of_rounding_are_no_components():
+    for count in (4, 60):
+        rng = np.random.default_rng(0)
+        plane = rng.normal(size=(count, 2)) @ rng.normal(size=(2, 7)) + 3
+        assert fit_pca(plane, 7).basis.shape == (2, 7)
+        assert fit_pca(plane * (1 + 1e-15 * rng.normal(size=plane.shape)), 7).basis.shape == (2, 7)
 
 
-@pytest.mark.parametrize("count", [4, 60])
-def test_values_that_do_not_move_have_no_components(count):
-    still = np.full((count, 7), 0.1) * (1 + 1e-15 * np.random.default_rng(0).normal(size=(count, 7)))
-    found = fit_pca(still, 3)
-    assert found.basis.shape == (0, 7)
-    assert found.restore(found.project(still)) == pytest.approx(still)
+def test_values_that_do_not_move_have_no_components():
+    for count in (4, 60):
+        still = np.full((count, 7), 0.1) * (1 + 1e-15 * np.random.default_rng(0).normal(size=(count, 7)))
+        found = fit_pca(still, 3)
+        assert found.basis.shape == (0, 7)
+        assert found.restore(found.project(still)) == pytest.approx(still)

@@ -9,9 +9,9 @@ def rounded(value: float, seed: int = 0) -> np.ndarray:
     return value * (1 + 1e-7 * np.random.default_rng(seed).uniform(-1, 1, size=(500, 1)))
 
 
-@pytest.mark.parametrize("value", [0.0, 1e-30, 0.3, -7.0, 1e6])
-def test_rounding_of_a_constant_is_no_movement(value: float) -> None:
-    assert not varies(rounded(value)).any()
+def test_rounding_of_a_constant_is_no_movement() -> None:
+    for value in (0.0, 1e-30, 0.3, -7.0, 1e6):
+        assert not varies(rounded(value)).any()
 
 
 @pytest.mark.parametrize("value", [0.0, 0.3, -7.0, 1e6])

@@ -10,15 +10,19 @@ import pytest
 from lipmotion.storage.archive import array_in, check_archive
 
 
-@pytest.mark.parametrize(
-    "array", [np.arange(6.0).reshape(2, 3), np.zeros((0, 3)), np.array(["a", "näher 😀"]), np.array("one"), np.eye(3).T]
-)
-def test_an_array_comes_back(array: np.ndarray) -> None:
-    stream = io.BytesIO()
-    np.save(stream, array)
-    found = array_in(stream.getvalue())
-    assert found.dtype == array.dtype
-    np.testing.assert_array_equal(found, array)
+def test_an_array_comes_back() -> None:
+    for array in (
+        np.arange(6.0).reshape(2, 3),
+        np.zeros((0, 3)),
+        np.array(["a", "näher 😀"]),
+        np.array("one"),
+        np.eye(3).T,
+    ):
+        stream = io.BytesIO()
+        np.save(stream, array)
+        found = array_in(stream.getvalue())
+        assert found.dtype == array.dtype
+        np.testing.assert_array_equal(found, array)
 
 
 def test_an_array_is_exactly_as_long_as_its_header_says() -> None:

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lipmotion.errors import ExportError
-from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
+from lipmotion.storage.checkpoint import Checkpoint
 
 ARRAYS: dict[str, NDArray[Any]] = {
     "single": np.array([[1 / 3, np.nan], [-0.0, np.inf]], np.float32),
@@ -41,11 +40,6 @@ def test_the_last_state_counts(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["stage.checkpoint"]
 
 
-def test_without_a_folder_nothing_is_kept() -> None:
-    NO_CHECKPOINT.save("stage", ARRAYS)
-    assert NO_CHECKPOINT.load("stage") is None
-
-
 def test_another_job_is_not_gone_on_with(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.INFO)
     Checkpoint(tmp_path, "a").save("stage", ARRAYS)
@@ -68,8 +62,3 @@ def test_any_damaged_byte_of_an_array_is_noticed(tmp_path: Path) -> None:
         assert checkpoint.load("stage") is None
     path.write_bytes(whole)
     assert checkpoint.load("stage") is not None
-
-
-def test_a_folder_that_is_gone_is_an_export_error(tmp_path: Path) -> None:
-    with pytest.raises(ExportError, match="does not exist"):
-        Checkpoint(tmp_path / "gone", "a").save("stage", ARRAYS)

@@ -10,7 +10,6 @@ import pytest
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.storage.archive import read_archive, write_archive
 from lipmotion.storage.coded_video import (
-    GROUP,
     decode_pictures,
     encode_pictures,
     encode_video,
@@ -56,32 +55,22 @@ def test_any_order_gives_the_same_frames(stored, order):
         np.testing.assert_array_equal(frame, whole[n])
 
 
-@pytest.mark.parametrize("group", [1, 5, 100])
-def test_groups_of_any_length(group):
-    stored = encode_video(film(), 25.0, group=group)
-    assert len(list(stored.frames(range(20, -1, -1)))) == 21
+def test_groups_of_any_length():
+    for group in (1, 5, 100):
+        stored = encode_video(film(), 25.0, group=group)
+        assert len(list(stored.frames(range(20, -1, -1)))) == 21
 
 
-@pytest.mark.parametrize("size", [(47, 64), (48, 63), (17, 19)])
-def test_odd_sizes(size):
-    frames = film(3, size)
-    stored = encode_video(frames, 25.0)
-    shown = np.stack(list(stored.frames(range(3))))
-    assert shown.shape == frames.shape
-    assert psnr_db(shown, frames) > 34
-    pictures = decode_pictures(encode_pictures(frames))
-    assert pictures.shape == frames.shape
-    assert psnr_db(pictures, frames) > 40
-
-
-def test_groups_are_shorter_than_the_video(stored):
-    groups = stored.groups()
-    groups.frame(20)
-    assert groups.nbytes <= GROUP * 48 * 64 * 3
-
-
-def test_the_same_frames_give_the_same_bytes(stored):
-    np.testing.assert_array_equal(encode_video(film(), 25.0).data, stored.data)
+def test_odd_sizes():
+    for size in ((47, 64), (48, 63), (17, 19)):
+        frames = film(3, size)
+        stored = encode_video(frames, 25.0)
+        shown = np.stack(list(stored.frames(range(3))))
+        assert shown.shape == frames.shape
+        assert psnr_db(shown, frames) > 34
+        pictures = decode_pictures(encode_pictures(frames))
+        assert pictures.shape == frames.shape
+        assert psnr_db(pictures, frames) > 40
 
 
 def test_a_smaller_factor_is_better():
@@ -104,29 +93,21 @@ def test_pictures_keep_their_colours():
     assert psnr_db(decode_pictures(encode_pictures(pictures, crf=8)), pictures) > 40
 
 
-def test_one_picture():
-    picture = film(1)
-    assert psnr_db(decode_pictures(encode_pictures(picture)), picture) > 40
-
-
-@pytest.mark.parametrize(
-    ("frames", "told"),
-    [
+def test_what_is_no_video_is_refused():
+    for frames, told in (
         ([], "no frames"),
         ([np.zeros((8, 8), np.uint8)], r"shape \(8, 8\), required \(H, W, 3\)"),
         ([np.zeros((32, 32, 3), np.uint8), np.zeros((32, 34, 3), np.uint8)], "frame 1 is uint8"),
         ([np.zeros((32, 32, 3))], "frame 0 is float64"),
-    ],
-)
-def test_what_is_no_video_is_refused(frames, told):
-    with pytest.raises(InputError, match=told):
-        encode_video(frames, 25.0)
+    ):
+        with pytest.raises(InputError, match=told):
+            encode_video(frames, 25.0)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("options", [{"crf": -1}, {"crf": 52}, {"group": 0}])
-def test_options_out_of_range_are_refused(options):
-    with pytest.raises(InputError, match="required 0 to 51"):
-        encode_video(film(2), 25.0, **options)
+def test_options_out_of_range_are_refused():
+    for options in ({"crf": -1}, {"crf": 52}, {"group": 0}):
+        with pytest.raises(InputError, match="required 0 to 51"):
+            encode_video(film(2), 25.0, **options)
 
 
 def test_no_pictures_are_refused():
@@ -138,7 +119,7 @@ class TestDamage:
     """Every byte may be wrong: a frame, or ModelFormatError, and nothing else."""
 
     @pytest.mark.parametrize("change", ["flip", "cut", "zeros", "swap"])
-    @pytest.mark.parametrize("seed", range(6))
+    @pytest.mark.parametrize("seed", range(2))
     def test_changed_bytes(self, stored, change, seed):
         draw = np.random.default_rng(seed)
         data = stored.data.copy()

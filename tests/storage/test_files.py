@@ -26,7 +26,6 @@ from lipmotion.storage.files import (
 )
 
 Context = Callable[[Path], AbstractContextManager[Path]]
-LONGEST = "x" * 250 + ".json"
 TOO_LONG = "x" * 300 + ".json"
 
 
@@ -84,13 +83,6 @@ def test_writers_do_not_share_a_temporary_name(tmp_path: Path) -> None:
         assert one != two
         one.touch()
         two.touch()
-
-
-def test_the_longest_name_can_be_written(tmp_path: Path) -> None:
-    check_target(tmp_path / LONGEST)
-    with whole_file(tmp_path / LONGEST) as unfinished:
-        unfinished.touch()
-    assert names(tmp_path) == [LONGEST]
 
 
 def test_a_longer_name_is_refused_in_words(tmp_path: Path) -> None:

@@ -47,9 +47,9 @@ def test_memory_is_bounded():
     assert most == 3 * 4 * 300
 
 
-@pytest.mark.parametrize("index", [-1, 18, 100])
-def test_other_frames_are_refused(index):
-    groups = FrameGroups(Film().frames, STARTS)
-    assert len(groups) == 18
-    with pytest.raises(IndexError, match=rf"frame {index} of 18"):
-        groups.frame(index)
+def test_other_frames_are_refused():
+    for index in (-1, 18, 100):
+        groups = FrameGroups(Film().frames, STARTS)
+        assert len(groups) == 18
+        with pytest.raises(IndexError, match=rf"frame {index} of 18"):
+            groups.frame(index)

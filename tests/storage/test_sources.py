@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from lipmotion.errors import ExportError
-from lipmotion.storage.sources import Source, check_apart, is_folder, is_same
+from lipmotion.storage.sources import Source, check_apart
 
 
 @pytest.fixture
@@ -63,12 +63,6 @@ def test_a_folder_that_is_written_holds_nothing_that_is_read(place: Path) -> Non
 def test_what_has_nothing_to_do_with_each_other(place: Path) -> None:
     sources = [Source(place / name, "text") for name in ("words.txt", "folder", "none", "x" * 5000, "a\0b")]
     check_apart([place / "new.json", place / "folder2", place / ("y" * 5000)], sources, folders=[place / "new"])
-
-
-def test_names_of_any_length(place: Path) -> None:
-    assert is_folder(place)
-    assert not is_folder(place / ("x" * 5000))
-    assert not is_same(place / "none", place / "none")
 
 
 def test_a_link_to_a_folder_inside_a_corpus_leads_into_the_corpus(place: Path) -> None:

@@ -145,6 +145,15 @@ def test_arrays_that_are_not_checked_are_noticed() -> None:
         ENGINE_CHECKS["damaged arrays are format errors"](broken(from_arrays=from_arrays))
 
 
+def test_arrays_of_nobody_are_noticed() -> None:
+    def from_arrays(self: Any, arrays: Any) -> Any:
+        known = {name: array for name, array in arrays.items() if name in (*LEARNED_MOTION_ARRAYS, *MEANS)}
+        return MeanPoses.from_arrays(self, known)
+
+    with pytest.raises(ContractError, match="an unknown array"):
+        ENGINE_CHECKS["damaged arrays are format errors"](broken(from_arrays=from_arrays))
+
+
 def test_a_model_that_does_not_come_back_is_noticed() -> None:
     def to_arrays(self: Any, model: Any) -> Any:
         return MeanPoses.to_arrays(self, (model[0], model[1] + 0.1))

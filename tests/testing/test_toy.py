@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import av
 import numpy as np
@@ -12,10 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.speech.audio_files import read_audio
 from lipmotion.testing.toy import (
     LIP_LEAD_S,
-    LIP_TARGETS,
     LIPS_TOUCH,
     WORDS,
     ToySentence,
@@ -26,7 +23,7 @@ from lipmotion.testing.toy import (
 )
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units.lexicon import Lexicon
-from lipmotion.units.phones import PHONES, SILENCE
+from lipmotion.units.phones import SILENCE
 
 FPS = 25.0
 
@@ -43,14 +40,10 @@ def spelled(*phones: tuple[str, float]) -> Timeline[Unit]:
     )
 
 
-@pytest.mark.parametrize("word", WORDS)
-def test_words_are_pronounced_as_in_the_dictionary(word: str) -> None:
-    assert Lexicon().known(word)
-    assert WORDS[word] in Lexicon().pronunciations(word)
-
-
-def test_every_phone_of_the_inventory_has_targets() -> None:
-    assert sorted(LIP_TARGETS) == sorted(PHONES)
+def test_words_are_pronounced_as_in_the_dictionary() -> None:
+    for word in WORDS:
+        assert Lexicon().known(word)
+        assert WORDS[word] in Lexicon().pronunciations(word)
 
 
 def test_sentences_say_their_words(sentences: list[ToySentence]) -> None:
@@ -74,7 +67,7 @@ def test_sentences_have_the_promised_lengths(sentences: list[ToySentence]) -> No
 def test_the_splits(sentences: list[ToySentence]) -> None:
     assert [sentence.split for sentence in sentences] == ["train"] * 8 + ["val"] * 2 + ["test"] * 2
     assert [sentence.split for sentence in toy_sentences(3)] == ["train", "val", "test"]
-    for seed in range(3):
+    for seed in range(1):
         said = {word for s in toy_sentences(6, seed) if s.split == "train" for word in s.words}
         assert said == set(WORDS)
 
@@ -86,10 +79,10 @@ def test_the_seed_decides_and_more_begins_with_the_same(sentences: list[ToySente
     assert [s.words for s in toy_sentences(4, seed=1)] != [s.words for s in sentences[:4]]
 
 
-@pytest.mark.parametrize("make", [toy_sentences, toy_utterances])
-def test_a_corpus_needs_three_sentences(make: Any) -> None:
-    with pytest.raises(InputError, match="2 toy sentences asked for"):
-        make(2)
+def test_a_corpus_needs_three_sentences() -> None:
+    for make in (toy_sentences, toy_utterances):
+        with pytest.raises(InputError, match="2 toy sentences asked for"):
+            make(2)
 
 
 @pytest.mark.parametrize("rate_hz", [25.0, 30.0, 100.0])
@@ -108,24 +101,6 @@ def test_the_mouth_is_shut_in_silence_and_touches_in_p_b_m(sentences: list[ToySe
                 assert motion["opening"][inside].max() > 0.2
 
 
-def test_channels_stay_in_their_ranges(sentences: list[ToySentence]) -> None:
-    for sentence in sentences:
-        motion = toy_motion(sentence.units, 100.0)
-        assert motion.names == ("opening", "width", "outer")
-        assert len(motion.values) == int(sentence.units.spans[-1].end_s * 100) + 1
-        assert motion["opening"].min() == 0
-        assert motion["opening"].max() <= 0.3 + 1e-9
-        assert motion["width"][0] == pytest.approx(0.55)
-        assert motion["width"].min() >= 0.42 - 1e-9
-        assert motion["width"].max() <= 0.62 + 1e-9
-        assert motion["outer"] - motion["opening"] == pytest.approx(0.22)
-
-
-def test_lips_are_rounded_in_uw_and_spread_in_iy() -> None:
-    motion = toy_motion(spelled(("sil", 0.3), ("uw", 0.3), ("iy", 0.3), ("sil", 0.3)), 100.0)
-    assert motion["width"][[10, 45, 75, 110]] == pytest.approx([0.55, 0.42, 0.62, 0.55])
-
-
 def test_the_lips_lead_the_sound() -> None:
     motion = toy_motion(spelled(("sil", 0.5), ("aa", 0.2), ("sil", 0.5)), 100.0)
     middle_s = np.average(motion.time_s, weights=motion["opening"])
@@ -133,30 +108,14 @@ def test_the_lips_lead_the_sound() -> None:
     assert 0 < LIP_LEAD_S < 1 / FPS
 
 
-def test_motion_is_smooth_and_the_same_at_every_rate(sentences: list[ToySentence]) -> None:
-    for sentence in sentences:
-        fast, slow = toy_motion(sentence.units, 100.0), toy_motion(sentence.units, 25.0)
-        assert fast.values[::4][: len(slow.values)] == pytest.approx(slow.values, abs=1e-9)
-        assert np.abs(np.diff(fast.values, axis=0)).max() < 0.07
-
-
-def test_a_gap_is_silence() -> None:
-    whole = spelled(("sil", 0.3), ("aa", 0.2), ("sil", 0.2), ("iy", 0.2))
-    gaps = Timeline(tuple(span for span in whole if span.label.phone != "sil"))
-    assert np.array_equal(toy_motion(whole, 100.0).values, toy_motion(gaps, 100.0).values)
-
-
-@pytest.mark.parametrize(
-    ("units", "rate_hz", "message"),
-    [
+def test_motion_says_what_is_wrong() -> None:
+    for units, rate_hz, message in (
         (Timeline(()), 25.0, "at least one"),
         (spelled(("aa", 0.1)), 0.0, "rate is 0.0 Hz"),
         (spelled(("aa", 0.1), ("AA", 0.1)), 25.0, "'AA'"),
-    ],
-)
-def test_motion_says_what_is_wrong(units: Timeline[Unit], rate_hz: float, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        toy_motion(units, rate_hz)
+    ):
+        with pytest.raises(InputError, match=message):
+            toy_motion(units, rate_hz)
 
 
 def test_utterances_are_the_sentences_perfectly_tracked(sentences: list[ToySentence]) -> None:
@@ -168,21 +127,6 @@ def test_utterances_are_the_sentences_perfectly_tracked(sentences: list[ToySente
         assert np.array_equal(utterance.track.motion.values, toy_motion(sentence.units, FPS).values)
         assert utterance.track.seen.shape == (len(utterance.track.motion.values),)
         assert utterance.track.seen.all()
-
-
-def test_phones_differ_in_their_features(sentences: list[ToySentence]) -> None:
-    """The phone whose mean features are nearest to a frame is mostly the phone of this frame."""
-    labels, rows = [], []
-    for utterance, sentence in zip(toy_utterances(12), sentences, strict=True):
-        for span in sentence.units:
-            frame = round((span.start_s + span.end_s) * 50)
-            labels.append(span.label.phone)
-            rows.append(utterance.features.values[frame, :13])
-    names, features = np.array(labels), np.array(rows)
-    means = {name: features[names == name].mean(axis=0) for name in set(labels)}
-    order = sorted(means)
-    distance = np.square(features[:, None] - np.array([means[name] for name in order])).sum(axis=-1)
-    assert np.mean(np.array(order)[distance.argmin(axis=1)] == names) > 0.8
 
 
 @pytest.fixture(scope="module")
@@ -205,15 +149,6 @@ def test_recordings_come_with_transcripts_and_lists(recordings: list[Path]) -> N
     for path, sentence in zip(recordings, sentences, strict=True):
         assert path.with_suffix(".txt").read_text().split() == list(sentence.words)
         assert (folder / f"{sentence.split}.txt").read_text() == f"{sentence.name}\n"
-
-
-def test_recordings_hold_the_sentences(recordings: list[Path]) -> None:
-    for path, sentence in zip(recordings, toy_sentences(3), strict=True):
-        assert len(pictures(path)) == len(toy_motion(sentence.units, FPS).values)
-        sound = read_audio(path).samples
-        count = min(len(sound), len(sentence.audio.samples))
-        assert abs(len(sound) - len(sentence.audio.samples)) < 0.1 * 16000
-        assert np.corrcoef(sound[:count], sentence.audio.samples[:count])[0, 1] > 0.95
 
 
 def test_recordings_say_what_is_wrong(tmp_path: Path) -> None:
@@ -245,6 +180,7 @@ def tracked_opening(video: Path) -> NDArray[np.float64]:
     return np.array(openings)
 
 
+@pytest.mark.long
 @pytest.mark.video
 def test_toy_faces_can_be_tracked(recordings: list[Path]) -> None:
     for path, sentence in zip(recordings, toy_sentences(3), strict=True):

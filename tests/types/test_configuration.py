@@ -27,9 +27,8 @@ class Example(Configuration):
     hints: ClassVar[Mapping[str, str]] = {"amount": "say count"}
 
 
-@pytest.mark.parametrize(
-    ("values", "words"),
-    [
+def test_a_value_that_is_not_allowed() -> None:
+    for values, words in (
         ({"count": 0}, "count is 0, required a whole number from 1"),
         ({"count": 1.0}, "count is 1.0, required a whole number from 1"),
         ({"count": True}, "count is True, required a whole number from 1"),
@@ -49,12 +48,10 @@ class Example(Configuration):
         ({"no": 1}, "no option 'no'; there are: count, odd, mixtures, weight, kind, on, free"),
         ({"amount": 1}, "no option 'amount'; say count"),
         ({"steps": 3}, "steps is 3; this option no longer exists, required 0"),
-    ],
-)
-def test_a_value_that_is_not_allowed(values: dict[str, Any], words: str) -> None:
-    with pytest.raises(InputError) as error:
-        Example.parsed(values)
-    assert words in str(error.value)
+    ):
+        with pytest.raises(InputError) as error:
+            Example.parsed(values)
+        assert words in str(error.value)
 
 
 def test_options_come_back() -> None:
@@ -64,31 +61,25 @@ def test_options_come_back() -> None:
     assert Example.parsed({}) == Example()
 
 
-@pytest.mark.parametrize(
-    ("settings", "values"),
-    [
+def test_texts_are_parsed_as_their_types() -> None:
+    for settings, values in (
         (["count=4", "weight=2", "kind=hard"], {"count": 4, "weight": 2.0, "kind": "hard"}),
         (["on=no"], {"on": False}),
         (["on=TRUE"], {"on": True}),
         (["free=a=b"], {"free": "a=b"}),
         (["how_many=2"], {"count": 2}),
         ([], {}),
-    ],
-)
-def test_texts_are_parsed_as_their_types(settings: list[str], values: dict[str, Any]) -> None:
-    assert Example.values_of(settings) == values
+    ):
+        assert Example.values_of(settings) == values
 
 
-@pytest.mark.parametrize(
-    ("setting", "words"),
-    [
+def test_texts_that_cannot_be_parsed() -> None:
+    for setting, words in (
         ("count", "the setting 'count' has no value; required NAME=VALUE"),
         ("count=four", "count is 'four', required a whole number"),
         ("on=perhaps", "on is 'perhaps', required true or false"),
         ("weight=much", "weight is 'much', required a number"),
         ("no=1", "no option 'no'; there are: count"),
-    ],
-)
-def test_texts_that_cannot_be_parsed(setting: str, words: str) -> None:
-    with pytest.raises(InputError, match=words):
-        Example.values_of([setting])
+    ):
+        with pytest.raises(InputError, match=words):
+            Example.values_of([setting])

@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -31,21 +29,18 @@ def test_an_unknown_channel_is_named_with_those_there_are() -> None:
         _ = motion()["width"]
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
+def test_it_says_what_does_not_fit() -> None:
+    for changes, message in (
         ({"values": np.zeros((3, 1))}, r"shape \(3, 1\), required \(T, 2\)"),
         ({"values": np.zeros(3)}, r"shape \(3,\), required \(T, 2\)"),
         ({"rate_hz": 0.0}, "rate is 0.0 Hz, required more than 0"),
         ({"rate_hz": -1.0}, "rate is -1.0 Hz"),
         ({"rate_hz": float("nan")}, "rate is nan Hz"),
         ({"channels": (Channel("opening"), Channel("opening", "mm"))}, "names repeat: opening, opening"),
-    ],
-)
-def test_it_says_what_does_not_fit(changes: dict[str, Any], message: str) -> None:
-    good = {"values": np.zeros((3, 2)), "rate_hz": 25.0, "channels": CHANNELS}
-    with pytest.raises(InputError, match=message):
-        Motion(**(good | changes))
+    ):
+        good = {"values": np.zeros((3, 2)), "rate_hz": 25.0, "channels": CHANNELS}
+        with pytest.raises(InputError, match=message):
+            Motion(**(good | changes))
 
 
 def test_between_frames_it_is_linear_and_beyond_the_ends_constant() -> None:
@@ -76,38 +71,27 @@ def test_resampling_keeps_the_duration_and_the_values(rows: int, rate_hz: float,
     assert again["opening"] == pytest.approx(np.minimum(again.time_s * rate_hz, rows - 1), abs=1e-6)
 
 
-def test_the_same_rate_changes_nothing() -> None:
-    curves = Motion(np.random.default_rng(0).normal(size=(277, 2)), 100.0, CHANNELS)
-    assert curves.resampled(100.0).values == pytest.approx(curves.values, abs=1e-9)
-
-
 def test_whole_multiples_keep_the_last_frame() -> None:
     for rows in range(1, 200):
         assert len(motion(rows, 100.0).resampled(50.0).values) == (rows - 1) // 2 + 1
         assert len(motion(rows, 25.0).resampled(100.0).values) == 4 * (rows - 1) + 1
 
 
-def test_nothing_resampled_is_nothing() -> None:
-    assert motion(0).resampled(100.0).values.shape == (0, 2)
+def test_an_impossible_rate_is_refused() -> None:
+    for rate_hz in (0.0, -25.0, float("nan"), float("inf")):
+        with pytest.raises(InputError, match=f"motion rate is {rate_hz} Hz"):
+            motion().resampled(rate_hz)
 
 
-@pytest.mark.parametrize("rate_hz", [0.0, -25.0, float("nan"), float("inf")])
-def test_an_impossible_rate_is_refused(rate_hz: float) -> None:
-    with pytest.raises(InputError, match=f"motion rate is {rate_hz} Hz"):
-        motion().resampled(rate_hz)
+def test_a_name_is_no_formula_of_a_spreadsheet() -> None:
+    for name in ("=1+1", "+1", "-2+3", "@SUM(A1)", "\t=1", "\r=1", " =1", "＝1", "\u3000＠x", "-x" * 500):
+        with pytest.raises(
+            InputError, match=r"begins as a spreadsheet's formula, required another beginning"
+        ) as caught:
+            Channel(name)
+        assert len(str(caught.value)) < 250
 
 
-@pytest.mark.parametrize(
-    "name", ["=1+1", "+1", "-2+3", "@SUM(A1)", "\t=1", "\r=1", " =1", "＝1", "\u3000＠x", "-x" * 500]
-)
-def test_a_name_is_no_formula_of_a_spreadsheet(name: str) -> None:
-    with pytest.raises(InputError, match=r"begins as a spreadsheet's formula, required another beginning") as caught:
-        Channel(name)
-    assert len(str(caught.value)) < 250
-
-
-@pytest.mark.parametrize(
-    "name", ["opening", "p12.x", "jaw-open", "Mouth Open (L)", "blendShape1.a=b", "öffnen", "", "_x", "|a|b"]
-)
-def test_other_names_are_names(name: str) -> None:
-    assert Channel(name).name == name
+def test_other_names_are_names() -> None:
+    for name in ("opening", "p12.x", "jaw-open", "Mouth Open (L)", "blendShape1.a=b", "öffnen", "", "_x", "|a|b"):
+        assert Channel(name).name == name

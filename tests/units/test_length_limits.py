@@ -12,14 +12,14 @@ from lipmotion.units.length_limits import (
 )
 
 
-@pytest.mark.parametrize("duration_s", [0.0, 1.0, 3600.0])
-def test_a_text_may_be_as_long_as_can_be_said(duration_s: float) -> None:
-    most = ALWAYS_ALLOWED_CHARACTERS + int(CHARACTERS_PER_S * duration_s)
-    check_text("a" * most, duration_s)
-    with pytest.raises(
-        AlignmentError, match=f"has {most + 1} characters, required at most {most} for {duration_s:.2f} s"
-    ):
-        check_text("a" * (most + 1), duration_s)
+def test_a_text_may_be_as_long_as_can_be_said() -> None:
+    for duration_s in (0.0, 1.0, 3600.0):
+        most = ALWAYS_ALLOWED_CHARACTERS + int(CHARACTERS_PER_S * duration_s)
+        check_text("a" * most, duration_s)
+        with pytest.raises(
+            AlignmentError, match=f"has {most + 1} characters, required at most {most} for {duration_s:.2f} s"
+        ):
+            check_text("a" * (most + 1), duration_s)
 
 
 def test_words_count_with_the_blanks_between_them() -> None:

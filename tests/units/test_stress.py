@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
-
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import Lexicon
 from lipmotion.units.stress import NUCLEI, stress_of, stressed_vowel
@@ -15,17 +13,30 @@ def said(*words: tuple[str, str]) -> Timeline[Unit]:
     return Timeline(tuple(Span(n / 10, (n + 1) / 10, label) for n, label in enumerate(labels)))
 
 
-@pytest.mark.parametrize(
-    ("word", "stressed"),
-    [
-        ("mother", 0), ("again", 1), ("banana", 1), ("before", 1), ("because", 1), ("beautiful", 0),
-        ("nation", 0), ("information", 2), ("electric", 1), ("university", 2), ("yesterday", 0), ("japanese", 2),
-        ("animated", 0), ("table", 0), ("bread", 0), ("the", None), ("them", None), ("your", None), ("media's", 0),
-    ],
-)  # fmt: skip
-def test_words_of_the_dictionary(word: str, stressed: int | None) -> None:
-    phones = Lexicon().pronunciations(word)[0]
-    assert stressed_vowel(word, [phone for phone in phones if phone in NUCLEI]) == stressed
+def test_words_of_the_dictionary() -> None:
+    for word, stressed in (
+        ("mother", 0),
+        ("again", 1),
+        ("banana", 1),
+        ("before", 1),
+        ("because", 1),
+        ("beautiful", 0),
+        ("nation", 0),
+        ("information", 2),
+        ("electric", 1),
+        ("university", 2),
+        ("yesterday", 0),
+        ("japanese", 2),
+        ("animated", 0),
+        ("table", 0),
+        ("bread", 0),
+        ("the", None),
+        ("them", None),
+        ("your", None),
+        ("media's", 0),
+    ):
+        phones = Lexicon().pronunciations(word)[0]
+        assert stressed_vowel(word, [phone for phone in phones if phone in NUCLEI]) == stressed
 
 
 def test_a_consonant_has_the_stress_of_its_syllable() -> None:

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from lipmotion.engines.selection.engine import SelectionEngine
 from lipmotion.engines.selection.inventory import digits, standing_in
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.windows import INVISIBLE_SYMBOL, PHONE_NUMBER, SILENT, covering, phone_windows
 from lipmotion.errors import InputError
 from lipmotion.testing.examples import PHONES as SPOKEN
-from lipmotion.types import Span, Timeline, Unit
+from lipmotion.testing.examples import examples
+from lipmotion.types import Span, Timeline, Unit, silent_monitor
 
 
 def spoken(text: str, word: str = "") -> Timeline[Unit]:
@@ -58,7 +62,7 @@ def test_an_unknown_phone_is_refused() -> None:
         phone_windows([spoken("xx")])
 
 
-@settings(max_examples=60)
+@settings(max_examples=20)
 @given(st.lists(st.sampled_from(SPOKEN), min_size=5, max_size=5), st.integers(1, 12), st.integers(0, 2))
 def test_the_index_finds_the_longest_agreement(
     model: SelectionModel, engine, window: list[str], count: int, bias: int
@@ -92,16 +96,12 @@ def test_a_phone_without_units_has_a_similar_one_in_its_place(model: SelectionMo
 
 
 def test_what_was_not_measured_is_no_unit(model: SelectionModel, engine) -> None:
-    from dataclasses import replace
-
-    from lipmotion.testing.examples import examples
-    from lipmotion.types import silent_monitor
-
-    blind = examples()[0]
+    blind = examples(3)[0]
     valid = blind.valid.copy()
     span = blind.speech.units[2]
     valid[int(span.start_s * 100) + 2] = False
-    inventory = engine.fit([replace(blind, valid=valid), *examples()[1:]], silent_monitor).model.inventory
+    plain = SelectionEngine(replace(engine.config, guide=0.0))
+    inventory = plain.fit([replace(blind, valid=valid), *examples(3)[1:]], silent_monitor).model.inventory
     assert model.inventory.usable[2]
     assert not inventory.usable[2]
     assert inventory.usable[4]

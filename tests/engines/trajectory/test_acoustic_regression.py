@@ -70,13 +70,6 @@ def test_each_node_is_drawn_towards_the_one_above():
     assert stiff[3] == pytest.approx(np.ones((3, 2)), abs=1e-6)
 
 
-def test_moments_add_up():
-    z, r = sample(50, np.ones((3, 2)), 0)
-    whole, halves = moments_of(z, r), moments_of(z[:20], r[:20]) + moments_of(z[20:], r[20:])
-    assert halves.products == pytest.approx(whole.products, rel=1e-5)
-    assert halves.targets == pytest.approx(whole.targets, rel=1e-5)
-
-
 def test_the_context_uses_features_around_a_frame_and_no_further():
     draw = np.random.default_rng(0)
     recordings = [draw.normal(size=(80, 3)).astype(np.float32) for _ in range(4)]
@@ -97,12 +90,6 @@ def test_the_context_uses_features_around_a_frame_and_no_further():
         < np.sqrt(np.square(fit_acoustic_context(recordings, 33)(x, slice(None))).sum(axis=1).mean())
         < SCALE * 1.5
     )
-
-
-def test_a_window_has_no_more_axes_than_there_are():
-    assert fit_acoustic_context(
-        [np.random.default_rng(0).normal(size=(50, 2)).astype(np.float32)], 300
-    ).basis.shape == (22, 22)
 
 
 def loud_and_soft(count):

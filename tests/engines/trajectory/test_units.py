@@ -10,7 +10,7 @@ from lipmotion.engines import Engine, engine_named
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.motion.closure import closable_ranges
 from lipmotion.motion.frame_labels import StateLayout, full_context_states
-from lipmotion.testing.examples import OPENINGS, examples, speech, timeline
+from lipmotion.testing.examples import examples, speech, timeline
 from lipmotion.types import Generation
 from lipmotion.types.progress import silent_monitor
 from lipmotion.units import LIP_CLOSING, PHONES, UNIT_SETS, unit_set
@@ -70,24 +70,14 @@ def test_the_timeline_names_units_in_context(name):
     assert {state.split()[0] for state in result.trace.states} <= {*wanted, "rest"}
 
 
-@pytest.mark.parametrize("name", [name for name in UNIT_SETS if name != "phone"])
-def test_phones_of_one_unit_move_alike(name):
-    engine, model = trained(name)
-    units = unit_set(name)
-    for one, two in (("t", "d"), ("iy", "ih"), ("aa", "ah"), ("f", "v")):
-        assert units.unit_of_phone[one] == units.unit_of_phone[two]
-        pair = [engine.generate(model, speech(timeline(("s", phone, "s")))).motion.values for phone in (one, two)]
-        assert pair[0].tobytes() == pair[1].tobytes()
-
-
-def test_finer_sets_tell_more_apart():
-    differs = {}
-    for name in UNIT_SETS:
+def test_phones_of_one_unit_move_alike():
+    for name in [name for name in UNIT_SETS if name != "phone"]:
         engine, model = trained(name)
-        one, two = (engine.generate(model, speech(timeline(("t", p, "t")))).motion["opening"] for p in ("iy", "aa"))
-        differs[name] = np.abs(one - two).max()
-    assert differs["2vis"] == 0
-    assert min(differs[name] for name in UNIT_SETS if name != "2vis") > 0.1
+        units = unit_set(name)
+        for one, two in (("t", "d"), ("iy", "ih"), ("aa", "ah"), ("f", "v")):
+            assert units.unit_of_phone[one] == units.unit_of_phone[two]
+            pair = [engine.generate(model, speech(timeline(("s", phone, "s")))).motion.values for phone in (one, two)]
+            assert pair[0].tobytes() == pair[1].tobytes()
 
 
 @named
@@ -97,13 +87,6 @@ def test_lips_meet_on_p_b_m_whatever_their_unit(name):
     assert len(spans) == sum(span.label.phone in LIP_CLOSING for span in SPOKEN.units) == 2
     for span in spans:
         assert result.motion["opening"][span].min() <= model.closure.closed + 1e-9
-
-
-@named
-def test_the_mouth_rests_in_silence_whatever_its_unit(name):
-    opening = generated(name).motion["opening"]
-    for rest in (opening[:20], opening[-20:]):
-        assert rest == pytest.approx(np.full(20, OPENINGS["sil"]), abs=2e-3)
 
 
 def test_silence_that_is_a_closed_mouth_is_cut_as_speech():
@@ -159,19 +142,15 @@ DAMAGES = {
 }
 
 
-@pytest.mark.parametrize("damage", DAMAGES)
-def test_a_damaged_table_is_refused(damage, tmp_path):
+def test_a_damaged_table_is_refused(tmp_path):
     engine, arrays = table_model(tmp_path)
-    with pytest.raises(ModelFormatError):
-        engine.from_arrays(arrays | {"units": DAMAGES[damage](arrays["units"])})
-
-
-@pytest.mark.parametrize("units", [3, None, True, ["eVis"]])
-def test_a_unit_set_has_a_name(units):
-    with pytest.raises(InputError, match="units"):
-        engine_named("trajectory", {"units": units})
+    for damage in DAMAGES.values():
+        with pytest.raises(ModelFormatError):
+            engine.from_arrays(arrays | {"units": damage(arrays["units"])})
 
 
 def test_no_such_unit_set():
+    with pytest.raises(InputError, match="units"):
+        engine_named("trajectory", {"units": ["eVis"]})
     with pytest.raises(InputError, match="there are: 2vis"):
         engine_named("trajectory", {"units": "evis"}).fit(examples(1), silent_monitor)

@@ -14,25 +14,23 @@ from lipmotion.stats.mixture import Mixtures
 from oracles import joint as slow
 
 
-@pytest.mark.parametrize("components", [1, 3])
-@pytest.mark.parametrize("name", STREAMS)
-def test_densities_are_those_of_the_formulas(name, components):
-    hmm = random_joint(1, components=components)
-    model, data = hmm.models[name], observed(np.random.default_rng(2), 12)
-    leaves = np.array([2, 0, 2, 1])
-    found = model.tied.log_density(model.scale.standardise(data.streams[name]), leaves, model.scale.log_determinant)
-    stream = data.streams[name]
-    expected = [
-        [slow.stream_density(model, leaf, stream.values[t], stream.known[t]) for leaf in leaves] for t in range(12)
-    ]
-    assert found == pytest.approx(np.array(expected), abs=1e-3)
+def test_densities_are_those_of_the_formulas():
+    for name, components in (*((name, 3) for name in STREAMS), ("f0", 1)):
+        hmm = random_joint(1, components=components)
+        model, data = hmm.models[name], observed(np.random.default_rng(2), 12)
+        leaves = np.array([2, 0, 2, 1])
+        found = model.tied.log_density(model.scale.standardise(data.streams[name]), leaves, model.scale.log_determinant)
+        stream = data.streams[name]
+        expected = [
+            [slow.stream_density(model, leaf, stream.values[t], stream.known[t]) for leaf in leaves] for t in range(12)
+        ]
+        assert found == pytest.approx(np.array(expected), abs=1e-3)
 
 
-@pytest.mark.parametrize("components", [1, 2])
-def test_voiced_and_unvoiced_together_are_everything(components):
-    hmm = random_joint(3, components=components)
+def test_voiced_and_unvoiced_together_are_everything():
+    hmm = random_joint(3, components=2)
     model = hmm.models["f0"]
-    grid = np.linspace(-40, 40, 200_001)
+    grid = np.linspace(-40, 40, 20_001)
     leaves = np.arange(model.forest.size)
 
     def density(values, known):
@@ -69,13 +67,6 @@ def test_one_gaussian_takes_the_mean_and_variance_of_its_frames():
     mean = np.average(values, axis=0, weights=share)
     assert better.means[0, 0] == pytest.approx(mean, abs=1e-5)
     assert better.variances[0, 0] == pytest.approx(np.average((values - mean) ** 2, axis=0, weights=share), rel=1e-4)
-
-
-def test_what_has_too_little_data_stays_as_it_is():
-    before = standard_normal_densities(1, 2, True, 0.3)
-    after = before.reestimated(sums_of(np.ones((1, 2)), np.ones(1)), 1e-3)
-    assert np.array_equal(after.mixtures.means, before.mixtures.means)
-    assert after.voiced == pytest.approx([0.3])
 
 
 def test_variances_have_a_floor_and_voicing_is_never_certain():

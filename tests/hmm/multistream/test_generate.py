@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hmm.multistream.synthetic import CLASSES, config, inventory, observed, random_joint, utterances
@@ -33,14 +33,7 @@ def random_densities(seed, frames, components, dimensions=2):
     )
 
 
-def test_static_values_alone_are_the_means():
-    densities = random_densities(0, 12, 1)
-    densities.precisions[:, :, 1:] = 0
-    found = generate(densities)
-    assert found.values == pytest.approx(densities.means[:, 0, 0], abs=1e-12)
-    assert found.variance == pytest.approx(1 / densities.precisions[:, 0, 0])
-
-
+@settings(max_examples=30)
 @given(frames=st.integers(1, 12), seed=st.integers(0, 50), pinned=st.booleans())
 def test_one_gaussian_has_the_closed_form(frames, seed, pinned):
     densities = random_densities(seed, frames, 1)
@@ -64,6 +57,7 @@ def test_many_steps_over_one_gaussian_change_nothing():
     assert generate(twins).log_likelihoods[-1] == pytest.approx(generate(densities).log_likelihoods[0], abs=1e-9)
 
 
+@settings(max_examples=30)
 @given(frames=st.integers(1, 25), components=st.integers(2, 4), seed=st.integers(0, 50), pinned=st.booleans())
 def test_the_likelihood_of_the_trajectory_never_falls(frames, components, seed, pinned):
     densities = random_densities(seed, frames, components)
@@ -97,8 +91,8 @@ def test_mixtures_take_sides():
     assert generate(FrameDensities(weights, means, precisions), iterations=1).values == pytest.approx(0.2, abs=0.05)
 
 
-@pytest.mark.parametrize("components", [1, 3])
-def test_the_densities_are_those_of_the_leaves_in_units_of_the_motion(components):
+def test_the_densities_are_those_of_the_leaves_in_units_of_the_motion():
+    components = 3
     hmm = random_joint(1, components=components, states=2)
     path = align(hmm, observed(np.random.default_rng(2), 9), ("sil", "a", "b"))
     found, model = densities_of_path(hmm, path), hmm.models[MOTION]
@@ -109,16 +103,6 @@ def test_the_densities_are_those_of_the_leaves_in_units_of_the_motion(components
     variance = model.tied.mixtures.variances[leaves[middle]] * model.scale.deviation**2
     assert found.precisions[middle] == pytest.approx(1 / variance.reshape(components, 3, 2), rel=1e-6)
     assert (found.precisions[[0, -1], :, 1:] == 0).all()
-
-
-def test_a_path_that_is_certain_is_that_path():
-    hmm = random_joint(3, components=1)
-    path = align(hmm, observed(np.random.default_rng(4), 20), ("sil", "a", "b", "sil"))
-    leaves = hmm.models[MOTION].forest.leaves(path.states.triphones)
-    one = np.eye(len(leaves))[path.frames]
-    assert generate(densities_of_posterior(hmm, leaves, one)).values == pytest.approx(
-        generate(densities_of_path(hmm, path)).values, abs=1e-9
-    )
 
 
 def test_all_paths_together_maximise_the_expected_density():

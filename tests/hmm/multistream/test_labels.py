@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
@@ -30,6 +30,13 @@ def test_a_unit_without_a_frame_is_left_out():
     assert bounds.tolist() == [0, 4, 6]
 
 
+def test_a_unit_begins_half_a_frame_before_its_first_frame():
+    spoken = units_in_time([RecognisedUnit("sil", 0), RecognisedUnit("a", 3), RecognisedUnit("sil", 9)], 0.125)
+    assert [span.start_s for span in spoken] == pytest.approx([0, 0.025, 0.085])
+    assert [span.end_s for span in spoken] == pytest.approx([0.025, 0.085, 0.125])
+
+
+@settings(max_examples=30)
 @given(lengths=st.lists(st.integers(1, 9), min_size=1, max_size=9))
 def test_there_and_back(lengths):
     firsts = np.cumsum([0, *lengths]).tolist()

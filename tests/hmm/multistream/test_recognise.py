@@ -10,7 +10,6 @@ from lipmotion.hmm.decode import decode_units, unit_loop
 from lipmotion.hmm.log_likelihoods import log_likelihoods_of
 from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.hmm.multistream.inventory import triphone_states
-from lipmotion.hmm.multistream.model import ACOUSTIC_ONLY
 from lipmotion.hmm.multistream.recognise import JointRecogniser
 from lipmotion.hmm.multistream.streams import SPEECH, StreamObservations, StreamWeights
 from lipmotion.hmm.states import StateTable
@@ -54,7 +53,7 @@ def candidates(hmm, frames):
     return sequences([unit for unit in hmm.inventory.names if unit != "sp"], counts, frames)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize(("states", "frames"), [(2, 7), (3, 8)])
 def test_nothing_else_is_more_probable(seed, states, frames):
     hmm = random_joint(seed, states=states, components=1 + seed % 2)
@@ -115,20 +114,6 @@ def test_paths_that_are_drawn_go_through_the_states_of_their_units():
     assert drawn == pytest.approx(state_posteriors(recogniser, data), abs=0.13)
 
 
-def test_a_wide_beam_changes_nothing():
-    hmm, data = random_joint(3), observed(np.random.default_rng(5), 40)
-    recogniser = JointRecogniser(hmm)
-    assert recogniser.recognise(data, beam=1e4) == recogniser.recognise(data)
-
-
-def test_the_same_seed_draws_the_same():
-    hmm = random_joint(6, bigram_weight=0.3, insertion=2.0)
-    data = observed(np.random.default_rng(7), 20)
-    recogniser = JointRecogniser(hmm, SOFT)
-    assert sampled_units(recogniser, data, 5, 1) == sampled_units(recogniser, data, 5, 1)
-    assert sampled_units(recogniser, data, 5, 1) != sampled_units(recogniser, data, 5, 2)
-
-
 def test_speech_alone_is_the_plain_model():
     """The densities of all contexts, by name, in plain unit models."""
     hmm = random_joint(8, streams=(SPEECH,))
@@ -154,13 +139,6 @@ def test_speech_alone_is_the_plain_model():
     said = JointRecogniser(hmm).recognise(data)
     assert tuple(s.unit for s in said) == units
     assert [s.first for s in said] == bounds[:-1].tolist()
-
-
-def test_streams_that_are_missing_say_nothing():
-    hmm, data = random_joint(10), observed(np.random.default_rng(11), 20)
-    only = StreamObservations({SPEECH: data.streams[SPEECH]})
-    found = JointRecogniser(hmm, ACOUSTIC_ONLY).recognise(only)
-    assert found == JointRecogniser(hmm, StreamWeights(1, 0, 0, 0, 0)).recognise(data)
 
 
 def test_what_cannot_be_recognised():

@@ -27,30 +27,20 @@ def test_motion_is_unknown_beside_frames_that_were_not_measured():
     assert (stream.values[~stream.known] == 0).all()
 
 
-@pytest.mark.parametrize(
-    "given",
-    [
+def test_what_does_not_fit_is_refused():
+    for given in (
         {"log_f0": np.zeros(4)},
         {"log_f0": np.full(5, np.inf)},
-        {"motion": np.zeros((4, 2))},
         {"motion": np.full((5, 2), NAN)},
         {"motion": np.zeros((5, 2)), "measured": np.ones(4, bool)},
-    ],
-)
-def test_what_does_not_fit_is_refused(given):
-    with pytest.raises(InputError):
-        stream_observations(np.zeros((5, 3)), **given)
-
-
-def test_an_utterance_has_speech():
+    ):
+        with pytest.raises(InputError):
+            stream_observations(np.zeros((5, 3)), **given)
     with pytest.raises(InputError, match="required speech"):
         StreamObservations({"motion": Stream(np.zeros((3, 3)), np.ones(3, bool))})
-
-
-@pytest.mark.parametrize("weight", [-0.1, float("nan"), float("inf")])
-def test_weights_are_positive(weight):
-    with pytest.raises(InputError, match="f0_slope"):
-        StreamWeights(f0_slope=weight)
+    for weight in (-0.1, NAN, float("inf")):
+        with pytest.raises(InputError, match="f0_slope"):
+            StreamWeights(f0_slope=weight)
 
 
 def test_a_weight_of_nothing_switches_off():

@@ -45,17 +45,12 @@ def test_densities_are_mixtures_of_gaussians() -> None:
     assert found[close] == pytest.approx((every - every.max(axis=1, keepdims=True))[close], abs=2e-2)
 
 
-def test_mixture_weights_sum_to_one() -> None:
-    for weights in general_model().weights:
-        assert weights.sum(axis=1) == pytest.approx(1, abs=0.08)  # bytes are steps of 10 %
-
-
-@pytest.mark.parametrize("block", [1, 7, 1000])
-def test_blocks_change_nothing(block: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    features = general_features(vowels())
+def test_blocks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    features = general_features(vowels())[:40]
     wanted = general_model().log_density(features)
-    monkeypatch.setattr(acoustic, "BLOCK", block)
-    assert general_model().log_density(features) == pytest.approx(wanted, abs=2e-3)
+    for block in (1, 7):
+        monkeypatch.setattr(acoustic, "BLOCK", block)
+        assert general_model().log_density(features) == pytest.approx(wanted, abs=2e-3)
 
 
 def test_vowels_are_told_apart() -> None:

@@ -9,7 +9,6 @@ from types import SimpleNamespace
 import pytest
 
 from children import Done, run_child
-from lipmotion.errors import InputError
 from lipmotion.speech.voices import espeak
 from lipmotion.speech.voices.espeak import ESPEAK_NG
 from lipmotion.speech.voices.installed import speak_sentence, voice_named
@@ -22,8 +21,6 @@ INSTALLED = espeak.wheel_folder() is not None
 SENTENCES = {
     "de": ("Die schöne Köchin möchte fünf süße Äpfel.", "die schöne köchin möchte fünf süße äpfel"),
     "fr": ("Une belle huître, bon vin blanc.", "une belle huître bon vin blanc"),
-    "es": ("El niño pequeño corre rápido.", "el niño pequeño corre rápido"),
-    "it": ("Gli gnocchi della mamma.", "gli gnocchi della mamma"),
     "pt": ("O coração não é pão.", "o coração não é pão"),
 }
 
@@ -112,7 +109,7 @@ class TestPackage:
         done = run_events(dict(espeak._library()))
         assert json.loads(done.stdout)["version"].startswith("1.52")
 
-    @pytest.mark.parametrize("language", SENTENCES)
+    @pytest.mark.parametrize("language", ["de", *(pytest.param(each, marks=pytest.mark.long) for each in ("fr", "pt"))])
     def test_other_languages(self, language: str, caplog: pytest.LogCaptureFixture) -> None:
         text, words = SENTENCES[language]
         audio, units = speak_sentence(text, voice_named(language))
@@ -120,10 +117,6 @@ class TestPackage:
         assert list(dict.fromkeys(said)) == words.split()
         assert units[-1].end_s == pytest.approx(audio.duration_s)
         assert caplog.text == ""
-
-    def test_english_of_another_kind(self) -> None:
-        _, units = speak_sentence("Hello mother", voice_named("espeak-ng:en-gb"))
-        assert {span.label.word for span in units} == {"", "hello", "mother"}
 
     def test_numbers_and_signs_have_the_words_that_are_said(self) -> None:
         _, units = speak_sentence("It cost 42 euros, mother-in-law.", voice_named("espeak-ng:en-us+f2"))
@@ -133,7 +126,3 @@ class TestPackage:
     def test_letters_of_other_scripts_are_said_somehow(self) -> None:
         _, units = speak_sentence("שלום 12345678901234567890", voice_named("espeak-ng:en-us+f2"))
         assert len(units) > 40
-
-    def test_no_such_voice(self) -> None:
-        with pytest.raises(InputError, match="no voice 'tlh' is installed"):
-            voice_named("tlh")

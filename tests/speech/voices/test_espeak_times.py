@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from lipmotion.speech.voices.espeak_times import corrected_phone_times
 from lipmotion.types import Audio
@@ -24,18 +23,18 @@ def starts(labels: list[tuple[str, float]], audio: Audio) -> list[float]:
     return [round(span.start_s, 4) for span in corrected_phone_times(labels, audio)]
 
 
-@pytest.mark.parametrize("stop", ["p", "t2", "k", "tS", "b", "d", "g", "dZ"])
-def test_a_stop_begins_with_its_closure(stop: str) -> None:
-    assert starts([("a", 0.1), (stop, 0.4), ("i:", 0.5)], sound((0.35, 0.42))) == [0.1, 0.35, 0.5]
+def test_a_stop_begins_with_its_closure() -> None:
+    for stop in ("p", "t2", "k", "tS", "b", "d", "g", "dZ"):
+        assert starts([("a", 0.1), (stop, 0.4), ("i:", 0.5)], sound((0.35, 0.42))) == [0.1, 0.35, 0.5]
 
 
 def test_a_long_silence_is_not_all_closure() -> None:
     assert starts([("a", 0.1), ("p", 0.4)], sound((0.2, 0.4))) == [0.1, 0.34]
 
 
-@pytest.mark.parametrize(("before", "label"), [("a", "s"), ("a", "m"), ("_:", "p"), ("_", "k")])
-def test_other_silences_stay(before: str, label: str) -> None:
-    assert starts([(before, 0.1), (label, 0.4)], sound((0.35, 0.4))) == [0.1, 0.4]
+def test_other_silences_stay() -> None:
+    for before, label in (("a", "s"), ("a", "m"), ("_:", "p"), ("_", "k")):
+        assert starts([(before, 0.1), (label, 0.4)], sound((0.35, 0.4))) == [0.1, 0.4]
 
 
 def test_a_closure_never_reaches_past_the_phone_before() -> None:

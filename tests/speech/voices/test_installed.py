@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import closing
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -54,43 +53,42 @@ def test_without_synthesisers_there_are_none() -> None:
             speak_sentence("Hello", voice)
 
 
-@pytest.mark.parametrize("voice", FAKED)
 @pytest.mark.usefixtures("faked")
-def test_a_voice_says_phones_in_time(voice: SyntheticVoice) -> None:
-    audio, units = speak_sentence("Hello", voice)
-    assert audio.rate_hz == 16_000
-    assert audio.duration_s == pytest.approx(1.0)
-    found = [(span.label.phone, span.label.word, round(span.start_s, 6)) for span in units]
-    assert found == [
-        ("sil", "", 0.0),
-        ("hh", "hello", 0.2),
-        ("ax", "hello", 0.3),
-        ("l", "hello", 0.4),
-        ("ow", "hello", 0.5),
-        ("sil", "", 0.9),
-    ]
+def test_a_voice_says_phones_in_time() -> None:
+    for voice in EACH:
+        audio, units = speak_sentence("Hello", voice)
+        assert audio.rate_hz == 16_000
+        assert audio.duration_s == pytest.approx(1.0)
+        found = [(span.label.phone, span.label.word, round(span.start_s, 6)) for span in units]
+        assert found == [
+            ("sil", "", 0.0),
+            ("hh", "hello", 0.2),
+            ("ax", "hello", 0.3),
+            ("l", "hello", 0.4),
+            ("ow", "hello", 0.5),
+            ("sil", "", 0.9),
+        ]
 
 
 @pytest.mark.parametrize("voice", EACH)
-@pytest.mark.parametrize("text", HARD)
 @pytest.mark.usefixtures("faked")
-def test_any_letters_reach_the_synthesiser(voice: SyntheticVoice, text: str) -> None:
-    assert len(list(speak_sentences([text, text], voice, Lexicon({"helló": (("hh", "ax", "l", "ow"),)})))) == 2
+def test_any_letters_reach_the_synthesiser(voice: SyntheticVoice) -> None:
+    lexicon = Lexicon({"helló": (("hh", "ax", "l", "ow"),)})
+    assert len(list(speak_sentences(HARD, voice, lexicon))) == len(HARD)
 
 
 @pytest.mark.parametrize("voice", EACH)
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("they crash", "failed with 1 .no such sound"),
-        ("nonsense", "nonsense"),
-        ("no bytes", "cannot be run|nonsense"),
-        ("... ", "holds no word"),
-    ],
-)
-def test_errors_are_clear_and_nothing_stays(faked: Path, voice: SyntheticVoice, text: str, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        speak_sentence(text, voice)
+def test_errors_are_clear_and_nothing_stays(faked: Path, voice: SyntheticVoice) -> None:
+    for text, message in (("they crash", "failed with 1 .no such sound"), ("nonsense", "nonsense")):
+        with pytest.raises(InputError, match=message):
+            speak_sentence(text, voice)
+        assert list(faked.iterdir()) == []
+
+
+def test_bytes_that_are_no_text_and_texts_without_words_are_refused(faked: Path) -> None:
+    for text, message in (("no bytes", "cannot be run|nonsense"), ("... ", "holds no word")):
+        with pytest.raises(InputError, match=message):
+            speak_sentence(text, FAKED[0])
     assert list(faked.iterdir()) == []
 
 
@@ -101,18 +99,16 @@ def test_a_sentence_that_festival_leaves_out_is_missed(faked: Path) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("voice", EACH)
-def test_a_program_that_hangs_is_stopped(faked: Path, voice: SyntheticVoice, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_program_that_hangs_is_stopped(faked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(synthesiser, "START_S", 1.0)
     monkeypatch.setattr(synthesiser, "EACH_S", 0.0)
     with pytest.raises(InputError, match="did not end within 1 s"):
-        speak_sentence("hang", voice)
+        speak_sentence("hang", FAKED[0])
     assert list(faked.iterdir()) == []
 
 
-@pytest.mark.parametrize("voice", EACH)
-def test_temporary_files_go_even_if_not_all_is_heard(faked: Path, voice: SyntheticVoice) -> None:
-    said = speak_sentences(["hello", "hello"], voice)
+def test_temporary_files_go_even_if_not_all_is_heard(faked: Path) -> None:
+    said = speak_sentences(["hello", "hello"], FAKED[0])
     next(said)
     assert len(list(faked.iterdir())) == 1
     said.close()
@@ -120,60 +116,25 @@ def test_temporary_files_go_even_if_not_all_is_heard(faked: Path, voice: Synthet
 
 
 @pytest.mark.usefixtures("faked")
-def test_no_texts_are_nothing() -> None:
-    assert list(speak_sentences([], FAKED[0])) == []
-
-
-@pytest.mark.parametrize(
-    ("voice", "message"),
-    [
-        (SyntheticVoice("a", "dectalk", "a"), "'dectalk'; required one of: flite, festival"),
-        (SyntheticVoice("rms", "flite", "rms"), "no voice 'rms' here; it has: kal16, slt"),
-    ],
-)
-@pytest.mark.usefixtures("faked")
-def test_unknown_voices(voice: SyntheticVoice, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        speak_sentence("Hello", voice)
-
-
-@pytest.mark.parametrize(
-    ("name", "full_name"),
-    [
+def test_voices_by_name() -> None:
+    for name, full_name in (
         ("flite:slt", "flite:slt"),
         ("slt", "flite:slt"),
         ("kal_diphone", "festival:kal_diphone"),
         ("en-us+f2", "espeak-ng:en-us+f2"),
-        ("espeak-ng:de", "espeak-ng:de"),
         ("de+f2", "espeak-ng:de+f2"),
-    ],
-)
-@pytest.mark.usefixtures("faked")
-def test_voices_by_name(name: str, full_name: str) -> None:
-    assert voice_named(name).full_name == full_name
-
-
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
+    ):
+        assert voice_named(name).full_name == full_name
+    for name, message in (
         ("dectalk:paul", "unknown synthesiser 'dectalk'; required one of: flite, festival, espeak-ng"),
         ("paul", "no voice 'paul' is installed; lipmotion speak --voices lists"),
         ("flite:de", "no voice 'flite:de' is installed"),
         ("de+robosoft", "no voice 'de.robosoft' is installed"),
-    ],
-)
-@pytest.mark.usefixtures("faked")
-def test_names_of_no_voice(name: str, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        voice_named(name)
-
-
-@pytest.mark.usefixtures("faked")
-def test_a_name_of_several_voices(monkeypatch: pytest.MonkeyPatch) -> None:
-    twice = replace(SYNTHESISERS["festival"], voices=SYNTHESISERS["flite"].voices)
-    monkeypatch.setitem(SYNTHESISERS, "festival", twice)
-    with pytest.raises(InputError, match="several voices are called 'slt'; give one of: flite:slt, flite:slt"):
-        voice_named("slt")
+    ):
+        with pytest.raises(InputError, match=message):
+            voice_named(name)
+    with pytest.raises(InputError, match="no voice 'rms' here; it has: kal16, slt"):
+        speak_sentence("Hello", SyntheticVoice("rms", "flite", "rms"))
 
 
 @pytest.mark.usefixtures("bare")
@@ -251,7 +212,7 @@ TEXTS = ["Please put both blue bowls on the table.", "The judge measured the bei
 
 def test_real_voices_say_what_the_dictionary_says(real: SyntheticVoice) -> None:
     lexicon = Lexicon()
-    for text, (audio, units) in zip(TEXTS, speak_sentences(TEXTS, real), strict=True):
+    for text, (audio, units) in zip(TEXTS[:2], speak_sentences(TEXTS[:2], real), strict=True):
         words = words_of(text)
         assert [span.label.word for span in units if not is_silent(span.label.phone)] != []
         assert list(dict.fromkeys(span.label.word for span in units if span.label.word)) == list(dict.fromkeys(words))
@@ -263,12 +224,7 @@ def test_real_voices_say_what_the_dictionary_says(real: SyntheticVoice) -> None:
         assert sum(not is_silent(span.label.phone) for span in units) == pytest.approx(expected, abs=2)
 
 
-def test_real_voices_say_the_same_again(real: SyntheticVoice) -> None:
-    first, again = speak_sentence(TEXTS[0], real), speak_sentence(TEXTS[0], real)
-    assert np.array_equal(first[0].samples, again[0].samples)
-    assert first[1] == again[1]
-
-
+@pytest.mark.long
 def test_the_times_of_real_voices_are_those_that_the_aligner_hears(real: SyntheticVoice, toy_model: Model) -> None:
     recogniser, late_s = Recogniser(toy_model.phones, "general"), []
     for audio, units in speak_sentences(TEXTS, real):

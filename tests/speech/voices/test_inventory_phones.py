@@ -31,7 +31,7 @@ def cost_of(found: Sequence[str], wanted: Sequence[str]) -> float:
     return sum(module._cost(*pair) for pair in pairs) + module.GAP * gaps
 
 
-@settings(max_examples=60)
+@settings(max_examples=40)
 @given(st.lists(st.sampled_from(SOUNDS), max_size=5), st.lists(st.sampled_from(SOUNDS), max_size=5))
 def test_matches_are_the_cheapest(found: list[str], wanted: list[str]) -> None:
     matched = [match for match in matches(found, wanted) if match >= 0]
@@ -52,11 +52,6 @@ def test_unstressed_vowels_are_reduced_and_words_known() -> None:
         Unit("ih", word="it"),
         Unit("t", word="it"),
     ]
-
-
-def test_what_the_synthesiser_says_stays() -> None:
-    lexicon = Lexicon({"either": (("iy", "dh", "axr"),)})
-    assert [unit.phone for unit in with_words(["ay", "dh", "er"], ["either"], lexicon)] == ["ay", "dh", "axr"]
 
 
 def test_pauses_are_named_by_place_and_length() -> None:
@@ -90,13 +85,10 @@ def test_several_phones_share_a_label_and_parts_join() -> None:
     ]
 
 
-@pytest.mark.parametrize(
-    ("said", "message"),
-    [(timeline(("xx", 0.0, 0.1)), "'xx', which is no phone"), (timeline(("pau", 0.0, 0.1)), "no phone; give")],
-)
-def test_it_says_what_is_wrong(said: Timeline[str], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        inventory_timeline(said, ARPABET_PHONES, ["it"], LEXICON, 0.2)
+def test_it_says_what_is_wrong() -> None:
+    for label, message in (("xx", "'xx', which is no phone"), ("pau", "no phone; give")):
+        with pytest.raises(InputError, match=message):
+            inventory_timeline(timeline((label, 0.0, 0.1)), ARPABET_PHONES, ["it"], LEXICON, 0.2)
 
 
 def test_tables_lead_to_the_inventory() -> None:

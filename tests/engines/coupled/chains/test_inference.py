@@ -121,15 +121,6 @@ def test_a_factorial_hmm_of_one_chain_is_the_hmm():
     np.testing.assert_allclose(result.densities[0], posterior, atol=2e-5)
 
 
-def test_a_multistream_hmm_without_visual_weight_is_the_audio_hmm():
-    audio = made(MULTISTREAM, (THREE,), 1, weights=(1.0, 0.0))
-    seen, unseen = observations(6), observations(6, seen=False)
-    one, other = (audio.infer(x, audio.full_lattice).posteriors for x in (seen, unseen))
-    np.testing.assert_allclose(one.chains[0], other.chains[0], atol=1e-6)
-    posterior, _ = single_chain(audio, 0, audio.transitions.advance[0], seen)
-    np.testing.assert_allclose(one.densities[0], posterior, atol=2e-5)
-
-
 def test_one_gaussian_each_makes_hmm_and_multistream_hmm_the_same():
     joint, apart = made(HMM, (THREE,), 1, components=(1,)), made(MULTISTREAM, (THREE,), 1, components=(1, 1))
     whole = joint.groups[0].mixtures

@@ -1,5 +1,4 @@
 import numpy as np
-import pytest
 
 from engines.coupled.tiny import THREE, TWO, chains, structure
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM
@@ -15,25 +14,27 @@ def random_counts(transitions, seed=0):
     return np.random.default_rng(seed).gamma(0.5, 20, len(transitions.product.arc_from))
 
 
-@pytest.mark.parametrize(
-    ("kind", "sets", "limit"),
-    [(COUPLED, (THREE, TWO), 1), (FACTORIAL, (THREE, TWO), 1), (COUPLED, (THREE, TWO), None), (HMM, (THREE,), 1)],
-)
-def test_no_other_tables_have_a_higher_expected_likelihood(kind, sets, limit):
-    transitions = chains(structure(kind, sets, limit=limit)).transitions
-    counts = random_counts(transitions)
-    best = transitions.reestimated(counts)
-    value = expected_log_likelihood(best, counts)
-    assert value > expected_log_likelihood(transitions, counts)
-    draw = np.random.default_rng(1)
-    for size in (1e-3, 1e-2, 0.1):
-        for _ in range(20):
-            moved = tuple(
-                np.clip(a + size * draw.normal(size=a.shape) * a * (1 - a), 1e-5, 1 - 1e-5) for a in best.advance
-            )
-            assert expected_log_likelihood(Transitions(best.product, best.rows, moved), counts) <= value + 1e-6 * abs(
-                value
-            )
+def test_no_other_tables_have_a_higher_expected_likelihood():
+    for kind, sets, limit in (
+        (COUPLED, (THREE, TWO), 1),
+        (FACTORIAL, (THREE, TWO), 1),
+        (COUPLED, (THREE, TWO), None),
+        (HMM, (THREE,), 1),
+    ):
+        transitions = chains(structure(kind, sets, limit=limit)).transitions
+        counts = random_counts(transitions)
+        best = transitions.reestimated(counts)
+        value = expected_log_likelihood(best, counts)
+        assert value > expected_log_likelihood(transitions, counts)
+        draw = np.random.default_rng(1)
+        for size in (1e-3, 1e-2, 0.1):
+            for _ in range(8):
+                moved = tuple(
+                    np.clip(a + size * draw.normal(size=a.shape) * a * (1 - a), 1e-5, 1 - 1e-5) for a in best.advance
+                )
+                assert expected_log_likelihood(
+                    Transitions(best.product, best.rows, moved), counts
+                ) <= value + 1e-6 * abs(value)
 
 
 def test_without_a_mask_it_is_the_closed_form():

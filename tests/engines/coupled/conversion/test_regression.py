@@ -94,10 +94,10 @@ def test_every_viseme_has_a_regression_for_each_position_of_a_state():
     assert len(TWO.units) == 2
 
 
-@pytest.mark.parametrize("regression", [True, False])
+@pytest.mark.parametrize("regression", [True, pytest.param(False, marks=pytest.mark.long)])
 def test_the_regression_brings_motion_closer(regression):
     config = CoupledConfig(acoustic_regression=regression, mixtures=1, closures=False, articulation=False)
-    model = fit_coupled(examples(), config, silent_monitor)
+    model = fit_coupled(examples(6), config, silent_monitor)
     assert (model.regression is not None) is regression
     held_out = example(("t", "aa", "p", "iy", "m", "uw", "s", "aa"), seed=77)
     generated = CoupledEngine(config).generate(model, held_out.speech).motion
