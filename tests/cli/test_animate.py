@@ -38,7 +38,7 @@ def test_it_is_the_function_of_the_same_name(
 
 
 def test_a_video(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
-    assert run(*basics, "-o", "a.mp4", "--fps", "5") == (0, ["a.mp4"], [])
+    assert run(*basics, "-o", "a.mp4", "--fps", "5", "--size", "160") == (0, ["a.mp4"], [])
     assert (here / "a.mp4").stat().st_size > 5000
 
 

@@ -46,12 +46,14 @@ def test_a_mesh_without_blendshapes_is_bound_once(run: RunCommand, here: Path, b
     bound = run("character", "head.obj", "--lip-points", "points.csv", "--write-binding", "head.binding")
     assert bound.code == 0
     assert (here / "head.binding").exists()
-    done = run(*basics, "--character", "head.obj", "--binding", "head.binding", "-o", "said.mp4", "--fps", "10")
+    done = run(
+        *basics, "--character", "head.obj", "--binding", "head.binding", "-o", "said.mp4", "--fps", "5", "--size", "90"
+    )
     assert done == (0, ["said.mp4"], [])
 
 
 def test_a_character_speaks(run: RunCommand, glb: Path, basics: tuple[object, ...], here: Path) -> None:
-    done = run(*basics, "--character", glb, "-o", "said.mp4", "said.json", "said.glb", "--fps", "10")
+    done = run(*basics, "--character", glb, "-o", "said.mp4", "said.json", "said.glb", "--fps", "3")
     assert done == (0, ["said.mp4", "said.json", "said.glb"], [])
     with av.open(str(here / "said.mp4")) as video:
         assert (video.streams.video[0].width, video.streams.video[0].height) == (1280, 720)

@@ -191,7 +191,8 @@ def _label_file(name: str, suffix: str, content: bytes | str, *messages: str) ->
 _label_file("binary", ".TextGrid", b"ooBinaryFile\x08TextGrid\x00\xff", "binary TextGrid; save it as a text file")
 _label_file("a billion tiers", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 1 <exists> 1000000000\n', "tier 1 is damaged")
 _label_file("phones that overlap", ".lab", "0 2000000 p\n1000000 3000000 aa\n", "before the one ahead of it ends")
-_label_file("an unknown phone", ".lab", "0 1000000 p\n1000000 2000000 qq\n", "line 2 is 'qq', which is no phone")
+_label_file("an unknown phone", ".lab", "0 1000000 p\n1000000 2000000 aa\n2000000 3000000 b\n3000000 4000000 qq\n",
+            "line 4 is 'qq', which is no phone")  # fmt: skip
 _label_file("a line of another form", ".lab", "0 1000000 p\nhello\n", "line 2 is 'hello'; required, as in line 1")
 _label_file("phones of another recording", ".lab", "0 900000000 p\n", "the sound lasts")
 _label_file("more phones than frames", ".lab", "".join(f"{i}0000 {i + 1}0000 p\n" for i in range(2000)),

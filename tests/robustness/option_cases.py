@@ -20,7 +20,9 @@ _option("--fps inf", 3, "the frame rate is inf, required 1 to 1000 a second", "-
 _option("--rate nan", 3, "the frame rate is nan, required 1 to 1000 a second", "--rate=nan")
 _option("--channels of an empty text", 3, "no motion channel ''", "--channels", "")
 _option("--channels of one name twice", 3, "channel names repeat", "--channels", "opening,opening")
-_option("an unknown --speaker", 3, "the model tells no speakers apart, so it has no 'nobody'", "--speaker", "nobody")
+_option(
+    "an unknown --speaker", 3, "the model tells no speakers apart, so that there is no 'nobody'", "--speaker", "nobody"
+)
 _option("an unknown --recogniser", 3, "unknown recogniser 'best'; required one of: auto", "--recogniser", "best")
 _option("--intensity nan", 3, "the intensity is nan, required 0 to 3", "--intensity=nan")
 _option("--anticipation-ms 2000", 3, "the anticipation is 2000 ms, required -1000", "--anticipation-ms=2000")
