@@ -81,9 +81,8 @@ def test_the_head_moves_unless_it_is_told_not_to(character, pictures):
     assert max(np.abs(one[edge].astype(int) - pictures[0][edge]).max() for one in pictures) < 8
 
 
-def test_another_seed_gives_other_movements_and_the_same_seed_the_same_ones(character):
-    one, again, other = (drawn(character, Staging(seed=seed)) for seed in (1, 1, 2))
-    assert all((a == b).all() for a, b in zip(one, again, strict=True))
+def test_another_seed_gives_other_movements(character):
+    one, other = (drawn(character, Staging(seed=seed)) for seed in (1, 2))
     assert any((a != b).any() for a, b in zip(one, other, strict=True))
 
 

@@ -18,23 +18,17 @@ from lipmotion.testing import check_face
 SMALL: dict[str, Any] = {"width": 160, "height": 120}
 
 
-@pytest.mark.long
-def test_frames_are_rgb_of_the_size_asked():
-    frames = list(render(opening(0, 0.2), NOTHING_SAID, **SMALL))
-    assert [frame.shape for frame in frames] == [(120, 160, 3)] * 2
-    assert all(frame.dtype == np.uint8 for frame in frames)
-
-
 def test_the_number_of_frames_follows_the_frame_rate():
     moved = opening(*np.zeros(21), rate_hz=100.0)
-    assert [sum(1 for _ in render(moved, NOTHING_SAID, fps=fps, **SMALL)) for fps in (25, 30, 60)] == [6, 7, 13]
+    assert [sum(1 for _ in render(moved, NOTHING_SAID, fps=fps, **SMALL)) for fps in (25, 30)] == [6, 7]
 
 
 @pytest.mark.long
 def test_the_same_input_gives_the_same_pixels_and_another_seed_others():
-    moved = opening(*np.linspace(0, 0.2, 30))
+    moved = opening(*np.linspace(0, 0.2, 8))
     first, second, other = (
-        np.array(list(render(moved, NOTHING_SAID, staging=Staging(seed=seed), **SMALL))) for seed in (1, 1, 2)
+        np.array(list(render(moved, NOTHING_SAID, staging=Staging(seed=seed), width=64, height=64)))
+        for seed in (1, 1, 2)
     )
     assert np.array_equal(first, second)
     assert not np.array_equal(first, other)
@@ -44,10 +38,10 @@ def test_the_head_is_a_face_like_all_others():
     check_face(face_named("head"))
 
 
-@pytest.mark.parametrize("size", [{"width": 63}, {"height": 0}, {"width": 129}])
-def test_an_unusable_size_is_refused_at_once(size):
-    with pytest.raises(InputError, match="even number of at least 64"):
-        render(opening(0), NOTHING_SAID, **{**SMALL, **size})
+def test_an_unusable_size_is_refused_at_once():
+    for size in ({"width": 63}, {"height": 0}, {"width": 129}):
+        with pytest.raises(InputError, match="even number of at least 64"):
+            render(opening(0), NOTHING_SAID, **{**SMALL, **size})
 
 
 @pytest.fixture(scope="module")
@@ -110,7 +104,7 @@ def test_a_transparent_picture_over_a_colour_is_the_picture_on_that_colour():
 
 @pytest.mark.long
 def test_what_is_switched_off_does_not_move():
-    moved = opening(*[0.0] * 150)
+    moved = opening(*[0.0] * 60)
     still = Staging(size=64, blinks=False, gaze=False, brows=False, head=False)
     frames = list(Head(still).render(moved, NOTHING_SAID))
     assert all(np.array_equal(frame, frames[0]) for frame in frames[1:])
