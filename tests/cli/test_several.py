@@ -47,16 +47,18 @@ def test_words_beside_recordings_are_used(
 
 
 def test_what_fails_does_not_stop_the_others(run: RunCommand, takes: Path, toy_model_file: Path) -> None:
+    """The exit code is the highest of those that failed."""
     (takes / "0.wav").write_text("no sound")
+    (takes / "a.txt").write_text("five " * 100)
     done = run("animate", takes, "--model", toy_model_file, "-o", "out/")
-    assert (done.code, done.out) == (3, ["out/a.json", "out/b.json"])
-    assert len(done.err) == 2
-    assert "skipped" in done.err[0]
-    assert "1 of 3 recordings were not animated" in done.err[1]
+    assert (done.code, done.out) == (5, ["out/b.json"])
+    assert len(done.err) == 3
+    assert all("skipped" in line for line in done.err[:2])
+    assert "2 of 3 recordings were not animated" in done.err[2]
     done = run("animate", takes, "--model", toy_model_file, "-o", "out/", "--machine-readable")
     lines = [json.loads(line) for line in done.out]
     outcomes = [line["outcome"] for line in lines if line["type"] == "item"]
-    assert outcomes == ["skipped", "animated", "animated"]
+    assert outcomes == ["skipped", "skipped", "animated"]
     assert lines[-1]["type"] == "failure"
     shares = [line["value"] for line in lines if line["type"] == "progress"]
     assert shares == sorted(shares)

@@ -54,6 +54,8 @@ def test_the_picture_keeps_its_form_and_its_place() -> None:
     assert inner[-4, -4].tolist() == [0, 200, 0]
     middle = np.abs(np.diff(inner[-4, :, 1])).argmax()
     assert middle == pytest.approx(width / 2, abs=1.5)
+    (turned,) = with_inset([frame], [picture[::-1, ::-1]])
+    assert np.abs(turned[rows, columns].astype(int) - made[rows, columns][::-1, ::-1]).max() <= 1
 
 
 def test_every_frame_has_its_own_picture_and_is_not_changed() -> None:

@@ -3,6 +3,7 @@ import pytest
 
 from lipmotion.errors import InputError
 from lipmotion.faces import FACES, Staging, staged_face
+from lipmotion.faces.portrait.movement import NECK_END, NECK_TOP, PIVOT_Y, HeadField, HeadPlacement, grid
 from lipmotion.faces.portrait.pose import MouthPose
 from lipmotion.faces.portrait.rasteriser import FacePose, Rasteriser
 from lipmotion.faces.portrait.view import View
@@ -140,3 +141,25 @@ def test_an_unusable_motion_is_refused_at_once():
     face = staged_face("woman", Staging())
     with pytest.raises(InputError, match="no channel 'opening'"):
         face.render(Motion(np.zeros((3, 1)), 25.0, (Channel("width"),)), NOTHING_SAID)
+
+
+def test_columns_and_rows_are_those_of_the_pixel_centres():
+    view = View(80)
+    whole = view.window(-9, -9, 9, 9)
+    for columns in (whole.columns(), whole.columns(4)):
+        assert columns == pytest.approx(-columns[::-1], abs=1e-6)  # the point between the eyes is in the middle
+    assert np.diff(whole.columns()) == pytest.approx(1 / view.scale, rel=1e-4)
+    assert whole.rows()[32] == pytest.approx(0.5 / view.scale)
+    part = view.window(-0.5, 0.2, 0.5, 0.6)
+    assert part.columns() == pytest.approx(whole.columns()[part.x0 : part.x1])
+
+
+def test_a_head_that_rolls_is_turned_about_its_neck():
+    """Each place moves at right angles to its distance from the pivot, and clockwise; below the neck nothing moves."""
+    window = View(160).window(-9, -9, 9, 9)
+    x, y = grid(window)
+    right, down = HeadField(window).shifts(HeadPlacement(roll=0.1))
+    head = y < NECK_TOP
+    assert (right * x + down * (y - PIVOT_Y))[head] == pytest.approx(0, abs=1e-9)
+    assert right[head].max() < 0  # what is shown at the top comes from the left
+    assert not right[y > NECK_END].any()

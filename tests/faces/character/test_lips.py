@@ -127,6 +127,14 @@ def test_the_lower_lip_of_f_touches_the_upper_teeth():
     assert contact(CharacterPose(gap=0.05, upper_rise=0.036))[60][2] > lower[2] + 0.02
 
 
+def test_pressed_lips_are_thinner():
+    def height(pose: CharacterPose) -> float:
+        contour = section_points(pose, figure().skin.base_z)[0]
+        return float(contour[20, 1] - contour[60, 1])
+
+    assert height(CharacterPose(press=1)) == pytest.approx(0.65 * height(CharacterPose()), rel=0.05)
+
+
 def test_the_corners_of_closed_lips_are_level_with_their_middle():
     for pose in (CharacterPose(), CharacterPose(press=1), CharacterPose(width=1.1, press=1)):
         assert np.ptp(contact(pose)[:, 1]) < 0.015
