@@ -19,7 +19,8 @@ def test_there_are_52_and_15():
 
 def test_names_as_files_spell_them():
     arkit = {
-        "jawOpen": "jawOpen", "JawOpen": "jawOpen", "head.mouthSmile_L": "mouthSmileLeft", "mouth_funnel": "mouthFunnel",
+        "jawOpen": "jawOpen", "JawOpen": "jawOpen",
+        "mouth_funnel": "mouthFunnel", "head.mouthSmile_L": "mouthSmileLeft",
         "blendShape1.mouthPress_R": "mouthPressRight", "Face_mouthLowerDownRight": "mouthLowerDownRight",
         "mouthSmile": None, "Fcl_MTH_A": None, "": None,
     }  # fmt: skip

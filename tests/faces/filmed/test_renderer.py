@@ -34,8 +34,8 @@ def appearance(filmed_face: FilmedFace) -> Appearance:
 @pytest.fixture(scope="module")
 def spoken() -> Motion:
     """The middle of a sentence, which the mouth opens and closes in."""
-    motion = toy_motion(toy_sentences(4)[1].units, 25.0)
-    return Motion(motion.values[10 : 10 + FRAMES], 25.0, motion.channels)
+    motion = toy_motion(toy_sentences(4)[3].units, 25.0)
+    return Motion(motion.values[20 : 20 + FRAMES], 25.0, motion.channels)
 
 
 @pytest.fixture(scope="module")
