@@ -5,7 +5,7 @@ from lipmotion.export.motion.rounded import formatted_rows
 
 
 def test_rows_are_the_rounded_values(monkeypatch):
-    for block, precision in ((1, np.float32), (7, np.float64), (50, np.float64), (2000, np.float32)):
+    for block, precision in ((1, "f4"), (7, "f8"), (50, "f8"), (2000, "f4")):
         monkeypatch.setattr(rounded, "BLOCK", block)
         values = np.random.default_rng(0).normal(0, 3, (50, 7)).astype(precision)
         parsed = np.array([[float(number) for number in row.split(",")] for row in formatted_rows(values)])
