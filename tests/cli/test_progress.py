@@ -97,13 +97,6 @@ def test_training_for_a_program(run: RunCommand, toy_corpus: Corpus, here: Path)
     assert [path.name for path in here.iterdir()] == ["m.lipmotion"]
 
 
-def test_evaluation_for_a_program(run: RunCommand, toy_corpus: Corpus, toy_model_file: Path) -> None:
-    done = run("evaluate", toy_model_file, toy_corpus.path, "--machine-readable")
-    last = objects(done)[-1]
-    assert (done.code, last["type"]) == (0, "success")
-    assert last["figures"]["clips"] == 2  # type: ignore[index]
-
-
 def test_a_failure_is_said_to_both(run: RunCommand) -> None:
     done = run("train", "missing", "-o", "m", "--machine-readable")
     assert done.code == 4

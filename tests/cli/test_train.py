@@ -62,18 +62,13 @@ def test_speakers_are_chosen(run: RunCommand, toy_corpus: Corpus, here: Path) ->
     )
 
 
-def test_the_joint_engine(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
-    assert run("train", toy_corpus.path, "-o", "joint", "--engine", "joint").code == 0
-    assert load_model(here / "joint").engine.name == "joint"
-    assert run("evaluate", "joint", toy_corpus.path).code == 0
-    assert "motion: " in "\n".join(run("info", "joint", "--structure").out)
-
-
 def test_what_is_given_wins_over_what_the_joint_engine_recognises(
     run: RunCommand, toy_corpus: Corpus, toy_speech: Path, here: Path
 ) -> None:
     own = ["--units", "eVis", "--set", "recognise_units=true", "--set", "mixtures=1"]
     assert run("train", toy_corpus.path, "-o", "m", "--engine", "joint", *own).code == 0
+    assert load_model(here / "m").engine.name == "joint"
+    assert "motion: " in "\n".join(run("info", "m", "--structure").out)
     told = {"alone": [], "right": ["--transcript", "see bob papa mama"], "wrong": ["--transcript", "we saw a weasel"]}
     for name, options in (told | {"again": ["--units", "alone.json"]}).items():
         assert run("animate", toy_speech, "--model", "m", "-o", f"{name}.json", *options).code == 0

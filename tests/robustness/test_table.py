@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from cli.conftest import RunCommand
-from lipmotion.cli import info
 from robustness.case import CASES, Bench, Case
 from robustness.document import DOCUMENT, rendered
 
@@ -36,18 +35,6 @@ def test_bad_input(case: Case, bench: Bench, run: RunCommand, here: Path, caplog
         assert bool(caplog.records or done.err) == bool(case.messages), printed
         for path in here.glob("*.json"):
             json.loads(path.read_text(encoding="utf-8"), parse_constant=pytest.fail)
-
-
-def test_not_enough_memory(run: RunCommand, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(_: object) -> None:
-        raise MemoryError("Unable to allocate 7 TiB")
-
-    monkeypatch.setattr(info, "run", fail)
-    done = run("info")
-    assert done.code == 3
-    assert done.err == [
-        "lipmotion: error: not enough memory (Unable to allocate 7 TiB); give a shorter recording or a smaller file"
-    ]
 
 
 def test_there_are_many_and_none_twice() -> None:

@@ -12,7 +12,7 @@ from export.cues.conftest import result, spoken, timeline
 from lipmotion.export.cues.choose import choose_cues, default_hold_frames
 from lipmotion.export.cues.sheet import CueSheet
 from lipmotion.testing.toy import ToySentence, toy_sentences
-from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
+from lipmotion.types import Channel, Generation, Motion, Timeline, Unit
 from lipmotion.units import LIP_CLOSING, PHONES, VISEMES, is_silent
 
 FRAME_RATES = [12.0, 24.0, 25.0, 30.0, 60.0]
@@ -193,10 +193,3 @@ def test_phones_outside_the_motion() -> None:
     sheet = choose_cues(result(units, Motion(np.full((41, 1), 0.2), 100.0, (Channel("opening"),))))
     check(sheet, 1.0, 2)
     assert sheet.cues.spans[-1].label == "A"
-
-
-def test_a_word_that_is_said_twice_is_two_words() -> None:
-    big = tuple(Span(n / 10, (n + 1) / 10, Unit(phone, word="big")) for n, phone in enumerate("b ih g b ih g".split()))
-    motion = Motion(np.zeros((61, 1)), 100.0, (Channel("opening"),))
-    made = Generation(motion, np.zeros((61, 1)), Timeline(big), StateTrace(("a",), np.zeros(61, np.intp)))
-    assert [word.label for word in choose_cues(made).words] == ["big", "big"]
