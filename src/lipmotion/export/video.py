@@ -146,7 +146,7 @@ def _picture(frame: Frame, n: int, rate: Fraction, converter: Any) -> Any:
         picture.colorspace, picture.color_range = _BT601, _LIMITED
     else:
         picture = VideoFrame.from_ndarray(np.ascontiguousarray(frame), format="rgb24")
-        picture = converter.reformat(picture, format="yuv420p", dst_colorspace="itu601")
+        picture = converter.reformat(picture, format="yuv420p", dst_colorspace="itu601", threads=1)
     picture.pts, picture.time_base = n, 1 / rate
     return picture
 
