@@ -55,6 +55,7 @@ def test_pictures_come_back_at_their_times_with_their_transparency(tmp_path, suf
         assert np.abs(one[..., 3].astype(int) - other[..., 3]).mean() < 4
         inside = one[..., 3] == 255
         assert np.abs(one[inside][:, :3].astype(int) - other[inside][:, :3]).mean() < 12
+        assert np.abs(np.median(other[inside], axis=0) - (200, 60, 30, 255)).max() <= 4
 
 
 @pytest.mark.parametrize("suffix", [".webm", ".mov"])
