@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -75,35 +74,33 @@ def test_a_take_is_read_as_the_library_reads_it(tmp_path: Path, codes: list[str]
         assert np.interp(library.time_s, times, curves[name]) == pytest.approx(library[other], abs=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("line", "message"),
-    [
+def test_a_take_that_is_damaged_and_other_files_are_refused(tmp_path: Path) -> None:
+    for line, message in (
         ("soon,61,0.5", "'soon' is no timecode"),
         ("10:00:00:02.000,61", "no rows with values"),
         ("09:59:50:00.000,61,0.5", r"row 3 goes back by 10.00 s"),
         ("10:00:00:02.000,61,0.5,0.5", "row 3 has 2 curves, required 1"),
-    ],
-)
-def test_a_take_that_is_damaged_is_refused(tmp_path: Path, line: str, message: str) -> None:
-    first = "10:00:00:00.000,61,0.5" if "no rows" not in message else "10:00:00:00.000,0,0"
-    (tmp_path / "take.csv").write_text(f"Timecode,BlendShapeCount,JawOpen\n{first}\n{line}\n")
-    with pytest.raises(ValueError, match=message):
-        read_motion(str(tmp_path / "take.csv"))
+    ):
+        first = "10:00:00:00.000,61,0.5" if "no rows" not in message else "10:00:00:00.000,0,0"
+        (tmp_path / "take.csv").write_text(f"Timecode,BlendShapeCount,JawOpen\n{first}\n{line}\n")
+        with pytest.raises(ValueError, match=message):
+            read_motion(str(tmp_path / "take.csv"))
+    for text in ("", "frame,a\n1,2\n", "{}", '{"format": "other"}'):
+        for name in ("a.csv", "a.json"):
+            (tmp_path / name).write_text(text)
+            with pytest.raises(ValueError, match=r"first column|'format' must be|Expecting value"):
+                read_motion(str(tmp_path / name))
 
 
-@pytest.mark.parametrize("text", ["", "frame,a\n1,2\n", "{}", json.dumps({"format": "other"})])
-def test_other_files_are_refused(tmp_path: Path, text: str) -> None:
-    for name in ("a.csv", "a.json"):
-        (tmp_path / name).write_text(text)
-        with pytest.raises(ValueError, match=r"first column|'format' must be|Expecting value"):
-            read_motion(str(tmp_path / name))
+def test_a_row_of_the_time_before_is_left_out(tmp_path: Path) -> None:
+    rows = "".join(f"10:00:00:{frame:02d}.000,61,{n / 10}\n" for n, frame in enumerate((10, 12, 12, 11, 14)))
+    (tmp_path / "take.csv").write_text("Timecode,BlendShapeCount,JawOpen\n" + rows)
+    assert read_motion(str(tmp_path / "take.csv"))[0] == {"JawOpen": [0.0, 0.1, 0.4]}
 
 
-@pytest.mark.parametrize(
-    "name", ["mouthSmile_L", "mouthSmileLeft", "MouthSmileLeft", "head.mouthSmile_L", "Mouth Smile l"]
-)
-def test_spellings_of_one_name(name: str) -> None:
-    assert spelling(name) == "mouthsmileleft"
+def test_spellings_of_one_name() -> None:
+    names = ("mouthSmile_L", "mouthSmileLeft", "MouthSmileLeft", "head.mouthSmile_L", "Mouth Smile l")
+    assert {spelling(name) for name in names} == {"mouthsmileleft"}
 
 
 def test_curves_find_their_shape_keys() -> None:
@@ -112,19 +109,12 @@ def test_curves_find_their_shape_keys() -> None:
     assert found == {"jawOpen": "head.jawOpen", "mouthSmileLeft": "mouthSmileLeft", "mouthSmileRight": "mouthSmile_R"}
 
 
-@pytest.mark.parametrize(
-    ("name", "found"),
-    [
-        ("jaw.master.rotation.x", ("jaw.master", "rotation", "x")),
-        ("Lip_T.location.z", ("Lip_T", "location", "z")),
-        ("rig bone[open]", ("rig bone", "property", "open")),
-        ("[lips]", ("", "property", "lips")),
-        ("jawOpen", None),
-        ("Jaw.rotateX", None),
-    ],
-)
-def test_controls_are_told_from_shapes(name: str, found: tuple[str, str, str] | None) -> None:
-    assert control(name) == found
+def test_controls_are_told_from_shapes() -> None:
+    assert control("jaw.master.rotation.x") == ("jaw.master", "rotation", "x")
+    assert control("rig bone[open]") == ("rig bone", "property", "open")
+    assert control("[lips]") == ("", "property", "lips")
+    assert control("jawOpen") is None
+    assert control("Jaw.rotateX") is None
 
 
 def test_frames_lie_on_straight_lines_between_values() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -34,22 +35,34 @@ def test_the_sound_is_where_the_motion_is(sound_s: float, start: int, heard_from
     assert (strip.start, strip.frame_final_start) == (start, heard_from)
 
 
-def test_held_curves_are_held_between_keys() -> None:
+@pytest.fixture
+def keyed(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Curve]]:
+    """Returns the keyed curves of two shape keys after all calls so far."""
     keys: dict[str, Curve] = {}
     blocks = {name: SimpleNamespace(slider_min=0.0, slider_max=1.0) for name in ("jawOpen", "eyeBlinkLeft")}
-    data = SimpleNamespace(shape_keys=SimpleNamespace(key_blocks=blocks))
+    mesh = SimpleNamespace(name="face", data=SimpleNamespace(shape_keys=SimpleNamespace(key_blocks=blocks)))
+    fcurves = SimpleNamespace(find=keys.get, new=lambda path: keys.setdefault(path, Curve()))
+    monkeypatch.setattr("lipmotion.addons.blender.keying._fcurves", lambda *_: fcurves)
 
-    def new(path: str) -> Curve:
-        return keys.setdefault(path, Curve())
+    def key(values: list[float], first: float, **how: Any) -> list[Curve]:
+        key_shapes(mesh, dict.fromkeys(blocks, values), {name: name for name in blocks}, first, **how)
+        return list(keys.values())
 
-    fcurves = SimpleNamespace(find=lambda _: None, new=new)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("lipmotion.addons.blender.keying._fcurves", lambda *_: fcurves)
-        mesh = SimpleNamespace(name="face", data=data)
-        curves = {name: [0.0, 1.0] for name in blocks}
-        key_shapes(mesh, curves, {name: name for name in blocks}, 1.0, stepped=("jawOpen",))
-    kinds = [{point.interpolation for point in curve.keyframe_points} for curve in keys.values()]
+    return key
+
+
+def test_held_curves_are_held_between_keys(keyed: Callable[..., list[Curve]]) -> None:
+    curves = keyed([0.0, 1.0], 1.0, stepped=("jawOpen",))
+    kinds = [{point.interpolation for point in curve.keyframe_points} for curve in curves]
     assert kinds == [{"CONSTANT"}, {"LINEAR"}]
+
+
+def test_keys_beside_those_of_a_take_are_kept_where_that_is_asked(keyed: Callable[..., list[Curve]]) -> None:
+    keyed([0.5] * 5, 1.0)
+    curve, _ = keyed([1.0, 1.0, 1.0], 2.0, replace=False)
+    assert [point.co for point in curve.keyframe_points] == [(1, 0.5), (2, 1.0), (3, 1.0), (4, 1.0), (5, 0.5)]
+    curve, _ = keyed([0.2], 7.0)
+    assert [point.co for point in curve.keyframe_points] == [(7, 0.2)]
 
 
 class Points(list[Any]):

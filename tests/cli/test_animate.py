@@ -11,7 +11,7 @@ from cli.conftest import RunCommand, is_one_error
 from lipmotion.corpora.store import Corpus
 from lipmotion.export.base import read_motion
 from lipmotion.pipeline.animate import animate, write
-from lipmotion.pipeline.model import VERSION, load_model
+from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.request import SpeechRequest
 
 
@@ -21,15 +21,10 @@ def basics(toy_speech: Path, toy_model_file: Path) -> tuple[object, ...]:
 
 
 def test_motion_files(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
-    done = run(*basics, "-o", "a.json", "a.csv", "a.npz", "--rate", "50")
+    done = run(*basics, "-o", "a.json", "a.csv", "-o", "a.npz", "--rate", "50")
     assert done == (0, ["a.json", "a.csv", "a.npz"], [])
     assert sorted(path.name for path in here.iterdir()) == ["a.csv", "a.json", "a.npz"]
     assert read_motion(Path("a.json"))[0].rate_hz == 50
-
-
-@pytest.mark.usefixtures("here")
-def test_outputs_may_be_given_one_by_one(run: RunCommand, basics: tuple[object, ...]) -> None:
-    assert run(*basics, "-o", "a.json", "-o", "a.csv") == (0, ["a.json", "a.csv"], [])
 
 
 @pytest.mark.long
@@ -43,18 +38,18 @@ def test_it_is_the_function_of_the_same_name(
 
 
 def test_a_video(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
-    assert run(*basics, "-o", "a.mp4", "--fps", "5") == (0, ["a.mp4"], [])
+    assert run(*basics, "-o", "a.mp4", "--fps", "5", "--size", "160") == (0, ["a.mp4"], [])
     assert (here / "a.mp4").stat().st_size > 5000
 
 
-@pytest.mark.parametrize("as_file", [True, False])
-def test_a_transcript(run: RunCommand, basics: tuple[object, ...], here: Path, as_file: bool) -> None:
+def test_a_transcript(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
     words = "See Bob, papa — mama!"
     (here / "words.lab").write_text("\ufeff" + words, encoding="utf-8")
-    done = run(*basics, "-o", "a.json", "--transcript", "words.lab" if as_file else words)
-    assert (done.code, done.err) == (0, [])
-    units = json.loads((here / "a.json").read_text())["units"]
-    assert " ".join(unit["phone"] for unit in units) == "sil s iy b aa b p aa p ax m aa m ax sil"
+    for transcript in ("words.lab", words):
+        done = run(*basics, "-o", "a.json", "--transcript", transcript)
+        assert (done.code, done.err) == (0, [])
+        units = json.loads((here / "a.json").read_text())["units"]
+        assert " ".join(unit["phone"] for unit in units) == "sil s iy b aa b p aa p ax m aa m ax sil"
 
 
 def test_an_unknown_word_is_a_warning(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
@@ -70,97 +65,45 @@ def test_a_lexicon_file(run: RunCommand, basics: tuple[object, ...], here: Path,
     assert (done.code, caplog.text) == (0, "")
 
 
-@pytest.mark.parametrize("what", ["missing", "empty", "text", "mute", "short", "folder", "long name"])
-def test_speech_that_cannot_be_used(
-    run: RunCommand, toy_model_file: Path, bad_speech: dict[str, Path], here: Path, what: str
-) -> None:
-    assert is_one_error(run("animate", bad_speech[what], "--model", toy_model_file, "-o", "a.json", "a.mp4"), 3)
-    assert list(here.iterdir()) == []
+UNUSABLE = [
+    (["--rate", "0"], 3, "frame rate is 0.0, required 1 to 1000"),
+    (["--fps", "1e9"], 3, "frame rate is 1000000000.0"),
+    (["--transcript", "missing.txt"], 3, "missing.txt: no such transcript file"),
+    (["--transcript", "five " * 100], 5, "too short for what should be said"),
+    (["--lexicon", "missing.txt"], 3, "missing.txt: no such lexicon file"),
+    (["--model", "missing.lipmotion"], 3, "missing.lipmotion: no such model"),
+    (["-o", "a.xyz"], 7, "unknown format '.xyz'; required one of: .json .csv .npz "),
+    (["-o", "a.csv", "x" * 300 + ".json"], 7, "cannot be written: File name too long"),
+    (["--still", "nose"], 3, "blinks, gaze, brows, head"),
+    (["--size", "63"], 3, "even number"),
+    (["--intensity", "7"], 3, "0 to 3"),
+    (["--background", "pink"], 3, "#40a0ff"),
+    (["--background", "transparent"], 7, "cannot be transparent"),
+]
 
 
-@pytest.mark.parametrize(
-    ("options", "code", "words"),
-    [
-        (["--rate", "0"], 3, "frame rate is 0.0, required 1 to 1000"),
-        (["--rate", "nan"], 3, "frame rate is nan"),
-        (["--rate", "-50"], 3, "frame rate is -50.0"),
-        (["--rate", "1e13"], 3, "frame rate is 10000000000000.0"),
-        (["--fps", "0"], 3, "frame rate is 0.0"),
-        (["--fps", "nan"], 3, "frame rate is nan"),
-        (["--fps", "-25"], 3, "frame rate is -25.0"),
-        (["--fps", "inf"], 3, "frame rate is inf"),
-        (["--fps", "1e-5"], 3, "frame rate is 1e-05"),
-        (["--fps", "1e9"], 3, "frame rate is 1000000000.0"),
-        (["--transcript", "missing.txt"], 3, "missing.txt: no such transcript file"),
-        (["--transcript", ""], 3, "holds no word"),
-        (["--transcript", "α" * 200], 3, "cannot guess how"),
-        (["--transcript", "9" * 5000], 5, "nobody says so much"),
-        (["--transcript", "five " * 100], 5, "too short for what should be said"),
-        (["--lexicon", "missing.txt"], 3, "missing.txt: no such lexicon file"),
-        (["--model", "missing.lipmotion"], 3, "missing.lipmotion: no such model"),
-        (["-o", "a.xyz"], 7, "unknown format '.xyz'; required one of: .json .csv .npz "),
-        (["-o", "missing/a.json"], 7, "the folder missing does not exist; create it first"),
-        (["-o", "a.csv", "x" * 300 + ".json"], 7, "cannot be written: File name too long"),
-    ],
-)
-def test_options_that_cannot_be_used(
-    run: RunCommand, basics: tuple[object, ...], here: Path, options: list[str], code: int, words: str
-) -> None:
-    done = run(*basics, "-o", "a.json", "a.mp4", *options)
-    assert is_one_error(done, code)
-    assert words in done.err[0]
-    assert list(here.iterdir()) == []
-
-
-@pytest.mark.parametrize(
-    ("options", "code"), [(["-o", "missing/a.json"], 7), (["-o", "a.json", "--rate", "0"], 3), (["-o", "a.xyz"], 7)]
-)
-@pytest.mark.usefixtures("here")
-def test_outputs_are_checked_before_work_begins(run: RunCommand, options: list[str], code: int) -> None:
-    done = run("animate", "missing.wav", "--model", "missing.lipmotion", *options)
-    assert is_one_error(done, code)
-    assert "no such" not in done.err[0]
-
-
-def test_files_that_are_not_what_they_should_be(
-    run: RunCommand, basics: tuple[object, ...], here: Path, toy_speech: Path, newer_model: Path
-) -> None:
-    (here / "control.txt").write_bytes(b"\xe4\x81")
-    (here / "empty.txt").touch()
-    (here / "lexicon.txt").write_text("bin B IH N\nbam B Q\n")
-    before = sorted(here.iterdir())
-    wrong: list[tuple[list[object], int, str]] = [
-        (["--transcript", "control.txt"], 3, "control.txt: is not UTF-8 text; save it as UTF-8"),
-        (["--transcript", "empty.txt"], 3, "holds no word"),
-        (["--lexicon", "lexicon.txt"], 3, "lexicon.txt, line 2: unknown phone 'Q'"),
-        (
-            ["--model", newer_model],
-            6,
-            f"version {VERSION + 1}, this lipmotion reads version {VERSION}; upgrade",
-        ),
-        (["--model", toy_speech], 6, "not a lipmotion model"),
-        (["--model", "empty.txt"], 6, "not a lipmotion model"),
-    ]
-    for options, code, words in wrong:
-        done = run(*basics, "-o", "a.json", *options)
+def test_options_that_cannot_be_used(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
+    for options, code, words in UNUSABLE:
+        done = run(*basics, "-o", "a.json", "a.mp4", *options)
         assert is_one_error(done, code), done
         assert words in done.err[0]
-        assert sorted(here.iterdir()) == before
+        assert list(here.iterdir()) == []
 
 
-def test_the_recording_is_not_overwritten(run: RunCommand, toy_model_file: Path, toy_speech: Path, here: Path) -> None:
-    (here / "speech.mp4").write_bytes(toy_speech.read_bytes())
-    done = run("animate", "speech.mp4", "--model", toy_model_file, "-o", "speech.mp4")
-    assert is_one_error(done, 7)
-    assert (here / "speech.mp4").read_bytes() == toy_speech.read_bytes()
+@pytest.mark.usefixtures("here")
+def test_outputs_are_checked_before_work_begins(run: RunCommand) -> None:
+    for options, code in ((["missing/a.json"], 7), (["a.json", "--rate", "0"], 3), (["a.xyz"], 7)):
+        done = run("animate", "missing.wav", "--model", "missing.lipmotion", "-o", *options)
+        assert is_one_error(done, code)
+        assert "no such" not in done.err[0]
 
 
-@pytest.mark.parametrize("options", [[], ["-o"], ["-o", "a.json", "--rate", "fast"], ["-o", "a.json", "--bogus"]])
-def test_a_wrong_command_line(run: RunCommand, basics: tuple[object, ...], here: Path, options: list[str]) -> None:
-    done = run(*basics, *options)
-    assert done.code == 2
-    assert done.err[-1].startswith("lipmotion")
-    assert list(here.iterdir()) == []
+def test_a_wrong_command_line(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
+    for options in ([], ["-o"], ["-o", "a.json", "--rate", "fast"], ["-o", "a.json", "--bogus"]):
+        done = run(*basics, *options)
+        assert done.code == 2
+        assert done.err[-1].startswith("lipmotion")
+        assert list(here.iterdir()) == []
 
 
 def test_edited_units_are_used(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
@@ -193,12 +136,6 @@ def test_units_with_a_gap_are_silent_there(run: RunCommand, basics: tuple[object
     assert after[3]["end_s"] == rows[5]["start_s"]
 
 
-def test_units_that_cannot_be_used(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
-    done = run(*basics, "-o", "a.json", "--units", "missing.json")
-    assert (done.code, len(done.err)) == (3, 1)
-    assert not (here / "a.json").exists()
-
-
 def test_a_picture_of_the_posteriors(run: RunCommand, coupled_model_file: Path, toy_speech: Path, here: Path) -> None:
     basics = ("animate", toy_speech, "--model", coupled_model_file, "-o")
     assert run(*basics, "a.json", "--posteriors", "a.png") == (0, ["a.json", "a.png"], [])
@@ -208,23 +145,6 @@ def test_a_picture_of_the_posteriors(run: RunCommand, coupled_model_file: Path, 
     run(*basics, "b.json")
     assert (here / "a.json").read_bytes() == (here / "b.json").read_bytes()
     assert sorted(path.name for path in here.iterdir()) == ["a.json", "a.png", "b.json"]
-
-
-@pytest.mark.parametrize(
-    ("picture", "code", "words"),
-    [
-        ("a.png", 3, "the engine 'trajectory' has no chains of states"),
-        ("a.jpg", 7, "a.jpg: unknown format '.jpg'; required: .png"),
-        ("missing/a.png", 7, "the folder missing does not exist"),
-    ],
-)
-def test_posteriors_that_cannot_be_drawn(
-    run: RunCommand, basics: tuple[object, ...], here: Path, picture: str, code: int, words: str
-) -> None:
-    done = run(*basics, "-o", "a.json", "--posteriors", picture)
-    assert is_one_error(done, code)
-    assert words in done.err[0]
-    assert list(here.iterdir()) == []
 
 
 @pytest.mark.long
@@ -257,19 +177,12 @@ def test_onto_another_person(
         (["--onto", toy_speech.parent], 4, "not a corpus"),
         (["--onto-speaker", "ben"], 3, "onto the speaker 'ben', but of what?"),
         (["--onto", toy_corpus.path, "--onto-speaker", "ben"], 3, "no speaker 'ben'"),
+        (["--onto", toy_corpus.path, "-o", toy_corpus.path / "one.json"], 7, "lies in"),
     ):
         done = run(*given, *options)
         assert is_one_error(done, code)
         assert words in done.err[0]
-
-
-def test_the_other_person_is_not_replaced(
-    run: RunCommand, toy_model_file: Path, toy_speech: Path, toy_corpus: Corpus
-) -> None:
-    inside = toy_corpus.path / "one.json"
-    done = run("animate", toy_speech, "--model", toy_model_file, "--onto", toy_corpus.path, "-o", inside)
-    assert done.code != 0
-    assert not inside.exists()
+    assert not (toy_corpus.path / "one.json").exists()
 
 
 def test_a_staged_face(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
@@ -278,20 +191,6 @@ def test_a_staged_face(run: RunCommand, basics: tuple[object, ...], here: Path) 
     picture = Image.open(here / "a00.png")
     assert picture.size == (64, 64)
     assert picture.getpixel((0, 0)) == (16, 32, 48)
-
-
-@pytest.mark.usefixtures("here")
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [("--still nose", "blinks, gaze, brows, head"), ("--size 63", "even number"), ("--intensity 7", "0 to 3"),
-     ("--background pink", "#40a0ff"), ("--background transparent", "cannot be transparent")],
-)  # fmt: skip
-def test_a_face_that_cannot_be_staged_so(
-    run: RunCommand, basics: tuple[object, ...], options: str, message: str
-) -> None:
-    done = run(*basics, "-o", "a.mp4", *options.split())
-    assert is_one_error(done, 7 if "transparent" in options else 3)
-    assert message in done[2][0]
 
 
 def test_articulation_in_motion_files(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:

@@ -3,8 +3,6 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import pytest
-
 from cli.conftest import RunCommand, is_one_error
 from lipmotion.corpora.store import Corpus
 from lipmotion.pipeline.corpus.coverage import coverage
@@ -34,18 +32,13 @@ def test_options(run: RunCommand, here: Path, toy_corpus: Corpus) -> None:
     assert [kind["kind"] for kind in document["kinds"]] == ["phones", "diphones", "triphones"]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "code", "words"),
-    [
-        (["CORPUS", "--text", "missing.txt"], 3, "missing.txt: no such transcript file"),
+def test_what_cannot_be_used(run: RunCommand, here: Path, toy_corpus: Corpus) -> None:
+    for arguments, code, words in (
+        ([toy_corpus.path, "--text", "missing.txt"], 3, "missing.txt: no such transcript file"),
         (["missing"], 4, "missing: no such corpus"),
-        (["CORPUS", "--lexicon", "missing"], 3, "missing: no such lexicon file"),
-    ],
-)
-def test_what_cannot_be_used(
-    run: RunCommand, here: Path, toy_corpus: Corpus, arguments: list[str], code: int, words: str
-) -> None:
-    done = run("corpus", "coverage", *[toy_corpus.path if each == "CORPUS" else each for each in arguments])
-    assert is_one_error(done, code)
-    assert words in done.err[0]
+        ([toy_corpus.path, "--lexicon", "missing"], 3, "missing: no such lexicon file"),
+    ):
+        done = run("corpus", "coverage", *arguments)
+        assert is_one_error(done, code)
+        assert words in done.err[0]
     assert not list(here.iterdir())

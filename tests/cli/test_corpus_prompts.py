@@ -2,8 +2,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
-
 from cli.conftest import RunCommand, is_one_error
 from lipmotion.corpora.store import Corpus
 from lipmotion.pipeline.corpus.prompts import prompts
@@ -36,17 +34,14 @@ def test_nothing_new(run: RunCommand, here: Path, toy_corpus: Corpus) -> None:
     assert (done.code, done.out) == (0, ["0 of 1 sentences: they add nothing"])
 
 
-@pytest.mark.parametrize(
-    ("arguments", "code", "words"),
-    [
+def test_what_cannot_be_used(run: RunCommand, here: Path) -> None:
+    for arguments, code, words in (
         (["--text", "missing.txt"], 3, "missing.txt: no such transcript file"),
         (["--have", "missing"], 4, "missing: no such corpus"),
         (["--count", "0"], 3, "0 prompts asked for, required at least 1"),
         (["--lexicon", "missing"], 3, "missing: no such lexicon file"),
-    ],
-)
-def test_what_cannot_be_used(run: RunCommand, here: Path, arguments: list[str], code: int, words: str) -> None:
-    done = run("corpus", "prompts", *arguments)
-    assert is_one_error(done, code)
-    assert words in done.err[0]
+    ):
+        done = run("corpus", "prompts", *arguments)
+        assert is_one_error(done, code)
+        assert words in done.err[0]
     assert not list(here.iterdir())

@@ -30,24 +30,17 @@ def test_for_machines(run: RunCommand, coupled_model_file: Path, toy_speech: Pat
     assert [json.loads(line)["frame"] for line in done.out] == [80, 50]
 
 
-@pytest.mark.parametrize(
-    ("options", "code", "words"),
-    [
-        (["MODEL", "SPEECH", "--at", "99"], 3, "99.0 s lies outside the recording (0 to "),
-        (["MODEL", "SPEECH", "--at=-1"], 3, "-1.0 s lies outside the recording"),
-        (["MODEL", "SPEECH", "--at", "nan"], 3, "nan s lies outside the recording"),
-        (["missing", "SPEECH", "--at", "1"], 3, "missing: no such model"),
-        (["MODEL", "missing.wav", "--at", "1"], 3, "missing.wav: no such file"),
-        (["SPEECH", "MODEL", "--at", "1"], 6, "not a lipmotion model"),
-    ],
-)
-def test_what_cannot_be_explained(
-    run: RunCommand, coupled_model_file: Path, toy_speech: Path, options: list[str], code: int, words: str
-) -> None:
-    given = {"MODEL": coupled_model_file, "SPEECH": toy_speech}
-    done = run("explain", *[given.get(option, option) for option in options])
-    assert is_one_error(done, code)
-    assert words in done.err[0]
+def test_what_cannot_be_explained(run: RunCommand, coupled_model_file: Path, toy_speech: Path) -> None:
+    for options, code, words in (
+        ([coupled_model_file, toy_speech, "--at=-1"], 3, "-1.0 s lies outside the recording (0 to "),
+        ([coupled_model_file, toy_speech, "--at", "nan"], 3, "nan s lies outside the recording"),
+        (["missing", toy_speech, "--at", "1"], 3, "missing: no such model"),
+        ([coupled_model_file, "missing.wav", "--at", "1"], 3, "missing.wav: no such file"),
+        ([toy_speech, coupled_model_file, "--at", "1"], 6, "not a lipmotion model"),
+    ):
+        done = run("explain", *options)
+        assert is_one_error(done, code)
+        assert words in done.err[0]
 
 
 def test_without_a_time_all_states_are_listed(run: RunCommand, toy_model_file: Path, toy_speech: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +11,8 @@ import numpy as np
 import pytest
 
 from cli.conftest import RunCommand, is_one_error
-from lipmotion.faces.filmed.face import VERSION, FilmedFace, load_face, save_face
+from lipmotion.faces.filmed.face import FilmedFace, load_face, save_face
 from lipmotion.pipeline.film import build
-from lipmotion.storage.archive import HEADER
 from lipmotion.testing.toy import toy_sentences
 from pipeline.film.toy_footage import ToyVideo, install, write_video
 from speech import stand_in_voice
@@ -83,38 +81,27 @@ def test_build_for_a_program(run: RunCommand, tracker: Path, here: Path) -> None
     assert (here / "anna.face").is_file()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "code", "words"),
-    [
-        (["missing.mp4", "-o", "a.face"], 3, "missing.mp4: no such"),
-        (["{folder}", "-o", "a.mp4"], 7, "a.mp4: a face is a file ending in .face; name it so"),
-        (["{folder}", "-o", "missing/a.face"], 7, "the folder missing does not exist"),
-        (["{folder}", "-o", "a.face", "--speaker", "ben"], 3, "no speaker 'ben', a face is that of one person"),
-        (["{folder}/toy00.mp4", "-o", "a.face"], 3, "s of footage with the face, required 5 s or more"),
-    ],
-)
-def test_what_cannot_be_built(
-    run: RunCommand, tracker: Path, here: Path, arguments: list[str], code: int, words: str
-) -> None:
-    named = [argument.format(folder=tracker) for argument in arguments]
-    done = run("face", "build", *named, "--workers", "1")
-    assert is_one_error(done, code), done
-    assert words in done.err[0]
-    assert list(here.iterdir()) == []
-
-
-@pytest.mark.parametrize("arguments", [[], ["build"], ["build", "a.mp4"], ["info"], ["paint", "a.mp4"]])
-def test_a_wrong_command_line(run: RunCommand, here: Path, arguments: list[str]) -> None:
-    assert run("face", *arguments).code == 2
-    assert list(here.iterdir()) == []
-
-
-def test_an_output_does_not_replace_the_footage(run: RunCommand, tracker: Path) -> None:
+def test_what_cannot_be_built(run: RunCommand, tracker: Path, here: Path) -> None:
     video = tracker / "toy00.mp4"
     before = video.read_bytes()
-    done = run("face", "build", video, "-o", video, "--workers", "1")
-    assert done.code == 7
+    for arguments, code, words in (
+        (["missing.mp4", "-o", "a.face"], 3, "missing.mp4: no such"),
+        ([tracker, "-o", "a.mp4"], 7, "a.mp4: a face is a file ending in .face; name it so"),
+        ([tracker, "-o", "missing/a.face"], 7, "the folder missing does not exist"),
+        ([tracker, "-o", "a.face", "--speaker", "ben"], 3, "no speaker 'ben', a face is that of one person"),
+        ([video, "-o", "a.face"], 3, "s of footage with the face, required 5 s or more"),
+        ([video, "-o", video], 7, "a face is a file ending in .face"),
+    ):
+        done = run("face", "build", *arguments, "--workers", "1")
+        assert is_one_error(done, code), done
+        assert words in done.err[0]
+        assert list(here.iterdir()) == []
     assert video.read_bytes() == before
+
+
+def test_a_wrong_command_line(run: RunCommand) -> None:
+    for arguments in ([], ["build"], ["build", "a.mp4"], ["info"], ["paint", "a.mp4"]):
+        assert run("face", *arguments).code == 2
 
 
 def test_info(run: RunCommand, filmed_face_file: Path) -> None:
@@ -184,61 +171,6 @@ def test_an_aid_to_lip_reading(
     else:
         assert 130 < rows.min() < rows.max() < 250
         assert changed.mean() < 0.15
-
-
-@pytest.mark.parametrize(
-    ("options", "code", "words"),
-    [
-        (["--face", "missing.face"], 3, "missing.face: no such file"),
-        (["--face", "nobody"], 3, "nobody"),
-        (["--background", "missing.mp4"], 3, "missing.mp4: no such file"),
-        (["--overlay", "inset"], 3, "has no pictures, and an overlay shows them"),
-        (["--overlay", "mouth"], 3, "has no pictures"),
-        (["--fps", "0"], 3, "the frame rate is 0.0"),
-    ],
-)
-def test_films_that_cannot_be_made(
-    run: RunCommand, basics: tuple[object, ...], here: Path, options: list[str], code: int, words: str
-) -> None:
-    done = run(*basics, *options, "-o", "a.mp4")
-    assert is_one_error(done, code), done
-    assert words in done.err[0]
-    assert list(here.iterdir()) == []
-
-
-def test_options_of_filmed_faces_alone(
-    run: RunCommand, basics: tuple[object, ...], here: Path, toy_speech: Path
-) -> None:
-    """A drawn face has no background, and is no recording in which a mark would be needed."""
-    for option in (["--overlay", "inset"], ["--background", toy_speech], ["--jaw", "none"], ["--mark", "visible"]):
-        done = run(*basics[:-2], "-o", "a.mp4", *option)
-        assert is_one_error(done, 3), done
-        assert "for filmed faces; give one: --face FILE.face" in done.err[0]
-    assert list(here.iterdir()) == []
-
-
-def test_a_face_of_a_later_version(
-    run: RunCommand, basics: tuple[object, ...], here: Path, filmed_face_file: Path
-) -> None:
-    newer = here.parent / "newer.face"
-    with zipfile.ZipFile(filmed_face_file) as old, zipfile.ZipFile(newer, "w") as new:
-        for name in old.namelist():
-            content = old.read(name)
-            header = json.dumps(json.loads(content) | {"version": VERSION + 1}) if name == HEADER else content
-            new.writestr(name, header)
-    for done in (run("face", "info", newer), run(*basics[:-1], newer, "-o", "a.mp4")):
-        assert is_one_error(done, 6)
-        assert f"face version {VERSION + 1}, this lipmotion reads version {VERSION}; upgrade lipmotion" in done.err[0]
-    assert list(here.iterdir()) == []
-
-
-def test_a_face_that_is_none(run: RunCommand, basics: tuple[object, ...], here: Path, toy_speech: Path) -> None:
-    wrong = here.parent / "wrong.face"
-    wrong.write_bytes(toy_speech.read_bytes())
-    for done in (run("face", "info", wrong), run(*basics[:-1], wrong, "-o", "a.mp4"), run("face", "info", toy_speech)):
-        assert is_one_error(done, 6)
-        assert "not a face" in done.err[0]
-    assert list(here.iterdir()) == []
 
 
 @pytest.mark.long

@@ -28,9 +28,9 @@ def run_limited(*arguments: object, limit: int = LIMIT) -> tuple[int, str]:
     return done.returncode, line
 
 
-@pytest.mark.parametrize("name", ["a.json", "a.csv", "a.npz", "a.mp4"])
+@pytest.mark.parametrize("name", ["a.json", "a.mp4"])
 def test_animate(toy_speech: Path, toy_model_file: Path, here: Path, name: str) -> None:
-    code, line = run_limited("animate", toy_speech, "--model", toy_model_file, "-o", name)
+    code, line = run_limited("animate", toy_speech, "--model", toy_model_file, "-o", name, "--fps", "5")
     assert (code, line.startswith(f"lipmotion: error: {name}: cannot be written: ")) == (7, True)
     assert line.endswith("; make room, then run it again")
     assert list(here.iterdir()) == []
@@ -39,10 +39,9 @@ def test_animate(toy_speech: Path, toy_model_file: Path, here: Path, name: str) 
 @pytest.mark.long
 def test_a_film(toy_speech: Path, toy_model_file: Path, filmed_face_file: Path, here: Path) -> None:
     basics = ("animate", toy_speech, "--model", toy_model_file, "--face", filmed_face_file)
-    for limit in (LIMIT, 20_000):
-        code, line = run_limited(*basics, "-o", "a.mp4", limit=limit)
-        assert (code, line.startswith("lipmotion: error: a.mp4: cannot be written: ")) == (7, True)
-        assert list(here.iterdir()) == []
+    code, line = run_limited(*basics, "-o", "a.mp4", limit=20_000)
+    assert (code, line.startswith("lipmotion: error: a.mp4: cannot be written: ")) == (7, True)
+    assert list(here.iterdir()) == []
 
 
 def test_a_face(filmed_face_file: Path, here: Path) -> None:
@@ -63,18 +62,9 @@ def test_a_face(filmed_face_file: Path, here: Path) -> None:
     assert list(here.iterdir()) == []
 
 
-def test_evaluate(toy_corpus: Corpus, toy_model_file: Path, here: Path) -> None:
-    code, line = run_limited("evaluate", toy_model_file, toy_corpus.path, "-o", "figures.json", limit=100)
-    assert (code, "figures.json: cannot be written" in line) == (7, True)
-    assert list(here.iterdir()) == []
-
-
 @pytest.mark.long
-@pytest.mark.parametrize("limit", [LIMIT, 100_000, 140_000])
-def test_train_says_what_is_kept_and_goes_on(
-    run_outside: RunCommand, toy_corpus: Corpus, here: Path, limit: int
-) -> None:
-    code, line = run_limited("train", toy_corpus.path, "-o", "m.lipmotion", limit=limit)
+def test_train_says_what_is_kept_and_goes_on(run_outside: RunCommand, toy_corpus: Corpus, here: Path) -> None:
+    code, line = run_limited("train", toy_corpus.path, "-o", "m.lipmotion", limit=100_000)
     assert (code, "cannot be written: " in line) == (7, True)
     assert "make room, then run it again; what is finished is kept in m.lipmotion.unfinished" in line
     left = [str(path.relative_to(here)) for path in here.rglob("*") if path.is_file()]

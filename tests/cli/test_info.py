@@ -3,8 +3,6 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import pytest
-
 from cli.conftest import RunCommand, is_one_error
 from lipmotion.pipeline.model import VERSION, load_model, read_header, save_model, shipped_path
 
@@ -63,17 +61,14 @@ def test_the_shipped_model_is_the_default(run: RunCommand) -> None:
     assert any(line.startswith("attribution") and "GRID" in line for line in done.out)
 
 
-@pytest.mark.parametrize(
-    ("name", "code", "words"),
-    [
+def test_what_is_no_model(run: RunCommand, newer_model: Path, here: Path) -> None:
+    (here / "text").write_text("words")
+    for name, code, words in (
         ("missing", 3, "missing: no such model"),
         ("text", 6, "text: not a lipmotion model"),
         (".", 3, ".: no such model"),
-        ("NEWER", 6, f"version {VERSION + 1}, this lipmotion reads version {VERSION}; upgrade"),
-    ],
-)
-def test_what_is_no_model(run: RunCommand, newer_model: Path, here: Path, name: str, code: int, words: str) -> None:
-    (here / "text").write_text("words")
-    done = run("info", newer_model if name == "NEWER" else name)
-    assert is_one_error(done, code)
-    assert words in done.err[0]
+        (newer_model, 6, f"version {VERSION + 1}, this lipmotion reads version {VERSION}; upgrade"),
+    ):
+        done = run("info", name)
+        assert is_one_error(done, code)
+        assert words in done.err[0]

@@ -28,34 +28,23 @@ REFUSED = [
     ("the recording itself", f"animate {TALKING} -o a.wav"),
     ("the transcript itself", f"animate {TALKING} -o b.json t.txt"),
     ("the lexicon itself", f"animate {TALKING} -o b.json -o l.txt"),
-    ("the units file itself", f"animate {TALKING} -o u.json"),
-    ("the model itself", f"animate {TALKING} -o m.lipmotion"),
-    ("the recording itself", f"animate {TALKING} -o b.json --posteriors a.wav"),
     ("the units file itself", f"animate {TALKING} -o b.json --posteriors u.json"),
-    ("the recording itself", f"cues {TALKING} -o a.wav"),
+    ("the model itself", f"animate {TALKING} -o m.lipmotion"),
     ("the transcript itself", f"cues {TALKING} -f tsv -o t.txt"),
-    ("the units file itself", f"cues {TALKING} -o b.tsv u.json"),
     ("the recording itself", "adapt b.wav a.wav --model m.lipmotion -o a.wav"),
-    ("the model itself", "adapt a.wav --model m.lipmotion -o m.lipmotion"),
     ("the corpus itself", "train c -o c"),
-    ("the corpus c", "train c -o c/corpus.json"),
     ("the corpus c", "train c -o c/m.lipmotion"),
-    ("the lexicon itself", "train c --lexicon l.txt -o l.txt"),
     ("the table of units itself", "train c --units t.txt -o t.txt"),
     ("the folder of recordings r", "train c --recordings r -o r/a.wav"),
     ("the corpus itself", "train d.unfinished -o d"),
     ("the folder of recordings d.unfinished/r", "train c --recordings d.unfinished/r -o d"),
     ("the model itself", f"evaluate m.lipmotion {FIGURES} -o m.lipmotion"),
-    ("the corpus c", f"evaluate m.lipmotion {FIGURES} -o c/corpus.json"),
     ("the lexicon itself", f"evaluate m.lipmotion {FIGURES} -o l.txt"),
     ("the corpus c", f"experiment unit-sets {FIGURES} -o c/corpus.json"),
-    ("the lexicon itself", f"experiment folds {FIGURES} -o l.txt"),
     ("the list itself", f"experiment learning-curve {FIGURES} --order t.txt -o t.txt"),
-    ("the list itself", f"experiment table3 {FIGURES} --order t.txt -o t.txt"),
     ("the folder of recordings r", f"experiment table3 {FIGURES} --talkers r -o r/a.wav"),
     ("the corpus c", f"experiment table3 {FIGURES} --plots c/pictures"),
     ("the folder of recordings itself", "corpus prepare r -o r"),
-    ("the folder of recordings r", "corpus prepare r -o r/c"),
     ("the folder of recordings d.unfinished/r", "corpus prepare d.unfinished/r -o d.unfinished"),
 ]
 
@@ -77,25 +66,24 @@ def content(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-@pytest.mark.parametrize(("what", "line"), REFUSED, ids=lambda value: value if " -" in value else "")
-def test_an_output_that_is_an_input(run: RunCommand, laid: Path, what: str, line: str) -> None:
+def test_an_output_that_is_an_input(run: RunCommand, laid: Path) -> None:
     before = content(laid)
-    done = run(*line.split())
-    assert is_one_error(done, 7), done
-    assert f" {what}; give another name" in done.err[0]
-    assert content(laid) == before
+    for what, line in REFUSED:
+        done = run(*line.split())
+        assert is_one_error(done, 7), (line, done)
+        assert f" {what}; give another name" in done.err[0]
+        assert content(laid) == before
 
 
-@pytest.mark.parametrize("spelled", ["./{}", "../here/{}", "soft", "hard"])
-@pytest.mark.parametrize("name", ["a.wav", "t.txt", "u.json", "m.lipmotion"])
-def test_however_it_is_spelled(run: RunCommand, laid: Path, name: str, spelled: str) -> None:
-    (laid / "soft").symlink_to(name)
-    os.link(laid / name, laid / "hard")
+def test_however_it_is_spelled(run: RunCommand, laid: Path) -> None:
+    (laid / "soft").symlink_to("t.txt")
+    os.link(laid / "t.txt", laid / "hard")
     before = content(laid)
-    done = run("animate", *TALKING.split(), "-o", spelled.format(name))
-    assert is_one_error(done, 7)
-    assert "itself; give another name" in done.err[0]
-    assert content(laid) == before
+    for spelled in ("./t.txt", "../here/t.txt", "soft", "hard"):
+        done = run("animate", *TALKING.split(), "-o", spelled)
+        assert is_one_error(done, 7)
+        assert "the transcript itself; give another name" in done.err[0]
+        assert content(laid) == before
 
 
 def test_the_model_that_ships_is_an_input_too(run: RunCommand, laid: Path) -> None:
@@ -106,12 +94,11 @@ def test_the_model_that_ships_is_an_input_too(run: RunCommand, laid: Path) -> No
     assert shipped_path().read_bytes() == before
 
 
-@pytest.mark.parametrize("force", [[], ["--force"]])
-def test_a_program_is_told(run: RunCommand, laid: Path, force: list[str]) -> None:
-    done = run("train", "c", "-o", "c/corpus.json", "--machine-readable", *force)
+@pytest.mark.usefixtures("laid")
+def test_a_program_is_told(run: RunCommand) -> None:
+    done = run("train", "c", "-o", "c/corpus.json", "--machine-readable", "--force")
     assert done.code == 7
     assert '"exit_code": 7' in done.out[-1]
-    assert laid.is_dir()
 
 
 def test_units_are_replaced_where_that_is_meant(
@@ -131,12 +118,12 @@ def test_a_model_is_adapted_in_its_place(run: RunCommand, here: Path, toy_speech
     assert load_model(here / "m.lipmotion").adaptation is not None
 
 
-@pytest.mark.parametrize("line", ["animate a.wav -o a.wav --force", "adapt a.wav -o a.wav --force"])
-def test_a_recording_is_never_replaced(run: RunCommand, laid: Path, line: str) -> None:
-    done = run(*line.split())
-    assert is_one_error(done, 7)
-    assert "--force" not in done.err[0]
-    assert (laid / "a.wav").read_text() == "what is in a.wav"
+def test_a_recording_is_never_replaced(run: RunCommand, laid: Path) -> None:
+    for line in ("animate a.wav -o a.wav --force", "adapt a.wav -o a.wav --force"):
+        done = run(*line.split())
+        assert is_one_error(done, 7)
+        assert "--force" not in done.err[0]
+        assert (laid / "a.wav").read_text() == "what is in a.wav"
 
 
 @pytest.mark.usefixtures("here")
@@ -179,9 +166,8 @@ def _verbs(found: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
                 yield from _verbs(inner)
 
 
-@pytest.mark.parametrize("suffix", [".json", ".mp4"])
-def test_from_python(laid: Path, toy_speech: Path, toy_model_file: Path, suffix: str) -> None:
-    speech = laid / f"speech{suffix}"
+def test_from_python(laid: Path, toy_speech: Path, toy_model_file: Path) -> None:
+    speech = laid / "speech.json"
     shutil.copy(toy_speech, speech)
     made = animate(SpeechRequest(toy_speech, recogniser="own"), model=toy_model_file)
     corpus = Corpus.open(laid / "c")

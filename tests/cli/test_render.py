@@ -34,7 +34,7 @@ def test_edited_values_are_drawn(run: RunCommand, motion_file: Path, toy_speech:
     (here / "shut.json").write_text(json.dumps(document))
     for name in ("said", "shut"):
         given = (f"{name}.json", "--sound", toy_speech, "-o", f"{name}.mp4", f"{name}.csv")
-        assert run("render", *given, "--size", "128", "--fps", "12") == (0, [f"{name}.mp4", f"{name}.csv"], [])
+        assert run("render", *given, "--size", "96", "--fps", "12") == (0, [f"{name}.mp4", f"{name}.csv"], [])
     said, shut = pictures(here / "said.mp4"), pictures(here / "shut.mp4")
     assert len(said) == len(shut)
     assert max(int(np.abs(a - b).max()) for a, b in zip(said, shut, strict=True)) > 60
@@ -48,7 +48,7 @@ def test_blendshapes_without_phones_or_sound(run: RunCommand, here: Path) -> Non
     jaw = np.maximum(np.sin(2 * np.pi * time_s), 0)
     rows = "\n".join(f"{t:.2f},{w:.4f},0" for t, w in zip(time_s, jaw, strict=True))
     (here / "rig.csv").write_text(f"time_s,jawOpen,mouthPucker\n{rows}\n")
-    assert run("render", "rig.csv", "-o", "a.mp4", "a.json", "--size", "128", "--curves", "arkit").code == 0
+    assert run("render", "rig.csv", "-o", "a.mp4", "a.json", "--size", "96", "--curves", "arkit").code == 0
     frames = pictures(here / "a.mp4")
     assert int(np.abs(frames[6] - frames[20]).max()) > 60
     weights = read_motion(here / "a.json")[0]
@@ -66,35 +66,23 @@ def test_sound_and_motion_of_other_lengths(run: RunCommand, motion_file: Path, t
     assert len(read_motion(here / "cut.csv")[0].values) == pytest.approx(len(read_motion(motion_file)[0].values), abs=2)
 
 
-@pytest.mark.usefixtures("motion_file")
-@pytest.mark.parametrize(
-    ("options", "code", "words"),
-    [
-        (["none.json", "-o", "a.csv"], 3, "none.json"),
-        (["said.json", "-o", "said.json"], 7, "said.json: is the motion file itself"),
-        (["said.json", "--sound", "none.wav", "-o", "a.csv"], 3, "none.wav: no such file"),
-        (["brows.csv", "-o", "a.mp4"], 7, "no channel 'opening' to draw a face from, nor the blendshape 'jawOpen'"),
-    ],
-)
-def test_what_cannot_be_drawn(run: RunCommand, here: Path, options: list[str], code: int, words: str) -> None:
+def test_what_cannot_be_drawn(run: RunCommand, motion_file: Path, here: Path) -> None:
+    before = motion_file.read_bytes()
     (here / "brows.csv").write_text("time_s,browInnerUp\n0,0\n0.1,1\n")
-    done = run("render", *options)
-    assert is_one_error(done, code)
-    assert words in done.err[0]
-
-
-@pytest.mark.parametrize(
-    ("last_s", "words"),
-    [
-        ("999999", "1e-06 frames a second, required 1 to 10000; export it again"),
-        ("1e-6", "1e+06 frames a second, required 1 to 10000"),
-    ],
-)
-def test_unlikely_rates_are_refused(run: RunCommand, here: Path, last_s: str, words: str) -> None:
-    (here / "rate.csv").write_text(f"time_s,opening\n0,0.1\n{last_s},0.2\n")
-    done = run("render", "rate.csv", "-o", "a.json")
-    assert is_one_error(done, 3)
-    assert words in done.err[0]
+    (here / "slow.csv").write_text("time_s,opening\n0,0.1\n999999,0.2\n")
+    (here / "fast.csv").write_text("time_s,opening\n0,0.1\n1e-6,0.2\n")
+    for options, code, words in (
+        ("none.json -o a.csv", 3, "none.json"),
+        ("said.json -o said.json", 7, "said.json: is the motion file itself"),
+        ("said.json --sound none.wav -o a.csv", 3, "none.wav: no such file"),
+        ("brows.csv -o a.mp4", 7, "no channel 'opening' to draw a face from, nor the blendshape 'jawOpen'"),
+        ("slow.csv -o a.json", 3, "1e-06 frames a second, required 1 to 10000; export it again"),
+        ("fast.csv -o a.json", 3, "1e+06 frames a second, required 1 to 10000"),
+    ):
+        done = run("render", *options.split())
+        assert is_one_error(done, code)
+        assert words in done.err[0]
+    assert motion_file.read_bytes() == before
 
 
 def test_motion_of_more_than_a_day_is_refused(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -114,8 +102,7 @@ def test_files_without_sound_get_no_silence(run: RunCommand, here: Path, monkeyp
     assert len(heard[1].samples) == 1600
 
 
-@pytest.mark.parametrize("name", ["a.livelink.csv", "a.mp4", "a%05d.png"])
-def test_a_single_pose_is_written(run: RunCommand, here: Path, name: str) -> None:
+def test_a_single_pose_is_written(run: RunCommand, here: Path) -> None:
     (here / "pose.csv").write_text("time_s,opening\n0,0.1\n0.01,0.1\n")
-    assert run("render", "pose.csv", "-o", name, "--size", "128").code == 0
-    assert (here / name.replace("%05d", "00000")).is_file() or len(list(here.glob("a*.png"))) == 1
+    assert run("render", "pose.csv", "-o", "a.livelink.csv", "a.mp4", "a%05d.png", "--size", "64").code == 0
+    assert {path.name for path in here.glob("a*")} == {"a.livelink.csv", "a.mp4", "a00000.png"}

@@ -72,38 +72,32 @@ def test_voices(run: RunCommand, monkeypatch: pytest.MonkeyPatch) -> None:
     assert run("speak", "--voices") == (0, ["no voice is installed"], [])
 
 
-@pytest.mark.parametrize(
-    ("line", "said"),
-    [
+def test_wrong_command_lines(run: RunCommand) -> None:
+    for line, said in (
         (["speak", TEXT], "required: -o FILE, or --voices"),
         (["speak", "--voices", "-o", "a.wav"], "required: -o FILE, or --voices"),
         (["speak", "-o", "a.wav"], "required: a text, or --text FILE"),
         (["speak", TEXT, "--text", "text.txt", "-o", "a.wav"], "required: a text, or --text FILE"),
-    ],
-)
-def test_wrong_command_lines(run: RunCommand, line: list[str], said: str) -> None:
-    done = run(*line)
-    assert (done.code, done.out) == (2, [])
-    assert said in done.err[-1]
+    ):
+        done = run(*line)
+        assert (done.code, done.out) == (2, [])
+        assert said in done.err[-1]
 
 
-@pytest.mark.parametrize(
-    ("more", "code", "said"),
-    [
-        (["-o", "a.mp3"], 7, ".wav .flac .ogg"),
-        (["-o", "no/a.wav"], 7, "does not exist"),
-        (["-o", "a.wav", "./a.wav"], 7, "is given twice"),
-        (["-o", "a.wav", "--voice", "three"], 3, "no voice 'three' is installed; lipmotion speak --voices"),
-        (["-o", "a.wav", "--voice", "stand-out:one"], 3, "unknown synthesiser 'stand-out'"),
-        (["-o", "a.json", "--channels", "smile"], 3, "no motion channel 'smile'"),
-        (["-o", "a.json", "--speaker", "nobody"], 3, "no 'nobody'"),
-    ],
-)
-def test_errors(run: RunCommand, basics: tuple[object, ...], here: Path, more: list[str], code: int, said: str) -> None:
-    done = run(*basics, *more)
-    assert is_one_error(done, code)
-    assert said in done.err[0]
-    assert list(here.iterdir()) == []
+def test_errors(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
+    for more, code, said in (
+        ("-o a.mp3", 7, ".wav .flac .ogg"),
+        ("-o no/a.wav", 7, "does not exist"),
+        ("-o a.wav ./a.wav", 7, "is given twice"),
+        ("-o a.wav --voice three", 3, "no voice 'three' is installed; lipmotion speak --voices"),
+        ("-o a.wav --voice stand-out:one", 3, "unknown synthesiser 'stand-out'"),
+        ("-o a.json --channels smile", 3, "no motion channel 'smile'"),
+        ("-o a.json --speaker nobody", 3, "no 'nobody'"),
+    ):
+        done = run(*basics, *more.split())
+        assert is_one_error(done, code)
+        assert said in done.err[0]
+        assert list(here.iterdir()) == []
 
 
 def test_without_a_synthesiser_it_says_what_to_install(

@@ -10,25 +10,10 @@ from lipmotion.types import TimedTranscript
 
 
 @pytest.mark.usefixtures("here")
-@pytest.mark.parametrize(
-    "text",
-    [
-        "hello there",
-        "see p. 3",
-        "",
-        "α" * 3000,
-        "a/b/c",
-        "the file words.txt",
-        "..",
-        "\n",
-        "é" * 130,
-        "é" * 130 + ".abc",
-        "你好.世界",
-        "a" * 300 + ".txt",
-    ],
-)
-def test_a_text_is_itself(text: str) -> None:
-    assert text_or_file_content(text) == text
+def test_a_text_is_itself() -> None:
+    texts = ["hello there", "see p. 3", "", "α" * 3000, "a/b/c", "the file words.txt", "..", "\n"]
+    for text in (*texts, "é" * 130, "é" * 130 + ".abc", "你好.世界", "a" * 300 + ".txt"):
+        assert text_or_file_content(text) == text
 
 
 def test_a_file_is_its_content(here: Path) -> None:
@@ -51,20 +36,14 @@ def test_subtitles_keep_their_times(here: Path) -> None:
     assert (transcript.lines[0].start_s, transcript.lines[0].end_s) == pytest.approx((1.0, 2.5))
 
 
-@pytest.mark.parametrize("name", ["subs/nofile", "./nofile", "../nofile", "subs/../nofile"])
-def test_a_name_in_a_folder_that_exists_is_no_text(here: Path, name: str) -> None:
+def test_a_name_in_a_folder_that_exists_is_no_text(here: Path) -> None:
     (here / "subs").mkdir()
-    with pytest.raises(InputError, match="nofile: no such transcript file"):
-        text_or_file_content(name)
+    for name in ("subs/nofile", "./nofile", "../nofile", "subs/../nofile", "nofile.txt"):
+        with pytest.raises(InputError, match=r"nofile(\.txt)?: no such transcript file"):
+            text_or_file_content(name)
     assert text_or_file_content("either/or") == "either/or"
     assert text_or_file_content("subs/ nofile") == "subs/ nofile"
     assert text_or_file_content("x" * 5000 + "/a") == "x" * 5000 + "/a"
-
-
-@pytest.mark.usefixtures("here")
-def test_a_file_that_is_not_there() -> None:
-    with pytest.raises(InputError, match=r"words.txt: no such transcript file"):
-        text_or_file_content("words.txt")
 
 
 def test_a_file_that_is_not_text(here: Path) -> None:

@@ -12,21 +12,17 @@ WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
 SAID = "please speak and my lips will move five big blue boats float by"
 
 
-def test_words_are_printed(run: RunCommand) -> None:
-    assert run("words", WELCOME) == (0, [SAID], [])
-
-
 def test_words_are_written_and_given_back(run: RunCommand, here: Path) -> None:
     assert run("words", WELCOME, "-o", "said.txt", "said.json") == (0, ["said.txt", "said.json"], [])
     assert (here / "said.txt").read_text() == SAID + "\n"
-    for transcript in ("said.txt", "said.json"):
-        done = run("animate", WELCOME, "--transcript", transcript, "-o", "motion.json")
-        assert (done.code, done.out) == (0, ["motion.json"])
-        units = json.loads((here / "motion.json").read_text())["units"]
-        assert list(dict.fromkeys(unit["word"] for unit in units if unit.get("word"))) == SAID.split()
+    done = run("animate", WELCOME, "--transcript", "said.json", "-o", "motion.json")
+    assert (done.code, done.out) == (0, ["motion.json"])
+    units = json.loads((here / "motion.json").read_text())["units"]
+    assert list(dict.fromkeys(unit["word"] for unit in units if unit.get("word"))) == SAID.split()
 
 
-def test_for_programs(run: RunCommand) -> None:
+def test_for_people_and_programs(run: RunCommand) -> None:
+    assert run("words", WELCOME) == (0, [SAID], [])
     done = run("words", WELCOME, "--machine-readable")
     start, success = map(json.loads, done.out)
     assert (start["type"], success["type"]) == ("start", "success")
@@ -35,21 +31,14 @@ def test_for_programs(run: RunCommand) -> None:
     assert 0 < success["confidence"] < 1
 
 
-@pytest.mark.parametrize(
-    ("line", "code", "said"),
-    [
-        (["words", "missing.wav"], 3, "no such file"),
-        (["words", WELCOME, "-o", "words.csv"], 7, "unknown format '.csv'; required one of: .txt .json"),
-        (["words", WELCOME, "--recogniser", "best"], 3, "unknown recogniser 'best'"),
-        (
-            ["words", WELCOME, "--recogniser", "fast"],
-            3,
-            "'fast' recognises phones, not words; required one of: auto, w",
-        ),
-        (["words", WELCOME, "--recogniser", "own"], 3, "'own' recognises phones, not words; required one of: auto, wo"),
-    ],
-)
-def test_errors(run: RunCommand, line: list[object], code: int, said: str) -> None:
-    done = run(*line)
-    assert is_one_error(done, code)
-    assert said in done.err[0]
+def test_errors(run: RunCommand) -> None:
+    for line, code, said in (
+        (["missing.wav"], 3, "no such file"),
+        ([WELCOME, "-o", "words.csv"], 7, "unknown format '.csv'; required one of: .txt .json"),
+        ([WELCOME, "--recogniser", "best"], 3, "unknown recogniser 'best'"),
+        ([WELCOME, "--recogniser", "fast"], 3, "'fast' recognises phones, not words; required one of: auto, w"),
+        ([WELCOME, "--recogniser", "own"], 3, "'own' recognises phones, not words; required one of: auto, wo"),
+    ):
+        done = run("words", *line)
+        assert is_one_error(done, code)
+        assert said in done.err[0]

@@ -34,18 +34,15 @@ def test_the_same_version_gives_the_same_bytes(tmp_path: Path) -> None:
     assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
 
 
-@pytest.mark.parametrize(
-    ("program", "name", "message"),
-    [
+def test_what_cannot_be_written_is_said(tmp_path: Path) -> None:
+    for program, name, message in (
         ("maya", "a.zip", "no add-on for 'maya', required one of blender"),
         ("blender", "a.py", "unknown format '.py'; Blender installs a .zip"),
         ("blender", "missing/a.zip", "does not exist"),
-    ],
-)
-def test_what_cannot_be_written_is_said(tmp_path: Path, program: str, name: str, message: str) -> None:
-    with pytest.raises(ExportError, match=message):
-        write_addon(program, tmp_path / name)
-    assert not list(tmp_path.iterdir())
+    ):
+        with pytest.raises(ExportError, match=message):
+            write_addon(program, tmp_path / name)
+        assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(("installed", "version"), [(None, "0.0.0"), ("1.2.3", "1.2.3"), ("1.2.3.dev4", "1.2.3")])

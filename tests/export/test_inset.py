@@ -19,13 +19,14 @@ def drawn(frame: np.ndarray, made: np.ndarray) -> tuple[slice, slice]:
     return slice(int(rows.min()), int(rows.max()) + 1), slice(int(columns.min()), int(columns.max()) + 1)
 
 
-@pytest.mark.parametrize("size", [(56, 72), (112, 144), (10, 300), (300, 10), (1, 1)])
-@pytest.mark.parametrize("frame_size", [(120, 160), (288, 360), (720, 1280), (480, 270)])
+@pytest.mark.parametrize("size", [(56, 72), (10, 300), (300, 10), (1, 1)])
+@pytest.mark.parametrize("frame_size", [(120, 160), (480, 270)])
 def test_it_lies_in_the_lower_right_corner(size: tuple[int, int], frame_size: tuple[int, int]) -> None:
     (frame,), picture = frames(1, *frame_size), np.full((*size, 3), 130, np.uint8)
     (made,) = with_inset([frame], [picture])
     assert (made.shape, made.dtype) == (frame.shape, np.uint8)
     rows, columns = drawn(frame, made)
+    assert inset_box(frame_size, size) == (columns.start, rows.start, columns.stop, rows.stop)
     margin = round(MARGIN_SHARE * min(frame_size))
     assert (rows.stop, columns.stop) == (frame_size[0] - margin, frame_size[1] - margin)
     inner = (made[rows, columns] == 130).all(axis=2)
@@ -53,6 +54,8 @@ def test_the_picture_keeps_its_form_and_its_place() -> None:
     assert inner[-4, -4].tolist() == [0, 200, 0]
     middle = np.abs(np.diff(inner[-4, :, 1])).argmax()
     assert middle == pytest.approx(width / 2, abs=1.5)
+    (turned,) = with_inset([frame], [picture[::-1, ::-1]])
+    assert np.abs(turned[rows, columns].astype(int) - made[rows, columns][::-1, ::-1]).max() <= 1
 
 
 def test_every_frame_has_its_own_picture_and_is_not_changed() -> None:
@@ -64,15 +67,6 @@ def test_every_frame_has_its_own_picture_and_is_not_changed() -> None:
     assert all(np.array_equal(frame, old) for frame, old in zip(films, before, strict=True))
     assert [frame[0, 0, 0] for frame in made] == [0, 10, 20, 30]
     assert list(with_inset([], pictures)) == []
-
-
-@pytest.mark.parametrize("size", [(56, 72), (112, 144), (300, 10)])
-@pytest.mark.parametrize("frame_size", [(120, 160), (288, 360), (480, 270)])
-def test_the_box_is_what_the_inset_covers(size: tuple[int, int], frame_size: tuple[int, int]) -> None:
-    (frame,) = frames(1, *frame_size)
-    (made,) = with_inset([frame], [np.full((*size, 3), 130, np.uint8)])
-    rows, columns = drawn(frame, made)
-    assert inset_box(frame_size, size) == (columns.start, rows.start, columns.stop, rows.stop)
 
 
 def test_a_label_leaves_the_inset_free() -> None:

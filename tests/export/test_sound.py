@@ -16,44 +16,39 @@ from lipmotion.types import Audio
 RATE_HZ = 22_050
 
 
-def tone(duration_s: float = 4.0, level: float = 0.5) -> Audio:
+def tone(duration_s: float = 2.0, level: float = 0.5) -> Audio:
     count = round(duration_s * RATE_HZ)
     return Audio((level * np.sin(np.arange(count) * 0.1)).astype(np.float32), RATE_HZ)
 
 
-@pytest.mark.parametrize("name", ["a.wav", "a.FLAC"])
-def test_samples_survive(tmp_path: Path, name: str) -> None:
-    write_sound(tmp_path / name, tone())
-    assert [path.name for path in tmp_path.iterdir()] == [name]
-    read = read_audio(tmp_path / name, RATE_HZ)
-    assert read.samples == pytest.approx(tone().samples, abs=1e-4)
-    with av.open(str(tmp_path / name)) as container:
-        assert container.streams.audio[0].rate == RATE_HZ
+def test_samples_survive(tmp_path: Path) -> None:
+    for name in ("a.wav", "a.FLAC"):
+        write_sound(tmp_path / name, tone())
+        read = read_audio(tmp_path / name, RATE_HZ)
+        np.testing.assert_allclose(read.samples, tone().samples, atol=1e-4)
+        with av.open(str(tmp_path / name)) as container:
+            assert container.streams.audio[0].rate == RATE_HZ
 
 
 def test_a_compressed_sound_is_as_long_and_as_loud(tmp_path: Path) -> None:
     write_sound(tmp_path / "a.ogg", tone())
     read = read_audio(tmp_path / "a.ogg", RATE_HZ)
-    assert read.duration_s == pytest.approx(4.0, abs=0.03)
-    assert np.abs(read.samples[RATE_HZ : 2 * RATE_HZ]).max() == pytest.approx(0.5, abs=0.05)
+    assert read.duration_s == pytest.approx(2.0, abs=0.03)
+    assert np.abs(read.samples[RATE_HZ // 2 : RATE_HZ]).max() == pytest.approx(0.5, abs=0.05)
 
 
 def test_too_loud_is_clipped(tmp_path: Path) -> None:
     write_sound(tmp_path / "a.wav", tone(level=2.0))
-    assert read_audio(tmp_path / "a.wav", RATE_HZ).samples == pytest.approx(
-        np.clip(tone(level=2.0).samples, -1, 1), abs=1e-4
-    )
+    heard = read_audio(tmp_path / "a.wav", RATE_HZ).samples
+    np.testing.assert_allclose(heard, np.clip(tone(level=2.0).samples, -1, 1), atol=1e-4)
 
 
-@pytest.mark.parametrize(
-    ("name", "audio", "message"),
-    [
+def test_errors_leave_nothing(tmp_path: Path) -> None:
+    for name, audio, message in (
         ("a.mp3", tone(), "unknown format '.mp3'; required one of: .wav .flac .ogg"),
         ("a.wav", Audio(np.zeros(0, np.float32), RATE_HZ), "the sound has no samples"),
         ("no/a.wav", tone(), "the folder .* does not exist"),
-    ],
-)
-def test_errors_leave_nothing(tmp_path: Path, name: str, audio: Audio, message: str) -> None:
-    with pytest.raises(ExportError, match=message):
-        write_sound(tmp_path / name, audio)
-    assert list(tmp_path.iterdir()) == []
+    ):
+        with pytest.raises(ExportError, match=message):
+            write_sound(tmp_path / name, audio)
+        assert list(tmp_path.iterdir()) == []

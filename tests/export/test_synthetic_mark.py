@@ -45,25 +45,6 @@ def test_a_marked_video_says_so_to_people_and_programs(tmp_path):
     assert description.findtext("dc:description/rdf:Alt/rdf:li", None, NAMES) == STATEMENT
 
 
-def test_the_tags_outlive_a_copy_of_the_streams(tmp_path):
-    """As ``ffmpeg -c copy`` makes it: without the packet."""
-    mark = mark_metadata()
-    audio = Audio(np.zeros(1600, np.float32), 16_000)
-    write_mp4(
-        tmp_path / "a.mp4", [np.zeros((64, 96, 3), np.uint8)] * 3, fps=25, audio=audio, tags=mark.tags, xmp=mark.xmp
-    )
-    with av.open(str(tmp_path / "a.mp4")) as source, av.open(str(tmp_path / "b.mp4"), "w") as copy:
-        copy.metadata.update(source.metadata)
-        stream = copy.add_stream_from_template(source.streams.video[0])
-        for packet in source.demux(video=0):
-            if packet.dts is not None:
-                packet.stream = stream
-                copy.mux(packet)
-    with av.open(str(tmp_path / "b.mp4")) as container:
-        assert container.metadata["comment"] == STATEMENT
-        assert SOURCE_TYPE in container.metadata["keywords"]
-
-
 def test_any_statement_is_valid_xml():
     packet = ET.fromstring(mark_metadata('<"&größe{}>').xmp.encode())  # noqa: S314
     assert packet.findtext(".//dc:description/rdf:Alt/rdf:li", None, NAMES) == '<"&größe{}>'
@@ -86,17 +67,15 @@ def test_every_frame_has_the_same_label_and_nothing_else_changes():
     assert all((frame == copy).all() for frame, copy in zip(frames, copies, strict=True))
 
 
-@pytest.mark.parametrize("grey", [0, 128, 255])
-def test_the_label_is_legible_on_any_ground(grey):
-    frame = np.full((720, 1280, 3), grey, np.uint8)
-    marked = next(mark_frames([frame]))
-    left, top, right, bottom = (1280 - 160, 720 - 70, 1280, 720)
-    part = marked[top:bottom, left:right, 0].astype(int)
-    letters = (part > 225).mean() if grey < 225 else 1
-    ground = part[(part < 160)]
-    assert letters > 0.02
-    assert ground.size > 0.2 * part.size
-    assert part.max() - np.median(ground) > 80
+def test_the_label_is_legible_on_any_ground():
+    for grey in (0, 128, 255):
+        (marked,) = mark_frames([np.full((720, 1280, 3), grey, np.uint8)])
+        part = marked[-70:, -160:, 0].astype(int)
+        letters = (part > 225).mean() if grey < 225 else 1
+        ground = part[(part < 160)]
+        assert letters > 0.02
+        assert ground.size > 0.2 * part.size
+        assert part.max() - np.median(ground) > 80
 
 
 @given(
@@ -104,7 +83,7 @@ def test_the_label_is_legible_on_any_ground(grey):
     width=st.integers(60, 640).map(lambda n: 2 * n),
     corners=st.tuples(*[st.floats(-0.2, 1.2)] * 4),
 )
-@settings(max_examples=60)
+@settings(max_examples=25)
 def test_the_face_is_left_free(height, width, corners):
     left, right = sorted(corners[:2])
     top, bottom = sorted(corners[2:])
@@ -127,16 +106,3 @@ def test_a_label_that_has_no_room_is_refused():
     with pytest.raises(InputError, match="left before right"):
         next(mark_frames([noise(288, 360)], (50, 5, 20, 283)))
     assert list(mark_frames([])) == []
-
-
-def test_frames_are_taken_one_at_a_time():
-    taken = []
-
-    def frames():
-        for n in range(5):
-            taken.append(n)
-            yield noise(64, 96, n)
-
-    marked = mark_frames(frames())
-    next(marked)
-    assert taken == [0]

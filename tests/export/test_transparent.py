@@ -43,7 +43,7 @@ def decoded(path: Path) -> tuple[list[float], list[np.ndarray]]:
 
 
 @pytest.mark.parametrize("suffix", [".webm", ".mov"])
-@pytest.mark.parametrize("fps", [12, 25, 29.97])
+@pytest.mark.parametrize("fps", [12, 29.97])
 def test_pictures_come_back_at_their_times_with_their_transparency(tmp_path, suffix, fps):
     path = tmp_path / f"a{suffix}"
     written = frames(10)
@@ -55,6 +55,7 @@ def test_pictures_come_back_at_their_times_with_their_transparency(tmp_path, suf
         assert np.abs(one[..., 3].astype(int) - other[..., 3]).mean() < 4
         inside = one[..., 3] == 255
         assert np.abs(one[inside][:, :3].astype(int) - other[inside][:, :3]).mean() < 12
+        assert np.abs(np.median(other[inside], axis=0) - (200, 60, 30, 255)).max() <= 4
 
 
 @pytest.mark.parametrize("suffix", [".webm", ".mov"])
@@ -69,27 +70,24 @@ def test_the_sound_is_as_long_as_given_and_starts_at_zero(tmp_path, suffix):
     assert np.abs(samples).max() > (0.2 if samples.dtype.kind == "f" else 0.2 * 32767)
 
 
-@pytest.mark.parametrize("channels", [3, 4])
-def test_numbered_pictures_are_exact(tmp_path, channels):
-    written = frames(3, channels)
-    write_pictures(tmp_path / "frame%03d.png", written)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["frame000.png", "frame001.png", "frame002.png"]
-    for n, frame in enumerate(written):
-        assert np.array_equal(np.asarray(Image.open(tmp_path / f"frame{n:03d}.png")), frame)
+def test_numbered_pictures_are_exact(tmp_path):
+    for channels in (3, 4):
+        written = frames(3, channels)
+        write_pictures(tmp_path / "frame%03d.png", written)
+        assert sorted(path.name for path in tmp_path.iterdir()) == ["frame000.png", "frame001.png", "frame002.png"]
+        for n, frame in enumerate(written):
+            assert np.array_equal(np.asarray(Image.open(tmp_path / f"frame{n:03d}.png")), frame)
 
 
-@pytest.mark.parametrize(
-    ("suffix", "pictures", "fps", "sound", "message"),
-    [
+def test_what_cannot_be_written_is_refused_and_leaves_no_file(tmp_path):
+    for suffix, pictures, fps, sound, message in (
         (".webm", [], 25, tone(), "no frames"),
         (".webm", [np.zeros((63, 96, 4), np.uint8)], 25, tone(), "even sizes"),
         (".mov", frames(1) + frames(1, 3), 25, tone(), "frame 1"),
         (".mov", frames(1), 0, tone(), "frame rate"),
         (".mov", frames(1), 25, Audio(np.zeros(0, np.float32), HZ), "no samples"),
         (".avi", frames(1), 25, tone(), "required one of"),
-    ],
-)
-def test_what_cannot_be_written_is_refused_and_leaves_no_file(tmp_path, suffix, pictures, fps, sound, message):
-    with pytest.raises(ExportError, match=message):
-        write_with_alpha(tmp_path / f"a{suffix}", pictures, fps=fps, audio=sound)
-    assert not list(tmp_path.iterdir())
+    ):
+        with pytest.raises(ExportError, match=message):
+            write_with_alpha(tmp_path / f"a{suffix}", pictures, fps=fps, audio=sound)
+        assert not list(tmp_path.iterdir())

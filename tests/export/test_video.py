@@ -11,7 +11,7 @@ from lipmotion.export.video import TAGS, frame_rate
 from lipmotion.export.xmp import LARGEST_PACKET
 from lipmotion.types import Audio
 
-RATES = [24, 25, 29.97, 30, 60]
+RATES = [24, 29.97, 60]
 
 
 def black(count: int, height: int = 64, width: int = 96) -> list[np.ndarray]:
@@ -53,14 +53,15 @@ def test_a_click_and_a_flash_stay_together(tmp_path, fps):
     assert heard_s == pytest.approx(seen_s, abs=1e-3)
 
 
-@pytest.mark.parametrize("fps", RATES)
-@pytest.mark.parametrize("duration_s", [1.0, 1.617])
+@pytest.mark.parametrize(("fps", "duration_s"), [(24, 1.617), (29.97, 1.0), (60, 1.617)])
 def test_streams_start_at_zero_and_keep_their_lengths(tmp_path, fps, duration_s):
     count = int(1.2 * fps)
     write_mp4(tmp_path / "a.mp4", black(count), fps=fps, audio=silence(duration_s, 22_050))
     with av.open(str(tmp_path / "a.mp4")) as container:
         video, sound_stream = container.streams.video[0], container.streams.audio[0]
         assert video.start_time == sound_stream.start_time == 0
+        assert (video.codec_context.name, sound_stream.codec_context.name) == ("h264", "aac")
+        assert video.codec_context.pix_fmt == "yuv420p"
         assert video.frames == count
         assert video.average_rate == frame_rate(fps)
         assert float(video.duration * video.time_base) == pytest.approx(count / fps, abs=1e-3)
@@ -77,17 +78,6 @@ def test_the_end_of_the_sound_is_heard(tmp_path):
     start_s, samples, rate_hz = sound(tmp_path / "a.mp4")
     loud = np.flatnonzero(np.abs(samples) > 0.2)
     assert start_s + loud[-1] / rate_hz == pytest.approx(1.0, abs=0.005)
-
-
-def test_players_find_it_playable(tmp_path):
-    write_mp4(tmp_path / "a.mp4", black(50), fps=25, audio=silence(2.0))
-    content = (tmp_path / "a.mp4").read_bytes()
-    assert content.index(b"moov") < content.index(b"mdat")
-    with av.open(str(tmp_path / "a.mp4")) as container:
-        video, sound_stream = container.streams.video[0], container.streams.audio[0]
-        assert (video.codec_context.name, sound_stream.codec_context.name) == ("h264", "aac")
-        assert video.codec_context.pix_fmt == "yuv420p"
-        assert (video.width, video.height) == (96, 64)
 
 
 def test_sound_lies_beside_its_frames(tmp_path):
@@ -127,38 +117,14 @@ def test_planes_are_written_as_they_are(tmp_path):
         assert np.abs(back[32, x].astype(int) - colour).max() <= 5
 
 
-def test_frames_are_taken_one_at_a_time(tmp_path):
-    alive = []
-
-    def frames():
-        for n in range(10):
-            alive.append(n)
-            yield np.full((32, 32, 3), n, dtype=np.uint8)
-
-    write_mp4(tmp_path / "a.mp4", frames(), fps=25, audio=silence(0.4))
-    assert alive == list(range(10))
-    assert len(pictures(tmp_path / "a.mp4")[0]) == 10
+def test_the_frame_rate_is_exact():
+    exact = {24: Fraction(24), 25.0: Fraction(25), 12.5: Fraction(25, 2), 23.976: Fraction(24000, 1001)}
+    exact |= {29.97: Fraction(30000, 1001), 30000 / 1001: Fraction(30000, 1001), 59.94: Fraction(60000, 1001)}
+    assert {fps: frame_rate(fps) for fps in exact} == exact
 
 
-@pytest.mark.parametrize(
-    ("fps", "rate"),
-    [
-        (24, Fraction(24)),
-        (25.0, Fraction(25)),
-        (12.5, Fraction(25, 2)),
-        (23.976, Fraction(24000, 1001)),
-        (29.97, Fraction(30000, 1001)),
-        (30000 / 1001, Fraction(30000, 1001)),
-        (59.94, Fraction(60000, 1001)),
-    ],
-)
-def test_the_frame_rate_is_exact(fps, rate):
-    assert frame_rate(fps) == rate
-
-
-@pytest.mark.parametrize(
-    ("frames", "message"),
-    [
+def test_unusable_frames_are_refused_and_leave_no_file(tmp_path):
+    for frames, message in (
         ([], "no frames"),
         (black(1, 63, 64), "even sizes"),
         (black(1, 64, 63), "even sizes"),
@@ -167,17 +133,17 @@ def test_the_frame_rate_is_exact(fps, rate):
         ([np.zeros((96, 63), dtype=np.uint8)], "even sizes"),
         ([np.zeros((96, 64), dtype=np.uint8), *black(1, 64, 64)], "frame 1 .* all alike"),
         ([np.zeros((64, 64, 3))], "float64"),
-    ],
-)
-def test_unusable_frames_are_refused_and_leave_no_file(tmp_path, frames, message):
-    with pytest.raises(ExportError, match=message):
-        write_mp4(tmp_path / "a.mp4", frames, fps=25, audio=silence(0.1))
-    assert not list(tmp_path.iterdir())
+    ):
+        with pytest.raises(ExportError, match=message):
+            write_mp4(tmp_path / "a.mp4", frames, fps=25, audio=silence(0.1))
+        assert not list(tmp_path.iterdir())
 
 
 def test_other_unusable_input_is_refused(tmp_path):
     with pytest.raises(ExportError, match="sound has no samples"):
         write_mp4(tmp_path / "a.mp4", black(1), fps=25, audio=silence(0))
+    with pytest.raises(ExportError, match="XMP metadata"):
+        write_mp4(tmp_path / "a.mp4", black(1), fps=25, audio=silence(0.1), xmp="x" * (LARGEST_PACKET + 1))
     for fps in (0, -1, float("nan"), float("inf")):
         with pytest.raises(ExportError, match="frame rate"):
             write_mp4(tmp_path / "a.mp4", black(1), fps=fps, audio=silence(0.1))
@@ -185,17 +151,7 @@ def test_other_unusable_input_is_refused(tmp_path):
         write_mp4(tmp_path / "no" / "a.mp4", black(1), fps=25, audio=silence(0.1))
 
 
-def test_an_error_while_drawing_passes_through_and_leaves_no_file(tmp_path):
-    def frames():
-        yield from black(3)
-        raise ZeroDivisionError
-
-    with pytest.raises(ZeroDivisionError):
-        write_mp4(tmp_path / "a.mp4", frames(), fps=25, audio=silence(0.1))
-    assert not list(tmp_path.iterdir())
-
-
-def moving(count: int, height: int = 96, width: int = 128) -> list[np.ndarray]:
+def moving(count: int, height: int = 64, width: int = 96) -> list[np.ndarray]:
     """Return frames of noise that moves, and changes a little from frame to frame."""
     draw = np.random.default_rng(0)
     large = draw.integers(60, 196, (height, width + count, 3))
@@ -205,22 +161,23 @@ def moving(count: int, height: int = 96, width: int = 128) -> list[np.ndarray]:
 def test_the_same_frames_give_the_same_bytes(tmp_path):
     for name in ("a.mp4", "b.mp4"):
         write_mp4(tmp_path / name, moving(40), fps=25, audio=silence(1.6), tags={"comment": "c"}, xmp="<x/>")
-    assert (tmp_path / "a.mp4").read_bytes() == (tmp_path / "b.mp4").read_bytes()
+    content = (tmp_path / "a.mp4").read_bytes()
+    assert content == (tmp_path / "b.mp4").read_bytes()
+    assert b" bframes=0 " in content
+    assert content.index(b"moov") < content.index(b"mdat")
 
 
 def test_the_bytes_do_not_depend_on_the_number_of_processors(tmp_path):
     """The encoder writes its settings into the video; where the number of threads is its own choice, it varies."""
-    write_mp4(tmp_path / "a.mp4", moving(3, 720, 1280), fps=25, audio=silence(0.2))
-    content = (tmp_path / "a.mp4").read_bytes()
-    assert b" threads=4 " in content
-    assert b" bframes=0 " in content
+    write_mp4(tmp_path / "a.mp4", moving(2, 720, 1280), fps=25, audio=silence(0.2))
+    assert b" threads=4 " in (tmp_path / "a.mp4").read_bytes()
 
 
 def test_tags_come_back(tmp_path):
-    tags = {name: f"{name}: größe\nline" for name in TAGS}
+    tags = {name: f"{name}: größe\nline" for name in TAGS} | {"title": "a\udcffb"}
     write_mp4(tmp_path / "a.mp4", black(2), fps=25, audio=silence(0.1), tags=tags)
     with av.open(str(tmp_path / "a.mp4")) as container:
-        assert {name: container.metadata.get(name) for name in TAGS} == tags
+        assert {name: container.metadata.get(name) for name in TAGS} == tags | {"title": r"a\udcffb"}
     content = (tmp_path / "a.mp4").read_bytes()
     assert content.index(b"moov") < content.index("\xa9cmt".encode("latin-1")) < content.index(b"mdat")
 
@@ -230,18 +187,6 @@ def test_a_tag_that_would_be_lost_is_refused(tmp_path):
         write_mp4(
             tmp_path / "a.mp4", black(1), fps=25, audio=silence(0.1), tags={"encoder": "x", "colour": "y", "title": "z"}
         )
-    assert not list(tmp_path.iterdir())
-
-
-def test_a_name_that_is_no_unicode_can_be_a_tag(tmp_path):
-    write_mp4(tmp_path / "a.mp4", black(1), fps=25, audio=silence(0.1), tags={"title": "a\udcffb"})
-    with av.open(str(tmp_path / "a.mp4")) as container:
-        assert container.metadata["title"] == r"a\udcffb"
-
-
-def test_an_unusable_packet_leaves_no_file(tmp_path):
-    with pytest.raises(ExportError, match="XMP metadata"):
-        write_mp4(tmp_path / "a.mp4", black(1), fps=25, audio=silence(0.1), xmp="x" * (LARGEST_PACKET + 1))
     assert not list(tmp_path.iterdir())
 
 

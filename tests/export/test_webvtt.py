@@ -50,11 +50,6 @@ def test_others_read_it(tmp_path: Path) -> None:
     assert found[1][:2] == ("00:00:00.520", "01:00:00.000")
 
 
-def test_nothing_said_is_a_file_without_cues(tmp_path: Path) -> None:
-    write_webvtt(tmp_path / "a.vtt", Timeline(()))
-    assert (tmp_path / "a.vtt").read_text() == "WEBVTT\n"
-
-
 def test_which_names_are_those_of_labels() -> None:
     assert [holds_labels(Path(name)) for name in ("a.TEXTGRID", "a.vtt", "a.phones.vtt", "a.csv")] == [True] * 3 + [
         False

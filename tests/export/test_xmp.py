@@ -31,12 +31,8 @@ def test_what_is_appended_is_read_and_the_video_stays(video):
     assert read_xmp(video) == "<größe/>"
     assert video.read_bytes().startswith(before)
     assert brightness(video) == shown
-
-
-def test_ffmpeg_reads_the_packet(video):
-    append_xmp(video, "<x>y</x>")
     with av.open(str(video), options={"export_xmp": "1"}) as container:
-        assert container.metadata["xmp"] == "<x>y</x>"
+        assert container.metadata["xmp"] == "<größe/>"
 
 
 def test_the_first_of_several_packets_counts(video):
@@ -55,25 +51,22 @@ def test_long_boxes_and_other_uuids_are_passed_over(tmp_path):
     assert read_xmp(path) == "yes"
 
 
-@pytest.mark.parametrize(
-    "content",
-    [
+def test_what_does_not_end_with_a_whole_box_is_left_alone(tmp_path):
+    path = tmp_path / "a.mp4"
+    for content in (
         b"",
         b"text",
         struct.pack(">I4s", 0, b"mdat") + b"until the end",
         struct.pack(">I4s", 99, b"mdat") + b"cut short",
         struct.pack(">I4s", 4, b"mdat"),
         struct.pack(">I4s", 8, b"free") + b"abc",
-    ],
-)
-def test_what_does_not_end_with_a_whole_box_is_left_alone(content, tmp_path):
-    path = tmp_path / "a.mp4"
-    path.write_bytes(content)
-    with pytest.raises(ExportError, match="not whole boxes"):
-        append_xmp(path, "x")
-    assert path.read_bytes() == content
-    if content:
-        assert read_xmp(path) is None
+    ):
+        path.write_bytes(content)
+        with pytest.raises(ExportError, match="not whole boxes"):
+            append_xmp(path, "x")
+        assert path.read_bytes() == content
+        if content:
+            assert read_xmp(path) is None
 
 
 def test_a_file_that_is_not_there_is_refused(tmp_path):

@@ -19,14 +19,14 @@ def closings(lids: np.ndarray) -> np.ndarray:
     return np.flatnonzero(np.diff((lids > 0.5).astype(int)) == 1)
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_eyes_blink_as_people_do_and_are_open_otherwise(seed):
-    lids = expression(frames(100), MINUTE, SAID, None, seed=seed).lids
-    blinks = closings(lids) / 100
-    assert 9 <= len(blinks) <= 30
-    assert np.diff(blinks).min() > 0.3
-    assert (lids <= RESTING_LIDS).mean() > 0.85
-    assert lids.max() == pytest.approx(1, abs=0.02)
+def test_eyes_blink_as_people_do_and_are_open_otherwise():
+    for seed in range(3):
+        lids = expression(frames(100), MINUTE, SAID, None, seed=seed).lids
+        blinks = closings(lids) / 100
+        assert 9 <= len(blinks) <= 30
+        assert np.diff(blinks).min() > 0.3
+        assert (lids <= RESTING_LIDS).mean() > 0.85
+        assert lids.max() == pytest.approx(1, abs=0.02)
 
 
 def test_every_blink_is_seen_at_25_frames_a_second():

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from lipmotion.faces.liveliness import liveliness
+from lipmotion.faces.liveliness import accent_of, liveliness
+from lipmotion.types import Prosody
 
 FPS = 50.0
 TIME_S = np.arange(0, 60, 1 / FPS)
@@ -53,9 +54,19 @@ def test_eyes_jump_and_hold(minute):
     assert steps.max() > 0.02
 
 
-@pytest.mark.parametrize("count", [1, 2, 5])
-def test_the_shortest_motions_have_movements(count):
-    alive = liveliness(np.zeros(count), np.zeros(count), 25.0)
-    assert alive.shut.shape == alive.brows.shape == (count,)
-    assert alive.gaze.shape == (count, 2)
-    assert alive.turn.shape == (count, 3)
+def test_the_shortest_motions_have_movements():
+    for count in (1, 2, 5):
+        alive = liveliness(np.zeros(count), np.zeros(count), 25.0)
+        assert alive.shut.shape == alive.brows.shape == (count,)
+        assert alive.gaze.shape == (count, 2)
+        assert alive.turn.shape == (count, 3)
+
+
+def test_a_loud_high_moment_is_an_accent_and_a_high_whisper_is_none():
+    level_db, pitch = np.full(300, -30.0), np.full(300, np.log(120.0))
+    level_db[100:140], pitch[100:140] = -10.0, np.log(200.0)
+    level_db[200:240], pitch[200:240] = -70.0, np.log(200.0)
+    accent = accent_of(Prosody(level_db, pitch), np.arange(300) / 100)
+    assert accent[120] > 0.9
+    assert np.abs(accent[[20, 220]]).max() < 1e-9
+    assert accent_of(None, TIME_S) is None

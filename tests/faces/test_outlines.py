@@ -4,8 +4,6 @@ import pytest
 from lipmotion.faces.portrait.outlines import (
     STEPS,
     closed_curve,
-    ellipse,
-    lowered,
     open_curve,
     path_points,
     stroke,
@@ -42,7 +40,3 @@ def test_a_stroke_is_as_wide_as_asked():
     outline = stroke(open_curve("0 0, 1 0, 2 0"), [0.2, 0.4])
     assert outline[0, 1] - outline[-1, 1] == pytest.approx(0.2)
     assert np.ptp(outline[:, 1]) == pytest.approx(0.4)
-
-
-def test_lowered_is_further_down():
-    assert lowered(ellipse(0, 0, 1, 2), 0.5).mean(axis=0) == pytest.approx([0, 0.5])

@@ -46,14 +46,11 @@ def drawn_and_tracked() -> tuple[np.ndarray, np.ndarray]:
     )
 
 
-def test_the_face_is_found_in_every_frame(drawn_and_tracked):
-    assert np.isfinite(drawn_and_tracked[1]).all()
-
-
-@pytest.mark.parametrize(("column", "least"), [(0, 0.95), (1, 0.85), (2, 0.9)], ids=["opening", "width", "outer"])
-def test_the_drawn_motion_is_tracked(drawn_and_tracked, column, least):
+def test_the_drawn_motion_is_tracked(drawn_and_tracked):
     drawn, measured = drawn_and_tracked
-    assert np.corrcoef(drawn[:, column], measured[:, column])[0, 1] >= least
+    assert np.isfinite(measured).all()  # the face is found in every frame
+    for column, least in enumerate((0.95, 0.85, 0.9)):  # opening, width, outer
+        assert np.corrcoef(drawn[:, column], measured[:, column])[0, 1] >= least
 
 
 def test_the_opening_is_tracked_somewhat_larger_than_given_and_closed_where_closed(drawn_and_tracked):

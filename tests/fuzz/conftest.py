@@ -19,5 +19,5 @@ def good(toy_corpus: Corpus, toy_model_file: Path, coupled_model_file: Path) -> 
 @pytest.fixture(scope="module")
 def worker(good: Good) -> Iterator[Worker]:
     """A worker with all readers."""
-    with Worker(good) as process:
+    with Worker(good, lines=False) as process:
         yield process

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import warnings
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -22,12 +23,15 @@ def read_with(error: Exception, folder: Path) -> Result:
     return read_result(Reader("planted", seeds, read), FILES, folder / "bad", NOWHERE)
 
 
-@pytest.mark.parametrize("line", ["x" * 5000, "a\nb", "\x1b[2J", "\x9b2J"])
-def test_a_message_that_is_no_short_printable_line(line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    error = InputError("anything")
-    assert read_with(error, tmp_path).kind == REFUSED
-    monkeypatch.setattr(judge, "outcome", lambda _: (3, line))
-    assert read_with(error, tmp_path).kind == ERROR
+def test_a_message_that_is_no_short_printable_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for line, kind in {"short": REFUSED, "x" * 5000: ERROR, "a\nb": ERROR, "\x1b[2J": ERROR, "\x9b2J": ERROR}.items():
+        monkeypatch.setattr(judge, "outcome", partial(_told, line))
+        assert read_with(InputError("anything"), tmp_path).kind == kind
+    assert list(tmp_path.iterdir()) == []
+
+
+def _told(line: str, _: object) -> tuple[int, str]:
+    return 3, line
 
 
 def test_messages_are_alike_whatever_they_quote(tmp_path: Path) -> None:
@@ -42,8 +46,3 @@ def test_memory_and_warnings_are_defects(tmp_path: Path) -> None:
 
     assert read_with(MemoryError("no room"), tmp_path).kind == MEMORY
     assert read_result(Reader("planted", seeds, warn), FILES, tmp_path / "bad", NOWHERE).kind == ERROR
-
-
-def test_nothing_stays(tmp_path: Path) -> None:
-    read_with(InputError("anything"), tmp_path)
-    assert list(tmp_path.iterdir()) == []

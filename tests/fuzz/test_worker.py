@@ -15,12 +15,7 @@ from fuzz.judge import CRASH, ERROR, HANG, IMPLAUSIBLE, LEFT, MEMORY, READ, REFU
 from fuzz.planted import MEGABYTES, readers
 from fuzz.worker import Worker
 
-ORDERS = {
-    **{"raise": ERROR, "lie": IMPLAUSIBLE, "drop": LEFT, "spoil": LEFT},
-    **{"refuse": REFUSED, "now": READ},
-}
-
-
+ORDERS = {"raise": ERROR, "lie": IMPLAUSIBLE, "drop": LEFT, "spoil": LEFT, "refuse": REFUSED, "now": READ}
 NOWHERE = Good(Path("nowhere"), ())
 
 
@@ -30,12 +25,12 @@ def planted() -> Iterator[Worker]:
         yield process
 
 
-@pytest.mark.parametrize(("order", "kind"), ORDERS.items())
-def test_defects_are_told_apart(order: str, kind: str, planted: Worker) -> None:
-    result = planted.read_input("planted", _input(order))
-    assert result.kind == kind, result
-    assert kind == READ or result.where
-    assert planted.read_input("planted", _input("now")).kind == READ  # the next input is not affected
+def test_defects_are_told_apart(planted: Worker) -> None:
+    for order, kind in ORDERS.items():
+        result = planted.read_input("planted", _input(order))
+        assert result.kind == kind, result
+        assert kind == READ or result.where
+        assert planted.read_input("planted", _input("now")).kind == READ  # the next input is not affected
 
 
 @pytest.mark.long
@@ -83,11 +78,11 @@ def test_a_campaign_finds_and_counts(planted: Worker) -> None:
     (reader,) = readers().values()
 
     def run() -> CampaignRecord:
-        return campaign(reader, planted, NOWHERE, 3, lambda record: record.distinct < 60)
+        return campaign(reader, planted, NOWHERE, 3, lambda record: record.distinct < 30)
 
     first, second = run(), run()
-    assert first.distinct == 60 <= first.made
-    assert sum(first.kinds.values()) == 60
+    assert first.distinct == 30 <= first.made
+    assert sum(first.kinds.values()) == 30
     assert first.kinds == second.kinds
 
 

@@ -32,12 +32,19 @@ class Worker:
 
     readers : a function that returns the readers by name; None: all readers
     hang_s  : processor time after which a reader counts as hanging; ``PATIENCE`` times as long by the clock
+    lines   : whether the lines that ran are told, which takes time
     """
 
     def __init__(
-        self, good: Good, *, hang_s: float = HANG_S, memory_mb: int = Memory.MOST_MB, readers: Any = None
+        self,
+        good: Good,
+        *,
+        hang_s: float = HANG_S,
+        memory_mb: int = Memory.MOST_MB,
+        readers: Any = None,
+        lines: bool = True,
     ) -> None:
-        self._arguments = (good, memory_mb, readers)
+        self._arguments = (good, memory_mb, readers, lines)
         self._hang_s = hang_s
         self._process: Any = None
         self._folder = tempfile.TemporaryDirectory(prefix="lipmotion-fuzz-")
@@ -116,7 +123,7 @@ class Worker:
         self._process = None
 
 
-def serve(pipe: Any, folder: str, good: Good, memory_mb: int, readers: Any) -> None:
+def serve(pipe: Any, folder: str, good: Good, memory_mb: int, readers: Any, tell_lines: bool) -> None:
     """Read the inputs that arrive through the pipe, in a folder that must stay empty."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is handled by the parent process
     here, log = Path(folder) / "here", (Path(folder) / "log").open("a")
@@ -130,7 +137,8 @@ def serve(pipe: Any, folder: str, good: Good, memory_mb: int, readers: Any) -> N
     tempfile.tempdir = str(here)
     quiet()
     known, lines, memory = _known(readers), LineCoverage(), Memory(memory_mb)
-    lines.watch()
+    if tell_lines:
+        lines.watch()
     pipe.send("ready")
     with suppress(EOFError, OSError):
         while True:

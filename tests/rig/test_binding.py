@@ -143,20 +143,20 @@ def test_written_points_are_read(binding, tmp_path):
     assert [named[point] for point in binding.placement.points] == binding.placement.vertices.tolist()
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("vertex,weight\n1,2\n", "required vertex,point,weight"),
-        ("vertex,point,weight\n1,17\n", "2 columns"),
-        ("vertex,point,weight\none,17,1\n", "line 2"),
-        ("vertex,point,weight\n1,17,0.5\n1,17,0.5\n", "occur twice"),
-        ("vertex,point,weight\n1,17,1.5\n", "is 1.5, required 0 to 1"),
-        ("vertex,point,weight\n1,17,nan\n", "is nan, required 0 to 1"),
-        ("vertex,point,weight\n-1,17,1\n", "does not exist"),
-        ("vertex,point,weight\n1,5,1\n", "is no control point"),
-    ],
-)
-def test_paint_is_checked(binding, mesh, tmp_path, text, message):
-    (tmp_path / "paint.csv").write_text(text)
-    with pytest.raises(InputError, match=message):
-        painted(binding, mesh, read_weights(tmp_path / "paint.csv"))
+WRONG = [
+    ("vertex,weight\n1,2\n", "required vertex,point,weight"),
+    ("vertex,point,weight\n1,17\n", "2 columns"),
+    ("vertex,point,weight\none,17,1\n", "line 2"),
+    ("vertex,point,weight\n1,17,0.5\n1,17,0.5\n", "occur twice"),
+    ("vertex,point,weight\n1,17,1.5\n", "is 1.5, required 0 to 1"),
+    ("vertex,point,weight\n1,17,nan\n", "is nan, required 0 to 1"),
+    ("vertex,point,weight\n-1,17,1\n", "does not exist"),
+    ("vertex,point,weight\n1,5,1\n", "is no control point"),
+]
+
+
+def test_paint_is_checked(binding, mesh, tmp_path):
+    for text, message in WRONG:
+        (tmp_path / "paint.csv").write_text(text)
+        with pytest.raises(InputError, match=message):
+            painted(binding, mesh, read_weights(tmp_path / "paint.csv"))

@@ -35,6 +35,9 @@ def test_the_jaw_opens_and_mouth_close_closes() -> None:
     assert opening[[0, 3]] == pytest.approx(REST_OPENING, abs=1e-6)
     assert np.diff(opening[:3]).min() > 0.1
     assert moved["y_152"][1] < moved["y_152"][0]
+    beyond = with_mouth(weights(jawOpen=[0.0, 0.0, 0.3], mouthClose=[0.0, 1.0, 0.9]))  # no further than the jaw is open
+    for name in ("outer", "y_14", "y_13"):
+        assert beyond[name][1] == pytest.approx(beyond[name][0])
     assert moved.names[:2] == ("jawOpen", "mouthClose")
 
 

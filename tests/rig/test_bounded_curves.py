@@ -10,9 +10,8 @@ from lipmotion.errors import InputError
 from lipmotion.rig.bounded_curves import CurveCosts, bounded_curves
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_each_frame_is_the_bounded_least_squares_solution(seed):
-    rng = np.random.default_rng(seed)
+def test_each_frame_is_the_bounded_least_squares_solution():
+    rng = np.random.default_rng(0)
     matrix, targets = rng.normal(size=(6, 20)), 2 * rng.normal(size=(5, 20))
     found = bounded_curves(matrix, targets, CurveCosts(ridge=1e-2, smooth=0.0))
     rows = np.concatenate([matrix.T, np.sqrt(1e-2) * np.eye(6)])
@@ -51,9 +50,8 @@ def test_more_cost_is_smoother():
     assert smooth < rough / 2
 
 
-@pytest.mark.parametrize(
-    ("matrix", "targets"), [(np.zeros((2, 3)), np.zeros((5, 4))), (np.full((2, 3), np.nan), np.zeros((5, 3)))]
-)
-def test_what_does_not_fit_is_refused(matrix, targets):
-    with pytest.raises(InputError):
-        bounded_curves(matrix, targets)
+def test_what_does_not_fit_is_refused():
+    with pytest.raises(InputError, match="do not fit"):
+        bounded_curves(np.zeros((2, 3)), np.zeros((5, 4)))
+    with pytest.raises(InputError, match="not finite"):
+        bounded_curves(np.full((2, 3), np.nan), np.zeros((5, 3)))

@@ -94,3 +94,6 @@ def test_a_closure_between_two_pictures_is_shown():
     rows = np.stack([gap, np.arange(6.0)], axis=1)
     shown = at_times(rows, gap, 100.0, np.array([0.0, 0.03]))
     np.testing.assert_allclose(shown, [[0.1, 0], [0.0, 2]])
+    gap[[2, 4]], rows[:, 0] = 0.0, gap
+    np.testing.assert_allclose(at_times(rows, gap, 100.0, np.array([0.0, 0.024]))[1], [0.0, 2])  # of two the nearest
+    np.testing.assert_allclose(at_times(rows, gap, 100.0, np.array([0.0, 0.036]))[1], [0.0, 4])

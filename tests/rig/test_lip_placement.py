@@ -74,19 +74,16 @@ def test_a_mouth_that_is_not_cut_open_is_refused():
         placed_by_points(mesh, mesh_surface(mesh), named)
 
 
-@pytest.mark.parametrize(
-    ("named", "message"),
-    [
+def test_named_points_are_checked():
+    mesh = head(shapes=False)
+    for named, message in (
         ({61: 0, 291: 1, 13: 2}, "14 are missing"),
         ({61: 0, 291: 1, 13: 2, 14: 99999}, "vertex 99999, required 0 to"),
         ({61: 0, 291: 1, 13: 2, 14: 2}, "are one vertex"),
         ({61: 0, 291: 1, 13: 2, 14: 3, 5: 4}, "5 is no lip or jaw point"),
-    ],
-)
-def test_named_points_are_checked(named, message):
-    mesh = head(shapes=False)
-    with pytest.raises(InputError, match=message):
-        placed_by_points(mesh, mesh_surface(mesh), named)
+    ):
+        with pytest.raises(InputError, match=message):
+            placed_by_points(mesh, mesh_surface(mesh), named)
 
 
 def test_a_mesh_without_a_shape_that_opens_says_what_it_has():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import socket
 import struct
 from pathlib import Path
 from typing import Any
@@ -21,10 +20,10 @@ CUT = ("cut short: it states 3", "s of sound and holds")
 CONTAINERS: dict[str, tuple[str, dict[float, Any]]] = {
     "wav": ("pcm_s16le", {0.6: (0,), 0.004: (3, "holds", "required at least 100 ms")}),
     "flac": ("flac", {0.6: (0, *CUT), 0.01: (3, *NO_RECORDING)}),
-    "mp3": ("libmp3lame", {0.6: (0, *CUT), 0.01: (3, *NO_RECORDING)}),
-    "ogg": ("libopus", {0.6: (0,), 0.01: (3, *NO_RECORDING)}),
-    "mp4": ("aac", {0.95: (3, "no sound track"), 0.6: (3, *NO_RECORDING), 0.01: (3, *NO_RECORDING)}),
-    "mkv": ("aac", {0.6: (0, *CUT), 0.01: (3, *NO_RECORDING)}),
+    "mp3": ("libmp3lame", {0.6: (0, *CUT)}),
+    "ogg": ("libopus", {0.6: (0,)}),
+    "mp4": ("aac", {0.6: (3, *NO_RECORDING)}),
+    "mkv": ("aac", {0.6: (0, *CUT)}),
 }
 
 
@@ -55,11 +54,6 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(bench.sound(np.zeros(0, np.int16)))
 
 
-@case(GROUP, "one sample", 3, "of sound, required at least 100 ms")
-def _(bench: Bench) -> list[object]:
-    return bench.animate(bench.sound(np.ones(1, np.int16)))
-
-
 @case(GROUP, "a header that promises more than there is", 0)
 def _(bench: Bench) -> list[object]:
     content = bytearray(bench.speech.read_bytes())
@@ -67,20 +61,11 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(bench.file("a.wav", bytes(content)))
 
 
-@case(GROUP, "a header that promises less than there is", 3, "required at least 100 ms")
+@case(GROUP, "infinite samples", 3, "not finite", "export the recording again")
 def _(bench: Bench) -> list[object]:
-    content = bytearray(bench.speech.read_bytes())
-    content[40:44] = struct.pack("<I", 100)
-    return bench.animate(bench.file("a.wav", bytes(content)))
-
-
-for _name, _value in {"NaN": np.nan, "+infinite": np.inf, "-infinite": -np.inf}.items():
-
-    @case(GROUP, f"{_name} samples", 3, "not finite", "export the recording again")
-    def _(bench: Bench, value: float = _value) -> list[object]:
-        samples = bench.samples()
-        samples[8000:8010] = value
-        return bench.animate(bench.sound(samples))
+    samples = bench.samples()
+    samples[8000:8010] = -np.inf
+    return bench.animate(bench.sound(samples))
 
 
 @case(GROUP, "samples a million times full scale", 3, "full scale 1, found a peak of")
@@ -90,9 +75,7 @@ def _(bench: Bench) -> list[object]:
 
 for _name, _rate_hz, _code, _messages in [
     ("1 Hz", 1, 3, ("sampled at 1 Hz, required 4000 to 1000000",)),
-    ("400 Hz", 400, 3, ("sampled at 400 Hz, required 4000",)),
     ("384 kHz", 384_000, 0, ()),
-    ("1 GHz", 1_000_000_000, 3, ("sampled at 1000000000 Hz, required",)),
 ]:
 
     @case(GROUP, f"sampled at {_name}", _code, *_messages)
@@ -108,14 +91,12 @@ def _(bench: Bench) -> list[object]:
 
 for _name, _samples in {
     "clipped": lambda samples: np.clip(samples * 50, -1, 1),
-    "a constant": lambda samples: np.full_like(samples, 0.5),
     "digital silence": lambda samples: 0 * samples,
     "white noise": lambda samples: np.random.default_rng(0).normal(0, 0.1, len(samples)).astype(np.float32),
-    "one click": lambda samples: (np.arange(len(samples)) == 9000).astype(np.float32),
     "all but inaudible": lambda samples: samples * np.float32(1e-12),
 }.items():
 
-    @case(GROUP, _name, 0, *(NO_SPEECH if _name in ("a constant", "digital silence") else ()))
+    @case(GROUP, _name, 0, *(NO_SPEECH if _name == "digital silence" else ()))
     def _(bench: Bench, change=_samples) -> list[object]:
         return bench.animate(bench.sound(change(bench.samples())))
 
@@ -127,10 +108,8 @@ def _(bench: Bench) -> list[object]:
 
 
 for _name, _content in {
-    "a text named .wav": b"words, not sound\n" * 50,
     "a web page": b"<!DOCTYPE html><html><body>404 Not Found</body></html>\n" * 20,
     "random bytes": np.random.default_rng(1).bytes(5000),
-    "zeros": bytes(5000),
 }.items():
 
     @case(GROUP, _name, 3, *NO_RECORDING)
@@ -149,30 +128,9 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(write_pictures(bench.folder / "a.mp4"))
 
 
-@case(GROUP, "a model", 3, *NO_RECORDING)
-def _(bench: Bench) -> list[object]:
-    return bench.animate(bench.model)
-
-
-@case(GROUP, "a motion file", 3, *NO_RECORDING)
-def _(bench: Bench) -> list[object]:
-    return bench.animate(bench.file("a.json", '{"format": "lipmotion.motion", "version": 1}\n' * 30))
-
-
 @case(GROUP, "a folder", 3, "no sounds and no videos in it; give a folder of recordings")
 def _(bench: Bench) -> list[object]:
     return bench.animate(bench.folder)
-
-
-@case(GROUP, "a file that does not exist", 3, "no such file")
-def _(bench: Bench) -> list[object]:
-    return bench.animate(bench.folder / "none.wav")
-
-
-@case(GROUP, "a link to a file that does not exist", 3, "no such file")
-def _(bench: Bench) -> list[object]:
-    (bench.folder / "a.wav").symlink_to(bench.folder / "none.wav")
-    return bench.animate(bench.folder / "a.wav")
 
 
 @case(GROUP, "a link to itself", 3, "a.wav")
@@ -187,20 +145,9 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(bench.folder / "a.wav")
 
 
-@case(GROUP, "a socket", 3, "is a pipe or a device, required a file")
+@case(GROUP, "/dev/zero", 3, "is a pipe or a device, required a file")
 def _(bench: Bench) -> list[object]:
-    os.chdir(bench.folder)  # a socket's path must be short
-    with socket.socket(socket.AF_UNIX) as server:
-        server.bind("a.wav")
-    os.chdir(bench.folder.parent / "here")
-    return bench.animate(bench.folder / "a.wav")
-
-
-for _device in ("/dev/null", "/dev/zero"):
-
-    @case(GROUP, _device, 3, "is a pipe or a device, required a file")
-    def _(bench: Bench, device: str = _device) -> list[object]:
-        return bench.animate(Path(device))
+    return bench.animate(Path("/dev/zero"))
 
 
 @case(GROUP, "a name that is too long", 3, "File name too long")
@@ -215,11 +162,6 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(path)
 
 
-@case(GROUP, "holes of a day, ten minutes each", 3, "leave holes of 89248 s beside 3.0 s of sound, at most 660 s")
-def _(bench: Bench) -> list[object]:
-    return bench.animate(write_stamped(bench.folder / "a.mkv", [599.0 * n for n in range(150)]))
-
-
 @case(GROUP, "time stamps that alternate", 3, "beside 8.0 s of sound, at most 760 s are bridged; export the recording")
 def _(bench: Bench) -> list[object]:
     return bench.animate(write_stamped(bench.folder / "a.mkv", [598.0 * (n % 2) + n / 50 for n in range(400)]))
@@ -230,15 +172,9 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(write_constant_flac(bench.folder / "a.flac", 80_000))
 
 
-@case(GROUP, "a rate that changes to 1 Hz", 3, "sampled at 1 Hz, required 4000 to 1000000")
-def _(bench: Bench) -> list[object]:
-    return bench.animate(write_constant_flac(bench.folder / "a.flac", 60, rates_hz=(8000, 1)))
-
-
 for _name, _content in {
     "a VobSub index": "# VobSub index file, v7\ntimestamp: 00:00:00:000, filepos: 000000000\n",
     "an HLS playlist": "#EXTM3U\n#EXT-X-TARGETDURATION:2\n#EXTINF:2,\na.sub\n#EXT-X-ENDLIST\n",
-    "a list of files to join": "ffconcat version 1.0\nfile 'a.sub'\n",
     "a session description": "v=0\no=- 0 0 IN IP4 127.0.0.1\ns=x\nc=IN IP4 127.0.0.1\nt=0 0\nm=audio 5004 RTP/AVP 0\n",
 }.items():
 
@@ -251,19 +187,3 @@ for _name, _content in {
 @case(GROUP, "a name like an address", 3, "no such file")
 def _(bench: Bench) -> list[object]:
     return bench.animate("concat:a.wav|b.wav")
-
-
-@case(GROUP, "adapt to digital silence", 3, "no speech found in the recordings; give some of the voice to adapt to")
-def _(bench: Bench) -> list[object]:
-    return ["adapt", bench.sound(np.zeros(48_000, np.float32)), "--model", bench.model, "-o", "m"]
-
-
-@case(GROUP, "adapt to words in a text file", 3, *NO_RECORDING)
-def _(bench: Bench) -> list[object]:
-    return ["adapt", bench.speech, bench.file("a.wav", "words"), "--model", bench.model, "-o", "m"]
-
-
-@case(GROUP, "adapt over one of the recordings", 7, "is the recording itself; give another name")
-def _(bench: Bench) -> list[object]:
-    path = bench.sound(np.zeros(48_000, np.float32))
-    return ["adapt", bench.speech, path, "--model", bench.model, "-o", path]

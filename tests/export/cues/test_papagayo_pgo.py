@@ -59,7 +59,7 @@ def said(sentence: ToySentence) -> Timeline[Unit]:
     return Timeline(tuple(spans))
 
 
-@pytest.mark.parametrize("fps", [12.0, 24.0, 25.0, 30.0])
+@pytest.mark.parametrize("fps", [12.0, 25.0])
 def test_every_frame_shows_the_cue(toy_sentence: ToySentence, fps: float) -> None:
     sheet = choose_cues(result(said(toy_sentence)), fps)
     about, phrases = read(CUE_FORMATS["pgo"](sheet, "a b.wav"))
@@ -106,7 +106,7 @@ def test_a_character_without_rest_has_no_gaps() -> None:
     assert {shown(phrases, frame) for frame in range(20)} <= {shape.blair for shape in SHAPES.values()} - {"rest"}
 
 
-@pytest.mark.parametrize(("fps", "whole"), [(29.97, 30), (23.976, 24), (12.5, 13)])
+@pytest.mark.parametrize(("fps", "whole"), [(29.97, 30), (12.5, 13)])
 def test_times_stay_at_a_rate_that_is_not_whole(fps: float, whole: int) -> None:
     """After ten minutes, 29.97 frames a second would be 18 frames behind 30."""
     times_s = [frame / fps for frame in (0, 1, *range(int(600 * fps), int(600 * fps) + 6))]

@@ -44,13 +44,6 @@ def test_the_special_shapes_belong_to_their_sounds() -> None:
     assert shown("X") == {phone for phone in PHONES if is_silent(phone)}
 
 
-def test_names_of_preston_blair() -> None:
-    names = [shape.blair for shape in SHAPES.values()]
-    assert len(set(names)) == len(names)
-    assert set(BLAIR) - set(names) == {"WQ"}
-    assert set(names) <= set(BLAIR)
-
-
 def test_optional_shapes_fall_back_as_rhubarb_does() -> None:
     assert OPTIONAL == "GHX"
     assert [drawn_shape(name, "ABCDEF") for name in "ABCDEFGHX"] == list("ABCDEFACA")

@@ -57,7 +57,7 @@ def test_the_columns_are_those_of_the_app(tmp_path: Path) -> None:
     assert all(line.split(",")[1] == "61" and line.count(",") == 62 for line in lines[1:])
 
 
-@pytest.mark.parametrize("rate_hz", [24.0, 29.97, 30.0, 60.0, 100.0])
+@pytest.mark.parametrize("rate_hz", [29.97, 100.0])
 def test_unreal_reads_the_same_times_and_values(tmp_path: Path, rate_hz: float) -> None:
     written = generation(rate_hz)
     write_motion(tmp_path / "a.livelink.csv", written, source={}, model={})
@@ -70,15 +70,7 @@ def test_unreal_reads_the_same_times_and_values(tmp_path: Path, rate_hz: float) 
     assert "opening" not in (tmp_path / "a.livelink.csv").read_text()
 
 
-@pytest.mark.parametrize(
-    ("time_s", "code"),
-    [
-        (0.0, "00:00:00:00.000"),
-        (0.999999999, "00:00:01:00.000"),
-        (1 / 60, "00:00:00:01.000"),
-        (59.99, "00:00:59:59.400"),
-        (3600 + 59.5, "01:00:59:30.000"),
-    ],
-)
-def test_times_carry_over(time_s: float, code: str) -> None:
-    assert timecode(time_s) == code
+def test_times_carry_over() -> None:
+    codes = {0.999999999: "00:00:01:00.000", 1 / 60: "00:00:00:01.000", 59.99: "00:00:59:59.400"}
+    codes |= {3600 + 59.5: "01:00:59:30.000", 2 * 3600 + 5 * 60: "02:05:00:00.000"}
+    assert {time_s: timecode(time_s) for time_s in codes} == codes

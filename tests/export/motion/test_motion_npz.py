@@ -48,10 +48,3 @@ def test_a_pickle_is_not_opened(tmp_path):
     np.savez(path, values=np.zeros((1, 1)), document=np.array({"format": "lipmotion.motion"}, dtype=object))
     with pytest.raises(InputError, match="not a motion file"):
         read_motion(path)
-
-
-def test_other_arrays_are_not_motion(tmp_path):
-    path = tmp_path / "a.npz"
-    np.savez(path, values=np.zeros((1, 1)))
-    with pytest.raises(InputError, match="not a motion file"):
-        read_motion(path)

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from faces.character.motions import NOTHING_SAID, opening, said, steady
+from faces.character.motions import NOTHING_SAID, opening
 from lipmotion.errors import InputError
 from lipmotion.faces import face_named
 from lipmotion.faces.base import Staging
@@ -18,23 +18,17 @@ from lipmotion.testing import check_face
 SMALL: dict[str, Any] = {"width": 160, "height": 120}
 
 
-@pytest.mark.long
-def test_frames_are_rgb_of_the_size_asked():
-    frames = list(render(opening(0, 0.2), NOTHING_SAID, **SMALL))
-    assert [frame.shape for frame in frames] == [(120, 160, 3)] * 2
-    assert all(frame.dtype == np.uint8 for frame in frames)
-
-
 def test_the_number_of_frames_follows_the_frame_rate():
     moved = opening(*np.zeros(21), rate_hz=100.0)
-    assert [sum(1 for _ in render(moved, NOTHING_SAID, fps=fps, **SMALL)) for fps in (25, 30, 60)] == [6, 7, 13]
+    assert [sum(1 for _ in render(moved, NOTHING_SAID, fps=fps, **SMALL)) for fps in (25, 30)] == [6, 7]
 
 
 @pytest.mark.long
 def test_the_same_input_gives_the_same_pixels_and_another_seed_others():
-    moved = opening(*np.linspace(0, 0.2, 30))
+    moved = opening(*np.linspace(0, 0.2, 8))
     first, second, other = (
-        np.array(list(render(moved, NOTHING_SAID, staging=Staging(seed=seed), **SMALL))) for seed in (1, 1, 2)
+        np.array(list(render(moved, NOTHING_SAID, staging=Staging(seed=seed), width=64, height=64)))
+        for seed in (1, 1, 2)
     )
     assert np.array_equal(first, second)
     assert not np.array_equal(first, other)
@@ -44,10 +38,10 @@ def test_the_head_is_a_face_like_all_others():
     check_face(face_named("head"))
 
 
-@pytest.mark.parametrize("size", [{"width": 63}, {"height": 0}, {"width": 129}])
-def test_an_unusable_size_is_refused_at_once(size):
-    with pytest.raises(InputError, match="even number of at least 64"):
-        render(opening(0), NOTHING_SAID, **{**SMALL, **size})
+def test_an_unusable_size_is_refused_at_once():
+    for size in ({"width": 63}, {"height": 0}, {"width": 129}):
+        with pytest.raises(InputError, match="even number of at least 64"):
+            render(opening(0), NOTHING_SAID, **{**SMALL, **size})
 
 
 @pytest.fixture(scope="module")
@@ -66,31 +60,11 @@ def test_closed_lips_show_nothing_of_the_mouth(front):
         assert seen == {"wall": 0, "tongue": 0, "teeth": 0, "upper teeth": 0}
 
 
-def test_what_is_seen_in_the_mouth_tells_the_sounds_apart(front):
-    f = areas(front, gap=0.05, upper_rise=0.036, tuck=1.0)
-    th = areas(front, gap=0.06, upper_rise=0.016, jaw=0.04, tongue_out=1.0)
-    s = areas(front, gap=0.07, upper_rise=0.02, jaw=0.01, bite=1.0)
-    aa = areas(front, gap=0.24, upper_rise=0.04, jaw=0.17, oval=1.0)
-    assert f["upper teeth"] > 5 * (f["teeth"] + f["tongue"] + f["wall"])
-    assert th["tongue"] > 3 * th["teeth"]
-    assert s["teeth"] > 2 * s["tongue"]
-    assert aa["wall"] > aa["upper teeth"] > 0
-
-
 def test_a_picture_of_the_moving_part_is_the_whole_picture():
     stage, pose = Stage(camera_for(320, 240)), CharacterPose(gap=0.1, turn=(0.2, 0.05, 0.0))
     drawn = stage.figure.frame(pose, stage.canvas.camera.place)
     whole = stage.canvas.picture(drawn.places, drawn.light, stage.figure.triangles)
     assert np.array_equal(stage.picture(pose), whole)
-
-
-def test_f_shows_teeth_where_m_shows_none():
-    def brightest(phone: str) -> int:
-        frames = list(render(steady(("ah", phone)), said("ah", phone), width=320, height=240))
-        row, column = 120 + int((0.70 - 0.03) * 240 / 3.35), 160
-        return int(frames[15][row - 4 : row + 6, column - 6 : column + 6].min(axis=2).max())
-
-    assert brightest("f") > brightest("m") + 20
 
 
 def first(motion=None, **settings: Any) -> np.ndarray:
@@ -110,7 +84,7 @@ def test_a_transparent_picture_over_a_colour_is_the_picture_on_that_colour():
 
 @pytest.mark.long
 def test_what_is_switched_off_does_not_move():
-    moved = opening(*[0.0] * 150)
+    moved = opening(*[0.0] * 60)
     still = Staging(size=64, blinks=False, gaze=False, brows=False, head=False)
     frames = list(Head(still).render(moved, NOTHING_SAID))
     assert all(np.array_equal(frame, frames[0]) for frame in frames[1:])

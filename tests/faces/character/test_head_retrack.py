@@ -17,14 +17,11 @@ def rendered_and_tracked() -> tuple[np.ndarray, np.ndarray]:
     return motion.resampled(25.0).values, tracked(frames)
 
 
-def test_the_face_is_found_in_every_frame(rendered_and_tracked):
-    assert np.isfinite(rendered_and_tracked[1]).all()
-
-
-@pytest.mark.parametrize(("column", "least"), [(0, 0.97), (1, 0.9), (2, 0.95)], ids=["opening", "width", "outer"])
-def test_the_rendered_motion_is_tracked(rendered_and_tracked, column, least):
+def test_the_rendered_motion_is_tracked(rendered_and_tracked):
     given, measured = rendered_and_tracked
-    assert np.corrcoef(given[:, column], measured[:, column])[0, 1] >= least
+    assert np.isfinite(measured).all()  # the face is found in every frame
+    for column, least in enumerate((0.97, 0.9, 0.95)):  # opening, width, outer
+        assert np.corrcoef(given[:, column], measured[:, column])[0, 1] >= least
 
 
 def test_the_opening_is_tracked_at_its_size(rendered_and_tracked):

@@ -5,10 +5,8 @@ from hypothesis import strategies as st
 
 from lipmotion.faces.character.inside import LOWER_EDGE, lower_drop, lower_teeth, upper_teeth
 from lipmotion.faces.character.lips import (
-    ACROSS,
     ARCH,
     COLUMNS,
-    RINGS,
     SIDE,
     TEETH_EDGE,
     TEETH_Z,
@@ -60,7 +58,7 @@ def test_closed_lips_meet_at_every_column():
 
 
 @given(poses())
-@settings(max_examples=60)
+@settings(max_examples=20)
 def test_the_gap_is_as_asked_and_lips_never_cross(pose):
     places = contact(pose)
     assert places[20, 1] - places[60, 1] == pytest.approx(pose.gap, abs=1e-9)
@@ -68,7 +66,7 @@ def test_the_gap_is_as_asked_and_lips_never_cross(pose):
 
 
 @given(poses())
-@settings(max_examples=40)
+@settings(max_examples=10)
 def test_both_halves_of_the_mouth_are_alike(pose):
     surface = lip_surface(section_points(pose, figure().skin.base_z))[:FRONT]
     mirrored = np.concatenate([np.arange(40, -1, -1), np.arange(COLUMNS - 1, 40, -1)])
@@ -76,7 +74,7 @@ def test_both_halves_of_the_mouth_are_alike(pose):
 
 
 @given(poses(), SHARES, SHARES)
-@settings(max_examples=80)
+@settings(max_examples=30)
 def test_lips_never_reach_into_the_teeth(pose, tuck, press):
     """What is above the edge of the upper teeth is before them; what is below the lower edge is before those."""
     moved = pose._replace(
@@ -129,11 +127,12 @@ def test_the_lower_lip_of_f_touches_the_upper_teeth():
     assert contact(CharacterPose(gap=0.05, upper_rise=0.036))[60][2] > lower[2] + 0.02
 
 
-def test_the_surface_has_its_rings_and_columns():
-    surface = lip_surface(section_points(CharacterPose(gap=0.1), figure().skin.base_z))
-    assert surface.shape == (RINGS, COLUMNS, 3)
-    assert np.ptp(surface[-1], axis=0) == pytest.approx([0, 0, 0], abs=1e-9)  # the throat is closed
-    assert ACROSS[0] == pytest.approx(-1)
+def test_pressed_lips_are_thinner():
+    def height(pose: CharacterPose) -> float:
+        contour = section_points(pose, figure().skin.base_z)[0]
+        return float(contour[20, 1] - contour[60, 1])
+
+    assert height(CharacterPose(press=1)) == pytest.approx(0.65 * height(CharacterPose()), rel=0.05)
 
 
 def test_the_corners_of_closed_lips_are_level_with_their_middle():
@@ -141,14 +140,14 @@ def test_the_corners_of_closed_lips_are_level_with_their_middle():
         assert np.ptp(contact(pose)[:, 1]) < 0.015
 
 
-@pytest.mark.parametrize("gap", [0.028, 0.04, 0.06, 0.1])
-def test_a_round_hole_is_an_ellipse_that_nothing_behind_it_narrows(gap):
-    pose = CharacterPose(gap=gap, upper_rise=0.48 * gap, width=0.75, roundness=1, protrusion=0.08)
-    surface = lip_surface(section_points(pose, figure().skin.base_z))
-    rim = surface[VISIBLE - 1]
-    line = np.interp(np.abs(rim[:, 0]), rim[20:41, 0], 0.5 * (rim[20:41, 1] + rim[60 - np.arange(21), 1]))
-    half_width, half_height = rim[:, 0].max(), 0.5 * (rim[20, 1] - rim[60, 1])
-    away = np.hypot(rim[:, 0] / half_width, (rim[:, 1] - line) / half_height)
-    assert np.abs(away - 1).max() < 0.06
-    behind = surface[VISIBLE : VISIBLE + 4]
-    assert behind[:, :, 0].max(axis=1).min() >= half_width - 1e-9
+def test_a_round_hole_is_an_ellipse_that_nothing_behind_it_narrows():
+    for gap in (0.028, 0.04, 0.06, 0.1):
+        pose = CharacterPose(gap=gap, upper_rise=0.48 * gap, width=0.75, roundness=1, protrusion=0.08)
+        surface = lip_surface(section_points(pose, figure().skin.base_z))
+        rim = surface[VISIBLE - 1]
+        line = np.interp(np.abs(rim[:, 0]), rim[20:41, 0], 0.5 * (rim[20:41, 1] + rim[60 - np.arange(21), 1]))
+        half_width, half_height = rim[:, 0].max(), 0.5 * (rim[20, 1] - rim[60, 1])
+        away = np.hypot(rim[:, 0] / half_width, (rim[:, 1] - line) / half_height)
+        assert np.abs(away - 1).max() < 0.06
+        behind = surface[VISIBLE : VISIBLE + 4]
+        assert behind[:, :, 0].max(axis=1).min() >= half_width - 1e-9
