@@ -1,7 +1,9 @@
 # make demo   installs, then turns a spoken sentence into an animated face with the model in the package
 # make test   installs everything, then runs the quick tests (under three minutes)
-# make test-all   the other tests: mutations, kills, real recordings, copies of the repository; then make test-portable
-# make test-portable   the numeric tests as other processors would run them
+# make test-all   the three that follow
+# make test-long      tests that take seconds: mutations, kills, real recordings, copies of the repository
+# make test-portable  the numeric tests as other processors would run them
+# make test-explore   the property tests with other random cases at every run
 # make check  lint, types, import contracts
 # make coverage   the tests of `make test`, and which lines and branches they reach
 # make fuzz   mutated input for every reader, MINUTES=10 in all; READER=name: that one only; SEED=1: other input
@@ -20,7 +22,9 @@ READER ?=
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 SOURCES := $(shell find src -type f -not -name '*.pyc') pyproject.toml README.md
-.PHONY: demo test test-all test-portable check coverage fuzz bench model requirements clean
+TIMED := $(BIN)/python scripts/processor_time.py
+PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
+.PHONY: demo test test-all test-long test-portable test-explore check coverage fuzz bench model requirements clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/core
@@ -28,13 +32,18 @@ demo: $(VENV)/core
 	$(BIN)/lipmotion animate examples/welcome.flac --transcript examples/welcome.txt --face head -o $(BUILD)/welcome.mp4 $(BUILD)/welcome.json
 
 test: $(VENV)/dev
-	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal -m "not long"
+	$(TIMED) --limit 600 $(PYTEST) -m "not long"
 
-test-all: $(VENV)/dev test-portable
-	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal -m long
+test-all: test-long test-portable test-explore
+
+test-long: $(VENV)/dev
+	$(TIMED) --limit 900 $(PYTEST) -m long
 
 test-portable: $(VENV)/dev
-	PYTHONPATH=tests $(BIN)/python -m portable.run
+	PYTHONPATH=tests $(TIMED) --limit 500 $(BIN)/python -m portable.run
+
+test-explore: $(VENV)/dev
+	$(PYTEST) -m "hypothesis and not long" --hypothesis-profile=explore
 
 check: $(VENV)/dev
 	$(BIN)/ruff format --check .

@@ -15,14 +15,14 @@ import subprocess
 import sys
 import time
 
-ADDITIONS = 10_000_000
+LOOP = compile("total = 0\nfor number in range(10_000_000):\n    total += number", "loop", "exec")
+"""With the variables of a module: in a function the same takes half the time."""
 
 
 def loop_s() -> float:
     """Return the processor seconds of a loop of ten million additions."""
-    start_s, total = time.process_time(), 0
-    for number in range(ADDITIONS):
-        total += number
+    start_s = time.process_time()
+    exec(LOOP, {})  # noqa: S102 - the constant above
     return time.process_time() - start_s
 
 

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+import os
+
+# Before NumPy is loaded: two threads of a matrix product wait for one another in a loop, and for long where the machine
+# has other work. The product itself computes under ``kernels.threads.one_thread``; two threads: ``make test-portable``.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import signal
 import wave
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, settings
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
@@ -18,13 +27,41 @@ from lipmotion.testing.toy import ToySentence, toy_sentences, toy_utterances
 from lipmotion.testing.toy_face import toy_face
 
 SENTENCES = 12
+FIXED, EXPLORE = "fixed", "explore"
+"""Profiles of Hypothesis: the same examples every time; and ``--hypothesis-profile=explore``: others, and more."""
+MORE = 10
+"""How many times the examples of a test are tried by ``explore``."""
+# How long an example takes depends on what else the machine does; a fixture that examples share is never changed here.
+ANYWHERE = settings(
+    deadline=None,
+    database=None,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
+    print_blob=True,
+)
+settings.register_profile(FIXED, ANYWHERE, derandomize=True)
+settings.register_profile(EXPLORE, ANYWHERE, derandomize=False, max_examples=100 * MORE)
+settings.load_profile(FIXED)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Whatever needs real recordings, or trains on them, takes long."""
+    """Whatever needs real recordings, or trains on them, takes long; exploring tries more than a test asks for."""
     for item in items:
         if item.get_closest_marker("recordings") or item.get_closest_marker("slow"):
             item.add_marker(pytest.mark.long)
+    if settings.get_current_profile_name() == EXPLORE:
+        for test in {getattr(item, "obj", None) for item in items}:
+            own = getattr(test, "_hypothesis_internal_use_settings", None)
+            if own is not None and own.max_examples < settings().max_examples:
+                test._hypothesis_internal_use_settings = settings(own, max_examples=MORE * own.max_examples)
+
+
+@pytest.fixture
+def ordinary_signals() -> Iterator[None]:
+    """Signals as a terminal leaves them: under ``nohup`` and in the background, tests are started with some ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler), signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    yield
+    for number, handler in zip((signal.SIGINT, signal.SIGTERM), before, strict=True):
+        signal.signal(number, handler)
 
 
 @pytest.fixture(scope="session")

@@ -2,13 +2,13 @@ from __future__ import annotations
 
 import ast
 import importlib
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
 import lipmotion
+from children import run_child
 
 HEAVY = ("numpy", "scipy", "av", "PIL", "pocketsphinx", "tqdm", "cv2", "mediapipe")
 
@@ -53,7 +53,7 @@ def test_heavy_packages_are_imported_when_they_are_needed(code: str) -> None:
         f"try:\n    exec({code!r})\nexcept SystemExit:\n    pass\n"
         f"print([name for name in {HEAVY!r} if name in sys.modules], file=sys.stderr)"
     )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    done = run_child([sys.executable, "-c", program], check=True)
     assert done.stderr.strip() == "[]"
 
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 import shlex
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from children import LIPMOTION, run_child
 
 ROOT = Path(__file__).parent.parent
 README, START = ((ROOT / page).read_text(encoding="utf-8") for page in ("README.md", "docs/start.md"))
@@ -32,10 +33,8 @@ def needs_training(command: list[str]) -> bool:
 
 def run(command: list[str], folder: Path) -> str:
     if command[0] == "lipmotion":
-        command = [sys.executable, "-m", "lipmotion.cli.main", *command[1:]]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+        command = [*LIPMOTION, *command[1:]]
+    return run_child(command, folder=folder, check=True, limit_s=300).stdout
 
 
 @pytest.fixture

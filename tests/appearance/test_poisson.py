@@ -137,7 +137,7 @@ def test_no_pictures_give_none() -> None:
     assert system.correction(none, none).shape == none.shape
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(seed=st.integers(0, 10**6), height=st.integers(3, 40), width=st.integers(3, 40), share=st.floats(0.1, 1))
 def test_the_membrane_lies_between_its_edge_values(seed: int, height: int, width: int, share: float) -> None:
     """The maximum principle, up to the error of interpolation, and the printed equation, for masks of any kind."""

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from children import Done, environment, run_child
 
 ROOT = Path(__file__).parents[2]
 FORBIDDEN = [
@@ -58,14 +58,13 @@ FORBIDDEN = [
 ]
 
 
-def lint(source: Path, folder: Path) -> subprocess.CompletedProcess[str]:
+def lint(source: Path, folder: Path) -> Done:
     """Check the contracts on the package in ``source``."""
     script = shutil.which("lint-imports", path=str(Path(sys.executable).parent)) or shutil.which("lint-imports")
     if script is None:
         pytest.skip("import-linter is not installed")
     command = [script, "--config", str(ROOT / "pyproject.toml"), "--no-cache"]
-    environment = os.environ | {"PYTHONPATH": str(source), "COLUMNS": "200"}
-    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    return run_child(command, folder=folder, variables=environment(PYTHONPATH=str(source), COLUMNS="200"))
 
 
 def broken(output: str) -> list[str]:

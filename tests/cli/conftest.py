@@ -1,9 +1,6 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 import wave
 import zipfile
 from collections.abc import Callable
@@ -12,6 +9,7 @@ from typing import NamedTuple
 
 import pytest
 
+from children import LIPMOTION, environment, run_child
 from lipmotion.cli.main import main
 from lipmotion.pipeline.model import VERSION
 from lipmotion.storage.archive import HEADER
@@ -57,13 +55,8 @@ def run(capsys: pytest.CaptureFixture[str]) -> RunCommand:
 def run_outside() -> RunCommand:
     """Runs a command in a process of its own, as a shell does."""
 
-    module = (sys.executable, "-m", "lipmotion.cli.main")
-
-    def run(*arguments: object, program: tuple[str, ...] = module, encoding: str = "utf-8") -> Done:
-        environment = os.environ | {"PYTHONIOENCODING": encoding}
-        done = subprocess.run(
-            [*program, *map(str, arguments)], capture_output=True, encoding="utf-8", check=False, env=environment
-        )
+    def run(*arguments: object, program: tuple[str, ...] = LIPMOTION, encoding: str = "utf-8") -> Done:
+        done = run_child([*program, *arguments], variables=environment(PYTHONIOENCODING=encoding))
         return Done(done.returncode, done.stdout.splitlines(), done.stderr.splitlines())
 
     return run

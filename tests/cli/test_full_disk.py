@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from children import run_child
 from cli.conftest import RunCommand
 from lipmotion.corpora.store import Corpus
 
@@ -22,9 +22,7 @@ def run_limited(*arguments: object, limit: int = LIMIT) -> tuple[int, str]:
         "from lipmotion.cli.main import main\n"
         "sys.exit(main())\n"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code, *map(str, arguments)], capture_output=True, text=True, check=False
-    )
+    done = run_child([sys.executable, "-c", code, *arguments])
     assert done.stdout == ""
     (line,) = done.stderr.splitlines()
     return done.returncode, line
@@ -59,9 +57,7 @@ def test_a_face(filmed_face_file: Path, here: Path) -> None:
         "except ExportError as error:\n"
         "    print(error)\n"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code, str(filmed_face_file)], capture_output=True, text=True, check=False
-    )
+    done = run_child([sys.executable, "-c", code, filmed_face_file])
     assert done.stderr == ""
     assert done.stdout.startswith("a.face: cannot be written: ")
     assert list(here.iterdir()) == []

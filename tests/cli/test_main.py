@@ -1,11 +1,10 @@
 from __future__ import annotations
 
-import os
-import subprocess
 import sys
 
 import pytest
 
+from children import PIPE, child
 from cli.conftest import RunCommand
 from lipmotion.cli import info, main
 from lipmotion.errors import AlignmentError, LipMotionError, MissingDependencyError
@@ -98,13 +97,11 @@ def test_a_reader_that_has_gone_is_no_error(arguments: list[str]) -> None:
         "-c",
         "import sys; sys.stdin.read(); from lipmotion.cli.main import main; sys.exit(main())",
     ]
-    buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
-    pipe = subprocess.PIPE
-    with subprocess.Popen([*program, *arguments], stdin=pipe, stdout=pipe, stderr=pipe, env=buffered) as process:
+    with child([*program, *arguments], stdin=PIPE, stderr=PIPE) as process:
         assert process.stdin is not None
         assert process.stdout is not None
         assert process.stderr is not None
         process.stdout.close()
         process.stdin.close()  # now it may begin
-        assert process.stderr.read() == b""
-    assert process.returncode == 0
+        assert process.stderr.read() == ""
+        assert process.wait() == 0

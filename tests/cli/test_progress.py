@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from children import LIPMOTION, environment, run_child
 from cli.conftest import Done, RunCommand
 from lipmotion.cli import evaluate
 from lipmotion.cli.events import Events, JsonLines
@@ -147,24 +148,16 @@ def test_an_error_on_the_command_line_is_a_failure_too(run: RunCommand) -> None:
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no /dev/full here")  # noqa: PTH110
 @pytest.mark.parametrize("arguments", [["info"], ["train", "CORPUS", "-o", "m", "--machine-readable"]])
 def test_output_that_is_full(toy_corpus: Corpus, here: Path, arguments: list[str]) -> None:
-    import subprocess
-
     command = [str(toy_corpus.path) if argument == "CORPUS" else argument for argument in arguments]
     for unbuffered in ("", "1"):
         with Path("/dev/full").open("w") as full:
-            done = subprocess.run(
-                [sys.executable, "-m", "lipmotion.cli.main", *command],
-                stdout=full,
-                stderr=subprocess.PIPE,
-                text=True,
-                check=False,
-                env=os.environ | {"PYTHONUNBUFFERED": unbuffered},
-            )
+            done = run_child([*LIPMOTION, *command], stdout=full, variables=environment(PYTHONUNBUFFERED=unbuffered))
         assert done.returncode == 7
         assert done.stderr == "lipmotion: error: standard output cannot be written: No space left on device\n"
     assert list(here.iterdir()) == []
 
 
+@pytest.mark.usefixtures("ordinary_signals")
 def test_what_is_swallowed_stops_at_the_next_event(monkeypatch: pytest.MonkeyPatch, run: RunCommand) -> None:
     """As when the signal comes during an import that treats any exception as a missing package."""
 

@@ -3,9 +3,7 @@ from __future__ import annotations
 import json
 import os
 import signal
-import subprocess
 import sys
-import time
 from argparse import Namespace
 from collections.abc import Sequence
 from contextlib import suppress
@@ -14,6 +12,8 @@ from pathlib import Path
 import pytest
 
 import lipmotion
+from children import LIPMOTION, PIPE, child, environment, run_child
+from children import Done as Completed
 from cli import signalled
 from cli.conftest import RunCommand
 from lipmotion.cli import info
@@ -21,9 +21,11 @@ from lipmotion.cli.stop import Stopped, Stopper
 from lipmotion.corpora.store import Corpus
 
 LINE = "lipmotion: stopped; run the same command again to go on"
-SOURCE = os.environ | {"PYTHONPATH": str(Path(lipmotion.__file__).parents[1])}
 BOTH = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals as POSIX has them")
+pytestmark = [
+    pytest.mark.skipif(sys.platform == "win32", reason="signals as POSIX has them"),
+    pytest.mark.usefixtures("ordinary_signals"),
+]
 
 
 @BOTH
@@ -90,13 +92,8 @@ def test_without_a_signal_nothing_is_raised() -> None:
 def test_while_packages_are_imported(number: signal.Signals, toy_speech: Path, here: Path) -> None:
     """The first package that is imported sends the signal, before the program has printed anything."""
     (here / "numpy.py").write_text(f"import os\nos.kill(os.getpid(), {int(number)})\nwhile True: pass\n")
-    done = subprocess.run(
-        [sys.executable, "-m", "lipmotion.cli.main", "animate", str(toy_speech), "-o", "a.json"],
-        capture_output=True,
-        text=True,
-        check=False,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(here), *sys.path])},
-    )
+    first = environment(PYTHONPATH=os.pathsep.join([str(here), *sys.path]))
+    done = run_child([*LIPMOTION, "animate", toy_speech, "-o", "a.json"], variables=first)
     assert (done.returncode, done.stdout, done.stderr) == (128 + number, "", LINE + "\n")
     assert [path.name for path in here.iterdir() if path.name != "__pycache__"] == ["numpy.py"]
 
@@ -126,19 +123,15 @@ def test_training_stopped_in_the_middle_goes_on(
     run_outside("train", toy_corpus.path, "-o", "whole.lipmotion")
     arguments = ["train", str(toy_corpus.path), "-o", "m.lipmotion"]
     pausing = [sys.executable, "-c", PAUSING, *arguments, "--machine-readable"]
-    with subprocess.Popen(pausing, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
-        assert process.stdout is not None
-        assert process.stderr is not None
+    with child(pausing, stderr=PIPE) as process:
         assert os.WIFSTOPPED(os.waitpid(process.pid, os.WUNTRACED)[1])
-        second = subprocess.run(
-            [sys.executable, "-m", "lipmotion.cli.main", *arguments], capture_output=True, text=True, check=False
-        )
+        second = run_child([*LIPMOTION, *arguments])
         process.send_signal(number)
         process.send_signal(signal.SIGCONT)
-        rest, said = process.stdout.read(), process.stderr.read()
+        rest, said = process.communicate()
     assert process.returncode == 128 + number
-    assert said.decode() == LINE + "\n"
-    assert f'"exit_code": {128 + number}}}' in rest.decode().splitlines()[-1]
+    assert said == LINE + "\n"
+    assert f'"exit_code": {128 + number}}}' in rest.splitlines()[-1]
     assert second.returncode == 7
     assert f"another lipmotion (process {process.pid}) is at work on it" in second.stderr
     assert sorted(path.name for path in here.iterdir()) == ["m.lipmotion.unfinished", "whole.lipmotion"]
@@ -148,35 +141,32 @@ def test_training_stopped_in_the_middle_goes_on(
     assert sorted(path.name for path in here.iterdir()) == ["m.lipmotion", "whole.lipmotion"]
 
 
-@pytest.mark.long
 def test_a_second_signal_later_ends_the_program() -> None:
     """A second signal ends the program at once, even where the first one was swallowed."""
     program = (
         "import time\n"
-        "from lipmotion.cli.stop import Stopper\n"
-        "Stopper().listen()\n"
+        "from lipmotion.cli import stop\n"
+        "stop.SAME_SIGNAL_S = 0.0\n"
+        "stop.Stopper().listen()\n"
         "while True:\n"
         "    try:\n"
         "        print('ready', flush=True)\n"
         "        time.sleep(60)\n"
         "    except KeyboardInterrupt: pass\n"
     )
-    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE) as process:
+    with child([sys.executable, "-c", program]) as process:
         assert process.stdout is not None
-        process.stdout.readline()
-        process.send_signal(signal.SIGINT)
-        time.sleep(1.5)
-        assert process.poll() is None
-        process.send_signal(signal.SIGINT)
-        assert process.wait(30) == 130
+        for _ in range(2):
+            assert process.stdout.readline() == "ready\n"
+            process.send_signal(signal.SIGINT)
+        assert process.wait() == 130
 
 
-def signalled_at(step: int, number: int, arguments: Sequence[object]) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, signalled.__file__, str(int(number)), str(step), *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+def signalled_at(step: int, number: int, arguments: Sequence[object]) -> Completed:
+    return run_child([sys.executable, signalled.__file__, int(number), step, *arguments])
 
 
-def ends_with_one_final_event(done: subprocess.CompletedProcess[str], number: int, events_only: bool) -> bool:
+def ends_with_one_final_event(done: Completed, number: int, events_only: bool) -> bool:
     """Return whether the last event, and only that, says how the command ended, in agreement with the exit code."""
     events = [json.loads(line) for line in (done.stderr if events_only else done.stdout).splitlines()]
     ends = [event for event in events if event["type"] in ("success", "failure")]
@@ -279,7 +269,8 @@ def test_little_is_loaded_before_signals_are_listened_to() -> None:
     program = (
         "import sys; before = set(sys.modules); import lipmotion.cli.main; print(*sorted({*sys.modules} - before))"
     )
-    done = subprocess.run([sys.executable, "-S", "-c", program], capture_output=True, text=True, check=True, env=SOURCE)
+    source = environment(PYTHONPATH=str(Path(lipmotion.__file__).parents[1]))
+    done = run_child([sys.executable, "-S", "-c", program], variables=source, check=True)
     loaded = set(done.stdout.split())
     assert {name for name in loaded if name.startswith("lipmotion")} == {
         "lipmotion",

@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from children import LIPMOTION, run_child
 from cli.conftest import Done, is_one_error
 from lipmotion.corpora.store import Corpus
 
@@ -111,8 +111,7 @@ def laid(here: Path, toy_corpus: Corpus, toy_model_file: Path, toy_speech: Path)
 
 
 def run_as_ordinary(line: str) -> Done:
-    command = [*ordinary(), sys.executable, "-m", "lipmotion.cli.main", *line.split()]
-    done = subprocess.run(command, capture_output=True, encoding="utf-8", check=False, timeout=120)
+    done = run_child([*ordinary(), *LIPMOTION, *line.split()])
     return Done(done.returncode, done.stdout.splitlines(), done.stderr.splitlines())
 
 

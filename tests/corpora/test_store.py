@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -9,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from children import run_child
 from lipmotion.corpora.entry import quantise, read_entry
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError, ExportError, InputError
@@ -202,7 +202,7 @@ def test_reading_needs_no_video_packages(corpus):
         "from pathlib import Path; from lipmotion.corpora.store import Corpus; "
         f"Corpus.open(Path({str(corpus.path)!r})).utterance('one').track.crops.sum()"
     )
-    subprocess.run([sys.executable, "-c", code], check=True)
+    run_child([sys.executable, "-c", code], check=True)
 
 
 def phones() -> Timeline[Unit]:

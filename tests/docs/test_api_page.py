@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from children import environment, run_child
 from lipmotion.corpora.store import Corpus
 
 ROOT = Path(__file__).parents[2]
@@ -22,15 +21,13 @@ BLOCKS = re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
 def test_every_block_of_the_page_runs(toy_corpus: Corpus, tmp_path: Path) -> None:
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
     shutil.copytree(toy_corpus.path, tmp_path / "my-corpus")
-    done = subprocess.run(
+    done = run_child(
         [sys.executable, "-W", "error", "-c", "\n".join(BLOCKS)],
-        cwd=tmp_path,
-        env=os.environ | {"NUMBA_DISABLE_PERFORMANCE_WARNINGS": "1"},
-        capture_output=True,
-        text=True,
-        check=False,
+        folder=tmp_path,
+        variables=environment(NUMBA_DISABLE_PERFORMANCE_WARNINGS="1"),
+        limit_s=600,
+        check=True,
     )
-    assert done.returncode == 0, done.stderr
     assert len(done.stdout.splitlines()) > len(BLOCKS)
     assert {"welcome.json", "welcome.csv", "welcome.tsv", "small.lipmotion"} <= {p.name for p in tmp_path.iterdir()}
 

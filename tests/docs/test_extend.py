@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import re
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from children import LIPMOTION, Done, environment, run_child
 from lipmotion.corpora.store import Corpus
 
 PAGES = Path(__file__).parents[2] / "docs" / "extend"
@@ -45,16 +45,13 @@ class Package:
         (self.sources / "pyproject.toml").write_text(project, encoding="utf-8")
         pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "install", "--quiet", "--no-index"]
         build = ["--no-deps", "--no-build-isolation", "--target", str(self.installed), str(self.sources)]
-        subprocess.run([*pip, *build], check=True, capture_output=True)
+        run_child([*pip, *build], check=True)
         shutil.rmtree(self.sources)
 
-    def run(self, *command: object) -> subprocess.CompletedProcess[str]:
+    def run(self, *command: object) -> Done:
         """Run Python with the package installed."""
         path = os.pathsep.join(filter(None, [str(self.installed), os.environ.get("PYTHONPATH", "")]))
-        environment = os.environ | {"PYTHONPATH": path}
-        return subprocess.run(
-            [sys.executable, *map(str, command)], env=environment, capture_output=True, text=True, check=False
-        )
+        return run_child([sys.executable, *command], variables=environment(PYTHONPATH=path))
 
     def lipmotion(self, *arguments: object) -> str:
         """Return what a verb prints."""
@@ -82,12 +79,7 @@ def test_an_installed_engine_trains_saves_loads_and_animates(
     lines = (tmp_path / "a.csv").read_text(encoding="utf-8").splitlines()
     assert lines[0].startswith("time_s,opening,width,outer")
     package.lipmotion("explain", model, toy_speech, "--at", "1.0")
-    missing = subprocess.run(
-        [sys.executable, "-m", "lipmotion.cli.main", "info", "--trees", str(model)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    missing = run_child([*LIPMOTION, "info", "--trees", model])
     assert missing.returncode == 6
     assert "no engine 'ridge'; there are: trajectory, coupled, joint, selection; install the package" in missing.stderr
 

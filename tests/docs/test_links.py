@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
 from collections.abc import Iterator
 from dataclasses import fields
 from itertools import chain
@@ -11,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from children import run_child
 from lipmotion.engines import ENGINES
 
 ROOT = Path(__file__).parents[2]
@@ -128,7 +128,7 @@ def test_all_pages_say_the_same_of_how_long_training_takes() -> None:
 
 
 def test_no_package_registry_and_no_absolute_path_is_named() -> None:
-    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False)
+    listed = run_child(["git", "ls-files"], folder=ROOT)
     if listed.returncode:
         pytest.skip("not a git repository")
     endings = {".md", ".toml", ".cff", ".yml", ".yaml", ".in", ".txt", ".bib"}

@@ -111,7 +111,7 @@ def test_every_frame_has_an_explanation(trained):
     assert explained(trained, spoken, [7, 3, 7]) == (found[7], found[3], found[7])
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(data=st.data())
 @pytest.mark.parametrize("name", [*ENGINES.built_in, *OTHERS])
 def test_pins_are_exact(name, data):

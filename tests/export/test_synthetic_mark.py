@@ -104,7 +104,7 @@ def test_the_label_is_legible_on_any_ground(grey):
     width=st.integers(60, 640).map(lambda n: 2 * n),
     corners=st.tuples(*[st.floats(-0.2, 1.2)] * 4),
 )
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_the_face_is_left_free(height, width, corners):
     left, right = sorted(corners[:2])
     top, bottom = sorted(corners[2:])

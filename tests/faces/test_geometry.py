@@ -35,7 +35,7 @@ DESIGNS = {"woman": WOMAN, "man": MAN, "cartoon": CARTOON}
 designs = st.sampled_from(sorted(DESIGNS))
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(designs, poses)
 def test_outlines_never_cross(name, drawn):
     design = DESIGNS[name]
@@ -56,7 +56,7 @@ def test_outlines_never_cross(name, drawn):
         assert (upper <= lower + 1e-9).all()
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(designs, poses)
 def test_the_gap_is_exact(name, drawn):
     design = DESIGNS[name]
@@ -66,7 +66,7 @@ def test_the_gap_is_exact(name, drawn):
     assert gap.max() <= drawn.gap + 1e-6
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(designs, poses)
 def test_the_mouth_ends_at_its_corners_and_is_symmetric(name, drawn):
     design = DESIGNS[name]
@@ -79,7 +79,7 @@ def test_the_mouth_ends_at_its_corners_and_is_symmetric(name, drawn):
     assert 0.55 < shape.upper_outer.min() < shape.lower_outer.max() < 1.7
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(designs, poses)
 def test_closed_lips_touch_along_the_whole_mouth(name, drawn):
     design = DESIGNS[name]

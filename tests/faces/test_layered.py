@@ -112,7 +112,7 @@ def test_what_is_no_drawing_is_refused(data):
         drawing_of(data)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.text(alphabet="MmLlHhVvCcSsQqTtAaZz0123456789.,- e", max_size=40))
 def test_any_path_is_read_or_refused(path):
     try:

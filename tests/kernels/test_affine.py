@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.kernels import affine
@@ -55,7 +55,7 @@ def test_every_blended_pixel_is_that_of_the_definition(seed, kind):
 
 
 @given(seed=st.integers(0, 2**32 - 1), as_floats=st.booleans())
-@settings(deadline=None, max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40)
 def test_both_forms_give_the_same_bits(seed, as_floats, monkeypatch):
     pytest.importorskip("numba")
     picture, to_source = noise((21, 17, 3), seed), random_map(seed, 20)

@@ -28,7 +28,7 @@ def all_are_there(arrays) -> None:
 
 
 @given(seed=st.integers(0, 2**32 - 1), states=st.integers(1, 30), dense=st.sampled_from([0.05, 0.5, 1.0]))
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_every_arc_has_its_place(seed, states, dense):
     all_are_there(random_network(seed, states, 3, dense)[0])
 

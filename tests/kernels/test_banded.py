@@ -25,7 +25,7 @@ def dense(mean, precision, pins=()) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 @given(seed=SEEDS, frames=LENGTHS)
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 def test_agrees_with_the_dense_system(seed, frames):
     mean, precision = statistics(seed, frames)
     values, variance = solve(normal_equations(mean, precision))
@@ -44,7 +44,7 @@ def test_the_shortest_trajectories(frames):
 
 
 @given(seed=SEEDS, frames=st.integers(1, 16), data=st.data())
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_pins_agree_with_elimination(seed, frames, data):
     mean, precision = statistics(seed, frames)
     where = data.draw(st.sets(st.tuples(st.integers(0, frames - 1), st.integers(0, 1))))
@@ -74,7 +74,7 @@ def test_pins_at_the_ends_and_side_by_side_are_exact(frames):
 
 
 @given(seed=SEEDS, frames=LENGTHS)
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 def test_static_windows_alone_generate_the_means(seed, frames):
     mean, precision = statistics(seed, frames)
     precision[:, 1:] = 0
@@ -84,7 +84,7 @@ def test_static_windows_alone_generate_the_means(seed, frames):
 
 
 @given(seed=SEEDS, frames=st.integers(3, 24))
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 def test_means_of_a_real_curve_generate_that_curve(seed, frames):
     curve = np.random.default_rng(seed).normal(0, 1, frames)
     mean = (trajectories.window_matrix(frames) @ curve).reshape(3, frames).T[:, :, None]

@@ -1,8 +1,8 @@
-import subprocess
 import sys
 
 import pytest
 
+from children import run_child
 from lipmotion.kernels import choice
 
 
@@ -47,7 +47,7 @@ from lipmotion.kernels.choice import compiled_pays
 assert not compiled_pays(1e9)
 assert banded.generate(np.ones((4, 3, 2)), np.ones((4, 3, 2)))[0].shape == (4, 2)
 """
-    subprocess.run([sys.executable, "-c", code], check=True)
+    run_child([sys.executable, "-c", code], check=True)
 
 
 @pytest.mark.parametrize(
@@ -61,4 +61,4 @@ assert banded.generate(np.ones((4, 3, 2)), np.ones((4, 3, 2)))[0].shape == (4, 2
 )
 def test_numba_stays_away_from_small_work(code, pytestconfig):
     code += "\nimport sys; sys.exit('numba' in sys.modules)"
-    subprocess.run([sys.executable, "-c", code], cwd=pytestconfig.rootpath, check=True)
+    run_child([sys.executable, "-c", code], folder=pytestconfig.rootpath, check=True)

@@ -2,7 +2,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, example, given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from kernels.networks import network_posteriors
@@ -14,7 +14,7 @@ from oracles import factorial as oracle
 from oracles.paths import path_score
 
 SEEDS = st.integers(0, 2**32 - 1)
-SHARED = settings(deadline=None, max_examples=20, suppress_health_check=[HealthCheck.function_scoped_fixture])
+SHARED = settings(max_examples=20)
 
 
 @pytest.fixture(params=["numpy", "compiled"], autouse=True)

@@ -32,7 +32,7 @@ SIZES = st.lists(st.tuples(st.integers(1, 7), st.integers(1, 3)), min_size=1, ma
 
 
 @given(seed=st.integers(0, 2**32 - 1), sizes=SIZES, padding=st.sampled_from([0.0, 50.0, -1e4, 1e4]))
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_agrees_with_the_enumeration_of_all_paths(seed, sizes, padding):
     batch, single = padded(seed, sizes, padding)
     posterior, stay, log_likelihood = chain_posteriors(*batch)
@@ -50,7 +50,7 @@ def test_agrees_with_the_enumeration_of_all_paths(seed, sizes, padding):
 
 
 @given(seed=st.integers(0, 2**32 - 1), loudness=st.sampled_from([1.0, 1e3, 1e5]))
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 def test_posteriors_of_every_frame_sum_to_one(seed, loudness):
     (log_emission, *rest), _ = padded(seed, [(60, 7), (31, 5), (7, 7)])
     posterior, stay, _ = chain_posteriors(log_emission * loudness, *rest)
@@ -91,7 +91,7 @@ def test_order_of_utterances_changes_nothing():
 
 
 @given(seed=st.integers(0, 2**32 - 1), sizes=SIZES, loudness=st.sampled_from([1e-3, 1.0, 30.0, 1e5]))
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_both_forms_agree(seed, sizes, loudness):
     pytest.importorskip("numba")
     (log_emission, *rest), _ = padded(seed, [*sizes, (40, 9)])

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kernels.networks import arrays_of, network_posteriors, phone_loop, random_network
@@ -9,7 +9,7 @@ from lipmotion.kernels.network import ForwardBackwardNetwork
 from oracles import networks
 
 SEEDS = st.integers(0, 2**32 - 1)
-SHARED = settings(deadline=None, max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
+SHARED = settings(max_examples=30)
 
 
 @pytest.fixture(params=["numpy", "compiled"], autouse=True)

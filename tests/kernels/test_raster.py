@@ -29,7 +29,7 @@ FACING = [[0, 1, 2], [0, 2, 3]]
 
 
 @given(seed=st.integers(0, 2**32 - 1))
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 def test_both_forms_draw_the_same_bits(seed):
     if not numba_works():
         pytest.skip("numba is not installed")

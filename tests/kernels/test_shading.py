@@ -12,7 +12,7 @@ def unit(vectors):
 
 
 @given(seed=st.integers(0, 2**32 - 1))
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 def test_both_forms_give_the_same_bits(seed):
     if not numba_works():
         pytest.skip("numba is not installed")

@@ -53,7 +53,7 @@ def square(x0: float, y0: float, x1: float, y1: float, near: float = 1.0) -> lis
 
 
 @given(seed=st.integers(0, 2**32 - 1))
-@settings(deadline=None, max_examples=12)
+@settings(max_examples=12)
 def test_both_forms_draw_the_same_bits(seed):
     if not numba_works():
         pytest.skip("numba is not installed")

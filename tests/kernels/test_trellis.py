@@ -18,7 +18,7 @@ def costs(states: int, frames: int, seed: int):
     return random.exponential(1, states), steps
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(states=st.integers(1, 3), frames=st.integers(1, 6), seed=SEEDS)
 def test_no_path_is_cheaper(states: int, frames: int, seed: int) -> None:
     start, steps = costs(states, frames, seed)
@@ -28,7 +28,7 @@ def test_no_path_is_cheaper(states: int, frames: int, seed: int) -> None:
     assert trace_back(pointers, int(arrival.argmin())).tolist() == path
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(states=st.integers(1, 6), frames=st.integers(1, 300), seed=SEEDS)
 def test_every_last_state_is_reached_at_least_cost_by_the_way_traced(states: int, frames: int, seed: int) -> None:
     start, steps = costs(states, frames, seed)
@@ -40,7 +40,7 @@ def test_every_last_state_is_reached_at_least_cost_by_the_way_traced(states: int
         assert trellis.path_cost([pointers[0, path[0]], *path], start, steps) == pytest.approx(arrival[last])
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(frames=st.integers(2, 200), cut=st.integers(1, 199), seed=SEEDS)
 def test_stretches_are_the_whole(frames: int, cut: int, seed: int) -> None:
     start, steps = costs(4, frames, seed)

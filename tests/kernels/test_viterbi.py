@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kernels.networks import phone_loop, random_network
@@ -49,7 +49,7 @@ def test_agrees_with_the_enumeration_of_all_paths():
 
 
 @given(seed=st.integers(0, 2**32 - 1), frames=st.integers(1, 80), block=st.integers(1, 90))
-@settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60)
 def test_blocks_change_nothing(seed, frames, block):
     arrays, arcs = random_network(seed, states=7, densities=4, density_of_arcs=0.3)
     log_emission = random_emission(seed, frames, 4)

@@ -18,7 +18,7 @@ def clips(seed: int, count: int = 12):
 
 
 @given(seed=st.integers(0, 10_000))
-@settings(deadline=None, max_examples=10)
+@settings(max_examples=10)
 def test_the_interval_holds_the_figure_itself(seed):
     generated, original = clips(seed)
     low, high = bootstrap_interval(acc, generated, original, seed=0, draws=200)

@@ -38,7 +38,7 @@ def test_a_closing_is_the_first_closed_frame_after_an_open_one():
 
 
 @given(generated=FRAMES, original=FRAMES)
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_matching_is_one_to_one_and_nearest_first(generated, original):
     pairs = match_closings(generated, original)
     assert len({g for g, _ in pairs}) == len({o for _, o in pairs}) == len(pairs)
@@ -49,7 +49,7 @@ def test_matching_is_one_to_one_and_nearest_first(generated, original):
 
 
 @given(generated=FRAMES, original=FRAMES)
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_as_many_as_possible_are_matched_as_near_as_possible(generated, original):
     pairs = match_closings(generated, original, reach=1)
     found = tuple(sum(abs(g - o) == distance for g, o in pairs) for distance in range(2))
@@ -138,7 +138,7 @@ def test_phones_beyond_the_clip_and_clips_without_phones():
 
 
 @given(clips=st.lists(st.tuples(FRAMES, FRAMES), min_size=1, max_size=4))
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_closings_found_clip_by_clip_add_up_to_the_score(clips):
     generated, original = ([opening(list(clip[side]))[:, None] for clip in clips] for side in (0, 1))
     hits, count = clip_closure_counts(generated, original, 0.5)

@@ -33,7 +33,7 @@ def test_correlation_by_hand():
 
 
 @given(seed=SEEDS, gain=st.floats(0.1, 10), offset=st.floats(-5, 5))
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 def test_correlation_is_one_with_itself_whatever_the_scale(seed, gain, offset):
     x = clips(seed, 1)[0]
     assert correlation(gain * x + offset, x) == pytest.approx([1, 1])
@@ -41,7 +41,7 @@ def test_correlation_is_one_with_itself_whatever_the_scale(seed, gain, offset):
 
 
 @given(seed=SEEDS)
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 def test_correlation_is_that_of_numpy(seed):
     one, two = clips(seed, 1)[0], clips(seed + 1, 1)[0]
     count = min(len(one), len(two))
@@ -81,7 +81,7 @@ def test_error_is_in_units_of_the_channels_deviation():
 
 
 @given(seed=SEEDS)
-@settings(deadline=None, max_examples=10)
+@settings(max_examples=10)
 def test_predicting_the_mean_is_an_error_of_one_and_a_range_of_none(seed):
     original = clips(seed)
     flat = [np.tile(np.concatenate(original).mean(axis=0), (len(clip), 1)) for clip in original]
@@ -96,7 +96,7 @@ def test_range_is_the_ratio_of_mean_deviations():
 
 
 @given(seed=SEEDS, gain=st.floats(0.1, 5))
-@settings(deadline=None, max_examples=10)
+@settings(max_examples=10)
 def test_scaling_scales_range_and_jerk(seed, gain):
     original = clips(seed)
     scaled = [gain * clip + 3 for clip in original]
@@ -117,7 +117,7 @@ def smooth(seed: int, frames: int) -> np.ndarray:
 
 
 @given(seed=SEEDS, late=st.integers(-8, 8), rate_hz=st.sampled_from([25.0, 29.97, 100.0]))
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 def test_lag_is_the_shift_and_late_is_positive(seed, late, rate_hz):
     curves = [smooth(seed, 120), smooth(seed + 1, 90)]
     original = [curve[30:-30, None] for curve in curves]

@@ -28,7 +28,7 @@ def scores(late_frames: float, seed: int = 0, noise: float = 0.0, valid: NDArray
     return shift_scores(wave(-late_frames, seed=seed), measured, valid, REACH)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(st.floats(-30, 30), st.integers(0, 20))
 def test_a_shift_is_found(late_frames: float, seed: int) -> None:
     found = best_offset(scores(late_frames, seed), RATE_HZ)

@@ -63,7 +63,7 @@ def test_similarity_is_that_of_scikit_image():
 
 
 @given(light=st.integers(1, 255), other=st.integers(1, 255))
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 def test_similarity_of_flat_pictures_is_that_of_their_light(light, other):
     made, true = (np.full((1, 20, 20, 3), level, np.uint8) for level in (light, other))
     stable = (0.01 * 255) ** 2

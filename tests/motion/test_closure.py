@@ -30,7 +30,7 @@ PINS = st.lists(st.tuples(st.integers(40, 120), st.floats(0, 0.4)), max_size=3)
 
 
 @given(units=SPOKEN, pins=PINS)
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_the_lips_meet_in_every_p_b_and_m_that_the_user_left_alone(units, pins):
     talk = speech(units)
     wanted = [(frame, value) for frame, value in pins if frame < len(talk.features.values)]

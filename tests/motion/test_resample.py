@@ -15,7 +15,7 @@ def seen(count: int) -> np.ndarray:
     rate_hz=st.sampled_from([24.0, 25.0, 29.97, 30.0, 50.0, 60.0]),
     count=st.integers(4, 40),
 )
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 def test_a_cubic_comes_back_exactly(seed, rate_hz, count):
     cubic = np.polynomial.Polynomial(np.random.default_rng(seed).normal(0, 1, 4))
     camera_s = np.arange(count) / rate_hz

@@ -53,7 +53,7 @@ def packed(store: MotionStore, path: Path) -> int:
     return path.stat().st_size
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     frames=st.integers(1, 150),
     channels=st.integers(1, 12),

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from children import run_child
 
 SCRIPT = Path(__file__).parents[2] / "benchmarks" / "kills.py"
 
@@ -20,8 +21,7 @@ def test_killed_runs_go_on_to_the_same_bytes(jobs: list[str], tmp_path: Path) ->
     pytest.importorskip("mediapipe")
     chosen = [word for job in jobs for word in ("--job", job)]
     command = [sys.executable, str(SCRIPT), *chosen, "--kills", "6", "--seed", "1", "-o", "kills.txt"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
-    assert done.returncode == 0, done.stdout + done.stderr
+    done = run_child(command, folder=tmp_path, limit_s=3600, check=True)
     assert done.stdout.startswith("6 kills, 0 problems, 0 inputs changed;")
     assert done.stdout.count("same bytes after going on") == len(jobs)
     assert (tmp_path / "kills.txt").read_text(encoding="utf-8") == done.stdout

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.errors import ExportError, InputError, ModelFormatError
@@ -174,7 +174,7 @@ def test_the_header_says_what_there_is_not(
         load_model(with_header(toy_model_file, tmp_path / "m.lipmotion", **changes))
 
 
-@settings(deadline=None, max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150)
 @given(data=st.data())
 def test_damage_is_noticed_or_harmless(data: st.DataObject, toy_model_file: Path, tmp_path: Path) -> None:
     content = bytearray(toy_model_file.read_bytes())

@@ -3,9 +3,9 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import socket
 import sys
 import threading
-import time
 from collections.abc import Iterator
 
 import pytest
@@ -115,22 +115,28 @@ def test_workers_leave_signals_to_the_process_that_started_them() -> None:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals are held back on POSIX")
+@pytest.mark.usefixtures("ordinary_signals")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_that_another_thread_takes_waits_until_a_process_has_started(number):
     """A BLAS has threads that do not mask signals; Python answers what they take in the main thread."""
     over, seen = threading.Event(), []
-    other = threading.Thread(target=over.wait, args=(60,))
-    before = signal.signal(number, lambda *_: seen.append("answered"))
+    other = threading.Thread(target=over.wait)
+    signal.signal(number, lambda *_: seen.append("answered"))
+    ours, theirs = socket.socketpair()
+    theirs.setblocking(False)
+    signal.set_wakeup_fd(theirs.fileno())
     other.start()
     try:
         with module._signals_delayed():
             os.kill(os.getpid(), number)
-            time.sleep(0.2)  # long enough to be answered, were it not held back
+            assert ours.recv(1) == bytes([number])  # it has arrived: were it not held back, it would be answered now
             seen.append("started")
     finally:
+        signal.set_wakeup_fd(-1)
         over.set()
         other.join()
-        signal.signal(number, before)
+        ours.close()
+        theirs.close()
     assert seen == ["started", "answered"]
 
 

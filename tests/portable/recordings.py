@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,6 +10,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 import lipmotion
+from children import run_child
 from portable.settings import BEFORE_AVX, environment
 
 
@@ -28,7 +28,7 @@ def compare(recordings: Sequence[str]) -> None:
         paths = [Path(folder) / "here.npz", Path(folder) / "there.npz"]
         for path, changes in zip(paths, ({}, BEFORE_AVX), strict=True):
             command = [sys.executable, __file__, "--compute", str(path), *recordings]
-            subprocess.run(command, env=environment(changes), check=True)
+            run_child(command, variables=environment(changes), check=True, limit_s=3600)
         here, there = (dict(np.load(path, allow_pickle=False)) for path in paths)
     differing = [name for name in here if name.startswith("phones") and here[name].tolist() != there[name].tolist()]
     largest = max(float(np.abs(here[name] - there[name]).max()) for name in here if name.startswith("motion"))

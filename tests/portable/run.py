@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import itertools
 import os
-import subprocess
 import sys
 import time
 from collections.abc import Sequence
@@ -13,6 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
+from children import run_child
 from portable.settings import BEFORE_AVX, CORES, different_cores, environment, kernels, possible_cores
 
 TESTS = Path(__file__).parents[1]
@@ -26,6 +26,7 @@ NUMERIC = (
     *("pipeline/test_animate.py", "pipeline/training/test_resume.py"),
 )
 """Less than a minute of tests that compare what was computed; name others on the command line for more."""
+LONGEST_S = 3600.0
 LEFT_OUT = ["-m", "not recordings and not slow and not video", "-k", "not memory"]
 """Tests that take longer and compute nothing that the others do not."""
 
@@ -46,7 +47,7 @@ def settings() -> dict[str, dict[str, str]]:
             "OPENBLAS_CORETYPE": core,
             "OPENBLAS_NUM_THREADS": str(threads),
         }
-        for core, threads in zip(different_cores(), itertools.cycle((1, 2)))  # noqa: B905 - one of them is endless
+        for core, threads in zip(different_cores(), itertools.cycle((1, 2)))
     }
     return found | {"no AVX, in NumPy neither": BEFORE_AVX}
 
@@ -55,9 +56,7 @@ def tested(name: str, changes: dict[str, str], tests: Sequence[str]) -> Outcome:
     """Return the outcome of the tests in a process with changed environment variables."""
     began = time.monotonic()
     command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *LEFT_OUT, *tests]
-    ran = subprocess.run(
-        command, env=environment(changes), capture_output=True, text=True, check=False, cwd=TESTS.parent
-    )
+    ran = run_child(command, variables=environment(changes), folder=TESTS.parent, limit_s=LONGEST_S)
     if ran.returncode:
         print(f"--- {name}\n{ran.stdout[-20_000:]}{ran.stderr[-5000:]}", flush=True)
     lines = [line for line in ran.stdout.splitlines() if line.strip()]

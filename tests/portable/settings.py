@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
 import sys
 from functools import cache
+
+import children
 
 CORES = {
     "Haswell": {"AVX2", "FMA3"},
@@ -14,8 +14,9 @@ CORES = {
     "Sandybridge": {"AVX"},
     "Prescott": {"SSE3"},
 }
-"""Values of ``OPENBLAS_CORETYPE``, the processor whose matrix products are used, and the features, by NumPy's names, that
-its instructions need: elsewhere a process ends at the first of them."""
+"""Values of ``OPENBLAS_CORETYPE``, the processor whose matrix products are used, and the features that these need.
+
+Features have NumPy's names. On a processor without them a process ends at the first such instruction."""
 BEFORE_AVX = {"OPENBLAS_CORETYPE": "Prescott", "NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX512_ICL AVX512_SPR"}
 """A processor without AVX, also in NumPy's own loops."""
 KERNELS = "from lipmotion.kernels.threads import blas_kernels; print('; '.join(blas_kernels()))"
@@ -29,25 +30,18 @@ def environment(changes: dict[str, str]) -> dict[str, str]:
     changes = dict(changes)
     if wanted := changes.get("NPY_DISABLE_CPU_FEATURES"):
         changes["NPY_DISABLE_CPU_FEATURES"] = " ".join(name for name in wanted.split() if name in known)
-    return {name: value for name, value in os.environ.items() if not name.startswith("OPENBLAS_")} | changes
+    return {name: value for name, value in children.environment().items() if not name.startswith("OPENBLAS_")} | changes
 
 
 @cache
 def kernels(core: str) -> str:
     """Return the kernels that a process actually uses with the core type ``core``."""
-    found = subprocess.run(
-        [sys.executable, "-c", KERNELS],
-        env=environment({"OPENBLAS_CORETYPE": core}),
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=120,
-    )
-    return found.stdout.strip()
+    changed = environment({"OPENBLAS_CORETYPE": core})
+    return children.run_child([sys.executable, "-c", KERNELS], variables=changed, check=True).stdout.strip()
 
 
 def possible_cores() -> list[str]:
-    """Return the core types whose instructions this processor has; ``NPY_DISABLE_CPU_FEATURES=X86_V4`` hides AVX-512."""
+    """Return the core types whose features this processor has; ``NPY_DISABLE_CPU_FEATURES=X86_V4`` hides AVX-512."""
     import numpy as np
 
     features = np._core._multiarray_umath.__cpu_features__  # type: ignore[attr-defined]

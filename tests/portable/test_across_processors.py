@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from children import child
 from portable.settings import BEFORE_AVX, environment
 
 pytestmark = pytest.mark.long
@@ -23,14 +24,19 @@ TOLERANCES = {"features of": 1e-4, "F0 of": 1e-4, "the shipped model": 1e-5, "tr
 def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     folder = tmp_path_factory.mktemp("across")
     path = os.pathsep.join([str(TESTS), os.environ.get("PYTHONPATH", "")])
-    jobs = [
-        subprocess.Popen(
-            [sys.executable, "-m", "portable.results", folder / f"{number}.npz"],
-            env=environment({"PYTHONPATH": path, "OMP_NUM_THREADS": "2", **changes}),
-        )
-        for number, changes in enumerate(({}, BEFORE_AVX))
-    ]
-    assert [job.wait(timeout=900) for job in jobs] == [0, 0]
+    with ExitStack() as both_at_once:
+        jobs = [
+            both_at_once.enter_context(
+                child(
+                    [sys.executable, "-m", "portable.results", folder / f"{number}.npz"],
+                    variables=environment({"PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "2", **changes}),
+                    stdout=None,
+                    limit_s=900,
+                )
+            )
+            for number, changes in enumerate(({}, BEFORE_AVX))
+        ]
+        assert [job.wait() for job in jobs] == [0, 0]
     here, there = (dict(np.load(folder / f"{number}.npz", allow_pickle=False)) for number in range(2))
     return here, there
 

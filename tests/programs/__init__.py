@@ -10,12 +10,13 @@ import importlib.util
 import json
 import os
 import shutil
-import subprocess
 import sys
 import tempfile
 from functools import cache
 from pathlib import Path
 from typing import Any
+
+from children import environment, run_child
 
 FOLDER = Path(__file__).parent
 LONGEST_S = 280
@@ -35,8 +36,8 @@ def run_with(module: str, script: str, *arguments: object, folder: Path | None =
     python = python_with(module)
     assert python is not None, f"no Python with {module}"
     with tempfile.TemporaryDirectory() as temporary:  # for the caches of Blender
-        own = {"PYTHONPATH": "", "BLENDER_USER_RESOURCES": str(folder or temporary)}
-        return _json_of([python, str(FOLDER / script), *map(str, arguments)], {**os.environ, **own})
+        own = environment(PYTHONPATH="", BLENDER_USER_RESOURCES=str(folder or temporary))
+        return _json_of([python, str(FOLDER / script), *map(str, arguments)], own)
 
 
 @cache
@@ -48,10 +49,9 @@ def gltf_validator() -> str | None:
 
 def gltf_report(path: Path) -> Any:
     """Return the validator's report of a glTF file."""
-    return _json_of(["node", str(FOLDER / "gltf_issues.cjs"), str(gltf_validator()), str(path)], dict(os.environ))
+    return _json_of(["node", str(FOLDER / "gltf_issues.cjs"), str(gltf_validator()), str(path)], environment())
 
 
-def _json_of(command: list[str], environment: dict[str, str]) -> Any:
-    done = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST_S, env=environment, check=False)
-    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
+def _json_of(command: list[str], variables: dict[str, str]) -> Any:
+    done = run_child(command, variables=variables, limit_s=LONGEST_S, check=True)
     return json.loads(done.stdout.strip().splitlines()[-1])

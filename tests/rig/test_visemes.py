@@ -28,7 +28,7 @@ def test_silence_and_closures():
     assert motion["viseme_ou"][115] == pytest.approx(1)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.lists(st.tuples(st.sampled_from(PHONES), st.floats(0.0, 0.3), st.floats(0.0, 0.1)), max_size=12),
     st.floats(10, 120),

@@ -1,12 +1,12 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from children import LIPMOTION, run_child
 from cli.conftest import RunCommand
 from lipmotion.cli import info
 from robustness.case import CASES, Bench, Case
@@ -48,8 +48,7 @@ def test_bad_input(case: Case, bench: Bench, run: RunCommand, here: Path, caplog
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
 def test_a_full_disk_behind_the_standard_output() -> None:
     with Path("/dev/full").open("w") as full:
-        command = [sys.executable, "-m", "lipmotion.cli.main", "info"]
-        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, encoding="utf-8", check=False, timeout=120)
+        done = run_child([*LIPMOTION, "info"], stdout=full)
     assert done.stderr == "lipmotion: error: standard output cannot be written: No space left on device\n"
     assert done.returncode == 7
 

@@ -63,7 +63,7 @@ times = st.one_of(st.none(), st.floats(-5, 40))
 
 
 @given(spans=st.lists(st.tuples(times, times), min_size=1, max_size=12), frames=st.integers(10, 3000))
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 def test_windows_of_any_times_are_in_order_and_hold_what_is_known(spans, frames):
     found = anchors_of(transcript(*(line("a b", start_s, end_s) for start_s, end_s in spans)))
     least = np.full(len(found.start_s), 3, np.intp)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import subprocess
 import sys
 import tracemalloc
 import wave
@@ -17,6 +16,7 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
+from children import run_child
 from lipmotion.errors import InputError
 from lipmotion.speech.audio_decoding import _TrackDecoder
 from lipmotion.speech.audio_files import read_audio
@@ -332,7 +332,7 @@ STAMPS_S = {
 
 def peak(path: Path) -> tuple[str, int]:
     """Return what a process of its own says when it reads a recording, and how many MB it has taken."""
-    done = subprocess.run([sys.executable, "-c", PEAK, path], capture_output=True, text=True, check=True, timeout=120)
+    done = run_child([sys.executable, "-c", PEAK, path], check=True)
     *said, taken_mb = done.stdout.splitlines()
     return " ".join(said), int(taken_mb)
 
@@ -404,7 +404,7 @@ def test_eight_channels_do_not_crash_a_process(tmp_path: Path) -> None:
     path = write_sound(tmp_path / "a.flac", np.tile(babble(48_000), (8, 1)), 48_000, "flac")
     call = f"read_audio(Path({str(path)!r}))"
     code = f"from pathlib import Path; from lipmotion.speech.audio_files import read_audio; {call}"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+    run_child([sys.executable, "-c", code], check=True)
 
 
 @pytest.mark.parametrize(("size", "is_refused"), [(810, True), (810_000, False)])

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import subprocess
 import sys
 import tracemalloc
 
@@ -11,6 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.signal import butter, lfilter
 
+from children import run_child
 from lipmotion.errors import InputError
 from lipmotion.speech import f0 as module
 from lipmotion.speech.f0 import HIGHEST_HZ, LOWEST_HZ, candidates, correlations, lags, log_f0
@@ -82,7 +82,7 @@ def test_the_best_peaks_are_the_candidates() -> None:
     assert np.isinf(cost[:, 1]).all()
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.integers(400, 40_000))
 def test_the_number_of_frames_is_that_of_the_features(count: int) -> None:
     audio = Audio(noise(count), RATE_HZ)
@@ -214,8 +214,7 @@ def test_a_tenth_of_a_second_is_enough() -> None:
 
 def test_numpy_is_enough() -> None:
     code = "import sys, lipmotion.speech.f0; print(sorted({'scipy', 'numba'} & set(sys.modules)))"
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert run.stdout.strip() == "[]"
+    assert run_child([sys.executable, "-c", code], check=True).stdout.strip() == "[]"
 
 
 @pytest.mark.parametrize(

@@ -37,7 +37,7 @@ def test_spoken_sound_is_its_slow_twin(toy_sentence) -> None:
     assert features(samples) == pytest.approx(slow_features(samples.astype(float)), abs=2e-3)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.integers(400, 40_000))
 def test_the_number_of_frames(count: int) -> None:
     audio = Audio(noise(count), RATE_HZ)
@@ -106,7 +106,7 @@ def test_a_constant_column_becomes_0(value: float, count: int) -> None:
     assert not normalised(np.full((count, 2), value, np.float32), ROUNDING * abs(value)).any()
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(st.integers(5, 60), st.floats(-3, 3), st.floats(-10, 10))
 def test_the_delta_of_a_ramp_is_its_slope(frames: int, slope: float, start: float) -> None:
     ramp = (start + slope * np.arange(frames)).astype(np.float32)[:, None]

@@ -82,7 +82,7 @@ def test_the_objective_has_the_slope_of_the_likelihood() -> None:
         assert rise / 2e-4 == pytest.approx(slope[place], rel=1e-2, abs=1e-2)
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 10_000), frames=st.integers(0, 30))
 def test_no_row_lowers_the_objective(seed: int, frames: int) -> None:
     draw = np.random.default_rng(seed)

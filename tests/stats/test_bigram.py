@@ -2,7 +2,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from lipmotion.stats.bigram import DISCOUNT, estimate_bigram
@@ -12,7 +12,6 @@ SENTENCES = st.lists(st.lists(st.sampled_from(UNITS), max_size=8), max_size=6)
 
 
 @given(sentences=SENTENCES)
-@settings(deadline=None)
 def test_rows_are_distributions(sentences):
     probability = np.exp(estimate_bigram(UNITS, sentences).log_probability)
     assert probability.sum(axis=1) == pytest.approx(np.ones(len(UNITS)), abs=1e-5)
@@ -20,7 +19,6 @@ def test_rows_are_distributions(sentences):
 
 
 @given(sentences=SENTENCES)
-@settings(deadline=None)
 def test_unseen_pairs_share_in_proportion_to_unigrams(sentences):
     bigram = estimate_bigram(UNITS, sentences)
     said = [unit for sentence in sentences for unit in sentence]
@@ -35,7 +33,6 @@ def test_unseen_pairs_share_in_proportion_to_unigrams(sentences):
 
 
 @given(sentences=SENTENCES)
-@settings(deadline=None)
 def test_order_of_units_changes_nothing(sentences):
     straight, back = estimate_bigram(UNITS, sentences), estimate_bigram(UNITS[::-1], sentences)
     for unit in UNITS:

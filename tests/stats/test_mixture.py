@@ -40,7 +40,7 @@ def weighted_log_likelihood(mixtures: Mixtures, density: int, x: np.ndarray, sha
 
 
 @given(seed=SEEDS, components=st.sampled_from([1, 2, 4]))
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 def test_log_likelihood_is_that_of_scipy(seed, components):
     mixtures, (x, _) = random_mixtures(seed, components=components), random_data(seed, 20)
     for density in range(3):
@@ -58,7 +58,7 @@ def test_chosen_densities_come_in_the_order_asked_for():
 
 
 @given(seed=SEEDS)
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 def test_no_step_of_improvement_lowers_the_likelihood(seed):
     mixtures, (x, share) = random_mixtures(seed), random_data(seed)
     before = -np.inf
@@ -100,7 +100,7 @@ def test_a_component_without_data_is_switched_off():
 
 
 @given(seed=SEEDS)
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 def test_huge_relevance_keeps_the_prior(seed):
     mixtures, (x, share) = random_mixtures(seed), random_data(seed)
     wanted = mixtures.selected(np.array([2]))
@@ -133,7 +133,7 @@ def test_relevance_counts_as_frames():
 
 
 @given(seed=SEEDS, components=st.sampled_from([1, 2]))
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 def test_splitting_keeps_the_density_nearly_the_same(seed, components):
     mixtures, (x, _) = random_mixtures(seed, components=components), random_data(seed, 50)
     split = mixtures.split()

@@ -16,7 +16,7 @@ def cloud(seed: int, count: int = 40, dimensions: int = 5) -> np.ndarray:
 
 
 @given(seed=SEEDS)
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 def test_all_components_restore_everything(seed):
     values = cloud(seed)
     pca = fit_pca(values, 5)
@@ -25,7 +25,7 @@ def test_all_components_restore_everything(seed):
 
 
 @given(seed=SEEDS, components=st.integers(1, 5))
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 def test_explained_variance_is_that_of_the_covariance(seed, components):
     values = cloud(seed)
     pca = fit_pca(values, components)
@@ -56,7 +56,7 @@ def spectrum(seed: int, count: int, dimensions: int) -> np.ndarray:
 
 @pytest.mark.parametrize(("count", "dimensions"), [(60, 20), (20, 60), (40, 40)])
 @given(seed=SEEDS)
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 def test_components_are_those_of_the_svd(count, dimensions, seed):
     values = spectrum(seed, count, dimensions)
     pca = fit_pca(values, 5)

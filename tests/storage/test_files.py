@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -11,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from children import PIPE, child, run_child
 from lipmotion.errors import ExportError
 from lipmotion.storage import files
 from lipmotion.storage.files import (
@@ -158,7 +158,7 @@ def test_what_a_killed_process_left_of_a_target_is_removed_with_the_next(tmp_pat
         "    unfinished.write_text('half')\n"
         "    os._exit(1)\n"
     )
-    subprocess.run([sys.executable, "-c", program, str(target)], check=False)
+    run_child([sys.executable, "-c", program, target])
     assert len(names(tmp_path)) == 1
     with whole_file(tmp_path / "other.json") as other, whole_file(target) as mine:
         assert len(names(tmp_path)) == 0
@@ -181,13 +181,13 @@ HOLD = (
 
 def test_a_folder_is_held_by_one_process_and_let_go_of_when_it_is_killed(tmp_path: Path) -> None:
     folder = tmp_path / "new" / "work"
-    pipe = subprocess.PIPE
-    with subprocess.Popen([sys.executable, "-c", HOLD, str(folder)], stdin=pipe, stdout=pipe) as process:
+    with child([sys.executable, "-c", HOLD, folder], stdin=PIPE) as process:
         assert process.stdout is not None
-        assert process.stdout.readline() == b"held\n"
+        assert process.stdout.readline() == "held\n"
         with pytest.raises(ExportError, match=rf"work: another lipmotion \(process {process.pid}\) is at work on it"):
             locked(folder).__enter__()
         process.kill()
+        process.wait()
     assert names(folder) == [LOCK]  # the file stays, but is not locked
     with locked(folder):
         assert (folder / LOCK).read_text() == str(os.getpid())

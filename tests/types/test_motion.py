@@ -54,7 +54,7 @@ def test_between_frames_it_is_linear_and_beyond_the_ends_constant() -> None:
     assert values[:, 1] == pytest.approx(-2 * values[:, 0])
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(st.integers(1, 30), st.floats(1, 120), st.lists(st.floats(-1, 5), max_size=20), st.integers(0, 1000))
 def test_at_is_what_numpy_interpolates(rows: int, rate_hz: float, time_s: list[float], seed: int) -> None:
     curves = Motion(np.random.default_rng(seed).normal(size=(rows, 2)), rate_hz, CHANNELS)
@@ -63,7 +63,7 @@ def test_at_is_what_numpy_interpolates(rows: int, rate_hz: float, time_s: list[f
         assert found[:, column] == pytest.approx(np.interp(time_s, curves.time_s, curves[name]), abs=1e-9)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(st.integers(1, 300), st.sampled_from([24.0, 25.0, 29.97, 30.0, 60.0, 100.0]), st.floats(1, 1000))
 def test_resampling_keeps_the_duration_and_the_values(rows: int, rate_hz: float, new_hz: float) -> None:
     curves = motion(rows, rate_hz)

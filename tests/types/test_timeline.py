@@ -47,7 +47,7 @@ def test_it_says_which_span_is_wrong(edges_s: list[tuple[float, float]], message
         timeline(*edges_s)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(st.lists(st.floats(0, 5), min_size=2, max_size=8), st.floats(0, 1000))
 def test_shifting_moves_every_time_and_nothing_else(steps_s: list[float], offset_s: float) -> None:
     spans = timeline(*pairwise(accumulate(steps_s)))

@@ -51,7 +51,7 @@ def steps_to(phone: str) -> dict[str, int]:
     return steps
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(st.sampled_from(SPOKEN), st.sets(st.sampled_from(SPOKEN), min_size=1, max_size=8))
 def test_the_nearest_known_relative_stands_in(phone: str, known: set[str]) -> None:
     chosen, steps = most_similar_phone(phone, known), steps_to(phone)

@@ -45,7 +45,7 @@ def test_scripts_without_blanks_are_cut() -> None:
     assert [len(part) for part in parts] == [400, 400, 100]
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.text(max_size=300))
 def test_no_word_is_lost_or_made(text: str) -> None:
     words = words_in(clean_text(text))

@@ -40,7 +40,7 @@ def test_every_rule_gives_phones_of_the_inventory() -> None:
     assert set(LETTERS) <= set(SPELLINGS)
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(st.text(LETTERS, min_size=1, max_size=20))
 def test_any_word_can_be_said(word: str) -> None:
     phones = guess_pronunciation(word)
@@ -48,7 +48,7 @@ def test_any_word_can_be_said(word: str) -> None:
     assert all(phone in PHONES and not is_silent(phone) for phone in phones)
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(st.text(LETTERS + "'", min_size=1, max_size=12).filter(lambda word: word.strip("'")))
 def test_the_lexicon_knows_how_any_word_is_said(word: str) -> None:
     variants = Lexicon().pronunciations(word)

@@ -89,7 +89,7 @@ def test_a_number_of_any_length_is_read_digit_by_digit() -> None:
     assert number_words("9" * 5000) == ["nine"] * 5000
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(st.integers(0, 10**12 - 1))
 def test_a_number_comes_back_from_its_words(number: int) -> None:
     values = {word: n for n, word in enumerate(ONES)} | {word: 10 * n for n, word in enumerate(TENS) if n > 1}
@@ -105,7 +105,7 @@ def test_a_number_comes_back_from_its_words(number: int) -> None:
     assert total + part == number
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(st.text(max_size=60))
 def test_any_text_gives_words_or_says_that_there_are_none(text: str) -> None:
     try:

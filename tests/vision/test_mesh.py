@@ -1,12 +1,12 @@
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 
 import numpy as np
 import pytest
 
+from children import run_child
 from lipmotion.errors import MissingDependencyError
 from lipmotion.vision.mesh import FaceMesh, quiet_stderr
 from lipmotion.vision.packages import import_face_mesh, import_opencv, package_versions
@@ -47,7 +47,7 @@ def test_importing_needs_no_video_packages():
         "import sys; sys.modules['cv2'] = sys.modules['mediapipe'] = None; "
         "import lipmotion.vision.track, lipmotion.corpora.store, lipmotion.pipeline.corpus.prepare"
     )
-    subprocess.run([sys.executable, "-c", code], check=True)
+    run_child([sys.executable, "-c", code], check=True)
 
 
 @pytest.mark.video

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import subprocess
 import sys
 from functools import partial
 from pathlib import Path
@@ -8,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from children import run_child
 from lipmotion.errors import InputError
 from lipmotion.vision.frames import VideoSpan
 from lipmotion.vision.landmarks import JAW_POINTS, LIP_POINTS
@@ -185,5 +185,5 @@ class TestRealRecordings:
     def test_nothing_is_printed(self, recordings: Path):
         path = recordings / "grid-s1" / "clips" / "brwa3s.mkv"
         code = f"from pathlib import Path; from lipmotion.vision.track import track; track(Path({str(path)!r}))"
-        done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True)
-        assert (done.stdout, done.stderr) == (b"", b"")
+        done = run_child([sys.executable, "-c", code], check=True)
+        assert (done.stdout, done.stderr) == ("", "")

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.corpora.labels import labels_beside, read_labels, read_transcript
@@ -384,7 +384,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @given(rows=many_lines, form=st.sampled_from(["srt", "vtt", "json", "tsv"]))
-@settings(deadline=None, max_examples=80)
+@settings(max_examples=80)
 def test_what_is_written_is_read(folder: Path, rows: list[tuple[float, float, list[str]]], form: str) -> None:
     shortest_s = 0.2  # shorter cues that repeat the one before are the bridges of captions that scroll
     spans = sorted((min(a, b), max(a, b, min(a, b) + shortest_s), said) for a, b, said in rows)
@@ -408,7 +408,7 @@ def test_what_is_written_is_read(folder: Path, rows: list[tuple[float, float, li
 @given(
     content=st.one_of(st.text(max_size=300), st.binary(max_size=300)), start=st.sampled_from(["", SRT, "WEBVTT\n\n"])
 )
-@settings(deadline=None, max_examples=150, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=150)
 def test_anything_is_read_or_refused(folder: Path, content: str | bytes, start: str) -> None:
     (folder / "b").write_bytes(
         start.encode() + (content.encode("utf-8", "replace") if isinstance(content, str) else content)

@@ -31,7 +31,7 @@ def laid_out(model: SelectionModel, engine: SelectionEngine, units: Timeline):
     return target, pieces
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(SENTENCES, st.floats(0.04, 0.3))
 def test_edges_of_phones_fall_on_edges_of_phones(
     model: SelectionModel, engine: SelectionEngine, phones: list[str], duration_s: float
@@ -46,7 +46,7 @@ def test_edges_of_phones_fall_on_edges_of_phones(
         assert (np.diff(clock(np.arange(0, target.windows.times_s[-1, 1], 0.005))) > -1e-9).all()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(SENTENCES)
 def test_pieces_cover_all_phones_in_order(model: SelectionModel, engine: SelectionEngine, phones: list[str]) -> None:
     target, pieces = laid_out(model, engine, timeline(phones))
@@ -55,7 +55,7 @@ def test_pieces_cover_all_phones_in_order(model: SelectionModel, engine: Selecti
     assert all(one.stop == two.first and one.start_s < two.start_s for one, two in pairwise(pieces))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(SENTENCES)
 def test_motion_stays_within_what_was_recorded(
     model: SelectionModel, engine: SelectionEngine, phones: list[str]
@@ -68,7 +68,7 @@ def test_motion_stays_within_what_was_recorded(
     assert (motion <= recorded.max(axis=0) + jump).all()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(SENTENCES)
 def test_no_join_is_a_jump(model: SelectionModel, engine: SelectionEngine, phones: list[str]) -> None:
     target, pieces = laid_out(model, engine, timeline(phones))
@@ -80,7 +80,7 @@ def test_no_join_is_a_jump(model: SelectionModel, engine: SelectionEngine, phone
     assert (np.abs(np.diff(motion, axis=0)).max(axis=0) < 3 * largest + hard * bend).all()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(SENTENCES, st.integers(0, 999))
 def test_every_unit_is_shown(model: SelectionModel, engine: SelectionEngine, phones: list[str], seed: int) -> None:
     costs = model.costs(engine.config)

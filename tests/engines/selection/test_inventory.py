@@ -58,7 +58,7 @@ def test_an_unknown_phone_is_refused() -> None:
         phone_windows([spoken("xx")])
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(st.sampled_from(SPOKEN), min_size=5, max_size=5), st.integers(1, 12), st.integers(0, 2))
 def test_the_index_finds_the_longest_agreement(
     model: SelectionModel, engine, window: list[str], count: int, bias: int

@@ -34,7 +34,7 @@ def total(costs: Costs, target: Target, units: list[int]) -> float:
     return float(each + sum(joins))
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.lists(st.sampled_from(SPOKEN), min_size=1, max_size=2), st.integers(0, 99))
 def test_no_sequence_of_candidates_is_cheaper(model: SelectionModel, engine, phones: list[str], seed: int) -> None:
     costs, target = wanted(model, engine, phones)
@@ -51,7 +51,7 @@ def test_no_sequence_of_candidates_is_cheaper(model: SelectionModel, engine, pho
     assert total(costs, target, chosen.units.tolist()) == pytest.approx(chosen.cost)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(SENTENCES)
 def test_pruning_does_not_change_the_cost(model: SelectionModel, engine, phones: list[str]) -> None:
     wide = SelectionEngine(replace(engine.config, beam=10**6, most=0.4))

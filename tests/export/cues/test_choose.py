@@ -59,7 +59,7 @@ def random_result(seed: int, phones: int, channels: str) -> Generation:
     return result(units, motion)
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(
     seed=st.integers(0, 2**32 - 1),
     phones=st.integers(1, 25),

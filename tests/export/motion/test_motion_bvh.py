@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from children import run_child
 from lipmotion.errors import ExportError
 from lipmotion.export import write_motion
 from lipmotion.export.motion.motion_bvh import CENTIMETRES
@@ -81,9 +81,7 @@ def _points():
 def test_blender_shows_the_same_places(talking, written, tmp_path):
     """Oracle: the importer of Blender."""
     (tmp_path / "look.py").write_text(IN_BLENDER)
-    done = subprocess.run(
-        [BLENDER, str(tmp_path / "look.py"), str(written)], capture_output=True, text=True, check=True
-    )
+    done = run_child([BLENDER, tmp_path / "look.py", written], check=True)
     found = json.loads(done.stdout.partition("FOUND")[2].splitlines()[0])
     assert found["fps"] == pytest.approx(50.0)
     assert len(found["bones"]) == 53

@@ -60,7 +60,7 @@ def test_closed_lips_meet_at_every_column():
 
 
 @given(poses())
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_the_gap_is_as_asked_and_lips_never_cross(pose):
     places = contact(pose)
     assert places[20, 1] - places[60, 1] == pytest.approx(pose.gap, abs=1e-9)
@@ -68,7 +68,7 @@ def test_the_gap_is_as_asked_and_lips_never_cross(pose):
 
 
 @given(poses())
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_both_halves_of_the_mouth_are_alike(pose):
     surface = lip_surface(section_points(pose, figure().skin.base_z))[:FRONT]
     mirrored = np.concatenate([np.arange(40, -1, -1), np.arange(COLUMNS - 1, 40, -1)])
@@ -76,7 +76,7 @@ def test_both_halves_of_the_mouth_are_alike(pose):
 
 
 @given(poses(), SHARES, SHARES)
-@settings(deadline=None, max_examples=80)
+@settings(max_examples=80)
 def test_lips_never_reach_into_the_teeth(pose, tuck, press):
     """What is above the edge of the upper teeth is before them; what is below the lower edge is before those."""
     moved = pose._replace(

@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hmm.multistream.synthetic import CLASSES, config, inventory, observed, random_joint, utterances
@@ -41,7 +41,6 @@ def test_static_values_alone_are_the_means():
     assert found.variance == pytest.approx(1 / densities.precisions[:, 0, 0])
 
 
-@settings(deadline=None)
 @given(frames=st.integers(1, 12), seed=st.integers(0, 50), pinned=st.booleans())
 def test_one_gaussian_has_the_closed_form(frames, seed, pinned):
     densities = random_densities(seed, frames, 1)
@@ -65,7 +64,6 @@ def test_many_steps_over_one_gaussian_change_nothing():
     assert generate(twins).log_likelihoods[-1] == pytest.approx(generate(densities).log_likelihoods[0], abs=1e-9)
 
 
-@settings(deadline=None)
 @given(frames=st.integers(1, 25), components=st.integers(2, 4), seed=st.integers(0, 50), pinned=st.booleans())
 def test_the_likelihood_of_the_trajectory_never_falls(frames, components, seed, pinned):
     densities = random_densities(seed, frames, components)

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
@@ -30,7 +30,6 @@ def test_a_unit_without_a_frame_is_left_out():
     assert bounds.tolist() == [0, 4, 6]
 
 
-@settings(deadline=None)
 @given(lengths=st.lists(st.integers(1, 9), min_size=1, max_size=9))
 def test_there_and_back(lengths):
     firsts = np.cumsum([0, *lengths]).tolist()

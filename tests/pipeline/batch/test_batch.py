@@ -6,17 +6,17 @@ import json
 import os
 import shutil
 import signal
-import subprocess
 import sys
-import threading
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import lipmotion
+from children import LIPMOTION, NOWHERE, Child, child, run_child, wait_until
 from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.export.base import motion_suffixes
 from lipmotion.faces.filmed.face import FilmedFace
@@ -274,7 +274,7 @@ def test_a_bug_that_one_line_meets_does_not_end_the_batch(
 
 
 def command(*words: object) -> list[str]:
-    return [sys.executable, "-m", "lipmotion.cli.main", "batch", *map(str, words), "--machine-readable"]
+    return [*LIPMOTION, "batch", *map(str, words), "--machine-readable"]
 
 
 def many(folder: Path, speech: Path, count: int) -> Path:
@@ -284,7 +284,8 @@ def many(folder: Path, speech: Path, count: int) -> Path:
     return folder
 
 
-def events_of(process: subprocess.Popen) -> Iterator[dict]:
+def events_of(process: Child) -> Iterator[dict]:
+    assert process.stdout is not None
     for text in process.stdout:
         yield json.loads(text)
 
@@ -297,15 +298,16 @@ def test_kills(toy_speech: Path, settings: BatchSettings, tmp_path: Path, whom: 
     sounds = many(tmp_path / "sounds", toy_speech, 40)
     batch(sounds, tmp_path / "whole", settings, jobs=1)
     how = [sounds, "--out", tmp_path / "out", "--model", settings.model, "--recogniser", "own", "--jobs", 2]
-    with subprocess.Popen(command(*how), stdout=subprocess.PIPE, text=True) as process:
+    with child(command(*how)) as process:
         items = 0
         for event in events_of(process):
             items += event["type"] == "item"
             if items == 10 and event["type"] == "item":
                 os.kill(process.pid if whom == "first process" else worker_of(process.pid), signal.SIGKILL)
+        process.wait()
     if whom == "first process":
         assert process.returncode == -signal.SIGKILL
-        assert subprocess.run(command(*how), capture_output=True, check=False).returncode == 0
+        assert run_child(command(*how)).returncode == 0
     assert contents(tmp_path / "out") == contents(tmp_path / "whole")
     assert Counter(row["name"] for row in ledger_rows(tmp_path / "out")).most_common(1)[0][1] == 1
     assert len(ledger_rows(tmp_path / "out")) == 40
@@ -313,61 +315,54 @@ def test_kills(toy_speech: Path, settings: BatchSettings, tmp_path: Path, whom: 
 
 def worker_of(process: int) -> int:
     """Return a worker process of a batch."""
-    listed = subprocess.run(
-        ["ps", "-o", "pid=,args=", "--ppid", str(process)], capture_output=True, text=True, check=True
-    )
+    listed = run_child(["ps", "-o", "pid=,args=", "--ppid", process], check=True)
     rows = [row.split(maxsplit=1) for row in listed.stdout.splitlines()]
     return next(int(pid) for pid, words in rows if "resource_tracker" not in words)
 
 
 @pytest.fixture
-def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen]]]:
+def cluster(tmp_path: Path) -> Iterator[tuple[str, list[Child]]]:
     """A scheduler and two workers of Dask, each a process of its own."""
     pytest.importorskip("distributed")
     where = tmp_path / "scheduler.json"
     base = [sys.executable, "-m", "distributed.cli.dask_scheduler"]
     worker = [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", str(where), "--nthreads", "1"]
 
-    def start(words: list[str]) -> subprocess.Popen:
-        return subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=tmp_path)
-
     options = ["--port", "0", "--host", "127.0.0.1", "--no-dashboard", "--scheduler-file", str(where)]
-    processes = [start([*base, *options])]
-    processes += [start([*worker, "--no-dashboard", "--no-nanny"]) for _ in range(2)]
-    try:
+    with ExitStack() as all_of_them:
+
+        def start(words: list[str]) -> Child:
+            return all_of_them.enter_context(child(words, stdout=NOWHERE, stderr=NOWHERE, folder=tmp_path, limit_s=600))
+
+        processes = [start([*base, *options])]
+        processes += [start([*worker, "--no-dashboard", "--no-nanny"]) for _ in range(2)]
         from distributed import Client
 
-        waited = threading.Event()
-        while not where.is_file() or not where.read_text():
-            assert processes[0].poll() is None
-            waited.wait(0.1)
+        wait_until(lambda: where.is_file() and where.read_text())
         address = json.loads(where.read_text())["address"]
         with Client(address, set_as_default=False) as client:
             client.wait_for_workers(2, timeout=60)
         yield address, processes
-    finally:
-        for process in processes:
-            process.kill()
-            process.wait()
 
 
 @pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.filterwarnings("ignore")
 def test_a_worker_of_a_cluster_is_killed(
-    cluster: tuple[str, list[subprocess.Popen]], toy_speech: Path, settings: BatchSettings, tmp_path: Path
+    cluster: tuple[str, list[Child]], toy_speech: Path, settings: BatchSettings, tmp_path: Path
 ) -> None:
     """Nothing is lost, and nothing is done twice."""
     address, processes = cluster
     sounds = many(tmp_path / "sounds", toy_speech, 60)
     batch(sounds, tmp_path / "whole", settings, jobs=1)
     how = [sounds, "--out", tmp_path / "out", "--model", settings.model, "--recogniser", "own", "--cluster", address]
-    with subprocess.Popen(command(*how), stdout=subprocess.PIPE, text=True) as process:
+    with child(command(*how), limit_s=300) as process:
         items = 0
         for event in events_of(process):
             items += event["type"] == "item"
             if items == 15 and event["type"] == "item":
                 processes[1].kill()
+        process.wait()
     assert process.returncode == 0
     assert contents(tmp_path / "out") == contents(tmp_path / "whole")
     names = Counter(row["name"] for row in ledger_rows(tmp_path / "out"))

@@ -3,15 +3,14 @@ from __future__ import annotations
 import os
 import shutil
 import signal
-import subprocess
 import sys
-import time
 import wave
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from children import NOWHERE, child
 from lipmotion.corpora.entry import read_entry
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError
@@ -289,23 +288,21 @@ if __name__ == "__main__":
 """
 
 
-def started(script: Path, folder: Path, corpus: Path) -> subprocess.Popen[str]:
-    """Start preparing in another process, which goes no further than the first utterances; return when they are there.
+def prepare_partly(script: Path, folder: Path, corpus: Path, stop: signal.Signals) -> None:
+    """Prepare in another process, which goes no further than the first utterances, and stop it when they are there.
 
     Each worker may finish one more meanwhile.
     """
     script.write_text(SCRIPT)
-    process = subprocess.Popen(
-        [sys.executable, str(script), str(folder), str(corpus)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-        text=True,
-    )
-    assert process.stdout is not None
-    assert process.stdout.readline() == "two are done\n"
-    process.stdout.close()
-    return process
+    with child([sys.executable, script, folder, corpus], stderr=NOWHERE) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "two are done\n"
+        if stop == signal.SIGINT:
+            os.killpg(process.pid, stop)  # as Ctrl-C does: the workers get it, too
+        else:
+            process.send_signal(stop)
+        assert process.stdout.read() == ""  # workers of a killed run end by themselves
+        assert process.wait() != 0
 
 
 @pytest.mark.long
@@ -313,13 +310,7 @@ def started(script: Path, folder: Path, corpus: Path) -> subprocess.Popen[str]:
 @pytest.mark.recordings
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGKILL])
 def test_real_clips_in_two_processes_stopped_and_gone_on(clips, tmp_path, stop):
-    process = started(tmp_path / "script.py", clips, tmp_path / "corpus")
-    if stop == signal.SIGINT:
-        os.killpg(process.pid, stop)  # as Ctrl-C does: the workers get it, too
-    else:
-        process.send_signal(stop)
-    assert process.wait(30) != 0
-    time.sleep(1)  # workers of a killed run end by themselves
+    prepare_partly(tmp_path / "script.py", clips, tmp_path / "corpus", stop)
     done = len(list((tmp_path / "corpus").glob("utterances/[a-z]*")))
     assert 2 <= done <= 4
     if stop == signal.SIGINT:

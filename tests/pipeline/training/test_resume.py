@@ -151,7 +151,7 @@ def test_threads_of_matrix_products_change_nothing(
     """Neither this process's own nor those that the processes it starts would use."""
     whole = content(run(corpus), tmp_path)
     monkeypatch.setattr(module, "UTTERANCES_PER_WORKER", 1)
-    monkeypatch.setenv("OMP_NUM_THREADS", str(there))
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", str(there))
     with threadpool_limits(here, user_api="blas"):
         assert content(train(corpus, recogniser=CONFIG, run=Run(workers=2))[0], tmp_path) == whole
         assert {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"} == {here}

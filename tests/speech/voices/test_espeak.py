@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-import subprocess
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
+from children import Done, run_child
 from lipmotion.errors import InputError
 from lipmotion.speech.voices import espeak
 from lipmotion.speech.voices.espeak import ESPEAK_NG
@@ -93,10 +93,8 @@ def test_a_word_that_is_said_with_the_one_before_belongs_to_it() -> None:
     assert written(3, 3, text="- one -") == ["0.0 - one -"]
 
 
-def run_events(task: dict[str, object]) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        espeak.PROGRAM, input=json.dumps(task), capture_output=True, encoding="utf-8", check=False, timeout=60
-    )
+def run_events(task: dict[str, object]) -> Done:
+    return run_child(espeak.PROGRAM, text=json.dumps(task))
 
 
 def test_a_library_that_is_none_is_said_so(tmp_path: Path) -> None:

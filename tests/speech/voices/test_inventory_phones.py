@@ -31,7 +31,7 @@ def cost_of(found: Sequence[str], wanted: Sequence[str]) -> float:
     return sum(module._cost(*pair) for pair in pairs) + module.GAP * gaps
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(st.sampled_from(SOUNDS), max_size=5), st.lists(st.sampled_from(SOUNDS), max_size=5))
 def test_matches_are_the_cheapest(found: list[str], wanted: list[str]) -> None:
     matched = [match for match in matches(found, wanted) if match >= 0]

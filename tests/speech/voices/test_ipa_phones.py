@@ -37,7 +37,7 @@ def test_the_table_leads_to_the_inventory() -> None:
     assert {phone for phones in IPA_PHONES.values() for phone in phones} <= SPOKEN
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(st.text(max_size=6))
 def test_any_label_becomes_phones(label: str) -> None:
     phones, unknown = ipa_phones(label)
