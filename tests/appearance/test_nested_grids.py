@@ -27,13 +27,6 @@ def test_filling_is_the_matrix(shape: tuple[int, int]) -> None:
                 assert np.abs(filled[t] - expected)[grids.region].max() < 1e-5
 
 
-def test_each_pixel_of_the_region_is_made_of_nodes_with_weights_of_sum_one() -> None:
-    grids = nested_grids(disc(130, 150))
-    sums = grids.matrix().sum(axis=1).reshape(130, 150)
-    assert sums[grids.region] == pytest.approx(1)
-    assert not sums[~grids.region].any()
-
-
 def test_cubic_functions_are_exact() -> None:
     grids = nested_grids(disc(130, 150))
     y, x = np.mgrid[:130, :150] / 150 - 0.5

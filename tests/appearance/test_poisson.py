@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -71,23 +69,6 @@ def test_mouths_of_a_film_are_within_one_grey_level_of_the_printed_equation() ->
     assert np.abs(source + system.correction(source[None], background[None])[0] - exact).max() < 0.25
 
 
-@pytest.mark.recordings
-def test_recorded_mouths_are_within_one_grey_level_of_the_printed_equation(recordings: Path) -> None:
-    av = pytest.importorskip("av")
-    clips = recordings / "grid-s1" / "clips"
-    if not clips.is_dir():
-        pytest.skip("no GRID recordings")
-    with av.open(str(clips / "bbaf2n.mkv")) as container:
-        frames = np.stack([frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)])
-    mouths = frames[::9, 180 : 180 + HEIGHT, 145 : 145 + WIDTH]
-    source, background = mouths[1:], mouths[:-1]
-    system = cloning_system(MASKS["ellipse"])
-    result = system.clone(source, background)
-    for t in range(len(source)):
-        exact = np.clip(np.rint(cloned(system.mask, source[t], background[t])), 0, 255)
-        assert np.abs(result[t] - exact).max() <= 1
-
-
 def test_constants_and_linear_functions_are_reproduced() -> None:
     """A difference on the edge that is linear in x and y has itself as its membrane, on every grid; none, none."""
     for name in ("ellipse", "scattered"):
@@ -128,13 +109,6 @@ def test_many_pictures_give_what_each_gives_alone() -> None:
     for t in (0, 31, poisson.BATCH - 1, poisson.BATCH, count - 1):
         alone = system.correction(source[t : t + 1], background[t : t + 1])[0]
         assert together[t] == pytest.approx(alone, abs=1e-2)
-
-
-def test_no_pictures_give_none() -> None:
-    system = cloning_system(MASKS["ellipse"])
-    none = np.empty((0, HEIGHT, WIDTH, 3), np.uint8)
-    assert system.clone(none, none).shape == none.shape
-    assert system.correction(none, none).shape == none.shape
 
 
 @settings(max_examples=12)

@@ -2,14 +2,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
 from lipmotion.vision.footage import footage_frames, footage_groups, track_footage, untracked_frames
-from lipmotion.vision.frames import VideoSpan, open_video
+from lipmotion.vision.frames import VideoSpan
 from lipmotion.vision.track import track
 from vision.scripted import face, script
 
@@ -131,21 +130,6 @@ def test_a_video_that_became_shorter_shows_its_last_picture(write_video, scripte
     assert levels(footage_frames(shorter)) == [*range(15), *([14] * 5)]
     with pytest.raises(InputError, match=r"no picture from 0\.72 s on"):
         list(footage_frames(shorter, 18))
-
-
-@pytest.mark.video
-@pytest.mark.recordings
-def test_a_recording_is_read_picture_by_picture(recordings: Path):
-    pytest.importorskip("mediapipe")
-    path = recordings / "grid-s1" / "clips" / "bbizzn.mkv"  # its first 12 pictures are grey
-    footage = track_footage(path)
-    assert footage.size == (288, 360)
-    np.testing.assert_array_equal(footage.face_to_image[:12], np.tile(footage.face_to_image[12], (12, 1, 1)))
-    with open_video(path) as video:
-        pictures = [picture.image for picture in video.frames]
-    assert len(pictures) == len(footage)
-    for frame, picture in zip(footage_frames(footage, 5, 20), pictures[5:20], strict=True):
-        np.testing.assert_array_equal(frame, picture)
 
 
 def test_untracked_frames_hold_the_last_picture(write_video):

@@ -124,6 +124,13 @@ class TestRegistration:
         ):
             np.testing.assert_allclose(registered_maps(footage), footage.face_to_image, atol=0.05)
 
+    def test_what_an_unseen_frame_shows_moves_nothing(self, scene):
+        """Somebody walks by, and the tracker's places are interpolated."""
+        places, seen = np.zeros((30, 2)), np.ones(30, bool)
+        places[12:17], seen[12:17] = 6, False
+        footage = scene(places, -places, seen=seen)
+        np.testing.assert_allclose(registered_maps(footage), footage.face_to_image, atol=0.05)
+
     def test_a_region_without_texture_stays(self, scene, monkeypatch):
         footage = scene(np.zeros((5, 2)), 0.0)
         monkeypatch.setattr(steadying, "footage_frames", lambda _: iter([np.full((120, 170, 3), 90, np.uint8)] * 5))

@@ -22,7 +22,6 @@ from lipmotion.pipeline.evaluation.conditions import compared_clips, held_out_re
 from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.training.train import train
 from lipmotion.speech.recogniser import cached_recogniser
-from lipmotion.types import Progress
 from lipmotion.units import unit_set
 
 PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
@@ -33,13 +32,8 @@ Rows = dict[str, dict[str, Any]]
 
 
 @pytest.fixture(scope="module")
-def stages() -> list[Progress]:
-    return []
-
-
-@pytest.fixture(scope="module")
-def figures(toy_corpus: Corpus, stages: list[Progress]) -> dict[str, Any]:
-    return unit_sets(toy_corpus, settings=replace(SMALL, monitor=stages.append))
+def figures(toy_corpus: Corpus) -> dict[str, Any]:
+    return unit_sets(toy_corpus, settings=SMALL)
 
 
 def all_rows(figures: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
@@ -133,46 +127,11 @@ def test_lips_that_are_made_to_meet_do(toy_corpus: Corpus, tmp_path: Path, monke
     assert "lips made to meet on p b m" in table(pinned)
 
 
-@pytest.mark.long
-def test_progress_goes_from_nothing_to_all(figures: dict[str, Any], stages: list[Progress]) -> None:
-    shares = [event.share for event in stages]
-    assert figures
-    assert shares == sorted(shares)
-    assert (shares[0] < 0.1, shares[-1]) == (True, 1.0)
-    assert stages[-1].stage == f"{SHIPPED}: unit sets"
-
-
 def test_nothing_to_train_on_or_to_compare_with(toy_corpus: Corpus, tmp_path: Path) -> None:
     with pytest.raises(CorpusError, match="no utterances of split 'train'"):
         unit_sets(copied(toy_corpus, tmp_path, partial(replace, split="test")))
     with pytest.raises(CorpusError, match="compared by the channel 'opening', which is not in it"):
         unit_sets(renamed(toy_corpus, tmp_path / "b", "shape 0", "shape 1", "shape 2"))
-
-
-def row(**changes: Any) -> dict[str, Any]:
-    plain = {"units": 6, "paper": 67.4, "score": 70.0, "score_95": (60.0, 80.0), "score_gain_95": (-1.0, 1.0)}
-    plain |= {"precision": 50.0, "recall_p_b_m": 90.0, "timing_ms": -20.0, "acc": 0.8, "acc_95": (0.7, 0.9)}
-    plain |= {"acc_gain_95": (-0.1, 0.0), "rmse": 0.0123, "nrmse": 0.5, "global_variance": 0.75}
-    return plain | changes
-
-
-def shown(**changes: Any) -> str:
-    figures = {"split": "test", "clips": 2, "trained_on": 8, "closed_under": 0.02, "closures": False}
-    lines = table(figures | {"systems": {"S": {"audio only": {"sVis": row(**changes)}}}}).splitlines()
-    assert lines[0] == "trained on 8 clips; split test: 2 clips, no lips made to meet; closed under 0.0200"
-    assert lines[2] == "S; audio only"
-    return lines[4]
-
-
-def test_a_line_of_the_table() -> None:
-    assert shown().split() == "sVis 6 67.4 70.0 (60.0–80.0) 50.0 90.0 -20 0.800 (0.700–0.900) 0.0123 0.500 0.75".split()
-
-
-def test_figures_that_do_not_exist_are_dashes() -> None:
-    none = {"score": None, "score_95": (None, None), "score_gain_95": (None, None), "precision": None}
-    line = shown(**none, timing_ms=None, recall_p_b_m=None)
-    assert line.split()[3:8] == ["–", "(–––)", "–", "–", "–"]
-    assert len(line) == len(shown())
 
 
 def test_the_document_shows_the_figures_beside_it() -> None:
@@ -182,10 +141,3 @@ def test_the_document_shows_the_figures_beside_it() -> None:
     assert f"```text\n{table(figures)}\n```" in text
     for name, row in all_rows(figures):
         assert (row["units"], row["paper"]) == (unit_set(name).count, PAPER_SCORES[name])
-
-
-def test_what_differs_from_phones_has_a_star() -> None:
-    for gain in ((0.1, 2.0), (-2.0, -0.1)):
-        score, motion = shown(score_gain_95=gain).split(), shown(acc_gain_95=gain).split()
-        assert (score[3], score[8]) == ("70.0*", "0.800")
-        assert (motion[3], motion[8]) == ("70.0", "0.800*")

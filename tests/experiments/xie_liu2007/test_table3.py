@@ -30,7 +30,6 @@ from lipmotion.pipeline.evaluation.conditions import compared_clips, held_out_re
 from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.training.train import train
 from lipmotion.speech.recogniser import cached_recogniser
-from lipmotion.types import Progress
 
 LONG = pytest.mark.long
 PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
@@ -40,17 +39,12 @@ PICTURE = b"\x89PNG\r\n\x1a\n"
 
 
 @pytest.fixture(scope="module")
-def stages() -> list[Progress]:
-    return []
-
-
-@pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("pictures") / "new"
 
 
 @pytest.fixture(scope="module")
-def figures(toy_corpus: Corpus, folder: Path, stages: list[Progress]) -> dict[str, Any]:
+def figures(toy_corpus: Corpus, folder: Path) -> dict[str, Any]:
     return table3(
         toy_corpus,
         ComparisonOptions(
@@ -62,7 +56,7 @@ def figures(toy_corpus: Corpus, folder: Path, stages: list[Progress]) -> dict[st
         ),
         sizes=[8, 3],
         plots=folder,
-        settings=replace(SMALL, monitor=stages.append),
+        settings=SMALL,
     )
 
 
@@ -127,13 +121,6 @@ def test_intervals_hold_their_figures_and_nothing_differs_from_itself(figures: d
 
 
 @LONG
-def test_a_pose_that_stands_still_has_no_lag(figures: dict[str, Any]) -> None:
-    row = figures["rows"][-1]["conditions"]["audio only"]["mean pose"]
-    assert (row["acc"], row["lag_ms"], row["opening"]["global_variance"]) == (0, None, pytest.approx(0))
-    assert row["opening"]["nrmse"] == pytest.approx(1, abs=0.05)
-
-
-@LONG
 def test_noise_makes_it_worse(figures: dict[str, Any]) -> None:
     clean = figures["rows"][-1]["conditions"]["audio only"]
     much = figures["noise"][0]["systems"]
@@ -147,14 +134,6 @@ def test_pictures_are_written(figures: dict[str, Any], folder: Path) -> None:
     assert figures
     assert sorted(path.name for path in folder.iterdir()) == sorted(PLOT_FILES.values())
     assert all(path.read_bytes().startswith(PICTURE) for path in folder.iterdir())
-
-
-@LONG
-def test_progress_goes_from_nothing_to_all(figures: dict[str, Any], stages: list[Progress]) -> None:
-    shares = [event.share for event in stages]
-    assert figures
-    assert shares == sorted(shares)
-    assert (shares[0] < 0.1, shares[-1]) == (True, pytest.approx(1.0))
 
 
 @LONG
@@ -183,29 +162,6 @@ def test_eigenlips(visual: str, toy_corpus: Corpus) -> None:
     assert json.loads(json.dumps(made, allow_nan=False))
     starts = [line.split()[:1] for line in table(made).splitlines()]
     assert (["eigenlips"] in starts) == (visual == "both")
-
-
-def row(**changes: Any) -> dict[str, Any]:
-    opening = {"nrmse": 0.5, "rmse": 0.0123, "score": 70.0, "recall_p_b_m": 90.0, "false_per_minute": 3.21}
-    plain = {"opening": opening | {"global_variance": 0.75}, "lag_ms": -7.4, "opening_acc": 0.8}
-    plain["opening_acc_95"] = (0.7, 0.9)
-    plain |= {"amse": 0.03, "amse_95": (0.02, 0.04), "amse_gain_95": (-0.1, 0.1), "acc": 0.7, "acc_95": (0.6, 0.8)}
-    return plain | {"acc_gain_95": (0.01, 0.02), "opening_acc_gain_95": (-0.2, -0.1)} | changes
-
-
-def test_a_line_of_the_table() -> None:
-    size = {"names": 9, "used": 8, "training": {"ph-HMM": {"mixtures": 4, "seconds": 12.34}}}
-    size["conditions"] = {"audio only": {"ph-HMM": row()}}
-    about = {"split": "val", "clips": 2, "order": "given", "seed": 0, "states": 5, "mixtures": [1, 4], "noise": []}
-    about |= {"channels": ["opening", "width"], "closed_under": 0.02}
-    lines = table(about | {"rows": [size]}).splitlines()
-    assert lines[0] == "the first N clips of the list given; split val: 2 clips"
-    assert lines[3] == "audio only, 8 of the first 9 clips"
-    wanted = (
-        "ph-HMM 8.043 0.581 0.0300 (0.0200–0.0400) 0.700* (0.600–0.800) 0.800* (0.700–0.900) 0.500 0.0123 -7 70.0 90.0"
-    )
-    assert lines[5].split() == f"{wanted} 3.2 0.75 4 12.3".split()
-    assert len(lines[5]) == len(lines[4])
 
 
 def test_systems_in_the_order_of_the_table() -> None:
