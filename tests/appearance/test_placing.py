@@ -135,7 +135,8 @@ def test_what_was_cut_is_placed_where_it_was() -> None:
 
 
 def test_a_frame_of_another_kind_is_refused() -> None:
-    for frame in (np.zeros((60, 80)), np.zeros((60, 80, 3)), np.zeros((60, 80, 4), np.uint8)):
+    frames: list[np.ndarray] = [np.zeros((60, 80)), np.zeros((60, 80, 3)), np.zeros((60, 80, 4), np.uint8)]
+    for frame in frames:
         with pytest.raises(InputError, match="frame of shape"):
             cut(frame, TURNED, (10, 12))
         with pytest.raises(InputError, match="frame of shape"):

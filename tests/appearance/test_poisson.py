@@ -156,4 +156,4 @@ def test_other_than_a_mask_is_refused() -> None:
         ((x + y) % 2 == 0, f"at most {poisson.LARGEST_EDGE}"),
     ):
         with pytest.raises(InputError, match=message):
-            cloning_system(mask)
+            cloning_system(mask)  # type: ignore[arg-type]

@@ -157,24 +157,20 @@ def test_a_damaged_utterance(corpus):
     folder = corpus.folder("one")
     entry = read_entry(folder)
     whole = {path.name: path.read_bytes() for path in folder.iterdir()}
-    damages: list[dict[str, bytes | None]] = [
-        {"motion.npy": None},
-        {"seen.npy": b""},
-        {"features.npy": whole["features.npy"][:200]},
-        {"entry.json": b"{"},
-        {"entry.json": b'{"name": "one"}'},
-        *[
-            {"entry.json": json.dumps(entry | {"phones": rows}).encode()}
-            for rows in ([[0, 1]], [[0.5, 0.2, "aa"]], "aa", [["x", 1, "aa"]])
-        ],
+    damages = [
+        ("motion.npy", None),
+        ("seen.npy", b""),
+        ("features.npy", whole["features.npy"][:200]),
+        ("entry.json", b"{"),
+        ("entry.json", b'{"name": "one"}'),
     ]
-    for damage in damages:
-        for name, content in damage.items():
-            (folder / name).unlink() if content is None else (folder / name).write_bytes(content)
+    for rows in ([[0, 1]], [[0.5, 0.2, "aa"]], "aa", [["x", 1, "aa"]]):
+        damages.append(("entry.json", json.dumps(entry | {"phones": rows}).encode()))
+    for name, content in damages:
+        (folder / name).unlink() if content is None else (folder / name).write_bytes(content)
         with pytest.raises(CorpusError, match=r"one: not a whole utterance .* prepare again"):
             corpus.utterance("one")
-        for name in damage:
-            (folder / name).write_bytes(whole[name])
+        (folder / name).write_bytes(whole[name])
     assert corpus.utterance("one").words == ("bin", "näh")
 
 

@@ -12,7 +12,7 @@ from lipmotion.testing.examples import CHANNELS
 from lipmotion.testing.examples import examples as sentences
 from lipmotion.types import Example, silent_monitor
 
-BASELINES = [MeanPose, LoudnessRegression, ContextRidge]
+BASELINES: list[type] = [MeanPose, LoudnessRegression, ContextRidge]
 
 
 @pytest.fixture(scope="module")
