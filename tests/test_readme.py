@@ -67,6 +67,7 @@ def test_commands_of_use(page: str, verbs: list[str], written: set[str], checkou
     assert written <= {path.name for path in checkout.iterdir()}
 
 
+@pytest.mark.long
 @PAGES
 def test_python_example(page: str, checkout: Path) -> None:
     (example,) = blocks(page, "python")

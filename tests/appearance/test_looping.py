@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lipmotion.appearance.frame_descriptors import FrameDescriptors
-from lipmotion.appearance.looping import FADE_FRAMES, JUMP_LIMIT, LoopOrder, loop_order
+from lipmotion.appearance.looping import BUSY_S, FADE_FRAMES, JUMP_LIMIT, LoopOrder, loop_order
 from lipmotion.errors import InputError
 
 RATE_HZ = 25.0
@@ -39,13 +39,13 @@ def runs_of(order: LoopOrder) -> list[int]:
     return [after - before for before, after in pairwise([0, *(join.at for join in order.joins), len(order)])]
 
 
-@pytest.mark.parametrize("count", [1, 2, 30, 74, 75])
-def test_a_long_background_is_shown_as_it_is(count):
-    order = loop_order(background(wander(75)), count, RATE_HZ)
-    assert len(order) == count
-    assert order.joins == ()
-    np.testing.assert_array_equal(np.diff(order.first), 1)
-    assert not order.weight.any()
+def test_a_long_background_is_shown_as_it_is():
+    for count in (1, 30, 75):
+        order = loop_order(background(wander(75)), count, RATE_HZ)
+        assert len(order) == count
+        assert order.joins == ()
+        np.testing.assert_array_equal(np.diff(order.first), 1)
+        assert not order.weight.any()
 
 
 def test_it_begins_and_ends_calmly():
@@ -56,18 +56,17 @@ def test_it_begins_and_ends_calmly():
     assert 140 <= order.first[-1] < 150
 
 
-@pytest.mark.parametrize("count", [76, 200, 4000])
-@pytest.mark.parametrize("seed", [0, 1, 2])
-def test_a_short_one_goes_to_and_fro(count, seed):
+def test_a_short_one_goes_to_and_fro():
     descriptors = background(wander(75))
-    order = loop_order(descriptors, count, RATE_HZ, seed=seed)
-    assert len(order) == len(list(order)) == count
-    assert order.first.min() >= 0
-    assert max(order.first.max(), order.second.max()) < 75
-    steps = np.diff(order.first)
-    jumps = {join.at for join in order.joins if join.kind == "jump"}
-    for at in np.flatnonzero(np.abs(steps) != 1) + 1:
-        assert any(abs(at - jump) <= FADE_FRAMES for jump in jumps)
+    for count, seed in ((76, 0), (200, 1), (2000, 2)):
+        order = loop_order(descriptors, count, RATE_HZ, seed=seed)
+        assert len(order) == len(list(order)) == count
+        assert order.first.min() >= 0
+        assert max(order.first.max(), order.second.max()) < 75
+        steps = np.diff(order.first)
+        jumps = {join.at for join in order.joins if join.kind == "jump"}
+        for at in np.flatnonzero(np.abs(steps) != 1) + 1:
+            assert any(abs(at - jump) <= FADE_FRAMES for jump in jumps)
 
 
 def test_no_step_is_much_larger_than_usual():
@@ -107,14 +106,13 @@ def test_jumps_go_on_in_the_same_direction():
             assert np.sign(before) == np.sign(after) or is_near_turn
 
 
-def test_no_join_in_a_blink():
-    descriptors = background(wander(150), blinks=(30, 75, 120))
-    order = loop_order(descriptors, 4000, RATE_HZ)
-    assert len(order.joins) > 20
-    for join in order.joins:
-        near = {*range(order.first[join.at - 1] - 1, order.first[join.at - 1] + 2)}
-        assert not near & {29, 30, 31, 32, 74, 75, 76, 77, 119, 120, 121, 122}
-    assert order.first[-1] not in (29, 30, 31, 32, 74, 75, 76, 77, 119, 120, 121, 122)
+def test_no_join_in_a_blink_or_near_one():
+    again_and_again = np.abs(np.arange(150) % 50) * 0.2
+    for path, blinks in ((wander(150), (30, 75, 120)), (again_and_again, (20, 50, 80, 110, 140))):
+        order = loop_order(background(path, blinks), 3000, RATE_HZ)
+        assert len(order.joins) > 20
+        for last in [*(order.first[join.at - 1] for join in order.joins), order.first[-1]]:
+            assert min(abs(last - blink - 0.5) for blink in blinks) > 2.5 + BUSY_S * RATE_HZ
 
 
 def test_runs_are_not_short():
@@ -140,20 +138,16 @@ def test_only_frames_that_may_be_shown():
     assert len(crossings) <= len(jumps)
 
 
-@pytest.mark.parametrize("length", [1, 2, 3, 5, 21])
-def test_tiny_backgrounds(length):
-    order = loop_order(background(wander(length)), 100, RATE_HZ)
-    assert len(order) == 100
-    assert set(order.first.tolist()) <= set(range(length))
-    assert np.abs(np.diff(order.first)).max() <= 1
+def test_nothing_to_show_is_refused():
+    for count, usable in ((0, None), (5, np.zeros(50, bool)), (5, np.ones(49, bool))):
+        with pytest.raises(InputError, match="required at least one of each"):
+            loop_order(background(wander(50)), count, RATE_HZ, usable=usable)
 
 
-def test_a_still_picture():
-    order = loop_order(background(np.zeros(60), noise=0.0), 500, RATE_HZ)
-    assert len(order) == 500
-
-
-@pytest.mark.parametrize(("count", "usable"), [(0, None), (5, np.zeros(50, bool)), (5, np.ones(49, bool))])
-def test_nothing_to_show_is_refused(count, usable):
-    with pytest.raises(InputError, match="required at least one of each"):
-        loop_order(background(wander(50)), count, RATE_HZ, usable=usable)
+def test_tiny_and_still_backgrounds():
+    for length in (1, 2, 3, 5, 21):
+        order = loop_order(background(wander(length)), 100, RATE_HZ)
+        assert len(order) == 100
+        assert set(order.first.tolist()) <= set(range(length))
+        assert np.abs(np.diff(order.first)).max() <= 1
+    assert len(loop_order(background(np.zeros(60), noise=0.0), 500, RATE_HZ)) == 500

@@ -13,25 +13,18 @@ def disc(height: int, width: int) -> np.ndarray:
     return region
 
 
-@pytest.mark.parametrize("shape", [(56, 72), (57, 71), (130, 101), (5, 40), (3, 3)])
-@pytest.mark.parametrize("colours", [1, 3])
-def test_filling_is_the_matrix(shape: tuple[int, int], colours: int) -> None:
+@pytest.mark.parametrize("shape", [(57, 71), (130, 101), (5, 40), (3, 3)])
+def test_filling_is_the_matrix(shape: tuple[int, int]) -> None:
     grids = nested_grids(disc(*shape))
     matrix = grids.matrix()
-    filler = GridFiller(grids, 3, colours)
-    for count in (3, 1, 2):  # memory that was used before changes nothing
-        values = np.random.default_rng(count).normal(size=(count, matrix.shape[1], colours)).astype(np.float32)
-        filled = filler.fill(values)
-        for t in range(count):
-            expected = (matrix @ values[t]).reshape(*shape, colours)
-            assert np.abs(filled[t] - expected)[grids.region].max() < 1e-5
-
-
-def test_each_pixel_of_the_region_is_made_of_nodes_with_weights_of_sum_one() -> None:
-    grids = nested_grids(disc(130, 150))
-    sums = grids.matrix().sum(axis=1).reshape(130, 150)
-    assert sums[grids.region] == pytest.approx(1)
-    assert not sums[~grids.region].any()
+    for colours in (1, 3):
+        filler = GridFiller(grids, 2, colours)
+        for count in (2, 1):  # memory that was used before changes nothing
+            values = np.random.default_rng(count).normal(size=(count, matrix.shape[1], colours)).astype(np.float32)
+            filled = filler.fill(values)
+            for t in range(count):
+                expected = (matrix @ values[t]).reshape(*shape, colours)
+                assert np.abs(filled[t] - expected)[grids.region].max() < 1e-5
 
 
 def test_cubic_functions_are_exact() -> None:

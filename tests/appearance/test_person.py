@@ -131,23 +131,6 @@ def test_all_pictures_are_in_one_light(footage: FootagePictures) -> None:
 
 
 @pytest.mark.long
-def test_large_footage_gives_finer_pictures(footage: FootagePictures) -> None:
-    fine = learn_appearance(toy_footage_pictures(scale=2))
-    assert fine.scale == 2
-    assert fine.mouths.shape[1:] == (112, 144, 3)
-    assert fine.jaws.shape[1:] == (256, 256, 3)
-    chosen = fine.mouths[:, ::2, ::2].astype(int)
-    coarse = fine.mouth.restore(fine.mouth_codes).astype(int)
-    assert np.abs(chosen - coarse).mean() < 4  # of the same frames
-    motion = Motion(footage.motion[60:80], 25.0, footage.channels)
-    refiner = fine.mouth_refiner(STEADY)
-    made = refiner.refine(fine.of_motion(motion).mouth).astype(float)
-    drawn = toy_lower_faces(motion, 2)[(slice(None), *mouth_part(2))].astype(float)
-    edges = [np.abs(np.diff(pictures, axis=1)).mean() for pictures in (made, drawn)]
-    assert 0.8 < edges[0] / edges[1] < 1.25
-
-
-@pytest.mark.long
 def test_damaged_pictures_are_no_candidates(footage: FootagePictures, monkeypatch: pytest.MonkeyPatch) -> None:
     """A blue square, as errors of video leave it, in a picture from which no component is learned."""
     monkeypatch.setattr(person, "LEARNED_FROM", 120)

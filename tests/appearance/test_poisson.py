@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -30,11 +28,9 @@ def two_parts_and_a_hole() -> np.ndarray:
 
 MASKS = {
     "ellipse": ellipse(),
-    "whole patch": np.ones((HEIGHT, WIDTH), bool),
     "large": ellipse(80, 100),
     "parts": two_parts_and_a_hole(),
     "one pixel": np.pad(np.ones((1, 1), bool), 3),
-    "a line": np.pad(np.ones((1, 40), bool), 2),
     "smallest picture": np.ones((3, 3), bool),
     "scattered": np.random.default_rng(3).random((30, 40)) < 0.6,
 }
@@ -73,39 +69,16 @@ def test_mouths_of_a_film_are_within_one_grey_level_of_the_printed_equation() ->
     assert np.abs(source + system.correction(source[None], background[None])[0] - exact).max() < 0.25
 
 
-@pytest.mark.recordings
-def test_recorded_mouths_are_within_one_grey_level_of_the_printed_equation(recordings: Path) -> None:
-    av = pytest.importorskip("av")
-    clips = recordings / "grid-s1" / "clips"
-    if not clips.is_dir():
-        pytest.skip("no GRID recordings")
-    with av.open(str(clips / "bbaf2n.mkv")) as container:
-        frames = np.stack([frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)])
-    mouths = frames[::9, 180 : 180 + HEIGHT, 145 : 145 + WIDTH]
-    source, background = mouths[1:], mouths[:-1]
-    system = cloning_system(MASKS["ellipse"])
-    result = system.clone(source, background)
-    for t in range(len(source)):
-        exact = np.clip(np.rint(cloned(system.mask, source[t], background[t])), 0, 255)
-        assert np.abs(result[t] - exact).max() <= 1
-
-
-@pytest.mark.parametrize("name", ["ellipse", "parts", "scattered"])
-def test_constants_and_linear_functions_are_reproduced(name: str) -> None:
-    """A difference on the edge that is linear in x and y has itself as its membrane, on every grid."""
-    system = cloning_system(MASKS[name])
-    height, width = system.mask.shape
-    y, x = np.mgrid[:height, :width] / max(height, width)
-    linear = np.stack([np.full_like(x, 40), 90 * x - 30 * y, 120 * y], axis=-1)[None]
-    source = noise(linear.shape).astype(float)
-    assert system.correction(source, source + linear) == pytest.approx(linear, abs=2e-3)
-
-
-def test_the_source_on_itself_stays() -> None:
-    system = cloning_system(MASKS["ellipse"])
-    pictures = noise((3, HEIGHT, WIDTH, 3))
-    assert (system.clone(pictures, pictures) == pictures).all()
-    assert np.abs(system.correction(pictures, pictures)).max() < 1e-6
+def test_constants_and_linear_functions_are_reproduced() -> None:
+    """A difference on the edge that is linear in x and y has itself as its membrane, on every grid; none, none."""
+    for name in ("ellipse", "scattered"):
+        system = cloning_system(MASKS[name])
+        height, width = system.mask.shape
+        y, x = np.mgrid[:height, :width] / max(height, width)
+        linear = np.stack([np.full_like(x, 40), 90 * x - 30 * y, 120 * y], axis=-1)[None]
+        source = noise(linear.shape)
+        assert system.correction(source.astype(float), source + linear) == pytest.approx(linear, abs=2e-3)
+        assert (system.clone(source, source) == source).all()
 
 
 def test_another_colour_of_the_light_vanishes() -> None:
@@ -119,42 +92,26 @@ def test_another_colour_of_the_light_vanishes() -> None:
 def test_floats_and_grey_levels_give_the_same() -> None:
     system = cloning_system(MASKS["parts"])
     source, background = (noise((2, *system.mask.shape, 3), seed) for seed in (1, 2))
+    between = background + 0.4
+    copies = source.copy(), background.copy(), between.copy()
     expected = system.clone(source, background)
     assert (system.clone(source.astype(np.float32), background.astype(np.float64)) == expected).all()
-    assert (system.clone(source.astype(np.float64), background) == expected).all()
-    between = background + 0.4
-    kept = between.copy()
     assert (system.clone(source, between)[:, ~system.mask] == background[:, ~system.mask]).all()
-    assert (between == kept).all()
-
-
-def test_the_inputs_stay_as_they_are() -> None:
-    system = cloning_system(MASKS["ellipse"])
-    source, background = (noise((2, HEIGHT, WIDTH, 3), seed) for seed in (1, 2))
-    copies = source.copy(), background.copy()
-    system.clone(source, background)
-    assert (source == copies[0]).all()
-    assert (background == copies[1]).all()
+    for given_one, copy in zip((source, background, between), copies, strict=True):
+        assert (given_one == copy).all()
 
 
 def test_many_pictures_give_what_each_gives_alone() -> None:
-    system = cloning_system(MASKS["ellipse"])
+    system = cloning_system(ellipse(20, 24))
     count = poisson.BATCH + 7
-    source, background = (noise((count, HEIGHT, WIDTH, 3), seed) for seed in (1, 2))
+    source, background = (noise((count, 20, 24, 3), seed) for seed in (1, 2))
     together = system.correction(source, background)
     for t in (0, 31, poisson.BATCH - 1, poisson.BATCH, count - 1):
         alone = system.correction(source[t : t + 1], background[t : t + 1])[0]
         assert together[t] == pytest.approx(alone, abs=1e-2)
 
 
-def test_no_pictures_give_none() -> None:
-    system = cloning_system(MASKS["ellipse"])
-    none = np.empty((0, HEIGHT, WIDTH, 3), np.uint8)
-    assert system.clone(none, none).shape == none.shape
-    assert system.correction(none, none).shape == none.shape
-
-
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(seed=st.integers(0, 10**6), height=st.integers(3, 40), width=st.integers(3, 40), share=st.floats(0.1, 1))
 def test_the_membrane_lies_between_its_edge_values(seed: int, height: int, width: int, share: float) -> None:
     """The maximum principle, up to the error of interpolation, and the printed equation, for masks of any kind."""
@@ -169,26 +126,6 @@ def test_the_membrane_lies_between_its_edge_values(seed: int, height: int, width
     outside = correction[~system.mask]
     assert (correction[system.mask] <= outside.max(axis=0) + 1).all()
     assert (correction[system.mask] >= outside.min(axis=0) - 1).all()
-
-
-def test_other_than_a_mask_is_refused() -> None:
-    for mask in (np.ones((5, 5)), np.ones((5, 5, 1), bool)):
-        with pytest.raises(InputError, match=r"required \(h, w\) and bool"):
-            cloning_system(mask)  # type: ignore[arg-type]
-
-
-def test_a_mask_without_an_inside_is_refused() -> None:
-    frame = np.ones((6, 9), bool)
-    frame[1:-1, 1:-1] = False
-    for mask in (np.zeros((8, 8), bool), frame, np.ones((2, 30), bool)):
-        with pytest.raises(InputError, match="none of these inside"):
-            cloning_system(mask)
-
-
-def test_too_long_an_edge_is_refused() -> None:
-    y, x = np.mgrid[:100, :100]
-    with pytest.raises(InputError, match=f"at most {poisson.LARGEST_EDGE}"):
-        cloning_system((x + y) % 2 == 0)
 
 
 def test_pictures_that_do_not_fit_are_refused() -> None:
@@ -207,16 +144,16 @@ def test_pictures_that_do_not_fit_are_refused() -> None:
             system.clone(source, background)
 
 
-def test_opencv_gives_nearly_the_same() -> None:
-    """OpenCV solves on a region that is some pixels smaller: the pictures differ near the edge by a colour alone."""
-    cv2 = pytest.importorskip("cv2")
-    y, x = np.mgrid[:HEIGHT, :WIDTH]
-    background = np.stack([100 + x / 2, 160 - y, 90 + y / 2 + x / 4], axis=-1)
-    blob = 60 * np.exp(-((x - 40) ** 2 + (y - 26) ** 2) / 60)[..., None] * [1, -0.7, 0.5]
-    source, background = (np.rint(each).astype(np.uint8) for each in (background + blob + [30, -20, 15], background))
-    ours = cloning_system(np.ones((HEIGHT, WIDTH), bool)).clone(source[None], background[None])[0].astype(int)
-    whole = np.full((HEIGHT, WIDTH), 255, np.uint8)
-    framed = np.pad(background, ((20, 20), (20, 20), (0, 0)), mode="edge")
-    theirs = cv2.seamlessClone(source, framed, whole, (WIDTH // 2 + 20, HEIGHT // 2 + 20), cv2.NORMAL_CLONE)
-    assert np.abs(ours - source).mean() > 15
-    assert np.abs(theirs[20:-20, 20:-20] - ours).mean() < 2
+def test_other_than_a_mask_is_refused() -> None:
+    frame = np.ones((6, 9), bool)
+    frame[1:-1, 1:-1] = False
+    y, x = np.mgrid[:100, :100]
+    for mask, message in (
+        (np.ones((5, 5)), r"required \(h, w\) and bool"),
+        (np.ones((5, 5, 1), bool), r"required \(h, w\) and bool"),
+        (frame, "none of these inside"),
+        (np.ones((2, 30), bool), "none of these inside"),
+        ((x + y) % 2 == 0, f"at most {poisson.LARGEST_EDGE}"),
+    ):
+        with pytest.raises(InputError, match=message):
+            cloning_system(mask)  # type: ignore[arg-type]

@@ -11,7 +11,7 @@ import pytest
 from children import run_child
 from lipmotion.corpora.entry import quantise, read_entry
 from lipmotion.corpora.store import Corpus
-from lipmotion.errors import CorpusError, ExportError, InputError
+from lipmotion.errors import CorpusError, InputError
 from lipmotion.types import Audio, Channel, Features, Motion, Span, Timeline, Track, Unit, Utterance
 
 
@@ -98,11 +98,6 @@ def test_the_bytes_do_not_depend_on_the_order(corpus, tmp_path):
         assert (corpus.path / path).read_bytes() == (other.path / path).read_bytes()
 
 
-def test_no_path_of_this_machine_is_kept(corpus):
-    for path in corpus.path.rglob("*.json"):
-        assert str(corpus.path.parent) not in path.read_text()
-
-
 def test_creating_again_keeps_what_is_there(corpus):
     assert Corpus.create(corpus.path).names() == ("one", "three", "two")
 
@@ -135,29 +130,20 @@ def test_something_else_is_not_overwritten(tmp_path):
         Corpus.create(tmp_path / "letter.txt")
 
 
-def test_a_folder_that_cannot_be_made(tmp_path):
-    (tmp_path / "file").touch()
-    with pytest.raises(ExportError, match="cannot be created"):
-        Corpus.create(tmp_path / "file" / "corpus")
+def test_names_must_be_those_of_folders(corpus):
+    for name in ("../two", "a/b", ".hidden", "", ".."):
+        with pytest.raises(InputError, match="cannot be named"):
+            corpus.add(replace(utterance(), name=name))
 
 
-@pytest.mark.parametrize("name", ["../two", "a/b", ".hidden", "", ".."])
-def test_names_must_be_those_of_folders(corpus, name):
-    with pytest.raises(InputError, match="cannot be named"):
-        corpus.add(replace(utterance(), name=name))
-
-
-def test_a_missing_corpus(tmp_path):
+def test_not_a_corpus(tmp_path):
     with pytest.raises(CorpusError, match="no such corpus; make one: lipmotion corpus prepare"):
         Corpus.open(tmp_path / "none")
-
-
-@pytest.mark.parametrize("content", [None, "", "[]", "{}", '{"format": "lipmotion.motion", "version": 1}'])
-def test_not_a_corpus(tmp_path, content):
-    if content is not None:
-        (tmp_path / "corpus.json").write_text(content)
-    with pytest.raises(CorpusError, match="give a prepared corpus"):
-        Corpus.open(tmp_path)
+    for content in (None, "", "[]", "{}", '{"format": "lipmotion.motion", "version": 1}'):
+        if content is not None:
+            (tmp_path / "corpus.json").write_text(content)
+        with pytest.raises(CorpusError, match="give a prepared corpus"):
+            Corpus.open(tmp_path)
 
 
 def test_a_newer_version(corpus):
@@ -167,25 +153,25 @@ def test_a_newer_version(corpus):
         Corpus.open(corpus.path)
 
 
-def test_an_unknown_utterance(corpus):
-    with pytest.raises(CorpusError, match="no utterance 'four' among 3"):
-        corpus.utterance("four")
-
-
-@pytest.mark.parametrize(
-    "damage",
-    [
-        lambda folder: (folder / "motion.npy").unlink(),
-        lambda folder: (folder / "seen.npy").write_bytes(b""),
-        lambda folder: (folder / "features.npy").write_bytes((folder / "features.npy").read_bytes()[:200]),
-        lambda folder: (folder / "entry.json").write_text("{"),
-        lambda folder: (folder / "entry.json").write_text('{"name": "one"}'),
-    ],
-)
-def test_a_damaged_utterance(corpus, damage):
-    damage(corpus.folder("one"))
-    with pytest.raises(CorpusError, match=r"one: not a whole utterance .* prepare again"):
-        corpus.utterance("one")
+def test_a_damaged_utterance(corpus):
+    folder = corpus.folder("one")
+    entry = read_entry(folder)
+    whole = {path.name: path.read_bytes() for path in folder.iterdir()}
+    damages = [
+        ("motion.npy", None),
+        ("seen.npy", b""),
+        ("features.npy", whole["features.npy"][:200]),
+        ("entry.json", b"{"),
+        ("entry.json", b'{"name": "one"}'),
+    ]
+    for rows in ([[0, 1]], [[0.5, 0.2, "aa"]], "aa", [["x", 1, "aa"]]):
+        damages.append(("entry.json", json.dumps(entry | {"phones": rows}).encode()))
+    for name, content in damages:
+        (folder / name).unlink() if content is None else (folder / name).write_bytes(content)
+        with pytest.raises(CorpusError, match=r"one: not a whole utterance .* prepare again"):
+            corpus.utterance("one")
+        (folder / name).write_bytes(whole[name])
+    assert corpus.utterance("one").words == ("bin", "näh")
 
 
 def test_settings_are_kept(tmp_path):
@@ -263,27 +249,18 @@ def test_the_first_version_is_read_and_can_be_added_to(corpus):
     assert Corpus.open(corpus.path).speakers == {"": (3, 3.0), "anna": (1, 1.0)}
 
 
-@pytest.mark.parametrize("rows", [[[0, 1]], [[0.5, 0.2, "aa"]], "aa", [["x", 1, "aa"]]])
-def test_damaged_phones(corpus, rows):
-    path = corpus.folder("one") / "entry.json"
-    path.write_text(json.dumps(read_entry(corpus.folder("one")) | {"phones": rows}))
-    with pytest.raises(CorpusError, match="not a whole utterance"):
-        corpus.utterance("one")
-
-
-@pytest.mark.parametrize("seconds", [10**400, 1e10, -1, float("nan")])
-def test_a_listed_duration_that_cannot_be(corpus: Corpus, seconds: float) -> None:
-    path = corpus.path / "corpus.json"
-    content = json.loads(path.read_text())
-    content["utterances"]["one"]["duration_s"] = seconds
-    path.write_text(json.dumps(content))
-    with pytest.raises(CorpusError, match=r"prepare the corpus again|no readable corpus\.json"):
-        Corpus.open(corpus.path)
-
-
-@pytest.mark.parametrize("key", ["rate_hz", "duration_s", "frames"])
-def test_a_described_number_that_cannot_be(corpus: Corpus, key: str) -> None:
-    path = corpus.folder("one") / "entry.json"
-    path.write_text(json.dumps(json.loads(path.read_text()) | {key: 10**400}))
-    with pytest.raises(CorpusError, match="delete this folder and prepare again"):
-        corpus.summary()
+def test_described_numbers_that_cannot_be(corpus: Corpus) -> None:
+    manifest, entry = corpus.path / "corpus.json", corpus.folder("one") / "entry.json"
+    whole = manifest.read_text()
+    for seconds in (10**400, 1e10, -1, float("nan")):
+        content = json.loads(whole)
+        content["utterances"]["one"]["duration_s"] = seconds
+        manifest.write_text(json.dumps(content))
+        with pytest.raises(CorpusError, match=r"prepare the corpus again|no readable corpus\.json"):
+            Corpus.open(corpus.path)
+    manifest.write_text(whole)
+    described = json.loads(entry.read_text())
+    for key in ("rate_hz", "duration_s", "frames"):
+        entry.write_text(json.dumps(described | {key: 10**400}))
+        with pytest.raises(CorpusError, match="delete this folder and prepare again"):
+            corpus.summary()

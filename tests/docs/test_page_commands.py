@@ -6,8 +6,6 @@ import re
 import shlex
 from pathlib import Path
 
-import pytest
-
 from lipmotion.cli.command_line import parser
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -21,8 +19,9 @@ def commands(page: Path) -> list[list[str]]:
     return [shlex.split(line, comments=True)[1:] for line in lines]
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(DOCS)))
-def test_commands_are_understood(page: Path) -> None:
-    assert commands(page)
-    for words in commands(page):
-        assert parser().parse_args(words).verb == words[0]
+def test_commands_are_understood() -> None:
+    understood = parser()
+    for page in PAGES:
+        assert commands(page), page
+        for words in commands(page):
+            assert understood.parse_args(words).verb == words[0]

@@ -1,8 +1,10 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,7 @@ import pytest
 from experiments.copies import copied, renamed
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.errors import CorpusError, InputError
+from lipmotion.experiments import folds as module
 from lipmotion.experiments.folds import folds, table
 from lipmotion.experiments.runner import ExperimentSettings
 from lipmotion.hmm.model import HmmConfig
@@ -19,23 +22,17 @@ from lipmotion.pipeline.evaluation.conditions import ComparedClip, compared_clip
 from lipmotion.pipeline.evaluation.figures import BILABIAL
 from lipmotion.pipeline.training.train import train
 from lipmotion.speech.recogniser import cached_recogniser
-from lipmotion.types import Progress
 
-pytestmark = pytest.mark.long
 PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
 SMALL = ExperimentSettings(recogniser=PHONE_MODELS)
 CONDITIONS = ["audio only", "with transcript"]
 RATE_HZ = 25
+LIPS = {"false_per_minute": 1.0, "original_per_minute": 2.0}
 
 
 @pytest.fixture(scope="module")
-def stages() -> list[Progress]:
-    return []
-
-
-@pytest.fixture(scope="module")
-def figures(toy_corpus: Corpus, stages: list[Progress]) -> dict[str, Any]:
-    return folds(toy_corpus, count=3, settings=replace(SMALL, monitor=stages.append))
+def figures(toy_corpus: Corpus) -> dict[str, Any]:
+    return folds(toy_corpus, count=3, settings=SMALL)
 
 
 @pytest.fixture(scope="module")
@@ -55,6 +52,7 @@ def by_hand(toy_corpus: Corpus) -> list[ComparedClip]:
     return made
 
 
+@pytest.mark.long
 def test_what_was_done(figures: dict[str, Any]) -> None:
     assert (figures["folds"], figures["seed"], figures["clips"]) == (3, 0, 8)
     assert figures["trained_on"] == [5, 5, 6]
@@ -75,6 +73,7 @@ def test_figures_are_of_all_clips_as_one_split(figures: dict[str, Any], by_hand:
     assert low <= row["acc"] <= high
 
 
+@pytest.mark.long
 def test_closings_are_of_all_clips_as_one_split(figures: dict[str, Any], by_hand: list[ComparedClip]) -> None:
     under, row = figures["closed_under"], figures["conditions"]["with transcript"]
     pairs = [(closings(c.generated[:, 0], under), closings(c.original[:, 0], under)) for c in by_hand]
@@ -84,6 +83,7 @@ def test_closings_are_of_all_clips_as_one_split(figures: dict[str, Any], by_hand
     assert (row["score"], row["precision"]) == pytest.approx((100 * np.mean(hits), 100 * np.mean(good)))
 
 
+@pytest.mark.long
 def test_p_b_m_and_elsewhere_by_hand(figures: dict[str, Any], by_hand: list[ComparedClip]) -> None:
     under, row = figures["closed_under"], figures["conditions"]["with transcript"]
     wanted, hit, elsewhere, speech_s = 0, 0, [0, 0], 0.0
@@ -106,31 +106,10 @@ def test_p_b_m_and_elsewhere_by_hand(figures: dict[str, Any], by_hand: list[Comp
     assert row["original_per_minute"] == pytest.approx(elsewhere[1] / speech_s * 60)
 
 
-def test_the_seed_cuts_the_list(figures: dict[str, Any], toy_corpus: Corpus) -> None:
-    other = folds(toy_corpus, count=3, settings=replace(SMALL, seed=1))
-    assert other["seed"] == 1
-    assert other["conditions"]["audio only"]["acc"] != figures["conditions"]["audio only"]["acc"]
-    assert other["conditions"]["audio only"]["closings"] == figures["conditions"]["audio only"]["closings"]
-
-
-def test_progress_goes_from_nothing_to_all(figures: dict[str, Any], stages: list[Progress]) -> None:
-    shares = [event.share for event in stages]
-    assert figures
-    assert shares == sorted(shares)
-    assert (shares[0] < 0.1, shares[-1]) == (True, 1.0)
-    assert {event.stage.partition(":")[0] for event in stages} == {"fold 1", "fold 2", "fold 3"}
-
-
-def test_what_is_not_transcribed_is_recognised(toy_corpus: Corpus, tmp_path: Path) -> None:
-    """A fold with such an utterance lacks the condition ``with transcript``, so all folds together lack it."""
-    untranscribed = copied(toy_corpus, tmp_path, lambda u: replace(u, words=None) if u.name == "toy00" else u)
-    assert list(folds(untranscribed, count=2, settings=SMALL)["conditions"]) == ["audio only"]
-
-
-@pytest.mark.parametrize("count", [-1, 0, 1, 9])
-def test_counts_that_cannot_be(toy_corpus: Corpus, count: int) -> None:
-    with pytest.raises(InputError, match=f"{count} folds; required: from 2 to 8, which is how many"):
-        folds(toy_corpus, count=count)
+def test_counts_that_cannot_be(toy_corpus: Corpus) -> None:
+    for count in (-1, 1, 9):
+        with pytest.raises(InputError, match=f"{count} folds; required: from 2 to 8, which is how many"):
+            folds(toy_corpus, count=count)
 
 
 def test_corpora_that_cannot_be(toy_corpus: Corpus, tmp_path: Path) -> None:
@@ -140,24 +119,34 @@ def test_corpora_that_cannot_be(toy_corpus: Corpus, tmp_path: Path) -> None:
         folds(renamed(toy_corpus, tmp_path / "b", "smile", "frown"))
 
 
-def test_the_table() -> None:
-    row = {"score": 70.0, "precision": None, "timing_ms": None, "closings": 10, "generated_closings": 0}
-    row |= {"recall_p_b_m": 98.04, "p_b_m": 51, "acc": 0.8, "acc_95": (0.7, 0.9), "nrmse": 0.5}
-    row |= {"global_variance": 0.75, "false_per_minute": 12.34, "original_per_minute": None}
-    figures = {"folds": 2, "seed": 3, "clips": 5, "trained_on": [3, 2], "closed_under": 0.02}
-    assert table(figures | {"conditions": {"audio only": row}}).splitlines() == [
-        "5 clips of train in 2 folds, shuffled with seed 3; each generated by a model of the others (2 to 3 clips); "
-        "closed under 0.0200",
-        "",
-        "audio only",
-        "  p b m: 98.0 % of 51 closed; closings elsewhere 12.3 a minute of speech (original –)",
-        "  closings: score 70.0 % of 10, precision – % of 0, timing – ms",
-        "  opening: ACC 0.800 (0.700–0.900), nRMSE 0.500, variance 0.75",
-    ]
-
-
 def test_the_document_shows_the_figures_beside_it() -> None:
     results = Path(__file__).parents[2] / "docs" / "results"
     figures = json.loads((results / "folds.json").read_text(encoding="utf-8"))
     assert f"```text\n{table(figures)}\n```" in (results / "folds.md").read_text(encoding="utf-8")
     assert (figures["folds"], figures["clips"]) == (5, 452)
+
+
+def test_each_clip_is_held_out_once_and_never_trained_on(toy_corpus: Corpus, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A fold with an utterance that has no words lacks a condition, so all folds together lack it."""
+    cut: list[tuple[str, ...]] = []
+
+    def result(_: object, names: Sequence[str], held_out: Sequence[str], *__: object) -> SimpleNamespace:
+        assert sorted([*names, *held_out]) == sorted(toy_corpus.names("train"))
+        cut.append(tuple(held_out))
+        conditions = CONDITIONS if len(cut) != 2 else CONDITIONS[:1]
+        clips = {condition: [f"{name} {condition}" for name in held_out] for condition in conditions}
+        return SimpleNamespace(used=names, clips=clips, recordings=SimpleNamespace(closed_under=0.1))
+
+    monkeypatch.setattr(module, "train_and_generate", result)
+    monkeypatch.setattr(module, "figures_of", lambda clips, *_: {"clips": clips, "closures_p_b_m": LIPS})
+    monkeypatch.setattr(module, "opening_row", lambda figures: {"clips": sorted(figures["clips"])})
+    figures = folds(toy_corpus, count=3)
+    assert sorted(name for held_out in cut for name in held_out) == sorted(toy_corpus.names("train"))
+    assert [len(held_out) for held_out in cut] == [3, 3, 2]
+    assert (figures["trained_on"], figures["closed_under"]) == ([5, 5, 6], 0.1)
+    wanted = [f"{name} audio only" for name in sorted(toy_corpus.names("train"))]
+    assert figures["conditions"] == {"audio only": {"clips": wanted} | LIPS}
+    first = cut[:]
+    cut.clear()
+    folds(toy_corpus, count=3, settings=ExperimentSettings(seed=1))
+    assert cut != first

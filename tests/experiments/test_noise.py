@@ -12,12 +12,12 @@ from lipmotion.pipeline.evaluation.conditions import HeldOutRecordings, held_out
 from lipmotion.pipeline.model import Model
 from lipmotion.speech.mfcc import mfcc
 from lipmotion.speech.noise import noisy_audio
-from lipmotion.speech.recogniser import cached_recogniser
+from lipmotion.speech.recogniser import Recogniser
 
 
 @pytest.fixture(scope="module")
 def clean(toy_corpus: Corpus, toy_model: Model) -> HeldOutRecordings:
-    return held_out_recordings(toy_corpus, cached_recogniser(toy_model.phones), selection=Selection("test"))
+    return held_out_recordings(toy_corpus, Recogniser(toy_model.phones, "own"), selection=Selection("test"))
 
 
 def test_faces_stay_and_the_sound_is_noisy(clean: HeldOutRecordings) -> None:

@@ -84,11 +84,6 @@ def test_another_corpus_is_refused(selection_model: Model, tmp_path) -> None:
         speak_from_corpus("baby blue", Corpus.create(tmp_path / "empty"), selection_model)
 
 
-def test_a_text_without_words_is_refused(toy_corpus: Corpus, selection_model: Model) -> None:
-    with pytest.raises(InputError):
-        speak_from_corpus(" ... ", toy_corpus, selection_model)
-
-
 def test_phones_that_were_never_recorded_are_named(
     toy_corpus: Corpus, selection_model: Model, caplog: pytest.LogCaptureFixture
 ) -> None:

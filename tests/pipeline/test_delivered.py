@@ -17,7 +17,7 @@ from lipmotion.faces.registry import face_named
 from lipmotion.motion.delivery import Delivery, closed_frames
 from lipmotion.pipeline.animate import check_outputs, write
 from lipmotion.pipeline.characters import with_curves
-from lipmotion.pipeline.delivered import delivered_scene, held_mouth, shown, staged_intensity
+from lipmotion.pipeline.delivered import delivered_scene, held_mouth, moved_prosody, shown, staged_intensity
 from lipmotion.rig.driven import driven_character
 from lipmotion.rig.gltf_writer import write_glb
 from lipmotion.types import Generation, Prosody, StateTrace
@@ -76,7 +76,18 @@ def test_brows_and_head_of_pictures_come_later_with_the_mouth(
     assert heard[-1][50:] == pytest.approx(heard[0])
 
 
-@pytest.mark.parametrize("rate_hz", [12.0, 23.976, 24.0])
+@pytest.mark.parametrize("offset_ms", [30.0, -30.0, 0.0])
+def test_loudness_and_pitch_move_together(offset_ms: float) -> None:
+    prosody = Prosody(np.arange(10.0) - 40, np.arange(10.0) / 10)
+    moved, by = moved_prosody(prosody, Delivery(offset_ms=offset_ms)), round(offset_ms / 10)
+    assert len(moved.level_db) == len(moved.log_f0) == 10 + by
+    assert moved.level_db[max(by, 0) :] == pytest.approx(prosody.level_db[max(-by, 0) :])
+    assert moved.log_f0[max(by, 0) :] == pytest.approx(prosody.log_f0[max(-by, 0) :])
+    assert (moved.level_db[: max(by, 0)] == -40).all()  # quiet, and without a pitch
+    assert np.isnan(moved.log_f0[: max(by, 0)]).all()
+
+
+@pytest.mark.parametrize("rate_hz", [12.0, 23.976])
 def test_closures_between_two_frames_of_a_slow_file_are_kept(
     generation: Generation, rate_hz: float, tmp_path: Path
 ) -> None:

@@ -5,7 +5,6 @@ from lipmotion.faces.base import Staging
 from lipmotion.faces.portrait.planar import PlanarRasteriser
 from lipmotion.faces.registry import face_named
 from lipmotion.kernels.choice import numba_works
-from lipmotion.pipeline import drawn_video
 from lipmotion.pipeline.drawn_video import load_drawing, write_drawn_face
 from lipmotion.types import Audio, Channel, Generation, Motion, StateTrace, Timeline, silent_monitor
 
@@ -54,9 +53,3 @@ def test_other_files_are_drawn_in_red_green_and_blue(tmp_path, generation, drawn
 def test_what_draws_is_loaded_by_drawing(drawn_poses):
     load_drawing(face_named("man"))
     assert len(drawn_poses) == 1
-
-
-def test_without_compiled_kernels_nothing_is_loaded(monkeypatch, drawn_poses):
-    monkeypatch.setattr(drawn_video, "numba_works", lambda: False)
-    load_drawing(face_named("man"))
-    assert not drawn_poses

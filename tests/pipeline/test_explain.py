@@ -14,7 +14,6 @@ from lipmotion.pipeline.explain import explanation_document, explanation_text
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import SpeechRequest
 from lipmotion.testing.toy import ToySentence
-from lipmotion.types import ChannelValue, Explanation, Span, Unit
 
 WORDS = "See Bob, papa & mama!"
 
@@ -36,25 +35,6 @@ def test_a_model_file_and_any_engine(toy_model_file: Path, toy_speech: Path) -> 
     (found,) = lipmotion.explain(toy_speech, at=0.8, model=toy_model_file)
     assert "speech." in found.state or found.state == "rest"
     assert (found.chains, found.gaussians, found.joint) == ((), (), None)
-
-
-@pytest.mark.parametrize("time_s", [-0.1, 1e6, float("nan"), float("inf")])
-def test_a_time_outside_the_recording(coupled_model: Model, toy_sentence: ToySentence, time_s: float) -> None:
-    frames = len(lipmotion.animate(toy_sentence.audio, model=coupled_model).motion.values)
-    with pytest.raises(InputError, match=rf"outside the recording \(0 to {(frames - 1) / 100:.2f} s\)"):
-        lipmotion.explain(toy_sentence.audio, at=[0.1, time_s], model=coupled_model)
-
-
-def test_the_last_frame_is_inside(coupled_model: Model, toy_sentence: ToySentence) -> None:
-    result = lipmotion.animate(toy_sentence.audio, model=coupled_model)
-    (last,) = lipmotion.explain(toy_sentence.audio, at=float(result.motion.time_s[-1]), model=coupled_model)
-    assert last.frame == len(result.motion.values) - 1
-
-
-def test_a_unit_whose_phone_is_not_known_has_no_phone_in_the_text() -> None:
-    unit = Span(0.7, 0.9, Unit("", "bilabial"))
-    lines = explanation_text(Explanation(0.8, 80, unit, "bilabial.1", {"opening": ChannelValue(0.0, 0.1)})).splitlines()
-    assert lines[1] == "  phone      not known, 0.70 to 0.90 s, modelled by bilabial"
 
 
 def test_the_text_names_everything(coupled_model: Model, toy_sentence: ToySentence) -> None:
@@ -83,3 +63,13 @@ def test_the_document_is_json_with_all_channels(coupled_model: Model, toy_senten
     assert document["chains"][1]["expected_lead"] == pytest.approx(expected)
     assert "expected_lead" not in document["chains"][0]
     assert np.isfinite(document["gaussians"][1]["channels"]["opening"]["deviation"])
+
+
+def test_times_within_and_outside_the_recording(coupled_model: Model, toy_sentence: ToySentence) -> None:
+    result = lipmotion.animate(toy_sentence.audio, model=coupled_model)
+    last_s = float(result.motion.time_s[-1])
+    (last,) = lipmotion.explain(toy_sentence.audio, at=last_s, model=coupled_model)
+    assert last.frame == len(result.motion.values) - 1
+    for time_s in (-0.1, 1e6, float("nan")):
+        with pytest.raises(InputError, match=rf"outside the recording \(0 to {last_s:.2f} s\)"):
+            lipmotion.explain(toy_sentence.audio, at=[0.1, time_s], model=coupled_model)

@@ -4,16 +4,13 @@ import io
 import json
 import zipfile
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from lipmotion.errors import ExportError, InputError, ModelFormatError
+from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.pipeline import model as module
 from lipmotion.pipeline.animate import animate
 from lipmotion.pipeline.model import VERSION, Model, load_model, read_header, save_model
@@ -63,11 +60,6 @@ def test_after_one_save_nothing_changes_any_more(toy_model_file: Path, toy_speec
     assert once.engine == twice.engine
 
 
-def test_the_same_model_gives_the_same_bytes(toy_model: Model, toy_model_file: Path, tmp_path: Path) -> None:
-    save_model(toy_model, tmp_path / "another name")
-    assert (tmp_path / "another name").read_bytes() == toy_model_file.read_bytes()
-
-
 def test_the_file_is_plain_arrays_and_a_header(toy_model_file: Path) -> None:
     header = read_header(toy_model_file)
     assert (header["format"], header["version"], header["engine"]) == ("lipmotion.model", VERSION, "trajectory")
@@ -90,104 +82,38 @@ def test_what_a_user_must_know_comes_back(toy_model: Model, tmp_path: Path) -> N
     assert load_model(tmp_path / "m.lipmotion").about == about
 
 
-def test_a_model_cannot_be_saved_where_there_is_no_folder(toy_model: Model, tmp_path: Path) -> None:
-    with pytest.raises(ExportError, match="does not exist; create it first"):
-        save_model(toy_model, tmp_path / "missing" / "m.lipmotion")
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("read", [load_model, read_header])
-def test_no_such_model(read, tmp_path: Path) -> None:
-    for path in (tmp_path / "m.lipmotion", tmp_path):
-        with pytest.raises(InputError, match="no such model"):
-            read(path)
-
-
-@pytest.mark.parametrize("read", [load_model, read_header])
-@pytest.mark.parametrize("version", [VERSION + 1, 0, str(VERSION), None])
-def test_another_version(read, version: object, toy_model_file: Path, tmp_path: Path) -> None:
-    path = with_header(toy_model_file, tmp_path / "m.lipmotion", version=version)
-    wanted = f"model version {version}, .* reads version {VERSION}; upgrade lipmotion, or"
-    with pytest.raises(ModelFormatError, match=wanted):
-        read(path)
-
-
-@pytest.mark.parametrize("read", [load_model, read_header])
-@pytest.mark.parametrize("content", [b"", b"words, not a model", b"PK\3\4", b"PK\5\6" + bytes(18)])
-def test_not_a_model(read, content: bytes, tmp_path: Path) -> None:
-    (tmp_path / "m.lipmotion").write_bytes(content)
-    with pytest.raises(
-        ModelFormatError, match=r"m.lipmotion: not a lipmotion model \(.+\); give a file that"
-    ) as caught:
-        read(tmp_path / "m.lipmotion")
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize("header", [b"{", b"\xff", b"[]", b'{"format": "lipmotion.motion"}', None])
-def test_a_zip_of_something_else(header: bytes | None, toy_model_file: Path, tmp_path: Path) -> None:
-    path = rewritten(toy_model_file, tmp_path / "m.lipmotion", {HEADER: header})
-    with pytest.raises(ModelFormatError, match="not a lipmotion model"):
-        load_model(path)
-
-
 PICKLED = b"\x93NUMPY\x01\x00v\x00{'descr': '|O', 'fortran_order': False, 'shape': (1,), }".ljust(127) + b"\n"
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [
+def test_a_part_is_missing_or_wrong(toy_model_file: Path, tmp_path: Path) -> None:
+    for changes in (
         {"phones/means.npy": None},
         {"phones/units.npy": npy(np.array(["sil"]))},
-        {"phones/units.npy": npy(np.array(3))},
         {"phones/means.npy": npy(np.zeros((2, 1, 39), np.float16))},
         {"phones/means.npy": b"not an array"},
         {"phones/means.npy": PICKLED},
         {"engine/means.npy": None},
-        {"engine/means.npy": npy(np.zeros(3))},
         {"engine/channels.npy": npy(np.array(["opening"]))},
         {"engine/variances.npy": npy(np.array(["a"]))},
         {"other/thing.npy": npy(np.zeros(3))},
-    ],
-)
-def test_a_part_is_missing_or_wrong(changes: dict[str, bytes | None], toy_model_file: Path, tmp_path: Path) -> None:
-    path = rewritten(toy_model_file, tmp_path / "m.lipmotion", changes)
-    with pytest.raises(ModelFormatError, match=r"damaged \(.+\); train or download") as caught:
-        load_model(path)
-    assert "\n" not in str(caught.value)
+    ):
+        path = rewritten(toy_model_file, tmp_path / "m.lipmotion", changes)
+        with pytest.raises(ModelFormatError, match=r"damaged \(.+\); train or download") as caught:
+            load_model(path)
+        assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
+def test_the_header_says_what_there_is_not(toy_model_file: Path, tmp_path: Path) -> None:
+    for changes, message in (
         ({"engine": "concatenative"}, "no engine 'concatenative'; there are: trajectory"),
         ({"configuration": {"part": 5}}, "no option 'part'; there are: states, "),
         ({"configuration": {"states": 4}}, "states is 4, required an odd number"),
         ({"recogniser": {"state": 3}}, "no option 'state'; there are: states, "),
         ({"recogniser": []}, "damaged"),
         ({"configuration": None}, "damaged"),
-    ],
-)
-def test_the_header_says_what_there_is_not(
-    changes: dict[str, object], message: str, toy_model_file: Path, tmp_path: Path
-) -> None:
-    with pytest.raises(ModelFormatError, match=message):
-        load_model(with_header(toy_model_file, tmp_path / "m.lipmotion", **changes))
-
-
-@settings(max_examples=150)
-@given(data=st.data())
-def test_damage_is_noticed_or_harmless(data: st.DataObject, toy_model_file: Path, tmp_path: Path) -> None:
-    content = bytearray(toy_model_file.read_bytes())
-    if data.draw(st.booleans()):
-        content = content[: data.draw(st.integers(0, len(content) - 1))]
-    else:
-        for _ in range(data.draw(st.integers(1, 4))):
-            content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
-    path = tmp_path / "m.lipmotion"
-    path.write_bytes(content)
-    for read in (load_model, read_header):
-        with suppress(ModelFormatError):  # any other error would be a traceback
-            read(path)
+    ):
+        with pytest.raises(ModelFormatError, match=message):
+            load_model(with_header(toy_model_file, tmp_path / "m.lipmotion", **changes))
 
 
 def test_the_shipped_model_is_read_once() -> None:
@@ -210,3 +136,24 @@ def test_a_model_with_the_former_names_of_options_is_read(toy_model_file: Path, 
     assert model.engine == load_model(toy_model_file).engine
     with pytest.raises(ModelFormatError, match="trajectory_steps is 3; this option no longer exists, required 0"):
         load_model(with_header(toy_model_file, tmp_path / "n.lipmotion", configuration={"trajectory_steps": 3}))
+
+
+def test_what_is_no_model(toy_model_file: Path, tmp_path: Path) -> None:
+    path = tmp_path / "m.lipmotion"
+    for read in (load_model, read_header):
+        for missing in (tmp_path / "missing.lipmotion", tmp_path):
+            with pytest.raises(InputError, match="no such model"):
+                read(missing)
+        for version in (VERSION + 1, str(VERSION), None):
+            wanted = f"model version {version}, .* reads version {VERSION}; upgrade lipmotion, or"
+            with pytest.raises(ModelFormatError, match=wanted):
+                read(with_header(toy_model_file, path, version=version))
+        for content in (b"", b"words, not a model", b"PK\3\4", b"PK\5\6" + bytes(18)):
+            path.write_bytes(content)
+            wanted = r"m.lipmotion: not a lipmotion model \(.+\); give a file that"
+            with pytest.raises(ModelFormatError, match=wanted) as caught:
+                read(path)
+            assert "\n" not in str(caught.value)
+        for header in (b"{", b"\xff", b"[]", b'{"format": "lipmotion.motion"}', None):
+            with pytest.raises(ModelFormatError, match="not a lipmotion model"):
+                read(rewritten(toy_model_file, path, {HEADER: header}))

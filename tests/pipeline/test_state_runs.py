@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from itertools import pairwise
 
@@ -12,7 +11,7 @@ import pytest
 import lipmotion
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import SpeechRequest
-from lipmotion.pipeline.state_runs import StateRun, run_document, run_lines, runs_of, state_runs
+from lipmotion.pipeline.state_runs import StateRun, run_lines, runs_of, state_runs
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 
@@ -64,10 +63,3 @@ def test_text_is_bounded() -> None:
     assert max(map(len, lines)) < 160
     assert lines[5] == "and 6 more (--count N prints N, --json all)"
     assert len(list(run_lines(runs, 10))) == 11
-
-
-def test_the_document_is_json() -> None:
-    document = json.loads(json.dumps(run_document(StateRun(0.5, 0.6, "p", "papa", "pgbr3a 1.2-1.3 s p"))))
-    assert document == {
-        "start_s": 0.5, "end_s": 0.6, "phone": "p", "word": "papa", "state": "pgbr3a 1.2-1.3 s p"
-    }  # fmt: skip

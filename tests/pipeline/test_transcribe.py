@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.errors import AlignmentError, InputError
+from lipmotion.errors import AlignmentError
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.transcribe import MOST_WARNINGS, transcribe, warn_of_guesses, warn_of_misfit
 from lipmotion.speech.agreement import TranscriptFit
@@ -59,20 +59,6 @@ def test_what_is_not_in_the_dictionary_is_reported_once(
     )
 
 
-def test_what_the_user_s_lexicon_knows_is_not_reported(
-    phones: Recogniser, audio: Audio, features: Features, caplog: pytest.LogCaptureFixture
-) -> None:
-    lexicon = Lexicon({"bimab": (("b", "aa", "b"),)})
-    units, _ = transcribe(phones, audio, features, ("see", "bimab", "papa", "mama"), lexicon)
-    assert [span.label.phone for span in units if span.label.word == "bimab"] == ["b", "aa", "b"]
-    assert not caplog.records
-
-
-def test_nothing_is_reported_when_nothing_is_guessed(caplog: pytest.LogCaptureFixture) -> None:
-    warn_of_guesses(("see", "bob's", "hello"), Lexicon())
-    assert not caplog.records
-
-
 WRONG = ("squash", "six", "fish", "chefs")
 
 
@@ -105,7 +91,7 @@ def welcome() -> tuple[AnalysedAudio, tuple[str, ...]]:
     return analysed(read_audio(WELCOME)), words_of(WELCOME.with_suffix(".txt").read_text())
 
 
-@pytest.mark.parametrize("kept", [slice(0, 7), slice(7, None), slice(0, 3)])
+@pytest.mark.parametrize("kept", [slice(0, 7), slice(7, None)])
 def test_speech_that_the_transcript_leaves_out_is_reported_with_its_times(
     welcome: tuple[AnalysedAudio, tuple[str, ...]], kept: slice, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -159,13 +145,6 @@ def test_a_long_word_is_not_repeated_in_full(caplog: pytest.LogCaptureFixture) -
     warn_of_guesses(("ab" * 5000,), Lexicon())
     (record,) = caplog.records
     assert len(record.getMessage()) < 300
-
-
-def test_it_says_what_is_wrong(phones: Recogniser, audio: Audio, features: Features) -> None:
-    with pytest.raises(InputError, match="how '真' is said"):
-        transcribe(phones, audio, features, ("真",), Lexicon())
-    with pytest.raises(AlignmentError, match="too short"):
-        transcribe(phones, audio, features, ("five",) * 60, Lexicon())
 
 
 def test_of_many_guesses_some_are_reported_one_by_one(caplog: pytest.LogCaptureFixture) -> None:

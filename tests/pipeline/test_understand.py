@@ -179,12 +179,6 @@ def test_a_recording_without_speech(toy_model: Model, kind: str, caplog: pytest.
     assert (outlook.words, outlook.advice, outlook.text) == ("no speech", (), "no speech found; levels 0 dB apart")
 
 
-def test_a_recording_with_speech(toy_model: Model, toy_sentence: ToySentence, caplog: pytest.LogCaptureFixture) -> None:
-    understood = understood_speech(toy_model, SpeechRequest(toy_sentence.audio, recogniser="own"))
-    assert not understood.is_without_speech
-    assert not caplog.records
-
-
 def test_a_transcript_beside_units_is_not_used(
     toy_model: Model, toy_sentence: ToySentence, caplog: pytest.LogCaptureFixture
 ) -> None:

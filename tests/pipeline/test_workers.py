@@ -35,25 +35,40 @@ def held(_: int) -> bool:
     return {signal.SIGINT, signal.SIGTERM} <= signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
 
-@pytest.mark.parametrize("count", [0, 1, 2])
-def test_results_come_in_order(count: int) -> None:
-    with worker_pool(count) as team:
+def test_no_worker_and_one_are_this_process() -> None:
+    for count in (0, 1):
+        with worker_pool(count) as team:
+            assert list(team.ordered_map(square, range(20))) == [number * number for number in range(20)]
+            assert sorted(team.unordered_map(square, range(20))) == [number * number for number in range(20)]
+            assert list(team.ordered_map(square, [])) == []
+            assert set(team.ordered_map(whose, range(3))) == {os.getpid()}
+            with pytest.raises(InputError, match="less than nothing"):
+                list(team.ordered_map(square, [1, -1, 2]))
+
+
+def test_several_workers_are_other_processes() -> None:
+    """Results come in order, items are taken when they are needed, errors come back, signals are not for workers."""
+    taken = []
+
+    def items() -> Iterator[int]:
+        for number in range(20):
+            taken.append(number)
+            yield number
+
+    with worker_pool(2) as team:
         assert list(team.ordered_map(square, range(20))) == [number * number for number in range(20)]
         assert list(team.ordered_map(square, [])) == []
-        assert sorted(team.unordered_map(square, range(20))) == [number * number for number in range(20)]
-
-
-def test_one_worker_is_this_process_and_several_are_others() -> None:
-    with worker_pool(1) as team:
-        assert set(team.ordered_map(whose, range(3))) == {os.getpid()}
-    with worker_pool(2) as team:
         assert os.getpid() not in set(team.ordered_map(whose, range(3)))
-
-
-@pytest.mark.parametrize("count", [1, 2])
-def test_errors_come_back(count: int) -> None:
-    with pytest.raises(InputError, match="less than nothing"), worker_pool(count) as team:
-        list(team.ordered_map(square, [1, -1, 2]))
+        results = team.unordered_map(square, items())
+        first = next(results)
+        assert len(taken) <= 4
+        assert sorted([first, *results]) == [number * number for number in range(20)]
+        if sys.platform != "win32":
+            assert all(team.ordered_map(held, range(4)))
+        with pytest.raises(InputError, match="less than nothing"):
+            list(team.ordered_map(square, [1, -1, 2]))
+    if sys.platform != "win32":
+        assert not signal.pthread_sigmask(signal.SIG_BLOCK, ()) & {signal.SIGINT, signal.SIGTERM}
 
 
 def test_a_worker_that_dies_is_a_clear_error() -> None:
@@ -66,8 +81,7 @@ def large(_: int) -> bytes:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("_", range(5))
-def test_a_worker_that_is_ended_while_it_sends_does_not_block(_: int) -> None:
+def test_a_worker_that_is_ended_while_it_sends_does_not_block() -> None:
     """Its result is larger than the pipe holds, so it is sending when the block is left."""
     before = set(multiprocessing.active_children())
 
@@ -90,28 +104,6 @@ def killed_while_sending(_: int) -> bytes:
 def test_a_worker_that_dies_while_it_sends_is_a_clear_error() -> None:
     with pytest.raises(CorpusError, match="a worker process died"), worker_pool(2) as team:
         list(team.ordered_map(killed_while_sending, range(2)))
-
-
-def test_items_are_taken_when_they_are_needed() -> None:
-    taken = []
-
-    def items() -> Iterator[int]:
-        for number in range(20):
-            taken.append(number)
-            yield number
-
-    with worker_pool(2) as team:
-        results = team.unordered_map(square, items())
-        next(results)
-        assert len(taken) <= 4
-        assert len(list(results)) == 19
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="signals as POSIX has them")
-def test_workers_leave_signals_to_the_process_that_started_them() -> None:
-    with worker_pool(2) as team:
-        assert all(team.ordered_map(held, range(4)))
-    assert not signal.pthread_sigmask(signal.SIG_BLOCK, ()) & {signal.SIGINT, signal.SIGTERM}
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals are held back on POSIX")

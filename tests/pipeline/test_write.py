@@ -78,7 +78,7 @@ def test_another_rate(result: Generation, toy_model: Model, tmp_path: Path) -> N
 
 
 def test_a_video_with_its_sound(result: Generation, toy_speech: Path, tmp_path: Path) -> None:
-    write(result, [tmp_path / "a.mp4"], speech=toy_speech, fps=10)
+    write(result, [tmp_path / "a.mp4"], speech=toy_speech, fps=10, staging=Staging(size=96))
     with av.open(str(tmp_path / "a.mp4")) as container:
         video, sound = container.streams.video[0], container.streams.audio[0]
         assert video.average_rate == 10
@@ -86,36 +86,33 @@ def test_a_video_with_its_sound(result: Generation, toy_speech: Path, tmp_path: 
         assert float(sound.duration * sound.time_base) == pytest.approx(result.motion.time_s[-1], abs=0.1)
 
 
-@pytest.mark.parametrize(
-    ("bad", "options", "error", "message"),
-    [
-        ("a.xyz", {}, ExportError, r"a.xyz: unknown format '.xyz'; required one of: .json .csv .npz "),
-        ("a", {}, ExportError, r"unknown format ''"),
-        ("missing/a.json", {}, ExportError, r"the folder .*missing does not exist; create it first"),
-        ("folder.json", {}, ExportError, r"folder.json: is a folder"),
-        ("a.mp4", {"speech": None}, ExportError, r"a video needs the recording: write\(..., speech=FILE\)"),
-        ("a.json", {"rate_hz": 0.0}, InputError, r"frame rate is 0.0, required 1 to 1000 a second"),
-        ("a.json", {"rate_hz": float("nan")}, InputError, r"frame rate is nan"),
-        ("a.json", {"rate_hz": 1e12}, InputError, r"frame rate is 1000000000000.0"),
-        ("a.mp4", {"fps": -25.0}, InputError, r"frame rate is -25.0"),
-        ("a.mp4", {"fps": float("inf")}, InputError, r"frame rate is inf"),
-        ("a.mp4", {"fps": 1e-5}, InputError, r"frame rate is 1e-05"),
-    ],
-)
 def test_nothing_is_written_unless_everything_can_be(
-    bad: str,
-    options: dict[str, Any],
-    error: type[Exception],
-    message: str,
-    result: Generation,
-    toy_model: Model,
-    toy_speech: Path,
-    tmp_path: Path,
+    result: Generation, toy_model: Model, toy_speech: Path, tmp_path: Path
 ) -> None:
     (tmp_path / "folder.json").mkdir()
-    with pytest.raises(error, match=message):
-        write(result, [tmp_path / "good.csv", tmp_path / bad], **({"speech": toy_speech, "model": toy_model} | options))
-    assert [path.name for path in tmp_path.iterdir()] == ["folder.json"]
+    plain = {"speech": toy_speech, "model": toy_model}
+    odd = (replace(result.motion.channels[0], name="a,b"), *result.motion.channels[1:])
+    broken = np.full_like(result.motion.values, np.nan)
+    cases: list[tuple[Generation, str, dict[str, Any], type[Exception], str]] = [
+        (result, "a.xyz", {}, ExportError, r"a.xyz: unknown format '.xyz'; required one of: .json .csv .npz "),
+        (result, "missing/a.json", {}, ExportError, r"the folder .*missing does not exist; create it first"),
+        (result, "folder.json", {}, ExportError, r"folder.json: is a folder"),
+        (result, "a.mp4", {"speech": None}, ExportError, r"a video needs the recording: write\(..., speech=FILE\)"),
+        (result, "a.json", {"rate_hz": 0.0}, InputError, r"frame rate is 0.0, required 1 to 1000 a second"),
+        (result, "a.json", {"rate_hz": float("nan")}, InputError, r"frame rate is nan"),
+        (result, "a.mp4", {"fps": -25.0}, InputError, r"frame rate is -25.0"),
+        (result, "a.mp4", {"fps": 1e-5}, InputError, r"frame rate is 1e-05"),
+        (result, "a.mp4", {"staging": CLEAR}, ExportError, "cannot be transparent"),
+        (result, "a.json", {"face": "nobody"}, InputError, "face"),
+        (result, "a.json", {"channels": ["smile"]}, InputError, "no motion channel 'smile'"),
+        (result.selected(["width"]), "a.mp4", {}, ExportError, r"a\.mp4: the motion has no channel 'opening' to draw"),
+        (replace(result, motion=replace(result.motion, channels=odd)), "a.json", {}, ExportError, "'a,b' does not fit"),
+        (replace(result, motion=replace(result.motion, values=broken)), "a.json", {}, ExportError, "not finite"),
+    ]
+    for given, bad, options, error, message in cases:
+        with pytest.raises(error, match=message):
+            write(given, [tmp_path / "good.csv", tmp_path / bad], **(plain | options))
+        assert [path.name for path in tmp_path.iterdir()] == ["folder.json"]
 
 
 def test_the_recording_is_not_overwritten(result: Generation, toy_speech: Path, tmp_path: Path) -> None:
@@ -128,13 +125,6 @@ def test_the_recording_is_not_overwritten(result: Generation, toy_speech: Path, 
     assert recording.read_bytes() == toy_speech.read_bytes()
 
 
-def test_values_that_are_not_finite_leave_no_file(result: Generation, toy_model: Model, tmp_path: Path) -> None:
-    broken = replace(result, motion=replace(result.motion, values=np.full_like(result.motion.values, np.nan)))
-    with pytest.raises(ExportError, match="not finite"):
-        write(broken, [tmp_path / "a.json"], model=toy_model)
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_some_channels_to_one_file(result: Generation, toy_model: Model, tmp_path: Path) -> None:
     write(result, str(tmp_path / "a.csv"), model=toy_model, channels=["width", "opening"])
     motion, _ = read_motion(str(tmp_path / "a.csv"))
@@ -142,52 +132,18 @@ def test_some_channels_to_one_file(result: Generation, toy_model: Model, tmp_pat
     assert motion["opening"] == pytest.approx(result.motion["opening"], abs=1e-5)
 
 
-def test_an_unknown_channel_writes_nothing(result: Generation, toy_model: Model, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no motion channel 'smile'"):
-        write(result, [tmp_path / "a.csv"], model=toy_model, channels=["smile"])
-    assert not list(tmp_path.iterdir())
-
-
-def test_motion_that_cannot_be_drawn_leaves_no_file(
-    result: Generation, toy_model: Model, toy_speech: Path, tmp_path: Path
-) -> None:
-    """Blendshapes have no opening; that is said before the first file is written."""
-    shapes = result.selected(["width"])
-    with pytest.raises(ExportError, match=r"a\.mp4: the motion has no channel 'opening' to draw a face from"):
-        write(shapes, [tmp_path / "a.csv", tmp_path / "a.mp4"], speech=toy_speech, model=toy_model)
-    assert not list(tmp_path.iterdir())
-
-
-def test_a_name_for_no_table_is_refused_before_the_first_file(result: Generation, tmp_path: Path) -> None:
-    channels = (replace(result.motion.channels[0], name="a,b"), *result.motion.channels[1:])
-    odd = replace(result, motion=replace(result.motion, channels=channels))
-    with pytest.raises(ExportError, match="'a,b' does not fit in a table"):
-        write(odd, [tmp_path / "a.json", tmp_path / "a.csv"])
-    assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize("name", ["a.webm", "a.mov", "a%03d.png"])
+@pytest.mark.parametrize("name", ["a.mov", "a%03d.png"])
 def test_a_face_may_be_transparent_where_the_file_can_be(
     result: Generation, toy_model: Model, toy_speech: Path, tmp_path: Path, name: str
 ) -> None:
     staging = Staging(size=64, background="transparent")
-    write(result, tmp_path / name, speech=toy_speech, model=toy_model, fps=5, face="man", staging=staging)
+    write(result, tmp_path / name, speech=toy_speech, model=toy_model, fps=2, face="man", staging=staging)
     first = min(tmp_path.iterdir())
     assert first.name == name.replace("%03d", "000")
     with av.open(str(first)) as container:
         stream = container.streams.video[0]
         assert (stream.height, stream.width) == (64, 64)
         assert stream.metadata.get("alpha_mode") == "1" or "a" in stream.codec_context.pix_fmt
-
-
-def test_what_cannot_be_transparent_or_staged_is_refused_before_anything_is_written(
-    result: Generation, toy_speech: Path, tmp_path: Path
-) -> None:
-    with pytest.raises(ExportError, match="cannot be transparent"):
-        write(result, [tmp_path / "a.json", tmp_path / "a.mp4"], speech=toy_speech, staging=CLEAR)
-    with pytest.raises(InputError, match="face"):
-        write(result, [tmp_path / "a.json"], speech=toy_speech, face="nobody")
-    assert not list(tmp_path.iterdir())
 
 
 CLEAR = Staging(background="transparent")

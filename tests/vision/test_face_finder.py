@@ -97,13 +97,6 @@ def test_missing_mediapipe_is_named_when_it_is_first_needed(monkeypatch):
 
 
 @pytest.mark.video
-def test_an_empty_picture():
-    pytest.importorskip("mediapipe")
-    with FaceFinder() as finder:
-        assert finder.boxes(np.full((600, 800, 3), 90, np.uint8)) == []
-
-
-@pytest.mark.video
 @pytest.mark.recordings
 @pytest.mark.parametrize("scale", [1.0, 0.4])
 def test_a_face_in_a_large_picture(recordings: Path, scale: float):

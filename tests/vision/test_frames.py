@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from fractions import Fraction
 from itertools import pairwise
@@ -23,47 +22,41 @@ def all_frames(path: Path) -> list[VideoFrame]:
 
 
 def test_every_frame_comes_with_its_time(write_video):
-    frames = all_frames(write_video())
-    np.testing.assert_allclose([frame.time_s for frame in frames], np.arange(10) / 25, atol=1e-9)
-    np.testing.assert_allclose([frame.image.mean() for frame in frames], 10 * np.arange(10), atol=3)
-    assert frames[0].image.shape == (48, 64, 3)
-    assert frames[0].image.dtype == np.uint8
+    for ticks in (range(10), [0, 1, 2, 5, 6, 9]):
+        with open_video(write_video(ticks=ticks)) as video:
+            frames = list(video.frames)
+            assert video.stated_rates_hz[0] == 25
+        np.testing.assert_allclose([frame.time_s for frame in frames], np.array(ticks) / 25, atol=1e-9)
+        np.testing.assert_allclose([frame.image.mean() for frame in frames], 10 * np.arange(len(ticks)), atol=3)
+        assert frames[0].image.shape == (48, 64, 3)
+        assert frames[0].image.dtype == np.uint8
 
 
-def test_dropped_frames_keep_their_times(write_video):
-    frames = all_frames(write_video(ticks=[0, 1, 2, 5, 6, 9]))
-    np.testing.assert_allclose([frame.time_s for frame in frames], np.array([0, 1, 2, 5, 6, 9]) / 25, atol=1e-9)
+def test_time_zero_is_the_start_of_the_container(write_video):
+    for name in ("clip.ts", "clip.mkv"):
+        frames = all_frames(write_video(name, ticks=range(100, 110)))
+        np.testing.assert_allclose([frame.time_s for frame in frames], np.arange(10) / 25, atol=1e-3)
 
 
-@pytest.mark.parametrize("name", ["clip.ts", "clip.mkv"])
-def test_time_zero_is_the_start_of_the_container(write_video, name):
-    frames = all_frames(write_video(name, ticks=range(100, 110)))
-    np.testing.assert_allclose([frame.time_s for frame in frames], np.arange(10) / 25, atol=1e-3)
-
-
-def test_states_the_nominal_rate(write_video):
-    with open_video(write_video(rate=30)) as video:
-        assert video.stated_rates_hz[0] == 30
-
-
-@pytest.mark.parametrize("name", ["clip.mp4", "clip.mkv", "clip.ts", "clip.avi", "clip.mpg"])
-@pytest.mark.parametrize("span", [VideoSpan(0.4, 0.8), VideoSpan(7.0, 8.0), VideoSpan(9.48), VideoSpan(0.0, 0.2)])
-def test_a_span_holds_the_frames_of_its_time(tmp_path, name, span):
+@pytest.mark.parametrize("name", ["clip.mp4", "clip.mkv", "clip.ts", "clip.mpg"])
+def test_a_span_holds_the_frames_of_its_time(tmp_path, name):
     """With B-frames, and key frames twelve frames apart, wherever seeking ends."""
-    pictures = [np.full((48, 64, 3), 30 + n % 200, np.uint8) for n in range(250)]
-    other = {"clip.avi": "mpeg4", "clip.mpg": "mpeg2video"}.get(name)
-    codec, options = (other, {"g": "12"}) if other else ("libx264", {"bf": "3", "g": "12", "crf": "1"})
+    pictures = [np.full((48, 64, 3), 30 + n, np.uint8) for n in range(125)]
+    codec, options = (
+        ("mpeg2video", {"g": "12"}) if name == "clip.mpg" else ("libx264", {"bf": "3", "g": "12", "crf": "1"})
+    )
     path = write_frames(tmp_path / name, pictures, codec=codec, options=options)
     with open_video(path) as video:
         whole = [(frame.time_s, frame.image.mean()) for frame in video.frames]
-        rest_s = video.stated_s - span.start_s
-    expected = [(t, value) for t, value in whole if span.start_s - 1e-4 <= t < span.end_s - 1e-4]
-    assert len(expected) >= round((min(span.end_s, 10.0) - span.start_s) * 25) - 1  # MPEG-2's encoder leaves one out
-    with open_video(path, span) as video:
-        found = [(frame.time_s + span.start_s, frame.image.mean()) for frame in video.frames]
-        assert video.stated_s == pytest.approx(min(span.end_s - span.start_s, rest_s))
-        assert video.damage == []
-    np.testing.assert_allclose(found, expected, atol=1e-4)
+        stated_s = video.stated_s
+    for span in (VideoSpan(0.4, 0.8), VideoSpan(3.0, 4.0), VideoSpan(4.48), VideoSpan(0.0, 0.2)):
+        expected = [(t, value) for t, value in whole if span.start_s - 1e-4 <= t < span.end_s - 1e-4]
+        assert len(expected) >= round((min(span.end_s, 5.0) - span.start_s) * 25) - 1  # MPEG-2's encoder leaves one out
+        with open_video(path, span) as video:
+            found = [(frame.time_s + span.start_s, frame.image.mean()) for frame in video.frames]
+            assert video.stated_s == pytest.approx(min(span.end_s - span.start_s, stated_s - span.start_s))
+            assert video.damage == []
+        np.testing.assert_allclose(found, expected, atol=1e-4)
 
 
 class LateContainer:
@@ -104,25 +97,15 @@ def test_a_quick_look_is_small(write_video):
     np.testing.assert_allclose([frame.image.mean() for frame in frames], 10 * np.arange(10), atol=3)
 
 
-@pytest.mark.parametrize("rotation", [90, 180, -90])
-def test_rotations_turn_the_corner(write_video, rotation):
+def test_rotations_turn_the_corner(write_video):
     pytest.importorskip("cv2")
     picture = np.zeros((48, 64, 3), np.uint8)
     picture[:16, :16] = 255
-    image = all_frames(write_video(picture=picture, rotation=rotation))[0].image
-    turned = np.rot90(picture, rotation // 90)
-    assert image.shape == turned.shape
-    np.testing.assert_allclose(image, turned, atol=60)
-
-
-def test_a_rotated_video_comes_upright(write_video):
-    pytest.importorskip("cv2")
-    picture = np.zeros((48, 64, 3), np.uint8)
-    picture[:16, :16] = 255
-    image = all_frames(write_video(picture=picture, rotation=90))[0].image
-    assert image.shape == (64, 48, 3)
-    assert image[-16:, :16].mean() > 200
-    assert image[:-16].mean() < 20
+    for rotation in (90, 180, -90):
+        image = all_frames(write_video(picture=picture, rotation=rotation))[0].image
+        turned = np.rot90(picture, rotation // 90)
+        assert image.shape == turned.shape
+        np.testing.assert_allclose(image, turned, atol=60)
 
 
 def test_oblong_pixels_become_square(write_video):
@@ -165,9 +148,8 @@ def test_sound_alone_is_not_a_video(tmp_path):
 
 
 def test_truncated_before_its_first_picture(write_video):
-    path = write_video(
-        "clip.mkv", picture=np.random.default_rng(0).integers(0, 255, (480, 640, 3)).astype(np.uint8), size=(640, 480)
-    )
+    noise = np.random.default_rng(0).integers(0, 255, (96, 128, 3)).astype(np.uint8)
+    path = write_video("clip.mkv", ticks=range(3), picture=noise, size=(128, 96))
     path.write_bytes(path.read_bytes()[:3000])
     with pytest.raises(InputError, match=r"picture|not a readable video"):
         all_frames(path)
@@ -195,18 +177,10 @@ def test_damaged_packets_are_left_out_and_counted(write_video):
     np.testing.assert_allclose(times_s, np.delete(np.arange(100), range(40, 50)) / 25, atol=1e-6)
 
 
-@pytest.mark.parametrize("name", ["12:30.mp4", "-a.mp4", "é 音 😀.mp4"])
-@pytest.mark.skipif(os.name == "nt", reason="such names cannot be given there")
-def test_any_name_is_a_files(write_video, tmp_path, monkeypatch, name):
-    monkeypatch.chdir(tmp_path)
-    write_video().rename(tmp_path / name)
-    assert len(all_frames(Path(name))) == 10
-
-
-@pytest.mark.parametrize("shape", [(30, 1), (1, 30)])
-def test_pixels_that_would_fill_the_memory(write_video, shape):
-    with pytest.raises(InputError, match=r"pictures of \d+ × 48 pixels, required 16 to 8192; scale the video"):
-        all_frames(write_video(size=(320, 48), pixel_shape=shape))
+def test_pixels_that_would_fill_the_memory(write_video):
+    for shape in ((30, 1), (1, 30)):
+        with pytest.raises(InputError, match=r"pictures of \d+ × 48 pixels, required 16 to 8192; scale the video"):
+            all_frames(write_video(ticks=[0], size=(320, 48), pixel_shape=shape))
 
 
 def grey_gif(side: int, pictures: int = 5) -> bytes:
@@ -230,7 +204,7 @@ def test_pictures_larger_than_stated_are_not_decoded(tmp_path):
     from PIL import Image
 
     packets = []
-    for side in (64, 4000):
+    for side in (64, 3200):
         stream = io.BytesIO()
         Image.new("L", (side, side)).save(stream, "PNG")
         packets += [stream.getvalue()] * 5
@@ -246,13 +220,14 @@ def test_pictures_larger_than_stated_are_not_decoded(tmp_path):
         assert len(video.damage) == 5
 
 
-def test_more_pixels_than_a_cinema_shows(write_video):
-    assert all_frames(write_video(ticks=[0], size=(4096, 2160)))[0].image.shape == (2160, 4096, 3)
-    with pytest.raises(InputError, match="pictures of 4096 × 3072 pixels, required at most 9437184 in all; scale"):
-        all_frames(write_video(ticks=[0], size=(4096, 3072)))
+def test_more_pixels_than_a_cinema_shows(write_video, monkeypatch):
+    monkeypatch.setattr(frames, "MOST_PIXELS", 9000)
+    assert all_frames(write_video(ticks=[0], size=(96, 64)))[0].image.shape == (64, 96, 3)
+    with pytest.raises(InputError, match="pictures of 128 × 96 pixels, required at most 9000 in all; scale"):
+        all_frames(write_video(ticks=[0], size=(128, 96)))
 
 
-@pytest.mark.parametrize(("name", "subtitles"), [("a.mkv", "subrip"), ("a.mkv", "ass"), ("a.mp4", "mov_text")])
+@pytest.mark.parametrize(("name", "subtitles"), [("a.mkv", "subrip"), ("a.mp4", "mov_text")])
 def test_subtitles_that_go_on_after_the_pictures(tmp_path, name, subtitles):
     with av.open(str(tmp_path / name), "w") as container:
         stream, words = container.add_stream("libx264", rate=25), container.add_mux_stream(subtitles)

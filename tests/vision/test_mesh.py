@@ -3,7 +3,6 @@ from __future__ import annotations
 import os
 import sys
 
-import numpy as np
 import pytest
 
 from children import run_child
@@ -48,16 +47,3 @@ def test_importing_needs_no_video_packages():
         "import lipmotion.vision.track, lipmotion.corpora.store, lipmotion.pipeline.corpus.prepare"
     )
     run_child([sys.executable, "-c", code], check=True)
-
-
-@pytest.mark.video
-def test_a_picture_without_a_face_has_no_points():
-    pytest.importorskip("mediapipe")
-    with FaceMesh() as mesh:
-        assert mesh.faces(np.full((120, 160, 3), 90, np.uint8)) == []
-
-
-@pytest.mark.video
-def test_versions_are_known():
-    pytest.importorskip("mediapipe")
-    assert package_versions().keys() == {"mediapipe", "opencv", "av"}

@@ -83,7 +83,7 @@ class TestRegistration:
         from scipy.ndimage import shift
 
         def make(places, tremble, cuts=(), seen=None) -> Footage:
-            texture = GaussianBlur(np.random.default_rng(1).uniform(0, 255, (140, 200)), (0, 0), 2.0)
+            texture = GaussianBlur(np.random.default_rng(1).uniform(0, 255, (120, 170)), (0, 0), 2.0)
             texture = 128 + 4 * (texture - texture.mean())
             frames = [
                 np.repeat(
@@ -97,13 +97,13 @@ class TestRegistration:
             track = Track(Motion(np.zeros((count, 0)), RATE_HZ, ()), shown)
             times_s = np.arange(count) / RATE_HZ
             maps = at(np.asarray(places) + tremble)
-            return Footage(Path("scene"), WHOLE, track, maps, times_s, tuple(cuts), (140, 200), RATE_HZ)
+            return Footage(Path("scene"), WHOLE, track, maps, times_s, tuple(cuts), (120, 170), RATE_HZ)
 
         return make
 
     def test_trembling_of_the_tracker_is_corrected(self, scene):
-        places = np.stack([3 * np.sin(np.arange(50) / 5), 2 * np.cos(np.arange(50) / 7)], axis=1)
-        footage = scene(places, trembling(0.4, 50))
+        places = np.stack([3 * np.sin(np.arange(30) / 5), 2 * np.cos(np.arange(30) / 7)], axis=1)
+        footage = scene(places, trembling(0.4, 30))
         wrong, right = (
             maps[:, :, 2] - at(places)[:, :, 2] for maps in (footage.face_to_image, registered_maps(footage))
         )
@@ -124,8 +124,15 @@ class TestRegistration:
         ):
             np.testing.assert_allclose(registered_maps(footage), footage.face_to_image, atol=0.05)
 
+    def test_what_an_unseen_frame_shows_moves_nothing(self, scene):
+        """Somebody walks by, and the tracker's places are interpolated."""
+        places, seen = np.zeros((30, 2)), np.ones(30, bool)
+        places[12:17], seen[12:17] = 6, False
+        footage = scene(places, -places, seen=seen)
+        np.testing.assert_allclose(registered_maps(footage), footage.face_to_image, atol=0.05)
+
     def test_a_region_without_texture_stays(self, scene, monkeypatch):
         footage = scene(np.zeros((5, 2)), 0.0)
-        monkeypatch.setattr(steadying, "footage_frames", lambda _: iter([np.full((140, 200, 3), 90, np.uint8)] * 5))
+        monkeypatch.setattr(steadying, "footage_frames", lambda _: iter([np.full((120, 170, 3), 90, np.uint8)] * 5))
         with np.errstate(invalid="raise"):
             np.testing.assert_array_equal(registered_maps(footage), footage.face_to_image)

@@ -67,7 +67,7 @@ def test_long_gaps_are_straight_and_ends_constant():
     np.testing.assert_allclose(np.diff(result[19:41], n=2, axis=0), 0, atol=1e-12)
 
 
-@pytest.mark.parametrize("count", [1, 2, 3])
-def test_a_few_frames_suffice(count):
-    result = resample_to_constant_rate(np.arange(count) / 5, np.ones((count, 2)), 25.0, 12)
-    np.testing.assert_allclose(result, 1)
+def test_a_few_frames_suffice():
+    for count in (1, 2, 3):
+        result = resample_to_constant_rate(np.arange(count) / 5, np.ones((count, 2)), 25.0, 12)
+        np.testing.assert_allclose(result, 1)

@@ -98,22 +98,10 @@ def test_too_few_faces_are_refused_with_counts(write_video, scripted):
         track(write_video(ticks=range(20)), crops=False)
 
 
-def test_no_face_at_all_is_refused(write_video, scripted):
-    scripted([None] * 20)
-    with pytest.raises(InputError, match=r"no face in 20 of 20 frames"):
-        track(write_video(ticks=range(20)), crops=False)
-
-
 def test_broken_time_stamps_are_refused(write_video, scripted):
     scripted([face(0.1)] * 20)
     with pytest.raises(InputError, match=r"20 frames span 40\.\d s.*constant frame rate"):
         track(write_video("clip.mkv", ticks=[*range(19), 1000]), crops=False)
-
-
-def test_a_time_stamp_of_years_fills_no_memory(write_video, scripted):
-    scripted([face(0.1)] * 20)
-    with pytest.raises(InputError, match=r"20 frames span 80000000\.\d s, 2000000001 were expected at 25 Hz"):
-        track(write_video("clip.mkv", ticks=[*range(19), 2_000_000_000]), crops=False)
 
 
 @pytest.mark.parametrize(("step", "rate", "told"), [(1000, 25, "0.025"), (1, 4000, "4000")])
@@ -133,13 +121,6 @@ def test_unseen_frames_show_the_nearest_mouth(write_video, scripted):
     assert result.crops.shape == (20, 56, 72, 3)
     shown = result.crops.mean(axis=(1, 2, 3))  # frame n is a flat grey of 10 n
     np.testing.assert_allclose(shown, [20, 20, *range(20, 90, 10), 80, *range(100, 190, 10), 180], atol=3)
-
-
-@pytest.mark.video
-def test_a_video_without_a_face(write_video):
-    pytest.importorskip("mediapipe")
-    with pytest.raises(InputError, match=r"no face in 10 of 10 frames"):
-        track(write_video())
 
 
 @pytest.mark.video
@@ -166,21 +147,6 @@ class TestRealRecordings:
         two = track(recordings / "grid-s1" / "original" / "bbal8p.mpg", crops=False).motion
         for name, least in (("opening", 0.98), ("width", 0.9), ("y_17", 0.98), ("y_152", 0.95)):
             assert np.corrcoef(one[name], two[name])[0, 1] > least
-
-    def test_the_head_is_upright_and_still(self, recordings: Path):
-        motion = track(recordings / "grid-others" / "lbax4n.mpg", crops=False).motion
-        assert abs(motion["x_0"].mean()) < 0.1
-        assert motion["y_0"].mean() < -0.5
-        assert motion["y_152"].mean() < motion["y_17"].mean() < motion["y_0"].mean()
-        assert motion["z_0"].mean() > 0.2
-        assert motion["x_61"].mean() < 0 < motion["x_291"].mean()
-
-    def test_a_clip_that_starts_without_a_picture(self, recordings: Path):
-        result = track(recordings / "grid-s1" / "clips" / "bbizzn.mkv")
-        assert np.flatnonzero(~result.seen).tolist() == list(range(12))
-        np.testing.assert_array_equal(result.motion.values[:12], np.tile(result.motion.values[12], (12, 1)))
-        assert result.crops is not None
-        np.testing.assert_array_equal(result.crops[0], result.crops[12])
 
     def test_nothing_is_printed(self, recordings: Path):
         path = recordings / "grid-s1" / "clips" / "brwa3s.mkv"

@@ -75,71 +75,11 @@ def test_variable_frame_rate(tmp_path: Path, frames: list[Image], usual: Track) 
     assert alike(found, usual) > 0.99
 
 
-def test_frames_out_of_step(tmp_path: Path, frames: list[Image], usual: Track) -> None:
-    times_s = np.arange(COUNT) / 25 + np.r_[0, np.random.default_rng(0).uniform(-0.008, 0.008, COUNT - 1)]
-    ticks = np.round(times_s * 90_000).astype(int).tolist()
-    found = track(write_frames(tmp_path / "a.mkv", frames, ticks=ticks, ticks_hz=90_000), crops=False)
-    assert (found.motion.rate_hz, unseen(found)) == (25, [])
-    assert alike(found, usual) > 0.97
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(("rate", "least"), [(24, 0.96), (30, 0.97), (60, 0.98)])
-def test_other_rates_by_repeating_or_dropping(
-    tmp_path: Path, frames: list[Image], usual: Track, rate: int, least: float
-) -> None:
-    shown = [frames[min(round(n * 25 / rate), COUNT - 1)] for n in range(3 * rate)]
-    found = track(write_frames(tmp_path / "a.mp4", shown, rate=rate, ticks_hz=rate), crops=False)
-    assert (found.motion.rate_hz, len(found.seen), unseen(found)) == (rate, 3 * rate, [])
-    assert alike(found, usual) > least
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("rotation", [90, 180, 270])
-def test_phones_held_sideways(tmp_path: Path, frames: list[Image], usual: Track, rotation: int) -> None:
-    turned = [np.rot90(frame, -rotation // 90) for frame in frames]
-    found = track(write_frames(tmp_path / "a.mp4", turned, rotation=rotation), crops=False)
-    assert unseen(found) == []
-    assert alike(found, usual) > 0.99
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("name", "codec", "options", "pixels"),
-    [
-        ("a.mp4", "libx264", {"bf": "3", "crf": "8"}, "yuv420p"),
-        ("a.avi", "mpeg4", {}, "yuv420p"),
-        ("a.avi", "mjpeg", {}, "yuvj420p"),
-        ("a.mpg", "mpeg2video", {"flags": "+ildct+ilme", "top": "1"}, "yuv420p"),
-        ("a.ts", "mpeg2video", {"bf": "2"}, "yuv420p"),
-        ("a.webm", "libvpx", {"crf": "8", "b": "4M"}, "yuv420p"),
-    ],
-)
-def test_codecs(
-    tmp_path: Path, frames: list[Image], usual: Track, name: str, codec: str, options: dict[str, str], pixels: str
-) -> None:
-    path = write_frames(tmp_path / name, frames, codec=codec, options=options, pixels=pixels)
-    found = track(path, crops=False)
-    assert (found.motion.rate_hz, len(found.seen), unseen(found)) == (25, COUNT, [])
-    assert alike(found, usual) > 0.99
-
-
-def test_odd_and_portrait_sizes(tmp_path: Path, frames: list[Image], usual: Track) -> None:
-    odd = write_frames(tmp_path / "a.mkv", [frame[:287, :359] for frame in frames], pixels="yuv444p")
-    portrait = write_frames(tmp_path / "b.mp4", [frame[:, 100:262] for frame in frames])
-    for path in (odd, portrait):
-        found = track(path, crops=False)
-        assert unseen(found) == []
-        assert alike(found, usual) > 0.99
-
-
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("size", "scale", "least"),
     [
-        ((1280, 720), 1.0, 0.97),  # eyes 66 px apart: somebody filmed to the waist
         ((1280, 720), 0.6, 0.95),  # 40 px
-        ((720, 1280), 1.0, 0.97),
         ((2560, 1440), 2.0, 0.97),
     ],
 )
@@ -158,52 +98,12 @@ def test_a_face_that_is_small_in_the_picture(
 
 
 @pytest.mark.long
-def test_a_face_that_leaves_and_returns(tmp_path: Path, frames: list[Image], usual: Track) -> None:
-    """Away for twenty frames, then on the other side of the picture."""
-    away = range(COUNT, COUNT + 20)
-    order = [*range(COUNT), *reversed(range(COUNT)), *range(COUNT)]
-
-    def at(n: int) -> tuple[float, float]:
-        return (300.0 if n < away[0] else 900.0, -1000.0 if n in away else 250.0)
-
-    shown = in_a_room([frames[n] for n in order], (1280, 720), 1.0, at)
-    found = track(write_frames(tmp_path / "a.mp4", shown, options={"crf": "15", "preset": "veryfast"}), crops=False)
-    assert unseen(found) == list(away)
-    seen = np.flatnonzero(found.seen)
-    assert np.corrcoef(found.motion["opening"][seen], usual.motion["opening"][order][seen])[0, 1] > 0.97
-
-
-def test_first_packet_later_than_zero(tmp_path: Path, frames: list[Image], usual: Track) -> None:
-    found = track(write_frames(tmp_path / "a.ts", frames, ticks=range(125, 125 + COUNT)), crops=False)
-    assert (len(found.seen), unseen(found)) == (COUNT, [])
-    assert alike(found, usual) > 0.99
-
-
-def test_dropped_frames_are_unseen(tmp_path: Path, frames: list[Image], usual: Track) -> None:
-    kept = [n for n in range(COUNT) if n not in MIDDLE]
-    found = track(write_frames(tmp_path / "a.mp4", [frames[n] for n in kept], ticks=kept), crops=False)
-    assert unseen(found) == list(MIDDLE)
-    assert alike(found, usual) > 0.99
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("kind", ["grey", "noise"])
-def test_ruined_frames_are_unseen(tmp_path: Path, frames: list[Image], usual: Track, kind: str) -> None:
-    draw = np.random.default_rng(0)
-    ruin = np.full_like(frames[0], 128) if kind == "grey" else draw.integers(0, 255, frames[0].shape).astype(np.uint8)
-    found = track(write_frames(tmp_path / "a.mp4", [ruin if n in MIDDLE else f for n, f in enumerate(frames)]))
-    assert unseen(found) == list(MIDDLE)
-    assert alike(found, usual) > 0.99
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("by", ["box", "hand"])
 def test_something_before_the_mouth(
-    tmp_path: Path, frames: list[Image], usual: Track, mouths: list[tuple[NDArray[np.float64], float]], by: str
+    tmp_path: Path, frames: list[Image], usual: Track, mouths: list[tuple[NDArray[np.float64], float]]
 ) -> None:
     hidden = range(30, 45)
     shown = [
-        covered(frame, place, 0.45 * unit, by=by) if n in hidden else frame
+        covered(frame, place, 0.45 * unit) if n in hidden else frame
         for n, (frame, (place, unit)) in enumerate(zip(frames, mouths, strict=True))
     ]
     found = track(write_frames(tmp_path / "a.mp4", shown), crops=False)
@@ -247,27 +147,14 @@ def test_a_jump_cut_to_the_same_person_is_followed(tmp_path: Path, frames: list[
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("is_left", [True, False])
 def test_of_two_people_the_larger_is_followed(
-    tmp_path: Path, frames: list[Image], usual: Track, stranger: tuple[list[Image], Track], is_left: bool
+    tmp_path: Path, frames: list[Image], usual: Track, stranger: tuple[list[Image], Track]
 ) -> None:
     for large, small, expected in ((frames, stranger[0], usual), (stranger[0], frames, stranger[1])):
-        pair = (large, half_size(small)) if is_left else (half_size(small), large)
+        pair = large, half_size(small)
         found = track(write_frames(tmp_path / "a.mp4", side_by_side(*pair)), crops=False)
         assert unseen(found) == []
         assert alike(found, expected) > 0.98
-
-
-@pytest.mark.long
-def test_two_alike_are_not_mixed_up(
-    tmp_path: Path, frames: list[Image], usual: Track, stranger: tuple[list[Image], Track]
-) -> None:
-    """Of two faces of nearly one size, side by side, one is followed throughout."""
-    path = write_frames(tmp_path / "a.mp4", side_by_side(frames, stranger[0]))
-    found = track(path, crops=False)
-    likenesses = [alike(found, one) for one in (usual, stranger[1])]
-    assert max(likenesses) > 0.98
-    assert unseen(found) == []
 
 
 def test_damage_is_told(tmp_path: Path, frames: list[Image], usual: Track) -> None:

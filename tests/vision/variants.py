@@ -1,4 +1,4 @@
-"""A real clip made into what people record: written with other rates, codecs, cuts, neighbours and damage."""
+"""A real clip made into what people record: with other frame times, cuts, neighbours and damage."""
 
 from __future__ import annotations
 
@@ -24,25 +24,19 @@ def write_frames(
     frames: Sequence[Image],
     *,
     ticks: Sequence[int] | None = None,
-    ticks_hz: int = 25,
-    rate: int = 25,
     codec: str = "libx264",
     options: dict[str, str] | None = None,
-    pixels: str = "yuv420p",
-    rotation: int = 0,
 ) -> Path:
-    """Write pictures; ``ticks`` are their times in 1 / ``ticks_hz`` s, by default one after the other."""
+    """Write pictures, 25 a second; ``ticks`` are their times in 1/25 s, by default one after the other."""
     with av.open(str(path), "w") as container:
-        stream = container.add_stream(codec, rate=rate, options={"crf": "8"} if options is None else options)
+        stream = container.add_stream(codec, rate=25, options={"crf": "8"} if options is None else options)
         stream.height, stream.width = frames[0].shape[:2]
-        stream.pix_fmt, stream.codec_context.time_base = pixels, Fraction(1, ticks_hz)
+        stream.pix_fmt, stream.codec_context.time_base = "yuv420p", Fraction(1, 25)
         if codec != "libx264":
             stream.bit_rate = 6_000_000
-        if rotation:
-            stream.set_display_rotation(rotation)
         for n, image in enumerate(frames):
             frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="rgb24")
-            frame.pts, frame.time_base = n if ticks is None else ticks[n], Fraction(1, ticks_hz)
+            frame.pts, frame.time_base = n if ticks is None else ticks[n], Fraction(1, 25)
             container.mux(stream.encode(frame))
         container.mux(stream.encode())
     return path
@@ -84,15 +78,12 @@ def zoomed(frames: Sequence[Image]) -> list[Image]:
     return [np.kron(frame[100:244, 70:250], np.ones((2, 2, 1), np.uint8)) for frame in frames]
 
 
-def covered(image: Image, mouth: NDArray[np.float64], reach: float, *, by: str) -> Image:
-    """Return the picture with something before the mouth: a ``box``, or the like of a ``hand``."""
+def covered(image: Image, mouth: NDArray[np.float64], reach: float) -> Image:
+    """Return the picture with the like of a hand before the mouth."""
     image = image.copy()
     (x, y), half = mouth.astype(int), int(reach)
     place = slice(max(y - half, 0), y + half), slice(x - half, x + half)
     height, width = image[place].shape[:2]
-    if by == "box":
-        image[place] = 0
-    else:
-        shade = np.add.outer(np.linspace(-25, 10, height), 12 * np.sin(np.linspace(0, 4 * np.pi, width)))[..., None]
-        image[place] = np.clip(image[y - 2 * half, x] + shade, 0, 255)
+    shade = np.add.outer(np.linspace(-25, 10, height), 12 * np.sin(np.linspace(0, 4 * np.pi, width)))[..., None]
+    image[place] = np.clip(image[y - 2 * half, x] + shade, 0, 255)
     return image

@@ -40,35 +40,33 @@ WORDS = [
 ]
 
 
-@pytest.mark.parametrize("kind", OTHER)
-@pytest.mark.parametrize("suffix", [".txt", ".lab"])
-def test_what_would_be_read_as_words_is_refused(tmp_path: Path, kind: str, suffix: str) -> None:
-    text, message = OTHER[kind]
-    path = tmp_path / f"a{suffix}"
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(InputError, match=message):
-        read_labels(path)
-    with pytest.raises(InputError, match=message):
+def test_what_would_be_read_as_words_is_refused(tmp_path: Path) -> None:
+    for text, message in OTHER.values():
+        for suffix in (".txt", ".lab"):
+            path = tmp_path / f"a{suffix}"
+            path.write_text(text, encoding="utf-8")
+            with pytest.raises(InputError, match=message):
+                read_labels(path)
+        with pytest.raises(InputError, match=message):
+            check_plain_text(text, "a.txt")
+
+
+def test_words_in_time_are_no_plain_text(tmp_path: Path) -> None:
+    for text, message in TIMED.values():
+        with pytest.raises(InputError, match=message):
+            check_plain_text(text, "a.txt")
+        (tmp_path / "a.txt").write_text(text, encoding="utf-8")
+        assert "hello" in (read_labels(tmp_path / "a.txt").words or ())
+
+
+def test_words_with_numbers_are_words(tmp_path: Path) -> None:
+    for text in WORDS:
         check_plain_text(text, "a.txt")
+        (tmp_path / "a.txt").write_text(text, encoding="utf-8")
+        assert read_labels(tmp_path / "a.txt").words
 
 
-@pytest.mark.parametrize("kind", TIMED)
-def test_words_in_time_are_no_plain_text(tmp_path: Path, kind: str) -> None:
-    text, message = TIMED[kind]
-    with pytest.raises(InputError, match=message):
-        check_plain_text(text, "a.txt")
-    (tmp_path / "a.txt").write_text(text, encoding="utf-8")
-    assert "hello" in (read_labels(tmp_path / "a.txt").words or ())
-
-
-@pytest.mark.parametrize("text", WORDS)
-def test_words_with_numbers_are_words(tmp_path: Path, text: str) -> None:
-    check_plain_text(text, "a.txt")
-    (tmp_path / "a.txt").write_text(text, encoding="utf-8")
-    assert read_labels(tmp_path / "a.txt").words
-
-
-@pytest.mark.parametrize("text", ["0 1000000 p\n1000000 2000000 aa\n", "0.0\t0.5\thello\n", '"ooTextFile" "TextGrid"'])
-def test_labels_in_time_are_no_plain_text(text: str) -> None:
-    with pytest.raises(InputError, match=r"a\.txt: holds labels in time, required the words alone"):
-        check_plain_text(text, "a.txt")
+def test_labels_in_time_are_no_plain_text() -> None:
+    for text in ("0 1000000 p\n1000000 2000000 aa\n", "0.0\t0.5\thello\n", '"ooTextFile" "TextGrid"'):
+        with pytest.raises(InputError, match=r"a\.txt: holds labels in time, required the words alone"):
+            check_plain_text(text, "a.txt")

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
+from typing import cast
 
 import numpy as np
 import pytest
@@ -10,15 +12,15 @@ from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.errors import InputError
 from lipmotion.experiments.xie_liu2007 import mixtures
-from lipmotion.experiments.xie_liu2007.mixtures import MixtureSelection, select_mixtures
+from lipmotion.experiments.xie_liu2007.mixtures import select_mixtures
 from lipmotion.measures import curves
 from lipmotion.pipeline.evaluation.conditions import HeldOutRecordings, compared_clips, held_out_recordings
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.training.train import model_motion
-from lipmotion.speech.recogniser import cached_recogniser
+from lipmotion.speech.recogniser import Recogniser
 from lipmotion.testing.examples import examples
 from lipmotion.testing.toy import toy_sentences
-from lipmotion.types import Example, Progress, Speech, silent_monitor
+from lipmotion.types import Example, Speech, silent_monitor
 
 PLAIN = CoupledConfig(structure="multistream", chains="viseme", states=2, conversion="em", closures=False)
 
@@ -30,39 +32,17 @@ def sentences() -> list[Example]:
 
 @pytest.fixture(scope="module")
 def validation(toy_corpus: Corpus, toy_model: Model) -> HeldOutRecordings:
-    return held_out_recordings(toy_corpus, cached_recogniser(toy_model.phones), selection=Selection("val"))
+    return held_out_recordings(toy_corpus, Recogniser(toy_model.phones, "own"), selection=Selection("val"))
 
 
-def chosen(
-    sentences: list[Example], validation: HeldOutRecordings, scores: dict[int, float], monkeypatch: pytest.MonkeyPatch
-) -> MixtureSelection:
-    monkeypatch.setattr(mixtures, "_mean_acc", lambda _, __, engine, ___: scores[engine.config.mixtures])
-    return select_mixtures(sentences, validation, PLAIN, tuple(scores))
-
-
-@pytest.mark.parametrize(
-    ("scores", "wanted"), [({1: 0.5, 2: 0.7, 4: 0.6}, 2), ({1: 0.5, 2: 0.5, 4: 0.5}, 1), ({4: 0.6, 1: 0.5}, 4)]
-)
-def test_the_best_is_taken(
-    scores: dict[int, float],
-    wanted: int,
-    sentences: list[Example],
-    validation: HeldOutRecordings,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    selection = chosen(sentences, validation, scores, monkeypatch)
-    assert (selection.engine.config.mixtures, selection.engine.config.visual_mixtures) == (wanted, wanted)
-    assert {group.mixtures.size[1] for group in selection.model.chains.groups} == {wanted}
-    assert selection.validation_acc == scores
-    assert list(selection.validation_acc) == sorted(scores)
-
-
-@pytest.mark.parametrize("number", [1, 2])
+@pytest.mark.long
 def test_a_model_on_the_way_is_that_of_its_own_training(
-    number: int, sentences: list[Example], validation: HeldOutRecordings, monkeypatch: pytest.MonkeyPatch
+    sentences: list[Example], validation: HeldOutRecordings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    selection = chosen(sentences, validation, {1: 0.0, 2: 0.0, 4: 0.0} | {number: 1.0}, monkeypatch)
-    engine = CoupledEngine(replace(PLAIN, mixtures=number, visual_mixtures=number))
+    scores = {1: 0.0, 2: 1.0, 4: 0.0}
+    monkeypatch.setattr(mixtures, "_mean_acc", lambda _, __, engine, ___: scores[engine.config.mixtures])
+    selection = select_mixtures(sentences, validation, PLAIN, tuple(scores))
+    engine = CoupledEngine(replace(PLAIN, mixtures=2, visual_mixtures=2))
     alone = engine.to_arrays(engine.fit(sentences, silent_monitor).model)
     selected = engine.to_arrays(selection.model)
     assert selection.engine == engine
@@ -81,24 +61,32 @@ def test_the_score_is_the_mean_correlation_of_what_is_made(toy_corpus: Corpus, v
     assert max(selection.validation_acc.values()) == selection.validation_acc[selection.engine.config.mixtures]
 
 
-def test_one_number_is_taken_without_being_tried(sentences: list[Example]) -> None:
-    stages: list[Progress] = []
-    selection = select_mixtures(sentences, None, PLAIN, [2], monitor=stages.append)
-    assert (selection.engine.config.mixtures, selection.validation_acc) == (2, {})
-    assert not any("trying" in event.stage for event in stages)
-    shares = [event.share for event in stages]
-    assert shares == sorted(shares)
+def _known_acc(scores: dict[int, float], _: object, __: object, engine: CoupledEngine, ___: object) -> float:
+    return scores[engine.config.mixtures]
 
 
-@pytest.mark.parametrize(
-    ("numbers", "words"),
-    [
+def test_the_best_is_taken_and_of_equals_the_smallest(monkeypatch: pytest.MonkeyPatch) -> None:
+    models = [lambda count=count: f"model of {count}" for count in (1, 2, 4)]
+    monkeypatch.setattr(mixtures, "growing_models", lambda *_: iter(models))
+    for scores, wanted in (
+        ({1: 0.5, 2: 0.7, 4: 0.6}, 2),
+        ({1: 0.5, 2: 0.5, 4: 0.5}, 1),
+        ({4: 0.6, 1: 0.5}, 4),
+    ):
+        monkeypatch.setattr(mixtures, "_mean_acc", partial(_known_acc, scores))
+        selection = select_mixtures([], cast(HeldOutRecordings, object()), PLAIN, tuple(scores))
+        assert (selection.engine.config.mixtures, selection.engine.config.visual_mixtures) == (wanted, wanted)
+        assert selection.model == f"model of {wanted}"
+        assert selection.validation_acc == scores
+        assert list(selection.validation_acc) == sorted(scores)
+
+
+def test_numbers_that_cannot_be() -> None:
+    for numbers, words in (
         ([], "numbers of Gaussians none; required: powers of two"),
         ([1, 3], "numbers of Gaussians 1, 3; required: powers of two"),
         ([0], "numbers of Gaussians 0; required"),
         ([1, 2], "2 numbers of Gaussians and no recordings to choose with; give one number"),
-    ],
-)
-def test_numbers_that_cannot_be(sentences: list[Example], numbers: list[int], words: str) -> None:
-    with pytest.raises(InputError, match=words):
-        select_mixtures(sentences, None, PLAIN, numbers)
+    ):
+        with pytest.raises(InputError, match=words):
+            select_mixtures([], None, PLAIN, numbers)

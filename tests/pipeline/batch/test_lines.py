@@ -52,6 +52,13 @@ def test_a_table(tmp_path: Path, name: str, mark: str, caplog: pytest.LogCapture
     assert "columns that are not used: note" in caplog.text
 
 
+def test_outputs_may_be_named_with_the_suffix_of_one_of_their_kinds(tmp_path: Path) -> None:
+    names = ("a.json", "b.cues.json", "c.take")
+    text = "file,output\n" + "".join(f"{number}.wav,{name}\n" for number, name in enumerate(names))
+    lines = listed(tmp_path, text, "t.csv", ("json", "cues.json"))
+    assert [line.name for line in lines] == ["a", "b", "c.take"]
+
+
 def test_short_rows_are_filled_and_long_ones_refused(tmp_path: Path) -> None:
     assert listed(tmp_path, "file,transcript\na.wav\n") == [BatchLine("a", str(tmp_path / "a.wav"))]
     with pytest.raises(InputError, match="row 2: 3 columns, required at most the 2"):

@@ -7,15 +7,13 @@ from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from lipmotion.corpora.store import Corpus
-from lipmotion.errors import CorpusError, InputError
 from lipmotion.pipeline.corpus.coverage import coverage, coverage_document, coverage_lines, phone_distances
 from lipmotion.testing.toy import toy_utterances
 from lipmotion.types import Span, Timeline, Unit
-from lipmotion.units import PHONES, VISEME_OF, Lexicon, most_similar_lips
+from lipmotion.units import PHONES, Lexicon, most_similar_lips
 
 WORDS = Lexicon({"pab": (("p", "aa", "b"),), "tib": (("t", "iy", "b"),), "zog": (("zh", "oy", "g"),)})
 
@@ -86,19 +84,6 @@ def test_the_nearest_has_the_least_distance(tmp_path: Path, toy_corpus: Corpus) 
         assert unit.recorded == recorded[chosen]
 
 
-def test_distances_of_phones() -> None:
-    distances = phone_distances()
-    assert distances.min() >= 0
-    assert distances.max() <= 2.5
-    assert np.abs(np.diag(distances)).max() < 1e-12
-    number = {phone: n for n, phone in enumerate(PHONES)}
-    assert distances[number["p"], number["b"]] < distances[number["p"], number["t"]] < distances[
-        number["p"], number["iy"]
-    ]  # fmt: skip
-    same = np.array([[VISEME_OF[a] == VISEME_OF[b] for b in PHONES] for a in PHONES])
-    assert distances[~same].min() >= 1
-
-
 def test_labelled_phones_count_and_silence_divides_them(tmp_path: Path) -> None:
     corpus = Corpus.create(tmp_path / "corpus")
     utterance = toy_utterances(3)[0]
@@ -125,13 +110,6 @@ def test_sentences_of_the_package_and_what_is_not_counted(tmp_path: Path) -> Non
     assert (found.utterances, found.unknown, found.left_out) == (3, 2, {})
     assert [kind.needed for kind in found.kinds[:2]] == [42, 1047]
     assert found.kinds[0].share > found.kinds[1].share > found.kinds[2].share > 0
-
-
-def test_what_cannot_be_counted(tmp_path: Path) -> None:
-    with pytest.raises(CorpusError, match="none of 1 utterances has labelled phones or words that are known"):
-        coverage(corpus_of(tmp_path / "unknown", None))
-    with pytest.raises(InputError, match="no sentence to choose from"):
-        coverage(corpus_of(tmp_path / "known", "see"), text_of(tmp_path / "text", ""))
 
 
 def test_text_is_bounded_and_json_holds_everything(tmp_path: Path) -> None:

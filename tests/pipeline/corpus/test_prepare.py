@@ -91,15 +91,6 @@ def test_remarks_on_a_video_are_reported_and_kept(studio, tmp_path):
     assert Corpus.open(report.corpus).utterance("cut").track.notes == ("cut at 0.50 s",)
 
 
-@pytest.mark.usefixtures("tracked")
-def test_features_are_those_of_the_sound_that_is_kept(studio, tmp_path):
-    from lipmotion.speech.mfcc import mfcc
-
-    prepare(studio, tmp_path / "corpus", workers=1)
-    found = Corpus.open(tmp_path / "corpus").utterance("b")
-    np.testing.assert_allclose(mfcc(found.audio).values, found.features.values, rtol=0, atol=1e-4)
-
-
 def test_what_is_up_to_date_is_kept(studio, tmp_path, tracked):
     prepare(studio, tmp_path / "corpus", workers=1)
     before = content(tmp_path / "corpus")
@@ -174,16 +165,6 @@ def test_missing_packages_are_reported_at_once(studio, tmp_path, monkeypatch):
 
 
 @pytest.mark.usefixtures("tracked")
-def test_a_full_disk_stops_it(studio, tmp_path, monkeypatch):
-    def full(*_: object) -> None:
-        raise ExportError("no space left on device")
-
-    monkeypatch.setattr(module, "write_utterance", full)
-    with pytest.raises(ExportError):
-        prepare(studio, tmp_path / "corpus", workers=1)
-
-
-@pytest.mark.usefixtures("tracked")
 def test_an_interrupted_run_goes_on_where_it_stopped(studio, tmp_path, monkeypatch):
     prepare(studio, tmp_path / "whole", workers=1)
     good = module.track  # type: ignore[attr-defined]
@@ -201,14 +182,6 @@ def test_an_interrupted_run_goes_on_where_it_stopped(studio, tmp_path, monkeypat
     report = prepare(studio, tmp_path / "corpus", workers=1)
     assert (report.kept, report.prepared) == (("a",), ("b", "c"))
     assert content(tmp_path / "corpus") == content(tmp_path / "whole")
-
-
-@pytest.mark.usefixtures("tracked")
-def test_a_second_folder_is_added(studio, tmp_path):
-    prepare(studio, tmp_path / "corpus", workers=1)
-    speak(tmp_path / "home" / "d.mp4", 9)
-    assert prepare(tmp_path / "home", tmp_path / "corpus", workers=1).prepared == ("d",)
-    assert Corpus.open(tmp_path / "corpus").names() == ("a", "b", "c", "d")
 
 
 @pytest.mark.usefixtures("tracked")
@@ -256,14 +229,14 @@ def test_two_at_a_time_are_refused(studio, tmp_path):
 
 @pytest.fixture
 def clips(tmp_path: Path) -> Path:
-    """A dozen GRID clips."""
+    """Six GRID clips."""
     pytest.importorskip("mediapipe")
     source = Path(__file__).parents[2].parent / "shared" / "corpora" / "grid-s1" / "clips"
     if not source.is_dir():
         pytest.skip("the real recordings are not here")
     folder = tmp_path / "clips"
     folder.mkdir()
-    for path in sorted(source.glob("*.mkv"))[:12]:
+    for path in sorted(source.glob("*.mkv"))[:6]:
         (folder / path.name).symlink_to(path)
     return folder
 
@@ -317,7 +290,7 @@ def test_real_clips_in_two_processes_stopped_and_gone_on(clips, tmp_path, stop):
         assert len(Corpus.open(tmp_path / "corpus")) == done
     report = prepare(clips, tmp_path / "corpus", workers=2)
     assert len(report.kept) == done
-    assert len(report.prepared) == 12 - done
+    assert len(report.prepared) == 6 - done
     assert not list((tmp_path / "corpus").rglob(".part-*"))
 
     prepare(clips, tmp_path / "whole", workers=1)

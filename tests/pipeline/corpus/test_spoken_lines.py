@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.errors import InputError
 from lipmotion.pipeline.corpus.spoken_lines import spoken_lines, transcript_beside
 from lipmotion.types import TimedTranscript, TimedWord, TranscriptLine
 
@@ -48,16 +47,6 @@ def test_subtitles_come_before_plain_text(tmp_path: Path) -> None:
     transcript = transcript_beside(tmp_path / "talk.mp4")
     assert transcript is not None
     assert transcript.has_times
-
-
-def test_no_file_no_transcript(tmp_path: Path) -> None:
-    assert transcript_beside(tmp_path / "talk.mp4") is None
-
-
-def test_a_damaged_file_is_named(tmp_path: Path) -> None:
-    (tmp_path / "talk.txt").write_text("0.5\t1.5\thello\nand then\n")
-    with pytest.raises(InputError, match=r"talk\.txt: line 2 is 'and then'"):
-        transcript_beside(tmp_path / "talk.mp4")
 
 
 def test_times_that_are_missing() -> None:

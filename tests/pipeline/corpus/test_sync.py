@@ -19,7 +19,7 @@ from lipmotion.types import Audio, Channel, Motion, Span, Timeline, Track, Unit,
 from lipmotion.vision.track import track
 
 RATE_HZ = 16_000
-COUNT = 6
+COUNT = 4
 
 
 def voice(seed: int, late_s: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
@@ -63,7 +63,7 @@ def test_each_collection_has_its_own(corpus: Corpus) -> None:
     assert found.collections["there"].late_s - found.collections["here"].late_s == pytest.approx(0.12, abs=0.01)
     assert found.collections["there"].known
     assert [line.split(":")[0] for line in found.lines()] == ["here", "there"]
-    assert "known in 6 of 6 clips" in found.lines()[1]
+    assert "known in 4 of 4 clips" in found.lines()[1]
 
 
 def test_sync_moves_what_is_late_once(corpus: Corpus) -> None:
@@ -82,6 +82,7 @@ def test_sync_moves_what_is_late_once(corpus: Corpus) -> None:
         assert read_entry(again.folder(name))["settings"] == {"recipe": "9"}
     assert abs(offsets(again).collections["there"].late_s) < 0.005
     assert "there" not in sync(again)
+    assert module._moved(one, 0.02).source["offset_removed_ms"] == f"{1000 * late_s + 20:.1f}"
 
 
 def test_early_sound_gets_a_beginning(corpus: Corpus) -> None:
@@ -92,14 +93,14 @@ def test_early_sound_gets_a_beginning(corpus: Corpus) -> None:
     assert float(moved.source["offset_removed_ms"]) == -100
 
 
-@pytest.mark.parametrize(("late_s", "expected"), [(0.5, [0.0, 0.7, 2.5]), (-0.5, [0.0, 1.7, 3.5])])
-def test_labels_move_with_the_sound(corpus: Corpus, late_s: float, expected: list[float]) -> None:
+def test_labels_move_with_the_sound(corpus: Corpus) -> None:
     bounds = [0.0, 0.4, 1.2, 3.0]
     spans = tuple(Span(a, b, Unit(phone)) for (a, b), phone in zip(pairwise(bounds), ("sil", "aa", "m"), strict=True))
-    moved = module._moved(replace(corpus.utterance("here0"), phones=Timeline(spans)), late_s)
-    found = list(moved.phones)
-    assert [found[0].start_s, found[-1].start_s, found[-1].end_s] == pytest.approx(expected)
-    assert found[-1].end_s == pytest.approx(moved.audio.duration_s)
+    for late_s, expected in ((0.5, [0.0, 0.7, 2.5]), (-0.5, [0.0, 1.7, 3.5])):
+        moved = module._moved(replace(corpus.utterance("here0"), phones=Timeline(spans)), late_s)
+        found = list(moved.phones)
+        assert [found[0].start_s, found[-1].start_s, found[-1].end_s] == pytest.approx(expected)
+        assert found[-1].end_s == pytest.approx(moved.audio.duration_s)
 
 
 def test_curves_without_lips_are_passed_over(corpus: Corpus) -> None:
@@ -124,7 +125,7 @@ def test_lips_that_do_not_follow_are_left_alone(corpus: Corpus) -> None:
 @pytest.mark.long
 @pytest.mark.video
 @pytest.mark.recordings
-@pytest.mark.parametrize("late_s", [-0.2, -0.06, 0.0, 0.13])
+@pytest.mark.parametrize("late_s", [-0.06, 0.13])
 def test_other_speakers_on_video(recordings: Path, tmp_path: Path, late_s: float) -> None:
     pytest.importorskip("mediapipe")
     corpus = Corpus.create(tmp_path / "corpus")

@@ -39,17 +39,16 @@ def numbers(sequence: BackgroundSequence, shown: list[Background]) -> list[int]:
     return [int(np.abs(places - each.face_to_frame.ravel()).sum(axis=1).argmin()) for each in shown]
 
 
-@pytest.mark.parametrize("count", [1, 7, 50])
-def test_short_speech_shows_the_beginning(sequence: BackgroundSequence, count: int) -> None:
-    shown = list(sequence.frames(count, 25.0))
-    assert numbers(sequence, shown) == list(range(count))
-    for number, each in enumerate(shown):
-        assert each.chin_px == pytest.approx(sequence.chin_px[number])
+def test_short_speech_shows_the_beginning(sequence: BackgroundSequence) -> None:
+    for count in (1, 50):
+        shown = list(sequence.frames(count, 25.0))
+        assert numbers(sequence, shown) == list(range(count))
+        assert [each.chin_px for each in shown] == pytest.approx(sequence.chin_px[:count])
 
 
-@pytest.mark.parametrize("count", [51, 173])
-def test_any_length(sequence: BackgroundSequence, count: int) -> None:
+def test_any_length(sequence: BackgroundSequence) -> None:
     """It goes on without a jump: neither the picture nor the place of the face."""
+    count = 130
     shown = list(sequence.frames(count, 25.0))
     assert len(shown) == count
     steps = [np.abs(a.frame.astype(int) - b.frame).mean() for a, b in pairwise(shown)]
@@ -59,13 +58,11 @@ def test_any_length(sequence: BackgroundSequence, count: int) -> None:
     assert len({each.frame.tobytes() for each in shown}) > 25
 
 
-@pytest.mark.parametrize(
-    ("rate_hz", "frames"), [(25.0, 50), (30.0, 58), (50.0, 98), (60.0, 118), (12.5, 24), (29.97, 58)]
-)
-def test_any_rate(sequence: BackgroundSequence, rate_hz: float, frames: int) -> None:
-    shown = numbers(sequence, list(sequence.frames(frames, rate_hz)))
-    assert len(shown) == frames
-    assert np.abs(np.array(shown) - np.arange(frames) / rate_hz * 25).max() <= 0.5 + 1e-6
+def test_any_rate(sequence: BackgroundSequence) -> None:
+    for rate_hz, frames in ((29.97, 58), (60.0, 60), (12.5, 24)):
+        shown = numbers(sequence, list(sequence.frames(frames, rate_hz)))
+        assert len(shown) == frames
+        assert np.abs(np.array(shown) - np.arange(frames) / rate_hz * 25).max() <= 0.5 + 1e-6
 
 
 def test_frames_are_those_that_were_filmed(sequence: BackgroundSequence, filmed_face: FilmedFace) -> None:

@@ -100,13 +100,6 @@ def test_no_videos(tmp_path: Path) -> None:
         takes_of(tmp_path / "empty.mp4")
 
 
-def test_a_video_that_cannot_be_read_is_left_to_tracking(videos: MakeVideos) -> None:
-    """There it is reported, and the others are used."""
-    folder = videos("a", "b")
-    (folder / "a.mkv").write_text("no video\n" * 99)
-    assert names(takes_of(folder)) == ["a", "b"]
-
-
 def prepared(folder: Path, files: list[str], speakers: tuple[str, ...] = ("",)) -> Corpus:
     """Return a corpus that says which videos it was prepared from."""
     corpus = Corpus.create(folder)

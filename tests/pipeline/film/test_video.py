@@ -10,16 +10,20 @@ import av
 import numpy as np
 import pytest
 
+from lipmotion.appearance.person import Appearance
 from lipmotion.errors import ExportError, InputError, ModelFormatError
 from lipmotion.export.synthetic_mark import SOURCE_TYPE
 from lipmotion.faces.filmed.face import FilmedFace
+from lipmotion.faces.filmed.renderer import Stitcher, StitchingOptions
 from lipmotion.faces.registry import face_named
 from lipmotion.pipeline.animate import animate, write
-from lipmotion.pipeline.film.video import FilmOptions, check_film, film_of, is_person_of, person_shown, write_film
+from lipmotion.pipeline.film import video as module
+from lipmotion.pipeline.film.background import stored_sequence
+from lipmotion.pipeline.film.video import FilmOptions, check_film, film_of, write_film
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import SpeechRequest
 from lipmotion.testing.toy import ToySentence, toy_motion
-from lipmotion.testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH, toy_face
+from lipmotion.testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH
 from lipmotion.types import Audio, Channel, Item, Motion, Progress
 from speech.sound import tone, write_sound
 
@@ -30,6 +34,12 @@ MIDDLE = (slice(150, 230), slice(70, 154))
 @pytest.fixture(scope="module")
 def motion(toy_sentence: ToySentence) -> Motion:
     return toy_motion(toy_sentence.units, 100.0)
+
+
+@pytest.fixture(scope="module")
+def brief(motion: Motion) -> Motion:
+    """The beginning of the sentence: 0.8 s, in which the mouth opens."""
+    return Motion(motion.values[40:120], 100.0, motion.channels)
 
 
 def dark(frames: list[np.ndarray]) -> np.ndarray:
@@ -45,31 +55,32 @@ def pictures(path: Path) -> tuple[list[np.ndarray], Any, dict[str, str]]:
         return frames, stream.average_rate, dict(container.metadata)
 
 
-@pytest.mark.parametrize("fps", [None, 12.5, 25.0, 30.0, 60.0])
-def test_any_rate(filmed_face: FilmedFace, motion: Motion, fps: float | None) -> None:
-    film = film_of(filmed_face, motion, fps=fps)
-    frames = list(film.frames)
-    assert film.rate_hz == pytest.approx(fps or 25.0)
-    assert len(frames) == int((len(motion.values) - 1) / 100 * film.rate_hz + 1e-9) + 1
-    assert {(frame.shape, str(frame.dtype)) for frame in frames} == {((FRAME_HEIGHT, FRAME_WIDTH, 3), "uint8")}
-    opening = motion.at(np.arange(len(frames)) / film.rate_hz)[:, 0]
-    assert np.corrcoef(dark(frames), opening)[0, 1] > 0.85
+def test_any_rate(filmed_face: FilmedFace, motion: Motion) -> None:
+    for fps in (None, 12.5, 30.0):
+        film = film_of(filmed_face, motion, fps=fps)
+        frames = list(film.frames)
+        assert film.rate_hz == pytest.approx(fps or 25.0)
+        assert len(frames) == int((len(motion.values) - 1) / 100 * film.rate_hz + 1e-9) + 1
+        assert {(frame.shape, str(frame.dtype)) for frame in frames} == {((FRAME_HEIGHT, FRAME_WIDTH, 3), "uint8")}
+        opening = motion.at(np.arange(len(frames)) / film.rate_hz)[:, 0]
+        assert np.corrcoef(dark(frames), opening)[0, 1] > 0.85
+    for fps in (0.0, -25.0, float("nan"), float("inf")):
+        with pytest.raises(InputError, match=r"the frame rate is .*, required more than 0"):
+            film_of(filmed_face, motion, fps=fps)
 
 
 def test_speech_longer_and_shorter_than_the_background(filmed_face: FilmedFace, motion: Motion) -> None:
-    long = Motion(np.tile(motion.values, (3, 1)), 100.0, motion.channels)
-    frames = list(film_of(filmed_face, long).frames)
-    assert len(frames) == pytest.approx(3 * len(motion.values) / 4, abs=1)
-    assert len(frames) > 3 * len(filmed_face.background.video)
-    short = Motion(motion.values[:9], 100.0, motion.channels)
-    assert len(list(film_of(filmed_face, short).frames)) == 3
-    one = Motion(motion.values[:1], 100.0, motion.channels)
-    assert len(list(film_of(filmed_face, one).frames)) == 1
+    frames = list(film_of(filmed_face, motion).frames)
+    assert len(frames) == pytest.approx(len(motion.values) / 4, abs=1)
+    assert len(frames) > len(filmed_face.background.video)
+    for samples, count in ((9, 3), (1, 1)):
+        short = Motion(motion.values[:samples], 100.0, motion.channels)
+        assert len(list(film_of(filmed_face, short).frames)) == count
 
 
-def test_the_jaw_follows_what_it_is_told(filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence) -> None:
-    closed = Motion(np.tile([[0.0, 0.55, 0.22]], (len(motion.values), 1)), 100.0, motion.channels)
-    sound = toy_sentence.audio
+def test_the_jaw_follows_what_it_is_told(filmed_face: FilmedFace, brief: Motion, toy_sentence: ToySentence) -> None:
+    closed = Motion(np.tile([[0.0, 0.55, 0.22]], (len(brief.values), 1)), 100.0, brief.channels)
+    sound = Audio(toy_sentence.audio.samples[16_000 * 4 // 10 :], 16_000)
     films = {
         jaw: np.stack(list(film_of(filmed_face, closed, sound=sound, options=FilmOptions(jaw=jaw)).frames)).astype(int)
         for jaw in ("motion", "energy", "none")
@@ -80,14 +91,7 @@ def test_the_jaw_follows_what_it_is_told(filmed_face: FilmedFace, motion: Motion
     shown = np.stack([each.copy() for each in filmed_face.background.video.frames(range(20))]).astype(int)
     assert np.array_equal(films["none"][:20][:, 225:], shown[:, 225:])  # the background's own jaw
     with pytest.raises(InputError, match="a jaw that follows the energy needs the sound; give the recording"):
-        film_of(filmed_face, motion, options=FilmOptions(jaw="energy"))
-
-
-@pytest.mark.long
-def test_the_same_motion_is_the_same_film(filmed_face: FilmedFace, motion: Motion) -> None:
-    """The frames are the same; what x264 makes of them is not ours."""
-    one, other = (np.stack(list(film_of(filmed_face, motion).frames)) for _ in range(2))
-    assert np.array_equal(one, other)
+        film_of(filmed_face, brief, options=FilmOptions(jaw="energy"))
 
 
 @pytest.mark.long
@@ -102,26 +106,17 @@ def test_sound_and_pictures_are_as_long(
     assert np.abs(np.stack(frames).astype(int) - np.stack(drawn)).mean() < 2
 
 
-@pytest.mark.parametrize("mark", ["metadata", "visible", "none"])
-def test_the_mark(
-    filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence, tmp_path: Path, mark: Any
-) -> None:
-    path = tmp_path / "a.mp4"
-    write_film(path, film_of(filmed_face, motion), toy_sentence.audio, mark=mark)
-    frames, _, tags = pictures(path)
-    assert tags.get("comment", "").startswith("synthetic:") == (mark != "none")
-    assert (SOURCE_TYPE.encode() in path.read_bytes()) == (mark != "none")
-    plain = np.stack(list(film_of(filmed_face, motion).frames))[::10].astype(int)
-    corners = np.abs(np.stack(frames)[::10].astype(int) - plain)[:, -40:]
-    assert (corners.max() > 60) == (mark == "visible")
-
-
-@pytest.mark.long
-def test_the_mark_is_the_default(
-    filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence, tmp_path: Path
-) -> None:
-    write_film(tmp_path / "a.mp4", film_of(filmed_face, motion), toy_sentence.audio)
-    assert pictures(tmp_path / "a.mp4")[2]["comment"].startswith("synthetic:")
+def test_the_mark(filmed_face: FilmedFace, brief: Motion, tmp_path: Path) -> None:
+    path, sound = tmp_path / "a.mp4", Audio(np.zeros(16_000 * 8 // 10, np.float32), 16_000)
+    plain = np.stack(list(film_of(filmed_face, brief).frames))[::10].astype(int)
+    for mark in ("metadata", "visible", "none"):
+        options: dict[str, Any] = {} if mark == "metadata" else {"mark": mark}  # it is the default
+        write_film(path, film_of(filmed_face, brief), sound, **options)
+        frames, _, tags = pictures(path)
+        assert tags.get("comment", "").startswith("synthetic:") == (mark != "none")
+        assert (SOURCE_TYPE.encode() in path.read_bytes()) == (mark != "none")
+        corners = np.abs(np.stack(frames)[::10].astype(int) - plain)[:, -40:]
+        assert (corners.max() > 60) == (mark == "visible")
 
 
 def test_motion_that_the_face_cannot_show(
@@ -135,12 +130,6 @@ def test_motion_that_the_face_cannot_show(
     with pytest.raises(InputError, match="not finite"):
         write_film(tmp_path / "a.mp4", film_of(filmed_face, Motion(broken, 100.0, motion.channels)), toy_sentence.audio)
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("fps", [0.0, -25.0, float("nan"), float("inf")])
-def test_rates_that_are_none(filmed_face: FilmedFace, motion: Motion, fps: float) -> None:
-    with pytest.raises(InputError, match=r"the frame rate is .*, required more than 0"):
-        film_of(filmed_face, motion, fps=fps)
 
 
 def test_overlays_need_the_video(filmed_face: FilmedFace, motion: Motion, toy_speech: Path, tmp_path: Path) -> None:
@@ -225,20 +214,6 @@ def test_eigenlips_become_the_person(
     assert len(pictures(tmp_path / "a.mp4")[0]) == len(frames)
 
 
-def test_whose_motion_it_is(filmed_face: FilmedFace, toy_model: Model, pictured_model: Model) -> None:
-    assert is_person_of(toy_model, filmed_face)
-    assert person_shown(toy_model, filmed_face) is None
-    other = replace(filmed_face, about=filmed_face.about | {"corpus": ["someone/else"]})
-    assert not is_person_of(toy_model, other)
-    assert person_shown(toy_model, other) is other
-    people = replace(toy_model, about=toy_model.about | {"speakers": ["anna", "ben"]})
-    ben = replace(filmed_face, about=filmed_face.about | {"speaker": "ben"})
-    assert [is_person_of(people, ben, name) for name in ("ben", "anna", "")] == [True, False, False]
-    pictured = replace(pictured_model, about=pictured_model.about | {"visual": "eigenlips"})
-    with pytest.raises(InputError, match=r"mouth pictures of the person of toy, the face is that of another"):
-        is_person_of(pictured, other)
-
-
 @pytest.mark.long
 def test_another_persons_motion_is_mapped_onto_the_face(
     toy_model: Model, filmed_face: FilmedFace, toy_sentence: ToySentence
@@ -285,8 +260,21 @@ def _spoiled(data: np.ndarray) -> np.ndarray:
     return changed
 
 
-@pytest.mark.long
-def test_large_footage(motion: Motion) -> None:
-    face = toy_face(3, scale=2)
-    frames = list(film_of(face, Motion(motion.values[::5], 20.0, motion.channels)).frames)
-    assert np.corrcoef(dark(frames), motion.at(np.arange(len(frames)) / 25)[:, 0])[0, 1] > 0.8
+def test_a_mouth_over_the_speakers_own_is_larger_and_has_no_jaw(
+    filmed_face: FilmedFace, brief: Motion, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    video = write_sound(tmp_path / "a.mkv", tone(16_000, 2.0), 16_000, "flac", video=True)
+    stitched, sequence = [], stored_sequence(filmed_face.background)
+
+    class Noted(Stitcher):
+        def __init__(self, appearance: Appearance, options: StitchingOptions) -> None:
+            stitched.append(options.jaw)
+            super().__init__(appearance, options)
+
+    monkeypatch.setattr(module, "Stitcher", Noted)
+    monkeypatch.setattr(module, "open_background", lambda *_, in_time: sequence if in_time else None)
+    film_of(filmed_face, brief)
+    film = film_of(filmed_face, brief, speech=video, fps=50.0, options=FilmOptions(overlay="mouth"))
+    assert stitched == [True, False]
+    assert film.rate_hz == pytest.approx(25.0)
+    assert film.covered == pytest.approx(sequence.enlarged(1.3).face_box)

@@ -16,6 +16,7 @@ from lipmotion.pipeline.training.transcripts import (
     warn_of_doubtful_transcripts,
     warn_of_missing_transcripts,
 )
+from lipmotion.speech.agreement import DOUBTFUL_SCORE, TranscriptFit
 from lipmotion.testing.toy import toy_sentences, toy_utterances
 from lipmotion.types import Timeline, Unit, Utterance
 
@@ -23,11 +24,11 @@ SMALL = HmmConfig(mixtures=1, iterations=2)
 Labelled = list[tuple[Utterance, Timeline[Unit]]]
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def labelled() -> Labelled:
     """Utterances whose transcripts are right, with their phones in time."""
     sentences = toy_sentences(12)[:3]
-    return [(utterance, said.units) for utterance, said in zip(toy_utterances(12), sentences, strict=False)]
+    return [(utterance, said.units) for utterance, said in zip(toy_utterances(12)[:3], sentences, strict=True)]
 
 
 def messages(caplog: pytest.LogCaptureFixture) -> list[str]:
@@ -92,3 +93,15 @@ def test_only_some_are_named(labelled: Labelled, caplog: pytest.LogCaptureFixtur
     assert "take09 and 4 more)" in text
     warn_of_missing_transcripts(many)  # that none has words is said elsewhere
     assert len(caplog.records) == 1
+
+
+def test_of_two_alignments_the_better_one_counts(
+    labelled: Labelled, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It may cover more of the speech and fit it worse."""
+    first, second = TranscriptFit(DOUBTFUL_SCORE, ((0.0, 3.0),), 4.0), TranscriptFit(DOUBTFUL_SCORE - 0.1, (), 4.0)
+    fits = iter([first, second, second, first])
+    monkeypatch.setattr(module, "transcript_fit", lambda *_: next(fits))
+    for _ in range(2):
+        warn_of_doubtful_transcripts(labelled[:1], lambda utterance: utterance.phones)  # type: ignore[arg-type,return-value]
+    assert ["leave out words" in text for text in messages(caplog)] == [True, True]
