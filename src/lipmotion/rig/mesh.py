@@ -53,6 +53,23 @@ class MeshPart:
     material: Material = Material()
 
 
+class PartNames:
+    """Gives parts names that no other part has."""
+
+    def __init__(self) -> None:
+        self._numbers: dict[str, int] = {}
+
+    def unused(self, owner: str, material: str) -> str:
+        """Return the name of the owner, with that of the material where it is taken, and a number where both are."""
+        both = f"{owner} {material}".strip()
+        name = owner if owner not in self._numbers else both
+        while name in self._numbers:
+            self._numbers[both] += 1
+            name = f"{both} {self._numbers[both]}"
+        self._numbers[name] = 1
+        return name
+
+
 @dataclass(frozen=True, eq=False)
 class Blendshape:
     """A named displacement of some of the vertices of a mesh.
