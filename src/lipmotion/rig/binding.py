@@ -26,7 +26,7 @@ eye distances."""
 MOST_WEIGHTS = 8
 """Most control points that a vertex follows."""
 LEAST_WEIGHT = 1e-3
-VERTICES_AT_ONCE = 1 << 16
+VERTICES_AT_ONCE = 1 << 13
 SOFTNESS = 0.03
 """Added to all distances, in eye distances: without it every control point would stick out of its surroundings."""
 PLATEAU = 0.4
@@ -93,13 +93,13 @@ def bind(mesh: Mesh, surface: MeshSurface, placement: LipPlacement) -> ControlBi
     template = mouth_template()
     reach = np.where(template.jaw, JAW_REACH, np.where(template.lower, LOWER_REACH, UPPER_REACH))[:, None]
     limit = float(reach.max()) * placement.scale
-    distances = surface.place_distances(placement.vertices, limit) / placement.scale
+    distances = surface.place_distances(placement.vertices, limit)
     inside = _inside(mesh, surface, placement)
     followers = np.array([placement.row(point) for point in JAW_FOLLOWERS])
     parts = []
     for first in range(0, len(mesh.vertices), VERTICES_AT_ONCE):
         rows = slice(first, first + VERTICES_AT_ONCE)
-        far = np.minimum(distances[:, surface.places[rows]], reach)
+        far = np.minimum(distances[:, surface.places[rows]] / placement.scale, reach)
         pulls = ((reach - far) / (reach * (far + SOFTNESS))) ** 2
         out = np.clip((np.min(far / reach, axis=0) - PLATEAU) / (1 - PLATEAU), 0.0, 1.0)
         held = (1 - out) ** 2 * (1 + 2 * out)  # from 1 to 0, with slope 0 at both ends
