@@ -177,7 +177,7 @@ class _SceneSurface:
 
     def _skin(self, number: int) -> Skin:
         if number not in self._skins:
-            self._skins[number] = read_skin(self._document.items("skins")[number], self._arrays, self._nodes)
+            self._skins[number] = read_skin(self._document, number, self._arrays, self._nodes)
         return self._skins[number]
 
     def _add_targets(

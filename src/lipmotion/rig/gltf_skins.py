@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.rig.bones import Bone
 from lipmotion.rig.gltf_accessors import GltfArrays
+from lipmotion.rig.gltf_container import GltfDocument
 from lipmotion.rig.gltf_nodes import PlacedNode
 from lipmotion.rig.gltf_schema import LARGEST_NUMBER, MOST_GROUPS
 
@@ -32,17 +32,20 @@ class Skin:
     matrices: Matrix
 
 
-def read_skin(skin: Mapping[str, Any], arrays: GltfArrays, nodes: Mapping[int, PlacedNode]) -> Skin:
+def read_skin(document: GltfDocument, number: int, arrays: GltfArrays, nodes: Mapping[int, PlacedNode]) -> Skin:
     """Return a skin of a document at rest. Raises InputError: a joint is not in the scene, or matrices are missing."""
-    if not all(joint in nodes for joint in skin["joints"]):
+    skin = document.items("skins")[number]
+    listed, inverse = skin["joints"], skin.get("inverseBindMatrices")
+    count = len(listed) if inverse is None else arrays.count(inverse)
+    document.budget.spend("joints", max(count, len(listed)))
+    if not all(joint in nodes for joint in listed):
         raise InputError("a skin with joints that are not in the scene; export it again")
-    joints = tuple(nodes[joint] for joint in skin["joints"])
+    if count < len(listed):
+        raise InputError(f"{count} matrices of {len(listed)} joints; export it again")
+    joints = tuple(nodes[joint] for joint in listed)
     matrices = np.array([joint.matrix for joint in joints])
-    if "inverseBindMatrices" in skin:
-        inverse = arrays.floats(skin["inverseBindMatrices"], 16).reshape(-1, 4, 4).transpose(0, 2, 1)
-        if len(inverse) < len(joints):
-            raise InputError(f"{len(inverse)} matrices of {len(joints)} joints; export it again")
-        matrices = matrices @ inverse[: len(joints)]
+    if inverse is not None:
+        matrices = matrices @ arrays.floats(inverse, 16)[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
     return Skin(joints, matrices[:, :3])
 
 

@@ -17,6 +17,7 @@ MOST = {
     "values in a document": 1_000_000,
     "lines": 5_000_000,
     "nodes": 10_000,
+    "joints": 100_000,
     "parts": 2_000,
     "vertices": 250_000,
     "corners of textures": 1_000_000,
@@ -24,13 +25,14 @@ MOST = {
     "blendshapes": 1_000,
     "morph targets": 20_000,
     "displacements": 8_000_000,
-    "numbers": 200_000_000,
+    "numbers": 80_000_000,
     "compressed bytes": 1 << 26,
     "bytes of pictures": 1 << 28,
     "pixels of pictures": 1 << 27,
 }
 """The most that one character may have, all of its files, nodes and parts together.
 
+joints        : of all skins, or their matrices
 parts         : primitives, counted again for every node that shows them
 morph targets : of all parts;  displacements : vertices that they, or expressions, move
 numbers       : of the arrays that are read;  compressed bytes : of them, what is decoded from meshopt
@@ -48,9 +50,7 @@ class Budget:
         """Count something before it is made. Raises InputError: the character would have more of it than ``MOST``."""
         self._spent[what] += count
         if self._spent[what] > MOST[what]:
-            raise InputError(
-                f"{self._spent[what]} {what}, required at most {MOST[what]}; reduce the mesh or its textures"
-            )
+            raise InputError(f"{self._spent[what]} {what}, required at most {MOST[what]}; reduce the mesh, or pictures")
 
     def file_bytes(self, path: Path, kind: str) -> bytes:
         """Return the content of a file, which counts.

@@ -28,14 +28,14 @@ LARGEST_LIBRARY = 1 << 20
 MOST_CORNERS = 1000
 """Most corners of a polygon."""
 LONGEST_LINE = 1 << 16
-AT_ONCE = 1000
-"""Lines that are counted at once."""
 OPAQUE_FROM = 250
 """A texture with pixels of a lower opacity than this, of 255, has holes."""
 _NO_COLOUR = (np.nan,) * 3
 _SHININESS = 60.0
 """A specular exponent (``Ns``) of so much is a gloss of 1/2."""
-_LINE = re.compile(rb"([^\r\n]*)(?:\r\n?|\n|\Z)")
+_REST = rb")(?=\s|\Z)[^\r\n\\]*(?:\\(?:\r?\n)?[^\r\n\\]*)*)"
+_STATEMENTS = re.compile(rb"(?:\A|(?<=[\r\n]))[ \t]*((?:v|vt|f|o|g|usemtl|mtllib" + _REST)
+_LOOKS = re.compile(rb"(?:\A|(?<=[\r\n]))[ \t]*((?:newmtl|map_Kd|Kd|Ns|d|Tf" + _REST)
 _VERTEX = re.compile(rb"(?:\A|[\r\n])v[ \t]([^\r\n]*)")
 
 
@@ -103,7 +103,7 @@ def read_obj(path: Path) -> Mesh:
     budget = Budget()
     surface, number = _Surface(budget), 0
     try:
-        for line, words in _lines(budget.file_bytes(path, "mesh"), budget):
+        for line, words in _lines(budget.file_bytes(path, "mesh"), _STATEMENTS, budget):
             number = line
             surface.add(words[0], words[1:])
         number = 0
@@ -227,21 +227,16 @@ def _damaged(path: Path, error: ValueError, number: int = 0) -> InputError:
     )
 
 
-def _lines(content: bytes, budget: Budget) -> Iterator[tuple[int, list[bytes]]]:
-    """Yield the number of each line that is not empty, and its words; a backslash at the end of a line continues it."""
-    before: list[bytes] = []
-    for number, line in enumerate(_LINE.finditer(content), start=1):
-        if number % AT_ONCE == 0:
-            budget.spend("lines", AT_ONCE)
-        if line.end() - line.start() > LONGEST_LINE or len(before) > LONGEST_LINE:
-            raise InputError(f"a line of more than {LONGEST_LINE} bytes, around line {number}")
-        words = line[1].split()
-        if words and words[-1].endswith(b"\\"):
-            before += [*words[:-1], words[-1][:-1]] if words[-1] != b"\\" else words[:-1]
-            continue
-        if before or words:
-            yield number, before + words
-            before = []
+def _lines(content: bytes, kinds: re.Pattern[bytes], budget: Budget) -> Iterator[tuple[int, list[bytes]]]:
+    """Yield the number of each line of some kinds, and its words; a backslash at the end of a line continues it."""
+    budget.spend("lines", max(content.count(b"\n"), content.count(b"\r")))
+    number, at = 1, 0
+    for line in kinds.finditer(content):
+        number += content.count(b"\n", at, line.start())
+        at = line.start()
+        if line.end() - at > LONGEST_LINE:
+            raise InputError(f"a line of {line.end() - at} bytes, required at most {LONGEST_LINE}, in line {number}")
+        yield number, line[1].replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").split()
 
 
 def _add_vertex(vertices: array[float], words: list[bytes]) -> None:
@@ -281,7 +276,7 @@ def _materials(folder: Path, library: str, used: Collection[str], budget: Budget
     found: dict[str, Material] = {}
     pictures: dict[str, str] = {}
     name = ""
-    for _, words in _lines(budget.file_bytes(path, "material library"), budget):
+    for _, words in _lines(budget.file_bytes(path, "material library"), _LOOKS, budget):
         if words[0] == b"newmtl":
             name = _text(words[1:])
             found[name] = Material(name)
