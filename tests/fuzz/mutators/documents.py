@@ -43,7 +43,7 @@ def document_in(name: str, content: bytes) -> Document | None:
 
 def change(chance: Random, content: bytes) -> bytes:
     """Change the document of a GLB, and keep the sizes right; or the rest of it, as bytes."""
-    found = document_in(".glb", content)
+    found = document_in("a.glb", content)
     if found is None or chance.random() < 0.15:
         return raw.change(chance, content)
     text, written = found
