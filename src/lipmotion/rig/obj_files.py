@@ -280,7 +280,7 @@ def _materials(folder: Path, library: str, used: Collection[str], budget: Budget
         if words[0] == b"newmtl":
             name = _text(words[1:])
             found[name] = Material(name)
-        elif name in used and len(words) > 1:
+        elif name in found and name in used and len(words) > 1:
             if words[0] == b"map_Kd":
                 pictures[name] = _text(words[-1:])
             else:
