@@ -1,16 +1,21 @@
-"""A fuzzing campaign: inputs are changed repeatedly; those that reach new lines or messages are changed further."""
+"""A fuzzing campaign: inputs are changed repeatedly; those that reach new lines or messages are changed further.
+
+Of readers of JSON, every other input has a hostile value in one place of a good document, until all have been read.
+"""
 
 from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from itertools import chain, zip_longest
 from random import Random
 
 from fuzz.inputs import Files, Good, Reader, digest
 from fuzz.judge import CRASH, HANG, READ, REFUSED, WRONG, Result
 from fuzz.mutators import mutated
+from fuzz.mutators.documents import systematic
 from fuzz.worker import Worker
 
 ACCEPTED, RECENT = 0.7, 0.5
@@ -70,14 +75,14 @@ def campaign(
     chance, record, seen = Random(f"{seed} {reader.name}"), CampaignRecord(reader.name), set[bytes]()
     accepted, refused = list[Files](), list[Files]()
     queue = reader.seeds(good)
+    order = Random(seed)
+    planned = chain.from_iterable(_in_turn([systematic(files, order) for files in queue]))
     start_s = time.monotonic()
     while (queue or going_on(record)) and record.kinds[HANG] + record.kinds[CRASH] < STOP_AFTER:
         first = bool(queue)
-        files = (
-            queue.pop(0)
-            if first
-            else mutated(chance, _chosen(chance, accepted, refused), chance.choice(accepted + refused))
-        )
+        files = queue.pop(0) if first else next(planned, None) if record.made % 2 else None
+        if files is None:
+            files = mutated(chance, _chosen(chance, accepted, refused), chance.choice(accepted + refused))
         record.made += 1
         if digest(files) in seen:
             continue
@@ -90,6 +95,11 @@ def campaign(
             (accepted if result.kind == READ else refused).append(files)
     record.kept, record.seconds = len(accepted + refused), time.monotonic() - start_s
     return record
+
+
+def _in_turn(inputs: list[Iterator[Files]]) -> Iterator[tuple[Files, ...]]:
+    """Yield one of each list of inputs, until all have ended."""
+    return (tuple(files for files in row if files is not None) for row in zip_longest(*inputs))
 
 
 def _chosen(chance: Random, accepted: list[Files], refused: list[Files]) -> Files:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 
+from fuzz.character_floods import CHARACTER_FLOODS
 from fuzz.inputs import Files
 from robustness.motion_cases import GOOD
 
@@ -40,5 +41,6 @@ FLOODS: dict[tuple[str, str], Callable[[], Files]] = {
     ("units", "units"): lambda: _units(60_000),
     ("labels", "a word time of many letters"): lambda: {"grid.align": b"0 1 sil\n" + b"9," * 100_000},
     ("labels", "a tier's kind of many letters"): lambda: {"a.TextGrid": TIER % (b"9" * 100_000)},
+    **{("character", name): made for name, made in CHARACTER_FLOODS.items()},
 }
 """By reader and name."""

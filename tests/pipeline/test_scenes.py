@@ -119,10 +119,10 @@ def test_the_sound_is_named_from_the_folder_of_the_file(tmp_path: Path) -> None:
 
 def test_the_sound_is_in_the_extras_of_the_scene(character: Scene, tmp_path: Path) -> None:
     write_scene(tmp_path / "a.glb", character, tmp_path / "said.wav")
-    stored = read_gltf_document(tmp_path / "a.glb").items("scenes")[0]
+    stored = read_gltf_document(tmp_path / "a.glb").json["scenes"][0]
     assert stored["extras"] == {"audio": {"uri": "said.wav", "start_s": 0.0}}
     write_scene(tmp_path / "b.glb", character)
-    assert "extras" not in read_gltf_document(tmp_path / "b.glb").items("scenes")[0]
+    assert "extras" not in read_gltf_document(tmp_path / "b.glb").json["scenes"][0]
 
 
 @pytest.mark.parametrize(
@@ -137,7 +137,7 @@ def test_a_sound_that_does_not_begin_with_the_animation(
     write_glb(tmp_path / "head.glb", head())
     for name, scene in (("a.glb", moved), ("b.glb", replace(moved, original=None))):
         write_scene(tmp_path / name, scene, tmp_path / "said.wav")
-        stored = read_gltf_document(tmp_path / name).items("scenes")[0]
+        stored = read_gltf_document(tmp_path / name).json["scenes"][0]
         assert stored["extras"] == {"audio": {"uri": "said.wav", "start_s": sound_s}}
     write_scene(tmp_path / "a.usda", moved, tmp_path / "said.wav")
     written = [line.strip() for line in (tmp_path / "a.usda").read_text().splitlines()]
@@ -158,7 +158,7 @@ def test_held_weights_change_at_once_and_others_do_not(character: Scene, tmp_pat
     write_scene(tmp_path / "a.usda", scene)
     assert "        1.99: [0, 0.995]," in (tmp_path / "a.usda").read_text()
     write_scene(tmp_path / "a.glb", scene)
-    (sampler,) = read_gltf_document(tmp_path / "a.glb").items("animations")[0]["samplers"]
+    (sampler,) = read_gltf_document(tmp_path / "a.glb").json["animations"][0]["samplers"]
     stored = GltfArrays(read_gltf_document(tmp_path / "a.glb"))
     assert stored.floats(sampler["input"], 1)[:, 0] == pytest.approx(time_s)
     assert stored.floats(sampler["output"], 1)[:, 0] == pytest.approx(table.reshape(-1))

@@ -49,10 +49,10 @@ def test_everything_stays_and_the_animation_comes_first(original: Path, tmp_path
     for name in ("images", "meshes", "materials", "nodes"):
         assert after.items(name) == before.items(name)
     assert after.json["asset"] == before.json["asset"]
-    assert [each["name"] for each in after.items("animations")] == ["speech", "dance"]
-    assert after.items("accessors")[: len(before.items("accessors"))] == before.items("accessors")
+    assert [each["name"] for each in after.json["animations"]] == ["speech", "dance"]
+    assert after.json["accessors"][: len(before.json["accessors"])] == before.json["accessors"]
     assert after.buffers[0][: len(before.buffers[0])] == before.buffers[0]
-    assert after.items("scenes")[0]["extras"] == {"audio": {"uri": "a.wav", "start_s": 0.0}}
+    assert after.json["scenes"][0]["extras"] == {"audio": {"uri": "a.wav", "start_s": 0.0}}
     assert read_character(tmp_path / "a.glb").shape_names == head().shape_names
 
 
@@ -60,7 +60,7 @@ def test_the_animation_has_the_weights(original: Path, tmp_path: Path) -> None:
     moved = weights("jawOpen", "mouthFunnel")
     assert write_animated_gltf(tmp_path / "a.glb", original, moved)
     document = read_gltf_document(tmp_path / "a.glb")
-    sampler = document.items("animations")[0]["samplers"][0]
+    sampler = document.json["animations"][0]["samplers"][0]
     arrays = GltfArrays(document)
     assert arrays.floats(sampler["input"], 1)[:, 0] == pytest.approx(moved.time_s, abs=1e-6)
     stored = arrays.floats(sampler["output"], 1).reshape(9, -1)
@@ -73,7 +73,7 @@ def test_held_weights_change_at_once(original: Path, tmp_path: Path) -> None:
     moved = Motion(np.array([[0.0], [0.0], [1.0]]), 10.0, (Channel("jawOpen", WEIGHT),))
     assert write_animated_gltf(tmp_path / "a.glb", original, moved, stepped=["jawOpen"])
     document = read_gltf_document(tmp_path / "a.glb")
-    sampler = document.items("animations")[0]["samplers"][0]
+    sampler = document.json["animations"][0]["samplers"][0]
     assert GltfArrays(document).floats(sampler["input"], 1)[:, 0] == pytest.approx([0, 0.1, 0.199, 0.2])
     stored = GltfArrays(document).floats(sampler["output"], 1).reshape(4, -1)
     assert stored[:, head().shape_names.index("jawOpen")] == pytest.approx([0, 0, 0, 1])

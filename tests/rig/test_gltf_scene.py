@@ -142,7 +142,7 @@ def _changed(change):
     ("change", "message"),
     [
         (lambda c: c["asset"].update(version="1.0"), "version '1.0', required 2.0"),
-        (lambda c: c.pop("asset"), "names no asset"),
+        (lambda c: c.pop("asset"), "asset is missing"),
         (lambda c: c.update(extensionsRequired=["KHR_draco_mesh_compression"]), "Draco"),
         (lambda c: c.update(extensionsRequired=["EXT_unheard_of"]), "'EXT_unheard_of', which is not read"),
         (lambda c: c["accessors"][0].update(count=5), "leads out"),
@@ -155,11 +155,11 @@ def _changed(change):
         (lambda c: c["buffers"][0].update(uri="../secret.bin"), "same folder"),
         (lambda c: c["buffers"][0].update(uri="data:;base64,@@@"), "base64"),
         (lambda c: c["nodes"][0].update(children=[0]), "twice"),
-        (lambda c: c["nodes"][0].update(mesh=7), "refers to meshes 7 of 1"),
-        (lambda c: c["nodes"][0].update(scale=[1, "two", 3]), "list of 3 numbers"),
+        (lambda c: c["nodes"][0].update(mesh=7), r"nodes\[0\].mesh is 7, required the number of one of its 1 meshes"),
+        (lambda c: c["nodes"][0].update(scale=[1, "two", 3]), r"nodes\[0\].scale\[1\] is 'two', required a number"),
         (lambda c: c["meshes"][0]["primitives"][0].update(mode=1), "no triangles"),
-        (lambda c: c["meshes"][0]["primitives"][0].update(targets=[{"POSITION": 3}] * 2), "required 3 numbers"),
-        (lambda c: c.update(meshes={}), "no list of objects"),
+        (lambda c: c["meshes"][0]["primitives"][0].update(targets=[{"POSITION": 3}] * 2), "moves 6 of 4 vertices"),
+        (lambda c: c.update(materials={}), "materials is an object, required a list"),
     ],
 )
 def test_what_is_wrong_is_said(tmp_path, change, message):

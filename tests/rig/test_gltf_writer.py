@@ -34,7 +34,7 @@ def test_the_animation_has_the_weights(tmp_path, weights):
     mesh = head()
     write_glb(tmp_path / "head.glb", mesh, weights)
     document = read_gltf_document(tmp_path / "head.glb")
-    sampler = document.items("animations")[0]["samplers"][0]
+    sampler = document.json["animations"][0]["samplers"][0]
     arrays = GltfArrays(document)
     np.testing.assert_allclose(arrays.floats(sampler["input"], 1)[:, 0], weights.time_s, atol=1e-6)
     stored = arrays.floats(sampler["output"], 1).reshape(7, -1)
@@ -55,5 +55,5 @@ def test_colours_of_vertices_come_back(tmp_path):
     painted = type(mesh)(mesh.vertices, mesh.triangles, mesh.parts, colours=colours)
     write_glb(tmp_path / "head.glb", painted)
     document = read_gltf_document(tmp_path / "head.glb")
-    primitive = document.items("meshes")[0]["primitives"][0]
+    primitive = document.json["meshes"][0]["primitives"][0]
     assert "COLOR_0" in primitive["attributes"]

@@ -91,7 +91,7 @@ def test_their_opacity_counts_as_the_material_says(tmp_path, mode, textured):
     [
         (lambda accessor: accessor.update(componentType=5122), "required VEC3 or VEC4"),
         (lambda accessor: accessor.update(type="VEC2"), "required VEC3 or VEC4"),
-        (lambda accessor: accessor.update(count=3), "colours of 3 vertices, required 4"),
+        (lambda accessor: accessor.update(count=3), "an array of 3 elements, required 4"),
     ],
 )
 def test_colours_that_do_not_fit_are_refused(tmp_path, change, message):

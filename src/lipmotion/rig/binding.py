@@ -26,6 +26,7 @@ eye distances."""
 MOST_WEIGHTS = 8
 """Most control points that a vertex follows."""
 LEAST_WEIGHT = 1e-3
+VERTICES_AT_ONCE = 1 << 13
 SOFTNESS = 0.03
 """Added to all distances, in eye distances: without it every control point would stick out of its surroundings."""
 PLATEAU = 0.4
@@ -92,19 +93,21 @@ def bind(mesh: Mesh, surface: MeshSurface, placement: LipPlacement) -> ControlBi
     template = mouth_template()
     reach = np.where(template.jaw, JAW_REACH, np.where(template.lower, LOWER_REACH, UPPER_REACH))[:, None]
     limit = float(reach.max()) * placement.scale
-    distances = surface.distances(placement.vertices, limit) / placement.scale
-    near = np.isfinite(distances).any(axis=0)
-    far = np.minimum(distances[:, near], reach)
-    pulls = ((reach - far) / (reach * (far + SOFTNESS))) ** 2
-    out = np.clip((np.min(far / reach, axis=0) - PLATEAU) / (1 - PLATEAU), 0.0, 1.0)
-    held = (1 - out) ** 2 * (1 + 2 * out)  # from 1 to 0, with slope 0 at both ends
-    weights = np.zeros((len(mesh.vertices), len(placement.points)))
-    weights[near] = (pulls / np.maximum(pulls.sum(axis=0), 1e-12) * held).T
+    distances = surface.place_distances(placement.vertices, limit)
     inside = _inside(mesh, surface, placement)
-    weights[inside] = 0.0
     followers = np.array([placement.row(point) for point in JAW_FOLLOWERS])
-    weights[np.ix_(np.flatnonzero(inside), followers)] = 1 / len(JAW_FOLLOWERS)
-    return _strongest(placement, weights)
+    parts = []
+    for first in range(0, len(mesh.vertices), VERTICES_AT_ONCE):
+        rows = slice(first, first + VERTICES_AT_ONCE)
+        far = np.minimum(distances[:, surface.places[rows]] / placement.scale, reach)
+        pulls = ((reach - far) / (reach * (far + SOFTNESS))) ** 2
+        out = np.clip((np.min(far / reach, axis=0) - PLATEAU) / (1 - PLATEAU), 0.0, 1.0)
+        held = (1 - out) ** 2 * (1 + 2 * out)  # from 1 to 0, with slope 0 at both ends
+        weights = (pulls / np.maximum(pulls.sum(axis=0), 1e-12) * held).T
+        weights[inside[rows]] = 0.0
+        weights[np.ix_(np.flatnonzero(inside[rows]), followers)] = 1 / len(JAW_FOLLOWERS)
+        parts.append(_strongest(weights, first))
+    return ControlBinding(placement, *map(np.concatenate, zip(*parts, strict=True)))
 
 
 def painted(binding: ControlBinding, mesh: Mesh, paint: Mapping[int, Mapping[int, float]]) -> ControlBinding:
@@ -128,18 +131,22 @@ def painted(binding: ControlBinding, mesh: Mesh, paint: Mapping[int, Mapping[int
                 raise InputError(f"the weight of point {point} on vertex {vertex} is {value:g}, required 0 to 1")
             weights[vertex, binding.placement.row(point)] = value
         weights[vertex] /= max(float(weights[vertex].sum()), 1.0)
-    return _strongest(binding.placement, weights)
+    return ControlBinding(binding.placement, *_strongest(weights))
 
 
-def _strongest(placement: LipPlacement, weights: Array) -> ControlBinding:
-    """Return a binding of the largest weights of each vertex; what is left out goes to those that are kept."""
+def _strongest(weights: Array, first: int = 0) -> tuple[Rows, Rows, Array]:
+    """Return the rows, controls and weights of a binding: the largest weights of each vertex [shape=(N, C)].
+
+    first : the number of the first vertex
+    What is left out goes to those that are kept.
+    """
     total = weights.sum(axis=1)
     rows = np.flatnonzero(total > LEAST_WEIGHT)
     controls = np.argsort(-weights[rows], axis=1, kind="stable")[:, :MOST_WEIGHTS]
     controls.sort(axis=1)
     kept = np.take_along_axis(weights[rows], controls, axis=1)
     kept *= (total[rows] / np.maximum(kept.sum(axis=1), 1e-12))[:, None]
-    return ControlBinding(placement, rows, controls.astype(np.int64), np.minimum(kept, 1.0))
+    return first + rows, controls.astype(np.int64), np.minimum(kept, 1.0)
 
 
 def _inside(mesh: Mesh, surface: MeshSurface, placement: LipPlacement) -> NDArray[np.bool_]:
@@ -150,8 +157,6 @@ def _inside(mesh: Mesh, surface: MeshSurface, placement: LipPlacement) -> NDArra
     lips = places[placement.vertices[~template.jaw]]
     centre, front = lips.mean(axis=0), float(lips[:, 2].max())
     half = float(np.ptp(lips[:, 0])) / 2
-    result = np.zeros(len(places), bool)
-    touched = set(surface.pieces[placement.vertices].tolist())
     within = (
         (np.abs(places[:, 0] - centre[0]) < 1.2 * half) & (places[:, 2] < front) & (places[:, 2] > front - 2 * _CAVITY)
     )
@@ -160,10 +165,9 @@ def _inside(mesh: Mesh, surface: MeshSurface, placement: LipPlacement) -> NDArra
     sizes = np.bincount(surface.pieces, minlength=count)
     heights = np.bincount(surface.pieces, places[:, 1], count) / np.maximum(sizes, 1)
     covered = np.bincount(surface.pieces[within], minlength=count) == sizes
-    for piece in np.flatnonzero(covered & (heights < centre[1])):
-        if piece not in touched:
-            result |= surface.pieces == piece
-    return result
+    chosen = covered & (heights < centre[1])
+    chosen[surface.pieces[placement.vertices]] = False
+    return np.asarray(chosen[surface.pieces])
 
 
 def _listed(points: Sequence[int]) -> str:

@@ -107,8 +107,9 @@ def _looks(
     one, two = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
     downwards = uv * (1.0, -1.0) + (0.0, 1.0)
     in_texture = 0.5 * np.abs(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0])
-    for number, part in enumerate(mesh.parts):
-        mine, material = parts == number, part.material
+    ends = np.cumsum(np.bincount(parts, minlength=len(mesh.parts)))
+    for mine, part in zip(np.split(np.argsort(parts, kind="stable"), ends[:-1]), mesh.parts, strict=True):
+        material = part.material
         looks[mine] = -1, SOLID
         if material.texture is not None:
             kind = {MASK: CUT, BLEND: CLEAR}.get(material.alpha, SOLID)
@@ -124,10 +125,10 @@ def _looks(
     return TexturedTriangles(np.zeros((0, 3), np.int32), downwards, looks, alphas, table.texels, table.levels)
 
 
-def _thin(material: Material, opacity: Array, mine: NDArray[np.bool_], looks: NDArray[np.int32], alphas: Array) -> None:
+def _thin(material: Material, opacity: Array, mine: Rows, looks: NDArray[np.int32], alphas: Array) -> None:
     """Multiply the opacity of a part's triangles by that of their vertices, the mean of each triangle's, in place.
 
-    opacity : of the triangles of the part [shape=(N,)];  mine : which ones these are [shape=(F,)]
+    opacity : of the triangles of the part;  mine : which ones these are [shape=(N,), both]
     """
     kind, hides, seen = (CUT, material.cutoff, material.cutoff) if material.alpha == MASK else (CLEAR, HIDES, SEEN)
     whole = material.opacity * opacity

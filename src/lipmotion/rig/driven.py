@@ -126,8 +126,7 @@ class DrivenCharacter:
         return self._moved(tuple(self._other_names.values()))
 
     def _moved(self, names: Sequence[str]) -> Array:
-        chosen = [self.mesh.shape_names.index(name) for name in names]
-        return self.mesh.displacements(self.moving)[chosen].reshape(len(chosen), 3 * len(self.moving))
+        return self.mesh.displacements(self.moving, names).reshape(len(names), 3 * len(self.moving))
 
     def _beside(self, others: Mapping[str, Array], count: int) -> Array:
         """Return the weights of the blendshapes of eyes and brows over time [shape=(T, S)]."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Collection
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError
 from lipmotion.rig.gltf_container import GltfDocument, read_gltf_document, write_container
 from lipmotion.rig.gltf_scene import target_names
 from lipmotion.rig.scene import with_jumps
@@ -38,50 +36,45 @@ def write_animated_gltf(
     """
     document = read_gltf_document(original)
     binary = document.buffers.get(0)
-    buffers = document.items("buffers")
-    if binary is None or not buffers or "uri" in buffers[0] or len(document.buffers) > 1 or not len(weights.values):
+    if binary is None or "uri" in document.items("buffers")[0] or len(document.buffers) > 1 or not len(weights.values):
         return False
     moved = _moved_nodes(document, weights)
     if not set(weights.names) <= {name for _, names in moved for name in names}:
         return False
-    json = copy.deepcopy(dict(document.json))
-    body = bytearray(binary[: json["buffers"][0].get("byteLength", len(binary))])
+    json = document.json
+    body = bytearray(binary[: document.items("buffers")[0].get("byteLength", len(binary))])
     chosen = [name in stepped for name in weights.names]
     time_s, rows = with_jumps(weights.time_s, weights.values.astype(np.float64), chosen)
     times = _added(json, body, time_s, limits=True)
-    samplers: list[dict[str, Any]] = []
+    samplers: dict[tuple[str, ...], dict[str, Any]] = {}
     channels: list[dict[str, Any]] = []
     for node, names in moved:
-        table = np.zeros((len(rows), len(names)))
-        for column, name in enumerate(names):
-            if name in weights.names:
-                table[:, column] = rows[:, weights.column(name)]
-        channels.append({"sampler": len(samplers), "target": {"node": node, "path": "weights"}})
-        output = _added(json, body, table.reshape(-1))
-        samplers.append({"input": times, "output": output, "interpolation": "LINEAR"})
-    json.setdefault("animations", []).insert(0, {"name": "speech", "channels": channels, "samplers": samplers})
+        if names not in samplers:
+            document.budget.spend("morph targets", len(names))
+            table = np.zeros((len(rows), len(names)))
+            for column, name in enumerate(names):
+                if name in weights.names:
+                    table[:, column] = rows[:, weights.column(name)]
+            output = _added(json, body, table.reshape(-1))
+            samplers[names] = {"input": times, "output": output, "interpolation": "LINEAR"}
+        channels.append({"sampler": list(samplers).index(names), "target": {"node": node, "path": "weights"}})
+    animation = {"name": "speech", "channels": channels, "samplers": [*samplers.values()]}
+    json.setdefault("animations", []).insert(0, animation)
     json["buffers"][0]["byteLength"] = len(body)
     if sound:
-        scene = json["scenes"][json.get("scene", 0)]
-        extras = scene.get("extras")
-        scene["extras"] = (extras if isinstance(extras, dict) else {}) | {"audio": {"uri": sound, "start_s": sound_s}}
+        shown = json["scenes"][json.get("scene", 0)] if json.get("scenes") else json
+        extras = shown.get("extras")
+        shown["extras"] = (extras if isinstance(extras, dict) else {}) | {"audio": {"uri": sound, "start_s": sound_s}}
     write_container(path, json, bytes(body))
     return True
 
 
-def _moved_nodes(document: GltfDocument, weights: Motion) -> list[tuple[int, list[str]]]:
+def _moved_nodes(document: GltfDocument, weights: Motion) -> list[tuple[int, tuple[str, ...]]]:
     """Return the nodes whose mesh has morph targets that move, with the names of all of its targets."""
     found = []
     for number, node in enumerate(document.items("nodes")):
-        if "mesh" not in node:
-            continue
-        mesh = document.item("meshes", node["mesh"])
-        primitives = mesh.get("primitives")
-        first = primitives[0] if isinstance(primitives, list) and primitives else {}
-        targets = first.get("targets", []) if isinstance(first, dict) else []
-        if not isinstance(targets, list):
-            raise InputError("morph targets that are no list of objects; export it again")
-        names = target_names(mesh, first, len(targets)) if targets else []
+        mesh = document.items("meshes")[node["mesh"]] if "mesh" in node else {}
+        names = tuple(target_names(mesh, mesh["primitives"][0])) if mesh.get("primitives") else ()
         if set(names) & set(weights.names):
             found.append((number, names))
     return found

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.rig.gltf_accessors import COMPONENTS, WIDTHS, GltfArrays
+from lipmotion.rig.gltf_accessors import GltfArrays
 from lipmotion.rig.gltf_container import GltfDocument
+from lipmotion.rig.gltf_schema import COMPONENTS, WIDTHS
 from lipmotion.rig.lighting import linear
 from lipmotion.rig.mesh import OPAQUE, Material
 
@@ -18,7 +17,7 @@ WHITE = (1.0, 1.0, 1.0)
 """The colour of a primitive that has colours of vertices and no material."""
 
 
-def vertex_tints(document: GltfDocument, arrays: GltfArrays, number: Any, count: int) -> Array:
+def vertex_tints(document: GltfDocument, arrays: GltfArrays, number: int, count: int) -> Array:
     """Return the light and the opacity by which those of a material are multiplied, 0 to 1 [shape=(N, 4)].
 
     number : of the accessor of ``COLOR_0``: three or four numbers, of floats or of bytes or shorts without a sign;
@@ -26,18 +25,15 @@ def vertex_tints(document: GltfDocument, arrays: GltfArrays, number: Any, count:
     count  : of the vertices
     Raises InputError: another kind of numbers, another number of vertices, or as ``GltfArrays.floats``.
     """
-    accessor = document.item("accessors", number)
-    width = WIDTHS.get(str(accessor.get("type")), 0)
-    kind = np.dtype(COMPONENTS.get(accessor.get("componentType", 0), "<i1"))
+    accessor = document.items("accessors")[number]
+    width, kind = WIDTHS[accessor["type"]], np.dtype(COMPONENTS[accessor["componentType"]])
     if width not in {3, 4} or not (kind.kind == "f" or (kind.kind == "u" and kind.itemsize < 4)):
         raise InputError(
-            f"colours of vertices are {accessor.get('type')!r} of {accessor.get('componentType')!r}, required VEC3 or "
-            "VEC4 of floats, unsigned bytes or unsigned shorts; export it again"
+            f"colours of vertices are {accessor['type']!r} of {accessor['componentType']!r}, required VEC3 or VEC4 of "
+            "floats, unsigned bytes or unsigned shorts; export it again"
         )
-    values = arrays.floats(number, width)
-    if len(values) != count:
-        raise InputError(f"colours of {len(values)} vertices, required {count}; export it again")
-    if kind.kind == "u" and accessor.get("normalized") is not True:
+    values = arrays.floats(number, width, count)
+    if kind.kind == "u" and not accessor.get("normalized"):
         values = values / np.iinfo(kind).max
     tints = np.ones((count, 4))
     tints[:, :width] = np.clip(values, 0, 1)

@@ -12,14 +12,16 @@ from typing import Any
 from urllib.parse import unquote
 
 from lipmotion.errors import InputError, shortened
-from lipmotion.rig.limits import LARGEST_FILE, file_bytes
+from lipmotion.rig.gltf_schema import ASSET, gltf_schema
+from lipmotion.rig.limits import Budget
 from lipmotion.storage.files import whole_file
+from lipmotion.storage.json_schema import SchemaError
 from lipmotion.storage.json_text import as_json, from_json
 
 MAGIC, VERSION = b"glTF", 2
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
-LARGEST_DOCUMENT = 1 << 25
-"""Most bytes of the JSON document."""
+MOST_CHUNKS = 100
+LONGEST_NAME = 1000
 READABLE = {
     *("KHR_mesh_quantization", "EXT_meshopt_compression", "KHR_meshopt_compression"),
     *("KHR_texture_basisu", "EXT_texture_webp", "EXT_texture_avif", "KHR_texture_transform"),
@@ -34,43 +36,36 @@ extensions are accepted as well."""
 class GltfDocument:
     """The JSON of a glTF file, and its buffers.
 
-    json    : the document, an object
+    json    : the document as it was written
+    parts   : what is used of it, of the types and in the ranges of ``gltf_schema``
+    folder  : where the files are that the document names
+    budget  : what has been read so far
     buffers : by number; a buffer that only the extension for compression could use is missing
-    folder  : where the files are that the document names; None: it may name none
     """
 
-    json: Mapping[str, Any]
-    buffers: Mapping[int, bytes] = field(default_factory=dict)
-    folder: Path | None = None
+    json: dict[str, Any]
+    parts: Mapping[str, Any]
+    folder: Path
+    budget: Budget
+    buffers: dict[int, memoryview] = field(default_factory=dict)
 
     def items(self, name: str) -> list[dict[str, Any]]:
-        """Return a list of objects of the document; none if it is missing. Raises InputError: it is something else."""
-        found = self.json.get(name, [])
-        if not isinstance(found, list) or not all(isinstance(item, dict) for item in found):
-            raise InputError(f"its {name!r} is no list of objects; export it again")
+        """Return a list of objects of the document; none if it is missing."""
+        found: list[dict[str, Any]] = self.parts.get(name, [])
         return found
 
-    def item(self, name: str, number: Any) -> dict[str, Any]:
-        """Return one object of such a list. Raises InputError: there is none of this number."""
-        found = self.items(name)
-        if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < len(found):
-            raise InputError(f"it refers to {name} {shortened(repr(number))} of {len(found)}; export it again")
-        return found[number]
-
-    def linked(self, uri: Any, kind: str) -> bytes:
+    def linked(self, uri: str, kind: str) -> bytes:
         """Return what an address in the document stands for: bytes inside of it, or a file in the same folder.
 
         kind : what it should be, for messages
         Raises InputError: no such file, a file elsewhere, too large, or damaged.
         """
-        if not isinstance(uri, str) or self.folder is None:
-            raise InputError(f"its {kind} has no address; export it again")
         if uri.startswith("data:"):
-            return _data(uri)
-        name = unquote(uri)
-        if not name or Path(name).name != name or "\\" in name or "\0" in name:
+            return _data(uri, kind)
+        name = unquote(uri) if len(uri) <= LONGEST_NAME else uri
+        if not name or len(name) > LONGEST_NAME or Path(name).name != name or "\\" in name or "\0" in name:
             raise InputError(f"its {kind} is {shortened(repr(name))}, required a file in the same folder")
-        return file_bytes(self.folder / name, kind)
+        return self.budget.file_bytes(self.folder / name, kind)
 
 
 def read_gltf_document(path: Path) -> GltfDocument:
@@ -79,22 +74,29 @@ def read_gltf_document(path: Path) -> GltfDocument:
     Buffers in files of their own are read only from the folder of the file.
     Raises InputError: damaged, too large, version 1, or it requires an extension that is not known.
     """
-    content = file_bytes(path, "mesh")
+    budget = Budget()
+    content = memoryview(budget.file_bytes(path, "mesh"))
     text, binary = _chunks(content) if content[:4] == MAGIC else (content, None)
-    if len(text) > LARGEST_DOCUMENT:
-        raise InputError(f"a document of {len(text)} bytes, required at most {LARGEST_DOCUMENT}; reduce it")
+    budget.spend("bytes of a document", len(text))
+    json = _json(bytes(text).rstrip(b"\0 "), budget)
     try:
-        json = from_json(text.rstrip(b"\0 "))
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"no glTF document ({shortened(str(error))}); give a .glb, .gltf or .vrm file") from error
-    if not isinstance(json, dict) or not isinstance(json.get("asset"), dict):
-        raise InputError("no glTF document: it names no asset; give a .glb, .gltf or .vrm file")
-    version = str(json["asset"].get("version", ""))
+        version = ASSET(json)["asset"]["version"]
+    except SchemaError as error:
+        raise InputError(f"no glTF document: {error}; give a .glb, .gltf or .vrm file") from error
     if version.split(".", maxsplit=1)[0] != str(VERSION):
-        raise InputError(f"glTF version {shortened(version)!r}, required 2.0; export it again")
-    _check_extensions(json.get("extensionsRequired", []))
-    document = GltfDocument(json, folder=path.parent)
-    return GltfDocument(json, _buffers(document, binary), path.parent)
+        raise InputError(f"glTF version {version!r}, required 2.0; export it again")
+    try:
+        document = GltfDocument(json, gltf_schema(json)(json), path.parent, budget)
+    except SchemaError as error:
+        raise InputError(f"{error}; export it again") from error
+    _check_extensions(document.parts.get("extensionsRequired", []))
+    _add_buffers(document, binary)
+    return document
+
+
+def plain_name(name: str) -> str:
+    """Return a name, or its beginning, on one line, which UTF-8 can encode."""
+    return " ".join(name[:LONGEST_NAME].encode("utf-8", "replace").decode().split())
 
 
 def write_container(path: Path, json: dict[str, Any], body: bytes) -> None:
@@ -108,7 +110,7 @@ def write_container(path: Path, json: dict[str, Any], body: bytes) -> None:
         file.write(struct.pack("<II", len(padded), BINARY_CHUNK) + padded)
 
 
-def _chunks(content: bytes) -> tuple[bytes, bytes | None]:
+def _chunks(content: memoryview) -> tuple[memoryview, memoryview | None]:
     """Return the document and the bytes of a GLB."""
     if len(content) < 20:
         raise InputError(f"{len(content)} bytes, required a whole .glb; copy it again")
@@ -117,9 +119,11 @@ def _chunks(content: bytes) -> tuple[bytes, bytes | None]:
         raise InputError(f"a .glb of version {version}, required {VERSION}; export it again")
     if length > len(content):
         raise InputError(f"{len(content)} bytes, required {length} as its header says; copy it again")
-    chunks: dict[int, bytes] = {}
+    chunks: dict[int, memoryview] = {}
     position = 12
-    while position + 8 <= length:
+    for _ in range(MOST_CHUNKS):
+        if position + 8 > length:
+            break
         size, kind = struct.unpack_from("<II", content, position)
         if position + 8 + size > length:
             raise InputError(f"a part of {size} bytes at {position}, required at most {length - position - 8} bytes")
@@ -130,37 +134,36 @@ def _chunks(content: bytes) -> tuple[bytes, bytes | None]:
     return chunks[JSON_CHUNK], chunks.get(BINARY_CHUNK)
 
 
-def _check_extensions(required: Any) -> None:
-    for name in required if isinstance(required, list) else []:
+def _json(text: bytes, budget: Budget) -> Any:
+    """Return the content of JSON text. Raises InputError: it is damaged, or has too many values."""
+    budget.spend("values in a document", sum(text.count(mark) for mark in (b",", b"[", b"{")))
+    try:
+        return from_json(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"no glTF document ({shortened(str(error))}); give a .glb, .gltf or .vrm file") from error
+
+
+def _check_extensions(required: list[str]) -> None:
+    for name in required:
         if name == "KHR_draco_mesh_compression":
             raise InputError("it is compressed by Draco, which is not read; export it without, or with meshopt")
-        if name not in READABLE and not str(name).startswith("KHR_materials_"):
-            raise InputError(
-                f"it requires the extension {shortened(str(name))!r}, which is not read; export without it"
-            )
+        if name not in READABLE and not name.startswith("KHR_materials_"):
+            raise InputError(f"it requires the extension {shortened(name)!r}, which is not read; export without it")
 
 
-def _buffers(document: GltfDocument, binary: bytes | None) -> dict[int, bytes]:
-    buffers: dict[int, bytes] = {}
-    total = 0
+def _add_buffers(document: GltfDocument, binary: memoryview | None) -> None:
     for number, buffer in enumerate(document.items("buffers")):
-        uri = buffer.get("uri")
-        if uri is None:
-            if number == 0 and binary is not None:
-                buffers[number] = binary
-        elif isinstance(uri, str):
-            buffers[number] = document.linked(uri, "buffer")
-        total += len(buffers.get(number, b""))
-        if total > LARGEST_FILE:
-            raise InputError(f"buffers of {total} bytes, required at most {LARGEST_FILE}; reduce the mesh")
-    return buffers
+        if "uri" in buffer:
+            document.buffers[number] = memoryview(document.linked(buffer["uri"], "buffer"))
+        elif number == 0 and binary is not None:
+            document.buffers[number] = binary
 
 
-def _data(uri: str) -> bytes:
+def _data(uri: str, kind: str) -> bytes:
     head, _, body = uri.partition(",")
     if not head.endswith(";base64"):
-        raise InputError(f"a buffer {shortened(head)!r}, required base64; export as .glb")
+        raise InputError(f"its {kind} is {shortened(head)!r}, required base64; export as .glb")
     try:
         return base64.b64decode(body, validate=True)
     except (binascii.Error, ValueError) as error:
-        raise InputError(f"a buffer that is no base64 ({error}); export as .glb") from error
+        raise InputError(f"its {kind} is no base64 ({error}); export as .glb") from error

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,48 +14,19 @@ from lipmotion.errors import InputError, shortened
 from lipmotion.rig.bones import Bone, merged_bones
 from lipmotion.rig.gltf_accessors import GltfArrays
 from lipmotion.rig.gltf_colours import WHITE, counted, tinted, vertex_tints
-from lipmotion.rig.gltf_container import GltfDocument, read_gltf_document
-from lipmotion.rig.gltf_skins import head_bones, held_bones, kinds_of_nodes, skin_weights
+from lipmotion.rig.gltf_container import GltfDocument, plain_name, read_gltf_document
+from lipmotion.rig.gltf_nodes import placed_nodes
+from lipmotion.rig.gltf_schema import LARGEST_NUMBER
+from lipmotion.rig.gltf_skins import Skin, head_bones, held_bones, read_skin, skin_weights, skinned_frames
 from lipmotion.rig.gltf_textures import GltfMaterials
-from lipmotion.rig.limits import (
-    MOST_DISPLACEMENTS,
-    MOST_SHAPES,
-    MOST_TRIANGLES,
-    MOST_VERTICES,
-    check_count,
-)
-from lipmotion.rig.mesh import Blendshape, Material, Mesh, MeshPart
+from lipmotion.rig.mesh import Blendshape, Material, Mesh, MeshPart, PartNames
 from lipmotion.rig.vrm import expression_shapes, looks_backwards
 
 Matrix = NDArray[np.float64]
 TRIANGLES = 4
 """The mode of primitives that are lists of triangles; strips, fans, lines and points are not read."""
-DEEPEST = 256
-"""Most levels of nodes."""
 LEAST = 1e-9
 """Vertices that a morph target moves by no more than this, in the unit of the file, are not stored."""
-
-
-@dataclass
-class _Surface:
-    """What the primitives have given so far."""
-
-    materials: GltfMaterials
-    vertices: list[Matrix] = field(default_factory=list)
-    triangles: list[NDArray[np.int64]] = field(default_factory=list)
-    uv: list[Matrix] = field(default_factory=list)
-    mapped: bool = False
-    colours: list[Matrix] = field(default_factory=list)
-    tints: list[Matrix] = field(default_factory=list)
-    tinted: bool = False
-    parts: list[tuple[str, Material]] = field(default_factory=list)
-    moved: dict[str, list[tuple[NDArray[np.int64], Matrix]]] = field(default_factory=dict)
-    targets: dict[tuple[int, int], str] = field(default_factory=dict)
-    first: dict[Any, int] = field(default_factory=dict)
-    blocks: dict[Any, int] = field(default_factory=dict)
-    bones: list[Bone] = field(default_factory=list)
-    count: int = 0
-    displacements: int = 0
 
 
 def read_gltf(path: Path) -> Mesh:
@@ -67,261 +38,183 @@ def read_gltf(path: Path) -> Mesh:
     Raises InputError: damaged, too large, or without triangles.
     """
     try:
-        document = read_gltf_document(path)
-        return _mesh(document, GltfArrays(document))
+        return _SceneSurface(read_gltf_document(path)).mesh()
     except InputError as error:
         text = str(error)
         raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from error
 
 
-def _mesh(document: GltfDocument, arrays: GltfArrays) -> Mesh:
-    surface = _Surface(GltfMaterials(document, arrays))
-    places = dict(_global_matrices(document))
-    for number, matrix in sorted(places.items()):
-        node = document.item("nodes", number)
-        if "mesh" in node:
-            _add_node(surface, document, arrays, node, matrix, places)
-    if not surface.triangles:
-        raise InputError("there are no triangles in it; export the surface")
-    vertices = np.concatenate(surface.vertices)
-    turn = np.array([-1.0, 1.0, -1.0]) if looks_backwards(document) else np.ones(3)
-    shapes = [
-        Blendshape(name, np.concatenate([rows for rows, _ in moved]), np.concatenate([way for _, way in moved]) * turn)
-        for name, moved in surface.moved.items()
-    ]
-    shapes += expression_shapes(document, surface.targets, shapes)
-    stops = np.cumsum([0, *(len(rows) for rows in surface.triangles)])
-    parts = tuple(
-        MeshPart(name, int(first), int(stop), material)
-        for (name, material), first, stop in zip(surface.parts, stops, stops[1:], strict=False)
-    )
-    return Mesh(
-        vertices * turn,
-        np.concatenate(surface.triangles).astype(np.int32),
-        parts,
-        tuple(shapes),
-        np.concatenate(surface.uv) if surface.mapped else None,
-        np.concatenate(surface.colours),
-        tuple(replace(bone, place=bone.place * turn) for bone in merged_bones(surface.bones)),
-        np.concatenate(surface.tints) if surface.tinted else None,
-    )
+@dataclass(frozen=True, eq=False)
+class _Block:
+    """Vertices that primitives of a node share: the number of the first one, and how they look."""
+
+    first: int
+    vertices: Matrix
+    colours: Matrix
+    tints: Matrix
 
 
-def _add_node(
-    surface: _Surface,
-    document: GltfDocument,
-    arrays: GltfArrays,
-    node: dict[str, Any],
-    matrix: Matrix,
-    places: dict[int, Matrix],
-) -> None:
-    mesh = document.item("meshes", node["mesh"])
-    primitives = mesh.get("primitives", [])
-    if not isinstance(primitives, list) or not all(isinstance(each, dict) for each in primitives):
-        raise InputError("a mesh without primitives; export it again")
-    name = _text(node.get("name") or mesh.get("name")) or f"mesh {node['mesh']}"
-    for primitive in primitives:
-        if primitive.get("mode", TRIANGLES) == TRIANGLES and isinstance(primitive.get("attributes"), dict):
-            _add_primitive(surface, document, arrays, node, primitive, (mesh, name), matrix, places)
+class _SceneSurface:
+    """The surface of a scene, primitive by primitive."""
+
+    def __init__(self, document: GltfDocument) -> None:
+        self._document, self._budget = document, document.budget
+        self._arrays = GltfArrays(document)
+        self._materials = GltfMaterials(document, self._arrays)
+        self._nodes = placed_nodes(document)
+        self._skins: dict[int, Skin] = {}
+        self._blocks: dict[Any, _Block] = {}
+        self._triangles: list[NDArray[np.int64]] = []
+        self._uv: list[Matrix] = []
+        self._parts: list[tuple[str, Material]] = []
+        self._names = PartNames()
+        self._moved: dict[str, list[tuple[NDArray[np.int64], Matrix]]] = {}
+        self._targets: dict[tuple[int, int], str] = {}
+        self._bones: list[Bone] = []
+        self._mapped = self._tinted = False
+        self._count = 0
+
+    def mesh(self) -> Mesh:
+        """Return the whole surface. Raises InputError: it is damaged or too large, or there are no triangles."""
+        for number in sorted(self._nodes):
+            node = self._document.items("nodes")[number]
+            if "mesh" in node:
+                self._add_node(number, node, self._document.items("meshes")[node["mesh"]])
+        if not self._triangles:
+            raise InputError("there are no triangles in it; export the surface")
+        turn = np.array([-1.0, 1.0, -1.0]) if looks_backwards(self._document) else np.ones(3)
+        shapes = [self._shape(name, turn) for name in list(self._moved)]
+        shapes += expression_shapes(self._document, self._targets, shapes)
+        stops = np.cumsum([0, *map(len, self._triangles)])
+        parts = tuple(
+            MeshPart(name, int(first), int(stop), material)
+            for (name, material), first, stop in zip(self._parts, stops, stops[1:], strict=False)
+        )
+        blocks = list(self._blocks.values())
+        return Mesh(
+            np.concatenate([block.vertices for block in blocks]) * turn,
+            np.concatenate(self._triangles).astype(np.int32),
+            parts,
+            tuple(shapes),
+            np.concatenate(self._uv) if self._mapped else None,
+            np.concatenate([block.colours for block in blocks]),
+            tuple(replace(bone, place=bone.place * turn) for bone in merged_bones(self._bones)),
+            np.concatenate([block.tints for block in blocks]) if self._tinted else None,
+        )
+
+    def _shape(self, name: str, turn: Matrix) -> Blendshape:
+        rows, moved = zip(*self._moved.pop(name), strict=True)
+        return Blendshape(name, np.concatenate(rows), np.concatenate(moved) * turn)
+
+    def _add_node(self, number: int, node: dict[str, Any], mesh: dict[str, Any]) -> None:
+        name = plain_name(node.get("name") or mesh.get("name", "")) or f"mesh {node['mesh']}"
+        self._budget.spend("parts", len(mesh["primitives"]))
+        for primitive in mesh["primitives"]:
+            if primitive.get("mode", TRIANGLES) == TRIANGLES and "POSITION" in primitive["attributes"]:
+                attributes = primitive["attributes"]
+                moved = tuple(target.get("POSITION") for target in primitive.get("targets", []))
+                shared = (number, attributes["POSITION"], attributes.get("COLOR_0"), moved)
+                if shared not in self._blocks:
+                    self._blocks[shared] = self._block(number, primitive, target_names(mesh, primitive))
+                self._add_primitive(primitive, name, self._blocks[shared])
+
+    def _add_primitive(self, primitive: dict[str, Any], name: str, block: _Block) -> None:
+        attributes, count = primitive["attributes"], len(block.vertices)
+        corners = self._corners(primitive, count)
+        if not corners.size:
+            return
+        material = self._materials.material(primitive.get("material"))
+        used = np.unique(corners)
+        tints = None
+        if "COLOR_0" in attributes:
+            material = material if "material" in primitive else replace(material, colour=WHITE)
+            tints = counted(vertex_tints(self._document, self._arrays, attributes["COLOR_0"], count)[used], material)
+            block.tints[used] = tints
+            self._tinted = True
+        colours = np.tile(material.colour, (len(used), 1))
+        mapped = np.zeros((corners.size // 3, 3, 2))
+        if "TEXCOORD_0" in attributes:
+            in_texture = self._arrays.floats(attributes["TEXCOORD_0"], 2, count)
+            in_texture = self._materials.moved(primitive.get("material"), in_texture)
+            mapped = (in_texture * (1.0, -1.0) + (0.0, 1.0))[corners].reshape(-1, 3, 2)
+            self._mapped = True
+            if material.texture is not None:
+                colours = material.texture.at(in_texture[used])[:, :3] * material.colour
+        block.colours[used] = colours if tints is None else tinted(colours, tints)
+        self._triangles.append(corners.reshape(-1, 3) + block.first)
+        self._parts.append((self._names.unused(name, material.name), material))
+        self._uv.append(mapped)
+
+    def _corners(self, primitive: dict[str, Any], count: int) -> NDArray[np.int64]:
+        """Return the vertices of the corners of triangles, counted in their block [shape=(3 · F,)]."""
+        size = self._arrays.count(primitive["indices"]) if "indices" in primitive else count
+        self._budget.spend("triangles", -(-size // 3))
+        corners = self._arrays.whole(primitive["indices"], 1)[:, 0] if "indices" in primitive else np.arange(count)
+        if size % 3 or (size and not 0 <= corners.min() <= corners.max() < count):
+            raise InputError(f"triangles of vertices up to {corners.max(initial=0)} of {count}; export it again")
+        return corners
+
+    def _block(self, number: int, primitive: dict[str, Any], names: list[str]) -> _Block:
+        """Return the vertices of a primitive at their places in the scene; keep its bones and morph targets."""
+        node, attributes = self._document.items("nodes")[number], primitive["attributes"]
+        count = self._arrays.count(attributes["POSITION"])
+        self._budget.spend("vertices", count)
+        vertices = self._arrays.floats(attributes["POSITION"], 3)
+        if "skin" in node:
+            skin = self._skin(node["skin"])
+            joints, weights = skin_weights(skin, self._arrays, attributes, count)
+            linear, shift = skinned_frames(skin, joints, weights)
+            self._bones += head_bones(skin, joints, weights, self._nodes, self._count)
+        else:
+            placed = self._nodes[number]
+            linear, shift = placed.matrix[:3, :3], placed.matrix[:3, 3]
+            self._bones += held_bones(placed, self._nodes, self._count, count)
+        self._add_targets(node["mesh"], primitive.get("targets", []), names, linear, count)
+        block = _Block(self._count, _mapped(linear, vertices) + shift, np.zeros((count, 3)), np.ones((count, 4)))
+        block.colours[:] = self._materials.material(primitive.get("material")).colour
+        self._count += count
+        return block
+
+    def _skin(self, number: int) -> Skin:
+        if number not in self._skins:
+            self._skins[number] = read_skin(self._document, number, self._arrays, self._nodes)
+        return self._skins[number]
+
+    def _add_targets(
+        self, mesh: int, targets: list[dict[str, Any]], names: list[str], linear: Matrix, count: int
+    ) -> None:
+        self._budget.spend("morph targets", len(targets))
+        for number, (name, target) in enumerate(zip(names, targets, strict=True)):
+            self._targets[(mesh, number)] = name
+            if name not in self._moved:
+                self._budget.spend("blendshapes", 1)
+            kept = self._moved.setdefault(name, [])
+            if "POSITION" not in target:
+                kept.append((np.zeros(0, np.int64), np.zeros((0, 3))))
+                continue
+            if self._arrays.count(target["POSITION"]) != count:
+                found = self._arrays.count(target["POSITION"])
+                raise InputError(f"the target {shortened(name)!r} moves {found} of {count} vertices; export it again")
+            moved = _mapped(linear, self._arrays.floats(target["POSITION"], 3))
+            rows = np.flatnonzero(np.abs(moved).max(axis=1, initial=0.0) > LEAST)
+            self._budget.spend("displacements", len(rows))
+            kept.append((rows + self._count, moved[rows]))
 
 
-def _add_primitive(
-    surface: _Surface,
-    document: GltfDocument,
-    arrays: GltfArrays,
-    node: dict[str, Any],
-    primitive: dict[str, Any],
-    owner: tuple[dict[str, Any], str],
-    matrix: Matrix,
-    places: dict[int, Matrix],
-) -> None:
-    attributes = primitive["attributes"]
-    targets = primitive.get("targets", [])
-    if not isinstance(targets, list) or not all(isinstance(target, dict) for target in targets):
-        raise InputError("morph targets that are no list of objects; export it again")
-    moved = tuple(target.get("POSITION") for target in targets)
-    shared = (id(node), attributes.get("POSITION"), attributes.get("COLOR_0"), moved)
-    if shared not in surface.first:
-        surface.first[shared], surface.blocks[shared] = surface.count, len(surface.vertices)
-        _add_vertices(surface, document, arrays, node, primitive, owner[0], matrix, places)
-    first = surface.first[shared]
-    count = len(arrays.floats(attributes.get("POSITION"), 3))
-    corners = arrays.whole(primitive["indices"])[:, 0] if "indices" in primitive else np.arange(count)
-    if corners.size % 3 or (corners.size and not 0 <= corners.min() <= corners.max() < count):
-        raise InputError(f"triangles of vertices up to {corners.max(initial=0)} of {count}; export it again")
-    material = surface.materials.material(primitive.get("material"))
-    check_count("triangles", sum(map(len, surface.triangles)) + corners.size // 3, MOST_TRIANGLES)
-    used, block = np.unique(corners), surface.colours[surface.blocks[shared]]
-    tints = None
-    if "COLOR_0" in attributes:
-        material = material if "material" in primitive else replace(material, colour=WHITE)
-        tints = counted(vertex_tints(document, arrays, attributes["COLOR_0"], count)[used], material)
-        surface.tints[surface.blocks[shared]][used] = tints
-        surface.tinted = True
-    block[used] = material.colour
-    mapped = np.zeros((corners.size // 3, 3, 2))
-    if "TEXCOORD_0" in attributes:
-        in_texture = arrays.floats(attributes["TEXCOORD_0"], 2)
-        if len(in_texture) != count:
-            raise InputError("texture coordinates of another number of vertices; export it again")
-        in_texture = surface.materials.moved(primitive.get("material"), in_texture)
-        mapped = (in_texture * (1.0, -1.0) + (0.0, 1.0))[corners].reshape(-1, 3, 2)
-        surface.mapped = True
-        if material.texture is not None:
-            block[used] = material.texture.at(in_texture[used])[:, :3] * material.colour
-    if tints is not None:
-        block[used] = tinted(block[used], tints)
-    if corners.size:
-        surface.triangles.append(corners.reshape(-1, 3) + first)
-        surface.parts.append((_unused(owner[1], material.name, surface), material))
-        surface.uv.append(mapped)
+def _mapped(linear: Matrix, vectors: Matrix) -> Matrix:
+    """Return vectors [shape=(N, 3)] under one matrix [shape=(3, 3)], or one each [shape=(N, 3, 3)]."""
+    mapped = vectors @ linear.T if linear.ndim == 2 else np.einsum("nij,nj->ni", linear, vectors)
+    if not (np.abs(mapped) <= LARGEST_NUMBER).all():
+        raise InputError(f"it has vertices beyond ±{LARGEST_NUMBER:g}; scale it down")
+    return mapped
 
 
-def _add_vertices(
-    surface: _Surface,
-    document: GltfDocument,
-    arrays: GltfArrays,
-    node: dict[str, Any],
-    primitive: dict[str, Any],
-    mesh: dict[str, Any],
-    matrix: Matrix,
-    places: dict[int, Matrix],
-) -> None:
-    """Add the vertices of a primitive and its morph targets, at their places in the scene."""
-    vertices = arrays.floats(primitive["attributes"].get("POSITION"), 3)
-    check_count("vertices", surface.count + len(vertices), MOST_VERTICES)
-    if "skin" in node:
-        joints, weights = skin_weights(document, arrays, node["skin"], primitive["attributes"], len(vertices))
-        linear, shift = _skinned(document, arrays, node["skin"], joints, weights, places)
-        surface.bones += head_bones(document, node["skin"], joints, weights, places, surface.count)
-        surface.vertices.append(np.einsum("nij,nj->ni", linear, vertices) + shift)
-    else:
-        linear = np.broadcast_to(matrix[:3, :3], (len(vertices), 3, 3))
-        surface.vertices.append(vertices @ matrix[:3, :3].T + matrix[:3, 3])
-        surface.bones += held_bones(kinds_of_nodes(document).get(id(node), {}), places, surface.count, len(vertices))
-    targets = primitive.get("targets", [])
-    check_count("blendshapes", len(targets), MOST_SHAPES)
-    surface.displacements += len(targets) * len(vertices)
-    check_count("displacements", surface.displacements, MOST_DISPLACEMENTS)
-    names = target_names(mesh, primitive, len(targets))
-    for number, (name, target) in enumerate(zip(names, targets, strict=True)):
-        surface.targets[(int(node["mesh"]), number)] = name
-        moved = arrays.floats(target["POSITION"], 3) if "POSITION" in target else np.zeros_like(vertices)
-        if moved.shape != vertices.shape:
-            raise InputError(f"the target {shortened(name)!r} moves {len(moved)} of {len(vertices)} vertices")
-        moved = np.einsum("nij,nj->ni", linear, moved)
-        rows = np.flatnonzero(np.abs(moved).max(axis=1, initial=0.0) > LEAST)
-        surface.moved.setdefault(name, []).append((rows + surface.count, moved[rows]))
-    colour = surface.materials.material(primitive.get("material")).colour
-    surface.colours.append(np.tile(colour, (len(vertices), 1)))
-    surface.tints.append(np.ones((len(vertices), 4)))
-    surface.count += len(vertices)
-
-
-def _skinned(
-    document: GltfDocument,
-    arrays: GltfArrays,
-    skin_number: Any,
-    joints: NDArray[np.int64],
-    weights: Matrix,
-    places: dict[int, Matrix],
-) -> tuple[Matrix, Matrix]:
-    """Return how a skin at rest maps every vertex: matrices [shape=(N, 3, 3)] and shifts [shape=(N, 3)]."""
-    skin = document.item("skins", skin_number)
-    listed = skin["joints"]
-    if not all(joint in places for joint in listed if isinstance(joint, int)):
-        raise InputError("a skin with joints that are not in the scene; export it again")
-    matrices = np.array([places.get(joint, np.eye(4)) for joint in listed])
-    if "inverseBindMatrices" in skin:
-        inverse = arrays.floats(skin["inverseBindMatrices"], 16).reshape(-1, 4, 4).transpose(0, 2, 1)
-        if len(inverse) < len(listed):
-            raise InputError(f"{len(inverse)} matrices of {len(listed)} joints; export it again")
-        matrices = matrices @ inverse[: len(listed)]
-    count = len(weights)
-    blended = np.zeros((count, 3, 4))
-    for column in range(weights.shape[1]):
-        blended += weights[:, column, None, None] * matrices[joints[:, column], :3]
-    total = weights.sum(axis=1)
-    held = total > 1e-6
-    blended[held] /= total[held, None, None]
-    blended[~held] = np.eye(4)[:3]
-    return blended[:, :, :3], blended[:, :, 3]
-
-
-def _global_matrices(document: GltfDocument) -> Iterator[tuple[int, Matrix]]:
-    """Yield every node of the scene with its matrix, parents first; every node once."""
-    nodes = document.items("nodes")
-    scene = document.json.get("scene", 0)
-    scenes = document.items("scenes")
-    children = {child for node in nodes for child in _numbers(node.get("children", []))}
-    roots = (
-        _numbers(document.item("scenes", scene).get("nodes", []))
-        if scenes
-        else sorted(set(range(len(nodes))) - children)
-    )
-    stack = [(root, np.eye(4), 0) for root in reversed(roots)]
-    seen: set[int] = set()
-    while stack:
-        number, parent, depth = stack.pop()
-        node = document.item("nodes", number)
-        if number in seen or depth > DEEPEST:
-            raise InputError(f"node {number} is in the scene twice, or too deep; export it again")
-        seen.add(number)
-        matrix = parent @ _local_matrix(node)
-        yield number, matrix
-        stack += [(child, matrix, depth + 1) for child in reversed(_numbers(node.get("children", [])))]
-
-
-def _local_matrix(node: dict[str, Any]) -> Matrix:
-    if "matrix" in node:
-        return _vector(node["matrix"], 16).reshape(4, 4).T
-    matrix = np.eye(4)
-    x, y, z, w = _vector(node.get("rotation", [0, 0, 0, 1]), 4)
-    matrix[:3, :3] = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    ) * _vector(node.get("scale", [1, 1, 1]), 3)
-    matrix[:3, 3] = _vector(node.get("translation", [0, 0, 0]), 3)
-    return matrix
-
-
-def _vector(value: Any, size: int) -> Matrix:
-    try:
-        vector = np.array(value, np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{shortened(repr(value))} is no list of {size} numbers; export it again") from error
-    if vector.shape != (size,) or not np.isfinite(vector).all() or np.abs(vector).max() > 1e9:
-        raise InputError(f"{shortened(repr(value))} is no list of {size} plausible numbers; export it again")
-    return vector
-
-
-def _numbers(value: Any) -> list[int]:
-    if not isinstance(value, list) or not all(isinstance(each, int) and not isinstance(each, bool) for each in value):
-        raise InputError(f"{shortened(repr(value))} is no list of nodes; export it again")
-    return value
-
-
-def target_names(mesh: dict[str, Any], primitive: dict[str, Any], count: int) -> list[str]:
-    """Return the names of morph targets; those without a name are numbered."""
+def target_names(mesh: Mapping[str, Any], primitive: Mapping[str, Any]) -> list[str]:
+    """Return the names of the morph targets of a primitive; those without a name are numbered."""
+    count = len(primitive.get("targets", []))
     for holder in (mesh, primitive):
-        extras = holder.get("extras")
-        names = extras.get("targetNames") if isinstance(extras, dict) else None
-        if isinstance(names, list) and len(names) >= count and len({_text(each) for each in names}) == len(names):
-            return [_text(name) or f"target {number}" for number, name in enumerate(names[:count])]
+        given = holder.get("extras", {}).get("targetNames", [])
+        names = [plain_name(name) or f"target {number}" for number, name in enumerate(given)]
+        if len(names) >= count and len(set(names)) == len(names):
+            return names[:count]
     return [f"target {number}" for number in range(count)]
-
-
-def _unused(owner: str, material: str, surface: _Surface) -> str:
-    """Return a name for a part that no other part has."""
-    taken = {name for name, _ in surface.parts}
-    if owner not in taken:
-        return owner
-    base = f"{owner} {material}".strip()
-    return next(name for name in (base, *(f"{base} {n}" for n in range(2, len(taken) + 3))) if name not in taken)
-
-
-def _text(value: Any) -> str:
-    return " ".join(str(value).split()) if isinstance(value, str | int) else ""

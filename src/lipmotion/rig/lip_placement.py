@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -42,7 +43,10 @@ DEPTH_WEIGHT = 0.35
 """Distances in depth count so much where a point is looked for, for lips protrude differently."""
 EYE_CORNERS = (33, 263)
 """The outer corners of the eyes, right and left; in a list of named points they give the upright direction."""
-_AT_ONCE = 64
+MOST_PAIRS, MOST_DISTANCES = 1_000_000, 1 << 30
+"""Pairs of vertices that are compared, about, and distances that are looked at for it: of meshes that are so dense
+around the mouth, only some vertices are compared."""
+DISTANCES_AT_ONCE = 1 << 22
 NEEDED = (RIGHT_CORNER, LEFT_CORNER, UPPER_MIDDLE, LOWER_MIDDLE)
 """The points that a list must name, where nothing is found by blendshapes."""
 
@@ -195,19 +199,34 @@ def _slit(vertices: Places, surface: MeshSurface, drop: Places, skin: NDArray[np
     low, high = np.flatnonzero(skin & (drop > SLIT_STEP)), np.flatnonzero(skin & (drop < 1 - SLIT_STEP))
     if not reach or not len(low) or not len(high):
         return np.zeros((0, 3))
-    nearest = _tree(vertices[high]).query_ball_point(vertices[low], reach)
-    listed = [(a, high[b]) for a, found in zip(low, nearest, strict=True) for b in found]
-    pairs = np.array(listed, np.int64).reshape(-1, 2)
+    tree = _tree(vertices[high])
+    count = int(tree.count_neighbors(_tree(vertices[low]), reach))
+    crowd = 1 + max(count // MOST_PAIRS, len(low) * len(vertices) // MOST_DISTANCES)
+    if crowd > 1:
+        low = np.sort(np.random.default_rng(0).choice(low, -(-len(low) // crowd), replace=False))
+    found = tree.query_ball_point(vertices[low], reach)
+    near = np.fromiter(chain.from_iterable(found), np.int64)
+    pairs = np.stack([np.repeat(low, [len(each) for each in found]), high[near]], axis=1)
     pairs = pairs[drop[pairs[:, 0]] - drop[pairs[:, 1]] > SLIT_STEP]
     pairs = pairs[_apart(vertices, surface, pairs, reach)]
     middle = (vertices[pairs[:, 0]] + vertices[pairs[:, 1]]) / 2
-    if not len(middle):
-        return middle
-    front = np.zeros(len(middle), bool)
-    tree = _tree(middle[:, :1])
-    for number, around in enumerate(tree.query_ball_point(middle[:, :1], reach / 4)):
-        front[number] = middle[number, 2] > middle[around, 2].max() - FRONT * reach / SLIT_REACH
-    return middle[front]
+    return middle[middle[:, 2] > _foremost(middle, reach / 4) - FRONT * reach / SLIT_REACH]
+
+
+def _foremost(places: Places, reach: float) -> Places:
+    """Return the largest z of all places whose x is within a reach of that of each [shape=(N,)]."""
+    order = np.argsort(places[:, 0], kind="stable")
+    across = places[order, 0]
+    first, stop = np.searchsorted(across, across - reach), np.searchsorted(across, across + reach, "right")
+    doubled = [places[order, 2]]  # the largest of 1, 2, 4, ... that follow one another
+    while 2 ** len(doubled) <= len(places):
+        half = 2 ** (len(doubled) - 1)
+        doubled.append(np.maximum(doubled[-1], np.append(doubled[-1][half:], np.full(half, -np.inf))))
+    level = np.log2(np.maximum(stop - first, 1)).astype(int)
+    table = np.stack(doubled)
+    largest = np.empty(len(places))
+    largest[order] = np.maximum(table[level, first], table[level, stop - 2**level])
+    return largest
 
 
 def _apart(vertices: Places, surface: MeshSurface, pairs: Rows, reach: float) -> NDArray[np.bool_]:
@@ -216,9 +235,10 @@ def _apart(vertices: Places, surface: MeshSurface, pairs: Rows, reach: float) ->
     straight = np.linalg.norm(vertices[pairs[:, 0]] - vertices[pairs[:, 1]], axis=1)
     longest = np.maximum(DETOUR * straight, reach / 2)
     sources, number = np.unique(pairs[:, 0], return_inverse=True)
-    for first in range(0, len(sources), _AT_ONCE):
-        along = surface.distances(sources[first : first + _AT_ONCE], float(longest.max(initial=0.0)) + reach)
-        here = (number >= first) & (number < first + _AT_ONCE)
+    at_once = max(1, DISTANCES_AT_ONCE // len(vertices))
+    for first in range(0, len(sources), at_once):
+        along = surface.distances(sources[first : first + at_once], float(longest.max(initial=0.0)) + reach)
+        here = (number >= first) & (number < first + at_once)
         far[here] = along[number[here] - first, pairs[here, 1]] > longest[here]
     return far
 

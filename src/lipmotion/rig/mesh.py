@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,6 +51,23 @@ class MeshPart:
     first: int
     stop: int
     material: Material = Material()
+
+
+class PartNames:
+    """Gives parts names that no other part has."""
+
+    def __init__(self) -> None:
+        self._numbers: dict[str, int] = {}
+
+    def unused(self, owner: str, material: str) -> str:
+        """Return the name of the owner, with that of the material where it is taken, and a number where both are."""
+        both = f"{owner} {material}".strip()
+        name = owner if owner not in self._numbers else both
+        while name in self._numbers:
+            self._numbers[both] += 1
+            name = f"{both} {self._numbers[both]}"
+        self._numbers[name] = 1
+        return name
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,11 +172,16 @@ class Mesh:
                 vertices[shape.rows] += weights[shape.name] * shape.displacements
         return vertices
 
-    def displacements(self, rows: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Return how far every blendshape moves the vertices ``rows`` [shape=(N,)] at weight 1 [shape=(S, N, 3)]."""
-        moved = np.zeros((len(self.shapes), len(rows), 3))
+    def displacements(self, rows: NDArray[np.int64], names: Sequence[str] | None = None) -> NDArray[np.float64]:
+        """Return how far blendshapes move the vertices ``rows`` [shape=(N,)] at weight 1 [shape=(S, N, 3)].
+
+        names : of blendshapes that it has; None: all of them
+        """
+        by_name = {shape.name: shape for shape in self.shapes}
+        shapes = self.shapes if names is None else [by_name[name] for name in names]
+        moved = np.zeros((len(shapes), len(rows), 3))
         dense = np.zeros_like(self.vertices)
-        for shape, chosen in zip(self.shapes, moved, strict=True):
+        for shape, chosen in zip(shapes, moved, strict=True):
             dense[shape.rows] = shape.displacements
             chosen[:] = dense[rows]
             dense[shape.rows] = 0.0

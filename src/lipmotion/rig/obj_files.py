@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import warnings
-from collections.abc import Callable, Iterable
+from array import array
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -11,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
-from lipmotion.rig.limits import MOST_DISPLACEMENTS, MOST_SHAPES, MOST_TRIANGLES, MOST_VERTICES, check_count, file_bytes
+from lipmotion.rig.limits import Budget
 from lipmotion.rig.mesh import MASK, OPAQUE, Blendshape, Material, Mesh, MeshPart
-from lipmotion.rig.textures import read_texture
+from lipmotion.rig.textures import Texture, read_texture
 from lipmotion.storage.files import as_text, whole_file
 from lipmotion.storage.sources import is_file
 
@@ -26,35 +28,69 @@ LARGEST_NUMBER = 1e9
 LARGEST_LIBRARY = 1 << 20
 MOST_CORNERS = 1000
 """Most corners of a polygon."""
+LONGEST_LINE = 1 << 16
 OPAQUE_FROM = 250
 """A texture with pixels of a lower opacity than this, of 255, has holes."""
-_NO_COLOUR = [b"nan"] * 3
+_NO_COLOUR = (np.nan,) * 3
 _SHININESS = 60.0
 """A specular exponent (``Ns``) of so much is a gloss of 1/2."""
+_REST = rb")(?=\s|\Z)[^\r\n\\]*(?:\\(?:\r?\n)?[^\r\n\\]*)*)"
+_STATEMENTS = re.compile(rb"(?:\A|(?<=[\r\n]))[ \t]*((?:v|vt|f|o|g|usemtl|mtllib" + _REST)
+_LOOKS = re.compile(rb"(?:\A|(?<=[\r\n]))[ \t]*((?:newmtl|map_Kd|Kd|Ns|d|Tf" + _REST)
+_VERTEX = re.compile(rb"(?:\A|[\r\n])v[ \t]([^\r\n]*)")
 
 
 @dataclass
-class _Faces:
-    """Triangles so far: corners of places and of textures, and the part of each."""
+class _Surface:
+    """What the lines of a file have given so far: three numbers a vertex, two a corner of a texture, and triangles.
 
-    corners: list[tuple[int, int, int]] = field(default_factory=list)
-    textures: list[tuple[int, int, int]] = field(default_factory=list)
-    parts: list[int] = field(default_factory=list)
+    corners, mapped : of each triangle, its vertices and its corners of textures (-1: none);  parts : its part
+    """
+
+    budget: Budget
+    vertices: array[float] = field(default_factory=lambda: array("d"))
+    colours: array[float] = field(default_factory=lambda: array("d"))
+    textures: array[float] = field(default_factory=lambda: array("d"))
+    corners: array[int] = field(default_factory=lambda: array("i"))
+    mapped: array[int] = field(default_factory=lambda: array("i"))
+    parts: array[int] = field(default_factory=lambda: array("i"))
     names: dict[tuple[str, str], int] = field(default_factory=dict)
     here: tuple[str, str] = ("", "")
+    library: str = ""
 
-    def add(self, words: list[bytes], places: int, textures: int) -> None:
+    def add(self, kind: bytes, words: list[bytes]) -> None:
+        """Add a line. Raises ValueError: it is damaged, or there are too many."""
+        if kind == b"f":
+            self._add_polygon(words)
+        elif kind == b"v":
+            self.budget.spend("vertices", 1)
+            _add_vertex(self.vertices, words)
+            self.colours.extend(map(float, words[3:6]) if len(words) == 6 else _NO_COLOUR)
+        elif kind == b"vt":
+            self.budget.spend("corners of textures", 1)
+            self.textures.extend(map(float, [*words, b"0", b"0"][:2]))
+        elif kind in {b"o", b"g"}:
+            self.here = (_text(words), self.here[1])
+        elif kind == b"usemtl":
+            self.here = (self.here[0], _text(words))
+        elif kind == b"mtllib":
+            self.library = _text(words)
+
+    def _add_polygon(self, words: list[bytes]) -> None:
         if not 3 <= len(words) <= MOST_CORNERS:
             raise InputError(f"a polygon of {len(words)} corners, required 3 to {MOST_CORNERS}")
-        part = self.names.setdefault(self.here, len(self.names))
-        split = [word.split(b"/") for word in words]
-        corners = [_index(each[0], places) for each in split]
+        self.budget.spend("triangles", len(words) - 2)
+        if self.here not in self.names:
+            self.budget.spend("parts", 1)
+            self.names[self.here] = len(self.names)
+        vertices, textures = len(self.vertices) // 3, len(self.textures) // 2
+        split = [word.split(b"/", 2) for word in words]
+        corners = [_index(each[0], vertices) for each in split]
         mapped = [_index(each[1], textures) if len(each) > 1 and each[1] else -1 for each in split]
         for n in range(1, len(words) - 1):
-            self.corners.append((corners[0], corners[n], corners[n + 1]))
-            self.textures.append((mapped[0], mapped[n], mapped[n + 1]))
-            self.parts.append(part)
-        check_count("triangles", len(self.corners), MOST_TRIANGLES)
+            self.corners.extend((corners[0], corners[n], corners[n + 1]))
+            self.mapped.extend((mapped[0], mapped[n], mapped[n + 1]))
+            self.parts.append(self.names[self.here])
 
 
 def read_obj(path: Path) -> Mesh:
@@ -65,42 +101,21 @@ def read_obj(path: Path) -> Mesh:
     (``map_Kd``) come from files in the same folder, where there are some. Lines, curves and normals are ignored.
     Raises InputError: no such file, too large, no triangles, or a damaged line, whose number is named.
     """
-    content = file_bytes(path, "mesh")
-    places: list[list[bytes]] = []
-    colours: list[list[bytes]] = []
-    textures: list[list[bytes]] = []
-    faces, library, number = _Faces(), "", 0
+    budget = Budget()
+    surface, number = _Surface(budget), 0
     try:
-        for line in _lines(content):
-            number += 1
-            words = line.split()
-            if not words:
-                continue
-            kind = words[0]
-            if kind == b"v":
-                places.append(words[1:4])
-                colours.append(words[4:7] if len(words) == 7 else _NO_COLOUR)
-            elif kind == b"vt":
-                textures.append([*words[1:3], b"0"][:2])
-            elif kind == b"f":
-                faces.add(words[1:], len(places), len(textures))
-            elif kind in {b"o", b"g"}:
-                faces.here = (_text(words[1:]), faces.here[1])
-            elif kind == b"usemtl":
-                faces.here = (faces.here[0], _text(words[1:]))
-            elif kind == b"mtllib":
-                library = _text(words[1:])
-        check_count("vertices", len(places), MOST_VERTICES)
+        for line, words in _lines(budget.file_bytes(path, "mesh"), _STATEMENTS, budget):
+            number = line
+            surface.add(words[0], words[1:])
         number = 0
-        vertices = _numbers(places, 3)
-        uv = _numbers(textures, 2)
-        painted = None if all(each is _NO_COLOUR for each in colours) else _numbers(colours, 3, missing=True)
-    except (InputError, ValueError, IndexError, OverflowError) as error:
-        where = f" in line {number}" if number else ""
-        raise InputError(f"{path}: {shortened(str(error))}{where}; export the mesh as OBJ again") from error
-    if not faces.corners:
+        vertices, uv = _numbers(surface.vertices, 3), _numbers(surface.textures, 2)
+        painted = _numbers(surface.colours, 3, missing=True)
+    except ValueError as error:
+        raise _damaged(path, error, number) from error
+    if not surface.corners:
         raise InputError(f"{path}: there are no polygons in it, required a mesh; export the surface, not points alone")
-    return _mesh(vertices, uv, painted, faces, _materials(path.parent, library))
+    used = {material for _, material in surface.names}
+    return _mesh(surface, vertices, uv, painted, _materials(path.parent, surface.library, used, budget))
 
 
 def read_obj_folder(folder: Path, wanted: Callable[[str], bool] = lambda _: True) -> Mesh:
@@ -118,8 +133,8 @@ def read_obj_folder(folder: Path, wanted: Callable[[str], bool] = lambda _: True
         )
     mesh = read_obj(neutral[0])
     others = [path for path in files if path != neutral[0] and wanted(path.stem)]
-    check_count("blendshapes", len(others), MOST_SHAPES)
-    check_count("displacements", len(others) * len(mesh.vertices), MOST_DISPLACEMENTS)
+    budget = Budget()
+    budget.spend("blendshapes", len(others))
     least = LEAST_SHARE * float(np.ptp(mesh.vertices, axis=0).max())
     shapes = []
     for path in others:
@@ -130,6 +145,7 @@ def read_obj_folder(folder: Path, wanted: Callable[[str], bool] = lambda _: True
                 "move other meshes to another folder"
             )
         shapes.append(Blendshape.between(path.stem, mesh.vertices, vertices, least=least))
+        budget.spend("displacements", len(shapes[-1].rows))
     return replace(mesh, shapes=tuple(shapes))
 
 
@@ -153,34 +169,34 @@ def write_obj(path: Path, mesh: Mesh, vertices: NDArray[np.float64] | None = Non
 
 
 def _mesh(
+    surface: _Surface,
     vertices: NDArray[np.float64],
     uv: NDArray[np.float64],
-    painted: NDArray[np.float64] | None,
-    faces: _Faces,
+    painted: NDArray[np.float64],
     materials: dict[str, Material],
 ) -> Mesh:
-    part = np.array(faces.parts)
+    part = np.array(surface.parts)
     order = np.argsort(part, kind="stable")
-    stops = np.cumsum([0, *np.bincount(part, minlength=len(faces.names))])
+    stops = np.cumsum([0, *np.bincount(part, minlength=len(surface.names))])
     parts = tuple(
         MeshPart(group or material, int(first), int(stop), materials.get(material, Material(material)))
-        for (group, material), first, stop in zip(faces.names, stops, stops[1:], strict=False)
+        for (group, material), first, stop in zip(surface.names, stops, stops[1:], strict=False)
     )
-    textures = np.array(faces.textures)[order]
+    textures = np.array(surface.mapped).reshape(-1, 3)[order]
     mapped = np.where(textures[..., None] >= 0, uv[textures], 0.0) if len(uv) else None
-    triangles = np.array(faces.corners, np.int32)[order]
+    triangles = np.array(surface.corners, np.int32).reshape(-1, 3)[order]
     colours = _colours(painted, triangles, parts)
     return Mesh(vertices, triangles, parts, uv=mapped, colours=colours)
 
 
 def _colours(
-    painted: NDArray[np.float64] | None, triangles: NDArray[np.int32], parts: tuple[MeshPart, ...]
+    painted: NDArray[np.float64], triangles: NDArray[np.int32], parts: tuple[MeshPart, ...]
 ) -> NDArray[np.float64] | None:
     """Return colours of all vertices, 0 to 1 [shape=(V, 3)]; those without one have that of their material.
 
     None: there are none, or all are white, as programs write them that have none.
     """
-    if painted is None or not (painted < 1).any():
+    if not (painted < 1).any():
         return None
     colours = painted / 255 if (painted > 1).any() else painted
     for part in parts:
@@ -192,19 +208,46 @@ def _colours(
 
 def _vertices_of(path: Path) -> NDArray[np.float64]:
     """Return the vertices of an OBJ file, without reading its polygons [shape=(V, 3)]."""
-    lines = [line.split()[1:4] for line in _lines(file_bytes(path, "mesh")) if line.startswith((b"v ", b"v\t"))]
-    check_count("vertices", len(lines), MOST_VERTICES)
+    budget, vertices = Budget(), array("d")
     try:
-        return _numbers(lines, 3)
+        for line in _VERTEX.finditer(budget.file_bytes(path, "mesh")):
+            budget.spend("vertices", 1)
+            _add_vertex(vertices, line[1].split())
+        return _numbers(vertices, 3)
     except ValueError as error:
-        raise InputError(f"{path}: {shortened(str(error))}; export the mesh as OBJ again") from error
+        raise _damaged(path, error) from error
 
 
-def _numbers(rows: list[list[bytes]], width: int, *, missing: bool = False) -> NDArray[np.float64]:
-    wrong = next((row for row in rows if len(row) != width), None)
-    if wrong is not None:
-        raise ValueError(f"{_text(wrong)!r} is no vertex of {width} numbers")
-    values = np.array(rows, dtype="S32").reshape(-1, width).astype(np.float64)
+def _damaged(path: Path, error: ValueError, number: int = 0) -> InputError:
+    """Return the error of a file, whose line is named where the number is not 0."""
+    text = str(error)
+    if text.startswith(str(path)):
+        return InputError(text)
+    return InputError(
+        f"{path}: {shortened(text)}{f' in line {number}' if number else ''}; export the mesh as OBJ again"
+    )
+
+
+def _lines(content: bytes, kinds: re.Pattern[bytes], budget: Budget) -> Iterator[tuple[int, list[bytes]]]:
+    """Yield the number of each line of some kinds, and its words; a backslash at the end of a line continues it."""
+    budget.spend("lines", max(content.count(b"\n"), content.count(b"\r")))
+    number, at = 1, 0
+    for line in kinds.finditer(content):
+        number += content.count(b"\n", at, line.start())
+        at = line.start()
+        if line.end() - at > LONGEST_LINE:
+            raise InputError(f"a line of {line.end() - at} bytes, required at most {LONGEST_LINE}, in line {number}")
+        yield number, line[1].replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").split()
+
+
+def _add_vertex(vertices: array[float], words: list[bytes]) -> None:
+    if len(words) < 3:
+        raise ValueError(f"{_text(words)!r} is no vertex of 3 numbers")
+    vertices.extend(map(float, words[:3]))
+
+
+def _numbers(found: array[float], width: int, *, missing: bool = False) -> NDArray[np.float64]:
+    values = np.array(found).reshape(-1, width)
     if not ((np.abs(values) <= LARGEST_NUMBER) | (missing & np.isnan(values))).all():
         raise ValueError(f"a vertex has numbers that are not finite, or beyond ±{LARGEST_NUMBER:g}")
     return values
@@ -214,13 +257,8 @@ def _index(word: bytes, count: int) -> int:
     number = int(word)
     index = number - 1 if number > 0 else count + number
     if number == 0 or not 0 <= index < count:
-        raise ValueError(f"a polygon names vertex {number} of {count}")
+        raise ValueError(f"a polygon names vertex {shortened(_text([word]))} of {count}")
     return index
-
-
-def _lines(content: bytes) -> Iterable[bytes]:
-    """Return the lines of a file; a backslash at the end of a line continues it."""
-    return content.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").splitlines()
 
 
 def _text(words: list[bytes]) -> str:
@@ -231,37 +269,47 @@ def _one_line(text: str) -> str:
     return as_text(" ".join(text.split())).rstrip("\\") or "part"  # a backslash at the end continues the line
 
 
-def _materials(folder: Path, library: str) -> dict[str, Material]:
-    """Return the materials of an MTL file in a folder; none if the name leads elsewhere, or there is no such file."""
-    if not library or Path(library).name != library or not is_file(folder / library):
-        return {}
-    if (folder / library).stat().st_size > LARGEST_LIBRARY:
+def _materials(folder: Path, library: str, used: Collection[str], budget: Budget) -> dict[str, Material]:
+    """Return those materials of an MTL file in a folder that are used; none if there is no such file."""
+    path = _beside(folder, library)
+    if path is None or path.stat().st_size > LARGEST_LIBRARY:
         return {}
     found: dict[str, Material] = {}
+    pictures: dict[str, str] = {}
     name = ""
-    for line in _lines(file_bytes(folder / library, "material library")):
-        words = line.split()
-        if words[:1] == [b"newmtl"]:
+    for _, words in _lines(budget.file_bytes(path, "material library"), _LOOKS, budget):
+        if words[0] == b"newmtl":
             name = _text(words[1:])
             found[name] = Material(name)
-        elif name and len(words) == 4 and words[0] == b"Kd":
-            red, green, blue = (min(max(_number(word), 0.0), 1.0) for word in words[1:])
-            found[name] = replace(found[name], colour=(red, green, blue))
-        elif name and len(words) == 2 and words[0] == b"Ns":
-            shininess = max(_number(words[1]), 0.0)
-            found[name] = replace(found[name], gloss=shininess / (shininess + _SHININESS))
-        elif name and len(words) > 1 and words[0] == b"map_Kd":
-            found[name] = _with_texture(found[name], folder, _text(words[-1:]))
-        elif name and len(words) > 1 and words[0] in {b"d", b"Tf"}:  # Maya writes Tf as 1 less the transparency
-            found[name] = replace(found[name], opacity=min(max(_number(words[-1]), 0.0), 1.0))
-    return found
+        elif name in found and name in used and len(words) > 1:
+            if words[0] == b"map_Kd":
+                pictures[name] = _text(words[-1:])
+            else:
+                found[name] = _with_look(found[name], words)
+    textures = {picture: _texture(folder, picture, budget) for picture in dict.fromkeys(pictures.values())}
+    return {name: _with_texture(found[name], textures.get(pictures.get(name, ""))) for name in found if name in used}
 
 
-def _with_texture(material: Material, folder: Path, name: str) -> Material:
-    """Return a material with the picture of a name, in the same folder; where its pixels are clear, there are holes."""
-    texture = None
-    if Path(name).name == name and is_file(folder / name):
-        texture = read_texture(file_bytes(folder / name, "picture"))
+def _with_look(material: Material, words: list[bytes]) -> Material:
+    """Return a material with what a line of its library says."""
+    if words[0] == b"Kd" and len(words) == 4:
+        red, green, blue = (min(max(_number(word), 0.0), 1.0) for word in words[1:])
+        return replace(material, colour=(red, green, blue))
+    if words[0] == b"Ns" and len(words) == 2:
+        shininess = max(_number(words[1]), 0.0)
+        return replace(material, gloss=shininess / (shininess + _SHININESS))
+    if words[0] in {b"d", b"Tf"}:  # Maya writes Tf as 1 less the transparency
+        return replace(material, opacity=min(max(_number(words[-1]), 0.0), 1.0))
+    return material
+
+
+def _texture(folder: Path, name: str, budget: Budget) -> Texture | None:
+    """Return the texture in a picture in a folder; None, and a warning, where there is none that can be read."""
+    path, texture = _beside(folder, name), None
+    if path is not None:
+        content = budget.file_bytes(path, "picture")
+        budget.spend("bytes of pictures", len(content))
+        texture = read_texture(content, budget)
     if texture is None:
         warnings.warn(
             f"{folder / name}: a texture of the character is not in the same folder, or is no PNG, JPEG or WebP. Its "
@@ -269,9 +317,20 @@ def _with_texture(material: Material, folder: Path, name: str) -> Material:
             UserWarning,
             stacklevel=2,
         )
+    return texture
+
+
+def _with_texture(material: Material, texture: Texture | None) -> Material:
+    """Return a material with a texture; where its pixels are clear, there are holes."""
+    if texture is None:
         return material
     clear = bool((texture.pixels[..., 3] < OPAQUE_FROM).any())
     return replace(material, texture=texture, alpha=MASK if clear else OPAQUE)
+
+
+def _beside(folder: Path, name: str) -> Path | None:
+    """Return the file of a name in a folder; None if there is none, or the name leads elsewhere."""
+    return folder / name if name and Path(name).name == name and is_file(folder / name) else None
 
 
 def _number(word: bytes) -> float:

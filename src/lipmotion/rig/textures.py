@@ -6,14 +6,23 @@ import io
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
+from lipmotion.rig.limits import Budget
 
-LARGEST_TEXTURE = 1 << 26
-"""Most pixels of a texture; a larger one is not looked at."""
+if TYPE_CHECKING:
+    from PIL import Image
+
+MOST_BYTES = 400_000_000
+"""Most bytes that decoding a picture may take: a larger one is not looked at."""
+MOST_SCANS = 100
+"""Most passes over a JPEG; each takes as long as a picture."""
+DIRECT = {"RGB", "L"}
+"""Modes of pictures that are reduced as they are; all others get an opacity first."""
 PICTURES = ("PNG", "JPEG", "WEBP")
 WIDEST = 1024
 """Textures are reduced to this many pixels across: a head of 720 rows shows no more."""
@@ -76,10 +85,12 @@ class Texture:
         return np.asarray(self.pixels[row, column] / 255.0)
 
 
-def read_texture(content: bytes) -> Texture | None:
+def read_texture(content: bytes | memoryview, budget: Budget | None = None) -> Texture | None:
     """Return the texture in the bytes of a picture, reduced to ``WIDEST`` pixels across.
 
+    budget : counts its pixels before they are decoded; None: of this picture alone
     None: the picture is damaged, too large, or of another format than PNG, JPEG and WebP.
+    Raises InputError: with those that were read before, there are too many pixels.
     """
     from PIL import Image
 
@@ -87,14 +98,37 @@ def read_texture(content: bytes) -> Texture | None:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             with Image.open(io.BytesIO(content), formats=PICTURES) as picture:
-                if picture.width * picture.height > LARGEST_TEXTURE:
-                    return None
+                pixels = picture.width * picture.height
                 picture.draft("RGB", (WIDEST, WIDEST))
-                small = picture.convert("RGBA")
+                if _bytes_to_decode(picture, pixels) > MOST_BYTES or _scans(picture, content) > MOST_SCANS:
+                    return None
+                (budget or Budget()).spend("pixels of pictures", pixels)
+                small = picture if _is_direct(picture) else picture.convert("RGBA")
                 small.thumbnail((WIDEST, WIDEST))
-                return Texture(np.asarray(small))
+                return Texture(np.asarray(small.convert("RGBA")))
+    except InputError:
+        raise
     except (OSError, ValueError, SyntaxError, MemoryError, Image.DecompressionBombError):
         return None
+
+
+def _is_direct(picture: Image.Image) -> bool:
+    return picture.mode in DIRECT and "transparency" not in picture.info
+
+
+def _scans(picture: Image.Image, content: bytes | memoryview) -> int:
+    return bytes(content).count(b"\xff\xda") if picture.format == "JPEG" else 1
+
+
+def _bytes_to_decode(picture: Image.Image, pixels: int) -> int:
+    """Return about how many bytes it takes to decode and to reduce a picture that is open.
+
+    pixels : in the file; those of the picture are fewer where a JPEG is reduced as it is decoded
+    """
+    if picture.format == "WEBP":
+        return 20 * pixels
+    coefficients = 2 * len(picture.getbands()) * pixels if "progressive" in picture.info else 0
+    return coefficients + (4 if _is_direct(picture) else 9) * picture.width * picture.height
 
 
 @dataclass(frozen=True, eq=False)

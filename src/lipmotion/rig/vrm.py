@@ -6,11 +6,10 @@ Source: the specifications of VRM 0.x (glTF extension ``VRM``) and VRM 1.0 (``VR
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
-from lipmotion.rig.gltf_container import GltfDocument
+from lipmotion.rig.gltf_container import GltfDocument, plain_name
 from lipmotion.rig.mesh import Blendshape
 
 PRESETS = {"a": "aa", "i": "ih", "u": "ou", "e": "ee", "o": "oh", "joy": "happy", "sorrow": "sad", "fun": "relaxed"}
@@ -24,7 +23,7 @@ Bind = tuple[int, int, float]
 
 def looks_backwards(document: GltfDocument) -> bool:
     """Return whether the character looks along −z, as those of VRM 0.x do; all others look along +z."""
-    return "VRM" in _extensions(document)
+    return "VRM" in document.parts.get("extensions", {})
 
 
 def expression_shapes(
@@ -34,14 +33,16 @@ def expression_shapes(
 
     targets : the name of each morph target, by mesh and number
     shapes  : the blendshapes of the targets; names that they have are left out
-    Binds that name no target are left out, as viewers do.
+    Binds that name no target are left out, as viewers do. Raises InputError: they move too many vertices.
     """
     by_name = {shape.name: shape for shape in shapes}
     expressions = {**_of_version_0(document), **_of_version_1(document)}
     found = []
     for name, binds in expressions.items():
         used = [(by_name[targets[bind[:2]]], bind[2]) for bind in binds if bind[:2] in targets]
-        if used and name not in by_name:
+        if used and name and name not in by_name:
+            document.budget.spend("blendshapes", 1)
+            document.budget.spend("displacements", sum(len(shape.rows) for shape, _ in used))
             rows = np.unique(np.concatenate([shape.rows for shape, _ in used]))
             moved = np.zeros((len(rows), 3))
             for shape, weight in used:
@@ -51,49 +52,25 @@ def expression_shapes(
 
 
 def _of_version_0(document: GltfDocument) -> dict[str, list[Bind]]:
-    groups = _objects(_object(_object(_extensions(document), "VRM"), "blendShapeMaster").get("blendShapeGroups"))
+    vrm = document.parts.get("extensions", {}).get("VRM", {})
     found = {}
-    for group in groups:
-        preset = str(group.get("presetName") or "").lower()
-        name = PRESETS.get(preset, preset) if preset not in {"", "unknown"} else str(group.get("name") or "")
-        binds = [
-            _bind(each.get("mesh"), each.get("index"), each.get("weight"), FULL)
-            for each in _objects(group.get("binds"))
-        ]
-        found[name] = [bind for bind in binds if bind is not None]
+    for group in vrm.get("blendShapeMaster", {}).get("blendShapeGroups", []):
+        preset = plain_name(group.get("presetName", "")).lower()
+        name = PRESETS.get(preset, preset) if preset not in {"", "unknown"} else plain_name(group.get("name", ""))
+        found[name] = [_bind(each["mesh"], each, FULL) for each in group.get("binds", [])]
     return found
 
 
 def _of_version_1(document: GltfDocument) -> dict[str, list[Bind]]:
-    expressions = _object(_object(_extensions(document), "VRMC_vrm"), "expressions")
-    meshes = [node.get("mesh") for node in document.items("nodes")]
+    expressions = document.parts.get("extensions", {}).get("VRMC_vrm", {}).get("expressions", {})
+    meshes = dict(enumerate(node.get("mesh", -1) for node in document.items("nodes")))
     found = {}
     for kind in ("preset", "custom"):
-        for name, expression in _object(expressions, kind).items():
-            listed = _objects(expression.get("morphTargetBinds")) if isinstance(expression, dict) else []
-            binds = []
-            for each in listed:
-                node = each.get("node")
-                mesh = meshes[node] if isinstance(node, int) and 0 <= node < len(meshes) else None
-                binds.append(_bind(mesh, each.get("index"), each.get("weight"), 1.0))
-            found[str(name)] = [bind for bind in binds if bind is not None]
+        for name, expression in expressions.get(kind, {}).items():
+            binds = expression.get("morphTargetBinds", [])
+            found[plain_name(name)] = [_bind(meshes.get(each["node"], -1), each, 1.0) for each in binds]
     return found
 
 
-def _bind(mesh: Any, index: Any, weight: Any, full: float) -> Bind | None:
-    if not isinstance(mesh, int) or not isinstance(index, int) or not isinstance(weight, int | float):
-        return None
-    return mesh, index, float(min(max(weight / full, 0.0), 1.0))
-
-
-def _extensions(document: GltfDocument) -> dict[str, Any]:
-    return _object(document.json, "extensions")
-
-
-def _object(holder: Mapping[str, Any], name: str) -> dict[str, Any]:
-    value = holder.get(name)
-    return value if isinstance(value, dict) else {}
-
-
-def _objects(value: Any) -> list[dict[str, Any]]:
-    return [each for each in value if isinstance(each, dict)] if isinstance(value, list) else []
+def _bind(mesh: int, bind: Mapping[str, float], full: float) -> Bind:
+    return mesh, int(bind["index"]), min(max(bind["weight"] / full, 0.0), 1.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections import Counter
 from typing import Any, NoReturn
 
 from lipmotion.errors import ExportError
@@ -16,7 +17,8 @@ def as_json(content: Any, **options: Any) -> str:
     """Return content as JSON text that can be encoded as UTF-8.
 
     options : of ``json.dumps``; surrogates, which UTF-8 cannot encode, are escaped in any case
-    Raises ExportError: a number that is not finite; JSON has none (``nan_as_null`` removes them from reports).
+    Raises ExportError: a number that is not finite; JSON has none (``nan_as_null`` removes them from reports); or it is
+    nested too deeply.
     """
     try:
         text = json.dumps(content, allow_nan=False, **options)
@@ -25,6 +27,8 @@ def as_json(content: Any, **options: Any) -> str:
         return text
     except ValueError as error:
         raise ExportError(f"cannot be written as JSON ({error}): every number must be finite") from error
+    except RecursionError as error:
+        raise ExportError("cannot be written as JSON: lists and objects are nested too deeply") from error
 
 
 def nan_as_null(content: Any) -> Any:
@@ -50,8 +54,8 @@ def from_json(text: str | bytes) -> Any:
 def _distinct_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     content = dict(pairs)
     if len(content) < len(pairs):
-        names = [key for key, _ in pairs]
-        raise ValueError(f"the key {next(key for key in names if names.count(key) > 1)!r} occurs twice")
+        counts = Counter(key for key, _ in pairs)
+        raise ValueError(f"the key {next(key for key, count in counts.items() if count > 1)!r} occurs twice")
     return content
 
 

@@ -7,12 +7,18 @@ from pathlib import PurePosixPath
 from random import Random
 
 from fuzz.inputs import Files
-from fuzz.mutators import arrays, boxes, json_text, raw, riff, text, xml_text, zips
+from fuzz.mutators import arrays, boxes, documents, json_text, raw, riff, text, xml_text, zips
 
 Mutate = Callable[[Random, bytes], bytes]
 
 FORMS: dict[str, tuple[Mutate, ...]] = {
     ".json": (json_text.change, json_text.change, text.change),
+    ".gltf": (json_text.change, json_text.change, text.change),
+    ".glb": (documents.change, documents.change, documents.change),
+    ".vrm": (documents.change, documents.change, documents.change),
+    ".binding": (zips.change, zips.change),
+    ".obj": (text.change, text.change, text.change),
+    ".mtl": (text.change, text.change, text.change),
     ".npy": (arrays.change, arrays.change),
     ".npz": (zips.change, zips.change),
     ".lipmotion": (zips.change, zips.change),

@@ -39,15 +39,15 @@ def change(chance: Random, content: bytes) -> bytes:
         tree = json.loads(content)
     except (ValueError, RecursionError):
         return raw.change(chance, content)
-    places = list(_places(tree, 2000))
-    if not places or chance.random() < 0.05:
+    found = list(places(tree, 2000))
+    if not found or chance.random() < 0.05:
         return _root(chance, content)
-    within, key = chance.choice(places)
+    within, key = chance.choice(found)
     _set(chance, within, key)
     return _written(chance, tree)
 
 
-def _places(tree: Any, most: int) -> Iterator[tuple[Any, Any]]:
+def places(tree: Any, most: int) -> Iterator[tuple[Any, Any]]:
     """Yield containers and the keys in them, those near the root first."""
     queue = [tree]
     for within in queue:

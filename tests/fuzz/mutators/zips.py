@@ -14,12 +14,19 @@ Member = tuple[str, bytes]
 
 def change(chance: Random, content: bytes) -> bytes:
     """Change, add or remove one member; other content is changed as bytes."""
-    try:
-        with zipfile.ZipFile(io.BytesIO(content)) as file:
-            members = [(info.filename, file.read(info)) for info in file.infolist()]
-    except Exception:  # it was damaged before
+    members = members_of(content)
+    if not members:
         return raw.change(chance, content)
     return zipped(_changed(chance, members), chance.choice((zipfile.ZIP_DEFLATED, zipfile.ZIP_STORED)))
+
+
+def members_of(content: bytes) -> list[Member]:
+    """Return the members of a zip file; none if it is damaged."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as file:
+            return [(info.filename, file.read(info)) for info in file.infolist()]
+    except Exception:  # whatever a damaged one raises
+        return []
 
 
 def zipped(members: list[Member], method: int) -> bytes:
@@ -33,8 +40,6 @@ def zipped(members: list[Member], method: int) -> bytes:
 
 
 def _changed(chance: Random, members: list[Member]) -> list[Member]:
-    if not members:
-        return [("header.json", b"{}")]
     at = chance.randrange(len(members))
     name, content = members[at]
     kind = chance.choice(("inside",) * 6 + ("remove", "double", "rename", "swap", "extra"))

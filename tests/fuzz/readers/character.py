@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import tempfile
 import warnings
 from itertools import islice
@@ -21,10 +22,11 @@ from lipmotion.rig.drawn_surface import drawn_surface
 from lipmotion.rig.driven import driven_character
 from lipmotion.rig.gltf_writer import write_glb
 from lipmotion.rig.obj_files import write_obj
-from rig.gltf import data_uri, document, glb, packed_attributes, textured_document
+from rig.gltf import data_uri, document, glb, packed_attributes, textured_document, with_colours
 from rig.heads import head, lip_points
 from rig.speech import motion, units
 
+HEADS = ("head.glb", "head.gltf", "head.obj", "head.vrm")
 TABLE = "control,source,gain,offset,low,high\nJaw,jawOpen,-25,,-20,0\nLips,viseme_oh,0.5\n"
 
 
@@ -43,29 +45,52 @@ def seeds(_: Good) -> list[Files]:
         write_weights(folder / "weights.csv", bound.binding)
         files = {path.name: path.read_bytes() for path in folder.iterdir()}
     content, binary = document()
-    packed = packed_attributes(np.frombuffer(binary[:48], np.uint8).reshape(4, 12))
-    small = content | {"buffers": [{"uri": data_uri(binary + packed), "byteLength": len(binary + packed)}]}
-    extension = {"buffer": 0, "byteOffset": len(binary), "byteLength": len(packed), "byteStride": 12, "count": 4}
-    squeezed = [dict(view) for view in content["bufferViews"]]
-    squeezed[0]["extensions"] = {"EXT_meshopt_compression": extension | {"mode": "ATTRIBUTES"}}
     skinned, joints = _skinned()
     picture = _picture()
     library = b"newmtl skin\nKd 0.9 0.8 0.7\nmap_Kd skin.png\n"
     mapped = b"mtllib head.mtl\nvt 0 0\nvt 1 0\nvt 1 1\nusemtl skin\n" + files["head.obj"].replace(b"usemtl", b"#")
-    moved = {"KHR_texture_transform": {"offset": [0.5, 0.25], "scale": [2, 2], "rotation": 0.3}}
-    clear = {"alphaMode": "BLEND", "doubleSided": True}
     return [
         {"head.glb": files["head.glb"]},
         {"head.obj": files["head.obj"], "points.csv": files["points.csv"]},
         {"head.obj": files["head.obj"], "head.binding": files["head.binding"]},
         {"head.obj": files["head.obj"], "points.csv": files["points.csv"], "weights.csv": files["weights.csv"]},
         {"head.glb": files["head.glb"], "rig.csv": TABLE.encode()},
-        {"head.glb": glb(small | {"bufferViews": squeezed}, b"")},
-        {"head.glb": glb(content, binary)},
+        {"head.gltf": json.dumps(content | {"buffers": [{"uri": data_uri(binary)}]}).encode()},
         {"head.obj": mapped, "head.mtl": library, "skin.png": picture, "points.csv": files["points.csv"]},
-        {"head.glb": glb(*textured_document(picture, clear, moved))},
         {"head.glb": glb(skinned, joints)},
+        *_whole(),
     ]
+
+
+def _whole() -> list[Files]:
+    """The square with all that is read of glTF and VRM, in one file and in several."""
+    colours = np.linspace(0, 255, 16).reshape(4, 4).astype(np.uint8)
+    moved = {"KHR_texture_transform": {"offset": [0.5, 0.25], "scale": [2, 2], "rotation": 0.3}}
+    content, binary = with_colours(*textured_document(_picture(), extension=moved), colours, normalised=True)
+    packed = packed_attributes(np.frombuffer(binary[:48], np.uint8).reshape(4, 12))
+    place = {"buffer": 0, "byteOffset": len(binary), "byteLength": len(packed), "byteStride": 12, "count": 4}
+    content["bufferViews"][0]["extensions"] = {"KHR_meshopt_compression": place | {"mode": "ATTRIBUTES"}}
+    content["bufferViews"].append({"buffer": 0, "byteOffset": 0, "byteLength": 16})
+    rows = {"bufferView": len(content["bufferViews"]) - 1, "componentType": 5121}
+    content["accessors"][2] |= {"sparse": {"count": 1, "indices": rows, "values": {"bufferView": 0}}}
+    content["skins"] = [{"joints": [1], "inverseBindMatrices": len(content["accessors"])}]
+    content["accessors"].append({"componentType": 5126, "count": 1, "type": "MAT4"})
+    content["nodes"].append({"name": "Head", "rotation": [0, 0, 0, 1], "scale": [1, 1, 1], "translation": [0, 1, 0]})
+    content["scenes"] = [{"nodes": [0, 1]}]
+    content["materials"][0] |= {"alphaMode": "MASK", "alphaCutoff": 0.3, "doubleSided": True, "name": "skin"}
+    content["materials"][0]["pbrMetallicRoughness"] |= {"baseColorFactor": [1, 0.5, 1, 1], "roughnessFactor": 0.5}
+    bind = {"node": 0, "index": 0, "weight": 0.5}
+    old = {"name": "A", "presetName": "a", "binds": [{"mesh": 0, "index": 1, "weight": 100}]}
+    content["extensions"] = {
+        "VRM": {"blendShapeMaster": {"blendShapeGroups": [old]}},
+        "VRMC_vrm": {"expressions": {"preset": {"oh": {"morphTargetBinds": [bind]}}, "custom": {}}},
+    }
+    content["extensionsRequired"] = ["KHR_mesh_quantization"]
+    content["animations"] = [{"channels": [], "samplers": []}]
+    linked = content | {"buffers": [{"uri": "head.bin", "byteLength": len(binary)}]}
+    linked["images"] = [{"uri": "skin.png"}]
+    files = {"head.gltf": json.dumps(linked).encode(), "head.bin": binary + packed, "skin.png": _picture()}
+    return [{"head.vrm": glb(content, binary + packed)}, files]
 
 
 def _picture() -> bytes:
@@ -104,7 +129,7 @@ def read(folder: Path, _: Good) -> None:
     if "rig.csv" in found:
         controls = curves_of(motion(), units(), found["rig.csv"])
         require(bool(np.isfinite(controls.values).all()), "controls that are not finite")
-    path = found.get("head.glb") or found["head.obj"]
+    path = next(path for name, path in sorted(found.items()) if name in HEADS)
     binding = found.get("head.binding") or found.get("weights.csv")
     mesh = read_character(path)
     surface = drawn_surface(mesh, np.ones(len(mesh.triangles), bool), 1.0)

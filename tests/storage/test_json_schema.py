@@ -1,0 +1,56 @@
+"""Documents are checked against tables of types and ranges; what stands in no table is not looked at."""
+
+from __future__ import annotations
+
+import pytest
+
+from lipmotion.storage.json_schema import (
+    SchemaError,
+    any_members,
+    if_fits,
+    items,
+    members,
+    number,
+    one_of,
+    text,
+    truth,
+    whole,
+)
+
+POINT = members({"at": items(number(-1, 1), 2, 2), "count": whole(0, 9), "kind": one_of(["a", 1])}, ["at"])
+DEEP: list = []
+for _ in range(5000):
+    DEEP = [DEEP]
+
+
+def test_what_fits_is_taken_out_in_its_type() -> None:
+    found = POINT({"at": [1, 0.5], "count": 3, "kind": 1, "unknown": DEEP})
+    assert found == {"at": [1.0, 0.5], "count": 3, "kind": 1}
+    assert isinstance(found["at"][0], float)
+    assert members({"a": if_fits(text(2)), "b": truth})({"a": "long", "b": True}) == {"b": True}
+    assert items(if_fits(whole(0, 1)))([0, "x", 1]) == [0, 1]
+    assert any_members(whole(0, 1))({"x": 1, "": 0}) == {"x": 1, "": 0}
+
+
+def test_what_does_not_fit_is_named_with_its_place() -> None:
+    wrong = {
+        "at is missing, required a value": {},
+        "at[1] is 2, required a number from -1 to 1": {"at": [0, 2]},
+        "at[0] is true, required a number": {"at": [True, 0]},
+        "at[0] is 1000": {"at": [10**400, 0]},
+        "at is a list of 3, required a list of 2 items": {"at": [0, 0, 0]},
+        "at is an object, required a list": {"at": {"0": 0}},
+        "count is 1.0, required a whole number from 0 to 9": {"at": [0, 0], "count": 1.0},
+        "count is null": {"at": [0, 0], "count": None},
+        "count is a list": {"at": [0, 0], "count": DEEP},
+        "kind is true, required one of a, 1": {"at": [0, 0], "kind": True},
+        "kind is an object": {"at": [0, 0], "kind": {}},
+        "the document is a list, required an object": [],
+    }
+    for message, value in wrong.items():
+        with pytest.raises(SchemaError) as refused:
+            POINT(value)
+        assert str(refused.value).startswith(message)
+        assert len(str(refused.value)) < 300
+    with pytest.raises(SchemaError, match=r"^a\.b\[1\]\.at\[0\] is 5"):
+        members({"a": any_members(items(POINT))})({"a": {"b": [{"at": [0, 0]}, {"at": [5, 0]}]}})
