@@ -55,6 +55,11 @@ class SpeechRequest:
     onto: Onto | None = None
     onto_speaker: str = ""
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.units, Timeline | None):
+            kind = type(self.units).__name__
+            raise InputError(f"the units are a {kind}, required a Timeline of spans of units")
+
 
 SpeechInput = str | Path | Audio | SpeechRequest
 """A recording alone, or a request."""

@@ -223,6 +223,8 @@ def _check_units(units: Timeline[Unit], duration_s: float) -> None:
             "them out"
         )
     check_phones(len(units), duration_s)
+    if not np.isfinite(units[0].start_s):
+        raise InputError(f"the units begin at {units[0].start_s} s, required a finite time")
     if duration_s + LATE_S < units[-1].end_s < np.inf:
         LOG.warning(
             "the units go on to %.2f s, the recording ends at %.2f s: are they those of another recording?",
