@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import pytest
 
+from lipmotion.cli.command_line import parser
 from lipmotion.cli.outcome import outcome
 from lipmotion.errors import InputError
 
@@ -25,3 +26,9 @@ def test_a_message_of_usual_length_is_whole() -> None:
     told = outcome(InputError("word " * 199))
     assert told is not None
     assert " ... " not in told[1]
+
+
+def test_a_wrong_command_line_is_one_line_of_limited_length(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        parser().error(f"unrecognized arguments: {'a.wav ' * 10_000}; see --help")
+    assert len(capsys.readouterr().err.splitlines()[-1]) < 1100

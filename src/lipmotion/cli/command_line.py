@@ -32,10 +32,10 @@ from lipmotion.cli import (
     words,
 )
 from lipmotion.cli.events import Events
+from lipmotion.cli.outcome import one_line
 from lipmotion.cli.output import flush_output, output_error, print_line, with_program_name
 from lipmotion.cli.paths import check_paths
 from lipmotion.cli.stop import Stopper
-from lipmotion.printable import printable
 
 VERBS = (
     *(animate, batch, speak, render, explain, cues, words, corpus, train, adapt, face),
@@ -110,10 +110,10 @@ def _option_strings(parser: argparse.ArgumentParser, verb: str = "") -> list[str
 
 
 class _Parser(argparse.ArgumentParser):
-    """Reports a wrong command line as printable text."""
+    """Reports a wrong command line as one printable line."""
 
     def error(self, message: str) -> NoReturn:
-        super().error(printable(message))
+        super().error(one_line(message))
 
 
 class _Version(argparse.Action):
