@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any, cast
 
 import pytest
 
@@ -25,7 +26,7 @@ def test_a_damaged_cache_is_written_again(tmp_path: Path, monkeypatch: pytest.Mo
         for damage in (b"", b"\xe9rubbish", None):
             for path in (path for path in files if path.suffix == suffix):
                 path.write_bytes(path.read_bytes()[:-1] if damage is None else damage)
-            again, after = compiled(_sum), compiled(_sum)
+            again, after = cast("Any", compiled(_sum)), cast("Any", compiled(_sum))
             assert again(1.0, 2.0) == after(1.0, 2.0) == 3.0
             assert not again.stats.cache_hits, "it was damaged"
             assert after.stats.cache_hits, "it is whole again"
