@@ -167,6 +167,8 @@ def test_constraints_and_units_that_are_none(move: Animate, toy_sentence: ToySen
         move(constraints=pins)
     with pytest.raises(InputError, match="the units are a list, required a Timeline"):
         SpeechRequest(toy_sentence.audio, units=[])
+    with pytest.raises(InputError, match="a unit is 'p', required a Unit"):
+        SpeechRequest(toy_sentence.audio, units=Timeline((Span(0, 1, "p"),)))
     for start_s, end_s in ((-math.inf, 0.5), (0.5, 1e308), (1e308, math.inf)):
         with pytest.raises(InputError, match=r"the units last from .* s, required times of this recording"):
             move(units=Timeline((Span(start_s, end_s, Unit("p")),)))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, shortened
 from lipmotion.kernels.banded import generate
 from lipmotion.motion.articulation import ArticulationPrior
 from lipmotion.motion.closure import OPENING, Closure, closable_ranges, frames_to_close
@@ -135,7 +135,9 @@ def resolved_pins(constraints: Constraints | None, space: MotionSpace, frames: i
     pins: Pins = {}
     for pin in constraints.pins if constraints else ():
         if pin.channel not in names:
-            raise InputError(f"cannot pin {pin.channel!r}; channels that can be pinned: {', '.join(names)}")
+            raise InputError(
+                f"cannot pin {shortened(repr(pin.channel))}; channels that can be pinned: {', '.join(names)}"
+            )
         frame = frame_of(pin.time_s, frames, FRAME_RATE_HZ)
         if frame is None:
             last_s = (frames - 1) / FRAME_RATE_HZ
