@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import os
+
 import pytest
 
 from lipmotion.cli.command_line import parser
@@ -9,6 +11,15 @@ from lipmotion.errors import InputError
 
 def test_a_bug_is_none() -> None:
     assert outcome(RuntimeError("oh")) is None
+
+
+def test_a_current_folder_that_is_gone_is_said() -> None:
+    told = outcome(FileNotFoundError(2, os.strerror(2)))
+    assert told is not None
+    assert "the current folder has been deleted" in told[1]
+    other = outcome(FileNotFoundError(2, os.strerror(2), "a.wav"))
+    assert other is not None
+    assert "a.wav" in other[1]
 
 
 @pytest.mark.parametrize("error", [InputError, OSError])

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import errno
+import os
+
 from lipmotion.errors import InputError, LipMotionError
 from lipmotion.printable import printable
 
+GONE = "the current folder has been deleted; go to one that exists"
 BEGIN, END = 700, 300
 """Characters of a long line that are shown from its beginning and from its end."""
 
@@ -16,8 +20,13 @@ def outcome(error: BaseException) -> tuple[int, str] | None:
     if isinstance(error, MemoryError):
         return InputError.exit_code, f"not enough memory ({error}); give a shorter recording or a smaller file"
     if isinstance(error, OSError):  # what the operating system refuses: no permission, a name too long
-        return InputError.exit_code, one_line(error)
+        return InputError.exit_code, one_line(GONE if _is_nameless(error) else error)
     return None
+
+
+def _is_nameless(error: OSError) -> bool:
+    """Return whether something without a name is missing: the current folder."""
+    return (error.errno, error.strerror, error.filename) == (errno.ENOENT, os.strerror(errno.ENOENT), None)
 
 
 def one_line(message: object) -> str:
