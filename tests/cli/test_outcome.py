@@ -1,5 +1,10 @@
 from __future__ import annotations
 
+import os
+
+import pytest
+
+from lipmotion.cli.command_line import parser
 from lipmotion.cli.outcome import outcome
 from lipmotion.errors import InputError
 
@@ -19,7 +24,22 @@ def test_a_message_that_repeats_a_file_is_cut_in_its_middle() -> None:
         assert " ... " in told[1]
 
 
+def test_a_current_folder_that_is_gone_is_said() -> None:
+    told = outcome(FileNotFoundError(2, os.strerror(2)))
+    assert told is not None
+    assert "the current folder has been deleted" in told[1]
+    other = outcome(FileNotFoundError(2, os.strerror(2), "a.wav"))
+    assert other is not None
+    assert "a.wav" in other[1]
+
+
 def test_a_message_of_usual_length_is_whole() -> None:
     told = outcome(InputError("word " * 199))
     assert told is not None
     assert " ... " not in told[1]
+
+
+def test_a_wrong_command_line_is_one_line_of_limited_length(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        parser().error(f"unrecognized arguments: {'a.wav ' * 10_000}; see --help")
+    assert len(capsys.readouterr().err.splitlines()[-1]) < 1100

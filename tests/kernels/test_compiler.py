@@ -1,15 +1,46 @@
+"""What a damaged cache of compiled kernels does: nothing that anybody sees."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, cast
+
 import pytest
 
-pytest.importorskip("numba")
-
-from lipmotion.kernels.compiled.compiler import compiled
+numba = pytest.importorskip("numba")
 
 
-def halves(x: float) -> float:
-    return x / 2
+def _sum(a: float, b: float) -> float:
+    return a + b
 
 
-def test_compiled_code_is_kept_on_disk():
-    function = compiled(halves)
-    assert function(3.0) == 1.5
-    assert function.stats.cache_path is not None
+@pytest.mark.long
+def test_a_damaged_cache_is_written_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from lipmotion.kernels.compiled.compiler import compiled
+
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    assert compiled(_sum)(1.0, 2.0) == 3.0
+    files = sorted(path for path in tmp_path.rglob("*") if path.is_file())
+    assert {path.suffix for path in files} == {".nbi", ".nbc"}
+    for suffix in (".nbi", ".nbc"):
+        for damage in (b"", b"\xe9rubbish", None):
+            for path in (path for path in files if path.suffix == suffix):
+                path.write_bytes(path.read_bytes()[:-1] if damage is None else damage)
+            again, after = cast("Any", compiled(_sum)), cast("Any", compiled(_sum))
+            assert again(1.0, 2.0) == after(1.0, 2.0) == 3.0
+            assert not again.stats.cache_hits, "it was damaged"
+            assert after.stats.cache_hits, "it is whole again"
+
+
+@pytest.mark.long
+def test_a_cache_that_takes_nothing_is_done_without(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from lipmotion.kernels.compiled.compiler import compiled
+
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    kernel = compiled(_sum)
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(numba.core.caching.IndexDataCacheFile, "save", full)
+    assert kernel(1.0, 2.0) == 3.0

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -148,6 +149,21 @@ def test_a_pin_that_cannot_be_met(move: Animate) -> None:
     ):
         with pytest.raises(InputError, match=message):
             move(constraints=Constraints((pin,)))
+
+
+def test_constraints_and_units_that_are_none(move: Animate, toy_sentence: ToySentence) -> None:
+    pins = Pin(0.5, "opening", 0.1), Pin(0.502, "opening", 0.2)
+    with pytest.raises(InputError, match=r"two pins at 0.5 s of opening: 0.1 and 0.2; leave one out"):
+        move(constraints=Constraints(pins))
+    with pytest.raises(InputError, match="the constraints are a tuple, required Constraints"):
+        move(constraints=pins)
+    with pytest.raises(InputError, match="the units are a list, required a Timeline"):
+        SpeechRequest(toy_sentence.audio, units=[])
+    with pytest.raises(InputError, match="a unit is 'p', required a Unit"):
+        SpeechRequest(toy_sentence.audio, units=Timeline((Span(0, 1, "p"),)))
+    for start_s, end_s in ((-math.inf, 0.5), (0.5, 1e308), (1e308, math.inf)):
+        with pytest.raises(InputError, match=r"the units last from .* s, required times of this recording"):
+            move(units=Timeline((Span(start_s, end_s, Unit("p")),)))
 
 
 def test_a_lexicon_gives_pronunciations(

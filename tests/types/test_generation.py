@@ -1,10 +1,23 @@
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.types import Channel, Generation, Motion, ReducedVariance, Span, StateTrace, Timeline, Unit
+from lipmotion.types import (
+    Channel,
+    Constraints,
+    Generation,
+    Motion,
+    Pin,
+    ReducedVariance,
+    Span,
+    StateTrace,
+    Timeline,
+    Unit,
+)
 
 
 def generation(frames: int = 101) -> Generation:
@@ -58,3 +71,20 @@ def test_variance_that_follows_from_few_dimensions_is_kept_as_such() -> None:
         assert isinstance(change(small).spread, ReducedVariance)
         assert change(small).variance == pytest.approx(change(large).variance)
     assert small.variance_of(slice(3, 5)) == pytest.approx(large.variance[3:5])
+
+
+def test_pins_and_times_are_numbers() -> None:
+    wrong: Any
+    for wrong in ("soon", None, [0.1], 1j, np.array([0.5]), 10**400):
+        with pytest.raises(InputError, match=r"the time of a pin is .*, required a number"):
+            Pin(wrong, "opening", 0.1)
+        with pytest.raises(InputError, match=r"the value of a pin is .*, required a number"):
+            Pin(0.5, "opening", wrong)
+    for wrong in ("soon", None, [0.1], 1j, 10**400):
+        with pytest.raises(InputError, match=r"the phone 'p' lasts from .* to .*, required seconds"):
+            Timeline((Span(wrong, wrong, Unit("p")),))
+    pin = Pin(0.5, "opening", 0.1)
+    pins: Any
+    for pins in (7, None, pin, "pins", [(0.5, "opening", 0.1)], [pin, None], iter([pin])):
+        with pytest.raises(InputError, match="required pins"):
+            Constraints(pins)

@@ -31,11 +31,11 @@ from lipmotion.cli import (
     words,
 )
 from lipmotion.cli.events import Events
+from lipmotion.cli.outcome import one_line
 from lipmotion.cli.output import flush_output, print_line, print_usage, with_program_name
 from lipmotion.cli.paths import check_paths
 from lipmotion.cli.stop import Stopper
 from lipmotion.errors import ExportError
-from lipmotion.printable import printable
 
 VERBS = (
     *(animate, batch, speak, render, explain, cues, words, corpus, train, adapt, face),
@@ -108,10 +108,10 @@ def _option_strings(parser: argparse.ArgumentParser, verb: str = "") -> list[str
 
 
 class _Parser(argparse.ArgumentParser):
-    """Reports a wrong command line as printable text, and help that cannot be printed."""
+    """Reports a wrong command line as one printable line, and help that cannot be printed."""
 
     def error(self, message: str) -> NoReturn:
-        super().error(printable(message))
+        super().error(one_line(message))
 
     def _print_message(self, message: str, file: Any = None) -> None:
         print_usage(message, is_wanted=file is sys.stdout)

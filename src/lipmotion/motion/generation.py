@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, shortened
 from lipmotion.kernels.banded import generate
 from lipmotion.motion.articulation import ArticulationPrior
 from lipmotion.motion.closure import OPENING, Closure, closable_ranges, frames_to_close
@@ -79,7 +79,7 @@ class LearnedMotion:
         close         : whether the lips are made to meet in every p, b and m
         closing_units : units that close the lips where no phone is known
         reliability   : of the phones in time, 0 to 1 [shape=(T,)]
-        Raises InputError: a pin names no channel, lies outside the recording or is not finite.
+        Raises InputError: a pin names no channel, lies outside the recording, is not finite, or contradicts another.
         Raises ModelFormatError: the motion leaves the limits, so that the model must be damaged.
         """
         pins = resolved_pins(constraints, self.space, frames)
@@ -128,13 +128,16 @@ def resolved_pins(constraints: Constraints | None, space: MotionSpace, frames: i
     """Return the pinned values by frame and dimension of the motion space.
 
     frames : length of the recording
-    Raises InputError: a channel that cannot be pinned, a time outside the recording, or a value that is not possible.
+    Raises InputError: a channel that cannot be pinned, a time outside the recording, a value that is not possible, or
+    two values for one frame.
     """
     names = space.direct_names
     pins: Pins = {}
     for pin in constraints.pins if constraints else ():
         if pin.channel not in names:
-            raise InputError(f"cannot pin {pin.channel!r}; channels that can be pinned: {', '.join(names)}")
+            raise InputError(
+                f"cannot pin {shortened(repr(pin.channel))}; channels that can be pinned: {', '.join(names)}"
+            )
         frame = frame_of(pin.time_s, frames, FRAME_RATE_HZ)
         if frame is None:
             last_s = (frames - 1) / FRAME_RATE_HZ
@@ -146,7 +149,11 @@ def resolved_pins(constraints: Constraints | None, space: MotionSpace, frames: i
         never_negative = pin.channel == OPENING or space.channels[space.direct[column]].unit == WEIGHT
         if never_negative and pin.value < 0:
             raise InputError(f"pin at {pin.time_s} s sets {pin.channel} to {pin.value}, required at least 0")
-        pins[frame, column] = pin.value
+        if pins.setdefault((frame, column), pin.value) != pin.value:
+            raise InputError(
+                f"two pins at {frame / FRAME_RATE_HZ:g} s of {pin.channel}: {pins[frame, column]} and {pin.value}; "
+                "leave one out"
+            )
     return pins
 
 

@@ -107,6 +107,8 @@ def animate(
     >>> result.units[1].label.word
     'please'
     """
+    if not isinstance(constraints, Constraints | None):
+        raise InputError(f"the constraints are a {type(constraints).__name__}, required Constraints((Pin(...),))")
     chosen = model if isinstance(model, Model) else load_model(model)
     request = request_of(speech, transcript)
     person = person_of(chosen, request)

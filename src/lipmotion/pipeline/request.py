@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from lipmotion.corpora.store import Corpus
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, shortened
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.motion.speakers import SpeakerMap
 from lipmotion.pipeline.model import Model
@@ -54,6 +54,14 @@ class SpeechRequest:
     speaker: str = ""
     onto: Onto | None = None
     onto_speaker: str = ""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.units, Timeline | None):
+            kind = type(self.units).__name__
+            raise InputError(f"the units are a {kind}, required a Timeline of spans of units")
+        for span in self.units or ():
+            if not isinstance(span.label, Unit):
+                raise InputError(f"a unit is {shortened(repr(span.label))}, required a Unit: Unit('p')")
 
 
 SpeechInput = str | Path | Audio | SpeechRequest

@@ -45,6 +45,8 @@ ResultT = TypeVar("ResultT")
 
 LATE_S = 0.1
 """Seconds by which given units may end after the sound; editing programs round times."""
+LATEST_S = 1e15
+"""Later units are refused: frames of such times cannot be counted."""
 LEAST_SPEECH_S = 0.2
 """Less recognised speech than this is none: the edge of a tone or of noise, taken as a consonant."""
 WORDS = (0.2, 0.9)
@@ -224,7 +226,10 @@ def _check_units(units: Timeline[Unit], duration_s: float) -> None:
             "them out"
         )
     check_phones(len(units), duration_s)
-    if duration_s + LATE_S < units[-1].end_s < np.inf:
+    first_s, last_s, end_s = units[0].start_s, units[-1].start_s, units[-1].end_s
+    if not -LATEST_S <= first_s <= last_s <= LATEST_S or LATEST_S < end_s < np.inf:
+        raise InputError(f"the units last from {first_s} to {end_s} s, required times of this recording")
+    if duration_s + LATE_S < end_s < np.inf:
         LOG.warning(
             "the units go on to %.2f s, the recording ends at %.2f s: are they those of another recording?",
             units[-1].end_s,

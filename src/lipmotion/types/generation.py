@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.errors import InputError, shortened
 from lipmotion.types.audio import Audio
 from lipmotion.types.features import Features
 from lipmotion.types.motion import Motion, between_frames
@@ -99,10 +101,17 @@ class Pin:
     channel: str
     value: float
 
+    def __post_init__(self) -> None:
+        for name, number in (("time", self.time_s), ("value", self.value)):
+            if not _is_number(number):
+                raise InputError(f"the {name} of a pin is {shortened(repr(number))}, required a number")
+
 
 @dataclass(frozen=True)
 class Constraints:
     """Values that generated motion must take exactly.
+
+    Raises InputError: something else than pins, or a time or a value that is no number.
 
     >>> import lipmotion
     >>> closed = lipmotion.Constraints((lipmotion.Pin(0.5, "opening", 0.02),))
@@ -112,6 +121,19 @@ class Constraints:
     """
 
     pins: tuple[Pin, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.pins, Collection) or not all(isinstance(pin, Pin) for pin in self.pins):
+            found = shortened(repr(self.pins))
+            raise InputError(f"constraints of {found}, required pins: Constraints((Pin(0.5, 'opening', 0.02),))")
+
+
+def _is_number(value: object) -> bool:
+    """Return whether a value is a real number that a float can hold; NaN and infinity are."""
+    try:
+        return isinstance(value, Real) and isinstance(float(value), float)
+    except OverflowError:
+        return False
 
 
 @dataclass(frozen=True, eq=False)

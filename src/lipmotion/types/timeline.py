@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, shortened
 
 LabelT = TypeVar("LabelT")
 
@@ -53,7 +53,7 @@ class Unit:
 class Timeline(Generic[LabelT]):
     """Spans in order of time, without overlap; gaps are allowed.
 
-    Raises InputError: a span ends before it starts, or two spans overlap.
+    Raises InputError: a time is no number, a span ends before it starts, or two spans overlap.
 
     >>> timeline = Timeline((Span(0.0, 0.5, Unit("sil")), Span(0.5, 0.6, Unit("p"))))
     >>> len(timeline), timeline[1].label.phone, timeline.shifted(1.0)[1].start_s
@@ -65,6 +65,7 @@ class Timeline(Generic[LabelT]):
     def __post_init__(self) -> None:
         end_s = float("-inf")
         for span in self.spans:
+            _check_times(span)
             if not span.start_s <= span.end_s:
                 raise InputError(f"{_described(span)} ends at {span.end_s} s, before its start at {span.start_s} s")
             if span.start_s < end_s - 1e-9:
@@ -86,6 +87,15 @@ class Timeline(Generic[LabelT]):
     def shifted(self, offset_s: float) -> Timeline[LabelT]:
         """Return the timeline with ``offset_s`` seconds added to all times."""
         return Timeline(tuple(replace(s, start_s=s.start_s + offset_s, end_s=s.end_s + offset_s) for s in self.spans))
+
+
+def _check_times(span: Span[LabelT]) -> None:
+    """Raise InputError if a time is no number, or one that no float can hold."""
+    try:
+        _ = span.start_s + 0.0 <= span.end_s + 0.0
+    except (TypeError, ValueError, OverflowError) as error:
+        first, last = (shortened(repr(time_s)) for time_s in (span.start_s, span.end_s))
+        raise InputError(f"{_described(span)} lasts from {first} to {last}, required seconds") from error
 
 
 def _described(span: Span[LabelT]) -> str:

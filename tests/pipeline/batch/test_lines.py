@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.pipeline.batch import BatchLine, read_lines
 from lipmotion.pipeline.batch import lines as lines_module
 from lipmotion.pipeline.batch.lines import check_names
+from lipmotion.pipeline.batch.settings import input_files
 
 
 def listed(folder: Path, text: str, name: str = "list.txt", kinds: tuple[str, ...] = ("json",)) -> list[BatchLine]:
@@ -138,3 +140,17 @@ def test_names_that_are_only_alike() -> None:
     names = ["a", "a.jso/b", "a/b", "x" * 240, "take.1", "take.livelink.2"]
     check_names([BatchLine(name, f"/{name}.wav") for name in names], ("json", "csv", "livelink.csv"))
     check_names([BatchLine("take.livelink", "/a.wav")], ("json",))
+
+
+@pytest.mark.skipif(os.name != "posix", reason="Windows has no such time")
+def test_another_file_of_the_same_size_and_time_is_noticed(tmp_path: Path) -> None:
+    path, other = tmp_path / "a.wav", tmp_path / "b.wav"
+    path.write_bytes(b"a")
+    (file,) = input_files(BatchLine("a", str(path)))
+    path.touch()
+    assert file.is_unchanged()
+    other.write_bytes(b"b")
+    status = path.stat()
+    other.replace(path)
+    os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
+    assert not file.is_unchanged()

@@ -11,6 +11,7 @@ import pytest
 from lipmotion.pipeline.batch.ledger import Place, opened_ledger
 from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.batch.report import COLUMNS, doubt_of, write_reports
+from lipmotion.printable import printable
 
 GOOD = {"outcome": "done", "words": "transcript", "confidence": 1.0, "range_db": 50.0, "warnings": []}
 GOOD |= {"closures_heard": 2, "closures_made": 2, "duration_s": 1.5, "seconds": 0.1, "advice": []}
@@ -56,7 +57,7 @@ def test_both_reports_hold_all_lines(tmp_path: Path) -> None:
     assert read[2]["outputs"] == "a.json"
     text = page.read_text(encoding="utf-8")
     rows = rows_of(text)
-    assert [row[COLUMNS.index("error")] for row in rows] == [hostile, None, None]
+    assert [row[COLUMNS.index("error")] for row in rows] == [printable(hostile), None, None]
     assert rows[2][-1] == ["a.json"]
     assert text.count("</script>") == 2
     assert "default-src 'none'" in text

@@ -148,6 +148,19 @@ def test_bad_recordings_are_listed_and_the_rest_is_prepared(studio, tmp_path):
 
 
 @pytest.mark.usefixtures("tracked")
+def test_utterances_of_recordings_that_are_gone_are_named(studio, tmp_path, caplog):
+    prepare(studio, tmp_path / "corpus", workers=1)
+    assert prepare(studio, tmp_path / "corpus", workers=1).kept == ("a", "b", "c")
+    assert not caplog.records
+    (studio / "a.mp4").unlink()
+    (studio / "c.mp4").write_bytes(b"")
+    assert prepare(studio, tmp_path / "corpus", workers=1).kept == ("b",)
+    assert (
+        "2 utterances are from recordings that are no longer there, or cannot be used any longer: a, c;" in caplog.text
+    )
+
+
+@pytest.mark.usefixtures("tracked")
 def test_nothing_usable(tmp_path):
     speak(tmp_path / "studio" / "broken.mp4", 5)
     with pytest.raises(CorpusError, match=r"none of 1 recordings is usable; the first, broken: .*no face in 25"):

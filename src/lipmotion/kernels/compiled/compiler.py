@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, TypeVar
 
 import numba
+from numba.core.caching import FunctionCache
 
 FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
 
@@ -24,8 +26,25 @@ def compiled_to_rounding(function: FunctionT) -> FunctionT:
 
 
 def _compiled(function: FunctionT, fastmath: set[str] | bool) -> FunctionT:
-    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": fastmath}
-    try:
-        return numba.njit(cache=True, **options)(function)
-    except RuntimeError:  # neither beside this file nor in the user's cache folder can anything be written
-        return numba.njit(**options)(function)
+    kernel = numba.njit(nogil=True, error_model="numpy", fastmath=fastmath)(function)
+    with suppress(RuntimeError):  # neither beside this file nor in the user's cache folder can anything be written
+        kernel._cache = _Cache(function)  # as its ``enable_caching``
+    return kernel
+
+
+class _Cache(FunctionCache):  # type: ignore[misc] # of a package without types
+    """Numba's cache on disk; what is damaged in it is compiled again, and what cannot be stored stays in memory."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return the stored machine code for a signature; None: there is none that can be read."""
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:  # unpickling what is damaged may raise anything
+            with suppress(OSError):
+                self.flush()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Store the machine code for a signature, if that is possible."""
+        with suppress(OSError):
+            super().save_overload(sig, data)

@@ -14,6 +14,7 @@ from urllib.parse import quote
 from lipmotion.pipeline.batch.ledger import Ledger
 from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.batch.record import FAILED, Record
+from lipmotion.printable import printable
 from lipmotion.speech.recognition import NOISY_DB
 from lipmotion.storage.files import as_text, whole_file
 from lipmotion.types.generation import ALL_FITS
@@ -93,5 +94,12 @@ def _field(value: Any) -> str:
 def _for_page(record: Record, values: Sequence[Any]) -> str:
     """Return a row of the page: its values, and the addresses of the outputs, relative to the page."""
     links = [quote(as_text(name)) for name in record["outputs"]]
-    text = json.dumps([*values, links], ensure_ascii=True, separators=(",", ":"))
+    text = json.dumps([*map(_visible, values), links], ensure_ascii=True, separators=(",", ":"))
     return text.replace("<", "\\u003c")  # nothing that a name says ends the script
+
+
+def _visible(value: Any) -> Any:
+    """Return a value of which nothing is invisible, as on a terminal: marks that turn a name around are shown."""
+    if isinstance(value, list):
+        return [printable(text) for text in value]
+    return printable(value) if isinstance(value, str) else value

@@ -118,11 +118,16 @@ class InputFile:
         """Return whether the file has the same content: by size and time of change, else by its digest."""
         try:
             status = Path(self.path).stat()
-            if (status.st_size, status.st_mtime_ns) == (self.size, self.changed_ns):
+            if (status.st_size, _changed_ns(status)) == (self.size, self.changed_ns):
                 return True
             return status.st_size == self.size and sha256_of(Path(self.path)) == self.sha256
         except (OSError, InputError):
             return False
+
+
+def _changed_ns(status: os.stat_result) -> int:
+    """Return when a file was changed: copying another file to its place may keep the time of its content."""
+    return max(status.st_mtime_ns, status.st_ctime_ns)
 
 
 def input_paths(line: BatchLine) -> list[Path]:
@@ -140,5 +145,5 @@ def input_files(line: BatchLine) -> list[InputFile]:
     found = []
     for path in input_paths(line):
         status = path.stat()
-        found.append(InputFile(str(path), status.st_size, status.st_mtime_ns, sha256_of(path)))
+        found.append(InputFile(str(path), status.st_size, _changed_ns(status), sha256_of(path)))
     return found

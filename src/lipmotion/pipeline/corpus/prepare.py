@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import shutil
 import time
@@ -33,8 +34,11 @@ from lipmotion.vision.frames import VideoSpan
 from lipmotion.vision.packages import package_versions
 from lipmotion.vision.track import track
 
+LOG = logging.getLogger("lipmotion")
 RECIPE = "5"
 """Version of the preparation, increased when the same video gives other values; older utterances are then replaced."""
+SHOWN = 5
+"""Utterances that a warning names."""
 _STAGE = "preparing recordings"
 """Name of the stage in reports of progress."""
 
@@ -147,6 +151,7 @@ def prepare(
             outcomes = _collected(
                 folder, team.unordered_map(_process, jobs), len(jobs), monitor, DIVIDING_SHARE if parts else 0.0
             )
+        _warn_of_older(corpus, _collection(place.resolve()), outcomes)
     report = _report(corpus, folder, outcomes, time.monotonic() - start_s)
     if not report.prepared and not report.kept:
         if is_new:
@@ -189,7 +194,7 @@ def _job(
     crops: bool,
     part: VideoPart | None,
 ) -> _Job:
-    collection = "/".join(directory.parts[-2:]).strip("/")
+    collection = _collection(directory)
     name = recording.name
     if _is_taken(corpus.folder(name), recording.file, collection):
         name = f"{collection.replace('/', '-')}-{name}"
@@ -211,6 +216,33 @@ def _job(
         source |= {"start_s": f"{recording.start_s:.3f}", "end_s": f"{recording.end_s:.3f}"}
         settings["part"] = f"{recording.start_s:.3f} to {recording.end_s:.3f} s"
     return _Job(replace(recording, name=name), corpus.folder(name), source, settings, part)
+
+
+def _collection(directory: Path) -> str:
+    """Return the name of a folder of recordings in the sources of their utterances: its last two names."""
+    return "/".join(directory.parts[-2:]).strip("/")
+
+
+def _warn_of_older(corpus: Corpus, collection: str, outcomes: list[_Outcome]) -> None:
+    """Log a warning if the corpus holds utterances of recordings that are gone, or that cannot be used any longer."""
+    good = {outcome.name for outcome in outcomes if not outcome.problem}
+    older = [name for name in corpus.names() if name not in good and _is_of(corpus.folder(name), collection)]
+    if older:
+        shown = ", ".join(older[:SHOWN]) + (", ..." if len(older) > SHOWN else "")
+        LOG.warning(
+            "%s: %d utterances are from recordings that are no longer there, or cannot be used any longer: %s; to do "
+            "without them, delete their folders and prepare again",
+            corpus.path / UTTERANCES,
+            len(older),
+            shown,
+        )
+
+
+def _is_of(folder: Path, collection: str) -> bool:
+    """Return whether a folder holds an utterance of a collection."""
+    with suppress(CorpusError):
+        return bool(read_entry(folder).get("source", {}).get("collection") == collection)
+    return False
 
 
 def _is_taken(folder: Path, video: Path, collection: str) -> bool:

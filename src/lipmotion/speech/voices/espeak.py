@@ -27,7 +27,8 @@ from lipmotion.speech.voices.espeak_events import PART, SILENCE
 from lipmotion.speech.voices.espeak_times import corrected_phone_times
 from lipmotion.speech.voices.ipa_phones import complete_map
 from lipmotion.speech.voices.phone_maps import ESPEAK_PHONES, PhoneMap
-from lipmotion.speech.voices.synthesiser import SynthesisedSentence, Synthesiser, SyntheticVoice, program_output
+from lipmotion.speech.voices.programs import program_output
+from lipmotion.speech.voices.synthesiser import SynthesisedSentence, Synthesiser, SyntheticVoice
 from lipmotion.types import Span, Timeline
 
 LOG = logging.getLogger("lipmotion")
@@ -115,7 +116,7 @@ def _languages(data: Path) -> list[str]:
 def _synthesise(voice: str, texts: Sequence[str], folder: Path) -> Iterator[SynthesisedSentence]:
     ipa = voice.partition("+")[0] != LANGUAGE
     task = {"voice": voice, "texts": list(texts), "folder": str(folder), "ipa": ipa} | _library()
-    sentences = _answer(program_output(PROGRAM, PACKAGE, len(texts), json.dumps(task)))
+    sentences = _answer(program_output(PROGRAM, PACKAGE, len(texts), json.dumps(task), folder))
     labels = (label.lstrip(STRESS_MARKS) for said in sentences for label, _, _ in said)
     phone_map, unknown = complete_map(labels, NO_IPA if ipa else ESPEAK_PHONES, ipa=ipa)
     if unknown:

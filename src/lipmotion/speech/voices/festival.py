@@ -10,7 +10,8 @@ from pathlib import Path
 from lipmotion.errors import InputError
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.voices.phone_maps import ARPABET_PHONES
-from lipmotion.speech.voices.synthesiser import SynthesisedSentence, Synthesiser, SyntheticVoice, program_output
+from lipmotion.speech.voices.programs import program_output
+from lipmotion.speech.voices.synthesiser import SynthesisedSentence, Synthesiser, SyntheticVoice
 from lipmotion.types import Span, Timeline
 
 PACKAGE = "festival festvox-us-slt-hts"
@@ -47,7 +48,7 @@ def _synthesise(voice: str, texts: Sequence[str], folder: Path) -> Iterator[Synt
     script = folder / "say.scm"
     calls = [f"(say {_quoted(text)} {_quoted(str(path))})" for text, path in zip(texts, paths, strict=True)]
     script.write_text("\n".join([f"(voice_{voice})", SPEAKING, *calls, ""]), encoding="utf-8")
-    printed = program_output(["festival", "-b", str(script)], PACKAGE, len(texts))
+    printed = program_output(["festival", "-b", str(script)], PACKAGE, len(texts), folder=folder)
     parts = printed.split(f"{MARK}\n")[1:]
     if len(parts) != len(texts):
         raise InputError(f"festival said {len(parts)} of {len(texts)} sentences; try another text or voice")

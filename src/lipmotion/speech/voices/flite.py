@@ -9,7 +9,8 @@ from pathlib import Path
 from lipmotion.errors import InputError
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.voices.phone_maps import ARPABET_PHONES
-from lipmotion.speech.voices.synthesiser import SynthesisedSentence, Synthesiser, SyntheticVoice, program_output
+from lipmotion.speech.voices.programs import program_output
+from lipmotion.speech.voices.synthesiser import SynthesisedSentence, Synthesiser, SyntheticVoice
 from lipmotion.types import Span, Timeline
 
 PACKAGE = "flite"
@@ -28,7 +29,8 @@ def _voices() -> tuple[SyntheticVoice, ...]:
 def _synthesise(voice: str, texts: Sequence[str], folder: Path) -> Iterator[SynthesisedSentence]:
     path = folder / "flite.wav"
     for text in texts:
-        printed = program_output(["flite", "-voice", voice, "-psdur", "-o", str(path), "-t", text], PACKAGE)
+        command = ["flite", "-voice", voice, "-psdur", "-o", str(path), "-t", text]
+        printed = program_output(command, PACKAGE, folder=folder)
         yield SynthesisedSentence(read_audio(path), parse_phone_ends(printed), path)
 
 

@@ -1,22 +1,13 @@
-"""The interface to speech synthesisers: voices, synthesised sentences, and running their programs."""
+"""The interface to speech synthesisers: voices, and synthesised sentences."""
 
 from __future__ import annotations
 
-import shutil
-import subprocess
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.speech.voices.phone_maps import PhoneMap
 from lipmotion.types import Audio, Timeline
-
-START_S, EACH_S = 30.0, 5.0
-"""The time limit of a program: to start, and for each sentence; both are a hundred times what it needs."""
-SHOWN = 200
-"""Characters of a program's error message that ours repeats."""
 
 
 @dataclass(frozen=True)
@@ -82,30 +73,3 @@ class Synthesiser:
     phone_map: PhoneMap
     others: Callable[[], tuple[SyntheticVoice, ...]] = tuple
     extra: str = ""
-
-
-def program_output(command: Sequence[str], package: str, sentences: int = 1, given: str = "") -> str:
-    """Return the standard output of a program.
-
-    package   : the Debian package with it
-    sentences : how many it synthesises, which sets its time limit
-    given     : its standard input
-    Raises MissingDependencyError: there is no such program. Raises InputError: it fails, or takes too long.
-    """
-    program = shutil.which(command[0])
-    if program is None:
-        raise MissingDependencyError(f"{command[0]} is not installed; install it: apt install {package}")
-    limit_s = START_S + EACH_S * sentences
-    name = package if command[0] == sys.executable else command[0]
-    try:
-        done = subprocess.run(
-            [program, *command[1:]], input=given, capture_output=True, encoding="utf-8", timeout=limit_s, check=False
-        )
-    except subprocess.TimeoutExpired as error:
-        raise InputError(f"{name} did not end within {limit_s:.0f} s; give shorter or fewer texts") from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{name} cannot be run ({error}); install it again: apt install {package}") from error
-    if done.returncode:
-        message = " ".join(done.stderr.split())[:SHOWN] or "no message"
-        raise InputError(f"{name} failed with {done.returncode} ({message}); try another text or voice")
-    return done.stdout
