@@ -11,7 +11,7 @@ from portable import settings
 def test_kernels_without_their_features_are_never_started(monkeypatch: pytest.MonkeyPatch) -> None:
     started = []
     features = {"SSE3": True, "AVX": True, "AVX2": True, "FMA3": True, "AVX512_SKX": False}
-    monkeypatch.setattr(np._core._multiarray_umath, "__cpu_features__", features)
+    monkeypatch.setattr(np._core._multiarray_umath, "__cpu_features__", features)  # type: ignore[attr-defined]
     monkeypatch.setattr(settings, "kernels", lambda core: started.append(core) or core)
     assert settings.possible_cores() == ["Haswell", "Zen", "Sandybridge", "Prescott"]
     assert settings.different_cores() == ["Haswell", "Zen", "Sandybridge", "Prescott"]
