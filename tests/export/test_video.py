@@ -153,7 +153,7 @@ def test_other_unusable_input_is_refused(tmp_path):
         write_mp4(tmp_path / "no" / "a.mp4", black(1), fps=25, audio=silence(0.1))
 
 
-def moving(count: int, height: int = 64, width: int = 96) -> list[np.ndarray]:
+def moving(count: int, height: int = 96, width: int = 128) -> list[np.ndarray]:
     """Return frames of noise that moves, and changes a little from frame to frame."""
     draw = np.random.default_rng(0)
     large = draw.integers(60, 196, (height, width + count, 3))
