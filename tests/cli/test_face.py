@@ -90,7 +90,7 @@ def test_what_cannot_be_built(run: RunCommand, tracker: Path, here: Path) -> Non
         ([tracker, "-o", "missing/a.face"], 7, "the folder missing does not exist"),
         ([tracker, "-o", "a.face", "--speaker", "ben"], 3, "no speaker 'ben', a face is that of one person"),
         ([video, "-o", "a.face"], 3, "s of footage with the face, required 5 s or more"),
-        ([video, "-o", video], 7, "a face is a file ending in .face"),
+        ([video, "-o", video], 7, "is the footage itself; give another name"),
     ):
         done = run("face", "build", *arguments, "--workers", "1")
         assert is_one_error(done, code), done

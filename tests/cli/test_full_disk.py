@@ -30,7 +30,7 @@ def run_limited(*arguments: object, limit: int = LIMIT) -> tuple[int, str]:
 
 @pytest.mark.parametrize("name", ["a.json", "a.mp4"])
 def test_animate(toy_speech: Path, toy_model_file: Path, here: Path, name: str) -> None:
-    code, line = run_limited("animate", toy_speech, "--model", toy_model_file, "-o", name, "--fps", "5")
+    code, line = run_limited("animate", toy_speech, "--model", toy_model_file, "-o", name, "--size", "64")
     assert (code, line.startswith(f"lipmotion: error: {name}: cannot be written: ")) == (7, True)
     assert line.endswith("; make room, then run it again")
     assert list(here.iterdir()) == []

@@ -1,5 +1,6 @@
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import av
 import numpy as np
@@ -124,7 +125,7 @@ def test_the_frame_rate_is_exact():
 
 
 def test_unusable_frames_are_refused_and_leave_no_file(tmp_path):
-    for frames, message in (
+    unusable: list[tuple[list[Any], str]] = [
         ([], "no frames"),
         (black(1, 63, 64), "even sizes"),
         (black(1, 64, 63), "even sizes"),
@@ -133,7 +134,8 @@ def test_unusable_frames_are_refused_and_leave_no_file(tmp_path):
         ([np.zeros((96, 63), dtype=np.uint8)], "even sizes"),
         ([np.zeros((96, 64), dtype=np.uint8), *black(1, 64, 64)], "frame 1 .* all alike"),
         ([np.zeros((64, 64, 3))], "float64"),
-    ):
+    ]
+    for frames, message in unusable:
         with pytest.raises(ExportError, match=message):
             write_mp4(tmp_path / "a.mp4", frames, fps=25, audio=silence(0.1))
         assert not list(tmp_path.iterdir())
@@ -151,7 +153,7 @@ def test_other_unusable_input_is_refused(tmp_path):
         write_mp4(tmp_path / "no" / "a.mp4", black(1), fps=25, audio=silence(0.1))
 
 
-def moving(count: int, height: int = 64, width: int = 96) -> list[np.ndarray]:
+def moving(count: int, height: int = 96, width: int = 128) -> list[np.ndarray]:
     """Return frames of noise that moves, and changes a little from frame to frame."""
     draw = np.random.default_rng(0)
     large = draw.integers(60, 196, (height, width + count, 3))

@@ -67,6 +67,7 @@ def test_a_loud_high_moment_is_an_accent_and_a_high_whisper_is_none():
     level_db[100:140], pitch[100:140] = -10.0, np.log(200.0)
     level_db[200:240], pitch[200:240] = -70.0, np.log(200.0)
     accent = accent_of(Prosody(level_db, pitch), np.arange(300) / 100)
+    assert accent is not None
     assert accent[120] > 0.9
     assert np.abs(accent[[20, 220]]).max() < 1e-9
     assert accent_of(None, TIME_S) is None

@@ -132,16 +132,14 @@ def test_bones_say_what_follows_the_head(character):
     assert (turned[1] == turned[2]).all()  # without a head bone, heights say it
 
 
-def test_the_head_turns_to_its_left_and_upwards(character):
-    """The pivot lies behind the face, so all of it goes to the right of the picture, and up."""
+def test_the_head_turns_to_its_left(character):
+    """The pivot lies behind the face, so all of it goes to the right of the picture."""
     stage = MeshStage(character, 256, 144)
 
-    def middle(turn: tuple[float, float, float]) -> np.ndarray:
-        return np.argwhere(stage.cut_out(character.mesh.vertices, turn)[..., 3] > 0).mean(axis=0)
+    def middle(turn: tuple[float, float, float]) -> float:
+        return float(np.nonzero(stage.cut_out(character.mesh.vertices, turn)[..., 3])[1].mean())
 
-    still, aside, up = (middle(turn) for turn in ((0.0, 0.0, 0.0), (0.2, 0.0, 0.0), (0.0, 0.2, 0.0)))
-    assert aside[1] > still[1] + 1
-    assert up[0] < still[0] - 1
+    assert middle((0.2, 0.0, 0.0)) > middle((0.0, 0.0, 0.0)) + 1
 
 
 def test_eyes_that_do_not_turn_with_the_head_look_where_the_gaze_is():

@@ -1,3 +1,5 @@
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -131,7 +133,12 @@ def test_a_transparent_background_shows_through_around_the_figure_only(face):
 
 
 def test_unusable_settings_are_refused():
-    for name, values in {"size": (62, 129, 5000), "intensity": (-1.0, 9.0), "background": ("blue", "#12345")}.items():
+    unusable: dict[str, tuple[Any, ...]] = {
+        "size": (62, 129, 5000),
+        "intensity": (-1.0, 9.0),
+        "background": ("blue", "#12345"),
+    }
+    for name, values in unusable.items():
         for value in values:
             with pytest.raises(InputError, match="required"):
                 Staging(**{name: value})

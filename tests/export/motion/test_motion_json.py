@@ -34,7 +34,7 @@ def test_the_document_is_as_specified(path, generation):
     assert values == np.round(generation.motion.values, 5).tolist()
 
 
-WRONG = [
+WRONG: list[tuple[dict[str, object], str]] = [
     ({"format": "other"}, "not a motion document"),
     ({"version": 2}, "version 2, this lipmotion reads up to 1: upgrade lipmotion"),
     ({"version": "1"}, "version '1', required 1"),
