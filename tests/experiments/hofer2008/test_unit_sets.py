@@ -116,7 +116,6 @@ def test_intervals_hold_their_figures_and_nothing_differs_from_itself(figures: d
 def test_lips_that_are_made_to_meet_do(toy_corpus: Corpus, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a corpus without transcripts to compare with, there is ``audio only``."""
     monkeypatch.setattr(module, "PAPER_SCORES", {"2vis": 66.5, "phone": 65.2})
-    monkeypatch.setattr(module, "ENGINE_SETTINGS", {SHIPPED: ENGINE_SETTINGS[SHIPPED]})
     corpus = copied(toy_corpus, tmp_path, lambda u: u if u.split == "train" else replace(u, words=None))
     pinned = unit_sets(corpus, settings=SMALL, closures=True, split="val")
     assert list(pinned["systems"][SHIPPED]) == ["audio only"]

@@ -40,9 +40,9 @@ def tracker(videos: Videos, monkeypatch: pytest.MonkeyPatch) -> Callable[..., No
     """Installs a tracker without errors; in some videos it sees only some frames."""
 
     def start(seen: dict[Path, np.ndarray] | None = None, more: Videos | None = None) -> None:
-        monkeypatch.setattr(build, "LEAST_FOOTAGE_S", 7.0)
         install(monkeypatch, videos | (more or {}), seen or {})
 
+    monkeypatch.setattr(build, "LEAST_FOOTAGE_S", 7.0)
     start()
     return start
 
