@@ -122,7 +122,7 @@ def test_a_part_of_a_transcript_is_noticed_and_a_whole_one_is_not(recordings: Pa
 @pytest.mark.recordings
 def test_real_recordings(recordings: Path) -> None:
     """No false alarm, and most transcripts of other clips found (docs/robustness.md)."""
-    names = (recordings / "grid-s1" / "val.txt").read_text().split()[::6]
+    names = (recordings / "grid-s1" / "val.txt").read_text().split()[::2]
     phones = Recogniser(load_model().phones, "auto")
     right, wrong = [], []
     for name, other in zip(names, [*names[7:], *names[:7]], strict=True):

@@ -357,14 +357,14 @@ def test_a_video_without_sound_and_a_sound_without_video(tmp_path: Path) -> None
 
 @pytest.mark.long
 def test_memory_is_that_of_the_result(tmp_path: Path) -> None:
-    path = write_sound(tmp_path / "a.aac", np.tile(babble(16_000, 20), (2, 15)), 16_000, "aac")  # 5 minutes
+    path = write_sound(tmp_path / "a.aac", np.tile(babble(16_000, 20), (2, 5)), 16_000, "aac")
     tracemalloc.start()
     try:
         audio = read_audio(path)
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    assert audio.duration_s > 299
+    assert audio.duration_s > 99
     assert peak < 1.3 * audio.samples.nbytes + 1e6
 
 
