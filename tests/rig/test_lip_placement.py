@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
+from lipmotion.rig import lip_placement
 from lipmotion.rig.lip_placement import placed_by_points, placed_by_shape, surface_of_named
 from lipmotion.rig.mesh import Blendshape, Mesh
 from lipmotion.rig.mouth_template import mouth_template
@@ -98,3 +99,14 @@ def test_a_shape_that_parts_no_lips_is_refused():
     whole = Blendshape.between("jawOpen", mesh.vertices, mesh.vertices - [0, SIZE, 0])
     with pytest.raises(InputError, match="parts no lips"):
         placed_by_shape(Mesh(mesh.vertices, mesh.triangles, shapes=(whole,)), mesh_surface(mesh))
+
+
+def test_of_a_dense_mesh_some_vertices_are_compared(monkeypatch):
+    mesh = head()
+    surface = mesh_surface(mesh)
+    whole = placed_by_shape(mesh, surface)
+    monkeypatch.setattr(lip_placement, "MOST_PAIRS", 1500)
+    thinned = placed_by_shape(mesh, surface)
+    assert (thinned.vertices != whole.vertices).any()
+    assert _offsets(mesh, thinned) < 2 * GRID
+    assert thinned.scale == pytest.approx(whole.scale, rel=0.2)
