@@ -224,7 +224,7 @@ def _report(_: Path, name: str) -> None:
     page = _for_page(record, [name])
     assert "<" not in page
     assert "\n" not in page
-    assert json.loads(page)[0] == name
+    assert json.loads(page)[0] == printable(name)
     text = StringIO(newline="")
     csv.writer(text).writerow([_field(name), "b"])
     text.seek(0)

@@ -62,8 +62,7 @@ def _speak(options: argparse.Namespace, report: Report) -> None:
     check_results(options)
     text = read_text(options.text) if options.text else options.words
     lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
-    model = load_model(options.model)
-    corpus = Corpus.open(options.corpus) if options.corpus else None
+    model, corpus = load_model(options.model), Corpus.open(options.corpus) if options.corpus else None
     how = {"voice": options.voice, "corpus": corpus, "model": model, "lexicon": lexicon, "speaker": options.speaker}
     onto = options.onto or person_shown(model, options.face, options.speaker)
     sound, result = speak(text, **how, onto=onto, onto_speaker=options.onto_speaker)

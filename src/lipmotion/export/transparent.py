@@ -122,7 +122,7 @@ def _picture(frame: Frame, n: int, rate: Fraction, pixels: str) -> Any:
     from av import VideoFrame
 
     picture = VideoFrame.from_ndarray(np.ascontiguousarray(frame), format="rgba" if frame.shape[2] == 4 else "rgb24")
-    picture = picture.reformat(format=pixels, dst_colorspace="itu709", threads=1)
+    picture = picture.reformat(format=pixels, dst_colorspace="itu709")
     picture.pts, picture.time_base = n, 1 / rate
     return picture
 

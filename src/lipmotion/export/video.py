@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import ExportError
 from lipmotion.export.xmp import append_xmp
 from lipmotion.storage.files import as_text, whole_file
+from lipmotion.storage.media import x264_instructions
 from lipmotion.types import Audio
 
 Frame = NDArray[np.uint8]
@@ -128,7 +129,8 @@ def _encode(
 
 
 def _video_stream(container: Any, first: Frame, rate: Fraction) -> Any:
-    stream = container.add_stream("libx264", rate=rate, options=dict(_ENCODER))
+    options = _ENCODER | {"x264-params": _ENCODER["x264-params"] + x264_instructions()}
+    stream = container.add_stream("libx264", rate=rate, options=options)
     stream.height, stream.width = first.shape[:2] if first.ndim == 3 else (len(first) * 2 // 3, first.shape[1])
     stream.pix_fmt = "yuv420p"
     context = stream.codec_context
@@ -146,7 +148,7 @@ def _picture(frame: Frame, n: int, rate: Fraction, converter: Any) -> Any:
         picture.colorspace, picture.color_range = _BT601, _LIMITED
     else:
         picture = VideoFrame.from_ndarray(np.ascontiguousarray(frame), format="rgb24")
-        picture = converter.reformat(picture, format="yuv420p", dst_colorspace="itu601", threads=1)
+        picture = converter.reformat(picture, format="yuv420p", dst_colorspace="itu601")
     picture.pts, picture.time_base = n, 1 / rate
     return picture
 

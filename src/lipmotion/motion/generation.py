@@ -125,11 +125,10 @@ class LearnedMotion:
 
 
 def resolved_pins(constraints: Constraints | None, space: MotionSpace, frames: int) -> Pins:
-    """Return the pinned values by frame and dimension of the motion space.
+    """Return the pinned values by frame and dimension of the motion space; of two pins in one frame the last holds.
 
     frames : length of the recording
-    Raises InputError: a channel that cannot be pinned, a time outside the recording, a value that is not possible, or
-    two values for one frame.
+    Raises InputError: a channel that cannot be pinned, a time outside the recording, or a value that is not possible.
     """
     names = space.direct_names
     pins: Pins = {}
@@ -149,11 +148,7 @@ def resolved_pins(constraints: Constraints | None, space: MotionSpace, frames: i
         never_negative = pin.channel == OPENING or space.channels[space.direct[column]].unit == WEIGHT
         if never_negative and pin.value < 0:
             raise InputError(f"pin at {pin.time_s} s sets {pin.channel} to {pin.value}, required at least 0")
-        if pins.setdefault((frame, column), pin.value) != pin.value:
-            raise InputError(
-                f"two pins at {frame / FRAME_RATE_HZ:g} s of {pin.channel}: {pins[frame, column]} and {pin.value}; "
-                "leave one out"
-            )
+        pins[frame, column] = pin.value
     return pins
 
 

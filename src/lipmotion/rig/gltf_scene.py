@@ -17,7 +17,7 @@ from lipmotion.rig.gltf_colours import WHITE, counted, tinted, vertex_tints
 from lipmotion.rig.gltf_container import GltfDocument, plain_name, read_gltf_document
 from lipmotion.rig.gltf_nodes import placed_nodes
 from lipmotion.rig.gltf_schema import LARGEST_NUMBER
-from lipmotion.rig.gltf_skins import Skin, head_bones, held_bones, read_skin, skin_weights, skinned_frames
+from lipmotion.rig.gltf_skins import GltfSkin, head_bones, held_bones, read_skin, skin_weights, skinned_frames
 from lipmotion.rig.gltf_textures import GltfMaterials
 from lipmotion.rig.mesh import Blendshape, Material, Mesh, MeshPart, PartNames
 from lipmotion.rig.vrm import expression_shapes, looks_backwards
@@ -45,7 +45,7 @@ def read_gltf(path: Path) -> Mesh:
 
 
 @dataclass(frozen=True, eq=False)
-class _Block:
+class _SharedVertices:
     """Vertices that primitives of a node share: the number of the first one, and how they look."""
 
     first: int
@@ -62,8 +62,8 @@ class _SceneSurface:
         self._arrays = GltfArrays(document)
         self._materials = GltfMaterials(document, self._arrays)
         self._nodes = placed_nodes(document)
-        self._skins: dict[int, Skin] = {}
-        self._blocks: dict[Any, _Block] = {}
+        self._skins: dict[int, GltfSkin] = {}
+        self._blocks: dict[Any, _SharedVertices] = {}
         self._triangles: list[NDArray[np.int64]] = []
         self._uv: list[Matrix] = []
         self._parts: list[tuple[str, Material]] = []
@@ -118,7 +118,7 @@ class _SceneSurface:
                     self._blocks[shared] = self._block(number, primitive, target_names(mesh, primitive))
                 self._add_primitive(primitive, name, self._blocks[shared])
 
-    def _add_primitive(self, primitive: dict[str, Any], name: str, block: _Block) -> None:
+    def _add_primitive(self, primitive: dict[str, Any], name: str, block: _SharedVertices) -> None:
         attributes, count = primitive["attributes"], len(block.vertices)
         corners = self._corners(primitive, count)
         if not corners.size:
@@ -154,7 +154,7 @@ class _SceneSurface:
             raise InputError(f"triangles of vertices up to {corners.max(initial=0)} of {count}; export it again")
         return corners
 
-    def _block(self, number: int, primitive: dict[str, Any], names: list[str]) -> _Block:
+    def _block(self, number: int, primitive: dict[str, Any], names: list[str]) -> _SharedVertices:
         """Return the vertices of a primitive at their places in the scene; keep its bones and morph targets."""
         node, attributes = self._document.items("nodes")[number], primitive["attributes"]
         count = self._arrays.count(attributes["POSITION"])
@@ -170,12 +170,14 @@ class _SceneSurface:
             linear, shift = placed.matrix[:3, :3], placed.matrix[:3, 3]
             self._bones += held_bones(placed, self._nodes, self._count, count)
         self._add_targets(node["mesh"], primitive.get("targets", []), names, linear, count)
-        block = _Block(self._count, _mapped(linear, vertices) + shift, np.zeros((count, 3)), np.ones((count, 4)))
+        block = _SharedVertices(
+            self._count, _mapped(linear, vertices) + shift, np.zeros((count, 3)), np.ones((count, 4))
+        )
         block.colours[:] = self._materials.material(primitive.get("material")).colour
         self._count += count
         return block
 
-    def _skin(self, number: int) -> Skin:
+    def _skin(self, number: int) -> GltfSkin:
         if number not in self._skins:
             self._skins[number] = read_skin(self._document, number, self._arrays, self._nodes)
         return self._skins[number]

@@ -21,7 +21,7 @@ LEAST_WEIGHT = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Skin:
+class GltfSkin:
     """The joints of a skin.
 
     joints   : their nodes, in the order of the skin [J]
@@ -32,7 +32,7 @@ class Skin:
     matrices: Matrix
 
 
-def read_skin(document: GltfDocument, number: int, arrays: GltfArrays, nodes: Mapping[int, PlacedNode]) -> Skin:
+def read_skin(document: GltfDocument, number: int, arrays: GltfArrays, nodes: Mapping[int, PlacedNode]) -> GltfSkin:
     """Return a skin of a document at rest. Raises InputError: a joint is not in the scene, or matrices are missing."""
     skin = document.items("skins")[number]
     listed, inverse = skin["joints"], skin.get("inverseBindMatrices")
@@ -46,10 +46,12 @@ def read_skin(document: GltfDocument, number: int, arrays: GltfArrays, nodes: Ma
     matrices = np.array([joint.matrix for joint in joints])
     if inverse is not None:
         matrices = matrices @ arrays.floats(inverse, 16)[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
-    return Skin(joints, matrices[:, :3])
+    return GltfSkin(joints, matrices[:, :3])
 
 
-def skin_weights(skin: Skin, arrays: GltfArrays, attributes: Mapping[str, int], count: int) -> tuple[Numbers, Matrix]:
+def skin_weights(
+    skin: GltfSkin, arrays: GltfArrays, attributes: Mapping[str, int], count: int
+) -> tuple[Numbers, Matrix]:
     """Return the joints that every vertex follows, as rows of the skin's list, and how far [shape=(N, W), both].
 
     count : of the vertices
@@ -67,7 +69,7 @@ def skin_weights(skin: Skin, arrays: GltfArrays, attributes: Mapping[str, int], 
     return np.concatenate(joints, axis=1), np.concatenate(weights, axis=1)
 
 
-def skinned_frames(skin: Skin, joints: Numbers, weights: Matrix) -> tuple[Matrix, Matrix]:
+def skinned_frames(skin: GltfSkin, joints: Numbers, weights: Matrix) -> tuple[Matrix, Matrix]:
     """Return how a skin at rest maps every vertex: matrices [shape=(N, 3, 3)] and shifts [shape=(N, 3)].
 
     joints, weights : as of ``skin_weights``
@@ -85,7 +87,7 @@ def skinned_frames(skin: Skin, joints: Numbers, weights: Matrix) -> tuple[Matrix
 
 
 def head_bones(
-    skin: Skin, joints: Numbers, weights: Matrix, nodes: Mapping[int, PlacedNode], first: int
+    skin: GltfSkin, joints: Numbers, weights: Matrix, nodes: Mapping[int, PlacedNode], first: int
 ) -> Iterator[Bone]:
     """Yield the bones of the head that vertices follow, or whose parts they follow.
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.storage.frame_groups import FrameGroups
-from lipmotion.storage.media import MOST_PIXELS, bound_allocations
+from lipmotion.storage.media import MOST_PIXELS, bound_allocations, x264_instructions
 from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
 
 Pictures = NDArray[np.uint8]
@@ -199,8 +199,7 @@ def _encode(frames: Iterable[Pictures], crf: float, group: int, pixel_format: st
         if frame.shape != shape or frame.dtype != np.uint8:
             raise InputError(f"frame {n} is {frame.dtype} {frame.shape}, required uint8 {shape} as the first")
         picture = av.VideoFrame.from_ndarray(_padded(frame, context.height, context.width), format="rgb24")
-        # with several threads, about one video in 1,500 differs on a busy machine
-        picture = picture.reformat(format=pixel_format, dst_colorspace=_BT601, dst_color_range=_LIMITED, threads=1)
+        picture = picture.reformat(format=pixel_format, dst_colorspace=_BT601, dst_color_range=_LIMITED)
         picture.pts = n
         yield from map(bytes, context.encode(picture))
     yield from map(bytes, context.encode(None))
@@ -225,7 +224,8 @@ def _encoder(shape: tuple[int, ...], crf: float, group: int, pixel_format: str) 
     context.options = {
         "crf": f"{crf:g}",
         "preset": "medium",
-        "x264-params": f"keyint={group}:min-keyint={group}:scenecut=0:bframes=0:aud=1:repeat-headers=1:threads=1",
+        "x264-params": f"keyint={group}:min-keyint={group}:scenecut=0:bframes=0:aud=1:repeat-headers=1:threads=1"
+        + x264_instructions(),
     }
     return context
 
@@ -287,6 +287,6 @@ def _as_rgb(picture: Any, size: tuple[int, int] | None) -> Pictures:
     height, width = size or (picture.height, picture.width)
     if picture.is_corrupt or not (0 <= picture.height - height <= 1 and 0 <= picture.width - width <= 1):
         raise ValueError(f"a picture of {picture.width} × {picture.height} pixels, required {width} × {height}")
-    picture = picture.reformat(format="rgb24", src_colorspace=_BT601, src_color_range=_LIMITED, threads=1)
+    picture = picture.reformat(format="rgb24", src_colorspace=_BT601, src_color_range=_LIMITED)
     rgb: Pictures = picture.to_ndarray()
     return rgb[:height, :width]

@@ -112,7 +112,7 @@ def drawing_of(data: bytes) -> Drawing:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"not text in UTF-8 (byte {error.start}); save it as plain SVG in UTF-8") from error
-    return _Reader().drawing(text)
+    return _DrawingReader().drawing(text)
 
 
 class _Group(NamedTuple):
@@ -130,7 +130,7 @@ class _Group(NamedTuple):
 
 
 @dataclass
-class _Reader:
+class _DrawingReader:
     """Takes the elements of one drawing as the parser finds them.
 
     groups  : those that are open, the innermost last
