@@ -16,10 +16,11 @@ from lipmotion.types import Pin, Span, Timeline, Unit
 
 SYSTEMS = {
     **{name: (name, {}) for name in sorted(ENGINES.names)},
+    "coupled": ("coupled", {"chains": "sVis 2vis", "mixtures": 2}),
     "trajectory of 2vis": ("trajectory", {"units": "2vis"}),
     "plain trajectory of eVis": ("trajectory", {"units": "eVis", "acoustic_regression": False}),
 }
-"""Every engine as it is, and its other settings that change what the model holds."""
+"""Every engine as it is, the coupled one smaller, and other settings that change what the model holds."""
 
 
 @cache
