@@ -224,4 +224,4 @@ def test_the_times_of_real_voices_are_those_that_the_aligner_hears(real: Synthet
         said, heard = ([span for span in part if not is_silent(span.label.phone)] for part in (units, placed))
         late_s += [a.start_s - b.start_s for a, b in zip(said, heard, strict=True)]
     assert np.median(np.abs(late_s)) < 0.02  # two frames; flite 0.013, festival with kal 0.015
-    assert abs(np.median(late_s)) < 0.01
+    assert abs(np.median(late_s)) < 0.02
