@@ -241,10 +241,10 @@ def test_two_at_a_time_are_refused(studio, tmp_path):
 
 
 @pytest.fixture
-def clips(tmp_path: Path) -> Path:
+def clips(recordings: Path, tmp_path: Path) -> Path:
     """Six GRID clips."""
     pytest.importorskip("mediapipe")
-    source = Path(__file__).parents[2].parent / "shared" / "corpora" / "grid-s1" / "clips"
+    source = recordings / "grid-s1" / "clips"
     if not source.is_dir():
         pytest.skip("the real recordings are not here")
     folder = tmp_path / "clips"
