@@ -37,10 +37,10 @@ test: $(VENV)/dev
 test-all: test-long test-portable test-explore
 
 test-long: $(VENV)/dev
-	$(TIMED) --limit 900 $(PYTEST) -m long
+	$(TIMED) --limit 1500 $(PYTEST) -m long
 
 test-portable: $(VENV)/dev
-	PYTHONPATH=tests $(TIMED) --limit 500 $(BIN)/python -m portable.run
+	PYTHONPATH=tests $(TIMED) --limit 400 $(BIN)/python -m portable.run
 
 test-explore: $(VENV)/dev
 	$(PYTEST) -m "hypothesis and not long" --hypothesis-profile=explore
