@@ -88,7 +88,7 @@ def read_entry(folder: Path) -> dict[str, Any]:
     """Return the description of an utterance, checked. Raises CorpusError: missing or damaged."""
     try:
         entry = from_json(read_text_file(folder / ENTRY, "description"))
-    except (OSError, ValueError, RecursionError) as error:
+    except (OSError, ValueError) as error:
         raise _damaged(folder, error) from error
     if not isinstance(entry, dict) or not entry.keys() >= KEYS:
         raise _damaged(folder, KeyError(f"{ENTRY} holds other keys than {', '.join(sorted(KEYS))}"))

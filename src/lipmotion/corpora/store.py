@@ -231,7 +231,7 @@ def _read_manifest(path: Path) -> dict[str, dict[str, Any]]:
     try:
         content = from_json(read_text_file(path, "manifest"))
         format_name, version = content["format"], content["version"]
-    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+    except (OSError, ValueError, KeyError, TypeError) as error:
         raise CorpusError(f"{path.parent}: not a corpus (no readable {MANIFEST}); give a prepared corpus") from error
     if format_name != FORMAT:
         raise CorpusError(f"{path}: format is {format_name!r}, required {FORMAT!r}; give a prepared corpus")

@@ -139,7 +139,7 @@ def _json(text: bytes, budget: Budget) -> Any:
     budget.spend("values in a document", sum(text.count(mark) for mark in (b",", b"[", b"{")))
     try:
         return from_json(text)
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise InputError(f"no glTF document ({shortened(str(error))}); give a .glb, .gltf or .vrm file") from error
 
 
