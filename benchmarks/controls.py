@@ -16,7 +16,7 @@ import numpy as np
 from character import SENTENCES
 
 import lipmotion
-from lipmotion.motion.delivery import Delivery, closed_frames, closed_on_grid, closed_times, held, intensified
+from lipmotion.articulation.delivery import Delivery, closed_frames, closed_on_grid, closed_times, held, intensified
 from lipmotion.types import Generation
 
 RATE_HZ = 24.0

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lipmotion.errors import InputError
-from lipmotion.motion.delivery import (
+from lipmotion.articulation.delivery import (
     Delivery,
     closed_frames,
     closed_on_grid,
@@ -18,6 +17,7 @@ from lipmotion.motion.delivery import (
     moved_in_time,
     sound_units,
 )
+from lipmotion.errors import InputError
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
 from rig.speech import motion, units
 

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion.articulation.delivery import Delivery, closed_frames
 from lipmotion.errors import InputError
 from lipmotion.export.base import read_motion
 from lipmotion.faces import Face, Staging
 from lipmotion.faces.mesh import MeshFace
 from lipmotion.faces.registry import face_named
-from lipmotion.motion.delivery import Delivery, closed_frames
 from lipmotion.pipeline.animate import check_outputs, write
 from lipmotion.pipeline.characters import with_curves
 from lipmotion.pipeline.delivered import delivered_scene, held_mouth, moved_prosody, shown, staged_intensity

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lipmotion.articulation.delivery import Delivery
 from lipmotion.errors import ExportError
 from lipmotion.faces import Staging
 from lipmotion.faces.character.pose import CharacterPose
 from lipmotion.faces.character.shapes import EYE_ACROSS, EYE_UPWARDS
-from lipmotion.motion.delivery import Delivery
 from lipmotion.pipeline.animate import check_outputs, write
 from lipmotion.pipeline.characters import curves_of
 from lipmotion.pipeline.living_curves import HEAD, curves_of_poses, living_curves

@@ -11,12 +11,12 @@ from typing import Any
 import av
 import numpy as np
 import pytest
+from lipmotion.motion.gestures import GESTURES
 
+from lipmotion.articulation.delivery import closed_on_grid
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import read_motion
 from lipmotion.faces import Staging
-from lipmotion.motion.delivery import closed_on_grid
-from lipmotion.motion.gestures import GESTURES
 from lipmotion.pipeline.animate import animate, with_articulation, write
 from lipmotion.pipeline.model import Model
 from lipmotion.types import Audio, Generation

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lipmotion.rig.mouth_template import mouth_template
+from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 
 PHONES = (("sil", 0.0, 0.5), ("m", 0.5, 0.6), ("aa", 0.6, 0.9), ("p", 0.9, 1.0), ("uw", 1.0, 1.3), ("sil", 1.3, 2.0))

@@ -7,6 +7,7 @@ import zipfile
 import numpy as np
 import pytest
 
+from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.kernels.skinning import skinned
 from lipmotion.rig.binding import MOST_WEIGHTS, bind, painted
@@ -19,7 +20,6 @@ from lipmotion.rig.binding_files import (
     write_weights,
 )
 from lipmotion.rig.lip_placement import placed_by_points, surface_of_named
-from lipmotion.rig.mouth_template import mouth_template
 from oracles.skinning import skinned_vertex_by_vertex
 from rig.heads import SEAM, SIZE, head, lip_points
 

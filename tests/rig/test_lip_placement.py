@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import InputError
 from lipmotion.rig import lip_placement
 from lipmotion.rig.lip_placement import placed_by_points, placed_by_shape, surface_of_named
 from lipmotion.rig.mesh import Blendshape, Mesh
-from lipmotion.rig.mouth_template import mouth_template
 from lipmotion.rig.surface import mesh_surface
 from rig.heads import COLUMNS, HALF, SEAM, SIZE, head, lip_points
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from lipmotion.rig.mouth_template import LEFT_CORNER, RIGHT_CORNER, mouth_template
+from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER, mouth_template
 from lipmotion.rig.reference_mouth import arkit_mouth
 from lipmotion.rig.rounding import rounded_displacements, rounded_weights, roundness
 from lipmotion.rig.shape_weights import shape_weights

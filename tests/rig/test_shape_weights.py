@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.rig.bounded_curves import CurveCosts
 from lipmotion.rig.face_shapes import face_shapes
 from lipmotion.rig.lip_placement import placed_by_shape
 from lipmotion.rig.mesh import Mesh
-from lipmotion.rig.mouth_template import mouth_template
 from lipmotion.rig.point_motion import point_motion
 from lipmotion.rig.reference_mouth import arkit_mouth
 from lipmotion.rig.shape_weights import SolverOptions, shape_weights

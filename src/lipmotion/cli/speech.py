@@ -52,6 +52,13 @@ def add_recording_arguments(parser: argparse.ArgumentParser, *, several: bool = 
     add_input(parser, "--units", what="units file", replaceable=True, metavar="FILE", help=edited)
     add_recogniser_argument(parser)
     add_speaker_argument(parser)
+    add_pauses_argument(parser)
+
+
+def add_pauses_argument(parser: argparse.ArgumentParser) -> None:
+    """Add ``--pauses``: what the mouth does between phrases."""
+    styles = "rest: lips close softly in pauses (default); natural: as people do, who breathe and hold a sound"
+    parser.add_argument("--pauses", choices=("rest", "natural"), default="rest", help=styles)
 
 
 def add_speaker_argument(parser: argparse.ArgumentParser) -> None:
@@ -129,4 +136,5 @@ def spoken_request(options: argparse.Namespace, words_beside: bool = False) -> S
         speaker=options.speaker,
         onto=options.onto,
         onto_speaker=options.onto_speaker,
+        pauses=options.pauses,
     )

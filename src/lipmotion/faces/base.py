@@ -11,6 +11,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.liveliness import Liveliness, liveliness
 from lipmotion.errors import InputError, shortened
 from lipmotion.types import Configuration, Motion, Prosody, Rule, Timeline, Unit, option
 
@@ -43,7 +44,6 @@ class Staging(Configuration):
 
     size       : height of the picture in pixels, an even number; 0: the face's own
     background : ``scene`` (the face's own), ``transparent``, or a colour as ``#40a0ff``
-    intensity  : 1: movements of the mouth as spoken; more, up to 3: larger. Closed lips stay closed at any intensity
     blinks, gaze, brows, head : whether these move on their own
     seed       : of the movements that depend on chance
     Raises InputError: a value out of its range, or no such background.
@@ -51,7 +51,6 @@ class Staging(Configuration):
 
     size: int = option(0, Rule(least=0))
     background: str = SCENE
-    intensity: float = option(1.0, Rule(least=0))
     blinks: bool = True
     gaze: bool = True
     brows: bool = True
@@ -62,8 +61,6 @@ class Staging(Configuration):
         super().__post_init__()
         if self.size and not (SMALLEST <= self.size <= LARGEST and self.size % 2 == 0):
             raise InputError(f"the size is {self.size} pixels, required an even number from {SMALLEST} to {LARGEST}")
-        if self.intensity > 3:
-            raise InputError(f"the intensity is {self.intensity:g}, required 0 to 3")
         if self.background not in (SCENE, TRANSPARENT) and not re.fullmatch("#[0-9a-fA-F]{6}", self.background):
             raise InputError(
                 f"the background is {shortened(self.background)!r}, required scene, transparent, or a colour as "
@@ -76,6 +73,22 @@ class Staging(Configuration):
         if not self.background.startswith("#"):
             return None
         return int(self.background[1:3], 16), int(self.background[3:5], 16), int(self.background[5:7], 16)
+
+
+def alive(
+    time_s: NDArray[np.float64],
+    motion: Motion,
+    units: Timeline[Unit],
+    staging: Staging | None = None,
+    prosody: Prosody | None = None,
+) -> Liveliness:
+    """Return what moves beside the mouth at some times, as a staging asks for it; None: everything moves.
+
+    motion, units, prosody : as of ``articulation.liveliness``
+    """
+    chosen = staging or Staging()
+    moving = {name: getattr(chosen, name) for name in ("blinks", "gaze", "brows", "head")}
+    return liveliness(time_s, motion, units, prosody, seed=chosen.seed, **moving)
 
 
 @runtime_checkable

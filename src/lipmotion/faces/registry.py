@@ -53,5 +53,5 @@ def staged_face(face: str | Face, staging: Staging, prosody: Prosody | None = No
         return face.staged(staging, prosody)
     if staging != Staging():
         kind = type(face).__name__
-        raise InputError(f"the face {kind!r} has no settings, as size, background and intensity; leave them out")
+        raise InputError(f"the face {kind!r} has no settings, as size and background; leave them out")
     return face

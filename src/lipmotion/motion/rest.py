@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError
-from lipmotion.types import ENERGY_FEATURE, FRAME_RATE_HZ, Motion, Timeline, Unit
+from lipmotion.types import ENERGY_FEATURE, FRAME_RATE_HZ, Timeline, Unit
 from lipmotion.units import is_silent
 
 Array = NDArray[np.float64]
@@ -43,36 +42,6 @@ def runs(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
 def speech_intervals(units: Timeline[Unit]) -> list[tuple[float, float]]:
     """Return start and end, in seconds, of every phone that is not silence."""
     return [(span.start_s, span.end_s) for span in units if not is_silent(span.label.phone)]
-
-
-def rest_frames(motion: Motion, units: Timeline[Unit]) -> NDArray[np.bool_]:
-    """Return the frames of the rest pose [shape=(T,)]: silence, or else the tenth of the frames that is most closed.
-
-    motion : needs ``opening``
-    """
-    time_s = motion.time_s
-    rest = np.zeros(len(time_s), dtype=bool)
-    for span in units:
-        if is_silent(span.label.phone):
-            rest |= (span.start_s <= time_s) & (time_s < span.end_s)
-    if rest.any():
-        return rest
-    most_closed = np.argsort(motion["opening"], kind="stable")[: max(1, len(time_s) // 10)]
-    rest[most_closed] = True
-    return rest
-
-
-def against_rest(name: str, curve: Array, rest: NDArray[np.bool_]) -> Array:
-    """Return a curve relative to its median at rest [shape=(T,)].
-
-    name : of the curve, for the message
-    rest : of ``rest_frames``
-    Raises InputError: the median is not positive.
-    """
-    value = float(np.median(curve[rest]))
-    if not value > 0:
-        raise InputError(f"the {name} is {value:g} at rest, required more than 0")
-    return curve / value
 
 
 def unheard_frames(features: NDArray[np.floating], units: Timeline[Unit]) -> NDArray[np.bool_]:

@@ -8,6 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from lipmotion.articulation.delivery import Delivery, closed_on_grid, closed_times, sound_units
+from lipmotion.articulation.pauses import with_pauses
+from lipmotion.articulation.phone_targets import GESTURES, with_gestures
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import check_motion, motion_format, motion_suffix, motion_suffixes, write_motion
 from lipmotion.export.sound import SOUND_CODECS, write_sound
@@ -16,8 +19,7 @@ from lipmotion.faces.base import Face, Staging
 from lipmotion.faces.filmed.face import SUFFIX, FilmedFace, load_face
 from lipmotion.faces.registry import FACES, face_named
 from lipmotion.kernels.threads import one_thread
-from lipmotion.motion.delivery import Delivery, closed_on_grid, closed_times, sound_units
-from lipmotion.motion.gestures import GESTURES, with_gestures
+from lipmotion.motion.speakers import SpeakerMap
 from lipmotion.pipeline.characters import WHOLE_FACE, with_curves
 from lipmotion.pipeline.delivered import (
     check_delivery,
@@ -26,7 +28,6 @@ from lipmotion.pipeline.delivered import (
     held_mouth,
     moved_prosody,
     shown,
-    staged_intensity,
 )
 from lipmotion.pipeline.drawn_video import (
     OPAQUE_SUFFIX,
@@ -41,11 +42,11 @@ from lipmotion.pipeline.film.video import FILM, FilmOptions, check_film, film_of
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.motion_files import check_length, in_format, needs_prosody, warn_of_unused
 from lipmotion.pipeline.outlook import outlook_of
-from lipmotion.pipeline.request import SpeechInput, request_of
+from lipmotion.pipeline.request import SpeechInput, SpeechRequest, request_of
 from lipmotion.pipeline.scenes import SCENE_SUFFIXES, check_sound_name, is_scene, sound_reference, write_scene
 from lipmotion.pipeline.speakers import generate_for
 from lipmotion.pipeline.transfer import person_of
-from lipmotion.pipeline.understand import understood_speech
+from lipmotion.pipeline.understand import UnderstoodSpeech, understood_speech
 from lipmotion.pipeline.workers import map_in_processes
 from lipmotion.rig.blendshape_motion import is_of_blendshapes
 from lipmotion.rig.driven import DrivenCharacter
@@ -114,9 +115,26 @@ def animate(
     person = person_of(chosen, request)
     understood = understood_speech(chosen, request, map_in_processes(workers, meanwhile), monitor)
     monitor(Progress("moving the mouth", 0, 1, MOVING))
-    generation = generate_for(person, chosen.engine, chosen.learned, understood.speech, constraints)
+    generation = generation_of(request, person, chosen, understood, constraints)
     monitor(Progress("moving the mouth", 1, 1, 1.0))
-    return replace(generation, outlook=outlook_of(request, understood))
+    return generation
+
+
+def generation_of(
+    request: SpeechRequest,
+    person: SpeakerMap | None,
+    model: Model,
+    understood: UnderstoodSpeech,
+    constraints: Constraints | None = None,
+) -> Generation:
+    """Return the motion of understood speech, with the pauses that are asked for, and what to expect of it.
+
+    person : of ``person_of``
+    Raises InputError: a constraint is not usable.
+    """
+    generation = generate_for(person, model.engine, model.learned, understood.speech, constraints)
+    pinned_s = [pin.time_s for pin in constraints.pins] if constraints else []
+    return replace(with_pauses(generation, request.pauses, pinned_s), outlook=outlook_of(request, understood))
 
 
 def write(
@@ -153,9 +171,10 @@ def write(
                filmed face (a value or a ``.face`` file), which is written as ``.mp4``. ``.glb`` and ``.usda`` hold the
                character of a ``MeshFace``, or else the 3D head
     film     : how a filmed face is shown
-    staging  : size, background, intensity of a drawn face, and what moves on its own (docs/faces.md); None: the
+    staging  : size and background of a drawn face, and what moves on its own (docs/faces.md); None: the
                defaults
-    delivery : intensity, anticipation, offset and held poses of every output (docs/controls.md); None: as generated
+    delivery : intensity, asymmetry, anticipation, offset and held poses of every output (docs/controls.md); None: the
+               defaults
     curves   : what motion files hold instead of the motion, unless ``channels`` asks for more: ``arkit``, ``visemes``,
                ``fap``, a table of a rig (``.csv``), or a character with blendshapes (docs/meshes.md)
     temporary : whether ``speech`` is a file that will be gone, which outputs then do not name
@@ -216,9 +235,8 @@ def write(
                 )
                 write_film(path, frames, played, mark=film.mark, monitor=monitor)
             else:
-                staged = staged_intensity(staging, delivery, shown_face, generation, character)
                 loudness = moved_prosody(prosody_heard(played), delivery)
-                write_drawn_face(path, seen, played, hertz, shown_face, staged, monitor, loudness)
+                write_drawn_face(path, seen, played, hertz, shown_face, staging, monitor, loudness)
         elif path in scenes:
             scene = scene or delivered_scene(generation, delivery, shown_face, rate_hz, staging=staging, prosody=heard)
             write_scene(path, scene, sound=heard_in)
@@ -251,7 +269,7 @@ def check_outputs(
     shown_face = opened_face(face)
     check_film(shown_face, film, speech)
     check_staging(shown_face, staging or Staging())
-    check_delivery(delivery or Delivery(), map(Path, outputs), shown_face, staging or Staging())
+    check_delivery(delivery or Delivery(), map(Path, outputs), shown_face)
     suffixes = (
         *motion_suffixes(),
         *VIDEO_SUFFIXES,

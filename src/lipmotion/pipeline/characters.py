@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.errors import InputError
 from lipmotion.faces.base import Staging
 from lipmotion.pipeline.living_curves import living_curves
-from lipmotion.rig.blendshape_motion import given_weights, with_mouth
+from lipmotion.rig.blendshape_motion import with_mouth
 from lipmotion.rig.driven import DrivenCharacter
 from lipmotion.rig.facial_animation import fap_motion
 from lipmotion.rig.reference_mouth import arkit_mouth
@@ -55,13 +56,12 @@ def curves_of(
         return curves.weights(motion, units)
     check_curve_set(curves)
     if curves == ARKIT:
-        given = given_weights(motion, arkit_mouth())
-        return given or shape_weights(motion, units, arkit_mouth())
+        return shape_weights(motion, units, arkit_mouth())
     motion = with_mouth(motion)
     if curves == WHOLE_FACE:
         return beside(curves_of(motion, units, ARKIT), living_curves(motion, units, staging, prosody))
     if curves == "visemes":
-        return viseme_motion(units, len(motion.values), motion.rate_hz)
+        return viseme_motion(units, spoken_mouth(motion, units))
     if curves == "fap":
         return fap_motion(motion, units)
     rows = read_rig_table(Path(curves))

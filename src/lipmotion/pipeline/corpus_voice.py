@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.pauses import REST
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines.base import SelectsRecordings, SourcePiece
 from lipmotion.errors import InputError
@@ -38,13 +39,14 @@ def speak_from_corpus(
     constraints: Constraints | None = None,
     lexicon: Lexicon | None = None,
     speaker: str = "",
+    pauses: str = REST,
 ) -> SpokenText:
     """Return a text as the joined sound of recordings, and the motion that was recorded with it.
 
     text    : one sentence or several, in English words that the dictionary or ``lexicon`` pronounces
     corpus  : the corpus that the model was trained on
     model   : of an engine that ``SelectsRecordings`` (``selection``)
-    constraints, speaker : as of ``speak``
+    constraints, speaker, pauses : as of ``speak``
     lexicon : pronunciations of words, ahead of those of the dictionary
     The sound is not changed but at the joins, where successive pieces are shifted by up to 8 ms to fit and overlap: how
     fast and how high words are spoken is what was recorded. Phones that were never recorded are replaced by similar
@@ -85,7 +87,7 @@ def speak_from_corpus(
     audio = Audio(joined.samples[first:last], rate_hz)
     edges_s = np.clip(begin_s - begin_s[0], 0, audio.duration_s).tolist()
     spoken = Timeline(tuple(Span(a, b, s.label) for a, b, s in zip(edges_s, edges_s[1:], units, strict=False)))
-    request = SpeechRequest(audio, units=spoken, speaker=speaker)
+    request = SpeechRequest(audio, units=spoken, speaker=speaker, pauses=pauses)
     return SpokenText(audio, animate(request, model=model, constraints=constraints))
 
 

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from lipmotion.articulation.delivery import Delivery, moved_in_time
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.cues import CUE_FORMATS, OPTIONAL, CueSheet, choose_cues, format_of, write_cue_file
-from lipmotion.motion.delivery import Delivery, moved_in_time
 from lipmotion.rig.blendshape_motion import with_mouth
 from lipmotion.storage.files import as_text, check_distinct, check_target
 from lipmotion.types import Generation

@@ -8,12 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lipmotion.errors import ExportError, InputError
-from lipmotion.faces.base import Face, Stageable, Staging
-from lipmotion.faces.filmed.face import FilmedFace
-from lipmotion.faces.mesh import MeshFace
-from lipmotion.motion.delivery import (
-    MOST_INTENSITY,
+from lipmotion.articulation.delivery import (
     Delivery,
     closed_on_grid,
     closed_times,
@@ -21,19 +16,23 @@ from lipmotion.motion.delivery import (
     intensified,
     moved_in_time,
 )
-from lipmotion.motion.gestures import with_gestures
+from lipmotion.articulation.phone_targets import with_gestures
+from lipmotion.articulation.symmetry import symmetrical
+from lipmotion.errors import ExportError, InputError
+from lipmotion.faces.base import Face, Staging
+from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.pipeline.characters import with_curves
 from lipmotion.pipeline.drawn_video import is_picture_sequence, shows_face
 from lipmotion.pipeline.living_curves import RADIAN
 from lipmotion.pipeline.scenes import scene_of
-from lipmotion.rig.blendshape_motion import given_weights, is_of_blendshapes, with_mouth
+from lipmotion.rig.blendshape_motion import is_of_blendshapes, with_mouth
 from lipmotion.rig.driven import DrivenCharacter
 from lipmotion.rig.scene import Scene
 from lipmotion.rig.shape_names import ARKIT_OTHERS, arkit_name
 from lipmotion.types import Generation, Motion, Prosody, StateTrace
 
 
-def check_delivery(delivery: Delivery, outputs: Iterable[Path], face: Face | FilmedFace, staging: Staging) -> None:
+def check_delivery(delivery: Delivery, outputs: Iterable[Path], face: Face | FilmedFace) -> None:
     """Raise ExportError or InputError if an output cannot be delivered so."""
     videos = [path for path in outputs if shows_face(path)]
     for path in videos:
@@ -42,22 +41,17 @@ def check_delivery(delivery: Delivery, outputs: Iterable[Path], face: Face | Fil
                 f"{path}: a video has its own sound, which begins with it; an offset is for files that are put beside "
                 "a sound: write the video without it"
             )
-    both = staging.intensity * delivery.intensity
-    if videos and isinstance(face, Stageable) and both > MOST_INTENSITY:
-        raise InputError(
-            f"the intensities of staging and delivery, {staging.intensity:g} and {delivery.intensity:g}, are "
-            f"{both:g} together, required at most {MOST_INTENSITY:g}; give one of them"
-        )
     if videos and delivery.hold_ms and isinstance(face, FilmedFace):
         raise InputError("the poses of a filmed face cannot be held; hold those of a drawn face, or of motion files")
 
 
 def delivered(generation: Generation, delivery: Delivery) -> Generation:
-    """Return generated motion with its intensity, anticipation and offset; held poses are made of it last (``held``).
+    """Return generated motion with its intensity, symmetry, anticipation and offset.
 
-    Raises InputError: the offset leaves nothing.
+    Held poses are made of it last (``held``). Raises InputError: the offset leaves nothing.
     """
-    return moved_in_time(_larger(generation, delivery.intensity), delivery)
+    larger = _larger(generation, delivery.intensity)
+    return moved_in_time(replace(larger, motion=symmetrical(larger.motion, delivery.asymmetry)), delivery)
 
 
 def shown(
@@ -69,12 +63,12 @@ def shown(
 ) -> Generation:
     """Return generated motion as a face shows it: with the channels that faces draw, and held poses at the frame rate.
 
-    The offset is left out where the file is a video. Faces that can be staged make movements larger themselves
-    (``staged_intensity``).
     character : whose weights are shown, if the face is a character with blendshapes
+    A filmed face keeps the asymmetry of its speaker.
     """
-    by_face = _enlarges(face, generation, delivery, character)
-    moved = moved_in_time(generation if by_face else _larger(generation, delivery.intensity), delivery)
+    if isinstance(face, FilmedFace):
+        delivery = replace(delivery, asymmetry=1.0)
+    moved = delivered(generation, delivery)
     if is_of_blendshapes(moved.motion):
         moved = _with(moved, with_mouth(moved.motion))
     frames = delivery.hold_frames(fps)
@@ -140,32 +134,6 @@ def moved_prosody(prosody: Prosody, delivery: Delivery) -> Prosody:
         return Prosody(prosody.level_db[-frames:], prosody.log_f0[-frames:])
     quiet = np.full(frames, prosody.level_db.min(initial=0.0))
     return Prosody(np.concatenate([quiet, prosody.level_db]), np.concatenate([quiet * np.nan, prosody.log_f0]))
-
-
-def staged_intensity(
-    staging: Staging,
-    delivery: Delivery,
-    face: Face | FilmedFace,
-    generation: Generation,
-    character: DrivenCharacter | None = None,
-) -> Staging:
-    """Return how a face is shown, with the intensity of the delivery where the face makes movements larger itself.
-
-    generation, character : as of ``shown``
-    """
-    if delivery.intensity == 1 or not _enlarges(face, generation, delivery, character):
-        return staging
-    return replace(staging, intensity=staging.intensity * delivery.intensity)
-
-
-def _enlarges(
-    face: Face | FilmedFace, generation: Generation, delivery: Delivery, character: DrivenCharacter | None
-) -> bool:
-    """Return whether a face makes movements larger itself: one that can be staged, and is not moved by weights."""
-    weighed = is_of_blendshapes(generation.motion) or (character is not None and delivery.hold_ms > 0)
-    if isinstance(face, MeshFace) and face.character.shapes is not None:
-        weighed = weighed or given_weights(generation.motion, face.character.shapes) is not None
-    return isinstance(face, Stageable) and not weighed
 
 
 def _with(generation: Generation, motion: Motion) -> Generation:

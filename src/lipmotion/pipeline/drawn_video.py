@@ -49,7 +49,7 @@ def check_staging(face: Face | FilmedFace, staging: Staging) -> None:
     if not isinstance(face, FilmedFace):
         staged_face(face, staging)
     elif staging != Staging():
-        raise InputError("size, colour of the background, intensity and what moves are of drawn faces; leave them out")
+        raise InputError("size, colour of the background and what moves are of drawn faces; leave them out")
 
 
 def write_drawn_face(

@@ -9,15 +9,15 @@ from pathlib import Path
 
 import numpy as np
 
+from lipmotion.articulation.contact import in_pictures
+from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.errors import ExportError
 from lipmotion.export.base import motion_format, motion_suffix
 from lipmotion.faces.base import Staging
 from lipmotion.pipeline.characters import ARKIT, WHOLE_FACE, beside, curves_of
 from lipmotion.pipeline.living_curves import RADIAN, living_curves
 from lipmotion.rig.blendshape_motion import with_mouth
-from lipmotion.rig.driven import at_times
 from lipmotion.rig.facial_animation import FAP
-from lipmotion.rig.point_motion import point_motion
 from lipmotion.rig.rig_tables import CONTROL
 from lipmotion.rig.shape_names import arkit_name
 from lipmotion.speech.audio_files import stated_length_s
@@ -66,10 +66,11 @@ def in_format(
     if hertz is None or abs(hertz - held.motion.rate_hz) < SAME_HZ:
         return held
     resampled = held.resampled(hertz)
-    if held is chosen or held is generation or OPENING not in generation.motion.names:
+    shown = with_mouth(generation.motion)
+    if held is chosen or held is generation or OPENING not in shown.names:
         return resampled
-    gap = point_motion(generation.motion, generation.units).gap
-    rows = at_times(held.motion.values.astype(np.float64), gap, held.motion.rate_hz, resampled.motion.time_s)
+    contact = spoken_mouth(shown, generation.units).contact
+    rows = in_pictures(held.motion.values.astype(np.float64), contact, held.motion.rate_hz, resampled.motion.time_s)
     return replace(resampled, motion=replace(resampled.motion, values=rows))
 
 

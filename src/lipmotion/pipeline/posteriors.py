@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 from lipmotion.engines import ENGINES
 from lipmotion.engines.base import HasPosteriors
 from lipmotion.errors import ExportError, InputError
 from lipmotion.kernels.threads import one_thread
+from lipmotion.pipeline.animate import generation_of
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.outlook import outlook_of
 from lipmotion.pipeline.request import SpeechInput, request_of
-from lipmotion.pipeline.speakers import generate_for
 from lipmotion.pipeline.transfer import person_of
 from lipmotion.pipeline.understand import understood_speech
 from lipmotion.storage.files import check_target, whole_file
@@ -37,9 +35,7 @@ def animate_with_posteriors(speech: SpeechInput, *, model: Model) -> tuple[Gener
     request = request_of(speech)
     person = person_of(model, request)
     understood = understood_speech(model, request)
-    generation = generate_for(person, engine, learned, understood.speech)
-    outlook = outlook_of(request, understood)
-    return replace(generation, outlook=outlook), engine.posteriors(learned, understood.speech)
+    return generation_of(request, person, model, understood), engine.posteriors(learned, understood.speech)
 
 
 def check_picture(path: Path, speech: Path | None = None) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from lipmotion.articulation.pauses import PAUSE_STYLES, REST
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError, shortened
 from lipmotion.faces.filmed.face import FilmedFace
@@ -39,6 +40,8 @@ class SpeechRequest:
     onto       : another person, onto whose face the motion is mapped (``map_onto``): a video of them, a prepared
                  corpus, another model, or a map that was made before. None: the motion is that of the speaker
     onto_speaker : which person, where the corpus or the other model has several
+    pauses     : ``rest``: lips close softly in pauses from 0.25 s, and part no earlier than 0.12 s before a phrase;
+                 ``natural``: the mouth does in pauses what the model learned
 
     >>> import lipmotion
     >>> request = lipmotion.SpeechRequest("examples/welcome.flac", recogniser="general")
@@ -54,8 +57,12 @@ class SpeechRequest:
     speaker: str = ""
     onto: Onto | None = None
     onto_speaker: str = ""
+    pauses: str = REST
 
     def __post_init__(self) -> None:
+        if self.pauses not in PAUSE_STYLES:
+            named = ", ".join(PAUSE_STYLES)
+            raise InputError(f"the style of pauses is {shortened(repr(self.pauses))}, required one of: {named}")
         if not isinstance(self.units, Timeline | None):
             kind = type(self.units).__name__
             raise InputError(f"the units are a {kind}, required a Timeline of spans of units")

@@ -9,14 +9,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.contact import in_pictures
+from lipmotion.articulation.mouth import frame_times, spoken_mouth
 from lipmotion.faces.base import Staging
 from lipmotion.faces.mesh import MeshFace
-from lipmotion.pipeline.living_curves import curves_of_poses, living_curves
-from lipmotion.rig.driven import DrivenCharacter, at_times
+from lipmotion.pipeline.living_curves import living_curves
+from lipmotion.rig.blendshape_motion import with_mouth
+from lipmotion.rig.driven import DrivenCharacter
 from lipmotion.rig.gltf_animator import write_animated_gltf
 from lipmotion.rig.gltf_writer import write_gltf_scene
 from lipmotion.rig.mesh import Blendshape
-from lipmotion.rig.point_motion import point_motion
 from lipmotion.rig.scene import HeadTurn, Scene
 from lipmotion.rig.shape_names import by_arkit_name
 from lipmotion.rig.usd_text import asset
@@ -92,22 +94,18 @@ def head_scene(
     """
     from scipy.spatial.transform import Rotation
 
-    from lipmotion.faces.character import staged_pose
     from lipmotion.faces.character.figure import PIVOT
     from lipmotion.faces.character.performance import head_poses
     from lipmotion.faces.character.shape_fit import mouth_weights
     from lipmotion.faces.character.shapes import head_mesh
     from lipmotion.faces.character.stage import figure
-    from lipmotion.faces.liveliness import SEED, turned
+    from lipmotion.faces.turning import turned
 
-    hertz, chosen = rate_hz or generation.motion.rate_hz, staging or Staging()
-    drawn = head_poses(
-        generation.motion, generation.units, hertz, seed=SEED + chosen.seed, intensity=chosen.intensity, prosody=prosody
-    )
-    poses = [staged_pose(pose, chosen) for pose in drawn]
+    motion, hertz = generation.motion, rate_hz or generation.motion.rate_hz
+    poses = head_poses(motion, generation.units, hertz, staging, prosody)
     character = figure()
     mesh = head_mesh(character)
-    living = curves_of_poses(poses, hertz)
+    living = living_curves(motion, generation.units, staging, prosody, len(poses), hertz)
     curves = mouth_weights(character, mesh, poses) | {name: living[name].astype(np.float64) for name in living.names}
     names = [name for name in mesh.shape_names if name in curves]
     weights = Motion(
@@ -137,13 +135,13 @@ def character_scene(
     motion, units = generation.motion, generation.units
     weights = character.weights(motion, units)
     known = by_arkit_name(character.mesh.shape_names)
-    living = living_curves(motion, units, staging, prosody)
+    living = living_curves(with_mouth(motion), units, staging, prosody)
     added = [name for name in living.names if name in known and known[name] not in weights.names]
     table = np.concatenate([weights.values, *(living[name][:, None] for name in added)], axis=1)
     channels = weights.channels + tuple(Channel(known[name], WEIGHT) for name in added)
     hertz = rate_hz or motion.rate_hz
-    time_s = np.arange(int(np.floor(motion.time_s[-1] * hertz + 1e-9)) + 1) / hertz
-    rows = at_times(table, point_motion(motion, units).gap, motion.rate_hz, time_s)
+    contact = spoken_mouth(with_mouth(motion), units).contact
+    rows = in_pictures(table, contact, motion.rate_hz, frame_times(len(table), motion.rate_hz, hertz))
     return Scene(character.mesh, Motion(rows, hertz, channels), original=character.file)
 
 

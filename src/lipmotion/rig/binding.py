@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import InputError
 from lipmotion.kernels.skinning import skinned
 from lipmotion.rig.lip_placement import LipPlacement
 from lipmotion.rig.mesh import Mesh
-from lipmotion.rig.mouth_template import mouth_template
 from lipmotion.rig.surface import MeshSurface
 
 Array = NDArray[np.float64]

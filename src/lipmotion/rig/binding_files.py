@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
+from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import InputError, ModelFormatError, shortened
 from lipmotion.rig.binding import MOST_WEIGHTS, ControlBinding
 from lipmotion.rig.limits import MOST_VERTICES
 from lipmotion.rig.lip_placement import LipPlacement
 from lipmotion.rig.mesh import Mesh
-from lipmotion.rig.mouth_template import mouth_template
 from lipmotion.storage.archive import UNREADABLE, read_archive, read_archive_header, write_archive
 from lipmotion.storage.files import check_source, read_text_file, whole_file
 from lipmotion.storage.schema import ArraySpec, checked_arrays, format_errors

@@ -12,8 +12,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.contact import GAP, LEAST_GAP, opening_of
+from lipmotion.articulation.lip_points import LEFT_CORNER, LOWER_EDGE, RIGHT_CORNER, UPPER_EDGE, mouth_template
 from lipmotion.rig.face_shapes import FaceShapes
-from lipmotion.rig.mouth_template import LEFT_CORNER, LOWER_EDGE, RIGHT_CORNER, UPPER_EDGE, mouth_template
 from lipmotion.rig.reference_mouth import arkit_mouth
 from lipmotion.rig.shape_names import arkit_name
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Motion
@@ -43,8 +44,6 @@ FACEGOOD: Mapping[str, tuple[tuple[str, float], ...]] = {
 """The blendshapes of FACEGOOD-Audio2Face as ARKit's: their weights, times these, added up. Set by eye."""
 OPENING = 0.05
 """A blendshape that parts the lips by more, in eye distances, opens the mouth."""
-REST_OPENING = 0.01
-"""The channel ``opening`` of closed lips, as trackers measure it, in eye distances."""
 ARTICULATORY = {
     "tongue": (("tongueOut", 3.0),),
     "lip_tuck": (("mouthRollLower", 1.8),),
@@ -68,8 +67,8 @@ def is_of_blendshapes(motion: Motion) -> bool:
 def with_mouth(motion: Motion) -> Motion:
     """Return motion of blendshapes with the channels that faces draw after its own; other motion as it is.
 
-    Added are ``opening``, ``width``, ``outer``, the lip and jaw points, and the articulatory channels that blendshapes
-    show. Weights that are not between 0 and 1 count as 0 or 1.
+    Added are ``lip_gap``, the ``opening`` that trackers would measure, ``width``, ``outer``, the lip and jaw points,
+    and the articulatory channels that blendshapes show. Weights that are not between 0 and 1 count as 0 or 1.
     """
     if not is_of_blendshapes(motion):
         return motion
@@ -79,8 +78,10 @@ def with_mouth(motion: Motion) -> Motion:
     rows[:, close] = np.minimum(rows[:, close], rows[:, jaw])
     places = template.places + (rows @ mouth.moved.reshape(len(mouth.known), -1)).reshape(-1, *template.places.shape)
     gap = np.maximum(rows @ mouth.gap, 0.0)
+    gap[gap < LEAST_GAP / 2] = 0.0
     distances = {
-        "opening": REST_OPENING + gap,
+        "opening": opening_of(gap),
+        GAP: gap,
         "width": _apart(places, LEFT_CORNER, RIGHT_CORNER),
         "outer": _apart(places, UPPER_EDGE, LOWER_EDGE),
     }

@@ -10,22 +10,20 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.contact import in_pictures
 from lipmotion.errors import InputError
 from lipmotion.rig.binding import ControlBinding, bind, painted
 from lipmotion.rig.binding_files import BINDING_SUFFIX, load_binding, read_points, read_weights
-from lipmotion.rig.blendshape_motion import given_weights
 from lipmotion.rig.character_files import read_character
 from lipmotion.rig.face_shapes import FaceShapes, face_shapes
 from lipmotion.rig.jaw_bone import with_jaw
 from lipmotion.rig.lip_placement import LipPlacement, placed_by_points, placed_by_shape, surface_of_named
 from lipmotion.rig.mesh import Mesh
-from lipmotion.rig.point_motion import closed_displacements, point_motion
-from lipmotion.rig.rounding import rounded_displacements, roundness
+from lipmotion.rig.point_motion import point_motion
 from lipmotion.rig.shape_names import ARKIT_OTHERS, by_arkit_name
-from lipmotion.rig.shape_weights import SolverOptions, shape_weights
+from lipmotion.rig.shape_weights import shape_weights
 from lipmotion.rig.surface import mesh_surface
 from lipmotion.types import Motion, Timeline, Unit
-from lipmotion.types.motion import between_frames
 
 Array = NDArray[np.float64]
 
@@ -50,7 +48,6 @@ class DrivenCharacter:
     def weights(self, motion: Motion, units: Timeline[Unit]) -> Motion:
         """Return the weights of the blendshapes over time, channels by the names of the mesh, 0 to 1.
 
-        Motion that has weights for them is taken as it is.
         Raises InputError: the character has no blendshapes of the mouth, or as ``shape_weights``.
         """
         if self.shapes is None:
@@ -58,8 +55,7 @@ class DrivenCharacter:
                 "the character is moved by control points and has no weights of blendshapes; write a video, or the "
                 "motion without --character"
             )
-        given = given_weights(motion, self.shapes)
-        return given or shape_weights(motion, units, self.shapes)
+        return shape_weights(motion, units, self.shapes)
 
     def vertices(
         self,
@@ -67,32 +63,24 @@ class DrivenCharacter:
         units: Timeline[Unit],
         time_s: Array,
         others: Mapping[str, Array] | None = None,
-        *,
-        intensity: float = 1.0,
     ) -> Iterator[Array]:
-        """Yield the vertices at some times in seconds [each shape=(V, 3)].
+        """Yield the vertices at some times in seconds, evenly spaced [each shape=(V, 3)].
 
-        others    : weights of ARKit's blendshapes of eyes and brows, 0 to 1 [each shape=(T,)]; those that the mesh does
-                    not have are left out; None: they stay at rest
-        intensity : 1: movements of the mouth as spoken; more: larger. Closed lips stay closed
-        A closure between two times is shown at the nearer one. Motion that has weights for the blendshapes is shown as
-        it is, without the intensity.
+        others : weights of ARKit's blendshapes of eyes and brows, 0 to 1 [each shape=(T,)]; those that the mesh does
+                 not have are left out; None: they stay at rest
+        A closure between two times is shown at the nearer one (``articulation.contact.shown_contact``).
         Raises InputError: as ``point_motion``.
         """
-        points = point_motion(motion, units).scaled(intensity)
-        beside = self._beside(others or {}, len(time_s))
+        points = point_motion(motion, units)
+        beside, contact = self._beside(others or {}, len(time_s)), points.mouth.contact
         if self.shapes is not None:
-            given = given_weights(motion, self.shapes)
-            solving = SolverOptions(intensity=intensity)
-            solved = (given or shape_weights(motion, units, self.shapes, solving)).values
-            rows = at_times(solved.astype(np.float64), points.gap, motion.rate_hz, time_s)
-            for row, other in zip(rows, beside, strict=True):
+            weights = shape_weights(motion, units, self.shapes).values.astype(np.float64)
+            for row, other in zip(in_pictures(weights, contact, motion.rate_hz, time_s), beside, strict=True):
                 yield self._shaped(row @ self._displacements, other)
         elif self.binding is not None:
-            round_lips = rounded_displacements(closed_displacements(points), roundness(units, motion.time_s))
-            flat = round_lips.reshape(len(points.gap), -1)
-            for row, other in zip(at_times(flat, points.gap, motion.rate_hz, time_s), beside, strict=True):
-                vertices = self.binding.moved(self.mesh, row.reshape(-1, 3))
+            rows = in_pictures(points.displacements, contact, motion.rate_hz, time_s)
+            for row, other in zip(rows, beside, strict=True):
+                vertices = self.binding.moved(self.mesh, row)
                 vertices[self.moving] += (other @ self._others).reshape(-1, 3)
                 yield vertices
 
@@ -181,22 +169,3 @@ def driven_character(
     except InputError as error:
         text = str(error)
         raise InputError(text if str(path) in text else f"{path}: {text}") from error
-
-
-def at_times(rows: Array, gap: Array, rate_hz: float, time_s: Array) -> Array:
-    """Return rows of curves at some times, evenly spaced [shape=(len(time_s), N)].
-
-    rows : one a frame [shape=(T, N)]; gap : of the lips [shape=(T,)]; at the time nearest to a frame with gap 0 the row
-    of that frame is returned, so that no closure is lost between pictures
-    """
-    values = between_frames(rows, rate_hz, time_s)
-    if len(time_s) > 1:
-        step = float(time_s[1] - time_s[0])
-        closed = np.flatnonzero(gap <= 0)
-        nearest = np.rint((closed / rate_hz - time_s[0]) / step).astype(int)
-        inside = (nearest >= 0) & (nearest < len(time_s))
-        away = np.abs(closed / rate_hz - time_s[np.clip(nearest, 0, len(time_s) - 1)])
-        order = np.argsort(-away, kind="stable")  # of several, the nearest is written last
-        for number in order[inside[order]]:
-            values[nearest[number]] = rows[closed[number]]
-    return values

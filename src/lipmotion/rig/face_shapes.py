@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.lip_points import FACING
 from lipmotion.errors import InputError, shortened
 from lipmotion.rig.lip_placement import LipPlacement
 from lipmotion.rig.mesh import Mesh
-from lipmotion.rig.mouth_template import FACING
 from lipmotion.rig.shape_names import ARKIT_MOUTH, arkit_name, viseme_name, vowel_name
 
 Array = NDArray[np.float64]

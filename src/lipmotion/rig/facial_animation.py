@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from lipmotion.rig.mouth_template import mouth_template
-from lipmotion.rig.point_motion import closed_displacements, point_motion
+from lipmotion.articulation.lip_points import mouth_template
+from lipmotion.rig.point_motion import point_motion
 from lipmotion.types import Channel, Motion, Timeline, Unit
 
 FAP = "fap"
@@ -55,8 +55,7 @@ def fap_motion(motion: Motion, units: Timeline[Unit]) -> Motion:
     Where the lips touch, ``lower_t_midlip`` and ``raise_b_midlip`` add up to 0.
     Raises InputError: as ``point_motion``.
     """
-    points = point_motion(motion, units)
-    moved = closed_displacements(points)
+    moved = point_motion(motion, units).displacements
     template = mouth_template()
     lengths = {"N": MOUTH_TO_NOSE, "W": template.width}
     columns = [

@@ -10,9 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, shortened
-from lipmotion.rig.mesh import Blendshape, Mesh
-from lipmotion.rig.mouth_template import (
+from lipmotion.articulation.lip_points import (
     LEFT_CORNER,
     LOWER_MIDDLE,
     RIGHT_CORNER,
@@ -20,6 +18,8 @@ from lipmotion.rig.mouth_template import (
     MouthTemplate,
     mouth_template,
 )
+from lipmotion.errors import InputError, shortened
+from lipmotion.rig.mesh import Blendshape, Mesh
 from lipmotion.rig.shape_names import arkit_name, viseme_name, vowel_name
 from lipmotion.rig.surface import MeshSurface, mesh_surface
 

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.lip_points import FACING, mouth_template
 from lipmotion.rig.face_shapes import FaceShapes
-from lipmotion.rig.mouth_template import FACING, mouth_template
 from lipmotion.rig.shape_names import ARKIT_MOUTH
 
 Array = NDArray[np.float64]

@@ -7,15 +7,16 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.contact import LEAST_GAP, gap_in
+from lipmotion.articulation.lip_points import FACING, mouth_template
+from lipmotion.articulation.mouth import SpokenMouth
+from lipmotion.rig.blendshape_motion import given_weights, with_mouth
 from lipmotion.rig.bounded_curves import CurveCosts, bounded_curves
 from lipmotion.rig.face_shapes import NOT_FROM_POINTS, FaceShapes
-from lipmotion.rig.gestures import gesture_curves, phone_weights
-from lipmotion.rig.mouth_template import FACING, mouth_template
 from lipmotion.rig.point_motion import PointMotion, point_motion
-from lipmotion.rig.rounding import rounded_weights, roundness
+from lipmotion.rig.rounding import rounded_weights
 from lipmotion.rig.visemes import NEAREST_VOWEL, viseme_curves
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
-from lipmotion.units import LIP_CLOSING
 
 Array = NDArray[np.float64]
 
@@ -31,6 +32,9 @@ PRESSED = 0.01
 LEAST_PARTING = 0.004
 """Shapes that part the lips by less than this, in eye distances, are not used to part or to close them."""
 BISECTIONS = 60
+PRESS, ROLL_UPPER, ROLL_LOWER, TONGUE_OUT = 0.2, 0.1, 0.55, 0.3
+"""Weights of ARKit's blendshapes for what lip points do not show: lips that are pressed together (``mouthPressLeft``,
+``mouthPressRight``, ``mouthRollUpper``), a lower lip on the teeth, a tongue between the teeth."""
 
 
 @dataclass(frozen=True)
@@ -39,12 +43,10 @@ class SolverOptions:
 
     costs    : of large and of sudden weights
     gestures : whether phones add what points do not show (pressed lips, a tucked lip, the tongue, round lips)
-    intensity : 1: movements as they are; more: larger
     """
 
     costs: CurveCosts = field(default_factory=CurveCosts)
     gestures: bool = True
-    intensity: float = 1.0
 
 
 def shape_weights(
@@ -52,21 +54,43 @@ def shape_weights(
 ) -> Motion:
     """Return the weights of blendshapes over time: one channel a blendshape, by the mesh's names, 0 to 1.
 
-    motion : of lip and jaw points, or of ``opening`` and ``width``; its rest pose is the mesh as it is
+    motion : of lip and jaw points, or of ``opening`` and ``width``, whose rest pose is the mesh as it is; or of
+             blendshapes: weights that it has for those of the mesh are kept as they are
     units  : phones in time
-    The lips are together where the motion has them together, as in p, b and m, and in silence: with ``mouthClose``,
-    where
-    the mesh has it, the jaw may stay open behind closed lips. ``mouthClose`` is never more than ``jawOpen``.
+    The lips are together where the spoken mouth has them together, and nowhere else: with ``mouthClose``, where the
+    mesh has it, the jaw may stay open behind closed lips. ``mouthClose`` is never more than ``jawOpen`` in solved
+    weights.
     Raises InputError: as ``point_motion``.
     """
     options = options or SolverOptions()
-    points = point_motion(motion, units).scaled(options.intensity)
-    if shapes.style == "visemes":
-        weights = _spoken_weights(points, motion, units, shapes, options)
+    points = point_motion(motion, units)
+    given = given_weights(motion, shapes)
+    if given is not None:
+        weights = _closed_as_spoken(given.values.astype(np.float64), with_mouth(motion), points.mouth, shapes)
     else:
-        weights = _free_weights(points, motion, units, shapes, options)
-    weights = with_gap(weights, shapes, points.gap - PRESSED * _closing(units, motion.time_s))
+        if shapes.style == "visemes":
+            weights = _spoken_weights(points, units, shapes, options)
+        else:
+            weights = _free_weights(points, shapes, options)
+        weights = with_gap(weights, shapes, points.mouth.gap - PRESSED * points.mouth.closing)
     return Motion(weights, motion.rate_hz, tuple(Channel(name, WEIGHT) for name in shapes.names))
+
+
+def _closed_as_spoken(weights: Array, motion: Motion, mouth: SpokenMouth, shapes: FaceShapes) -> Array:
+    """Return given weights with the lips of the mesh in contact where the spoken mouth has it [shape=(T, S)].
+
+    motion : with the channels of ``with_mouth``
+    Frames in which the lips of the mesh touch as they should, and that no closure is near, stay as they are.
+    """
+    own, said = weights @ shapes.gap, gap_in(motion)
+    share = np.clip(mouth.gap / np.maximum(said, 1e-9), 0, 1)
+    wanted = np.where(said > LEAST_GAP, share * own, own)
+    touching, contact = own < LEAST_GAP / 2, mouth.contact
+    wanted = np.where(contact, np.where(touching, own, 0.0), np.where(touching, LEAST_GAP, wanted))
+    changed = np.abs(wanted - own) > 1e-9
+    result = weights.copy()
+    result[changed] = with_gap(weights[changed], shapes, wanted[changed])
+    return result
 
 
 def with_gap(weights: Array, shapes: FaceShapes, gap: Array) -> Array:
@@ -97,20 +121,14 @@ def with_gap(weights: Array, shapes: FaceShapes, gap: Array) -> Array:
     return np.clip(weights, 0.0, 1.0)
 
 
-def _closing(units: Timeline[Unit], time_s: Array) -> Array:
-    """Return how far phones that close the lips are being said, 0 to 1 [shape=(T,)]."""
-    said = phone_weights(units, time_s, lambda phone: "closing" if phone in LIP_CLOSING else "")
-    return said.get("closing", np.zeros(len(time_s)))
-
-
-def _free_weights(
-    points: PointMotion, motion: Motion, units: Timeline[Unit], shapes: FaceShapes, options: SolverOptions
-) -> Array:
+def _free_weights(points: PointMotion, shapes: FaceShapes, options: SolverOptions) -> Array:
     """Return the weights of shapes that the points decide on [shape=(T, S)]."""
-    fixed = np.zeros((len(points.gap), len(shapes.names)))
+    mouth = points.mouth
+    fixed = np.zeros((len(mouth.gap), len(shapes.names)))
     if options.gestures:
-        for name, curve in gesture_curves(units, motion.time_s, shapes.known).items():
-            fixed[:, shapes.known.index(name)] = curve
+        for name, curve in _beside_points(mouth).items():
+            if name in shapes.known:
+                fixed[:, shapes.known.index(name)] = curve
     free = np.array([name not in NOT_FROM_POINTS for name in shapes.known])
     matrix, targets = _rows(shapes), _targets(points)
     jaw, close = shapes.row("jawOpen"), shapes.row("mouthClose")
@@ -123,15 +141,23 @@ def _free_weights(
     if jaw is not None and close is not None:
         weights[:, jaw] += weights[:, close]
     if options.gestures:
-        weights = rounded_weights(weights, shapes, roundness(units, motion.time_s))
+        weights = rounded_weights(weights, shapes, mouth.protrusion)
     return np.clip(weights, 0.0, 1.0)
 
 
-def _spoken_weights(
-    points: PointMotion, motion: Motion, units: Timeline[Unit], shapes: FaceShapes, options: SolverOptions
-) -> Array:
+def _beside_points(mouth: SpokenMouth) -> dict[str, Array]:
+    """Return the weights of ARKit's blendshapes of what lip points do not show [each shape=(T,)]."""
+    return {
+        **dict.fromkeys(("mouthPressLeft", "mouthPressRight"), PRESS * mouth.closing),
+        "mouthRollUpper": ROLL_UPPER * mouth.closing,
+        "mouthRollLower": ROLL_LOWER * mouth.tuck,
+        "tongueOut": TONGUE_OUT * mouth.between_teeth,
+    }
+
+
+def _spoken_weights(points: PointMotion, units: Timeline[Unit], shapes: FaceShapes, options: SolverOptions) -> Array:
     """Return the weights of visemes: the phones say which, the points how much [shape=(T, S)]."""
-    said = _said(units, motion.time_s, shapes)
+    said = _said(units, np.arange(len(points.mouth.gap)) / points.mouth.rate_hz, shapes)
     matrix = np.concatenate([_rows(shapes), PHONES_SAY * np.eye(len(shapes.names))], axis=1)
     targets = np.concatenate([_targets(points), PHONES_SAY * said], axis=1)
     return bounded_curves(matrix, targets, options.costs)
@@ -157,7 +183,7 @@ def _rows(shapes: FaceShapes) -> Array:
 
 def _targets(points: PointMotion) -> Array:
     """Return the displacements of the points, and the gap, as such rows [shape=(T, D)]."""
-    return _weighted(points.displacements, points.gap)
+    return _weighted(points.displacements, points.mouth.gap)
 
 
 def _weighted(displacements: Array, gap: Array) -> Array:

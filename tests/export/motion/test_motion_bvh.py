@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from children import run_child
+from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import ExportError
 from lipmotion.export import write_motion
 from lipmotion.export.motion.motion_bvh import CENTIMETRES
-from lipmotion.rig.mouth_template import mouth_template
 from lipmotion.rig.point_motion import closed_displacements, point_motion
 from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 

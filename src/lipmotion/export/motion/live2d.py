@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER, mouth_template
+from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.errors import ExportError
 from lipmotion.export.base import MotionFormat
-from lipmotion.rig.mouth_template import LEFT_CORNER, RIGHT_CORNER, mouth_template
-from lipmotion.rig.point_motion import lip_gap, rest_frames
 from lipmotion.rig.reference_mouth import arkit_mouth
 from lipmotion.storage.json_text import as_json
 from lipmotion.types import Generation, Motion
@@ -76,7 +76,7 @@ def mouth_open(generation: Generation) -> Array:
     """Return how far the mouth is open, 0 to 1 [shape=(T,)]; 0 where the lips touch."""
     motion = generation.motion
     if "opening" in motion.names:
-        gap = lip_gap(motion["opening"].astype(np.float64), rest_frames(motion, generation.units))
+        gap = spoken_mouth(motion, generation.units).gap
     else:
         gap = _by_weights(motion, arkit_mouth().gap)
     return np.clip(gap / WHOLLY_OPEN, 0.0, 1.0)
@@ -86,8 +86,7 @@ def mouth_form(generation: Generation) -> Array:
     """Return the form of the mouth, −1 puckered to 1 wide [shape=(T,)]; 0 at rest, and where no channel says it."""
     motion = generation.motion
     if "opening" in motion.names and "width" in motion.names:
-        width = motion["width"].astype(np.float64)
-        wider = width - np.median(width[rest_frames(motion, generation.units)])
+        wider = (spoken_mouth(motion, generation.units).width - 1) * mouth_template().width
     else:
         template = mouth_template()
         corners = arkit_mouth().moved[:, [template.row(LEFT_CORNER), template.row(RIGHT_CORNER)], 0]

@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import ExportError
 from lipmotion.export.base import MotionFormat
 from lipmotion.export.motion.rounded import formatted_rows
-from lipmotion.rig.mouth_template import mouth_template
-from lipmotion.rig.point_motion import closed_displacements, point_motion
+from lipmotion.rig.point_motion import point_motion
 from lipmotion.types import Generation, Motion
 
 Array = NDArray[np.float64]
@@ -38,7 +38,7 @@ def check(motion: Motion) -> None:
 def write(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
     """Write the points; of motion with distances alone, they move as mouths usually do (``rig.point_motion``)."""
     motion, template = generation.motion, mouth_template()
-    moved = closed_displacements(point_motion(motion, generation.units))
+    moved = point_motion(motion, generation.units).displacements
     offsets = [_point(place) for place in template.places]
     lines = ["HIERARCHY", "ROOT head", "{", "  OFFSET 0 0 0", f"  CHANNELS 6 {ROOT_CHANNELS}"]
     for point, jaw, offset in zip(template.points, template.jaw, offsets, strict=True):

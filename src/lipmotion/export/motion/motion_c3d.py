@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.lip_points import CHIN, mouth_template
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import MotionFormat
 from lipmotion.export.motion.c3d_file import LONGEST_LABEL, MOST_FRAMES, C3dFile, read_c3d
 from lipmotion.export.motion.c3d_writing import write_c3d
 from lipmotion.export.motion.marker_frame import MILLIMETRES, in_head_frame
-from lipmotion.rig.mouth_template import CHIN, mouth_template
 from lipmotion.types import EYE_DISTANCE, Channel, Generation, Motion, Timeline, Unit
 
 Array = NDArray[np.float64]

@@ -1,6 +1,6 @@
 """A three-dimensional head: a friendly character made by this code, drawn without a graphics card.
 
-Motion and phones become poses (``performance``, with ``gestures`` and ``liveliness``); a pose moves the surfaces
+The spoken mouth and what moves beside it (``articulation``) become poses (``performance``); a pose moves the surfaces
 (``skin`` with ``lips`` and ``eyelids``, ``inside``, ``eyes``), which ``figure`` puts together, lights and gives to the
 rasteriser. The forms are made once: ``forms`` (skin), ``hair``, ``body``.
 """
@@ -18,13 +18,12 @@ from numpy.typing import NDArray
 from lipmotion.faces.base import SMALLEST, TRANSPARENT, Face, Staging
 from lipmotion.faces.character.performance import head_poses
 from lipmotion.faces.character.pose import CharacterPose
-from lipmotion.faces.liveliness import SEED
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 
 if TYPE_CHECKING:
     from lipmotion.rig.rasteriser import Camera
 
-__all__ = ["Head", "render", "staged_pose"]
+__all__ = ["Head", "render"]
 
 OWN_SIZE = 720
 """Height of pictures whose size is not given."""
@@ -69,7 +68,7 @@ def render(
               they exist. ``width`` and ``outer`` count relative to the rest pose in silence, so they suit any speaker
     units   : the phones, for tongue, teeth and the shape of the lips; may be empty
     width, height : even numbers of pixels, at least 64; the size of the staging does not count here
-    staging : background, intensity, seed, and what moves on its own; None: everything moves
+    staging : background, seed, and what moves on its own; None: everything moves
     prosody : of the speech, for accents of brows and head; None: not known
     Returns RGB, or RGBA [shape=(height, width, 4)] with straight alpha where the background is transparent.
     Raises InputError: no ``opening``, no frames, values that are not finite, a size that is odd or under 64,
@@ -79,20 +78,7 @@ def render(
     from lipmotion.faces.character.stage import camera_for
 
     chosen = staging or Staging()
-    poses = head_poses(motion, units, fps, seed=SEED + chosen.seed, intensity=chosen.intensity, prosody=prosody)
-    poses = [staged_pose(pose, chosen) for pose in poses]
-    return _frames(poses, camera_for(width, height), chosen)
-
-
-def staged_pose(pose: CharacterPose, staging: Staging) -> CharacterPose:
-    """Return the pose without the movements that are switched off."""
-    gaze = pose.gaze if staging.gaze else (-0.85 * pose.turn[0], -0.85 * pose.turn[1])
-    return pose._replace(
-        shut=pose.shut if staging.blinks else 0.0,
-        brows=pose.brows if staging.brows else 0.0,
-        gaze=gaze if staging.head else (gaze[0] + 0.85 * pose.turn[0], gaze[1] + 0.85 * pose.turn[1]),
-        turn=pose.turn if staging.head else (0.0, 0.0, 0.0),
-    )
+    return _frames(head_poses(motion, units, fps, chosen, prosody), camera_for(width, height), chosen)
 
 
 def _frames(poses: list[CharacterPose], camera: Camera, staging: Staging) -> Iterator[NDArray[np.uint8]]:

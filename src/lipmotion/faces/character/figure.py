@@ -19,7 +19,7 @@ from lipmotion.faces.character.part import part
 from lipmotion.faces.character.pose import CharacterPose
 from lipmotion.faces.character.skin import AT_CORNER, REST, Skin, jaw_moved
 from lipmotion.faces.character.tint import skin_colours
-from lipmotion.faces.liveliness import turned
+from lipmotion.faces.turning import turned
 from lipmotion.rig.lighting import Lighting
 from lipmotion.rig.occlusion import reaches
 from lipmotion.rig.rasteriser import normals_of

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.faces.character.figure import Figure
 from lipmotion.faces.character.pose import CharacterPose
 from lipmotion.faces.character.skin import REST
+from lipmotion.rig.eyes_and_brows import FULL_BROWS, FULL_LOOK
 from lipmotion.rig.mesh import Blendshape, Material, Mesh, MeshPart
 
 Real = NDArray[np.float64]
@@ -24,7 +25,7 @@ POSES = {
     "mouthRollLower": CharacterPose(gap=0.054, upper_rise=0.054, tuck=1),
     "tongueOut": CharacterPose(tongue_out=1),
     "tongueUp": CharacterPose(tongue_up=1),
-    "browInnerUp": CharacterPose(brows=0.06),
+    "browInnerUp": CharacterPose(brows=FULL_BROWS),
 }
 """The poses of the shapes that are the same on both sides."""
 SIDED_POSES = {
@@ -36,11 +37,7 @@ SIDED_POSES = {
     "eyeBlink": CharacterPose(shut=1),
 }
 """The poses of the shapes that are one each for the left and the right side."""
-EYE_ACROSS, EYE_UPWARDS = 0.6, 0.45
-"""How far an eye turns to the side, and up or down, where its shape has the weight 1, in radians."""
-BROWS_UP = POSES["browInnerUp"].brows
-"""How far the brows rise where their shape has the weight 1."""
-_GAZES = {"Out": (EYE_ACROSS, 0.0), "In": (-EYE_ACROSS, 0.0), "Up": (0.0, EYE_UPWARDS), "Down": (0.0, -EYE_UPWARDS)}
+_GAZES = {"Out": (FULL_LOOK, 0.0), "In": (-FULL_LOOK, 0.0), "Up": (0.0, FULL_LOOK), "Down": (0.0, -FULL_LOOK)}
 LEAST = 1e-5
 """Vertices that move less, in eye distances, are left out of a shape."""
 _SOFT = 0.12

@@ -10,11 +10,13 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.mouth import frame_times
 from lipmotion.errors import InputError
-from lipmotion.faces.base import SMALLEST, TRANSPARENT, Face, Staging
-from lipmotion.faces.mesh.performance import mesh_performance
+from lipmotion.faces.base import SMALLEST, TRANSPARENT, Face, Staging, alive
 from lipmotion.faces.mesh.stage import MeshStage
+from lipmotion.rig.blendshape_motion import with_mouth
 from lipmotion.rig.driven import DrivenCharacter
+from lipmotion.rig.eyes_and_brows import eye_and_brow_weights
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 
 __all__ = ["MeshFace", "MeshStage"]
@@ -30,7 +32,7 @@ class MeshFace(Face):
 
     character     : from ``driven_character``
     width, height : of the pictures in pixels, even; a size of the staging counts instead, 16 to 9
-    staging       : background, intensity, seed, and what moves on its own; None: the defaults
+    staging       : background, seed, and what moves on its own; None: the defaults
     prosody       : of the speech that will be rendered, for accents of brows and head; None: not known
     """
 
@@ -65,15 +67,13 @@ class MeshFace(Face):
             width, height = max(2 * round(self.staging.size * 8 / 9), SMALLEST), self.staging.size
         stage = MeshStage(self._character, width, height, self.staging.colour)
         draw = stage.cut_out if self.staging.background == TRANSPARENT else stage.picture
-        count = int(np.floor((len(motion.values) - 1) / motion.rate_hz * fps + 1e-9)) + 1
-        time_s = np.arange(count) / fps
-        intensity = self.staging.intensity
-        alive = mesh_performance(motion, units, time_s, self.staging, self._prosody)
-        frames = self._character.vertices(motion, units, time_s, alive.weights, intensity=intensity)
-        gaze = alive.gaze if not self._character.has_shape("eyeLookOutLeft") else np.zeros_like(alive.gaze)
+        time_s = frame_times(len(motion.values), motion.rate_hz, fps)
+        moved = alive(time_s, with_mouth(motion), units, self.staging, self._prosody)
+        frames = self._character.vertices(motion, units, time_s, eye_and_brow_weights(moved))
+        gaze = moved.gaze if not self._character.has_shape("eyeLookOutLeft") else np.zeros_like(moved.gaze)
         with ThreadPoolExecutor(THREADS) as threads:
             waiting: deque[Future[NDArray[np.uint8]]] = deque()
-            for vertices, turn, look in zip(frames, alive.turn.tolist(), gaze.tolist(), strict=True):
+            for vertices, turn, look in zip(frames, moved.turn.tolist(), gaze.tolist(), strict=True):
                 waiting.append(threads.submit(draw, vertices, tuple(turn), tuple(look)))
                 if len(waiting) > THREADS:
                     yield waiting.popleft().result()

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.faces.liveliness import turned
+from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER
+from lipmotion.faces.turning import turned
 from lipmotion.rig.bones import HEAD, LEFT_EYE, NECK, RIGHT_EYE, Bone
 from lipmotion.rig.drawn_surface import drawn_surface
 from lipmotion.rig.driven import DrivenCharacter
-from lipmotion.rig.mouth_template import LEFT_CORNER, RIGHT_CORNER
 from lipmotion.rig.rasteriser import Camera, flat, normals_of
 from lipmotion.rig.single_sided import single_sided
 from lipmotion.rig.surface import mesh_surface

@@ -11,14 +11,20 @@ from typing import Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.faces.base import Staging
-from lipmotion.faces.portrait.expression import expression
+from lipmotion.articulation.mouth import spoken_mouth
+from lipmotion.faces.base import Staging, alive
 from lipmotion.faces.portrait.movement import HeadPlacement
-from lipmotion.faces.portrait.pose import frame_times, mouth_poses
+from lipmotion.faces.portrait.pose import mouth_poses
 from lipmotion.faces.portrait.rasteriser import FacePose
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 
 CanvasT = TypeVar("CanvasT")
+RESTING_LIDS = 0.07
+"""Awake and calm, the upper lids cover a little of the irises."""
+LOOK, YAW, PITCH = 0.25, 0.3, 0.4
+"""How far an iris moves for an angle of the eyes, and features for angles of the head, in eye distances a radian."""
+SWAY_X, SWAY_Y = 0.25, 0.12
+"""How far the head moves to the side and up for the same angles."""
 THREADS, AHEAD = 2, 6
 """Threads that draw, and frames that may be drawn before they are asked for."""
 
@@ -26,23 +32,18 @@ THREADS, AHEAD = 2, 6
 def face_poses(
     motion: Motion, units: Timeline[Unit], fps: float, staging: Staging, prosody: Prosody | None = None
 ) -> list[FacePose]:
-    """Return the pose of every video frame, frame n at ``n / fps`` seconds. Raises InputError: as ``mouth_poses``."""
-    mouths = mouth_poses(motion, units, fps, staging.intensity)
-    moved = expression(
-        frame_times(motion, fps),
-        motion,
-        units,
-        prosody,
-        seed=staging.seed,
-        blinks=staging.blinks,
-        gaze=staging.gaze,
-        brows=staging.brows,
-        head=staging.head,
-    )
-    curves = (curve.tolist() for curve in moved)
+    """Return the pose of every video frame, frame n at ``n / fps`` seconds. Raises InputError: as ``spoken_mouth``."""
+    mouth = spoken_mouth(motion, units, fps)
+    moved = alive(np.arange(len(mouth.gap)) / fps, motion, units, staging, prosody)
+    gaze = LOOK * moved.gaze
+    yaw, pitch, roll = moved.turn.T
+    heads = np.stack([SWAY_X * yaw, -SWAY_Y * pitch, roll, YAW * yaw, -PITCH * pitch], axis=1)
+    lids = np.maximum(moved.lids, RESTING_LIDS)
     return [
-        FacePose(mouth, lids, gaze_x, gaze_y, brows, worry, HeadPlacement(*head))
-        for mouth, lids, gaze_x, gaze_y, brows, worry, head in zip(mouths, *curves, strict=True)
+        FacePose(pose, shut, look[0], -look[1], brows, HeadPlacement(*head))
+        for pose, shut, look, brows, head in zip(
+            mouth_poses(mouth), lids.tolist(), gaze.tolist(), moved.brows.tolist(), heads.tolist(), strict=True
+        )
     ]
 
 

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.mouth import upper_share
 from lipmotion.faces.portrait.design import LipDesign
 from lipmotion.faces.portrait.outlines import open_curve
-from lipmotion.faces.portrait.pose import MouthPose, upper_share
+from lipmotion.faces.portrait.pose import MouthPose
 
 Heights = NDArray[np.float64]
 

@@ -75,15 +75,13 @@ class BrowField:
         fade = np.clip((-0.1 - y) / 0.07, 0, 1) * np.clip((y + 0.62) / 0.2, 0, 1)
         bump = fade * np.exp(-(((np.abs(x) - 0.36) / 0.34) ** 4))
         self._both = bump
-        self._inner = bump * np.exp(-(((np.abs(x) - 0.16) / 0.16) ** 2))
 
-    def shifts(self, raised: float, worried: float) -> tuple[Floats, Floats]:
+    def shifts(self, raised: float) -> tuple[Floats, Floats]:
         """Return the shifts in pixels.
 
-        raised  : how far both brows are raised, in eye distances
-        worried : how far their inner ends are raised beyond that; negative: a frown
+        raised : how far both brows are raised, in eye distances
         """
-        y = (raised * self._both + worried * self._inner) * self._scale
+        y = raised * self._both * self._scale
         return np.zeros_like(y), y
 
 

@@ -111,13 +111,13 @@ class PlanarRasteriser:
         """Paint brows and eyes where they are not those of the last frame."""
         steps, gaze = BROW_STEPS * self._parts.brow.view.scale, GAZE_STEPS * self._parts.eyes.view.scale
         lids, x, y = round(pose.lids * LID_POSITIONS), round(pose.gaze_x * gaze), round(pose.gaze_y * gaze)
-        raised, worried = round(pose.brows * steps), round(pose.worry * steps)
-        if canvas.upper == (lids, x, y, raised, worried):
+        raised = round(pose.brows * steps)
+        if canvas.upper == (lids, x, y, raised):
             return
-        canvas.upper = (lids, x, y, raised, worried)
+        canvas.upper = (lids, x, y, raised)
         brow, eyes, below = self._parts.brow, self._parts.eyes, self._parts.below_brows
         skin, still = self._brow_layers
-        shifts = self._brow_field.shifts(raised / steps, worried / steps)
+        shifts = self._brow_field.shifts(raised / steps)
         lay_skin(skin, *shifts, still, brow.y0, brow.x0, canvas.planes)
         rows, columns = below.area
         canvas.planes[:, rows, columns] = self._still[:, rows, columns]

@@ -33,7 +33,7 @@ class FacePose(NamedTuple):
 
     lids           : how far the eyes are closed, 0..1
     gaze_x, gaze_y : how far the irises are to the right and down, in eye distances
-    brows, worry   : how far the brows are raised, and their inner ends beyond that, in eye distances
+    brows          : how far the brows are raised, in eye distances
     """
 
     mouth: MouthPose
@@ -41,7 +41,6 @@ class FacePose(NamedTuple):
     gaze_x: float = 0.0
     gaze_y: float = 0.0
     brows: float = 0.0
-    worry: float = 0.0
     head: HeadPlacement = HeadPlacement()
 
 
@@ -78,7 +77,7 @@ class Rasteriser:
         self._mouth_painter.paint(skin[self._mouth.area_in(self._jaw)][..., :4], pose.mouth)
         self._lay(skin, self._jaw, canvas[self._jaw.area])
         steps = BROW_STEPS * self._brow.view.scale
-        canvas[self._brow.area] = self._brows(round(pose.brows * steps), round(pose.worry * steps))
+        canvas[self._brow.area] = self._brows(round(pose.brows * steps))
         canvas[self._below_brows.area] = self._still[self._below_brows.area]
         _put(self._eye_painter.painted(pose.lids, pose.gaze_x, pose.gaze_y), canvas[self._eyes.area])
         frame = self._frame.copy()
@@ -86,12 +85,10 @@ class Rasteriser:
         warp_bytes(canvas[area], *self._head_field.shifts(pose.head), STEP, frame[area])
         return frame if self._opaque else _straight(frame)
 
-    def _painted_brows(self, raised: int, worried: int) -> Canvas:
+    def _painted_brows(self, raised: int) -> Canvas:
         steps = BROW_STEPS * self._brow.view.scale
         picture = np.empty_like(self._still[self._brow.area])
-        self._lay(
-            self._moved(self._brow, self._brow_field.shifts(raised / steps, worried / steps)), self._brow, picture
-        )
+        self._lay(self._moved(self._brow, self._brow_field.shifts(raised / steps)), self._brow, picture)
         return picture
 
     def _moved(self, window: Window, shifts: tuple[NDArray[np.float64], NDArray[np.float64]]) -> Pixels:

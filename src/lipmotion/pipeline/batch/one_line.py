@@ -203,6 +203,7 @@ def _request(line: BatchLine, settings: BatchSettings, model: Model) -> SpeechRe
         lexicon=_lexicon(settings.lexicon, _stamp(settings.lexicon)),
         recogniser=settings.recogniser,
         speaker=speaker,
+        pauses=settings.pauses,
         onto=None if face is None else _map_onto(model, face, speaker),
     )
 

@@ -9,6 +9,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from lipmotion.articulation.delivery import Delivery
+from lipmotion.articulation.pauses import REST
 from lipmotion.corpora.labels import label_files_beside
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import motion_suffixes
@@ -16,7 +18,6 @@ from lipmotion.export.cues import CUE_FORMATS
 from lipmotion.export.timed_labels import LABEL_SUFFIXES
 from lipmotion.extensions import installed_version
 from lipmotion.faces.base import Staging
-from lipmotion.motion.delivery import Delivery
 from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.drawn_video import VIDEO_SUFFIXES
 from lipmotion.pipeline.model import shipped_path
@@ -37,6 +38,7 @@ class BatchSettings:
                    ``cues.dat``
     recogniser   : of recordings without a transcript, as of ``SpeechRequest``
     speaker      : of lines that name none
+    pauses       : ``rest`` or ``natural``, as of ``SpeechRequest``
     model        : path of the model file; empty: the shipped model
     lexicon      : path of a file of pronunciations; empty: none
     channels     : of motion files; empty: all of the motion
@@ -47,7 +49,7 @@ class BatchSettings:
     fps          : frames per second of videos and cues; None: 25 and 24
     face         : of videos, a name or the path of a file
     staging      : of that face
-    delivery     : intensity, anticipation, offset and held poses of every output
+    delivery     : intensity, asymmetry, anticipation, offset and held poses of every output
 
     >>> BatchSettings(kinds=("json", "cues.tsv")).recogniser
     'auto'
@@ -56,6 +58,7 @@ class BatchSettings:
     kinds: tuple[str, ...] = ("json",)
     recogniser: str = "auto"
     speaker: str = ""
+    pauses: str = REST
     model: str = ""
     lexicon: str = ""
     channels: tuple[str, ...] = ()

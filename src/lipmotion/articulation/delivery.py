@@ -11,12 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.contact import CLOSED_BELOW, closures
+from lipmotion.articulation.rest import rest_frames
 from lipmotion.errors import InputError
 from lipmotion.kernels.holds import best_holds
-from lipmotion.motion.rest import rest_frames
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Generation, Motion, Span, StateTrace, Timeline, Unit
 from lipmotion.types.generation import ReducedVariance
-from lipmotion.units import LIP_CLOSING, is_silent
+from lipmotion.units import is_silent
 
 Curve = NDArray[np.float64]
 
@@ -26,8 +27,6 @@ MOST_HOLD_MS = 10_000.0
 MOST_OFFSET_MS = 600_000.0
 USUAL_HOLD_MS = 2000 / 24
 """Held poses last as long as two frames of an animation at 24 frames a second, if nothing else is asked for."""
-CLOSED_BELOW = 0.012
-"""Tracked lips that touch have openings up to this, in eye distances."""
 FREE = 0.03
 """Lips that have just parted by less than this, in eye distances, move less than in proportion to the intensity."""
 GROWING = ("protrusion", "spread")
@@ -47,6 +46,7 @@ class Delivery:
                       would be before time 0 is left out. For files that are put beside a sound; videos have their own
     min_hold_ms     : 0: the curves are smooth; more: poses are held, each for at least so many milliseconds
     stepped         : poses are held; with ``min_hold_ms`` 0, each for at least two frames at 24 frames a second
+    asymmetry       : 0: lip and jaw points move alike on both sides; 1: as on the speaker's own face
     Raises InputError: a value out of its range.
 
     >>> Delivery(anticipation_ms=40).hold_ms, Delivery(stepped=True).hold_ms > 80, Delivery(min_hold_ms=120).hold_ms
@@ -58,6 +58,7 @@ class Delivery:
     offset_ms: float = 0.0
     min_hold_ms: float = 0.0
     stepped: bool = False
+    asymmetry: float = 0.0
 
     def __post_init__(self) -> None:
         for name, least, most in (
@@ -65,6 +66,7 @@ class Delivery:
             ("anticipation_ms", -MOST_ANTICIPATION_MS, MOST_ANTICIPATION_MS),
             ("offset_ms", -MOST_OFFSET_MS, MOST_OFFSET_MS),
             ("min_hold_ms", 0.0, MOST_HOLD_MS),
+            ("asymmetry", 0.0, 1.0),
         ):
             value = getattr(self, name)
             if not least <= value <= most:
@@ -106,7 +108,7 @@ def moved_in_time(generation: Generation, delivery: Delivery) -> Generation:
     else:
         values = motion.at(position / rate_hz)
         spread = _rows_of(generation, nearest)
-        for frame in closed_frames(generation):
+        for frame in closures(motion, generation.units):
             at = round(frame + by_s * rate_hz)
             if 0 <= at < len(values):
                 values[at] = motion.values[frame]
@@ -149,7 +151,7 @@ def intensified(generation: Generation, intensity: float, opening: Curve | None 
         return generation
     if opening is None and "opening" in motion.names:
         opening = motion["opening"].astype(np.float64)
-    rest = _at_rest(motion, generation.units, opening)
+    rest = rest_frames(motion, generation.units, opening)
     factor = np.full(len(motion.values), float(intensity))
     if opening is not None:
         closed = float(np.median(opening[rest]))
@@ -206,7 +208,7 @@ def closed_on_grid(generation: Generation, rate_hz: float) -> Generation:
     """
     motion = generation.motion
     values = motion.values.copy()
-    for frame in closed_frames(generation):
+    for frame in closures(motion, generation.units):
         position = round(frame / motion.rate_hz * rate_hz) / rate_hz * motion.rate_hz
         first, last = int(np.floor(position + 1e-6)), int(np.ceil(position - 1e-6))
         values[min(first, len(values) - 1) : last + 1] = motion.values[frame]
@@ -215,22 +217,7 @@ def closed_on_grid(generation: Generation, rate_hz: float) -> Generation:
 
 def closed_times(generation: Generation) -> list[float]:
     """Return the time in seconds at which each p, b and m closes the lips; none where no opening is known."""
-    return [frame / generation.motion.rate_hz for frame in closed_frames(generation)]
-
-
-def closed_frames(generation: Generation) -> list[int]:
-    """Return the frame of every p, b and m in which the lips are closest together; none where no opening is known."""
-    motion = generation.motion
-    if "opening" not in motion.names:
-        return []
-    opening, found = motion["opening"], []
-    for span in generation.units:
-        if span.label.phone in LIP_CLOSING:
-            first = max(int(np.ceil(span.start_s * motion.rate_hz - 1e-6)), 0)
-            stop = min(int(np.floor(span.end_s * motion.rate_hz + 1e-6)) + 1, len(opening))
-            if first < stop:
-                found.append(first + int(opening[first:stop].argmin()))
-    return sorted(set(found))
+    return [frame / generation.motion.rate_hz for frame in closures(generation.motion, generation.units)]
 
 
 def _factors(further: Curve, touching: float, intensity: float) -> Curve:
@@ -246,19 +233,6 @@ def _factors(further: Curve, touching: float, intensity: float) -> Curve:
     weight = share * share * (3 - 2 * share)
     factor = np.divide(limited, further, out=np.ones_like(further), where=further > 0)
     return 1 + weight * (factor - 1)
-
-
-def _at_rest(motion: Motion, units: Timeline[Unit], opening: Curve | None) -> NDArray[np.bool_]:
-    if "opening" in motion.names:
-        return rest_frames(motion, units)
-    rest = np.zeros(len(motion.values), bool)
-    for span in units:
-        if is_silent(span.label.phone):
-            rest |= (span.start_s <= motion.time_s) & (motion.time_s < span.end_s)
-    if not rest.any():
-        order = np.argsort(opening, kind="stable") if opening is not None else np.arange(len(rest))
-        rest[order[: max(1, len(rest) // 10)]] = True
-    return rest
 
 
 def _deciding(motion: Motion) -> Curve:

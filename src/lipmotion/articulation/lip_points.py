@@ -76,8 +76,8 @@ class MouthTemplate:
 
 @cache
 def mouth_template() -> MouthTemplate:
-    """Return the template of the table ``mouth_template.csv``."""
-    text = resources.files("lipmotion.rig").joinpath("mouth_template.csv").read_text(encoding="ascii")
+    """Return the template of the table ``lip_points.csv``."""
+    text = resources.files("lipmotion.articulation").joinpath("lip_points.csv").read_text(encoding="ascii")
     rows = list(csv.DictReader(text.splitlines()))
     points = tuple(int(row["point"]) for row in rows)
     kinds = {kind: np.array([kind in row["place"] for row in rows]) for kind in "upper lower corner jaw inner".split()}

@@ -1,4 +1,6 @@
-"""What a speaking head does beside speaking: blinks, glances, raised brows, nods and sway.
+"""Liveliness: what a speaking head does beside speaking: blinks, glances, raised brows, nods and sway.
+
+All faces, meshes and curve sets have the same.
 
 Everything follows from the phones in time, the loudness and pitch of the voice, and one seed; nothing depends on the
 frame rate. Accents, where the voice is loud and high, raise the brows and nod the head; blinks prefer the ends of
@@ -12,7 +14,7 @@ H. P. Graf et al., "Visual prosody: facial movements accompanying speech", FG 20
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,36 +26,41 @@ Curve = NDArray[np.float64]
 
 BLINK_S, MEAN_BLINK_S, LEAST_BLINK_S = 0.24, 3.3, 1.1
 """Duration of a blink; mean and least time between two."""
-RESTING_LIDS = 0.07
-"""Awake and calm, the upper lids cover a little of the irises."""
 PHRASE_PAUSE_S = 0.15
 """A pause of at least this duration ends a phrase."""
 SACCADE_S = 0.05
 """Duration of a movement of the eyes."""
-LARGEST_GLANCE = (0.05, 0.018)
-"""Of the irises, to the side and up or down, in eye distances."""
+LARGEST_GLANCE = (0.2, 0.08)
+"""Of the eyes, to the side and up or down, in radians."""
 BROW_RAISE = 0.03
 """For a strong accent, in eye distances."""
+FOLLOWING = 0.85
+"""The eyes turn against the head by this part of its way, and so hold their target."""
+SWAY = (0.034, 0.016, 0.018)
+"""Deviations of the slow turning of the head in speech: to the side, up and down, to a shoulder, in radians."""
+NOD, FALL = 0.045, 0.03
+"""How far the head nods with a strong accent, and how much lower a phrase ends than it begins, in radians."""
+STILL_SHARE = 0.35
+"""Share of the turning of the head that is left in silence."""
 
 
-class Expression(NamedTuple):
-    """Movements beside the mouth's, each a curve over the video frames [each shape=(N,)].
+@dataclass(frozen=True, eq=False)
+class Liveliness:
+    """Movements beside the mouth's, in F frames.
 
-    lids           : how far the eyes are closed, 0..1
-    gaze_x, gaze_y : of the irises, to the right and down, in eye distances
-    brows, worry   : how far the brows are raised, and their inner ends beyond that, in eye distances
-    head           : x, y, roll, yaw, pitch as of ``HeadPlacement`` [shape=(N, 5)]
+    lids  : how far the eyes are closed, 0 to 1 [shape=(F,)]
+    brows : how far the brows are raised, in eye distances [shape=(F,)]
+    gaze  : of the eyes against the head, to the character's left and upwards, in radians [shape=(F, 2)]
+    turn  : of the head to its left, upwards and to its left shoulder, in radians [shape=(F, 3)]
     """
 
     lids: Curve
-    gaze_x: Curve
-    gaze_y: Curve
     brows: Curve
-    worry: Curve
-    head: Curve
+    gaze: Curve
+    turn: Curve
 
 
-def expression(
+def liveliness(
     time_s: Curve,
     motion: Motion,
     units: Timeline[Unit],
@@ -64,25 +71,24 @@ def expression(
     gaze: bool = True,
     brows: bool = True,
     head: bool = True,
-) -> Expression:
-    """Return the movements beside the mouth's at the times of video frames.
+) -> Liveliness:
+    """Return the movements beside the mouth's at the times of pictures, in seconds.
 
+    motion  : needs ``opening`` where the prosody is not known
     prosody : of the speech; None: accents are where the mouth opens far
-    Each of ``blinks``, ``gaze``, ``brows``, ``head`` that is off leaves the others as they are.
+    Each of ``blinks``, ``gaze``, ``brows``, ``head`` that is off leaves the others as they are; without ``gaze`` the
+    eyes still hold their target while the head turns.
     """
-    still = np.zeros(len(time_s))
-    end_s = float(time_s[-1]) if len(time_s) else 0.0
+    still, end_s = np.zeros(len(time_s)), float(time_s[-1]) if len(time_s) else 0.0
     spoken = phrases(units)
     accent = _accents(motion, prosody)
-    talking = _talking(spoken, time_s)
-    pose = _head(time_s, accent, talking, spoken, _generator(seed, 1)) if head else np.zeros((len(time_s), 5))
-    blink_s = blink_times(end_s, spoken, _generator(seed, 2))
-    lids = np.maximum(lid_closure(time_s, blink_s) if blinks else still, RESTING_LIDS)
-    look_x, look_y = _gaze(time_s, end_s, spoken, _generator(seed, 3)) if gaze else (still, still)
-    if gaze:
-        look_x, look_y = look_x - 0.55 * pose[:, 3] - 0.2 * pose[:, 0], look_y - 0.4 * pose[:, 4]
-    raised, worry = _brows(time_s, accent, spoken, _generator(seed, 4)) if brows else (still, still)
-    return Expression(lids, look_x, look_y, raised, worry, pose)
+    turn = np.zeros((len(time_s), 3))
+    if head:
+        turn = _turn(time_s, accent, _talking(spoken, time_s), spoken, _generator(seed, 1))
+    lids = lid_closure(time_s, blink_times(end_s, spoken, _generator(seed, 2))) if blinks else still
+    aim = _gaze(time_s, end_s, spoken, _generator(seed, 3)) if gaze else np.zeros((len(time_s), 2))
+    raised = _brows(time_s, accent, spoken, _generator(seed, 4)) if brows else still
+    return Liveliness(lids, raised, aim - FOLLOWING * turn[:, :2], turn)
 
 
 def phrases(units: Timeline[Unit]) -> list[tuple[float, float]]:
@@ -177,70 +183,60 @@ def _sway(time_s: Curve, rng: np.random.Generator, slowest_hz: float, fastest_hz
     return np.asarray(strengths @ waves / np.sqrt(np.sum(strengths**2) / 2))
 
 
-def _head(
+def _turn(
     time_s: Curve, accent: Curve, talking: Curve, spoken: list[tuple[float, float]], rng: np.random.Generator
 ) -> Curve:
-    lively = 0.4 + 0.6 * talking
-    x, y, roll, yaw, pitch = (_sway(time_s, rng, 0.08, 0.45) for _ in range(5))
+    lively = STILL_SHARE + (1 - STILL_SHARE) * talking
+    yaw, pitch, roll = (size * _sway(time_s, rng, 0.08, 0.45) for size in SWAY)
     nod = _at(_smoothed(accent, 0.11), time_s + 0.04)
     tilt = np.zeros(len(time_s))
     for begin, end in spoken:  # every phrase has its own pose, and ends a little lower
-        side, turn = rng.normal(0, 1, 2)
+        side, about = rng.normal(0, 1, 2).clip(-1.6, 1.6)
         first, last = np.searchsorted(time_s, (begin - 0.5, end + 0.8))
         near = time_s[first:last]
         rise = np.clip((near - begin + 0.5) / 0.7, 0, 1) * np.clip((end + 0.8 - near) / 0.8, 0, 1)
         rise = rise * rise * (3 - 2 * rise)
-        roll[first:last] += 0.9 * side * rise
-        yaw[first:last] += 0.9 * turn * rise
+        roll[first:last] += 0.9 * SWAY[2] * side * rise
+        yaw[first:last] += 0.9 * SWAY[0] * about * rise
         tilt[first:last] += rise * (np.clip((near - begin) / max(end - begin, 0.1), 0, 1) - 0.5)
-    return np.stack(
-        [
-            0.014 * lively * x + 0.16 * 0.016 * lively * roll,
-            0.006 * lively * y + 0.016 * nod + 0.006 * tilt,
-            0.012 * lively * roll,
-            0.016 * lively * yaw,
-            0.008 * lively * pitch + 0.03 * nod + 0.016 * tilt,
-        ],
-        axis=1,
-    )
+    return np.stack([lively * yaw, lively * pitch - NOD * nod - FALL * tilt, lively * roll], axis=1)
 
 
-def _brows(
-    time_s: Curve, accent: Curve, spoken: list[tuple[float, float]], rng: np.random.Generator
-) -> tuple[Curve, Curve]:
-    raised = BROW_RAISE * _at(_smoothed(accent, 0.1), time_s + 0.06) + 0.004 * _sway(time_s, rng, 0.05, 0.3)
+def _brows(time_s: Curve, accent: Curve, spoken: list[tuple[float, float]], rng: np.random.Generator) -> Curve:
+    raised = BROW_RAISE * _at(_smoothed(accent, 0.1), time_s + 0.06)
+    raised += 0.003 * (1 + np.tanh(_sway(time_s, rng, 0.05, 0.3)))
     for begin, _ in spoken:  # some phrases begin with raised brows
         strength = float(rng.uniform(-0.6, 1.0))
         if strength > 0:
             first, last = np.searchsorted(time_s, (begin - 0.25, begin + 0.75))
             wave = np.sin(np.pi * np.clip((time_s[first:last] - begin + 0.25) / 1.0, 0, 1)) ** 2
             raised[first:last] += 0.6 * BROW_RAISE * strength * wave
-    return raised, 0.003 * _sway(time_s, rng, 0.04, 0.2) - 0.004
+    return raised
 
 
-def _gaze(
-    time_s: Curve, end_s: float, spoken: list[tuple[float, float]], rng: np.random.Generator
-) -> tuple[Curve, Curve]:
-    """Return where the eyes look: steps between fixations."""
+def _gaze(time_s: Curve, end_s: float, spoken: list[tuple[float, float]], rng: np.random.Generator) -> Curve:
+    """Return where the eyes look, to the left and upwards in radians [shape=(F, 2)]: steps between fixations."""
     moments, targets = [0.0], [(0.0, 0.0)]
     begins = np.array([begin for begin, _ in spoken] or [np.inf])
     at = float(rng.uniform(0.4, 1.2))
     while at < end_s:
-        away = targets[-1] == (0.0, 0.0) or abs(targets[-1][0]) < 0.01
         near_begin = np.abs(begins - at).min() < 0.8
-        if away and rng.random() < (0.5 if near_begin else 0.14):
-            side = rng.choice([-1.0, 1.0])
-            target = (side * LARGEST_GLANCE[0] * rng.uniform(0.45, 1), LARGEST_GLANCE[1] * rng.uniform(-1, 0.6))
-            stay = rng.uniform(0.35, 0.9)
+        if abs(targets[-1][0]) < 0.04 and rng.random() < (0.5 if near_begin else 0.14):
+            side = float(rng.choice([-1.0, 1.0]))
+            target = (
+                side * LARGEST_GLANCE[0] * float(rng.uniform(0.45, 1)),
+                LARGEST_GLANCE[1] * float(rng.uniform(-0.6, 1)),
+            )
+            stay = float(rng.uniform(0.35, 0.9))
         else:
-            target = (float(rng.normal(0, 0.0045)), float(rng.normal(0, 0.003)))
-            stay = rng.uniform(0.5, 2.0)
+            target = (float(rng.normal(0, 0.018)), float(rng.normal(0, 0.012)))
+            stay = float(rng.uniform(0.5, 2.0))
         moments.append(at)
-        targets.append((float(target[0]), float(target[1])))
-        at += float(stay)
+        targets.append(target)
+        at += stay
     steps = np.array(targets)
     moved = np.zeros((len(time_s), 2)) + steps[0]
     for moment, change in zip(moments[1:], np.diff(steps, axis=0), strict=True):
         share = np.clip((time_s - moment) / SACCADE_S, 0, 1)
         moved += (share * share * (3 - 2 * share))[:, None] * change
-    return moved[:, 0], moved[:, 1]
+    return moved

@@ -1,8 +1,8 @@
-"""What the phones say that lip points do not: lips pressed, a lip rolled in, the tongue between the teeth."""
+"""How far each phone is being said at a time: cross-fades between phones in time."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -16,14 +16,6 @@ FADE_S = 0.06
 """Longest half of a cross-fade between two phones, in seconds; of short phones, half of the phone."""
 LEAST_FADE_S = 0.025
 """Shortest half of a cross-fade: no curve jumps, and a phone under 50 ms is not wholly said."""
-GESTURES: Mapping[str, tuple[tuple[str, ...], float]] = {
-    "mouthPressLeft": (("p", "b", "m", "em"), 0.2),
-    "mouthPressRight": (("p", "b", "m", "em"), 0.2),
-    "mouthRollUpper": (("p", "b", "m", "em"), 0.1),
-    "mouthRollLower": (("f", "v"), 0.55),
-    "tongueOut": (("th", "dh"), 0.3),
-}
-"""Phones that add to a blendshape of ARKit, and how much in their middle. What lip points show is not in this table."""
 
 
 def phone_weights(units: Timeline[Unit], time_s: Array, kind: Callable[[str], str]) -> dict[str, Array]:
@@ -43,16 +35,6 @@ def phone_weights(units: Timeline[Unit], time_s: Array, kind: Callable[[str], st
         weights[name] += reached - after
         reached = after
     return weights
-
-
-def gesture_curves(units: Timeline[Unit], time_s: Array, known: Collection[str]) -> dict[str, Array]:
-    """Return what phones add to blendshapes of ARKit, 0 to 1 [each shape=(T,)], of those that are known."""
-    chosen = {name: each for name, each in GESTURES.items() if name in known}
-    phones = phone_weights(units, time_s, lambda phone: phone)
-    return {
-        name: most * sum((phones[phone] for phone in said if phone in phones), np.zeros(len(time_s)))
-        for name, (said, most) in chosen.items()
-    }
 
 
 def _segments(units: Timeline[Unit], kind: Callable[[str], str]) -> tuple[list[str], list[float], list[float]]:

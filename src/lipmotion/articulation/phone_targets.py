@@ -1,4 +1,6 @@
-"""Articulatory channels: what lips and tongue do in each phone that distances between lip points do not show.
+"""Phone targets: what lips and tongue do in each phone that distances between lip points do not show.
+
+This is the one table of phones for all faces, meshes and curve sets.
 
 Every phone has a target for every channel, and a dominance: how strongly it pulls the channel towards its target. The
 value at a time is the mean of all targets, weighted by the dominances there. A consonant that asks nothing of the lips
@@ -19,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
-from lipmotion.units import LIP_CLOSING, is_silent
+from lipmotion.units import LIP_CLOSING
 
 Curve = NDArray[np.float64]
 GESTURES = ("tongue", "lip_tuck", "protrusion", "spread", "lip_press", "teeth")
@@ -32,8 +34,6 @@ PURSED = 0.5
 """Value of ``lip_press`` of w: with protruded lips, a hole that is almost closed. The round hole of uw has 0."""
 REACH = 4.0
 """Dominance is 0 further than so many widths from a phone."""
-LEAST_PAUSE_S = 0.06
-"""In shorter pauses the mouth goes on."""
 
 
 class GestureTarget(NamedTuple):
@@ -140,38 +140,6 @@ def with_gestures(motion: Motion, units: Timeline[Unit], names: Collection[str] 
         return motion
     values = np.hstack([motion.values, np.stack(list(curves.values()), axis=1).astype(motion.values.dtype)])
     return Motion(values, motion.rate_hz, (*motion.channels, *(Channel(name, WEIGHT) for name in curves)))
-
-
-def pause_curve(
-    units: Timeline[Unit],
-    time_s: Curve,
-    least_s: float = LEAST_PAUSE_S,
-    *,
-    blend_s: float = 0.06,
-    after_s: float = 0.0,
-    before_s: float = 0.0,
-) -> Curve:
-    """Return the weight of pauses at each time, 0 to 1 [shape=(T,)]; it is 0.5 at the boundaries of a pause.
-
-    least_s : shorter pauses are none
-    blend_s : duration of the change
-    after_s, before_s : the pause begins so much after the last phone, and ends so much before the next one
-    """
-    total = np.zeros(len(time_s))
-    for span in units:
-        if is_silent(span.label.phone) and span.duration_s >= least_s:
-            start_s, end_s = span.start_s, span.end_s
-            if start_s > 0:
-                start_s += min(after_s, span.duration_s / 4)
-            end_s -= min(before_s, span.duration_s / 4)
-            total += _risen((time_s - start_s) / blend_s) - _risen((time_s - end_s) / blend_s)
-    return np.clip(total, 0, 1)
-
-
-def _risen(share: Curve) -> Curve:
-    """Return a smooth step from 0 to 1 that is 0.5 at 0."""
-    clipped = np.clip(share + 0.5, 0, 1)
-    return np.asarray(clipped * clipped * (3 - 2 * clipped))
 
 
 def _curve(name: str, units: Timeline[Unit], time_s: Curve) -> Curve:

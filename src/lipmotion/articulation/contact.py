@@ -1,0 +1,152 @@
+"""Contact of the lips: how far apart they are for a measured opening, when they touch, and how pictures show it.
+
+This module alone decides whether lips are closed. Faces, meshes and curve sets close them where it says so.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.types import Motion, Timeline, Unit
+from lipmotion.types.motion import between_frames
+from lipmotion.units import LIP_CLOSING
+
+Curve = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+CLOSED_BELOW: Final = 0.012
+"""Trackers measure openings up to this on lips that touch, in eye distances."""
+UNSEEN, SEEN_FROM = 0.01, 0.035
+"""Trackers measure this much less than the distance of parted lips; from the second length on, all of it is added."""
+BEND, WIDEST = 0.27, 0.45
+"""Up to the first gap, lips are as far apart as measured; further ones approach the second, in eye distances."""
+LEAST_GAP: Final = 0.006
+"""Lips that do not touch are at least this far apart, in eye distances (0.5 mm on a face)."""
+LEAST_CONTACT_S: Final = 0.06
+"""The lips touch for at least this long in p, b and m: longer than a picture at 24 a second."""
+FADE_S: Final = 0.05
+"""Lips that are made to touch come together, and part, within this time."""
+MEANT: Final = 0.15
+"""Lips that are further apart than this in all of a p, b or m are left so: somebody edited or pinned them."""
+GAP: Final = "lip_gap"
+"""The channel of the distance between the inner lips itself, of motion that comes from a rig, in eye distances."""
+
+
+def gap_of(opening: Curve) -> Curve:
+    """Return the distance between the inner lips for a measured opening [shape=(T,)]; 0 where they touch.
+
+    Both in eye distances. It never falls where the opening rises.
+    """
+    share = np.clip((opening - CLOSED_BELOW) / (SEEN_FROM - CLOSED_BELOW), 0, 1)
+    gap = (opening + UNSEEN) * share
+    over = (WIDEST - BEND) * np.tanh(np.maximum(gap - BEND, 0) / (WIDEST - BEND))
+    return np.minimum(gap, BEND) + over
+
+
+def opening_of(gap: Curve) -> Curve:
+    """Return the opening that trackers measure for a distance between the inner lips [shape=(T,)]: of ``gap_of``."""
+    openings = np.concatenate([np.linspace(CLOSED_BELOW, SEEN_FROM, 24), np.linspace(SEEN_FROM, 1.0, 200)[1:]])
+    return np.where(gap > 0, np.interp(gap, gap_of(openings), openings), CLOSED_BELOW - 0.002)
+
+
+def gap_in(motion: Motion) -> Curve:
+    """Return the distance between the inner lips in every frame [shape=(T,)]: ``lip_gap``, or that of ``opening``."""
+    if GAP in motion.names:
+        return np.maximum(motion[GAP].astype(np.float64), 0)
+    return gap_of(motion["opening"].astype(np.float64))
+
+
+def closures(motion: Motion, units: Timeline[Unit]) -> list[int]:
+    """Return the frame of every p, b and m in which the lips are closest together, ascending.
+
+    None where the motion has no ``opening``. Where they touch in several frames, the middle of the longest contact.
+    """
+    if "opening" not in motion.names:
+        return []
+    gap, found = gap_in(motion), set()
+    for span in units:
+        if span.label.phone in LIP_CLOSING:
+            first = max(int(np.ceil(span.start_s * motion.rate_hz - 1e-6)), 0)
+            stop = min(int(np.floor(span.end_s * motion.rate_hz + 1e-6)) + 1, len(gap))
+            if first >= stop:  # a phone between two frames: the nearer one
+                first = min(max(round((span.start_s + span.end_s) / 2 * motion.rate_hz), 0), len(gap) - 1)
+                stop = first + 1
+            least = np.flatnonzero(gap[first:stop] <= gap[first:stop].min() + 1e-9)
+            found.add(first + int(least[len(least) // 2]))
+    return sorted(found)
+
+
+def closed_lips(gap: Curve, motion: Motion, units: Timeline[Unit]) -> Curve:
+    """Return a gap with the lips in contact for ``LEAST_CONTACT_S`` in every p, b and m [shape=(T,)].
+
+    gap : of the frames of the motion, with all that phones but p, b and m ask of it [shape=(T,)]
+    It is 0 where the lips touch, and at least ``LEAST_GAP`` where not.
+    """
+    time_s, open_share = motion.time_s, np.ones(len(gap))
+    shut = gap < LEAST_GAP / 2
+    for frame in closures(motion, units):
+        if gap[frame] > MEANT:
+            continue
+        if shut[frame] and _contact_s(shut, frame, motion.rate_hz) >= LEAST_CONTACT_S - 1e-9:
+            continue
+        near = slice(*np.searchsorted(time_s, (time_s[frame] - 0.2, time_s[frame] + 0.2)))
+        outside = np.abs(time_s[near] - time_s[frame]) - LEAST_CONTACT_S / 2 - 1e-9
+        share = np.clip(outside / FADE_S, 0, 1)
+        open_share[near] = np.minimum(open_share[near], share * share * (3 - 2 * share))
+    gap = gap * open_share
+    return np.where(gap < LEAST_GAP / 2, 0.0, np.maximum(gap, LEAST_GAP))
+
+
+def _contact_s(shut: Mask, frame: int, rate_hz: float) -> float:
+    """Return for how long the lips touch around a frame, in seconds, up to the frames in which they do not."""
+    parted = np.flatnonzero(~shut)
+    after = int(np.searchsorted(parted, frame))
+    before = int(parted[after - 1]) if after else -1
+    return ((int(parted[after]) if after < len(parted) else len(shut)) - before) / rate_hz
+
+
+def shown_contact(contact: Mask, rate_hz: float, time_s: Curve) -> Mask:
+    """Return in which pictures the lips touch [shape=(len(time_s),), bool].
+
+    contact : of frames at ``rate_hz`` [shape=(T,), bool]
+    time_s  : of the pictures in seconds, evenly spaced
+    A picture shows contact if the frame nearest to it has it. Contact between two pictures is shown by the nearer one.
+    """
+    frames = np.clip(np.rint(time_s * rate_hz).astype(int), 0, max(len(contact) - 1, 0))
+    shown = contact[frames].copy()
+    if len(time_s) > 1:
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], contact, [False]]))).reshape(-1, 2)
+        step_s = float(time_s[1] - time_s[0])
+        for first, stop in edges.tolist():
+            nearest = round(((first + stop - 1) / 2 / rate_hz - float(time_s[0])) / step_s)
+            if 0 <= nearest < len(shown):
+                begin, end = np.searchsorted(frames, (first, stop))
+                shown[nearest] |= begin == end
+    return shown
+
+
+def in_pictures(rows: Curve, contact: Mask, rate_hz: float, time_s: Curve) -> Curve:
+    """Return rows of curves in pictures, in which the lips touch in those of ``shown_contact`` and in no other.
+
+    rows   : one a frame [shape=(T,) or (T, N)], which lips touch where ``contact`` says so [shape=(T,), bool]
+    time_s : of the pictures in seconds, evenly spaced
+    A picture in which the lips touch shows the nearest frame in which they do. The others lie between frames, or, where
+    the lips touch in one of these, show the other one.
+    """
+    values = between_frames(rows.reshape(len(rows), -1), rate_hz, time_s)
+    shown = shown_contact(contact, rate_hz, time_s)
+    position = time_s * rate_hz
+    low = np.clip(np.floor(position + 1e-6).astype(int), 0, len(rows) - 1)
+    high = np.minimum(low + (position - low > 1e-6), len(rows) - 1)
+    mixed = np.flatnonzero((contact[low] != shown) | (contact[high] != shown))
+    for kind in (True, False):
+        frames, chosen = np.flatnonzero(contact == kind), mixed[shown[mixed] == kind]
+        if len(frames) and len(chosen):
+            after = np.clip(np.searchsorted(frames, position[chosen]), 0, len(frames) - 1)
+            before = np.maximum(after - 1, 0)
+            nearer = np.abs(frames[before] - position[chosen]) <= np.abs(frames[after] - position[chosen])
+            values[chosen] = rows.reshape(len(rows), -1)[frames[np.where(nearer, before, after)]]
+    return values.reshape(len(time_s), *rows.shape[1:])

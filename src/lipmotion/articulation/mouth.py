@@ -1,0 +1,237 @@
+"""The mouth in every frame, as all faces, meshes and curve sets show it: from motion and phones to one set of curves.
+
+Lengths are in eye distances (the distance between the outer corners of the eyes).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.articulation.contact import GAP, closed_lips, gap_in, in_pictures
+from lipmotion.articulation.phone_targets import GESTURES, OVAL, PURSED, TIP_OUT, TIP_UP, gesture_curves
+from lipmotion.articulation.rest import against_rest, rest_frames
+from lipmotion.errors import InputError
+from lipmotion.types import Motion, Timeline, Unit
+
+Curve = NDArray[np.float64]
+
+TUCKED_GAP = (0.04, 0.052)
+"""Range of the gap while the lower lip is on the upper teeth, which are seen."""
+TONGUE_GAP = (0.055, 0.085)
+"""Range of the gap while the tongue is between the teeth."""
+PURSED_GAP = (0.034, 0.05)
+"""Range of the gap of w: a small hole."""
+ROUND_GAP, TEETH_GAP = 0.05, 0.045
+"""Least gap of protruded lips, and where both rows of teeth are seen."""
+ROUND_WIDTH, SPREAD_WIDTH, OVAL_WIDTH = 0.82, 1.06, 0.94
+"""Protruded lips are at most so wide, spread ones at least, and those of an oval mouth at most, against rest."""
+OVAL_GAPS = (0.08, 0.18)
+"""The gap at which an opening begins to be an oval, and at which it is one, where the phone asks for it."""
+WIDTH_REACH = 0.3
+"""Changes of width approach this."""
+LIP_SPEED = 2.2
+"""The gap changes no faster than this beside f and v, in eye distances a second (20 cm/s on a face)."""
+TUCKED_CHIN = 0.6
+"""Share of its drop by which the chin rises while the lower lip is on the teeth."""
+UPPER_MOST, UPPER_RATE = 0.058, 5.2
+"""The upper lip rises by at most the first length (5 mm), for small gaps by the product of both times the gap."""
+JAW_SHARE = 0.85
+"""Share of the lower lip's way that the chin goes: the lip also turns outwards."""
+DRAWN = ("opening", "width", "outer", "y_152", *GESTURES)
+"""The channels of motion that are used."""
+
+
+@dataclass(frozen=True, eq=False)
+class SpokenMouth:
+    """The mouth in F frames; each curve has the shape (F,).
+
+    rate_hz    : frames per second; frame n is at ``n / rate_hz`` seconds
+    gap        : distance between the inner lips; 0 where they touch, else at least ``contact.LEAST_GAP``
+    width      : distance of the lip corners, relative to the rest pose
+    fullness   : thickness of the lips, relative to the rest pose
+    jaw        : drop of the chin
+    tongue, tuck, protrusion, spread, press, teeth : the articulatory channels, 0 to 1 (docs/articulation.md)
+    pursed     : how far protruded lips leave only a small hole, as in w, 0 to 1
+    oval       : how far the opening is tall and narrow, as in aa, 0 to 1
+    """
+
+    rate_hz: float
+    gap: Curve
+    width: Curve
+    fullness: Curve
+    jaw: Curve
+    tongue: Curve
+    tuck: Curve
+    protrusion: Curve
+    spread: Curve
+    press: Curve
+    teeth: Curve
+    pursed: Curve
+    oval: Curve
+
+    @property
+    def contact(self) -> NDArray[np.bool_]:
+        """The frames in which the lips touch [shape=(F,)]."""
+        return np.asarray(self.gap == 0)
+
+    @property
+    def closing(self) -> Curve:
+        """How far the lips are pressed together in p, b and m, 0 to 1 [shape=(F,)]."""
+        return np.clip(2 * self.press - 1, 0, 1) * self.contact
+
+    @property
+    def between_teeth(self) -> Curve:
+        """How far the tip of the tongue is between the teeth, 0 to 1 [shape=(F,)]."""
+        return np.clip((self.tongue - TIP_UP) / (TIP_OUT - TIP_UP), 0, 1)
+
+    def at(self, fps: float) -> SpokenMouth:
+        """Return the same mouth at another frame rate, to its last frame, with the contact of ``shown_contact``."""
+        if abs(fps - self.rate_hz) < 1e-9:
+            return self
+        time_s = frame_times(len(self.gap), self.rate_hz, fps)
+        rows = np.stack(list(self._curves().values()), axis=1)
+        sampled = in_pictures(rows, self.contact, self.rate_hz, time_s)
+        return SpokenMouth(fps, *(np.ascontiguousarray(column) for column in sampled.T))
+
+    def rows(self) -> Iterator[dict[str, float]]:
+        """Yield the values of every frame by the names of the curves."""
+        curves = self._curves()
+        for values in np.stack(list(curves.values()), axis=1).tolist():
+            yield dict(zip(curves, values, strict=True))
+
+    def _curves(self) -> dict[str, Curve]:
+        return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "rate_hz"}
+
+
+def frame_times(frames: int, rate_hz: float, fps: float) -> Curve:
+    """Return the times of pictures, ``fps`` a second, of so many frames of motion, to the last one [shape=(N,)]."""
+    return np.arange(int(np.floor((frames - 1) / rate_hz * fps + 1e-9)) + 1) / fps
+
+
+def spoken_mouth(motion: Motion, units: Timeline[Unit], fps: float | None = None) -> SpokenMouth:
+    """Return the mouth of a motion and its phones in every frame.
+
+    motion : needs ``opening``. ``width``, ``outer`` and the chin ``y_152`` are used where it has them, against the rest
+             pose; articulatory channels that it lacks follow from the phones. With a channel ``lip_gap``, which motion
+             of rigs has, phones say of the gap only that p, b and m close the lips
+    units  : phones in time; may be empty
+    fps    : frames per second, to the end of the motion; None: those of the motion
+    In every p, b and m the lips touch (``contact.closed_lips``).
+    Raises InputError: no channel ``opening``, no frames, values that are not finite, fps not positive, or lips without
+    width or thickness at rest.
+    """
+    check_spoken(motion, motion.rate_hz if fps is None else fps)
+    time_s, rest = motion.time_s, rest_frames(motion, units)
+    said = gesture_curves(units, time_s, [name for name in (*GESTURES, OVAL) if name not in motion.names])
+    said |= {name: np.clip(motion[name].astype(np.float64), 0, 1) for name in {*GESTURES} & {*motion.names}}
+    # w has half the press of p, with protruded lips: a hole that is almost closed
+    said["pursed"] = np.clip(said["lip_press"] / (0.8 * PURSED), 0, 1) * said["protrusion"]
+    said["pursed"] *= np.clip((0.75 - said["lip_press"]) / 0.15, 0, 1)
+    gap = gap_in(motion)
+    if GAP not in motion.names:
+        gap = _articulated(gap, said, time_s)
+    gap = closed_lips(gap, motion, units)
+    oval = said[OVAL] * np.clip((gap - OVAL_GAPS[0]) / (OVAL_GAPS[1] - OVAL_GAPS[0]), 0, 1)
+    mouth = SpokenMouth(
+        motion.rate_hz,
+        gap,
+        _width(motion, rest, said, oval),
+        _fullness(motion, rest),
+        _jaw(motion, rest, gap) * (1 - TUCKED_CHIN * said["lip_tuck"]),
+        said["tongue"],
+        said["lip_tuck"],
+        said["protrusion"],
+        said["spread"],
+        said["lip_press"],
+        said["teeth"],
+        said["pursed"],
+        oval,
+    )
+    return mouth if fps is None else mouth.at(fps)
+
+
+def check_spoken(motion: Motion, fps: float) -> None:
+    """Raise InputError if no mouth can be made of motion: no ``opening``, no frames, or values that are not finite.
+
+    fps : frames per second of what is made, required more than 0
+    """
+    if not 0 < fps < np.inf:
+        raise InputError(f"the frame rate is {fps}, required more than 0")
+    if "opening" not in motion.names:
+        names = ", ".join(motion.names[:6]) + (", ..." if len(motion.names) > 6 else "") or "no channels"
+        raise InputError(f"no channel 'opening' to draw a face from; the motion has: {names}")
+    if not len(motion.values):
+        raise InputError("the motion has no frames; there is nothing to draw")
+    for name in (*DRAWN, GAP):
+        if name in motion.names and not np.isfinite(motion[name]).all():
+            raise InputError(
+                f"the channel {name!r} has values that are not finite; interpolate the missing frames first"
+            )
+
+
+def upper_share(gap: Any) -> Any:
+    """Return how far the upper lip rises for a gap; the rest of the gap is the lower lip's. Source: GRID speaker 1."""
+    return UPPER_MOST * (1 - np.exp(-UPPER_RATE * np.asarray(gap)))
+
+
+def jaw_drop(gap: Any) -> Any:
+    """Return how far the chin drops for a gap."""
+    return JAW_SHARE * (np.asarray(gap) - upper_share(gap))
+
+
+def _articulated(gap: Curve, said: dict[str, Curve], time_s: Curve) -> Curve:
+    """Return a gap that suits what is said beside p, b and m: teeth on the lip, tongue between the teeth, a round hole.
+
+    said : the articulatory channels, with ``pursed`` [each shape=(T,)]
+    """
+    press, tuck, pursed = said["lip_press"], said["lip_tuck"], said["pursed"]
+    free = (1 - press) * np.clip(gap / 0.03, 0, 1)
+    shown = np.maximum(2 * said["teeth"] - 1, 0)
+    for weight, least in ((shown, TEETH_GAP), (said["protrusion"] ** 2 * (1 - pursed), ROUND_GAP)):
+        gap = gap + free * weight * (np.maximum(gap, least) - gap)
+    between = np.clip((said["tongue"] - TIP_UP) / (TIP_OUT - TIP_UP), 0, 1)
+    apart = np.clip((0.75 - press) / 0.15, 0, 1)  # also where they were tracked as closed
+    for weight, (least, most) in ((pursed, PURSED_GAP), (between * apart, TONGUE_GAP), (tuck * apart, TUCKED_GAP)):
+        gap = gap + weight * (np.clip(gap, least, most) - gap)
+    return np.minimum(gap, _most_beside_tucks(gap, tuck, time_s))
+
+
+def _most_beside_tucks(gap: Curve, tuck: Curve, time_s: Curve) -> Curve:
+    """Return the largest gap from which the lip can reach every tucked frame at ``LIP_SPEED`` [shape=(T,)]."""
+    at_tucks = np.where(tuck > 0.5, gap, np.inf)
+    after = np.minimum.accumulate(at_tucks - LIP_SPEED * time_s) + LIP_SPEED * time_s
+    before = np.minimum.accumulate((at_tucks + LIP_SPEED * time_s)[::-1])[::-1] - LIP_SPEED * time_s
+    return np.minimum(after, before)
+
+
+def _width(motion: Motion, rest: NDArray[np.bool_], said: dict[str, Curve], oval: Curve) -> Curve:
+    if "width" in motion.names:
+        change = against_rest("width", motion["width"].astype(np.float64), rest) - 1
+    else:
+        change = -0.25 * np.clip(motion["opening"].astype(np.float64), 0, 0.4)
+    width = 1 + WIDTH_REACH * np.tanh(change / WIDTH_REACH)
+    for weight, most in ((said["protrusion"], ROUND_WIDTH), (oval, OVAL_WIDTH)):
+        width = width + weight * (np.minimum(width, most) - width)
+    spread = said["spread"] * (1 - said["protrusion"])
+    return np.asarray(width + spread * (np.maximum(width, SPREAD_WIDTH) - width))
+
+
+def _fullness(motion: Motion, rest: NDArray[np.bool_]) -> Curve:
+    if "outer" not in motion.names:
+        return 1 - 0.4 * np.clip(motion["opening"].astype(np.float64), 0, 0.4)
+    thickness = (motion["outer"] - motion["opening"]).astype(np.float64)
+    return np.clip(against_rest("thickness of the lips (outer - opening)", thickness, rest), 0.75, 1.25)
+
+
+def _jaw(motion: Motion, rest: NDArray[np.bool_], gap: Curve) -> Curve:
+    """Return how far the chin drops: as tracked (point 152, y upwards), within limits that suit the gap."""
+    usual = jaw_drop(gap)
+    if "y_152" not in motion.names:
+        return np.asarray(usual)
+    chin = motion["y_152"].astype(np.float64)
+    return np.clip(np.median(chin[rest]) - chin, 0.7 * usual, 1.15 * usual + 0.01)

@@ -1,0 +1,127 @@
+"""Pauses: when the mouth rests between phrases, and motion that rests there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.articulation.contact import CLOSED_BELOW
+from lipmotion.articulation.rest import rest_frames
+from lipmotion.types import EYE_DISTANCE, Generation, Motion, Span, Timeline, Unit
+from lipmotion.units import LIP_CLOSING, is_silent
+
+Curve = NDArray[np.float64]
+
+REST, NATURAL = "rest", "natural"
+PAUSE_STYLES: Final = (REST, NATURAL)
+"""Lips close softly in pauses; or they do in pauses what the model learned, as people who breathe and hold a sound."""
+LEAST_PAUSE_S: Final = 0.25
+"""In shorter pauses the mouth goes on; silence at both ends of a line counts at any length."""
+CLOSING_S, OPENING_S = 0.2, 0.12
+"""Lips take so long to close after a phrase, and begin to part so long before the next one; less in short pauses."""
+BREATH, BREATH_S = 0.03, 0.04
+"""The lips are parted by this, in eye distances, for a breath, so long before a phrase that begins with open lips."""
+LEAST_BREATH_S: Final = 0.4
+"""Pauses in which a breath is taken last at least so long."""
+PINNED_S: Final = 0.15
+"""Within this time of a pin the motion stays as it is."""
+
+
+def pauses(units: Timeline[Unit]) -> list[tuple[float, float, bool, bool]]:
+    """Return the pauses in which the mouth rests: start and end in seconds, and whether speech is before and after."""
+    runs: list[list[float]] = []
+    for span in units:
+        if is_silent(span.label.phone):
+            if runs and abs(runs[-1][1] - span.start_s) < 1e-6:
+                runs[-1][1] = span.end_s
+            else:
+                runs.append([span.start_s, span.end_s])
+    first = min((span.start_s for span in units if not is_silent(span.label.phone)), default=np.inf)
+    last = max((span.end_s for span in units if not is_silent(span.label.phone)), default=-np.inf)
+    found = [(start_s, end_s, first < end_s - 1e-9, last > start_s + 1e-9) for start_s, end_s in runs]
+    return [each for each in found if each[1] - each[0] >= LEAST_PAUSE_S - 1e-9 or not (each[2] and each[3])]
+
+
+def pause_weight(units: Timeline[Unit], time_s: Curve) -> Curve:
+    """Return how far the mouth rests at each time, 0 to 1 [shape=(T,)]: 0 in speech and in short pauses.
+
+    It leaves 0 where a phrase ends and is 0 again where the next one begins.
+    """
+    weight = np.zeros(len(time_s))
+    for start_s, end_s, after_speech, before_speech in pauses(units):
+        longest_s = end_s - start_s
+        share = longest_s / (CLOSING_S + OPENING_S) if after_speech and before_speech else longest_s / CLOSING_S
+        share = min(share, 1.0)
+        inside = np.flatnonzero((time_s >= start_s - 1e-9) & (time_s <= end_s + 1e-9))
+        closed = np.ones(len(inside))
+        if after_speech:
+            closed = _risen((time_s[inside] - start_s) / max(share * CLOSING_S, 1e-9))
+        if before_speech:
+            closed = np.minimum(closed, _risen((end_s - time_s[inside]) / max(share * OPENING_S, 1e-9)))
+        weight[inside] = np.maximum(weight[inside], closed)
+    return weight
+
+
+def without_short_pauses(units: Timeline[Unit]) -> Timeline[Unit]:
+    """Return phones in time in which each pause that the mouth does not rest in is shared by the phones beside it."""
+    resting = pauses(units)
+    kept: list[Span[Unit]] = []
+    short_s = 0.0
+    for span in units:
+        inside = any(start_s - 1e-6 <= span.start_s and span.end_s <= end_s + 1e-6 for start_s, end_s, *_ in resting)
+        if is_silent(span.label.phone) and not inside:
+            short_s += span.duration_s
+        else:
+            if short_s and kept:
+                kept[-1] = replace(kept[-1], end_s=span.start_s - short_s / 2)
+            kept.append(replace(span, start_s=span.start_s - short_s / 2) if short_s and kept else span)
+            short_s = 0.0
+    return Timeline(tuple(kept))
+
+
+def with_pauses(generation: Generation, style: str, pinned_s: Sequence[float] = ()) -> Generation:
+    """Return generated motion whose mouth is in its rest pose in pauses, with closed lips.
+
+    style    : ``rest``; or ``natural``, which leaves the motion as it is
+    pinned_s : times of pins, around which the motion stays as it is
+    Before phrases after a longer pause the lips part for a breath. The motion may have any channels; without phones it
+    stays as it is.
+    """
+    motion, units = generation.motion, generation.units
+    if style == NATURAL or not pauses(units) or not len(motion.values):
+        return generation
+    time_s = motion.time_s
+    weight = pause_weight(units, time_s)
+    for pin_s in pinned_s:
+        weight *= np.clip(np.abs(time_s - pin_s) / PINNED_S - 1, 0, 1)
+    values = motion.values.astype(np.float64)
+    pose = np.median(values[rest_frames(motion, units)], axis=0)
+    if "opening" in motion.names:
+        pose[motion.column("opening")] = min(pose[motion.column("opening")], 0.5 * CLOSED_BELOW)
+    rested = values + weight[:, None] * (pose - values)
+    if "opening" in motion.names and motion.channels[motion.column("opening")].unit == EYE_DISTANCE:
+        column = motion.column("opening")
+        rested[:, column] = np.maximum(rested[:, column], _breaths(units, time_s) * (weight < 1))
+    return replace(generation, motion=Motion(rested.astype(motion.values.dtype), motion.rate_hz, motion.channels))
+
+
+def _breaths(units: Timeline[Unit], time_s: Curve) -> Curve:
+    """Return the least opening of lips that part for a breath, in eye distances [shape=(T,)]; 0 away from breaths."""
+    least = np.zeros(len(time_s))
+    spoken = [span for span in units if not is_silent(span.label.phone)]
+    for start_s, end_s, _, before_speech in pauses(units):
+        following = next((span.label.phone for span in spoken if span.start_s >= end_s - 1e-6), "")
+        if before_speech and end_s - start_s >= LEAST_BREATH_S and following not in LIP_CLOSING:
+            near = np.clip(1 - np.abs(time_s - end_s + BREATH_S) / (OPENING_S - BREATH_S), 0, 1)
+            least = np.maximum(least, BREATH * near * near * (3 - 2 * near))
+    return least
+
+
+def _risen(share: Curve) -> Curve:
+    """Return a smooth step from 0 at 0 to 1 at 1."""
+    clipped = np.clip(share, 0, 1)
+    return np.asarray(clipped * clipped * (3 - 2 * clipped))

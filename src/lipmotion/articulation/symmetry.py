@@ -1,0 +1,26 @@
+"""Motion with the left and the right of the mouth alike."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lipmotion.articulation.lip_points import mouth_template
+from lipmotion.types import Motion
+
+
+def symmetrical(motion: Motion, asymmetry: float = 0.0) -> Motion:
+    """Return motion whose lip and jaw points move alike on both sides; distances and weights stay as they are.
+
+    asymmetry : 0 to 1: the share that is left of the difference between the sides of the speaker's own mouth
+    Points are in the head frame: x to the speaker's left, 0 between the eyes.
+    """
+    template, names = mouth_template(), {*motion.names}
+    if asymmetry >= 1 or not names.issuperset(f"{axis}_{point}" for point in template.points for axis in "xyz"):
+        return motion
+    values = motion.values.astype(np.float64)
+    for axis, sign in (("x", -1.0), ("y", 1.0), ("z", 1.0)):
+        columns = [motion.column(f"{axis}_{point}") for point in template.points]
+        own = values[:, columns]
+        both = (own + sign * own[:, template.mirrored]) / 2
+        values[:, columns] = both + asymmetry * (own - both)
+    return Motion(values.astype(motion.values.dtype), motion.rate_hz, motion.channels)
