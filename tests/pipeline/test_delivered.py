@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.articulation.delivery import Delivery, closed_frames
+from lipmotion.articulation.contact import closures
+from lipmotion.articulation.delivery import Delivery
 from lipmotion.errors import InputError
 from lipmotion.export.base import read_motion
 from lipmotion.faces import Face, Staging
@@ -92,7 +93,7 @@ def test_closures_between_two_frames_of_a_slow_file_are_kept(
     generation: Generation, rate_hz: float, tmp_path: Path
 ) -> None:
     narrow = generation.motion.values.copy()
-    column, closed = generation.motion.column("opening"), closed_frames(generation)
+    column, closed = generation.motion.column("opening"), closures(generation.motion, generation.units)
     narrow[50:100, column] = 0.1
     narrow[closed, column] = 0.0
     spiky = replace(generation, motion=replace(generation.motion, values=narrow))

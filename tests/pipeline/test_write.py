@@ -11,9 +11,9 @@ from typing import Any
 import av
 import numpy as np
 import pytest
-from lipmotion.motion.gestures import GESTURES
 
 from lipmotion.articulation.delivery import closed_on_grid
+from lipmotion.articulation.phone_targets import GESTURES
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import read_motion
 from lipmotion.faces import Staging

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.rig.gestures import FADE_S, phone_weights
+from lipmotion.articulation.crossfade import FADE_S, phone_weights
 from lipmotion.rig.shape_names import VISEMES_15
 from lipmotion.rig.visemes import VISEME_OF_PHONE, viseme_motion
 from lipmotion.types import Span, Timeline, Unit

@@ -136,11 +136,14 @@ def in_pictures(rows: Curve, contact: Mask, rate_hz: float, time_s: Curve) -> Cu
     A picture in which the lips touch shows the nearest frame in which they do. The others lie between frames, or, where
     the lips touch in one of these, show the other one.
     """
-    values = between_frames(rows.reshape(len(rows), -1), rate_hz, time_s)
+    table = rows.reshape(len(rows), -1)
+    values = between_frames(table, rate_hz, time_s)
     shown = shown_contact(contact, rate_hz, time_s)
     position = time_s * rate_hz
     low = np.clip(np.floor(position + 1e-6).astype(int), 0, len(rows) - 1)
-    high = np.minimum(low + (position - low > 1e-6), len(rows) - 1)
+    at_frame = position - low <= 1e-6
+    values[at_frame] = table[low[at_frame]]
+    high = np.where(at_frame, low, np.minimum(low + 1, len(rows) - 1))
     mixed = np.flatnonzero((contact[low] != shown) | (contact[high] != shown))
     for kind in (True, False):
         frames, chosen = np.flatnonzero(contact == kind), mixed[shown[mixed] == kind]
@@ -148,5 +151,5 @@ def in_pictures(rows: Curve, contact: Mask, rate_hz: float, time_s: Curve) -> Cu
             after = np.clip(np.searchsorted(frames, position[chosen]), 0, len(frames) - 1)
             before = np.maximum(after - 1, 0)
             nearer = np.abs(frames[before] - position[chosen]) <= np.abs(frames[after] - position[chosen])
-            values[chosen] = rows.reshape(len(rows), -1)[frames[np.where(nearer, before, after)]]
+            values[chosen] = table[frames[np.where(nearer, before, after)]]
     return values.reshape(len(time_s), *rows.shape[1:])

@@ -82,6 +82,8 @@ def liveliness(
     still, end_s = np.zeros(len(time_s)), float(time_s[-1]) if len(time_s) else 0.0
     spoken = phrases(units)
     accent = _accents(motion, prosody)
+    if len(units):
+        accent = accent * _talking(spoken, np.arange(len(accent)) / FRAME_RATE_HZ)
     turn = np.zeros((len(time_s), 3))
     if head:
         turn = _turn(time_s, accent, _talking(spoken, time_s), spoken, _generator(seed, 1))

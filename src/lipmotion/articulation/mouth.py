@@ -24,11 +24,11 @@ TUCKED_GAP = (0.04, 0.052)
 """Range of the gap while the lower lip is on the upper teeth, which are seen."""
 TONGUE_GAP = (0.055, 0.085)
 """Range of the gap while the tongue is between the teeth."""
-PURSED_GAP = (0.034, 0.05)
+PURSED_GAP = (0.034, 0.043)
 """Range of the gap of w: a small hole."""
 ROUND_GAP, TEETH_GAP = 0.05, 0.045
 """Least gap of protruded lips, and where both rows of teeth are seen."""
-ROUND_WIDTH, SPREAD_WIDTH, OVAL_WIDTH = 0.82, 1.06, 0.94
+ROUND_WIDTH, SPREAD_WIDTH, OVAL_WIDTH = 0.86, 1.06, 0.94
 """Protruded lips are at most so wide, spread ones at least, and those of an oval mouth at most, against rest."""
 OVAL_GAPS = (0.08, 0.18)
 """The gap at which an opening begins to be an oval, and at which it is one, where the phone asks for it."""

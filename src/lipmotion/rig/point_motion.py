@@ -23,7 +23,7 @@ from lipmotion.types import Motion, Timeline, Unit
 
 Array = NDArray[np.float64]
 
-FORWARD = 0.07
+FORWARD = 0.045
 """Protruded lips are at least so far in front of their rest pose, in eye distances."""
 
 

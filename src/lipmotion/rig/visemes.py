@@ -41,7 +41,7 @@ LAX = "E"
 """The viseme of parted lips in a pause."""
 MOST_CLOSED = 0.85
 """Largest sum of the visemes of closed lips where the lips are parted."""
-ALMOST, PARTED = (0.0, 0.03), (0.06, 0.16)
+ALMOST, PARTED = (0.0, 0.04), (0.06, 0.16)
 """Gaps between which the least, and the largest, sum of the visemes of closed lips falls to 0, in eye distances."""
 LITTLE = 1e-6
 

@@ -6,7 +6,7 @@ from lipmotion.faces.character.pose import CharacterPose
 from lipmotion.faces.character.shapes import POSES, SIDED_POSES, head_mesh
 from lipmotion.faces.character.skin import REST
 from lipmotion.faces.character.stage import camera_for, figure
-from lipmotion.faces.liveliness import turned
+from lipmotion.faces.turning import turned
 
 VIEWER = camera_for(640, 360).place
 OPEN = CharacterPose(gap=0.25, upper_rise=0.04, jaw=0.18)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from lipmotion.motion.gestures import GESTURES, TIP_OUT, gesture_curves, pause_curve, with_gestures
+from lipmotion.articulation.phone_targets import GESTURES, TIP_OUT, gesture_curves, with_gestures
 from lipmotion.types import WEIGHT, Channel, Motion, Span, Timeline, Unit
 
 TIME_S = np.arange(0, 1.2, 0.01)
@@ -67,9 +67,3 @@ def test_channels_are_added_where_they_lack():
     assert more["tongue"] == pytest.approx(0.3)
     assert more["lip_tuck"].max() > 0.9
     assert with_gestures(more, said("f")) is more
-
-
-def test_short_pauses_are_none():
-    units = Timeline((Span(0.0, 0.3, Unit("aa")), Span(0.3, 0.34, Unit("sp")), Span(0.34, 0.8, Unit("aa"))))
-    assert not pause_curve(units, TIME_S).any()
-    assert pause_curve(said("aa", "sp", "aa"), TIME_S).max() == pytest.approx(1)

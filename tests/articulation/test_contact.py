@@ -1,0 +1,126 @@
+"""Contact: when lips touch, for how long, and in which pictures."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lipmotion.articulation.contact import (
+    CLOSED_BELOW,
+    GAP,
+    LEAST_CONTACT_S,
+    LEAST_GAP,
+    MEANT,
+    WIDEST,
+    closed_lips,
+    closures,
+    gap_in,
+    gap_of,
+    in_pictures,
+    opening_of,
+    shown_contact,
+)
+from lipmotion.types import Channel, Motion, Span, Timeline, Unit
+
+RATES = (24.0, 25.0, 29.97, 30.0, 60.0, 100.0)
+
+
+def motion(opening: np.ndarray, rate_hz: float = 100.0, name: str = "opening") -> Motion:
+    return Motion(np.asarray(opening, float)[:, None], rate_hz, (Channel(name),))
+
+
+def said(*spans: tuple[float, float, str]) -> Timeline[Unit]:
+    return Timeline(tuple(Span(start, end, Unit(phone)) for start, end, phone in spans))
+
+
+def runs(mask: np.ndarray) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
+    return [(int(first), int(stop)) for first, stop in edges.reshape(-1, 2)]
+
+
+def test_the_gap_is_0_where_trackers_see_closed_lips_and_grows_with_the_opening():
+    assert not gap_of(np.array([-0.01, 0, 0.005, CLOSED_BELOW])).any()
+    gap = gap_of(np.linspace(0, 1, 1001))
+    assert (np.diff(gap) >= 0).all()
+    assert np.diff(gap).max() < 0.004
+    assert gap[-1] <= WIDEST
+    people = np.array([0.05, 0.1, 0.25])
+    assert gap_of(people) == pytest.approx(people + 0.01, abs=1e-3)
+
+
+def test_an_opening_has_the_gap_that_it_was_made_of():
+    gap = np.array([0.0, LEAST_GAP, 0.02, 0.1, 0.25, 0.4])
+    assert gap_of(opening_of(gap)) == pytest.approx(gap, abs=1e-3)
+    assert gap_of(opening_of(np.zeros(1)))[0] == 0
+
+
+def test_motion_with_a_gap_of_its_own_has_that_gap():
+    both = Motion(np.array([[0.3, 0.1], [0.3, -0.1]]), 100.0, (Channel("opening"), Channel(GAP)))
+    assert gap_in(both) == pytest.approx([0.1, 0.0])
+
+
+def test_lips_touch_once_in_every_p_b_and_m_for_longer_than_a_picture():
+    for phone in ("p", "b", "m", "em"):
+        for start_s in (0.2, 0.213, 0.227):
+            for length_s in (0.02, 0.08, 0.15):
+                dip = 0.1 - 0.06 * np.exp(-(((np.arange(101) / 100 - start_s - length_s / 2) / 0.04) ** 2))
+                units = said((0, start_s, "aa"), (start_s, start_s + length_s, phone), (start_s + length_s, 1, "aa"))
+                gap = closed_lips(gap_of(dip), motion(dip), units)
+                [(first, stop)] = runs(gap == 0)
+                assert LEAST_CONTACT_S - 0.011 <= (stop - first) / 100 <= LEAST_CONTACT_S + 0.021
+                assert start_s - 0.04 < (first + stop - 1) / 200 < start_s + length_s + 0.04
+                assert gap[gap > 0].min() >= LEAST_GAP
+                assert np.abs(np.diff(gap)).max() < 0.04
+                for fps in RATES:
+                    assert shown_contact(gap == 0, 100.0, np.arange(int(fps)) / fps).any()
+
+
+def test_a_contact_that_the_motion_has_is_neither_longer_nor_shorter():
+    opening = np.full(101, 0.1)
+    opening[40:55] = 0.005
+    assert runs(closed_lips(gap_of(opening), motion(opening), said((0.35, 0.6, "m"))) == 0) == [(40, 55)]
+
+
+def test_lips_that_are_wide_open_in_all_of_a_p_are_meant_so():
+    opening = np.full(101, MEANT + 0.05)
+    assert not (closed_lips(gap_of(opening), motion(opening), said((0.3, 0.5, "p"))) == 0).any()
+
+
+def test_closing_twice_changes_nothing():
+    dip = np.full(101, 0.08)
+    units = said((0.3, 0.4, "b"), (0.7, 0.75, "m"))
+    for rate_hz in (25.0, 100.0):
+        once = closed_lips(gap_of(dip), motion(dip, rate_hz), units)
+        again = Motion(np.stack([opening_of(once), once], axis=1), rate_hz, (Channel("opening"), Channel(GAP)))
+        assert closed_lips(gap_in(again), again, units) == pytest.approx(once, abs=1e-12)
+
+
+def test_closures_are_the_least_open_frames():
+    opening = np.full(101, 0.1)
+    opening[33], opening[52:57] = 0.02, 0.0
+    units = said((0.3, 0.4, "p"), (0.5, 0.6, "m"), (0.6, 0.7, "f"))
+    assert closures(motion(opening), units) == [33, 54]
+    assert closures(motion(opening, name="width"), units) == []
+    assert closures(motion(opening[::4], 25.0), said((0.405, 0.41, "p"))) == [10]
+
+
+def test_pictures_show_every_contact_and_no_other():
+    draw = np.random.default_rng(4)
+    for _ in range(20):
+        gap = np.where(np.repeat(draw.random(20) < 0.3, 6), 0.0, draw.uniform(LEAST_GAP, 0.2, 120))
+        gap[50:53] = 0.1, 0.0, 0.1  # a contact of one frame
+        for fps in RATES:
+            time_s = np.arange(int(1.19 * fps) + 1) / fps
+            shown, values = shown_contact(gap == 0, 100.0, time_s), in_pictures(gap, gap == 0, 100.0, time_s)
+            assert np.array_equal(values == 0, shown)
+            assert values[values > 0].min() >= LEAST_GAP
+            for first, stop in runs(gap == 0):
+                near = (time_s > (first - 1) / 100 - 0.5 / fps) & (time_s < stop / 100 + 0.5 / fps)
+                assert shown[near].any()
+    assert in_pictures(gap, gap == 0, 100.0, np.arange(120) / 100) == pytest.approx(gap)
+
+
+def test_pictures_of_no_contact_and_of_nothing_but_contact():
+    rows = np.arange(10.0)
+    for contact in (np.zeros(10, bool), np.ones(10, bool)):
+        assert in_pictures(rows, contact, 100.0, np.array([0.0, 0.04, 0.08])) == pytest.approx([0, 4, 8])

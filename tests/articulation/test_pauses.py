@@ -1,0 +1,91 @@
+"""Pauses: the mouth rests in them, softly, and starts no earlier than a breath before the next phrase."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lipmotion.articulation.contact import CLOSED_BELOW
+from lipmotion.articulation.mouth import spoken_mouth
+from lipmotion.articulation.pauses import (
+    BREATH,
+    NATURAL,
+    OPENING_S,
+    REST,
+    pause_weight,
+    with_pauses,
+    without_short_pauses,
+)
+from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
+
+TIME_S = np.arange(301) / 100
+
+
+def said(*spans: tuple[float, float, str]) -> Timeline[Unit]:
+    return Timeline(tuple(Span(start, end, Unit(phone)) for start, end, phone in spans))
+
+
+def generation(units: Timeline[Unit], opening: float = 0.1) -> Generation:
+    values = np.column_stack([np.full(301, opening), np.where(TIME_S < 0.3, 0.5, 0.55)])
+    motion = Motion(values, 100.0, (Channel("opening"), Channel("width")))
+    return Generation(motion, np.zeros_like(values), units, StateTrace(("",), np.zeros(301, np.intp)))
+
+
+LINE = said((0, 0.4, "sil"), (0.4, 1.0, "aa"), (1.0, 1.5, "sp"), (1.5, 2.0, "aa"), (2.0, 2.15, "sp"), (2.15, 2.9, "eh"),
+            (2.9, 3.0, "sil"))  # fmt: skip
+
+
+def test_the_mouth_rests_in_pauses_and_at_both_ends_and_goes_on_in_short_ones():
+    weight = pause_weight(LINE, TIME_S)
+    assert weight[:25] == pytest.approx(1)
+    assert weight[122:136] == pytest.approx(1)
+    assert weight[300] == pytest.approx(1)
+    assert not weight[40:100].any()
+    assert not weight[150:290].any()
+    assert np.abs(np.diff(weight)).max() < 0.2
+
+
+def test_nothing_moves_earlier_than_the_opening_time_before_a_phrase():
+    moved = with_pauses(generation(LINE), REST)
+    opening = moved.motion["opening"]
+    for start_s in (0.4, 1.5):
+        before = opening[round((start_s - 0.2) * 100) : round((start_s - OPENING_S) * 100)]
+        assert np.ptp(before) < 1e-9
+        assert before.max() <= CLOSED_BELOW
+        assert opening[round(start_s * 100) - 4] >= BREATH - 1e-9
+    assert opening[60] == pytest.approx(0.1)
+    mouth = spoken_mouth(moved.motion, LINE)
+    assert mouth.contact[[0, 20, 125, 135, 300]].all()
+    assert not mouth.contact[200:289].any()
+
+
+def test_a_phrase_that_begins_with_closed_lips_takes_no_breath():
+    units = said((0, 1, "sil"), (1, 1.2, "m"), (1.2, 2.5, "aa"), (2.5, 3.0, "sil"))
+    moved = with_pauses(generation(units, 0.01), REST)
+    assert moved.motion["opening"][80:110].max() <= 0.0101
+
+
+def test_natural_pauses_and_motion_without_pauses_stay_as_they_are():
+    assert with_pauses(generation(LINE), NATURAL).motion is not None
+    for units, style in ((LINE, NATURAL), (said((0, 3, "aa")), REST), (Timeline(()), REST)):
+        given = generation(units)
+        assert with_pauses(given, style) is given
+
+
+def test_a_pin_in_a_pause_holds():
+    moved = with_pauses(generation(LINE), REST, [1.25])
+    assert moved.motion["opening"][125] == pytest.approx(0.1)
+    assert moved.motion["opening"][20] <= CLOSED_BELOW
+
+
+def test_all_silence_is_rest():
+    moved = with_pauses(generation(said((0, 3, "sil"))), REST)
+    assert moved.motion["opening"].max() <= CLOSED_BELOW
+
+
+def test_short_pauses_are_shared_by_the_phones_beside_them():
+    shared = without_short_pauses(LINE)
+    assert [span.label.phone for span in shared] == ["sil", "aa", "sp", "aa", "eh", "sil"]
+    assert shared[3].end_s == pytest.approx(2.075)
+    assert shared[4].start_s == pytest.approx(2.075)
+    assert shared[2] == LINE[2]
