@@ -3,10 +3,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from lipmotion.articulation.contact import WIDEST
+from lipmotion.articulation.mouth import TUCKED_GAP, jaw_drop
 from lipmotion.faces.portrait.cartoon import CARTOON
 from lipmotion.faces.portrait.geometry import TEETH_EDGE, lip_outlines, mouth_interior
 from lipmotion.faces.portrait.man import MAN
-from lipmotion.faces.portrait.pose import TUCKED_GAP, WIDEST, MouthPose, jaw_drop
+from lipmotion.faces.portrait.pose import MouthPose
 from lipmotion.faces.portrait.woman import WOMAN
 
 X = np.linspace(-0.5, 0.5, 1001)

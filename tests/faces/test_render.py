@@ -67,7 +67,7 @@ def test_the_chin_drops_in_one_piece():
 
     closed, wide = frames(opening(0, 0.2), size=640, **STILL)
     assert chin_y(closed) == pytest.approx(1.39, abs=0.03)
-    assert 0.15 < chin_y(wide) - chin_y(closed) < 0.32
+    assert 0.12 < chin_y(wide) - chin_y(closed) < 0.3
 
 
 def test_f_shows_teeth_where_closed_lips_show_none():
@@ -135,7 +135,6 @@ def test_a_transparent_background_shows_through_around_the_figure_only(face):
 def test_unusable_settings_are_refused():
     unusable: dict[str, tuple[Any, ...]] = {
         "size": (62, 129, 5000),
-        "intensity": (-1.0, 9.0),
         "background": ("blue", "#12345"),
     }
     for name, values in unusable.items():

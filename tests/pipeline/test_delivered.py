@@ -11,14 +11,13 @@ import pytest
 
 from lipmotion.articulation.contact import closures
 from lipmotion.articulation.delivery import Delivery
-from lipmotion.errors import InputError
 from lipmotion.export.base import read_motion
 from lipmotion.faces import Face, Staging
 from lipmotion.faces.mesh import MeshFace
 from lipmotion.faces.registry import face_named
-from lipmotion.pipeline.animate import check_outputs, write
+from lipmotion.pipeline.animate import write
 from lipmotion.pipeline.characters import with_curves
-from lipmotion.pipeline.delivered import delivered_scene, held_mouth, moved_prosody, shown, staged_intensity
+from lipmotion.pipeline.delivered import delivered, delivered_scene, held_mouth, moved_prosody, shown
 from lipmotion.rig.driven import driven_character
 from lipmotion.rig.gltf_writer import write_glb
 from lipmotion.types import Generation, Prosody, StateTrace
@@ -53,10 +52,22 @@ def test_weights_beside_an_opening_are_enlarged_for_the_mesh_that_has_them(
     character = driven_character(tmp_path / "head.glb")
     face, larger = MeshFace(character), Delivery(intensity=2)
     both = with_curves(generation, "arkit")[0]
-    assert staged_intensity(Staging(), larger, face, both, character) == Staging()
     before, after = both.motion["jawOpen"], shown(both, larger, face, 25.0, character).motion["jawOpen"]
     assert after.max() > 1.3 * before.max()
-    assert staged_intensity(Staging(), larger, face, generation, character).intensity == pytest.approx(2)
+    for kind in (face, face_named("woman")):
+        plain, doubled = (shown(generation, each, kind, 25.0).motion["opening"] for each in (Delivery(), larger))
+        assert doubled.max() > 1.5 * plain.max()
+
+
+def test_both_sides_of_characters_move_alike_unless_asked_otherwise(generation: Generation) -> None:
+    values = generation.motion.values.copy()
+    values[:, generation.motion.column("y_61")] += 0.02
+    lopsided = replace(generation, motion=replace(generation.motion, values=values))
+    for asymmetry, left in ((0.0, 0.0), (0.5, 0.01), (1.0, 0.02)):
+        moved = delivered(lopsided, Delivery(asymmetry=asymmetry)).motion
+        assert moved["y_61"] - moved["y_291"] == pytest.approx(left, abs=1e-9)
+        assert moved["x_61"] + moved["x_291"] == pytest.approx(0.0, abs=1e-9)
+        assert moved["opening"] == pytest.approx(generation.motion["opening"])
 
 
 def test_brows_and_head_of_pictures_come_later_with_the_mouth(
@@ -115,10 +126,3 @@ def test_eyes_and_head_move_on_while_the_mouth_is_held(generation: Generation, t
     write(smooth, tmp_path / "a.livelink.csv", delivery=delivery, rate_hz=100)
     assert read_motion(tmp_path / "a.livelink.csv")[0]["headYaw"] == pytest.approx(smooth.motion["headYaw"], abs=1e-5)
     assert {"jawOpen", "opening"} <= set(steps.stepped)
-
-
-def test_intensities_that_are_too_large_together_are_found_before_the_work() -> None:
-    staging, delivery = Staging(intensity=2), Delivery(intensity=2)
-    with pytest.raises(InputError, match="staging and delivery, 2 and 2, are 4 together, required at most 3"):
-        check_outputs(["a.mp4"], "said.wav", staging=staging, delivery=delivery)
-    check_outputs(["a.json"], "said.wav", staging=staging, delivery=delivery)

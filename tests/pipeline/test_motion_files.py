@@ -12,16 +12,16 @@ import numpy as np
 import pytest
 
 from lipmotion.articulation.delivery import Delivery
+from lipmotion.articulation.liveliness import Liveliness
 from lipmotion.errors import ExportError
 from lipmotion.faces import Staging
-from lipmotion.faces.character.pose import CharacterPose
-from lipmotion.faces.character.shapes import EYE_ACROSS, EYE_UPWARDS
 from lipmotion.pipeline.animate import check_outputs, write
 from lipmotion.pipeline.characters import curves_of
-from lipmotion.pipeline.living_curves import HEAD, curves_of_poses, living_curves
+from lipmotion.pipeline.living_curves import HEAD, living_curves
 from lipmotion.pipeline.motion_files import in_format, needs_prosody
+from lipmotion.rig.eyes_and_brows import FULL_LOOK, eye_and_brow_weights
 from lipmotion.rig.shape_names import ARKIT_MOUTH
-from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace
+from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
 from rig.speech import motion, units
 
 TAKE = Path("a.livelink.csv")
@@ -63,7 +63,7 @@ def test_blendshapes_that_the_motion_has_are_kept(generation: Generation) -> Non
     names = ("head.jawOpen", "mouthSmile_L", "eyeBlink_L", "opening")
     values = np.random.default_rng(2).random((frames, 4))
     given = Motion(values, 100.0, tuple(Channel(name, WEIGHT) for name in names))
-    edited = replace(generation, motion=given, spread=np.zeros(values.shape))
+    edited = replace(generation, motion=given, spread=np.zeros(values.shape), units=Timeline(()))
     held = in_format(TAKE, edited, edited, 100.0).motion
     for column, name in enumerate(("jawOpen", "mouthSmileLeft", "eyeBlinkLeft")):
         assert held[name] == pytest.approx(values[:, column])
@@ -96,8 +96,8 @@ def test_what_moves_on_its_own_can_be_switched_off(generation: Generation) -> No
 
 
 def test_eyes_look_to_one_side_together(generation: Generation) -> None:
-    pose = CharacterPose(gaze=(0.5 * EYE_ACROSS, 0.25 * EYE_UPWARDS))
-    to_its_left = curves_of_poses([pose], 25.0)
+    gaze = np.array([[0.5 * FULL_LOOK, 0.25 * FULL_LOOK]])
+    to_its_left = eye_and_brow_weights(Liveliness(np.zeros(1), np.zeros(1), gaze, np.zeros((1, 3))))
     for name, weight in (("OutLeft", 0.5), ("InRight", 0.5), ("InLeft", 0), ("OutRight", 0), ("UpLeft", 0.25)):
         assert to_its_left[f"eyeLook{name}"] == pytest.approx(weight)
     moving = living_curves(generation.motion, generation.units)

@@ -65,7 +65,7 @@ def model(people: Corpus) -> Model:
 
 
 def request(sentence: ToySentence, speaker: str = "") -> SpeechRequest:
-    return SpeechRequest(sentence.audio, units=sentence.units, speaker=speaker)
+    return SpeechRequest(sentence.audio, units=sentence.units, speaker=speaker, pauses="natural")
 
 
 def opening(model: Model, sentence: ToySentence, speaker: str = "") -> np.ndarray:

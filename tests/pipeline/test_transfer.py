@@ -63,7 +63,7 @@ def two_model(of_two: Corpus) -> Model:
 
 
 def request(sentence: ToySentence, onto: Onto | None = None, **more: str) -> SpeechRequest:
-    return SpeechRequest(sentence.audio, units=sentence.units, onto=onto, **more)
+    return SpeechRequest(sentence.audio, units=sentence.units, onto=onto, pauses="natural", **more)
 
 
 def is_like_ben(model: Model, sentence: ToySentence, onto: Onto, **more: str) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from lipmotion.errors import InputError
 from lipmotion.rig.binding_files import save_binding, write_weights
-from lipmotion.rig.driven import at_times, driven_character
+from lipmotion.rig.driven import driven_character
 from lipmotion.rig.gltf_writer import write_glb
 from lipmotion.rig.obj_files import write_obj
 from rig.heads import head, lip_points
@@ -87,13 +87,3 @@ def test_control_points_have_no_weights(files):
     character = driven_character(files / "head.glb", by_points=True)
     with pytest.raises(InputError, match="moved by control points"):
         character.weights(motion(), units())
-
-
-def test_a_closure_between_two_pictures_is_shown():
-    gap = np.array([0.1, 0.1, 0.0, 0.1, 0.1, 0.1])
-    rows = np.stack([gap, np.arange(6.0)], axis=1)
-    shown = at_times(rows, gap, 100.0, np.array([0.0, 0.03]))
-    np.testing.assert_allclose(shown, [[0.1, 0], [0.0, 2]])
-    gap[[2, 4]], rows[:, 0] = 0.0, gap
-    np.testing.assert_allclose(at_times(rows, gap, 100.0, np.array([0.0, 0.024]))[1], [0.0, 2])  # of two the nearest
-    np.testing.assert_allclose(at_times(rows, gap, 100.0, np.array([0.0, 0.036]))[1], [0.0, 4])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from lipmotion.articulation.contact import gap_of
 from lipmotion.rig.facial_animation import MOUTH_TO_NOSE, STEPS, fap_motion
 from rig.speech import motion, units
 
@@ -33,7 +34,7 @@ def test_the_directions_are_those_of_the_standard(parameters):
 
 def test_a_gap_is_its_share_of_the_unit(parameters):
     apart = -(parameters["fap4_lower_t_midlip"][75] + parameters["fap5_raise_b_midlip"][75])
-    assert apart / STEPS * MOUTH_TO_NOSE == pytest.approx(0.2, abs=0.002)
+    assert apart / STEPS * MOUTH_TO_NOSE == pytest.approx(float(gap_of(motion()["opening"][75:76])[0]), abs=0.002)
 
 
 def test_values_are_whole(parameters):

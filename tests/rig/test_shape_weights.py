@@ -43,7 +43,7 @@ def test_weights_are_between_0_and_1_and_smooth(weights):
 
 def test_the_gap_is_that_of_the_motion(weights, shapes):
     gap = weights.values @ shapes.gap
-    wanted = point_motion(motion(), units()).gap
+    wanted = point_motion(motion(), units()).mouth.gap
     phone = np.array([name for name, start, end in _phones() for _ in range(round(100 * (end - start)))] + ["sil"])
     free = ~np.isin(phone, ["p", "m"])
     assert np.abs(gap - wanted)[free].max() < 0.012

@@ -40,7 +40,7 @@ from lipmotion.pipeline.drawn_video import (
 )
 from lipmotion.pipeline.film.video import FILM, FilmOptions, check_film, film_of, write_film
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.motion_files import check_length, in_format, needs_prosody, warn_of_unused
+from lipmotion.pipeline.motion_files import check_length, in_format, needs_prosody, resampled_curves, warn_of_unused
 from lipmotion.pipeline.outlook import outlook_of
 from lipmotion.pipeline.request import SpeechInput, SpeechRequest, request_of
 from lipmotion.pipeline.scenes import SCENE_SUFFIXES, check_sound_name, is_scene, sound_reference, write_scene
@@ -341,7 +341,7 @@ def _motion_files(
         asked = asked if named or isinstance(curves, DrivenCharacter) else names
         channels = names if channels is None else channels
     chosen = spoken.selected(channels) if channels is not None else spoken
-    chosen = chosen if rate_hz is None else chosen.resampled(rate_hz)
+    chosen = chosen if rate_hz is None else resampled_curves(chosen, spoken, rate_hz)
     written = {path: in_format(path, spoken, chosen, rate_hz, staging, prosody, named) for path in files}
     for path, each in written.items():
         warn_of_unused(path, each, asked)

@@ -65,9 +65,16 @@ def in_format(
     hertz = rate_hz or form.rate_hz
     if hertz is None or abs(hertz - held.motion.rate_hz) < SAME_HZ:
         return held
-    resampled = held.resampled(hertz)
-    shown = with_mouth(generation.motion)
-    if held is chosen or held is generation or OPENING not in shown.names:
+    return resampled_curves(held, generation, hertz)
+
+
+def resampled_curves(held: Generation, generation: Generation, rate_hz: float) -> Generation:
+    """Return curves at another rate, in whose frames the lips touch as in pictures of the motion at that rate.
+
+    held       : the curves;  generation : the motion that they are of, with as many frames
+    """
+    resampled, shown = held.resampled(rate_hz), with_mouth(generation.motion)
+    if OPENING not in shown.names or len(held.motion.values) != len(shown.values):
         return resampled
     contact = spoken_mouth(shown, generation.units).contact
     rows = in_pictures(held.motion.values.astype(np.float64), contact, held.motion.rate_hz, resampled.motion.time_s)
@@ -113,12 +120,26 @@ def _curves(generation: Generation, name: str, staging: Staging | None, prosody:
     own = _held_already(motion, name)
     if own is None:
         return curves_of(motion, units, name, staging=staging, prosody=prosody)
+    if name in (ARKIT, WHOLE_FACE):
+        own = _closed(own, curves_of(motion, units, ARKIT))
     if name != WHOLE_FACE:
         return own
     living = living_curves(with_mouth(motion), units, staging, prosody)
     added = [column for column, name in enumerate(living.names) if name not in own.names]
     channels = tuple(living.channels[column] for column in added)
     return beside(own, Motion(living.values[:, added], motion.rate_hz, channels))
+
+
+def _closed(own: Motion, mouth: Motion) -> Motion:
+    """Return blendshapes with those of the mouth as another motion has them, and those that this one has in addition.
+
+    mouth : the same weights, but where lips close that would not (``shape_weights``)
+    """
+    curves = {name: own[name] for name in own.names}
+    curves |= {name: mouth[name] for name in mouth.names if name in curves or mouth[name].any()}
+    channels = {channel.name: channel for channel in (*mouth.channels, *own.channels)}
+    values = np.stack([curve.astype(np.float64) for curve in curves.values()], axis=1)
+    return Motion(values, own.rate_hz, tuple(channels[name] for name in curves))
 
 
 def _held_already(motion: Motion, curves: str) -> Motion | None:

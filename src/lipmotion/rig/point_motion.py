@@ -7,14 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.lip_points import (
-    CHIN,
-    LEFT_CORNER,
-    LOWER_MIDDLE,
-    RIGHT_CORNER,
-    UPPER_MIDDLE,
-    mouth_template,
-)
+from lipmotion.articulation.lip_points import CHIN, FACING, LEFT_CORNER, RIGHT_CORNER, mouth_template
 from lipmotion.articulation.mouth import SpokenMouth, spoken_mouth, upper_share
 from lipmotion.articulation.rest import rest_frames
 from lipmotion.errors import InputError
@@ -25,6 +18,10 @@ Array = NDArray[np.float64]
 
 FORWARD = 0.045
 """Protruded lips are at least so far in front of their rest pose, in eye distances."""
+
+
+KNOWN_GAP = 0.02
+"""From this distance of the measured points on, the opening has the shape that they show, in eye distances."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,14 +74,34 @@ def _as_spoken(displacements: Array, mouth: SpokenMouth) -> Array:
     moved[:, lips, 0] += np.outer(wider / 2, across[lips])
     forward = np.maximum(FORWARD * mouth.protrusion - moved[:, lips, 2].mean(axis=1), 0) * mouth.protrusion
     moved[:, lips, 2] += forward[:, None]
-    upper, lower = (np.flatnonzero(side & template.inner) for side in (template.upper, template.lower))
-    middle = (template.row(UPPER_MIDDLE), template.row(LOWER_MIDDLE))
-    correction = mouth.gap - (moved[:, middle[0], 1] - moved[:, middle[1], 1])
-    beside = 1 - np.abs(across)
-    moved[:, upper, 1] += np.outer(correction / 2, beside[upper])
-    moved[:, lower, 1] -= np.outer(correction / 2, beside[lower])
-    moved[:, middle[0], 1] += correction / 2 * (1 - beside[middle[0]])
-    moved[:, middle[1], 1] -= correction / 2 * (1 - beside[middle[1]])
+    moved[:, :, 1] += _parting(moved[:, :, 1], across, mouth.gap)
+    return moved
+
+
+def _parting(heights: Array, across: Array, gap: Array) -> Array:
+    """Return how the points of the inner lips move up or down for a gap between their middles [shape=(T, 52)].
+
+    heights : displacements of all points [shape=(T, 52)];  across : where they are, -1 to 1 [shape=(52,)]
+    The opening keeps its shape from corner to corner; where there is none, it is half an ellipse.
+    """
+    template = mouth_template()
+    pairs = np.array([(template.row(upper), template.row(lower)) for upper, lower in FACING])
+    pairs = pairs[np.argsort(across[pairs[:, 0]], kind="stable")]
+    places, half = across[pairs[:, 0]], len(pairs) // 2
+    own = heights[:, pairs[:, 0]] - heights[:, pairs[:, 1]]
+    middle = own[:, [half]]
+    known = np.clip(middle / KNOWN_GAP, 0, 1)
+    shape = known * own / np.maximum(middle, KNOWN_GAP / 10) + (1 - known) * np.sqrt(1 - places**2)
+    lacking = np.clip(shape, 0, 1.2) * gap[:, None] - own
+    lacking[:, half] = gap - middle[:, 0]
+    lacking, places = np.pad(lacking, ((0, 0), (1, 1))), np.concatenate([[-1.0], places, [1.0]])
+    inner = np.flatnonzero(template.inner & (template.upper | template.lower))
+    right = np.clip(np.searchsorted(places, across[inner]), 1, len(places) - 1)
+    share = (across[inner] - places[right - 1]) / (places[right] - places[right - 1])
+    parted = (lacking[:, right - 1] * (1 - share) + lacking[:, right] * share) / 2
+    moved = np.zeros_like(heights)
+    moved[:, inner] = np.where(template.upper[inner], parted, -parted)
+    moved[:, pairs[:, 0]], moved[:, pairs[:, 1]] = lacking[:, 1:-1] / 2, -lacking[:, 1:-1] / 2
     return moved
 
 

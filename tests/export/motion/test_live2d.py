@@ -84,9 +84,9 @@ def test_held_poses_change_at_once(tmp_path, talking):
 def test_the_mouth_rests_opens_and_is_wide(talking):
     opened, form = mouth_open(talking), mouth_form(talking)
     assert opened[:100].max() < 1e-9
-    assert 0.7 < opened.max() < 0.9
+    assert 0.75 < opened.max() < 0.95
     assert np.abs(form[:100]).max() < 1e-9
-    assert form.max() == pytest.approx(1.0, abs=0.01)
+    assert form.max() > 0.9
     assert -0.7 < form.min() < -0.6
 
 

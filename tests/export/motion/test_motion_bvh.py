@@ -14,7 +14,7 @@ from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import ExportError
 from lipmotion.export import write_motion
 from lipmotion.export.motion.motion_bvh import CENTIMETRES
-from lipmotion.rig.point_motion import closed_displacements, point_motion
+from lipmotion.rig.point_motion import point_motion
 from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 
 FRAMES = 60
@@ -53,7 +53,7 @@ def written(talking: Generation, tmp_path: Path) -> Path:
 
 def expected(talking: Generation) -> np.ndarray:
     """Return the places of the points in centimetres [shape=(T, 52, 3)]."""
-    moved = closed_displacements(point_motion(talking.motion, talking.units))
+    moved = point_motion(talking.motion, talking.units).displacements
     return (mouth_template().places + moved) * CENTIMETRES
 
 

@@ -3,7 +3,7 @@ import pytest
 
 from faces.character.motions import NOTHING_SAID, opening, said, steady
 from lipmotion.errors import InputError
-from lipmotion.faces.character.performance import drawn_gap, head_poses, upper_share
+from lipmotion.faces.character.performance import head_poses
 from lipmotion.types import Channel, Motion, Prosody
 from lipmotion.units import LIP_CLOSING
 
@@ -12,19 +12,6 @@ def middle(phone: str, value: float = 0.08, before: str = "ah", after: str = "ah
     """Return the pose in the middle of a phone."""
     phones = (before, phone, after)
     return head_poses(steady(phones, value), said(*phones), 25.0)[15]
-
-
-def test_lips_that_touch_are_drawn_closed_and_wider_openings_wider():
-    gap = drawn_gap(np.array([-0.01, 0.0, 0.012, 0.02, 0.03, 0.1, 0.2, 0.9]))
-    assert (gap[:3] == 0).all()
-    assert (np.diff(gap[2:7]) > 0).all()
-    assert gap[-1] == pytest.approx(0.4)
-
-
-def test_the_upper_lip_rises_less_than_the_gap():
-    gap = np.linspace(0.001, 0.4, 50)
-    assert (upper_share(gap) < gap).all()
-    assert upper_share(gap).max() < 0.06
 
 
 def test_p_b_and_m_are_closed_exactly_whatever_the_motion_is():
@@ -53,14 +40,6 @@ def test_each_sound_has_its_own_shape():
     assert oo.width < aa.width < ee.width
 
 
-def test_long_pauses_are_nearly_closed_and_short_ones_are_not():
-    quiet = head_poses(steady(("aa", "sil", "aa"), 0.1), said("aa", "sil", "aa"), 25.0)
-    assert quiet[14].gap < 0.035
-    phones = ("aa", "sp", "aa")
-    short = head_poses(steady(phones, 0.1, 0.1), said(*phones, duration_s=0.1), 25.0)
-    assert short[4].gap > 0.08
-
-
 def test_the_motion_alone_moves_the_corners():
     values = np.array([[0.05, width] for width in (0.57, 0.57, 0.57, 0.5, 0.5, 0.62, 0.62)])
     motion = Motion(values, 25.0, (Channel("opening"), Channel("width")))
@@ -84,15 +63,6 @@ def test_an_unusable_motion_is_refused():
         head_poses(Motion(np.zeros((3, 1)), 25.0, (Channel("width"),)), NOTHING_SAID, 25.0)
     with pytest.raises(InputError, match="frame rate"):
         head_poses(opening(0.0), NOTHING_SAID, 0.0)
-
-
-def test_intensity_makes_movements_larger_and_keeps_lips_closed():
-    motion, labels = steady(("aa", "m", "uw"), 0.1), said("aa", "m", "uw")
-    plain, large = (head_poses(motion, labels, 25.0, intensity=x) for x in (1.0, 2.0))
-    assert large[5].gap > 1.5 * plain[5].gap
-    assert min(pose.gap for pose in large[10:20]) == 0
-    assert large[25].roundness >= plain[25].roundness
-    assert max(pose.gap for pose in large) <= 0.45
 
 
 def test_articulatory_channels_of_the_motion_come_before_the_phones():

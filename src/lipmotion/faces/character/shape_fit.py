@@ -12,19 +12,17 @@ from lipmotion.faces.character.lips import COLUMNS, VISIBLE
 from lipmotion.faces.character.pose import CharacterPose
 from lipmotion.faces.character.skin import REST
 from lipmotion.rig.bounded_curves import CurveCosts, bounded_curves
+from lipmotion.rig.face_shapes import FaceShapes
 from lipmotion.rig.mesh import Mesh
+from lipmotion.rig.shape_weights import with_gap
 
 Real = NDArray[np.float64]
 
 FROM_POSE = {"tongueOut": "tongue_out", "tongueUp": "tongue_up", "mouthPressLeft": "press", "mouthPressRight": "press"}
 """Shapes whose weight is a number of the pose."""
 _NOT_OF_LIPS = ("eye", "brow", *FROM_POSE)
-_OPENING = ("mouthFunnel", "mouthRollLower", "mouthUpperUp", "mouthLowerDown")
-"""Shapes that part the lips, beside ``jawOpen``."""
 APART = 12.0
 """How much the distance between the lips counts against the places of their vertices."""
-HARDLY = 0.02
-"""Below this gap the shapes that part the lips fade out, in eye distances: at gap 0 the lips meet."""
 COSTS = CurveCosts(ridge=1e-3, smooth=2e-3)
 
 
@@ -32,7 +30,7 @@ def mouth_weights(figure: Figure, mesh: Mesh, poses: Sequence[CharacterPose]) ->
     """Return the weights of the shapes of lips, jaw and tongue in every pose, 0 to 1 [each shape=(T,)].
 
     mesh : of this figure, from ``head_mesh``
-    Where the gap of a pose is 0, the lips of the mesh meet as they do at rest.
+    The middles of the lips are apart by the gap of the pose.
     """
     names = [name for name in mesh.shape_names if not name.startswith(_NOT_OF_LIPS)]
     fixed = {name: np.array([getattr(pose, field) for pose in poses], float) for name, field in FROM_POSE.items()}
@@ -46,13 +44,21 @@ def mouth_weights(figure: Figure, mesh: Mesh, poses: Sequence[CharacterPose]) ->
     for name, curve in fixed.items():
         targets -= np.outer(curve, rows[name] @ spanned)
     weights = bounded_curves(triangle.T, targets, COSTS)
-    curves = dict(zip(names, weights.T, strict=True)) | fixed
-    parted = np.clip(np.array([pose.gap for pose in poses]) / HARDLY, 0, 1)
-    for name in names:
-        if name.startswith(_OPENING):
-            curves[name] = curves[name] * parted
-    curves["mouthClose"] = np.clip(curves["jawOpen"] - parted * (curves["jawOpen"] - curves["mouthClose"]), 0, 1)
-    return curves
+    jaw, close = names.index("jawOpen"), names.index("mouthClose")
+    weights[:, close] = np.minimum(weights[:, close], weights[:, jaw])
+    parting = np.array([lip_gap(figure, moved[mesh.shape_names.index(name)]) for name in names])
+    shapes = FaceShapes(tuple(names), tuple(names), np.zeros((len(names), 0, 3)), parting, "arkit")
+    weights = with_gap(weights, shapes, np.array([pose.gap for pose in poses]))
+    return dict(zip(names, weights.T, strict=True)) | fixed
+
+
+def lip_gap(figure: Figure, moved: Real) -> float:
+    """Return by how much displacements of the vertices part the middle of the lips, in eye distances."""
+    edge = figure.skin.lip_rows()[VISIBLE - 1]
+    half = COLUMNS // 2
+    upper, lower = edge[1:half], edge[:half:-1]
+    middle = len(upper) // 2
+    return float(moved[upper[middle], 1] - moved[lower[middle], 1])
 
 
 def _rows(figure: Figure, moved: Real) -> Real:

@@ -1,0 +1,216 @@
+"""Contact of the lips: the same in all faces, characters and curve sets, at all rates, for all kinds of motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from lipmotion.articulation.contact import LEAST_GAP
+from lipmotion.articulation.delivery import Delivery
+from lipmotion.articulation.lip_points import FACING
+from lipmotion.articulation.mouth import frame_times, spoken_mouth
+from lipmotion.faces.base import Staging
+from lipmotion.faces.character.performance import head_poses
+from lipmotion.faces.character.shape_fit import lip_gap
+from lipmotion.faces.character.shapes import head_mesh
+from lipmotion.faces.character.stage import figure
+from lipmotion.faces.portrait.frames import face_poses
+from lipmotion.pipeline.characters import ARKIT, WHOLE_FACE, curves_of
+from lipmotion.pipeline.delivered import delivered
+from lipmotion.pipeline.motion_files import in_format, resampled_curves
+from lipmotion.pipeline.scenes import character_scene, head_scene
+from lipmotion.rig.blendshape_motion import with_mouth
+from lipmotion.rig.driven import DrivenCharacter, driven_character
+from lipmotion.rig.facial_animation import FAP
+from lipmotion.rig.gltf_writer import write_glb
+from lipmotion.rig.mesh import Mesh
+from lipmotion.rig.obj_files import write_obj
+from lipmotion.rig.reference_mouth import arkit_mouth
+from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
+from rig.heads import head, lip_points
+from rig.speech import motion, units
+
+Mask = NDArray[np.bool_]
+Reader = Callable[[Generation, float], Mask]
+RATES = (24.0, 25.0, 30.0, 60.0, 100.0)
+TOUCHING = LEAST_GAP / 2
+
+
+def _generation(moved: Motion, said: Timeline[Unit]) -> Generation:
+    trace = StateTrace(("a",), np.zeros(len(moved.values), np.intp))
+    return Generation(moved, np.zeros(moved.values.shape), said, trace)
+
+
+def _sentence() -> Timeline[Unit]:
+    phones = "sil m ay f r eh n d sp w aa z b uw th p ey v b l em sil".split()
+    return Timeline(tuple(Span(0.11 * n, 0.11 * (n + 1), Unit(phone)) for n, phone in enumerate(phones)))
+
+
+def _wandering(rate_hz: float, seed: int) -> Motion:
+    """Motion that knows nothing of the phones: lips touch where they happen to."""
+    draw, count = np.random.default_rng(seed), int(2.42 * rate_hz)
+    knots = np.maximum(draw.normal(0.06, 0.06, 40), 0.0)
+    opening = np.interp(np.arange(count) / rate_hz, np.linspace(0, 2.42, 40), knots)
+    width = 0.57 + 0.03 * np.sin(np.arange(count) / rate_hz * 5)
+    return Motion(np.column_stack([opening, width]), rate_hz, (Channel("opening"), Channel("width")))
+
+
+def _captured() -> Motion:
+    """Weights of blendshapes at 60 Hz, as a capture has them: p, b and m are not wholly closed."""
+    time_s = np.arange(146) / 60
+    jaw = np.where((time_s > 1.0) & (time_s < 1.1), 0.0, 0.16 + 0.14 * np.sin(2 * np.pi * 2.3 * time_s))
+    curves = {"jawOpen": jaw, "mouthClose": 0.5 * jaw, "mouthFunnel": 0.1 * jaw, "mouthSmileLeft": 0.2 * (1 - jaw)}
+    return Motion(np.column_stack(list(curves.values())), 60.0, tuple(Channel(name, WEIGHT) for name in curves))
+
+
+def _edited() -> Motion:
+    """A generated motion with one vowel closed, and one m held further apart, by hand."""
+    moved = motion()
+    values = moved.values.copy()
+    values[70:78, 0], values[50:60, 0] = 0.0, 0.06
+    return replace(moved, values=values)
+
+
+KINDS: dict[str, Callable[[], Generation]] = {
+    "generated": lambda: _generation(motion(), units()),
+    "distances alone": lambda: _generation(motion(points=False), units()),
+    "edited by hand": lambda: _generation(_edited(), units()),
+    "imported at 25 Hz": lambda: _generation(_wandering(25.0, 1), _sentence()),
+    "imported at 100 Hz, no phones": lambda: _generation(_wandering(100.0, 2), Timeline(())),
+    "captured weights": lambda: _generation(_captured(), _sentence()),
+    "captured weights, no phones": lambda: _generation(_captured(), Timeline(())),
+}
+
+
+def _own_vowels() -> Mesh:
+    """A head with three blendshapes of its own."""
+    mesh = head()
+    names = {"jawOpen": "A", "mouthPucker": "O", "mouthStretchLeft": "E"}
+    kept = tuple(type(s)(names[s.name], s.rows, s.displacements) for s in mesh.shapes if s.name in names)
+    return Mesh(mesh.vertices, mesh.triangles, mesh.parts, kept)
+
+
+def _visemes() -> Mesh:
+    mesh = head()
+    names = {"jawOpen": "viseme_aa", "mouthPucker": "viseme_U", "mouthFunnel": "viseme_O", "mouthSmileLeft": "viseme_E"}
+    names |= {"mouthStretchLeft": "viseme_I", "mouthRollLower": "viseme_FF", "mouthPressLeft": "viseme_PP"}
+    names |= {"mouthLowerDownLeft": "viseme_DD", "mouthUpperUpLeft": "viseme_SS"}
+    kept = tuple(type(s)(names[s.name], s.rows, s.displacements) for s in mesh.shapes if s.name in names)
+    return Mesh(mesh.vertices, mesh.triangles, mesh.parts, kept)
+
+
+@pytest.fixture(scope="module")
+def characters(tmp_path_factory: pytest.TempPathFactory) -> dict[str, DrivenCharacter]:
+    folder = tmp_path_factory.mktemp("characters")
+    for name, mesh in (("arkit", head()), ("visemes", _visemes()), ("vowels", _own_vowels())):
+        write_glb(folder / f"{name}.glb", mesh)
+    plain = head(shapes=False)
+    write_obj(folder / "points.obj", plain)
+    rows = "".join(f"{point},{vertex}\n" for point, vertex in lip_points(plain).items())
+    (folder / "points.csv").write_text("point,vertex\n" + rows)
+    found = {name: driven_character(folder / f"{name}.glb") for name in ("arkit", "visemes")}
+    found["vowels"] = driven_character(folder / "vowels.glb", only=["A", "O", "E"])
+    found["points"] = driven_character(folder / "points.obj", points=folder / "points.csv")
+    return found
+
+
+def _mesh_gap(character: DrivenCharacter, vertices: NDArray[np.float64]) -> float:
+    placement, rest = character.placement, character.mesh.vertices
+    rows = [tuple(placement.vertices[placement.row(point)] for point in pair) for pair in FACING[:3]]
+    moved = [(vertices[up] - vertices[low] - rest[up] + rest[low]) @ placement.axes[:, 1] for up, low in rows]
+    return float(np.mean(moved)) / placement.scale
+
+
+def _of_character(character: DrivenCharacter) -> Reader:
+    def read(generation: Generation, fps: float) -> Mask:
+        moved = generation.motion
+        time_s = frame_times(len(moved.values), moved.rate_hz, fps)
+        gaps = [_mesh_gap(character, each) for each in character.vertices(moved, generation.units, time_s)]
+        return np.array(gaps) < TOUCHING
+
+    return read
+
+
+def _of_curves(name: str) -> Reader:
+    def read(generation: Generation, fps: float) -> Mask:
+        curves = curves_of(generation.motion, generation.units, name)
+        return _closed(_sampled(generation, curves, fps))
+
+    return read
+
+
+def _of_take(generation: Generation, fps: float) -> Mask:
+    return _closed(in_format(Path("a.livelink.csv"), generation, generation, fps).motion)
+
+
+def _of_scene(character: DrivenCharacter) -> Reader:
+    assert character.shapes is not None
+    gap = dict(zip(character.shapes.names, character.shapes.gap.tolist(), strict=True))
+
+    def read(generation: Generation, fps: float) -> Mask:
+        weights = character_scene(generation, character, fps).weights
+        assert weights is not None
+        apart = sum(gap[name] * weights[name] for name in weights.names if name in gap)
+        return np.asarray(apart < TOUCHING)
+
+    return read
+
+
+def _of_head_scene(generation: Generation, fps: float) -> Mask:
+    moved = _generation(with_mouth(generation.motion), generation.units)
+    weights = head_scene(moved, fps).weights
+    assert weights is not None
+    character = figure()
+    mesh = head_mesh(character)
+    moved = mesh.displacements(np.arange(len(character.skin.rest)))
+    parting = {name: lip_gap(character, moved[number]) for number, name in enumerate(mesh.shape_names)}
+    return np.asarray(sum(parting[name] * weights[name] for name in weights.names) < TOUCHING)
+
+
+def _sampled(generation: Generation, curves: Motion, fps: float) -> Motion:
+    """Return curves as files of another rate hold them."""
+    whole = replace(generation, motion=curves, spread=np.zeros(curves.values.shape))
+    return resampled_curves(whole, generation, fps).motion
+
+
+def _closed(curves: Motion) -> Mask:
+    """Return the frames in which curves close the lips, as a program that reads them would show it."""
+    if "viseme_sil" in curves.names:
+        return np.asarray(curves["viseme_sil"] + curves["viseme_PP"] > 0.99)
+    if "fap4_lower_t_midlip" in curves.names:
+        return np.asarray(np.abs(curves["fap4_lower_t_midlip"] + curves["fap5_raise_b_midlip"]) < 5)
+    mouth = arkit_mouth()
+    return np.asarray(
+        sum(gap * curves[name] for name, gap in zip(mouth.names, mouth.gap, strict=True) if name in curves.names)
+        < TOUCHING
+    )
+
+
+def _drawn(generation: Generation, fps: float) -> Mask:
+    poses = face_poses(with_mouth(generation.motion), generation.units, fps, Staging())
+    return np.array([pose.mouth.gap < TOUCHING for pose in poses])
+
+
+def _of_head(generation: Generation, fps: float) -> Mask:
+    poses = head_poses(with_mouth(generation.motion), generation.units, fps)
+    return np.array([pose.gap < TOUCHING for pose in poses])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_lips_touch_in_the_same_frames_everywhere(kind: str, characters: dict[str, DrivenCharacter]) -> None:
+    readers: dict[str, Reader] = {"drawn faces": _drawn, "head": _of_head, "head scene": _of_head_scene}
+    readers |= {name: _of_curves(name) for name in (ARKIT, WHOLE_FACE, "visemes", FAP)} | {"take": _of_take}
+    readers |= {f"character {name}": _of_character(each) for name, each in characters.items()}
+    readers |= {f"scene {name}": _of_scene(each) for name, each in characters.items() if each.shapes is not None}
+    generation = delivered(KINDS[kind](), Delivery())
+    for fps in RATES:
+        mouth = spoken_mouth(with_mouth(generation.motion), generation.units, fps)
+        assert 0 < mouth.contact.sum() < 0.8 * len(mouth.contact)
+        for name, read in readers.items():
+            wrong = np.flatnonzero(read(generation, fps) != mouth.contact)
+            assert not len(wrong), f"{name} at {fps:g} Hz: other contact in frames {wrong.tolist()}"
