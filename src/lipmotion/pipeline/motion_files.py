@@ -121,7 +121,7 @@ def _curves(generation: Generation, name: str, staging: Staging | None, prosody:
     if own is None:
         return curves_of(motion, units, name, staging=staging, prosody=prosody)
     if name in (ARKIT, WHOLE_FACE):
-        own = _closed(own, curves_of(motion, units, ARKIT))
+        own = _closed(own, curves_of(own, units, ARKIT))
     if name != WHOLE_FACE:
         return own
     living = living_curves(with_mouth(motion), units, staging, prosody)

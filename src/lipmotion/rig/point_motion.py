@@ -79,7 +79,7 @@ def _as_spoken(displacements: Array, mouth: SpokenMouth) -> Array:
 
 
 def _parting(heights: Array, across: Array, gap: Array) -> Array:
-    """Return how the points of the inner lips move up or down for a gap between their middles [shape=(T, 52)].
+    """Return how the points of both lips move up or down for a gap between their middles [shape=(T, 52)].
 
     heights : displacements of all points [shape=(T, 52)];  across : where they are, -1 to 1 [shape=(52,)]
     The opening keeps its shape from corner to corner; where there is none, it is half an ellipse.
@@ -95,12 +95,12 @@ def _parting(heights: Array, across: Array, gap: Array) -> Array:
     lacking = np.clip(shape, 0, 1.2) * gap[:, None] - own
     lacking[:, half] = gap - middle[:, 0]
     lacking, places = np.pad(lacking, ((0, 0), (1, 1))), np.concatenate([[-1.0], places, [1.0]])
-    inner = np.flatnonzero(template.inner & (template.upper | template.lower))
-    right = np.clip(np.searchsorted(places, across[inner]), 1, len(places) - 1)
-    share = (across[inner] - places[right - 1]) / (places[right] - places[right - 1])
+    lips = np.flatnonzero(template.upper | template.lower)
+    right = np.clip(np.searchsorted(places, across[lips]), 1, len(places) - 1)
+    share = (across[lips] - places[right - 1]) / (places[right] - places[right - 1])
     parted = (lacking[:, right - 1] * (1 - share) + lacking[:, right] * share) / 2
     moved = np.zeros_like(heights)
-    moved[:, inner] = np.where(template.upper[inner], parted, -parted)
+    moved[:, lips] = np.where(template.upper[lips], parted, -parted)
     moved[:, pairs[:, 0]], moved[:, pairs[:, 1]] = lacking[:, 1:-1] / 2, -lacking[:, 1:-1] / 2
     return moved
 
