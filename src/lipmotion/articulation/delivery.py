@@ -46,7 +46,6 @@ class Delivery:
                       would be before time 0 is left out. For files that are put beside a sound; videos have their own
     min_hold_ms     : 0: the curves are smooth; more: poses are held, each for at least so many milliseconds
     stepped         : poses are held; with ``min_hold_ms`` 0, each for at least two frames at 24 frames a second
-    asymmetry       : 0: lip and jaw points move alike on both sides; 1: as on the speaker's own face
     Raises InputError: a value out of its range.
 
     >>> Delivery(anticipation_ms=40).hold_ms, Delivery(stepped=True).hold_ms > 80, Delivery(min_hold_ms=120).hold_ms
@@ -58,7 +57,6 @@ class Delivery:
     offset_ms: float = 0.0
     min_hold_ms: float = 0.0
     stepped: bool = False
-    asymmetry: float = 0.0
 
     def __post_init__(self) -> None:
         for name, least, most in (
@@ -66,7 +64,6 @@ class Delivery:
             ("anticipation_ms", -MOST_ANTICIPATION_MS, MOST_ANTICIPATION_MS),
             ("offset_ms", -MOST_OFFSET_MS, MOST_OFFSET_MS),
             ("min_hold_ms", 0.0, MOST_HOLD_MS),
-            ("asymmetry", 0.0, 1.0),
         ):
             value = getattr(self, name)
             if not least <= value <= most:

@@ -10,14 +10,12 @@ if TYPE_CHECKING:
 
 
 def add_delivery_arguments(parser: argparse.ArgumentParser, *, steps: bool = True) -> None:
-    """Add intensity, asymmetry, anticipation, offset and held poses (docs/controls.md).
+    """Add intensity, anticipation, offset and held poses (docs/controls.md).
 
     steps : also add ``--stepped``; cues are held always
     """
     add = parser.add_argument
     add("--intensity", type=float, default=1.0, metavar="X", help="movements of the mouth X times as large, 0 to 3")
-    lopsided = "0: both sides of the mouth move alike; 1: as on the speaker's own face"
-    add("--asymmetry", type=float, default=0.0, metavar="X", help=lopsided)
     earlier = "the mouth moves N ms before the sound"
     add("--anticipation-ms", type=float, default=0.0, metavar="N", help=earlier)
     later = "everything in motion, label and cue files comes N ms later; negative: earlier"
@@ -38,5 +36,4 @@ def delivery_of(options: argparse.Namespace) -> Delivery:
         options.offset_ms,
         options.min_hold_ms,
         stepped=getattr(options, "stepped", False),
-        asymmetry=options.asymmetry,
     )

@@ -52,13 +52,15 @@ def add_recording_arguments(parser: argparse.ArgumentParser, *, several: bool = 
     add_input(parser, "--units", what="units file", replaceable=True, metavar="FILE", help=edited)
     add_recogniser_argument(parser)
     add_speaker_argument(parser)
-    add_pauses_argument(parser)
+    add_style_arguments(parser)
 
 
-def add_pauses_argument(parser: argparse.ArgumentParser) -> None:
-    """Add ``--pauses``: what the mouth does between phrases."""
+def add_style_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add ``--pauses`` and ``--asymmetry``: what the mouth does between phrases, and whether its sides differ."""
     styles = "rest: lips close softly in pauses (default); natural: as people do, who breathe and hold a sound"
     parser.add_argument("--pauses", choices=("rest", "natural"), default="rest", help=styles)
+    lopsided = "0: both sides of the mouth move alike; 1: as on the speaker's own face (default: 0)"
+    parser.add_argument("--asymmetry", type=float, default=0.0, metavar="X", help=lopsided)
 
 
 def add_speaker_argument(parser: argparse.ArgumentParser) -> None:
@@ -137,4 +139,5 @@ def spoken_request(options: argparse.Namespace, words_beside: bool = False) -> S
         onto=options.onto,
         onto_speaker=options.onto_speaker,
         pauses=options.pauses,
+        asymmetry=options.asymmetry,
     )

@@ -11,6 +11,7 @@ import numpy as np
 from lipmotion.articulation.delivery import Delivery, closed_on_grid, closed_times, sound_units
 from lipmotion.articulation.pauses import with_pauses
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
+from lipmotion.articulation.symmetry import symmetrical
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import check_motion, motion_format, motion_suffix, motion_suffixes, write_motion
 from lipmotion.export.sound import SOUND_CODECS, write_sound
@@ -127,13 +128,15 @@ def generation_of(
     understood: UnderstoodSpeech,
     constraints: Constraints | None = None,
 ) -> Generation:
-    """Return the motion of understood speech, with the pauses that are asked for, and what to expect of it.
+    """Return the motion of understood speech, with the pauses and the asymmetry that are asked for, and what to expect of it.
 
     person : of ``person_of``
     Raises InputError: a constraint is not usable.
     """
     generation = generate_for(person, model.engine, model.learned, understood.speech, constraints)
     pinned_s = [pin.time_s for pin in constraints.pins] if constraints else []
+    if request.onto is None:
+        generation = replace(generation, motion=symmetrical(generation.motion, request.asymmetry))
     return replace(with_pauses(generation, request.pauses, pinned_s), outlook=outlook_of(request, understood))
 
 
@@ -173,7 +176,7 @@ def write(
     film     : how a filmed face is shown
     staging  : size and background of a drawn face, and what moves on its own (docs/faces.md); None: the
                defaults
-    delivery : intensity, asymmetry, anticipation, offset and held poses of every output (docs/controls.md); None: the
+    delivery : intensity, anticipation, offset and held poses of every output (docs/controls.md); None: the
                defaults
     curves   : what motion files hold instead of the motion, unless ``channels`` asks for more: ``arkit``, ``visemes``,
                ``fap``, a table of a rig (``.csv``), or a character with blendshapes (docs/meshes.md)
@@ -227,7 +230,7 @@ def write(
             played = sound or read_audio(Path(str(recording)), SOUND_RATE_HZ, warn=False)
             hertz = DRAWN_HZ if fps is None else fps
             character = curves if isinstance(curves, DrivenCharacter) else None
-            seen = shown(generation, delivery, shown_face, hertz, character)
+            seen = shown(generation, delivery, hertz, character)
             if isinstance(shown_face, FilmedFace):
                 filmed = None if recording is None else Path(recording)
                 frames = film_of(

@@ -40,13 +40,14 @@ def speak_from_corpus(
     lexicon: Lexicon | None = None,
     speaker: str = "",
     pauses: str = REST,
+    asymmetry: float = 0.0,
 ) -> SpokenText:
     """Return a text as the joined sound of recordings, and the motion that was recorded with it.
 
     text    : one sentence or several, in English words that the dictionary or ``lexicon`` pronounces
     corpus  : the corpus that the model was trained on
     model   : of an engine that ``SelectsRecordings`` (``selection``)
-    constraints, speaker, pauses : as of ``speak``
+    constraints, speaker, pauses, asymmetry : as of ``speak``
     lexicon : pronunciations of words, ahead of those of the dictionary
     The sound is not changed but at the joins, where successive pieces are shifted by up to 8 ms to fit and overlap: how
     fast and how high words are spoken is what was recorded. Phones that were never recorded are replaced by similar
@@ -87,7 +88,7 @@ def speak_from_corpus(
     audio = Audio(joined.samples[first:last], rate_hz)
     edges_s = np.clip(begin_s - begin_s[0], 0, audio.duration_s).tolist()
     spoken = Timeline(tuple(Span(a, b, s.label) for a, b, s in zip(edges_s, edges_s[1:], units, strict=False)))
-    request = SpeechRequest(audio, units=spoken, speaker=speaker, pauses=pauses)
+    request = SpeechRequest(audio, units=spoken, speaker=speaker, pauses=pauses, asymmetry=asymmetry)
     return SpokenText(audio, animate(request, model=model, constraints=constraints))
 
 

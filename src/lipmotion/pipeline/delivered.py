@@ -17,7 +17,6 @@ from lipmotion.articulation.delivery import (
     moved_in_time,
 )
 from lipmotion.articulation.phone_targets import with_gestures
-from lipmotion.articulation.symmetry import symmetrical
 from lipmotion.errors import ExportError, InputError
 from lipmotion.faces.base import Face, Staging
 from lipmotion.faces.filmed.face import FilmedFace
@@ -46,28 +45,23 @@ def check_delivery(delivery: Delivery, outputs: Iterable[Path], face: Face | Fil
 
 
 def delivered(generation: Generation, delivery: Delivery) -> Generation:
-    """Return generated motion with its intensity, symmetry, anticipation and offset.
+    """Return generated motion with its intensity, anticipation and offset; held poses are made of it last (``held``).
 
-    Held poses are made of it last (``held``). Raises InputError: the offset leaves nothing.
+    Raises InputError: the offset leaves nothing.
     """
-    larger = _larger(generation, delivery.intensity)
-    return moved_in_time(replace(larger, motion=symmetrical(larger.motion, delivery.asymmetry)), delivery)
+    return moved_in_time(_larger(generation, delivery.intensity), delivery)
 
 
 def shown(
     generation: Generation,
     delivery: Delivery,
-    face: Face | FilmedFace,
     fps: float,
     character: DrivenCharacter | None = None,
 ) -> Generation:
     """Return generated motion as a face shows it: with the channels that faces draw, and held poses at the frame rate.
 
     character : whose weights are shown, if the face is a character with blendshapes
-    A filmed face keeps the asymmetry of its speaker.
     """
-    if isinstance(face, FilmedFace):
-        delivery = replace(delivery, asymmetry=1.0)
     moved = delivered(generation, delivery)
     if is_of_blendshapes(moved.motion):
         moved = _with(moved, with_mouth(moved.motion))

@@ -42,6 +42,8 @@ class SpeechRequest:
     onto_speaker : which person, where the corpus or the other model has several
     pauses     : ``rest``: lips close softly in pauses from 0.25 s, and part no earlier than 0.12 s before a phrase;
                  ``natural``: the mouth does in pauses what the model learned
+    asymmetry  : 0 to 1: the share that is left of the difference between both sides of the speaker's own mouth, in the
+                 lip and jaw points; the mouth of another person (``onto``) stays as it is
 
     >>> import lipmotion
     >>> request = lipmotion.SpeechRequest("examples/welcome.flac", recogniser="general")
@@ -58,11 +60,14 @@ class SpeechRequest:
     onto: Onto | None = None
     onto_speaker: str = ""
     pauses: str = REST
+    asymmetry: float = 0.0
 
     def __post_init__(self) -> None:
         if self.pauses not in PAUSE_STYLES:
             named = ", ".join(PAUSE_STYLES)
             raise InputError(f"the style of pauses is {shortened(repr(self.pauses))}, required one of: {named}")
+        if not 0 <= self.asymmetry <= 1:
+            raise InputError(f"the asymmetry is {self.asymmetry:g}, required 0 to 1")
         if not isinstance(self.units, Timeline | None):
             kind = type(self.units).__name__
             raise InputError(f"the units are a {kind}, required a Timeline of spans of units")

@@ -56,6 +56,7 @@ def speak(
     onto: Onto | None = None,
     onto_speaker: str = "",
     pauses: str = REST,
+    asymmetry: float = 0.0,
 ) -> SpokenText:
     """Return a text as sound of a synthetic voice, and the lip motion for it, with 0.25 s of rest at both ends.
 
@@ -67,7 +68,7 @@ def speak(
     constraints : values that the motion must take exactly, in the units of the speaker
     lexicon     : pronunciations of English words; they tell which vowels are reduced, not how the voice says the words
     speaker     : whose motion is generated, of the people whom the model was trained on; empty: the mean person
-    onto, onto_speaker, pauses : as of ``SpeechRequest``
+    onto, onto_speaker, pauses, asymmetry : as of ``SpeechRequest``
     The phones and their times are the synthesiser's, so nothing is recognised.
     Raises MissingDependencyError: no synthesiser is installed, or not the one that was asked for.
     Raises InputError: no such voice or speaker, or a text that is too long, has no word, or cannot be spoken.
@@ -82,16 +83,16 @@ def speak(
         if onto is not None:
             raise InputError("a corpus speaks with the motion that was recorded; it is not mapped onto another person")
         loaded = model if isinstance(model, Model) else load_model(model)
-        return speak_from_corpus(
-            text, corpus, loaded, constraints=constraints, lexicon=lexicon, speaker=speaker, pauses=pauses
-        )
+        how = {"constraints": constraints, "lexicon": lexicon, "speaker": speaker}
+        return speak_from_corpus(text, corpus, loaded, pauses=pauses, asymmetry=asymmetry, **how)
     sentences = sentences_of(text)
     chosen = voice_named(voice) if isinstance(voice, str) else voice or default_voice()
     loaded = model if isinstance(model, Model) else load_model(model)
     speaker_map(loaded.speakers, speaker)  # an unknown one is reported before anything is spoken
     sound, speech, units = _said(sentences, chosen, lexicon)
+    style = {"pauses": pauses, "asymmetry": asymmetry}
     request = SpeechRequest(
-        _with_floor(speech, units), units=units, speaker=speaker, onto=onto, onto_speaker=onto_speaker, pauses=pauses
+        _with_floor(speech, units), units=units, speaker=speaker, onto=onto, onto_speaker=onto_speaker, **style
     )
     return SpokenText(sound, animate(request, model=loaded, constraints=constraints))
 

@@ -204,6 +204,7 @@ def _request(line: BatchLine, settings: BatchSettings, model: Model) -> SpeechRe
         recogniser=settings.recogniser,
         speaker=speaker,
         pauses=settings.pauses,
+        asymmetry=settings.asymmetry,
         onto=None if face is None else _map_onto(model, face, speaker),
     )
 

@@ -38,7 +38,7 @@ class BatchSettings:
                    ``cues.dat``
     recogniser   : of recordings without a transcript, as of ``SpeechRequest``
     speaker      : of lines that name none
-    pauses       : ``rest`` or ``natural``, as of ``SpeechRequest``
+    pauses, asymmetry : as of ``SpeechRequest``
     model        : path of the model file; empty: the shipped model
     lexicon      : path of a file of pronunciations; empty: none
     channels     : of motion files; empty: all of the motion
@@ -49,7 +49,7 @@ class BatchSettings:
     fps          : frames per second of videos and cues; None: 25 and 24
     face         : of videos, a name or the path of a file
     staging      : of that face
-    delivery     : intensity, asymmetry, anticipation, offset and held poses of every output
+    delivery     : intensity, anticipation, offset and held poses of every output
 
     >>> BatchSettings(kinds=("json", "cues.tsv")).recogniser
     'auto'
@@ -59,6 +59,7 @@ class BatchSettings:
     recogniser: str = "auto"
     speaker: str = ""
     pauses: str = REST
+    asymmetry: float = 0.0
     model: str = ""
     lexicon: str = ""
     channels: tuple[str, ...] = ()
