@@ -7,7 +7,8 @@ One JSON object a line; lengths are in eye distances but where millimetres are n
 a person who speaks; their motion is generated from the sound alone, that of the people is tracked and moved by the lag
 within 120 ms at which both fit best. Phones in time are those recognised, for people as well.
 
-strength    : 98th percentile over speech of the opening and of ARKit's curves, beside people's and a capture's
+strength    : 98th percentile over speech of the opening and of ARKit's curves, of what is generated and of the person's
+              tracked motion, beside a capture's
 vowels      : share of the frames inside vowels with an opening under ``SHUT``, under several doubts of the phones: of
               whole recordings and, of those longer than ten seconds, of pieces of five, where it is worst
 pauses      : median opening in inner pauses of ``PAUSE_S``, without ``EDGE_S`` at both ends, over that in vowels; the
@@ -28,6 +29,7 @@ from functools import cache
 from itertools import pairwise
 from operator import itemgetter
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from anyone import PIECE_S, lag_of, open_english, pieces, show, strangers
@@ -113,11 +115,13 @@ def main() -> None:
 class Take:
     """A recording: its phones, its motion, and the person's.
 
-    opening : tracked, at the times of the motion; NaN where no face was seen [shape=(T,)]
+    person  : the tracked motion, resampled to the times of what is generated
+    opening : of the person; NaN where no face was seen [shape=(T,)]
     """
 
     speech: Speech
     generation: Generation
+    person: Motion
     opening: Array
     lag_s: float
 
@@ -157,11 +161,10 @@ def take(audio: Audio, tracked: Track, model: Model, recogniser: str) -> Take:
     speech = understood_speech(model, SpeechRequest(audio, recogniser=recogniser)).speech
     generation = generate_for(None, model.engine, model.learned, speech)
     lag_s = lag_of(generation.motion, tracked, LAG_S)
-    opening = np.where(tracked.seen, tracked.motion["opening"], np.nan)
     time_s = generation.motion.time_s - lag_s
-    within = (time_s >= 0) & (time_s <= tracked.motion.time_s[-1])
-    seen = np.where(within, np.interp(time_s, tracked.motion.time_s, opening), np.nan)
-    return Take(speech, generation, seen, lag_s)
+    person = Motion(tracked.motion.at(time_s), generation.motion.rate_hz, tracked.motion.channels)
+    seen = np.interp(time_s, tracked.motion.time_s, tracked.seen, left=0, right=0) == 1
+    return Take(speech, generation, person, np.where(seen, person["opening"], np.nan), lag_s)
 
 
 def takes_of(options: argparse.Namespace, model: Model) -> dict[str, Take]:
@@ -171,14 +174,18 @@ def takes_of(options: argparse.Namespace, model: Model) -> dict[str, Take]:
 
 def strength(options: argparse.Namespace, model: Model) -> None:
     """Print how far mouths open, and how large the curves become."""
-    rows = []
+    rows: dict[str, list[dict[str, float]]] = {"generated": [], "person": []}
     for name, each in takes_of(options, model).items():
-        spoken, motion = each.spoken(), each.generation.motion
-        curves = curves_of(motion, each.generation.units, "arkit")
-        row = {"generated": strong(motion["opening"][spoken]), "person": strong(each.opening[spoken])}
-        rows.append(row | {curve: strong(curves[curve][spoken]) for curve in CAPTURED})
-        show("strength", recording=name, lag_ms=round(1000 * each.lag_s), **rounded(rows[-1]))
-    show_mean("strength", rows, captured=CAPTURED)
+        for source, motion in (("generated", each.generation.motion), ("person", each.person)):
+            curves = curves_of(motion, each.generation.units, "arkit")
+            chosen = each.spoken() & np.isfinite(each.opening)
+            row = {"opening": strong(motion["opening"][chosen])}
+            rows[source].append(row | {curve: strong(curves[curve][chosen]) for curve in CAPTURED})
+            lag_ms = round(1000 * each.lag_s)
+            show(f"strength, {source}", recording=name, lag_ms=lag_ms, **rounded(rows[source][-1]))
+    for source, found in rows.items():
+        show_mean(f"strength, {source}", found)
+    show("strength, captured", recording="a Live Link take", **CAPTURED)
 
 
 def vowels(options: argparse.Namespace, model: Model) -> None:
@@ -193,7 +200,7 @@ def vowels(options: argparse.Namespace, model: Model) -> None:
     show_worst(f"vowels, {PIECE_S} s", short)
 
 
-def vowels_of(length: str, name: str, each: Take, model: Model) -> dict[str, object]:
+def vowels_of(length: str, name: str, each: Take, model: Model) -> dict[str, Any]:
     """Print and return the shares of shut vowels of a recording."""
     chosen = each.spoken(vowels=True)
     speech, learned = each.speech, model.learned
@@ -221,7 +228,7 @@ def vowels_of(length: str, name: str, each: Take, model: Model) -> dict[str, obj
         frames=int(chosen.sum()),
         **rounded(shares),
     )
-    return {"recording": name} | shares
+    return {"recording": name, **shares}
 
 
 @dataclass(frozen=True, eq=False)
@@ -342,12 +349,12 @@ def accuracy(options: argparse.Namespace, model: Model) -> None:
     open_english(options, model)
 
 
-def strong(curve: Array) -> float:
+def strong(curve: NDArray[np.floating[Any]]) -> float:
     """Return the strength of a curve."""
     return float(np.nanpercentile(curve, STRONG))
 
 
-def shut_share(opening: Array) -> float:
+def shut_share(opening: NDArray[np.floating[Any]]) -> float:
     """Return the share of openings at which the mouth is shut."""
     return float(np.mean(opening[np.isfinite(opening)] < SHUT))
 
@@ -357,14 +364,14 @@ def rounded(row: Mapping[str, object], digits: int = 3) -> dict[str, object]:
     return {name: round(value, digits) if isinstance(value, float) else value for name, value in row.items()}
 
 
-def show_mean(figure_name: str, rows: list[dict[str, float]], **values: object) -> None:
+def show_mean(figure_name: str, rows: list[dict[str, float]]) -> None:
     """Print the means over recordings."""
     if rows:
         means = {name: float(np.nanmean([row[name] for row in rows])) for name in rows[0]}
-        show(figure_name, recording="mean", recordings=len(rows), **rounded(means), **values)
+        show(figure_name, recording="mean", recordings=len(rows), **rounded(means))
 
 
-def show_worst(figure_name: str, rows: list[dict[str, object]]) -> None:
+def show_worst(figure_name: str, rows: list[dict[str, Any]]) -> None:
     """Print the mean over recordings of each doubt, and the worst recording."""
     numbers = [{name: value for name, value in row.items() if isinstance(value, float)} for row in rows]
     show_mean(figure_name, numbers)
@@ -373,7 +380,7 @@ def show_worst(figure_name: str, rows: list[dict[str, object]]) -> None:
         show(
             figure_name,
             recording="worst",
-            **{name: [row["recording"], round(float(row[name]), 3)] for name, row in worst.items()},
+            **{name: [row["recording"], round(row[name], 3)] for name, row in worst.items()},
         )
 
 
