@@ -1,6 +1,7 @@
 """Anyone's voice, any words, any room: accuracy of a model outside the training speaker's quiet studio.
 
-    python benchmarks/anyone.py [--model FILE] [--split val] [--open FOLDER] [--only rooms|strangers|phones|open]
+    python benchmarks/anyone.py [--model FILE] [--split val] [--open FOLDER] [--tracks FOLDER]
+        [--only rooms|strangers|phones|open]
 
 rooms     : clips of the corpus of ``--corpus`` in babble, white noise, a room, over a telephone; ACC of opening, pooled
 strangers : GRID clips of other speakers, audio only and with transcript; mean ACC per clip, best lag within 60 ms
@@ -17,6 +18,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
+from kept_tracks import kept_track
 from numpy.typing import NDArray
 from robust import SPOKEN
 from scipy.signal import butter, fftconvolve, sosfilt
@@ -30,7 +32,6 @@ from lipmotion.pipeline.request import SpeechRequest
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.noise import noisy_audio
 from lipmotion.types import Audio, Motion, Track
-from lipmotion.vision.track import track
 
 RATE_HZ = 16_000
 CHANNELS = ("opening", "width", "outer")
@@ -49,6 +50,7 @@ def main() -> None:
     parser.add_argument("--corpus", type=Path, default=Path("build/grid-s1"), help="prepared, of the training speaker")
     parser.add_argument("--split", default="val")
     parser.add_argument("--open", type=Path, help="folder of videos of people who speak English")
+    parser.add_argument("--tracks", type=Path, help="where tracks of videos are kept; default: they are not")
     parser.add_argument("--model", type=Path, help="default: the one that ships")
     parser.add_argument("--recogniser", default="auto")
     parser.add_argument("--only", action="append", choices=list(PARTS), help="repeatable; default: all")
@@ -104,7 +106,7 @@ def rooms(options: argparse.Namespace, model: Model) -> None:
 def strangers(options: argparse.Namespace, model: Model) -> None:
     """Print the correlations of other GRID speakers."""
     clips = sorted((options.corpora / "grid-others").glob("*.mpg"))
-    tracks = {clip: track(clip, crops=False) for clip in clips}
+    tracks = {clip: kept_track(clip, options.tracks) for clip in clips}
     for condition in ("audio only", "transcript"):
         each = {}
         for clip in clips:
@@ -155,15 +157,15 @@ def open_english(options: argparse.Namespace, model: Model) -> None:
     for path in sorted(options.open.rglob("*.mp4")):
         if "french" in path.stem:
             continue
-        for name, audio, piece in pieces(path):
+        for name, audio, piece in pieces(path, options.tracks):
             request = SpeechRequest(audio, recogniser=options.recogniser)
             each[name] = best_lag(animate(request, model=model).motion, piece, 0.12)
     show_means("open English, audio only", each)
 
 
-def pieces(path: Path) -> Iterator[tuple[str, Audio, Track]]:
-    """Yield pieces of five seconds of a video: name, sound, track."""
-    audio, tracked = read_audio(path), track(path, crops=False)
+def pieces(path: Path, tracks: Path | None = None) -> Iterator[tuple[str, Audio, Track]]:
+    """Yield pieces of five seconds of a video: name, sound, track; the whole track is kept in ``tracks``."""
+    audio, tracked = read_audio(path), kept_track(path, tracks)
     whole, rate = tracked.motion, tracked.motion.rate_hz
     for number in range(max(int(audio.duration_s / PIECE_S), 1)):
         end = len(whole.values) if audio.duration_s < 2 * PIECE_S else int((number + 1) * PIECE_S * rate)
@@ -186,10 +188,15 @@ def correlations(generated: Curves, tracked: Curves) -> dict[str, float]:
     return {name: round(float(np.corrcoef(generated[:, n], tracked[:, n])[0, 1]), 3) for n, name in enumerate(CHANNELS)}
 
 
+def lag_of(motion: Motion, tracked: Track, limit_s: float) -> float:
+    """Return the seconds by which the tracked opening leads the generated one, within a limit, where both fit best."""
+    lags = np.arange(-limit_s, limit_s + 1e-9, 0.01).tolist()
+    return max(lags, key=lambda lag: correlations(*compared(motion, tracked, lag))["opening"])
+
+
 def best_lag(motion: Motion, tracked: Track, limit_s: float) -> dict[str, float]:
     """Return the correlations at the lag within a limit that is best for the opening."""
-    lags = np.arange(-limit_s, limit_s + 1e-9, 0.01)
-    return max((correlations(*compared(motion, tracked, lag)) for lag in lags), key=lambda each: each["opening"])
+    return correlations(*compared(motion, tracked, lag_of(motion, tracked, limit_s)))
 
 
 def show_means(figure: str, each: dict[str, dict[str, float]]) -> None:
