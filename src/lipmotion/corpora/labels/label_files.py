@@ -16,6 +16,7 @@ from lipmotion.corpora.labels.textgrid import MARK, is_textgrid, parse_interval_
 from lipmotion.corpora.labels.tier import (
     LabelTier,
     holds_phones,
+    is_named_as_phones,
     is_named_as_recognised,
     is_named_as_words,
     phone_timeline,
@@ -155,7 +156,8 @@ def read_phones(path: Path) -> Timeline[Unit]:
     else:
         lines = parse_timed_lines(text, where)
         tiers = [lines] if lines is not None else []
-    phones = _tiers_of_phones(tiers, where)
+    silent = [tier for tier in tiers if is_named_as_phones(tier) and tier.labels]
+    phones = _tiers_of_phones(tiers, where) or silent
     if not phones:
         raise InputError(
             f"{where}: holds no phones in time, required a motion file (.json, .npz), a TextGrid with a tier of "

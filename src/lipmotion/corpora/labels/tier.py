@@ -76,9 +76,14 @@ def holds_phones(tier: LabelTier) -> bool:
     spoken = [label for label in tier.labels if not _is_silence(label.text)]
     if not spoken or is_named_as_words(tier):
         return False
-    if re.search(r"phone|segment|\bmau\b", tier.name.lower()):
+    if is_named_as_phones(tier):
         return True
     return sum(_phone(label.text) is not None for label in spoken) >= PHONES_SHARE * len(spoken)
+
+
+def is_named_as_phones(tier: LabelTier) -> bool:
+    """Return whether a tier's name says that it holds phones."""
+    return re.search(r"phone|segment|\bmau\b", tier.name.lower()) is not None
 
 
 def is_named_as_words(tier: LabelTier) -> bool:
