@@ -31,7 +31,7 @@ def exact_rate(hertz: float, off_hz: float = 1e-6) -> float:
     off_hz : by how much rounding may have changed it
     """
     television = float(np.rint(hertz * 1.001)) * 1000 / 1001
-    return television if abs(television - hertz) <= off_hz else hertz
+    return television if television and abs(television - hertz) <= off_hz else hertz
 
 
 def steady_rows(time_s: Array, rows: Array) -> tuple[Array, float]:
