@@ -34,6 +34,7 @@ from typing import Any
 import numpy as np
 from anyone import PIECE_S, lag_of, open_english, pieces, show, strangers
 from kept_tracks import kept_track
+from lipmotion.rig.mouth_template import CHIN, LOWER_MIDDLE, UPPER_MIDDLE
 from numpy.typing import NDArray
 
 from lipmotion import Corpus, Selection, animate, evaluate, load_model
@@ -54,7 +55,6 @@ from lipmotion.rig.driven import driven_character
 from lipmotion.rig.gltf_writer import write_glb
 from lipmotion.rig.lip_placement import LipPlacement, placed_by_shape
 from lipmotion.rig.mesh import Blendshape, Mesh
-from lipmotion.rig.mouth_template import CHIN, LOWER_MIDDLE, UPPER_MIDDLE
 from lipmotion.rig.surface import mesh_surface
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.types import Audio, Generation, Motion, Speech, Timeline, Track, Unit

@@ -11,7 +11,8 @@ import pytest
 from lipmotion.errors import ExportError
 from lipmotion.export.sound import write_sound
 from lipmotion.speech.audio_files import read_audio
-from lipmotion.types import Audio
+from lipmotion.speech.resampling import at_speech_rate
+from lipmotion.types import Audio, from_sixteen_bits
 
 RATE_HZ = 22_050
 
@@ -28,6 +29,16 @@ def test_samples_survive(tmp_path: Path) -> None:
         np.testing.assert_allclose(read.samples, tone().samples, atol=1e-4)
         with av.open(str(tmp_path / name)) as container:
             assert container.streams.audio[0].rate == RATE_HZ
+
+
+@pytest.mark.parametrize("rate_hz", [16_000, 22_050, 44_100])
+def test_sixteen_bits_come_back_as_they_were_and_are_heard_so(tmp_path: Path, rate_hz: int) -> None:
+    values = np.resize(np.array([-32_768, -32_767, -1, 0, 1, 20_000, 32_766, 32_767], np.int16), 70_000)
+    sound = Audio(from_sixteen_bits(values), rate_hz)
+    for name in ("a.wav", "a.flac"):
+        write_sound(tmp_path / name, sound)
+        assert np.array_equal(read_audio(tmp_path / name, rate_hz).samples, sound.samples)
+        assert np.array_equal(read_audio(tmp_path / name).samples, at_speech_rate(sound).samples)
 
 
 def test_a_compressed_sound_is_as_long_and_as_loud(tmp_path: Path) -> None:

@@ -59,7 +59,7 @@ def test_the_units_cover_all_with_rest_at_both_ends(spoken: SpokenText) -> None:
 
 def test_the_sound_is_silent_where_the_units_are(spoken: SpokenText) -> None:
     samples, rate_hz = spoken.sound.samples, spoken.sound.rate_hz
-    assert not samples[: round(0.1 * rate_hz)].any()
+    assert 0 < np.abs(samples[: round(0.1 * rate_hz)]).max() < 0.02 * np.abs(samples).max()  # noise, no digital silence
     loud = {
         span.label.phone: float(np.abs(samples[round(span.start_s * rate_hz) : round(span.end_s * rate_hz)]).max())
         for span in spoken.generation.units

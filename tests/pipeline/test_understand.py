@@ -16,7 +16,7 @@ from lipmotion.pipeline import understand as pipeline_understand
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outlook import WHOLE_TRANSCRIPT, outlook_of
 from lipmotion.pipeline.request import SpeechRequest, request_of
-from lipmotion.pipeline.understand import recognised_speech, speech_of, understand, understood_speech
+from lipmotion.pipeline.understand import recognised_speech, recognised_with, speech_of, understand, understood_speech
 from lipmotion.speech.agreement import TranscriptFit
 from lipmotion.speech.f0 import log_f0
 from lipmotion.speech.mfcc import mfcc
@@ -63,25 +63,25 @@ def test_phones_that_the_engine_recognises_are_aligned_as_in_training(
     assert [s.label.phone for s in speech.units] == [s.label.phone for s in toy_sentence.units]
     assert {s.label.word for s in speech.units} == {""}
     aligned = Recogniser(toy_model.phones, "own").align_phones(toy_sentence.audio, mfcc(toy_sentence.audio), late)
-    assert speech.units == aligned
+    assert speech.units == recognised_with(aligned, 0.0)
     errors = [abs(a.start_s - b.start_s) for a, b in zip(speech.units, toy_sentence.units, strict=True)]
     assert np.median(errors) < 0.03
 
 
 def test_the_recogniser_says_what_the_engine_does_not_know(toy_model: Model, toy_sentence: ToySentence) -> None:
-    assert recognised(RecognisingEngine(), toy_model, toy_sentence).units is RECOGNISED
+    assert recognised(RecognisingEngine(), toy_model, toy_sentence).units == RECOGNISED
 
 
 def test_general_models_alone_are_taken_by_their_word(toy_model: Model, toy_sentence: ToySentence) -> None:
     assert (
-        recognised(RecognisingEngine(found=toy_sentence.units), toy_model, toy_sentence, "general").units is RECOGNISED
+        recognised(RecognisingEngine(found=toy_sentence.units), toy_model, toy_sentence, "general").units == RECOGNISED
     )
 
 
 def test_phones_that_do_not_fit_are_not_taken(toy_model: Model, toy_sentence: ToySentence) -> None:
     spans = toy_sentence.units.spans[1:-1]
     crowd = [span for n in range(30) for span in Timeline(spans).shifted(3.0 * n)]
-    assert recognised(RecognisingEngine(found=Timeline(tuple(crowd))), toy_model, toy_sentence).units is RECOGNISED
+    assert recognised(RecognisingEngine(found=Timeline(tuple(crowd))), toy_model, toy_sentence).units == RECOGNISED
 
 
 def test_f0_is_computed_for_engines_that_want_it(toy_sentence: ToySentence) -> None:

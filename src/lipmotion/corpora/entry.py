@@ -29,6 +29,8 @@ from lipmotion.types import (
     Unit,
     Utterance,
     check_curves,
+    from_sixteen_bits,
+    sixteen_bits,
 )
 
 ENTRY = "entry.json"
@@ -49,15 +51,19 @@ UTTERANCE_ARRAYS = {
     "crops": ArraySpec(np.uint8, "F H W 3", optional=True),
 }
 """The arrays of an utterance: N samples, T frames of sound, F frames of motion."""
-FULL_SCALE = 32_768
-"""16-bit steps per unit of amplitude: 16-bit recordings are kept exactly."""
+BLOCK = 1 << 20
+"""Samples that are quantised at a time."""
 LARGEST_NUMBER = 1e9
 """No utterance has more seconds or frames, nor more frames a second."""
 
 
 def quantise(audio: Audio) -> Audio:
-    """Return sound quantised to 16 bits, as a corpus stores it: features computed of it can be computed again."""
-    return Audio(_as_float(_as_int16(audio.samples)), audio.rate_hz)
+    """Return sound quantised to 16 bits, as files hold it: features computed of it can be computed again."""
+    samples = np.empty(len(audio.samples), np.float32)
+    for start in range(0, len(samples), BLOCK):
+        block = slice(start, start + BLOCK)
+        samples[block] = from_sixteen_bits(sixteen_bits(audio.samples[block]))
+    return Audio(samples, audio.rate_hz)
 
 
 def is_utterance_name(name: str) -> bool:
@@ -109,7 +115,7 @@ def read_utterance(folder: Path) -> Utterance:
         channels = tuple(Channel(**channel) for channel in entry["channels"])
         arrays = {name: _load(folder, name) for name in UTTERANCE_ARRAYS if name != "crops" or entry["crops"]}
         sizes = checked_sizes(arrays, UTTERANCE_ARRAYS, P=len(channels), F=entry["frames"])
-        audio = Audio(_as_float(arrays["audio"]), entry["audio_rate_hz"])
+        audio = Audio(from_sixteen_bits(arrays["audio"]), entry["audio_rate_hz"])
         expected = int(audio.duration_s * FRAME_RATE_HZ + 1e-9) + 1
         if sizes["T"] != expected:
             raise ValueError(f"{sizes['T']} frames of features, required {expected} for {audio.duration_s:.2f} s")
@@ -133,7 +139,7 @@ def read_utterance(folder: Path) -> Utterance:
 
 def _arrays(utterance: Utterance) -> dict[str, NDArray[Any]]:
     arrays: dict[str, NDArray[Any]] = {
-        "audio": _as_int16(utterance.audio.samples),
+        "audio": sixteen_bits(utterance.audio.samples),
         "features": utterance.features.values.astype(np.float32),
         "motion": utterance.track.motion.values.astype(np.float32),
         "seen": utterance.track.seen.astype(np.bool_),
@@ -226,14 +232,6 @@ def _load(folder: Path, name: str) -> NDArray[Any]:
     except Exception as error:  # the header is parsed as Python, which can fail in many ways
         raise ValueError(f"{path.name}: not an array ({type(error).__name__}: {error})") from error
     return array
-
-
-def _as_int16(samples: NDArray[np.float32]) -> NDArray[np.int16]:
-    return np.clip(np.rint(samples * FULL_SCALE), -FULL_SCALE, FULL_SCALE - 1).astype(np.int16)
-
-
-def _as_float(samples: NDArray[np.int16]) -> NDArray[np.float32]:
-    return samples.astype(np.float32) / np.float32(FULL_SCALE)
 
 
 def _damaged(folder: Path, error: Exception) -> CorpusError:

@@ -5,11 +5,9 @@ from __future__ import annotations
 from fractions import Fraction
 from pathlib import Path
 
-import numpy as np
-
 from lipmotion.errors import ExportError
 from lipmotion.storage.files import whole_file
-from lipmotion.types import Audio
+from lipmotion.types import Audio, sixteen_bits
 
 SOUND_CODECS: dict[str, tuple[str, str, int | None]] = {
     ".wav": ("wav", "pcm_s16le", None),
@@ -17,7 +15,6 @@ SOUND_CODECS: dict[str, tuple[str, str, int | None]] = {
     ".ogg": ("ogg", "libopus", 48_000),
 }
 """Container and codec of every suffix, and the only sampling rate that the codec has (None: it has any)."""
-FULL_SCALE = 32_767
 BLOCK = 1 << 16
 """Samples that are encoded at a time."""
 
@@ -26,7 +23,7 @@ def write_sound(path: Path, audio: Audio) -> None:
     """Write sound to a file in the format of its suffix, at its own rate; after a failure there is no partial file.
 
     ``.wav`` and ``.flac`` hold 16 bits a sample, ``.ogg`` is compressed (Opus at 48 kHz). Samples beyond full scale are
-    clipped.
+    clipped. What was read from 16 bits is written as it was.
     Raises ExportError: another suffix, no samples, or the file cannot be written.
     """
     if path.suffix.lower() not in SOUND_CODECS:
@@ -45,8 +42,7 @@ def _encode(temporary: Path, path: Path, audio: Audio) -> None:
         with av.open(str(temporary), "w", format=container_name) as container:
             stream = container.add_stream(codec, rate=rate_hz or audio.rate_hz, layout="mono")
             for start in range(0, len(audio.samples), BLOCK):
-                samples = np.clip(audio.samples[None, start : start + BLOCK], -1, 1)
-                values = np.round(samples * FULL_SCALE).astype(np.int16)
+                values = sixteen_bits(audio.samples[None, start : start + BLOCK])
                 part = av.AudioFrame.from_ndarray(values, format="s16", layout="mono")
                 part.rate, part.pts, part.time_base = audio.rate_hz, start, Fraction(1, audio.rate_hz)
                 container.mux(stream.encode(part))

@@ -128,7 +128,7 @@ def generation_of(
     understood: UnderstoodSpeech,
     constraints: Constraints | None = None,
 ) -> Generation:
-    """Return the motion of understood speech, with the pauses and the asymmetry that are asked for, and what to expect of it.
+    """Return the motion of understood speech, with pauses and asymmetry as asked for, and what to expect of it.
 
     person : of ``person_of``
     Raises InputError: a constraint is not usable.

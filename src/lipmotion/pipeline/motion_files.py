@@ -44,7 +44,7 @@ def in_format(
     """Return a generation as a motion file of that name holds it.
 
     chosen  : the generation with the channels, and at the rate, that the user asked for: what most formats hold
-    rate_hz : the rate that the user asked for; None: that of the format, or else that of the motion
+    rate_hz : the rate that the user asked for; None: that of the format for motion at the model's rate, else its own
     staging, prosody : of what moves on its own, in formats that hold a whole face; None: everything moves; not known
     channels : those that the user asked for by name: of a format's own curves only these are held, if any of them is
                one; None: all
@@ -62,7 +62,7 @@ def in_format(
         held = held.selected(own) if own else held
     elif form.mouth and OPENING not in held.motion.names:
         held = generation
-    hertz = rate_hz or form.rate_hz
+    hertz = rate_hz or (form.rate_hz if abs(generation.motion.rate_hz - MODEL_HZ) < SAME_HZ else None)
     if hertz is None or abs(hertz - held.motion.rate_hz) < SAME_HZ:
         return held
     return resampled_curves(held, generation, hertz)

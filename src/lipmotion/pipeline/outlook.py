@@ -37,7 +37,7 @@ def _advice(understood: UnderstoodSpeech) -> tuple[str, ...]:
     """Return what would help, the most helpful first."""
     found, advice = understood.recognition, []
     if found is not None:
-        if understood.speech.confidence < 1:
+        if found.reliability < 1:
             advice.append(TRANSCRIPT)
         if found.similarity is None or found.similarity < FULL_WEIGHT_SCORE:
             advice.append(OWN_MODEL)

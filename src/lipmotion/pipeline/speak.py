@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.pauses import REST
+from lipmotion.corpora.entry import quantise
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
 from lipmotion.kernels.threads import one_thread
@@ -20,6 +21,7 @@ from lipmotion.pipeline.request import Onto, SpeechRequest
 from lipmotion.pipeline.speakers import speaker_map
 from lipmotion.speech.audio_files import SPEECH_RATE_HZ
 from lipmotion.speech.recogniser import SHORT_PAUSE_S
+from lipmotion.speech.resampling import at_speech_rate
 from lipmotion.speech.voices.installed import default_voice, voice_named, voiced_sentences
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.storage.files import read_text_file
@@ -32,8 +34,9 @@ CORPUS_VOICE = "corpus"
 REST_S = 0.25
 """Silence before the first and after the last sound."""
 FLOOR_DB = 50.0
-"""Noise under the speech that the model is given, in decibels, as in training: a synthesiser's silence has no sound at
-all, which would shift features that are normalised over the recording. The sound that is returned has none."""
+"""Noise under the speech, in decibels of what lies under 8 kHz, as in training: a synthesiser's silence has no sound at
+all, which would shift features that are normalised over the recording. The sound that is returned has it, too: what
+the model hears is what a ``.wav`` of it holds, so that its motion is generated again from that file and the phones."""
 AT_ONCE = 20
 """Sentences that one run of a synthesiser speaks; only their files are on the disk at a time."""
 BLOCK = 1 << 20
@@ -69,7 +72,9 @@ def speak(
     lexicon     : pronunciations of English words; they tell which vowels are reduced, not how the voice says the words
     speaker     : whose motion is generated, of the people whom the model was trained on; empty: the mean person
     onto, onto_speaker, pauses, asymmetry : as of ``SpeechRequest``
-    The phones and their times are the synthesiser's, so nothing is recognised.
+    The phones and their times are the synthesiser's, so nothing is recognised. The sound is one of 16 bits, at the
+    synthesiser's rate or 16 kHz if that is less; ``animate`` of a ``.wav`` or ``.flac`` of it, with the units, returns
+    the same motion.
     Raises MissingDependencyError: no synthesiser is installed, or not the one that was asked for.
     Raises InputError: no such voice or speaker, or a text that is too long, has no word, or cannot be spoken.
 
@@ -83,16 +88,30 @@ def speak(
         if onto is not None:
             raise InputError("a corpus speaks with the motion that was recorded; it is not mapped onto another person")
         loaded = model if isinstance(model, Model) else load_model(model)
-        how = {"constraints": constraints, "lexicon": lexicon, "speaker": speaker}
-        return speak_from_corpus(text, corpus, loaded, pauses=pauses, asymmetry=asymmetry, **how)
+        return speak_from_corpus(
+            text,
+            corpus,
+            loaded,
+            constraints=constraints,
+            lexicon=lexicon,
+            speaker=speaker,
+            pauses=pauses,
+            asymmetry=asymmetry,
+        )
     sentences = sentences_of(text)
     chosen = voice_named(voice) if isinstance(voice, str) else voice or default_voice()
     loaded = model if isinstance(model, Model) else load_model(model)
     speaker_map(loaded.speakers, speaker)  # an unknown one is reported before anything is spoken
-    sound, speech, units = _said(sentences, chosen, lexicon)
-    style = {"pauses": pauses, "asymmetry": asymmetry}
+    sound, units = _said(sentences, chosen, lexicon)
+    sound = quantise(_with_floor(sound, units))
     request = SpeechRequest(
-        _with_floor(speech, units), units=units, speaker=speaker, onto=onto, onto_speaker=onto_speaker, **style
+        at_speech_rate(sound),
+        units=units,
+        speaker=speaker,
+        onto=onto,
+        onto_speaker=onto_speaker,
+        pauses=pauses,
+        asymmetry=asymmetry,
     )
     return SpokenText(sound, animate(request, model=loaded, constraints=constraints))
 
@@ -102,29 +121,24 @@ def read_text(path: Path) -> str:
     return read_text_file(path, "text", LARGEST_TEXT)
 
 
-def _said(
-    sentences: Sequence[str], voice: SyntheticVoice, lexicon: Lexicon | None
-) -> tuple[Audio, Audio, Timeline[Unit]]:
-    """Return sentences one after the other: at the synthesiser's rate, at 16 kHz, and their phones in time."""
+def _said(sentences: Sequence[str], voice: SyntheticVoice, lexicon: Lexicon | None) -> tuple[Audio, Timeline[Unit]]:
+    """Return sentences one after the other, at the synthesiser's rate or 16 kHz, and their phones in time."""
     sounds: list[_Part] = []
-    speech: list[_Part] = []
     spans: list[Span[Unit]] = []
     rate_hz, at = SPEECH_RATE_HZ, 0
     for start in range(0, len(sentences), AT_ONCE):
         with closing(voiced_sentences(sentences[start : start + AT_ONCE], voice, lexicon)) as said:
             for sentence in said:
                 sound = sentence.own_sound()
+                sound = sentence.audio if sound.rate_hz < SPEECH_RATE_HZ else sound
                 if not spans:
                     rate_hz = sound.rate_hz
                     at = _rest_samples(sentence.units[0], rate_hz)
                 sounds.append((at, sound.samples))
-                speech.append((round(at / rate_hz * SPEECH_RATE_HZ), sentence.audio.samples))
                 spans += sentence.units.shifted(at / rate_hz)
                 at += len(sound.samples)
     count = at + _rest_samples(spans[-1], rate_hz)
-    units = Timeline(tuple(_joined(spans, count / rate_hz)))
-    whole = Audio(_placed(sounds, count), rate_hz)
-    return whole, Audio(_placed(speech, round(count / rate_hz * SPEECH_RATE_HZ)), SPEECH_RATE_HZ), units
+    return Audio(_placed(sounds, count), rate_hz), Timeline(tuple(_joined(spans, count / rate_hz)))
 
 
 def _rest_samples(edge: Span[Unit], rate_hz: int) -> int:
@@ -148,7 +162,7 @@ def _with_floor(speech: Audio, units: Timeline[Unit]) -> Audio:
     spoken = [span for span in units if not is_silent(span.label.phone)]
     slices = [samples[round(span.start_s * rate_hz) : round(span.end_s * rate_hz)] for span in spoken]
     power = sum(float(part @ part) for part in slices) / max(sum(map(len, slices)), 1)
-    gain = np.float32(np.sqrt(power) * 10 ** (-FLOOR_DB / 20))
+    gain = np.float32(np.sqrt(power * rate_hz / SPEECH_RATE_HZ) * 10 ** (-FLOOR_DB / 20))
     rng = np.random.default_rng(0)
     for start in range(0, len(samples), BLOCK):
         part = samples[start : start + BLOCK]

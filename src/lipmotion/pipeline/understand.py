@@ -27,6 +27,7 @@ from lipmotion.speech.recogniser import RECOGNISER_KINDS, Recogniser, cached_rec
 from lipmotion.speech.recognition import Recognition, level_range_db
 from lipmotion.storage.sources import is_file
 from lipmotion.types import (
+    FRAME_RATE_HZ,
     Audio,
     Features,
     Monitor,
@@ -172,7 +173,29 @@ def speech_of(engine: Animator[Any], audio: Audio, features: Features, units: Ti
     """Return speech of features and phones in time, with F0 and spectrum of the recording if the engine needs them."""
     f0 = log_f0(audio) if isinstance(engine, WantsF0) and engine.wants_f0 else None
     hears = isinstance(engine, HearsConditions) and engine.conditions(np.inf)
-    return Speech(features, units, f0, spectrum=analysed(audio).spectrum if hears else None)
+    spectrum = analysed(audio).spectrum if hears else None
+    return with_units(Speech(features, Timeline(()), f0, spectrum=spectrum), units)
+
+
+def with_units(speech: Speech, units: Timeline[Unit]) -> Speech:
+    """Return speech with other phones in time, which are known or recognised as their labels say.
+
+    Where only some of them are known, those of a user who corrected the others, ``confidence`` is one of each frame.
+    """
+    found = [span.label.confidence for span in units]
+    first = found[0] if found else None
+    if found.count(first) == len(found):
+        return replace(speech, units=units, units_known=first is None, confidence=1.0 if first is None else first)
+    confidence = np.ones(len(speech.features.values))
+    for span, sure in zip(units, found, strict=True):
+        frames = np.ceil(np.array([span.start_s, span.end_s]) * FRAME_RATE_HZ - 1e-6).astype(int)
+        confidence[slice(*np.clip(frames, 0, len(confidence)))] = 1.0 if sure is None else sure
+    return replace(speech, units=units, units_known=False, confidence=confidence)
+
+
+def recognised_with(units: Timeline[Unit], confidence: float) -> Timeline[Unit]:
+    """Return phones in time as recognised ones of a confidence."""
+    return Timeline(tuple(replace(span, label=replace(span.label, confidence=confidence)) for span in units))
 
 
 def recognised_speech(
@@ -198,11 +221,11 @@ def recognised_speech(
     if recognised is not None:
         try:
             units = phones.align_phones(audio, features, recognised)
-            return replace(speech, units=units, units_known=False, confidence=0.0)
+            return with_units(speech, recognised_with(units, 0.0))
         except AlignmentError:
             pass
     found = recognise()
-    return replace(speech, units=found.units, units_known=False, confidence=found.reliability)
+    return with_units(speech, recognised_with(found.units, found.reliability))
 
 
 def _words(

@@ -11,6 +11,8 @@ Array = NDArray[np.float64]
 
 USUAL_RATES_HZ = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 90.0, 100.0, 120.0, 240.0)
 """Frame rates of cameras and of motion capture."""
+TELEVISION_RATES_HZ = tuple(whole * 1000 / 1001 for whole in (24, 30, 48, 60, 120, 240))
+"""Rates that even rows have where none of the usual ones fits."""
 NEAR_RATE = 0.15
 """Uneven rows whose median rate is this near to a usual one, as a share, are put on a grid of that rate. Times stay."""
 EVEN_SHARE = 0.1
@@ -21,6 +23,15 @@ LONGEST_GAP = 3
 """Most frames of the steady rate for each row: a table whose time is mostly gaps is refused."""
 SPARE_FRAMES = 600
 """Frames of gaps that are allowed besides, so that a short take may have a long gap."""
+
+
+def exact_rate(hertz: float, off_hz: float = 1e-6) -> float:
+    """Return a rate of television, N · 1000 / 1001 (29.97), that a rounded rate stands for, else the same rate.
+
+    off_hz : by how much rounding may have changed it
+    """
+    television = float(np.rint(hertz * 1.001)) * 1000 / 1001
+    return television if television and abs(television - hertz) <= off_hz else hertz
 
 
 def steady_rows(time_s: Array, rows: Array) -> tuple[Array, float]:
@@ -39,10 +50,11 @@ def steady_rows(time_s: Array, rows: Array) -> tuple[Array, float]:
         raise InputError(f"the time of row {row} is not after that of the row before, required: times that increase")
     passed_s = time_s - time_s[0]
     mean_hz = (len(time_s) - 1) / float(passed_s[-1])
-    usual_hz = min(USUAL_RATES_HZ, key=lambda usual: abs(usual - mean_hz))
-    off, usual_off = (_unevenness(passed_s, hertz) for hertz in (mean_hz, usual_hz))
-    if min(off, usual_off) <= EVEN_SHARE:
-        return rows, usual_hz if usual_off <= 2 * off + ROUNDING else round(mean_hz, 6)
+    known_hz = [min(rates, key=lambda usual: abs(usual - mean_hz)) for rates in (USUAL_RATES_HZ, TELEVISION_RATES_HZ)]
+    off, *known_off = (_unevenness(passed_s, hertz) for hertz in (mean_hz, *known_hz))
+    if min(off, known_off[0]) <= EVEN_SHARE:
+        fits = (hertz for hertz, each in zip(known_hz, known_off, strict=True) if each <= 2 * off + ROUNDING)
+        return rows, next(fits, round(mean_hz, 6))
     hertz = _usual(1 / float(np.median(steps)))
     frames = round(float(passed_s[-1]) * hertz) + 1
     if frames > LONGEST_GAP * len(time_s) + SPARE_FRAMES:

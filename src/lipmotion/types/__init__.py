@@ -1,6 +1,6 @@
 """Data types of the whole package: frozen values without files, and without computation beyond interpolation."""
 
-from lipmotion.types.audio import Audio
+from lipmotion.types.audio import Audio, from_sixteen_bits, sixteen_bits
 from lipmotion.types.configuration import Configuration, Rule, option
 from lipmotion.types.explanation import (
     ChainPosteriors,
@@ -80,9 +80,11 @@ __all__ = [
     "check_curves",
     "check_magnitude",
     "frame_of",
+    "from_sixteen_bits",
     "in_order",
     "option",
     "silent_monitor",
+    "sixteen_bits",
     "sub_monitor",
     "with_progress",
 ]

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+FULL_SCALE = 32_768
+"""The 16-bit value of a sample of 1, which is one more than there is."""
+
 
 @dataclass(frozen=True, eq=False)
 class Audio:
@@ -27,3 +30,13 @@ class Audio:
     def duration_s(self) -> float:
         """Duration in seconds."""
         return len(self.samples) / self.rate_hz
+
+
+def sixteen_bits(samples: NDArray[np.float32]) -> NDArray[np.int16]:
+    """Return samples in 16 bits, as files hold them; what is beyond full scale is clipped."""
+    return np.clip(np.rint(samples * FULL_SCALE), -FULL_SCALE, FULL_SCALE - 1).astype(np.int16)
+
+
+def from_sixteen_bits(values: NDArray[np.int16]) -> NDArray[np.float32]:
+    """Return the samples that 16-bit values stand for; they become the same values again."""
+    return values.astype(np.float32) / np.float32(FULL_SCALE)

@@ -41,7 +41,8 @@ class Speech:
                   does not use F0)
     units_known : whether the units are given, labelled, or aligned to known words; False: they were recognised
     spectrum    : float32 array [shape=(T, 40)], the normalised log mel spectrum (None: the engine does not use it)
-    confidence  : 0 to 1, how well recognised units are confirmed by words; 1 where the units are known
+    confidence  : 0 to 1, how well recognised units are confirmed by words; 1 where the units are known. One number, or
+                  one of each frame [shape=(T,)] where somebody has corrected some of the recognised units
     prior       : what another model makes of the same speech, on which this engine's model stands (None: on none)
     """
 
@@ -50,8 +51,13 @@ class Speech:
     log_f0: NDArray[np.float32] | None = None
     units_known: bool = True
     spectrum: NDArray[np.float32] | None = None
-    confidence: float = 1.0
+    confidence: float | NDArray[np.float64] = 1.0
     prior: PriorOutput | None = None
+
+    @property
+    def units_decide(self) -> bool:
+        """Whether engines that recognise units themselves must take these: all, or some of them, are known."""
+        return self.units_known or isinstance(self.confidence, np.ndarray)
 
 
 @dataclass(frozen=True, eq=False)

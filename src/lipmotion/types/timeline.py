@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Generic, TypeVar
 
 from lipmotion.errors import InputError, shortened
@@ -39,6 +39,8 @@ class Unit:
     phone : one of the 47 phones of the inventory; empty where a model recognised a unit that several phones share
     unit  : full-context name of the unit (``sil-p+aa``), or its name alone (``bilabial``) where there is no phone
     word  : the word that contains the phone; empty where it is not known
+    confidence : of a recognised phone, 0 to 1: how well words confirm it; None: the phone is known (given, labelled, or
+                 aligned to known words)
 
     >>> Unit("p", "sil-p+l", "please")
     Unit(phone='p', unit='sil-p+l', word='please')
@@ -47,6 +49,7 @@ class Unit:
     phone: str
     unit: str = ""
     word: str = ""
+    confidence: float | None = field(default=None, repr=False)
 
 
 @dataclass(frozen=True)

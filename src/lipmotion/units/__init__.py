@@ -15,6 +15,7 @@ from lipmotion.units.phones import (
     most_similar_phone,
     unknown_phone_message,
 )
+from lipmotion.units.recognised import RECOGNISED, RecognisedPhone, recognised_phones, with_confidences
 from lipmotion.units.transcript import words_in, words_of
 from lipmotion.units.unit_set import UnitSet
 from lipmotion.units.unit_sets import UNIT_SETS, unit_set
@@ -25,6 +26,7 @@ __all__ = [
     "LIP_CLOSING",
     "PAUSE",
     "PHONES",
+    "RECOGNISED",
     "SILENCE",
     "SIMILAR_PHONES",
     "UNIT_SETS",
@@ -32,6 +34,7 @@ __all__ = [
     "VISEME_OF",
     "Lexicon",
     "Pronunciation",
+    "RecognisedPhone",
     "UnitSet",
     "check_phones",
     "check_text",
@@ -41,8 +44,10 @@ __all__ = [
     "most_similar_phone",
     "phone_classes",
     "phone_named",
+    "recognised_phones",
     "unit_set",
     "unknown_phone_message",
+    "with_confidences",
     "with_reduced_vowels",
     "without_gaps",
     "words_in",

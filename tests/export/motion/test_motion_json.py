@@ -47,6 +47,9 @@ WRONG: list[tuple[dict[str, object], str]] = [
     ({"values": [[float("nan"), 1.0]]}, "not finite"),
     ({"units": [{"start_s": 0.3, "end_s": 0.1, "phone": "m", "unit": "m"}]}, "before its start"),
     ({"units": 3}, "damaged"),
+    ({"recognised": 3}, "damaged"),
+    ({"recognised": [[0.0, 0.3, "sil"]]}, "damaged"),
+    ({"recognised": [[0.0, 0.3, "sil", 1.5]]}, "the confidence 1.5, required 0 to 1"),
 ]
 
 

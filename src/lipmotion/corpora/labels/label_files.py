@@ -13,7 +13,17 @@ from lipmotion.corpora.labels.plain_text import check_no_labels
 from lipmotion.corpora.labels.recognised_words import is_json, parse_recognised
 from lipmotion.corpora.labels.subtitles import is_subtitles, parse_subtitles
 from lipmotion.corpora.labels.textgrid import MARK, is_textgrid, parse_interval_tiers
-from lipmotion.corpora.labels.tier import LabelTier, holds_phones, is_named_as_words, phone_timeline, tier_transcript
+from lipmotion.corpora.labels.tier import (
+    LabelTier,
+    holds_phones,
+    is_named_as_phones,
+    is_named_as_recognised,
+    is_named_as_words,
+    phone_timeline,
+    tier_transcript,
+    with_recognised,
+    with_words,
+)
 from lipmotion.corpora.labels.timed_lines import parse_timed_lines
 from lipmotion.corpora.labels.word_lists import is_ctm, parse_ctm
 from lipmotion.errors import InputError
@@ -132,6 +142,8 @@ def read_transcript(path: Path) -> str | TimedTranscript:
 def read_phones(path: Path) -> Timeline[Unit]:
     """Return the phones in time of a TextGrid or of a file of labels with times; they may have gaps.
 
+    Those of a TextGrid have the words of its tier of words, and are recognised, not known, where its tier of recognised
+    phones has the same.
     Vowels stay as they are labelled, whatever words another tier has; the end of the last phone may be infinite.
     Raises InputError: no such file, as ``read_labels``, or no phones in time.
     """
@@ -144,13 +156,18 @@ def read_phones(path: Path) -> Timeline[Unit]:
     else:
         lines = parse_timed_lines(text, where)
         tiers = [lines] if lines is not None else []
-    phones = _tiers_of_phones(tiers, where)
+    silent = [tier for tier in tiers if is_named_as_phones(tier) and tier.labels]
+    phones = _tiers_of_phones(tiers, where) or silent
     if not phones:
         raise InputError(
             f"{where}: holds no phones in time, required a motion file (.json, .npz), a TextGrid with a tier of "
             "phones, or labels with times, one phone a line"
         )
-    return phone_timeline(phones[0], None, where, with_gaps=True)
+    units = phone_timeline(phones[0], None, where, with_gaps=True)
+    words = next(filter(is_named_as_words, tiers), None)
+    recognised = next(filter(is_named_as_recognised, tiers), None)
+    units = units if words is None else with_words(units, words)
+    return units if recognised is None else with_recognised(units, recognised)
 
 
 def _tiers_of_phones(tiers: list[LabelTier], where: str) -> list[LabelTier]:
@@ -213,7 +230,8 @@ def check_size(path: Path, text: str) -> None:
 def _chosen(tiers: list[LabelTier], where: str) -> RecordingLabels:
     """Return the phones of the only tier of phones, and the words of the tier named so, else of the first other."""
     phones = _tiers_of_phones(tiers, where)
-    others = [tier for tier in tiers if tier not in phones and any(label.text for label in tier.labels)]
+    passed_over = (*phones, *filter(is_named_as_recognised, tiers))
+    others = [tier for tier in tiers if tier not in passed_over and any(label.text for label in tier.labels)]
     words = next(filter(is_named_as_words, others), others[0] if others else None)
     if not phones and words is None:
         return RecordingLabels()

@@ -4,13 +4,23 @@ from __future__ import annotations
 
 import math
 import re
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from lipmotion.errors import InputError, shortened
+from lipmotion.printable import is_line
 from lipmotion.types import Span, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
-from lipmotion.units import PHONES, SILENCE, is_silent, phone_named, with_reduced_vowels
+from lipmotion.units import (
+    PHONES,
+    RECOGNISED,
+    SILENCE,
+    RecognisedPhone,
+    is_silent,
+    phone_named,
+    with_confidences,
+    with_reduced_vowels,
+)
 from lipmotion.units.spoken_text import line_words
 
 SILENCES = frozenset(["", *"sil sp spn pau ssil nsn h# #h # _ - silence <sil> <p:> {sil} [sil] <eps>".split()])
@@ -22,6 +32,8 @@ ROUNDING_S = 1e-3
 IN_CONTEXT = re.compile(r"[^-+]*-([^-+]+)\+.*")
 """Triphones and full-context labels of HTK and HTS: ``t-iy+n``, ``x^sil-hh+iy=t@...``."""
 STATE_NUMBER = re.compile(r"\[(\d{1,9})\]$")
+RECOGNISED_LABEL = re.compile(r"(\S+) (0|1|1\.0|0\.\d+|\d(?:\.\d+)?e-\d+)")
+"""A phone or unit, and its confidence from 0 to 1."""
 MOST_LABELS = 250_000
 """Most labels of a file: phones of five hours of speech."""
 REDUCED_VOWELS = frozenset({"ax", "axr", "ix"})
@@ -64,14 +76,45 @@ def holds_phones(tier: LabelTier) -> bool:
     spoken = [label for label in tier.labels if not _is_silence(label.text)]
     if not spoken or is_named_as_words(tier):
         return False
-    if re.search(r"phone|segment|\bmau\b", tier.name.lower()):
+    if is_named_as_phones(tier):
         return True
     return sum(_phone(label.text) is not None for label in spoken) >= PHONES_SHARE * len(spoken)
+
+
+def is_named_as_phones(tier: LabelTier) -> bool:
+    """Return whether a tier's name says that it holds phones."""
+    return re.search(r"phone|segment|\bmau\b", tier.name.lower()) is not None
 
 
 def is_named_as_words(tier: LabelTier) -> bool:
     """Return whether a tier's name says that it holds words."""
     return re.search(r"\bwords?\b|transcript|\bort", tier.name.lower()) is not None
+
+
+def is_named_as_recognised(tier: LabelTier) -> bool:
+    """Return whether a tier's name says that it holds the phones as they were recognised (``units.recognised``)."""
+    return tier.name == f"tier {RECOGNISED!r}"
+
+
+def with_recognised(units: Timeline[Unit], tier: LabelTier) -> Timeline[Unit]:
+    """Return phones in time in which those of a tier of recognised ones have their confidence; the others are known."""
+    found = [(label, RECOGNISED_LABEL.fullmatch(label.text)) for label in tier.labels]
+    rows = (RecognisedPhone(label.start_s, label.end_s, match[1], float(match[2])) for label, match in found if match)
+    return with_confidences(units, rows)
+
+
+def with_words(units: Timeline[Unit], tier: LabelTier) -> Timeline[Unit]:
+    """Return phones in time, each with the word of a tier in which its middle lies; silence has none."""
+    starts_s = [label.start_s for label in tier.labels]
+    spans = []
+    for span in units:
+        middle_s = (span.start_s + span.end_s) / 2
+        place = bisect_right(starts_s, middle_s) - 1
+        inside = place >= 0 and middle_s < tier.labels[place].end_s and not is_silent(span.label.phone)
+        word = tier.labels[place].text if inside else ""
+        said = word if is_line(word) and not _is_silence(word) else ""
+        spans.append(replace(span, label=replace(span.label, word=said)))
+    return Timeline(tuple(spans))
 
 
 def tier_transcript(tier: LabelTier, where: str) -> TimedTranscript:

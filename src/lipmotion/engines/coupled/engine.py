@@ -32,7 +32,6 @@ from lipmotion.types import (
     Explanation,
     Generation,
     Monitor,
-    Span,
     Speech,
     StateTrace,
     Timeline,
@@ -95,7 +94,7 @@ class CoupledEngine(Engine[CoupledModel]):
     def lattice(self, model: CoupledModel, speech: Speech, wanted: slice) -> Lattice:
         """Return the lattice of some frames: joint states near the phones of a transcript, or all without one."""
         chains = model.chains
-        if not speech.units_known:
+        if not speech.units_decide:
             return chains.full_lattice
         frames = len(speech.features.values)
         allowed = allowed_units(chains.structure, speech.units, frames)[wanted]
@@ -161,8 +160,5 @@ def _with_units(model: CoupledModel, units: Timeline[Unit]) -> Timeline[Unit]:
     """Return the phones with the names of the units that model them, one for each chain, joined by ``/``."""
     chains = model.chains.structure.chains
     return Timeline(
-        tuple(
-            Span(s.start_s, s.end_s, Unit(s.label.phone, "/".join(c.unit(s.label.phone) for c in chains), s.label.word))
-            for s in units
-        )
+        tuple(replace(s, label=replace(s.label, unit="/".join(c.unit(s.label.phone) for c in chains))) for s in units)
     )

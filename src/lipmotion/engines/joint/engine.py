@@ -187,7 +187,7 @@ class JointEngine(Engine[JointModel]):
 
     def generate(self, model: JointModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         observations = self._observations(speech)
-        if self.config.recognise_units and not speech.units_known:
+        if self.config.recognise_units and not speech.units_decide:
             units, paths = self._recognised(model, observations, speech.features.duration_s)
         else:
             units, paths = speech.units, [_aligned(model, observations, speech.units)]
@@ -249,7 +249,7 @@ class JointEngine(Engine[JointModel]):
         """Return the recognised units in time, and the state sequences from which motion is generated."""
         recogniser = joint_recogniser(model.hmm)
         segments = recogniser.recognise(observations)
-        units = units_in_time(segments, duration_s, model.units.label)
+        units = units_in_time(segments, duration_s, lambda unit: replace(model.units.label(unit), confidence=0.0))
         if self.config.paths > 1:
             return units, recogniser.sampled_paths(observations, self.config.paths, self.config.seed)
         bounds = np.array([*(segment.first for segment in segments), observations.frames])

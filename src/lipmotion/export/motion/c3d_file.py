@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
+from lipmotion.rig.steady_rate import exact_rate
 
 Array = NDArray[np.float64]
 Values = list[str] | NDArray[np.floating[Any]] | NDArray[np.integer[Any]]
@@ -114,7 +115,14 @@ def _content(found: dict[str, Values], rows: Array, points: int, scale: float, r
     units = [*_texts(found, "ANALOG.UNITS"), *[""] * curves.shape[1]][: curves.shape[1]]
     unit, software = (next(iter(_texts(found, name)), "") for name in ("POINT.UNITS", "MANUFACTURER.SOFTWARE"))
     return C3dFile(
-        tuple(labels), places, float(f"{rate_hz:.6g}"), unit or "mm", software, curves, tuple(names), tuple(units)
+        tuple(labels),
+        places,
+        exact_rate(float(f"{rate_hz:.7g}"), 5e-6),
+        unit or "mm",
+        software,
+        curves,
+        tuple(names),
+        tuple(units),
     )
 
 

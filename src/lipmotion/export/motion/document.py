@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError, shortened
 from lipmotion.printable import is_line
 from lipmotion.types import Channel, Generation, Motion, Span, Timeline, Unit
+from lipmotion.units import RECOGNISED, RecognisedPhone, recognised_phones, with_confidences
 
 FORMAT = "lipmotion.motion"
 VERSION = 1
@@ -29,10 +30,12 @@ def header(generation: Generation) -> dict[str, Any]:
 
 
 def units_and_origin(generation: Generation, source: Mapping[str, str], model: Mapping[str, str]) -> dict[str, Any]:
-    """Return the members ``units``, ``outlook`` (if it is known), ``source`` and ``model``."""
+    """Return the members ``units``, ``recognised`` (if phones were), ``outlook`` (if known), ``source``, ``model``."""
     outlook = {} if generation.outlook is None else {"outlook": asdict(generation.outlook)}
-    units = [_row(span) for span in generation.units]
-    return {"units": units, **outlook, "source": dict(source), "model": dict(model)}
+    units: dict[str, Any] = {"units": [_row(span) for span in generation.units]}
+    if recognised := recognised_phones(generation.units):
+        units[RECOGNISED] = recognised
+    return {**units, **outlook, "source": dict(source), "model": dict(model)}
 
 
 def parse(document: Any, values: Any) -> tuple[Motion, Timeline[Unit]]:
@@ -44,7 +47,7 @@ def parse(document: Any, values: Any) -> tuple[Motion, Timeline[Unit]]:
     try:
         channels = tuple(Channel(str(channel["name"]), str(channel["unit"])) for channel in document["channels"])
         motion = Motion(_array(values, len(channels)), float(document["rate_hz"]), channels)
-        return motion, parse_units(document["units"])
+        return motion, parse_units(document["units"], document.get(RECOGNISED, ()))
     except InputError:
         raise
     except KeyError as error:
@@ -53,13 +56,15 @@ def parse(document: Any, values: Any) -> tuple[Motion, Timeline[Unit]]:
         raise InputError(f"the motion document is damaged ({error}); export it again") from error
 
 
-def parse_units(rows: Any) -> Timeline[Unit]:
+def parse_units(rows: Any, recognised: Any = ()) -> Timeline[Unit]:
     """Return the units of the member ``units``: objects with ``start_s``, ``end_s`` and ``phone`` or ``unit``.
 
+    recognised : the member ``recognised``, where there is one: units that are in it, too, are not known
     Raises InputError: rows of another kind, without a time or a name, or with times that no recording has.
     """
     try:
-        return Timeline(tuple(_span(row) for row in rows))
+        units = Timeline(tuple(_span(row) for row in rows))
+        return with_confidences(units, [_recognised(*row) for row in recognised])
     except InputError:
         raise
     except KeyError as error:
@@ -104,3 +109,11 @@ def _span(row: Any) -> Span[Unit]:
             f"the unit {span.label.phone!r} lasts from {span.start_s} to {span.end_s} s, required: finite times from 0"
         )
     return span
+
+
+def _recognised(start_s: Any, end_s: Any, name: Any, confidence: Any) -> RecognisedPhone:
+    """Return a row of the member ``recognised``. Raises ValueError, TypeError: it is none."""
+    phone = RecognisedPhone(float(start_s), float(end_s), str(name), float(confidence))
+    if not 0 <= phone.confidence <= 1:
+        raise ValueError(f"the confidence {phone.confidence}, required 0 to 1")
+    return phone

@@ -19,7 +19,7 @@ from lipmotion.export.base import MotionFormat
 from lipmotion.export.motion.rounded import formatted_rows
 from lipmotion.rig.live_link_table import is_live_link, read_live_link
 from lipmotion.rig.shape_names import ARKIT_MOUTH, ARKIT_OTHERS
-from lipmotion.rig.steady_rate import steady_rows
+from lipmotion.rig.steady_rate import exact_rate, steady_rows
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Generation, Motion, Timeline, Unit
 
 LONGEST_HEAD = 1 << 20
@@ -117,7 +117,7 @@ def _rate(time_s: NDArray[np.float64]) -> float:
     step_s = (time_s[-1] - time_s[0]) / (len(time_s) - 1)
     if time_s[0] != 0 or not step_s > 0 or np.abs(np.diff(time_s) - step_s).max() > 1e-6:
         raise InputError("the column time_s must begin at 0 and rise in even steps")
-    return round(float(1 / step_s), 6)
+    return exact_rate(round(float(1 / step_s), 6))
 
 
 MOTION_FORMAT = MotionFormat(write, read, check)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import ExportError, InputError, shortened
 from lipmotion.export.base import MotionFormat
 from lipmotion.rig.facial_animation import FAP, PARAMETERS
+from lipmotion.rig.steady_rate import exact_rate
 from lipmotion.types import Channel, Generation, Motion, Timeline, Unit
 
 VERSION = "2.1"
@@ -68,7 +69,7 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
         raise InputError(f"not a file of facial animation parameters ({error}); export it again") from error
     numbers = np.flatnonzero(used) + 1
     channels = tuple(Channel(NAMES.get(int(number), f"fap{number}"), FAP) for number in numbers)
-    return Motion(held[:, numbers - 1].astype(np.float64), float(rate), channels), Timeline(())
+    return Motion(held[:, numbers - 1].astype(np.float64), exact_rate(float(rate)), channels), Timeline(())
 
 
 def _frames(lines: Iterator[str], count: int) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:

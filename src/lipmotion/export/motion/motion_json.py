@@ -13,6 +13,7 @@ from lipmotion.export.motion.json_stream import read_members
 from lipmotion.export.motion.rounded import formatted_rows
 from lipmotion.storage.json_text import as_json
 from lipmotion.types import Generation, Motion, Timeline, Unit
+from lipmotion.units import RECOGNISED
 
 
 def write(path: Path, generation: Generation, source: Mapping[str, str], model: Mapping[str, str]) -> None:
@@ -54,7 +55,7 @@ def read_units(path: Path) -> Timeline[Unit] | None:
         return None
     if document is None or "units" not in document or "channels" in document:
         return None
-    return parse_units(document["units"])
+    return parse_units(document["units"], document.get(RECOGNISED, ()))
 
 
 MOTION_FORMAT = MotionFormat(write, read, units=read_units)
