@@ -159,9 +159,6 @@ def test_an_edited_value_is_the_only_one_that_changes(
     assert (after - before)[50, columns] == pytest.approx(0.125, abs=1e-5)
 
 
-@pytest.mark.xfail(
-    strict=True, reason="without a sound, brows and head follow the opening against 3 s around (liveliness._beats)"
-)
 def test_an_edited_opening_leaves_brows_alone_that_are_far_away(generation: Generation, tmp_path: Path) -> None:
     values = generation.motion.values.copy()
     values[20:25, generation.motion.column("opening")] += 0.3

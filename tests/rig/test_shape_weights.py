@@ -119,8 +119,8 @@ def _of(displacements, gap):
     places = np.concatenate([rest, places])
     channels = [Channel(f"{axis}_{point}") for point in template.points for axis in "xyz"]
     opening = np.concatenate([np.zeros(30), np.maximum(gap, 0)])[:, None]
-    values = np.concatenate([opening, places.reshape(len(places), -1)], axis=1)
-    return Motion(values, 100.0, (Channel("opening"), *channels))
+    values = np.concatenate([opening, opening, places.reshape(len(places), -1)], axis=1)
+    return Motion(values, 100.0, (Channel("opening"), Channel("lip_gap"), *channels))
 
 
 def _phones():

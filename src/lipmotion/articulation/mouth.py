@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import GAP, closed_lips, gap_in, in_pictures
+from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER
 from lipmotion.articulation.phone_targets import GESTURES, OVAL, PURSED, TIP_OUT, TIP_UP, gesture_curves
 from lipmotion.articulation.rest import against_rest, rest_frames
 from lipmotion.errors import InputError
@@ -42,6 +43,8 @@ UPPER_MOST, UPPER_RATE = 0.058, 5.2
 """The upper lip rises by at most the first length (5 mm), for small gaps by the product of both times the gap."""
 JAW_SHARE = 0.85
 """Share of the lower lip's way that the chin goes: the lip also turns outwards."""
+CORNERS = (f"x_{RIGHT_CORNER}", f"x_{LEFT_CORNER}")
+"""Where the lip corners are across, in motion that has points."""
 DRAWN = ("opening", "width", "outer", "y_152", *GESTURES)
 """The channels of motion that are used."""
 
@@ -212,6 +215,9 @@ def _most_beside_tucks(gap: Curve, tuck: Curve, time_s: Curve) -> Curve:
 def _width(motion: Motion, rest: NDArray[np.bool_], said: dict[str, Curve], oval: Curve) -> Curve:
     if "width" in motion.names:
         change = against_rest("width", motion["width"].astype(np.float64), rest) - 1
+    elif {*CORNERS} <= {*motion.names}:
+        apart = (motion[CORNERS[1]] - motion[CORNERS[0]]).astype(np.float64)
+        change = against_rest("distance of the lip corners", apart, rest) - 1
     else:
         change = -0.25 * np.clip(motion["opening"].astype(np.float64), 0, 0.4)
     width = 1 + WIDTH_REACH * np.tanh(change / WIDTH_REACH)

@@ -344,7 +344,8 @@ def _motion_files(
         asked = asked if named or isinstance(curves, DrivenCharacter) else names
         channels = names if channels is None else channels
     chosen = spoken.selected(channels) if channels is not None else spoken
-    chosen = chosen if rate_hz is None else resampled_curves(chosen, spoken, rate_hz)
+    if rate_hz is not None:
+        chosen = chosen.resampled(rate_hz) if curves is None else resampled_curves(chosen, spoken, rate_hz)
     written = {path: in_format(path, spoken, chosen, rate_hz, staging, prosody, named) for path in files}
     for path, each in written.items():
         warn_of_unused(path, each, asked)

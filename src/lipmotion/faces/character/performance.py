@@ -18,6 +18,8 @@ SPREAD_RISE = 0.52
 """Part of the gap by which the upper lip rises where lips are spread: the upper teeth show more than the lower ones."""
 BITTEN_GAP = (0.12, 0.2)
 """Teeth stay together up to the first gap, and part until the second one."""
+BITTEN = (0.8, 0.95)
+"""Teeth are apart up to the first value of ``teeth``, and together from the second on."""
 NARROW, WIDE = 0.16, 0.12
 """Changes of width at which lips are round, and spread, whatever the phones ask for."""
 
@@ -46,8 +48,8 @@ def posed(mouth: SpokenMouth, moved: Liveliness) -> list[CharacterPose]:
     roundness = np.maximum(mouth.protrusion, 0.4 * np.clip(-change / NARROW, 0, 1) * (1 - spread))
     wide = np.clip(np.maximum(spread, np.clip(change / WIDE, 0, 1)) - roundness, 0, 1)
     together = np.clip((BITTEN_GAP[1] - gap) / np.ptp(BITTEN_GAP), 0, 1)
-    teeth = np.clip(2 * mouth.teeth - 1, 0, 1)
-    bite = np.maximum(teeth, 0.6 * spread) * together
+    teeth = np.clip((mouth.teeth - BITTEN[0]) / (BITTEN[1] - BITTEN[0]), 0, 1)
+    bite = np.maximum(teeth, 0.5 * spread) * together
     closing, out = mouth.closing, mouth.between_teeth * (1 - mouth.closing)
     curves = {
         "gap": gap,

@@ -21,7 +21,7 @@ Real = NDArray[np.float64]
 FROM_POSE = {"tongueOut": "tongue_out", "tongueUp": "tongue_up", "mouthPressLeft": "press", "mouthPressRight": "press"}
 """Shapes whose weight is a number of the pose."""
 _NOT_OF_LIPS = ("eye", "brow", *FROM_POSE)
-APART = 12.0
+APART = 30.0
 """How much the distance between the lips counts against the places of their vertices."""
 COSTS = CurveCosts(ridge=1e-3, smooth=2e-3)
 
