@@ -8,13 +8,7 @@ from pathlib import Path
 from lipmotion.cli.delivery import add_delivery_arguments, delivery_of
 from lipmotion.cli.options import add_machine_readable
 from lipmotion.cli.paths import add_input, add_output
-from lipmotion.cli.speech import (
-    add_lexicon_argument,
-    add_model_argument,
-    add_recogniser_argument,
-    add_speaker_argument,
-    add_style_arguments,
-)
+from lipmotion.cli.speech import add_recognition_arguments, style_of
 from lipmotion.cli.staging import add_staging_arguments, staging_of
 from lipmotion.printable import printable
 
@@ -29,9 +23,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--to", default="json", metavar="KIND,KIND", help=kinds)
     parser.add_argument("--jobs", type=int, metavar="N", help="number of processes (default: one per core)")
     parser.add_argument("--cluster", default="", metavar="ADDRESS", help="Dask scheduler, as tcp://HOST:8786")
-    for add_argument in (add_recogniser_argument, add_model_argument, add_lexicon_argument, add_speaker_argument):
-        add_argument(parser)
-    add_style_arguments(parser)
+    add_recognition_arguments(parser)
     parser.add_argument("--rate", type=float, metavar="HZ", help="rate of motion files (default: --fps, or 100)")
     parser.add_argument("--fps", type=float, help="frames per second of videos (default: 25) and of cues (24)")
     parser.add_argument("--channels", metavar="NAME,NAME", help="write only these to motion files: opening,width,...")
@@ -61,8 +53,7 @@ def run(options: argparse.Namespace) -> None:
         kinds=tuple(options.to.split(",")),
         channels=tuple(options.channels.split(",")) if options.channels else (),
         articulation=options.articulation,
-        pauses=options.pauses,
-        asymmetry=options.asymmetry,
+        **style_of(options),
         rate_hz=rate_of(options),
         fps=options.fps,
         staging=staging_of(options),

@@ -9,13 +9,7 @@ from typing import TYPE_CHECKING
 from lipmotion.cli.options import add_machine_readable
 from lipmotion.cli.paths import add_input
 from lipmotion.cli.results import add_result_arguments, check_results, write_results
-from lipmotion.cli.speech import (
-    add_lexicon_argument,
-    add_model_argument,
-    add_onto_arguments,
-    add_speaker_argument,
-    add_style_arguments,
-)
+from lipmotion.cli.speech import add_text_arguments, style_of
 from lipmotion.printable import printable
 from lipmotion.storage.sources import is_file
 
@@ -32,9 +26,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--voice", metavar="NAME", help=named)
     add_input(parser, "--corpus", what="corpus", metavar="FOLDER", help="whose recordings speak, for --voice corpus")
     parser.add_argument("--voices", action="store_true", help="list the installed voices")
-    for add_argument in (add_lexicon_argument, add_model_argument, add_speaker_argument, add_onto_arguments):
-        add_argument(parser)
-    add_style_arguments(parser)
+    add_text_arguments(parser)
     suffixes = "FILE.mp4 .webm .mov %%05d.png .wav .flac .ogg .json .csv .npz .TextGrid .vtt, ... (docs/formats.md)"
     add_result_arguments(parser, suffixes, required=False)
     add_machine_readable(parser)
@@ -72,7 +64,6 @@ def _speak(options: argparse.Namespace, report: Report) -> None:
     model, corpus = load_model(options.model), Corpus.open(options.corpus) if options.corpus else None
     how = {"voice": options.voice, "corpus": corpus, "model": model, "lexicon": lexicon, "speaker": options.speaker}
     onto = options.onto or person_shown(model, options.face, options.speaker)
-    style = {"pauses": options.pauses, "asymmetry": options.asymmetry}
-    sound, result = speak(text, **how, onto=onto, onto_speaker=options.onto_speaker, **style)
+    sound, result = speak(text, **how, onto=onto, onto_speaker=options.onto_speaker, **style_of(options))
     write_results(options, result, sound, model, report)
     report.finish("\n".join(map(printable, options.output)), files=options.output, seconds=round(sound.duration_s, 3))

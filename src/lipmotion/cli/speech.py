@@ -55,12 +55,31 @@ def add_recording_arguments(parser: argparse.ArgumentParser, *, several: bool = 
     add_style_arguments(parser)
 
 
+def add_recognition_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add recogniser, model, lexicon, speaker and style, for many recordings."""
+    for add_argument in (add_recogniser_argument, add_model_argument, add_lexicon_argument, add_speaker_argument):
+        add_argument(parser)
+    add_style_arguments(parser)
+
+
+def add_text_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add lexicon, model, speaker, another person and style, for a text."""
+    for add_argument in (add_lexicon_argument, add_model_argument, add_speaker_argument, add_onto_arguments):
+        add_argument(parser)
+    add_style_arguments(parser)
+
+
 def add_style_arguments(parser: argparse.ArgumentParser) -> None:
     """Add ``--pauses`` and ``--asymmetry``: what the mouth does between phrases, and whether its sides differ."""
     styles = "rest: lips close softly in pauses (default); natural: as people do, who breathe and hold a sound"
     parser.add_argument("--pauses", choices=("rest", "natural"), default="rest", help=styles)
     lopsided = "0: both sides of the mouth move alike; 1: as on the speaker's own face (default: 0)"
     parser.add_argument("--asymmetry", type=float, default=0.0, metavar="X", help=lopsided)
+
+
+def style_of(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the arguments of ``add_style_arguments`` by their names in ``SpeechRequest``."""
+    return {"pauses": options.pauses, "asymmetry": options.asymmetry}
 
 
 def add_speaker_argument(parser: argparse.ArgumentParser) -> None:
@@ -138,6 +157,5 @@ def spoken_request(options: argparse.Namespace, words_beside: bool = False) -> S
         speaker=options.speaker,
         onto=options.onto,
         onto_speaker=options.onto_speaker,
-        pauses=options.pauses,
-        asymmetry=options.asymmetry,
+        **style_of(options),
     )
