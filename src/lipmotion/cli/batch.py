@@ -49,16 +49,16 @@ def run(options: argparse.Namespace) -> None:
     named = {
         name: getattr(options, name) or "" for name in ("recogniser", "speaker", "model", "lexicon", "face", "curves")
     }
+    files = {name: str(Path(text).absolute()) if Path(text).is_file() else str(text) for name, text in named.items()}
     settings = BatchSettings(
         kinds=tuple(options.to.split(",")),
         channels=tuple(options.channels.split(",")) if options.channels else (),
         articulation=options.articulation,
-        **style_of(options),
         rate_hz=rate_of(options),
         fps=options.fps,
         staging=staging_of(options),
         delivery=delivery_of(options),
-        **{name: str(Path(text).absolute()) if Path(text).is_file() else str(text) for name, text in named.items()},
+        **(style_of(options) | files),
     )
     with reporting(options) as report:
         found = batch(
