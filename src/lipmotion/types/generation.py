@@ -43,6 +43,7 @@ class Speech:
     spectrum    : float32 array [shape=(T, 40)], the normalised log mel spectrum (None: the engine does not use it)
     confidence  : 0 to 1, how well recognised units are confirmed by words; 1 where the units are known
     prior       : what another model makes of the same speech, on which this engine's model stands (None: on none)
+    voice       : 0 to 1, how well the model's training knows the voice
     """
 
     features: Features
@@ -52,6 +53,7 @@ class Speech:
     spectrum: NDArray[np.float32] | None = None
     confidence: float = 1.0
     prior: PriorOutput | None = None
+    voice: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from lipmotion.units.phones import (
 from lipmotion.units.transcript import words_in, words_of
 from lipmotion.units.unit_set import UnitSet
 from lipmotion.units.unit_sets import UNIT_SETS, unit_set
-from lipmotion.units.visemes import VISEME_OF, VISEMES
+from lipmotion.units.visemes import VISEME_OF, VISEMES, VOWELS
 from lipmotion.units.word_spans import words_in_time
 
 __all__ = [
@@ -29,6 +29,7 @@ __all__ = [
     "SIMILAR_PHONES",
     "UNIT_SETS",
     "VISEMES",
+    "VOWELS",
     "VISEME_OF",
     "Lexicon",
     "Pronunciation",
