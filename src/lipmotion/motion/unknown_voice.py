@@ -21,7 +21,7 @@ from lipmotion.types import EYE_DISTANCE, Timeline, Unit
 from lipmotion.units import VOWELS
 
 Array = NDArray[np.float64]
-LEAST_OPEN = 0.5
+LEAST_OPEN = 0.4
 """Share of the opening that the table of articulation gives a vowel, which a voice that training does not know has at
 least: what the model makes of its vowels is shut where it takes them for something else."""
 INSET_S = 0.03
@@ -77,7 +77,7 @@ def closing_reach_s(voice: float) -> float:
 
 
 def _strangeness(voice: float) -> float:
-    """Return how far the measures for unknown voices apply, 0 to 1; soon fully, where the voice is not the speaker's."""
+    """Return how far the measures for unknown voices apply, 0 to 1; more than half for voices half known."""
     return float(np.sqrt(1 - voice))
 
 

@@ -23,8 +23,9 @@ from lipmotion.speech.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.audio_files import SPEECH_RATE_HZ, read_audio
 from lipmotion.speech.f0 import log_f0
 from lipmotion.speech.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
-from lipmotion.speech.recogniser import RECOGNISER_KINDS, Recogniser, cached_recogniser
+from lipmotion.speech.recogniser import RECOGNISER_KINDS, Recogniser, cached_recogniser, voice_knowledge
 from lipmotion.speech.recognition import Recognition, level_range_db
+from lipmotion.speech.speaker_similarity import speaker_similarity
 from lipmotion.storage.sources import is_file
 from lipmotion.types import (
     Audio,
@@ -102,7 +103,18 @@ def understood_speech(
     understood = _understood(model, request, audio, _reported(each, audio.duration_s, monitor))
     if understood.is_without_speech:
         LOG.warning("no speech found in the recording: the mouth rests; give a recording in which something is said")
-    return replace(understood, speech=with_prior(model.prior, understood.speech))
+    speech = replace(with_prior(model.prior, understood.speech), voice=_voice(model, audio, understood))
+    return replace(understood, speech=speech)
+
+
+def _voice(model: Model, audio: AnalysedAudio, understood: UnderstoodSpeech) -> float:
+    """Return how well a model knows the voice of a recording, 0 to 1; 1 if its engine recognised the speaker."""
+    speech, found = understood.speech, understood.recognition
+    if not speech.features.values.any() or (found is None and not speech.units_known):
+        return 1.0
+    if found is not None and found.similarity is not None:
+        return voice_knowledge(found.similarity)
+    return voice_knowledge(speaker_similarity(model.phones, audio).score)
 
 
 def _reported(each: ParallelMap, duration_s: float, monitor: Monitor) -> ParallelMap:
