@@ -87,7 +87,7 @@ def test_jaw_and_lips_go_with_the_opening(welcome: Speech) -> None:
     np.testing.assert_allclose(slopes[1], slopes[0], rtol=0.15)
 
 
-def _distances(motion: Motion) -> tuple[NDArray[np.float64], ...]:
+def _distances(motion: Motion) -> tuple[NDArray[np.floating], ...]:
     return -motion["y_152"], motion["y_13"] - motion["y_14"]
 
 

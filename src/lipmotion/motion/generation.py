@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError, shortened
 from lipmotion.kernels.banded import generate
 from lipmotion.motion.articulation import ArticulationPrior
-from lipmotion.motion.closure import OPENING, Closure, closable_ranges, frames_to_close
+from lipmotion.motion.closure import OPENING, REACH_S, Closure, closable_ranges, frames_to_close
 from lipmotion.motion.limits import MotionLimits
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.unknown_voice import closing_reach_s, typical_range, with_open_vowels
@@ -87,15 +87,15 @@ class LearnedMotion:
         Raises ModelFormatError: the motion leaves the limits, so that the model must be damaged.
         """
         pins = resolved_pins(constraints, self.space, frames)
-        ranges = closable_ranges(units, frames, closing_units, closing_reach_s(voice)) if close else []
-        scaling = self.scaling
+        scaling, reach_s = self.scaling, REACH_S
         if self.prior is not None:
             statistics = self.prior.blended(statistics, units, frames, reliability)
             if voice < 1 and scaling is not None and self.closure is not None:
-                column = self.closure.column
+                column, reach_s = self.closure.column, closing_reach_s(voice)
                 statistics = with_open_vowels(statistics, self.prior, column, units, frames, reliability, voice)
                 gain = typical_range(self.prior, self.space, voice, float(np.mean(reliability)))
                 scaling = scaling._replace(factors=scaling.factors * gain)
+        ranges = closable_ranges(units, frames, closing_units, reach_s) if close else []
         values, variance = self._generated(statistics, frames, ranges, pins, scaling)
         return Motion(values, FRAME_RATE_HZ, self.space.channels), variance
 

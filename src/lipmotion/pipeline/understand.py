@@ -14,6 +14,7 @@ import numpy as np
 from lipmotion.engines import Animator
 from lipmotion.engines.base import HearsConditions, RecognisesPhones, WantsF0
 from lipmotion.errors import AlignmentError, InputError
+from lipmotion.hmm.model import UnitHmm
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.prior import with_prior
 from lipmotion.pipeline.request import SpeechRequest
@@ -103,18 +104,23 @@ def understood_speech(
     understood = _understood(model, request, audio, _reported(each, audio.duration_s, monitor))
     if understood.is_without_speech:
         LOG.warning("no speech found in the recording: the mouth rests; give a recording in which something is said")
-    speech = replace(with_prior(model.prior, understood.speech), voice=_voice(model, audio, understood))
+    voice = known_voice(model.phones, audio, understood.speech, understood.recognition)
+    speech = replace(with_prior(model.prior, understood.speech), voice=voice)
     return replace(understood, speech=speech)
 
 
-def _voice(model: Model, audio: AnalysedAudio, understood: UnderstoodSpeech) -> float:
-    """Return how well a model knows the voice of a recording, 0 to 1; 1 if its engine recognised the speaker."""
-    speech, found = understood.speech, understood.recognition
+def known_voice(phones: UnitHmm, audio: Audio, speech: Speech, found: Recognition | None) -> float:
+    """Return how well a model knows the voice of a recording, 0 to 1; 1 if its engine recognised the speaker.
+
+    phones : the model's own phone models
+    speech : of the recording
+    found  : what was recognised in it; None: the words were given, or the engine recognised the speaker
+    """
     if not speech.features.values.any() or (found is None and not speech.units_known):
         return 1.0
     if found is not None and found.similarity is not None:
         return voice_knowledge(found.similarity)
-    return voice_knowledge(speaker_similarity(model.phones, audio).score)
+    return voice_knowledge(speaker_similarity(phones, analysed(audio)).score)
 
 
 def _reported(each: ParallelMap, duration_s: float, monitor: Monitor) -> ParallelMap:
