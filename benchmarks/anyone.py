@@ -1,12 +1,14 @@
 """Anyone's voice, any words, any room: accuracy of a model outside the training speaker's quiet studio.
 
-    python benchmarks/anyone.py [--model FILE] [--split val] [--open FOLDER] [--only rooms|strangers|phones|open]
+    python benchmarks/anyone.py [--model FILE] [--split val] [--open FOLDER] [--only rooms|strangers|phones|open|doubt]
 
 rooms     : clips of the corpus of ``--corpus`` in babble, white noise, a room, over a telephone; ACC of opening, pooled
 strangers : GRID clips of other speakers, audio only and with transcript; mean ACC per clip, best lag within 60 ms
 phones    : ``speech-open`` with transcripts: mean opening and width by phone, and their rank correlation with the table
 open      : recordings with a face of ``--open`` (docs/results/voices.md), in pieces of five seconds; mean ACC per clip,
             best lag within 120 ms
+doubt     : the same recordings, each as a whole: 98th percentile of the opening, generated and tracked, and the share
+            of the frames of vowels with the lips shut, as recognised and with a forced confidence
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -27,9 +30,11 @@ from lipmotion.corpora.grid import words_of_name
 from lipmotion.motion.articulation import articulation_table
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.request import SpeechRequest
+from lipmotion.pipeline.understand import understand
 from lipmotion.speech.audio_files import read_audio
 from lipmotion.speech.noise import noisy_audio
 from lipmotion.types import Audio, Motion, Track
+from lipmotion.units import VOWELS
 from lipmotion.vision.track import track
 
 RATE_HZ = 16_000
@@ -39,6 +44,7 @@ BABBLE = ("61-70968-0000.flac", "acoustic_corpus.wav", "13697_11991_000000.opus"
 PIECE_S = 5
 OPEN_VOWELS, NARROW = ("aa", "ae", "ay", "aw"), ("s", "t", "iy", "ih", "n", "d")
 ROUND, SPREAD = ("uw", "ow", "w", "ao"), ("iy", "ey")
+CONFIDENCES, SHUT = (0.0, 0.25, 0.5, 0.75, 1.0), 0.015
 Curves = NDArray[np.float64]
 
 
@@ -173,6 +179,30 @@ def pieces(path: Path) -> Iterator[tuple[str, Audio, Track]]:
         yield f"{path.stem} {number}", Audio(samples, RATE_HZ), Track(motion, tracked.seen[start:end])
 
 
+def doubt(options: argparse.Namespace, model: Model) -> None:
+    """Print how far mouths open, and how often they are shut in vowels, by the confidence of the words."""
+    for path in sorted(options.open.rglob("*.mp4")) if options.open else ():
+        speech, tracked = (
+            understand(model, SpeechRequest(path, recogniser=options.recogniser)),
+            track(path, crops=False),
+        )
+        forced = {str(each): replace(speech, units_known=False, confidence=each) for each in CONFIDENCES}
+        openings = {
+            name: model.engine.generate(model.learned, each).motion["opening"]
+            for name, each in {"as recognised": speech, **forced}.items()
+        }
+        vowels = np.zeros(len(speech.features.values), bool)
+        for span in speech.units:
+            if span.label.phone in VOWELS:
+                vowels[int(np.ceil(span.start_s * 100)) : int(np.ceil(span.end_s * 100))] = True
+        show(
+            f"{path.stem}, voice {speech.voice:.2f}, confidence {speech.confidence:.2f}",
+            generated=round(float(np.percentile(openings["as recognised"], 98)), 3),
+            tracked=round(float(np.percentile(tracked.motion["opening"][tracked.seen], 98)), 3),
+            shut={name: round(float((opening[vowels] < SHUT).mean()), 3) for name, opening in openings.items()},
+        )
+
+
 def compared(motion: Motion, tracked: Track, lag_s: float = 0.0) -> tuple[Curves, Curves]:
     """Return generated and tracked channels in the frames with a face [each shape=(N, 3)]."""
     time_s = tracked.motion.time_s + lag_s
@@ -198,7 +228,7 @@ def show_means(figure: str, each: dict[str, dict[str, float]]) -> None:
     show(figure, clips=len(each), **means, each={name: clip["opening"] for name, clip in each.items()})
 
 
-PARTS = {"rooms": rooms, "strangers": strangers, "phones": phones, "open": open_english}
+PARTS = {"rooms": rooms, "strangers": strangers, "phones": phones, "open": open_english, "doubt": doubt}
 
 if __name__ == "__main__":
     main()
