@@ -104,19 +104,24 @@ def understood_speech(
     understood = _understood(model, request, audio, _reported(each, audio.duration_s, monitor))
     if understood.is_without_speech:
         LOG.warning("no speech found in the recording: the mouth rests; give a recording in which something is said")
-    voice = known_voice(model.phones, audio, understood.speech, understood.recognition)
-    speech = replace(with_prior(model.prior, understood.speech), voice=voice)
+    speech, found = understood.speech, understood.recognition
+    voice = known_voice(model.phones, audio, speech, found, given=request.units is not None)
+    speech = replace(with_prior(model.prior, speech), voice=voice)
     return replace(understood, speech=speech)
 
 
-def known_voice(phones: UnitHmm, audio: Audio, speech: Speech, found: Recognition | None) -> float:
+def known_voice(
+    phones: UnitHmm, audio: Audio, speech: Speech, found: Recognition | None, *, given: bool = False
+) -> float:
     """Return how well a model knows the voice of a recording, 0 to 1; 1 if its engine recognised the speaker.
 
     phones : the model's own phone models
     speech : of the recording
-    found  : what was recognised in it; None: the words were given, or the engine recognised the speaker
+    found  : what was recognised in it; None: words or phones were given, or the engine recognised the speaker
+    given  : whether the phones in time were given
     """
-    if not speech.features.values.any() or (found is None and not speech.units_known):
+    recognised_by_engine = found is None and not given and not speech.units_known
+    if recognised_by_engine or not speech.features.values.any():
         return 1.0
     if found is not None and found.similarity is not None:
         return voice_knowledge(found.similarity)
