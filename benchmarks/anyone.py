@@ -97,7 +97,7 @@ def rooms(options: argparse.Namespace, model: Model) -> None:
     for name, condition in conditions(options.corpora).items():
         pairs = []
         for seed, utterance in enumerate(utterances):
-            request = SpeechRequest(condition(utterance.audio, seed), recogniser=options.recogniser)
+            request = SpeechRequest(condition(utterance.audio, seed), recogniser=options.recogniser, pauses="natural")
             pairs.append(compared(animate(request, model=model).motion, utterance.track))
         generated, tracked = (np.concatenate(each) for each in zip(*pairs, strict=True))
         show(f"{options.split}, {name}", clips=len(pairs), **correlations(generated, tracked))
@@ -111,7 +111,7 @@ def strangers(options: argparse.Namespace, model: Model) -> None:
         each = {}
         for clip in clips:
             words = " ".join(words_of_name(clip.stem) or ()) if condition == "transcript" else None
-            request = SpeechRequest(clip, transcript=words, recogniser=options.recogniser)
+            request = SpeechRequest(clip, transcript=words, recogniser=options.recogniser, pauses="natural")
             each[clip.stem] = best_lag(animate(request, model=model).motion, tracks[clip], 0.06)
         show_means(f"grid-others, {condition}", each)
 
@@ -158,7 +158,7 @@ def open_english(options: argparse.Namespace, model: Model) -> None:
         if "french" in path.stem:
             continue
         for name, audio, piece in pieces(path, options.tracks):
-            request = SpeechRequest(audio, recogniser=options.recogniser)
+            request = SpeechRequest(audio, recogniser=options.recogniser, pauses="natural")
             each[name] = best_lag(animate(request, model=model).motion, piece, 0.12)
     show_means("open English, audio only", each)
 

@@ -21,7 +21,7 @@ from lipmotion.motion.space import MotionSpace
 from lipmotion.stats.delta_windows import with_dynamics
 from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays
 from lipmotion.types import EYE_DISTANCE, FRAME_RATE_HZ, Example, Span, Timeline, Unit
-from lipmotion.units import PHONES, SILENCE, is_silent, most_similar_phone, unknown_phone_message
+from lipmotion.units import PHONES, SILENCE, VOWELS, is_silent, most_similar_phone, unknown_phone_message
 
 Array = NDArray[np.float64]
 Context = tuple[str, str, str]
@@ -66,12 +66,13 @@ class ArticulationPrior:
     matrix: Array
     contexts: Mapping[Context, int]
 
-    def trajectory(self, units: Timeline[Unit], frames: int) -> Array:
+    def trajectory(self, units: Timeline[Unit], frames: int, reliability: Array | float = 1.0) -> Array:
         """Return the motion of phones in time, in the motion space [shape=(frames, Q)].
 
+        reliability : of the phones, 0 to 1 [shape=(frames,)]
         Raises InputError: an unknown phone.
         """
-        return self.centre + GAIN * articulators(units, frames) @ self.matrix
+        return self.centre + GAIN * articulators(units, frames, reliability) @ self.matrix
 
     def familiarity(self, units: Timeline[Unit], frames: int) -> Array:
         """Return how well training knows each phone between its neighbours, 0 to 1 [shape=(frames,)].
@@ -83,7 +84,7 @@ class ArticulationPrior:
             at_end = is_silent(span.label.phone) and span in (units[0], units[-1])
             if span.label.phone and not at_end:
                 count = self.contexts.get((_merged(left), _merged(span.label.phone), _merged(right)), 0)
-                first, stop = _frames_of(span, frames)
+                first, stop = frames_of(span, frames)
                 steps[first:stop] = count / (count + HALF_FAMILIAR)
         steps[away_from_speech(np.arange(frames) / FRAME_RATE_HZ, speech_intervals(units), REST_S)] = 1
         return smoothed(steps)[:, 0]
@@ -119,23 +120,28 @@ def dynamics_of(values: Array, frames: slice) -> Array:
     return with_dynamics(values[first : stop + 1])[start - first :][: stop - start]
 
 
-def articulators(units: Timeline[Unit], frames: int) -> Array:
+def articulators(units: Timeline[Unit], frames: int, reliability: Array | float = 1.0) -> Array:
     """Return the articulators of phones in time, in standard deviations of a speaker [shape=(frames, 8)].
 
+    reliability : of the phones, 0 to 1 [shape=(frames,)]
     Every third of a phone has the means of the table; a Gaussian joins them. A phone without a row of its own has that
-    of the most similar phone with one.
+    of the most similar phone with one. What cannot be relied on has the mean of what it may be: of all vowels, or of
+    all consonants.
     Raises InputError: an unknown phone.
     """
-    table, steps = articulation_table(), np.zeros((frames, len(ARTICULATORS)))
+    table, means, steps = articulation_table(), class_means(), np.zeros((frames, len(ARTICULATORS)))
+    relied = np.broadcast_to(np.asarray(reliability, float), frames)[:, None]
     for span in units:
-        phone, (first, stop) = span.label.phone, _frames_of(span, frames)
+        phone, (first, stop) = span.label.phone, frames_of(span, frames)
         if phone and phone not in PHONES:
             raise InputError(unknown_phone_message(phone, f" at {span.start_s} s"))
         if first < stop and phone:
             row = table[phone if phone in table else most_similar_phone(phone, list(table))]
             time_s = np.arange(first, stop) / FRAME_RATE_HZ
             third = (time_s - span.start_s) / max(span.duration_s, 1e-9) * len(THIRDS)
-            steps[first:stop] = row[np.clip(third.astype(int), 0, len(THIRDS) - 1)]
+            thirds, sure = np.clip(third.astype(int), 0, len(THIRDS) - 1), relied[first:stop]
+            mean = row if is_silent(phone) else means[phone in VOWELS]
+            steps[first:stop] = sure * row[thirds] + (1 - sure) * mean[thirds]
     return smoothed(steps)
 
 
@@ -150,13 +156,36 @@ def smoothed(steps: Array) -> Array:
 
 
 @cache
+def class_means() -> dict[bool, Array]:
+    """Return the mean of every articulator in each third of consonants (False) and vowels (True) [each shape=(3, 8)].
+
+    Phones count as often as they occur.
+    """
+    table, counts = articulation_table(), {row["phone"]: float(row["count"]) for row in _csv_rows()}
+    spoken = [phone for phone in table if not is_silent(phone)]
+    return {
+        vowels: np.average(
+            [table[phone] for phone in spoken if (phone in VOWELS) == vowels],
+            axis=0,
+            weights=[counts[phone] for phone in spoken if (phone in VOWELS) == vowels],
+        )
+        for vowels in (False, True)
+    }
+
+
+@cache
 def articulation_table() -> dict[str, Array]:
     """Return the mean of every articulator in each third of every phone [each shape=(3, 8)]."""
-    text = resources.files("lipmotion.motion").joinpath("articulation.csv").read_text(encoding="ascii")
     return {
         row["phone"]: np.array([[float(row[f"{name}_{third}"]) for name in ARTICULATORS] for third in THIRDS])
-        for row in csv.DictReader(text.splitlines())
+        for row in _csv_rows()
     }
+
+
+@cache
+def _csv_rows() -> list[dict[str, str]]:
+    text = resources.files("lipmotion.motion").joinpath("articulation.csv").read_text(encoding="ascii")
+    return list(csv.DictReader(text.splitlines()))
 
 
 def fit_articulation_prior(
@@ -246,7 +275,7 @@ def _merged(phone: str) -> str:
     return SILENCE if is_silent(phone) else phone
 
 
-def _frames_of(span: Span[Unit], frames: int) -> tuple[int, int]:
+def frames_of(span: Span[Unit], frames: int) -> tuple[int, int]:
     """Return the first frame of a span, and the one after its last."""
     edges = np.ceil(np.array([span.start_s, span.end_s]) * FRAME_RATE_HZ - 1e-6)
     first, stop = np.clip(edges, 0, frames).astype(int).tolist()

@@ -34,18 +34,24 @@ class Closure:
     follow: NDArray[np.float64]
 
 
-def closable_ranges(units: Timeline[Unit], frames: int, closing_units: Container[str] = ()) -> list[slice]:
+def closable_ranges(
+    units: Timeline[Unit], frames: int, closing_units: Container[str] = (), reach_s: float = REACH_S
+) -> list[slice]:
     """Return, for each p, b and m, the range of frames at 100 Hz in which it may close the lips.
 
     frames        : length of the recording
     closing_units : units all of whose phones close the lips; they count where a label has no phone
+    reach_s       : seconds before and after the phone that belong to the range; negative: seconds at both its ends that
+                    do not; its middle always does
     """
     ranges = []
     for span in units:
         label = span.label
         if label.phone in LIP_CLOSING or (not label.phone and label.unit in closing_units):
-            first = max(int(np.ceil((span.start_s - REACH_S) * FRAME_RATE_HZ - 1e-6)), 0)
-            stop = min(int(np.floor((span.end_s + REACH_S) * FRAME_RATE_HZ + 1e-6)) + 1, frames)
+            inside_s = min(-reach_s, span.duration_s / 2)
+            first = max(int(np.ceil((span.start_s + inside_s) * FRAME_RATE_HZ - 1e-6)), 0)
+            stop = min(int(np.floor((span.end_s - inside_s) * FRAME_RATE_HZ + 1e-6)) + 1, frames)
+            stop = max(stop, min(first + 1, frames)) if reach_s < 0 else stop
             if first < stop:
                 ranges.append(slice(first, stop))
     return ranges

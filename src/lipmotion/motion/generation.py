@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError, shortened
 from lipmotion.kernels.banded import generate
 from lipmotion.motion.articulation import ArticulationPrior
-from lipmotion.motion.closure import OPENING, Closure, closable_ranges, frames_to_close
+from lipmotion.motion.closure import OPENING, REACH_S, Closure, closable_ranges, frames_to_close
 from lipmotion.motion.limits import MotionLimits
 from lipmotion.motion.space import MotionSpace
+from lipmotion.motion.unknown_voice import closing_reach_s, typical_range, with_open_vowels
 from lipmotion.motion.variance_scaling import VarianceScaling
 from lipmotion.types import (
     FRAME_RATE_HZ,
@@ -67,11 +68,13 @@ class LearnedMotion:
         close: bool = True,
         closing_units: Container[str] = (),
         reliability: NDArray[np.float64] | float = 1.0,
+        voice: float = 1.0,
     ) -> tuple[Motion, NDArray[np.floating[Any]] | ReducedVariance]:
         """Return the motion of all channels at 100 Hz, and its variance [shape=(T, P)], by parameter generation.
 
         The steps are blending with the table of articulation, variance scaling, parameter generation with pins,
-        closures in p, b and m, the check of the limits, and the restoration of all channels.
+        closures in p, b and m, the check of the limits, and the restoration of all channels. Voices that training does
+        not know have open vowels, and the range of typical talkers (``motion.unknown_voice``).
         statistics    : returns the predicted means and precisions of a range of frames [each shape=(N, 3, Q)]
         frames        : length of the whole recording, T
         units         : phones in time
@@ -79,18 +82,30 @@ class LearnedMotion:
         close         : whether the lips are made to meet in every p, b and m
         closing_units : units that close the lips where no phone is known
         reliability   : of the phones in time, 0 to 1 [shape=(T,)]
+        voice         : how well training knows the voice, 0 to 1: others move as far as people do on average
         Raises InputError: a pin names no channel, lies outside the recording, is not finite, or contradicts another.
         Raises ModelFormatError: the motion leaves the limits, so that the model must be damaged.
         """
         pins = resolved_pins(constraints, self.space, frames)
-        ranges = closable_ranges(units, frames, closing_units) if close else []
+        scaling, reach_s = self.scaling, REACH_S
         if self.prior is not None:
             statistics = self.prior.blended(statistics, units, frames, reliability)
-        values, variance = self._generated(statistics, frames, ranges, pins)
+            if voice < 1 and scaling is not None and self.closure is not None:
+                column, reach_s = self.closure.column, closing_reach_s(voice)
+                statistics = with_open_vowels(statistics, self.prior, column, units, frames, reliability, voice)
+                gain = typical_range(self.prior, self.space, voice, float(np.mean(reliability)))
+                scaling = scaling._replace(factors=scaling.factors * gain)
+        ranges = closable_ranges(units, frames, closing_units, reach_s) if close else []
+        values, variance = self._generated(statistics, frames, ranges, pins, scaling)
         return Motion(values, FRAME_RATE_HZ, self.space.channels), variance
 
     def _generated(
-        self, statistics: Callable[[slice], Statistics], frames: int, ranges: Sequence[slice], pins: Pins
+        self,
+        statistics: Callable[[slice], Statistics],
+        frames: int,
+        ranges: Sequence[slice],
+        pins: Pins,
+        scaling: VarianceScaling | None,
     ) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]] | ReducedVariance]:
         """Return values and variance of all channels [each shape=(T, P)], block by block.
 
@@ -111,8 +126,8 @@ class LearnedMotion:
                 if outer.start <= closing.start and closing.stop <= outer.stop
             ]
             predicted = statistics(outer)
-            if self.scaling is not None:
-                predicted = self.scaling.apply(*predicted)
+            if scaling is not None:
+                predicted = scaling.apply(*predicted)
             result = _generated(self.closure, predicted, block_pins, block_ranges)
             self.limits.check(result[0], self.closure, block_pins)
             kept = slice(inner.start - outer.start, inner.stop - outer.start)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from lipmotion.pipeline.request import SpeechRequest
 from lipmotion.pipeline.understand import UnderstoodSpeech
 from lipmotion.speech.agreement import LEAST_FITTING_SHARE
-from lipmotion.speech.recogniser import FULL_WEIGHT_SCORE, NO_WEIGHT_SCORE
+from lipmotion.speech.recogniser import FULL_WEIGHT_SCORE, own_model_weight
 from lipmotion.speech.recognition import CONFIDENCES, NOISY_DB
 from lipmotion.types import Outlook
 
@@ -25,10 +25,7 @@ def outlook_of(request: SpeechRequest, understood: UnderstoodSpeech) -> Outlook:
         share = understood.fit.share if understood.fit else 1.0
         return Outlook(words, share, 1.0 if words == "own model" else None, understood.range_db, _advice(understood))
     words = "words" if found.word_s > found.phone_s else "phones"
-    voice = None
-    if found.similarity is not None:
-        share = (found.similarity - NO_WEIGHT_SCORE) / (FULL_WEIGHT_SCORE - NO_WEIGHT_SCORE)
-        voice = min(max(share, 0.0), 1.0)
+    voice = own_model_weight(found.similarity) if found.similarity is not None else None
     confidence = (found.confidence or 0.0) * found.word_s / max(found.word_s + found.phone_s, 1e-9)
     return Outlook(words, confidence, voice, understood.range_db, _advice(understood))
 

@@ -14,6 +14,7 @@ import numpy as np
 from lipmotion.engines import Animator
 from lipmotion.engines.base import HearsConditions, RecognisesPhones, WantsF0
 from lipmotion.errors import AlignmentError, InputError
+from lipmotion.hmm.model import UnitHmm
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.prior import with_prior
 from lipmotion.pipeline.request import SpeechRequest
@@ -23,8 +24,9 @@ from lipmotion.speech.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.audio_files import SPEECH_RATE_HZ, read_audio
 from lipmotion.speech.f0 import log_f0
 from lipmotion.speech.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
-from lipmotion.speech.recogniser import RECOGNISER_KINDS, Recogniser, cached_recogniser
+from lipmotion.speech.recogniser import RECOGNISER_KINDS, Recogniser, cached_recogniser, voice_knowledge
 from lipmotion.speech.recognition import Recognition, level_range_db
+from lipmotion.speech.speaker_similarity import speaker_similarity
 from lipmotion.storage.sources import is_file
 from lipmotion.types import (
     FRAME_RATE_HZ,
@@ -103,7 +105,28 @@ def understood_speech(
     understood = _understood(model, request, audio, _reported(each, audio.duration_s, monitor))
     if understood.is_without_speech:
         LOG.warning("no speech found in the recording: the mouth rests; give a recording in which something is said")
-    return replace(understood, speech=with_prior(model.prior, understood.speech))
+    speech, found = understood.speech, understood.recognition
+    voice = known_voice(model.phones, audio, speech, found, given=request.units is not None)
+    speech = replace(with_prior(model.prior, speech), voice=voice)
+    return replace(understood, speech=speech)
+
+
+def known_voice(
+    phones: UnitHmm, audio: Audio, speech: Speech, found: Recognition | None, *, given: bool = False
+) -> float:
+    """Return how well a model knows the voice of a recording, 0 to 1; 1 if its engine recognised the speaker.
+
+    phones : the model's own phone models
+    speech : of the recording
+    found  : what was recognised in it; None: words or phones were given, or the engine recognised the speaker
+    given  : whether the phones in time were given
+    """
+    recognised_by_engine = found is None and not given and not speech.units_known
+    if recognised_by_engine or not speech.features.values.any():
+        return 1.0
+    if found is not None and found.similarity is not None:
+        return voice_knowledge(found.similarity)
+    return voice_knowledge(speaker_similarity(phones, analysed(audio)).score)
 
 
 def _reported(each: ParallelMap, duration_s: float, monitor: Monitor) -> ParallelMap:

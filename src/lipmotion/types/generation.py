@@ -44,6 +44,7 @@ class Speech:
     confidence  : 0 to 1, how well recognised units are confirmed by words; 1 where the units are known. One number, or
                   one of each frame [shape=(T,)] where somebody has corrected some of the recognised units
     prior       : what another model makes of the same speech, on which this engine's model stands (None: on none)
+    voice       : 0 to 1, how well the model's training knows the voice
     """
 
     features: Features
@@ -53,6 +54,7 @@ class Speech:
     spectrum: NDArray[np.float32] | None = None
     confidence: float | NDArray[np.float64] = 1.0
     prior: PriorOutput | None = None
+    voice: float = 1.0
 
     @property
     def units_decide(self) -> bool:

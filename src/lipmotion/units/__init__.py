@@ -19,7 +19,7 @@ from lipmotion.units.recognised import RECOGNISED, RecognisedPhone, recognised_p
 from lipmotion.units.transcript import words_in, words_of
 from lipmotion.units.unit_set import UnitSet
 from lipmotion.units.unit_sets import UNIT_SETS, unit_set
-from lipmotion.units.visemes import VISEME_OF, VISEMES
+from lipmotion.units.visemes import VISEME_OF, VISEMES, VOWELS
 from lipmotion.units.word_spans import words_in_time
 
 __all__ = [
@@ -32,6 +32,7 @@ __all__ = [
     "UNIT_SETS",
     "VISEMES",
     "VISEME_OF",
+    "VOWELS",
     "Lexicon",
     "Pronunciation",
     "RecognisedPhone",

@@ -19,3 +19,6 @@ VISEMES: dict[str, tuple[str, ...]] = {
 }
 
 VISEME_OF: dict[str, str] = {phone: viseme for viseme, phones in VISEMES.items() for phone in phones}
+
+VOWELS = frozenset(phone for viseme in ("lr1", "lr2", "lr3", "lr4") for phone in VISEMES[viseme]) - {"hh", "em"}
+"""The phones of the visemes of vowels that are vowels."""

@@ -172,6 +172,7 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
             constraints,
             close=self.config.closures,
             reliability=experts.reliability,
+            voice=speech.voice,
         )
         return Generation(
             motion,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -22,7 +22,7 @@ from lipmotion.pipeline.speakers import generate_for
 from lipmotion.pipeline.training.channels import GEOMETRY, with_visual_channels
 from lipmotion.pipeline.training.train import phones_of
 from lipmotion.pipeline.transcribe import warn_of_guesses
-from lipmotion.pipeline.understand import recognised_speech, speech_of
+from lipmotion.pipeline.understand import known_voice, recognised_speech, speech_of
 from lipmotion.speech.recogniser import Recogniser
 from lipmotion.speech.recognition import Recognition
 from lipmotion.types import (
@@ -227,7 +227,13 @@ def speech_of_condition(
             speech_of(engine, u.audio, u.features, units)
             for u, units in zip(recordings.utterances, recordings.conditions[condition], strict=True)
         ]
-    return [with_prior(prior, speech) for speech in heard]
+    return [
+        replace(
+            with_prior(prior, speech),
+            voice=known_voice(phones.own, u.audio, speech, found if speech.units is found.units else None),
+        )
+        for u, speech, found in zip(recordings.utterances, heard, recordings.recognitions, strict=True)
+    ]
 
 
 def compare_with_recorded(

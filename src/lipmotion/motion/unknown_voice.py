@@ -1,0 +1,98 @@
+"""Motion for voices that training does not know: vowels are open, and movements as large as people's are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.motion.articulation import (
+    ARTICULATORS,
+    TYPICAL_DEVIATIONS,
+    ArticulationPrior,
+    Statistics,
+    dynamics_of,
+    frames_of,
+)
+from lipmotion.motion.closure import OPENING, REACH_S
+from lipmotion.motion.space import MotionSpace
+from lipmotion.types import EYE_DISTANCE, Timeline, Unit
+from lipmotion.units import VOWELS
+
+Array = NDArray[np.float64]
+LEAST_OPEN = 0.4
+"""Share of the opening that the table of articulation gives a vowel, which a voice that training does not know has at
+least: what the model makes of its vowels is shut where it takes them for something else."""
+INSET_S = 0.03
+"""The lips of such a voice close in p, b and m further than this from both ends of the phone, or in its middle, so that
+short vowels beside it stay open."""
+RETAINED = (0.52, 0.62)
+"""Standard deviation of what a model generates for voices that it does not know, as a share of that of its speaker:
+where phones cannot be relied on at all, and where they can. The more there is doubt, the closer motion is to a mean."""
+
+
+def with_open_vowels(
+    statistics: Callable[[slice], Statistics],
+    prior: ArticulationPrior,
+    column: int,
+    units: Timeline[Unit],
+    frames: int,
+    reliability: Array | float,
+    voice: float,
+) -> Callable[[slice], Statistics]:
+    """Return means and precisions of ranges of frames, with the mouth open in vowels.
+
+    statistics  : returns those of a model
+    prior       : the table of articulation
+    column      : of the opening in the motion space
+    reliability : of the phones in time, 0 to 1 [shape=(frames,)]
+    voice       : how well training knows the voice, 0 to 1; at 1 nothing changes
+    Where the mean of the opening is less than a share of the table's, all dimensions are drawn towards the table until
+    it is not. Precisions stay those of the model.
+    """
+    values = prior.trajectory(units, frames, reliability)
+    opening = values[:, column]
+    vowels = np.zeros(frames)
+    for span in units:
+        if span.label.phone in VOWELS:
+            vowels[slice(*frames_of(span, frames))] = 1
+    least = LEAST_OPEN * _strangeness(voice) * vowels * np.maximum(opening, 0)
+
+    def opened(chosen: slice) -> Statistics:
+        means, precisions = statistics(chosen)
+        shut = means[:, 0, column]
+        share = np.clip((least[chosen] - shut) / np.maximum(opening[chosen] - shut, 1e-9), 0, 1)
+        return means + share[:, None, None] * (dynamics_of(values, chosen) - means), precisions
+
+    return opened
+
+
+def closing_reach_s(voice: float) -> float:
+    """Return how many seconds before and after a p, b or m the lips may close; negative: seconds within it.
+
+    voice : how well training knows the voice, 0 to 1
+    """
+    return REACH_S - _strangeness(voice) * (REACH_S + INSET_S)
+
+
+def _strangeness(voice: float) -> float:
+    """Return how far the measures for unknown voices apply, 0 to 1; more than half for voices half known."""
+    return float(np.sqrt(1 - voice))
+
+
+def typical_range(prior: ArticulationPrior, space: MotionSpace, voice: float, reliability: float) -> float:
+    """Return the factor by which movements reach the range of typical talkers, at least 1.
+
+    prior       : the table of articulation, which knows the range of the model's speaker
+    space       : of the motion; the factor is 1 where its opening is not in eye distances
+    voice       : how well training knows the voice, 0 to 1; at 1 the range is that of the speaker, and the factor 1
+    reliability : of the phones, 0 to 1, on average
+    """
+    column, row = space.direct_names.index(OPENING), ARTICULATORS.index(OPENING)
+    if space.channels[space.direct[column]].unit != EYE_DISTANCE:
+        return 1.0
+    typical = TYPICAL_DEVIATIONS[row]
+    own = prior.matrix[row, column] ** 2 / typical
+    generated = own * float(np.interp(reliability, (0, 1), RETAINED))
+    return float(max(typical / generated, 1.0) ** (1 - voice))

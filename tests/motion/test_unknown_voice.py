@@ -1,0 +1,131 @@
+"""Voices that training does not know, at any confidence: open vowels, the range of typical talkers, exact pins."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from lipmotion.motion.closure import REACH_S, closable_ranges
+from lipmotion.motion.space import MotionSpace
+from lipmotion.motion.unknown_voice import INSET_S, closing_reach_s, typical_range
+from lipmotion.pipeline.model import load_model
+from lipmotion.pipeline.request import SpeechRequest
+from lipmotion.pipeline.understand import understand
+from lipmotion.speech.recogniser import voice_knowledge
+from lipmotion.testing.examples import timeline
+from lipmotion.types import Constraints, Generation, Motion, Pin, Speech
+from lipmotion.units import VOWELS
+
+WELCOME = Path(__file__).parent.parent.parent / "examples" / "welcome.flac"
+SHUT = 0.015
+"""Eye distances; people do not say a vowel through lips that are so close."""
+CONFIDENCES = (0.0, 0.25, 0.5, 0.75, 1.0)
+
+
+@pytest.fixture(scope="module")
+def welcome() -> Speech:
+    """Recognised phones of a voice that the model does not know."""
+    return understand(load_model(), SpeechRequest(WELCOME, recogniser="fast"))
+
+
+@pytest.fixture
+def no_distortion_is_low(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Phones can be relied on as far as words confirm them, however clear the sound is."""
+    monkeypatch.setattr("lipmotion.motion.reliability.DISTORTIONS", (-2.0, -1.0))
+
+
+def generated(speech: Speech, *pins: Pin) -> Generation:
+    """What the shipped model makes of some speech."""
+    model = load_model()
+    return model.engine.generate(model.learned, speech, Constraints(pins))
+
+
+def shut_share(generation: Generation) -> float:
+    """The share of the frames of vowels in which the lips are shut."""
+    opening = generation.motion["opening"]
+    vowels = [opening[int(s.start_s * 100) : int(s.end_s * 100)] for s in generation.units if s.label.phone in VOWELS]
+    return float((np.concatenate(vowels) < SHUT).mean())
+
+
+@pytest.mark.parametrize("confidence", CONFIDENCES)
+@pytest.mark.usefixtures("no_distortion_is_low")
+def test_vowels_are_open_at_any_confidence(welcome: Speech, confidence: float) -> None:
+    assert welcome.voice < 0.5
+    assert shut_share(generated(replace(welcome, confidence=confidence))) <= 0.03
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("confidence", CONFIDENCES)
+@pytest.mark.usefixtures("no_distortion_is_low")
+def test_vowels_of_other_talkers_are_open(recordings: Path, confidence: float) -> None:
+    for clip in sorted((recordings / "grid-others").glob("*.mpg")):
+        speech = understand(load_model(), SpeechRequest(clip, recogniser="fast"))
+        assert shut_share(generated(replace(speech, confidence=confidence))) <= 0.03, clip.stem
+
+
+def test_movements_are_those_of_typical_talkers_about_the_same_rest(welcome: Speech) -> None:
+    known, unknown = (generated(replace(welcome, voice=voice, confidence=1.0)) for voice in (1.0, 0.0))
+    own, typical = known.motion["opening"], unknown.motion["opening"]
+    assert np.percentile(own, 98) < 0.18
+    assert 0.2 < np.percentile(typical, 98) < 0.3
+    assert np.abs(typical[:10] - own[:10]).max() < 0.01
+    for frames in closable_ranges(unknown.units, len(typical), reach_s=closing_reach_s(0.0)):
+        assert typical[frames].min() <= load_model().learned.closure.closed + 1e-9
+    ratio = np.sqrt(unknown.variance[:, 0] / np.maximum(known.variance[:, 0], 1e-12))
+    assert 1.4 < np.median(ratio) < 2
+
+
+def test_jaw_and_lips_go_with_the_opening(welcome: Speech) -> None:
+    slopes = []
+    for voice in (1.0, 0.0):
+        motion = generated(replace(welcome, voice=voice)).motion
+        slopes.append([np.polyfit(motion["opening"], apart, 1)[0] for apart in _distances(motion)])
+    np.testing.assert_allclose(slopes[1], slopes[0], rtol=0.15)
+
+
+def _distances(motion: Motion) -> tuple[NDArray[np.floating], ...]:
+    return -motion["y_152"], motion["y_13"] - motion["y_14"]
+
+
+def test_pins_are_in_delivered_units(welcome: Speech) -> None:
+    pinned = generated(replace(welcome, voice=0.0), Pin(1.0, "opening", 0.31), Pin(1.4, "width", 0.52))
+    assert pinned.motion["opening"][100] == pytest.approx(0.31, abs=1e-12)
+    assert pinned.motion["width"][140] == pytest.approx(0.52, abs=1e-12)
+    assert pinned.variance[100, 0] == pytest.approx(0, abs=1e-15)
+
+
+def test_the_range_grows_with_what_is_not_known() -> None:
+    learned = load_model().learned
+    factors = [typical_range(learned.prior, learned.space, voice, 1.0) for voice in (1.0, 0.7, 0.3, 0.0)]
+    assert factors[0] == pytest.approx(1)
+    assert np.diff(factors).min() > 0
+    assert typical_range(learned.prior, learned.space, 0.0, 0.0) > factors[-1]
+    weights = tuple(replace(channel, unit="weight") for channel in learned.space.channels)
+    other = MotionSpace(weights, learned.space.direct, learned.space.points)
+    assert typical_range(learned.prior, other, 0.0, 1.0) == pytest.approx(1)
+
+
+def test_lips_close_within_the_phones_of_unknown_voices() -> None:
+    assert closing_reach_s(1.0) == pytest.approx(REACH_S)
+    assert closing_reach_s(0.0) == pytest.approx(-INSET_S)
+    for duration_s in (0.02, 0.1):
+        span = timeline(("b",), duration_s)[1]
+        (frames,) = closable_ranges(timeline(("b",), duration_s), 200, reach_s=-INSET_S)
+        assert span.start_s - 1e-9 <= frames.start / 100 <= (frames.stop - 1) / 100 <= span.end_s + 1e-9
+
+
+def test_voices_are_known_by_their_similarity(welcome: Speech) -> None:
+    assert [voice_knowledge(score) for score in (-20.0, -9.0, -6.0, -3.0, 2.0)] == pytest.approx([0, 0, 0.5, 1, 1])
+    with_units = understand(load_model(), SpeechRequest(WELCOME, units=welcome.units))
+    assert with_units.voice == pytest.approx(welcome.voice)
+
+
+@pytest.mark.long
+def test_the_models_own_voice_is_known(recordings: Path) -> None:
+    names = (recordings / "grid-s1" / "val.txt").read_text().split()[:3]
+    clips = [recordings / "grid-s1" / "clips" / f"{name}.mkv" for name in names]
+    assert [understand(load_model(), SpeechRequest(clip)).voice for clip in clips] == pytest.approx([1, 1, 1])
