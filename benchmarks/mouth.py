@@ -34,15 +34,16 @@ from typing import Any
 import numpy as np
 from anyone import PIECE_S, lag_of, open_english, pieces, show, strangers
 from kept_tracks import kept_track
-from lipmotion.rig.mouth_template import CHIN, LOWER_MIDDLE, UPPER_MIDDLE
 from numpy.typing import NDArray
 
 from lipmotion import Corpus, Selection, animate, evaluate, load_model
+from lipmotion.articulation.lip_points import CHIN, LOWER_MIDDLE, UPPER_MIDDLE
+from lipmotion.articulation.mouth import spoken_mouth
+from lipmotion.articulation.pauses import PAUSE_STYLES, with_pauses
 from lipmotion.faces.character.performance import head_poses
 from lipmotion.faces.character.pose import CharacterPose
 from lipmotion.faces.character.shapes import head_mesh
 from lipmotion.faces.character.stage import figure
-from lipmotion.faces.portrait.pose import mouth_poses
 from lipmotion.motion.predictors import Predictor
 from lipmotion.motion.reliability import phone_reliability
 from lipmotion.pipeline.characters import curves_of
@@ -86,8 +87,7 @@ VOWELS = {
 """The shapes of a head that has only three."""
 READINGS: dict[str, Callable[[Motion, Units], Array]] = {
     "opening": lambda motion, _: motion["opening"].astype(float),
-    "head": lambda motion, units: np.array([pose.gap for pose in head_poses(motion, units, motion.rate_hz)]),
-    "portrait": lambda motion, units: np.array([pose.gap for pose in mouth_poses(motion, units, motion.rate_hz)]),
+    "all faces": lambda motion, units: spoken_mouth(motion, units).gap,
     "arkit": lambda motion, units: curves_of(motion, units, "arkit")["jawOpen"].astype(float),
 }
 """How far each face opens the mouth, at the rate of the motion [shape=(T,)]."""
@@ -254,7 +254,11 @@ def pauses(options: argparse.Namespace, model: Model) -> None:
     for name, each in takes_of(options, model).items():
         motion, units = each.generation.motion, each.generation.units
         paused_frames, vowel_frames = paused(units, motion.time_s), each.spoken(vowels=True)
-        curves = {face: reading(motion, units) for face, reading in READINGS.items()} | {"person": each.opening}
+        curves = {
+            f"{face}, {style}": reading(with_pauses(each.generation, style).motion, units)
+            for face, reading in READINGS.items()
+            for style in PAUSE_STYLES
+        } | {"person": each.opening}
         medians = {
             face: (float(np.nanmedian(curve[paused_frames])), float(np.nanmedian(curve[vowel_frames])))
             for face, curve in curves.items()

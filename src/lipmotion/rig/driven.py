@@ -27,6 +27,8 @@ from lipmotion.types import Motion, Timeline, Unit
 
 Array = NDArray[np.float64]
 
+METRIC = (".glb", ".gltf", ".vrm")
+"""Suffixes of characters whose unit is the metre."""
 EYES_AND_BROWS = tuple(name for name in ARKIT_OTHERS if name.startswith(("eyeBlink", "eyeLook", "brow")))
 
 
@@ -147,7 +149,7 @@ def driven_character(
     Raises InputError: a file is damaged, or what moves the mouth is not found in it.
     Raises ModelFormatError: the binding is damaged.
     """
-    mesh = with_jaw(read_character(path))
+    mesh, in_metres = with_jaw(read_character(path)), Path(path).suffix.lower() in METRIC
     is_stored = binding is not None and binding.suffix.lower() == BINDING_SUFFIX
     try:
         if is_stored and binding is not None:
@@ -161,7 +163,9 @@ def driven_character(
             surface = mesh_surface(mesh)
             placement = placed_by_shape(mesh, surface)
         if mesh.shapes and not by_points and binding is None:
-            return DrivenCharacter(mesh, placement, face_shapes(mesh, placement, only), None, Path(path))
+            return DrivenCharacter(
+                mesh, placement, face_shapes(mesh, placement, only, in_metres=in_metres), None, Path(path)
+            )
         bound = bind(mesh, surface, placement)
         if binding is not None:
             bound = painted(bound, mesh, read_weights(binding))

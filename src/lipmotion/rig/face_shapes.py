@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.lip_points import FACING
+from lipmotion.articulation.lip_points import CHIN, FACING
 from lipmotion.errors import InputError, shortened
 from lipmotion.rig.lip_placement import LipPlacement
 from lipmotion.rig.mesh import Mesh
@@ -23,6 +23,9 @@ NOT_FROM_POINTS |= {"mouthPressRight"}
 LEAST_MOVED = 0.02
 """A blendshape that moves no lip point by this many eye distances is none of the mouth."""
 MOST_SHAPES = 200
+EYES_M, HEAD_M = 0.09, (0.18, 0.3)
+"""People's distance between the outer corners of the eyes, and the range of heights from the chin to the top of a head
+with its hair, in metres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,12 +61,26 @@ class FaceShapes:
         return np.array(rows).reshape(-1, len(self.known))
 
 
-def face_shapes(mesh: Mesh, placement: LipPlacement, only: Collection[str] = ()) -> FaceShapes:
+def life_scale(mesh: Mesh, placement: LipPlacement) -> float:
+    """Return the length of an eye distance in units of a mesh that is in metres: of a head as high as people's, theirs.
+
+    Of a head of another size, it is that of the placement, which goes by the width of the mouth.
+    """
+    heights = mesh.vertices @ (placement.axes[:, 1] / np.linalg.norm(placement.axes[:, 1]))
+    height_m = float(heights.max() - heights[placement.vertices[placement.row(CHIN)]])
+    return EYES_M if HEAD_M[0] <= height_m <= HEAD_M[1] else placement.scale
+
+
+def face_shapes(
+    mesh: Mesh, placement: LipPlacement, only: Collection[str] = (), *, in_metres: bool = False
+) -> FaceShapes:
     """Return the blendshapes of a mesh that move the mouth.
 
     ARKit's, where the mesh has ``jawOpen`` and five more of them; otherwise visemes and vowels, where it has five;
     otherwise all that move lip points.
-    only : names of the mesh; empty: as above
+    only      : names of the mesh; empty: as above
+    in_metres : whether the mesh is in metres; then one motion parts the lips by the same length on all heads that are
+                as high as people's, however wide their mouths are
     Raises InputError: there is no such blendshape, or none that moves the mouth.
     """
     moved = placement.to_motion(mesh.displacements(placement.vertices))
@@ -87,6 +104,8 @@ def face_shapes(mesh: Mesh, placement: LipPlacement, only: Collection[str] = ())
         raise InputError(f"{len(chosen)} blendshapes move the mouth, required at most {MOST_SHAPES}; name those to use")
     facing = [(placement.row(upper), placement.row(lower)) for upper, lower in FACING[:3]]
     gap = np.mean([moved[:, upper, 1] - moved[:, lower, 1] for upper, lower in facing], axis=0)
+    if in_metres:
+        gap = gap * placement.scale / life_scale(mesh, placement)
     return FaceShapes(tuple(mesh.shape_names[n] for n in chosen), tuple(known), moved[chosen], gap[chosen], style)
 
 
