@@ -168,7 +168,7 @@ class Figure:
         )
         lips, closed = self.skin.lip_rows(), closed_share(pose)
         for ring, part_of in enumerate(SEAM_LIGHT, VISIBLE - len(SEAM_LIGHT)):
-            arrives[lips[ring]] *= 1 - (1 - part_of) * np.maximum(closed, CORNER_SHADE * AT_CORNER)
+            arrives[lips[ring]] *= 1 - (1 - part_of) * np.maximum(closed, CORNER_SHADE * (1 - pose.roundness) * AT_CORNER)
         for ring, part_of in enumerate(RIM_LIGHT, VISIBLE - 1):
             arrives[lips[ring]] *= 1 - (1 - part_of) * pose.roundness
         arrives[self.rows["teeth"]] *= LOWER_TEETH_LIGHT

@@ -28,7 +28,7 @@ ARCH = 1.15
 _UPPER_LIP, _LOWER_LIP = 0.076, 0.106
 OVAL_SQUEEZE = 0.14
 """How much nearer to the middle the inner edge of an oval mouth lies than the corners."""
-HOLE_WIDTH = (0.008, 0.55)
+HOLE_WIDTH = (0.024, 0.72)
 """Half the width of a round hole, round which the lips run as a ring: a length, and so much of the gap."""
 ROUND_BOW = 0.0012
 """How far the middle of a round hole is raised: its middle lies before its sides, and the camera looks down on it."""
@@ -61,9 +61,9 @@ def _smooth(knots: list[tuple[float, float]]) -> Real:
     return np.asarray(CubicSpline(x, y)(ACROSS))
 
 
-_BOW = _smooth([(0, 0.80), (0.2, 0.97), (0.36, 0.93), (0.62, 0.66), (0.85, 0.3), (1, 0)])
+_BOW = _smooth([(0, 0.80), (0.2, 0.97), (0.36, 0.92), (0.62, 0.62), (0.85, 0.24), (1, 0)])
 _BELOW = _smooth([(0, 1.0), (0.25, 0.97), (0.5, 0.83), (0.72, 0.58), (0.89, 0.27), (1, 0)])
-_LINE = _smooth([(0, -0.004), (0.15, -0.002), (0.4, 0.003), (0.7, 0.005), (1, 0.004)])
+_LINE = _smooth([(0, -0.006), (0.15, -0.005), (0.4, -0.002), (0.7, 0.005), (0.88, 0.014), (1, 0.022)])
 _ENVELOPE = np.sqrt(np.maximum(1 - ACROSS**2, 0))
 _FULL = np.where(SIDE > 0, _BOW, _BELOW)
 
@@ -81,7 +81,8 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
     drop = pose.gap - rise
     middle = _between(pose)
     squeeze = _squeeze(pose)
-    belly = _ENVELOPE + squeeze * (1 - _ENVELOPE)
+    rounded = _ENVELOPE ** (1 + pose.roundness)
+    belly = rounded + squeeze * (1 - rounded)
     hole, contour = _opening(pose)
     inner_y = middle + np.where(upper, rise, -drop) * hole
     full = _FULL + 0.85 * pose.roundness * (_ENVELOPE - _FULL)
@@ -91,11 +92,11 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
     outer_y = middle + np.where(upper, rise, -drop) * contour + SIDE * thick * _rounded(pose)
     forward = pose.protrusion * (1 - 0.45 * ACROSS**2)
     arch = -ARCH * (x**2 - (REST_HALF_WIDTH * ACROSS) ** 2)
-    back = np.where(upper, 0.0, 0.22 * drop + 0.05 * pose.tuck * _ENVELOPE)
+    back = np.where(upper, 0.0, 0.22 * drop + 0.05 * pose.tuck) * _ENVELOPE
     outer_z = base_z + 0.85 * forward + arch - back
-    meet = np.interp(ACROSS, ACROSS[:_UPPER], 0.5 * (base_z[:_UPPER] + _opposite(base_z))) + forward + arch
-    meet = meet - np.where(upper, 0.0, 0.25 * drop) * contour
-    bulge = np.where(upper, 0.05, 0.062) * belly * pose.fullness * (1 - 0.3 * pose.press)
+    lower_back = np.where(upper, 0.0, 0.25 * drop) * contour
+    meet = _meeting(pose, base_z, 1 - squeeze) - lower_back
+    bulge = (0.056 - 0.006 * SIDE * _ENVELOPE) * belly * pose.fullness * (1 - 0.3 * pose.press)
     inner_x = x * (1 - squeeze)
     teeth = TEETH_Z - ARCH * inner_x**2
     up = SIDE * 1.0
@@ -105,7 +106,7 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
     contact_z = contact_z + tuck * (teeth + 0.02 - contact_z)
     on_teeth = np.minimum(TEETH_EDGE + 0.010, inner_y + 0.08)
     inner_y = np.where(upper, inner_y, np.maximum(inner_y, inner_y + tuck * (on_teeth - inner_y)))
-    crest = meet + bulge * (1 - 0.25 * tuck) - 0.03 * tuck
+    crest = _meeting(pose, base_z, 1 - 0.5 * squeeze) - lower_back + bulge * (1 - 0.25 * tuck) - 0.03 * tuck
     behind = np.maximum(teeth + 0.022, contact_z - 0.10)
     y, z = outer_y, outer_z
     broad = inner_y + pose.roundness * (middle + np.where(upper, rise, -drop) * contour - inner_y)
@@ -121,6 +122,14 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
         (1.12 * x, inner_y + up * (0.13 * _ENVELOPE + 0.012), behind - 0.01),
     ]
     return np.stack([np.stack(row, axis=1) for row in rows])
+
+
+def _meeting(pose: CharacterPose, base_z: Real, inwards: float) -> Real:
+    """Return how far forward the lips meet, at places so much nearer to the middle than the columns [shape=(COLUMNS,)]."""
+    across = inwards * ACROSS
+    between = np.interp(across, ACROSS[:_UPPER], 0.5 * (base_z[:_UPPER] + _opposite(base_z)))
+    curved = ARCH * REST_HALF_WIDTH**2 * (pose.width**2 - 1)
+    return np.asarray(between + pose.protrusion - (0.45 * pose.protrusion + curved) * across**2)
 
 
 def closed_share(pose: CharacterPose) -> float:
@@ -159,7 +168,7 @@ def _opening(pose: CharacterPose) -> tuple[Real, Real]:
 def _squeeze(pose: CharacterPose) -> float:
     """Return how much nearer to the middle the inner edge of the lips lies than the corners, 0 to 1."""
     hole = (HOLE_WIDTH[0] + HOLE_WIDTH[1] * pose.gap) / (REST_HALF_WIDTH * pose.width)
-    as_ring = max(1 - hole, 0.0) * (1 - 0.6 * pose.press)
+    as_ring = max(1 - hole, 0.0) * (1 - 0.6 * pose.press) * (1 - closed_share(pose))
     return as_ring * pose.roundness + OVAL_SQUEEZE * pose.oval * (1 - pose.roundness)
 
 
