@@ -28,7 +28,7 @@ ARCH = 1.15
 _UPPER_LIP, _LOWER_LIP = 0.076, 0.106
 OVAL_SQUEEZE = 0.14
 """How much nearer to the middle the inner edge of an oval mouth lies than the corners."""
-HOLE_WIDTH = (0.024, 0.72)
+HOLE_WIDTH = (0.014, 0.6)
 """Half the width of a round hole, round which the lips run as a ring: a length, and so much of the gap."""
 ROUND_BOW = 0.0012
 """How far the middle of a round hole is raised: its middle lies before its sides, and the camera looks down on it."""
@@ -63,7 +63,7 @@ def _smooth(knots: list[tuple[float, float]]) -> Real:
 
 _BOW = _smooth([(0, 0.80), (0.2, 0.97), (0.36, 0.92), (0.62, 0.62), (0.85, 0.24), (1, 0)])
 _BELOW = _smooth([(0, 1.0), (0.25, 0.97), (0.5, 0.83), (0.72, 0.58), (0.89, 0.27), (1, 0)])
-_LINE = _smooth([(0, -0.006), (0.15, -0.005), (0.4, -0.002), (0.7, 0.005), (0.88, 0.014), (1, 0.022)])
+_LINE = _smooth([(0, -0.006), (0.15, -0.005), (0.4, -0.002), (0.7, 0.005), (0.88, 0.013), (1, 0.020)])
 _ENVELOPE = np.sqrt(np.maximum(1 - ACROSS**2, 0))
 _FULL = np.where(SIDE > 0, _BOW, _BELOW)
 
@@ -81,7 +81,7 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
     drop = pose.gap - rise
     middle = _between(pose)
     squeeze = _squeeze(pose)
-    rounded = _ENVELOPE ** (1 + pose.roundness)
+    rounded = _ENVELOPE ** (1 + min(2 * pose.roundness, 1.0))
     belly = rounded + squeeze * (1 - rounded)
     hole, contour = _opening(pose)
     inner_y = middle + np.where(upper, rise, -drop) * hole
@@ -119,7 +119,7 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
         (inner_x, inner_y, contact_z),
         (x * (1 - 0.88 * squeeze), inner_y + up * 0.014 * _ENVELOPE, 0.5 * (contact_z + behind)),
         (x * (1 - 0.45 * squeeze), inner_y + up * (0.05 * _ENVELOPE + 0.002), behind),
-        (1.12 * x, inner_y + up * (0.13 * _ENVELOPE + 0.012), behind - 0.01),
+        ((1.12 - 0.2 * pose.roundness) * x, inner_y + up * (0.13 * _ENVELOPE + 0.012), behind - 0.01),
     ]
     return np.stack([np.stack(row, axis=1) for row in rows])
 
@@ -140,8 +140,9 @@ def closed_share(pose: CharacterPose) -> float:
 
 def _between(pose: CharacterPose) -> Real:
     """Return the height of the line between the lips, closed, at every column [shape=(COLUMNS,)]."""
-    line = (1 - 0.8 * pose.roundness - 0.6 * pose.spread) * _LINE
-    raised = (pose.smile - 0.22 * pose.gap * (1 - 0.6 * pose.spread)) * ACROSS**2
+    line = (1 - pose.roundness - 0.6 * pose.spread) * _LINE
+    lowered = 0.22 * pose.gap * (1 - 0.6 * pose.spread) * (1 - 0.75 * pose.roundness)
+    raised = (pose.smile - lowered) * ACROSS**2
     bowed = ROUND_BOW * (1 - ACROSS**2) - ROUND_DROP - 0.2 * pose.gap
     return np.asarray(MOUTH_Y + line + raised + bowed * pose.roundness)
 
