@@ -28,7 +28,7 @@ Real = NDArray[np.float64]
 
 PIVOT = np.array([0.0, -0.75, -0.9])
 """The head turns about this place, the top of the neck."""
-TONGUE_LIGHT, UPPER_TEETH_LIGHT, LOWER_TEETH_LIGHT = 1.35, 0.85, 0.45
+TONGUE_LIGHT, UPPER_TEETH_LIGHT, LOWER_TEETH_LIGHT = 1.35, 0.92, 0.45
 """The tongue is wet, and drawn brighter than the rest of the mouth; the lower teeth lie in the shade of the upper."""
 SEAM_LIGHT = (0.88, 0.72, 0.54, 0.42, 0.34)
 """The part of the light that arrives beside the seam of closed lips, at the rings that end there: a soft line."""
@@ -170,7 +170,9 @@ class Figure:
         )
         lips, closed = self.skin.lip_rows(), closed_share(pose)
         for ring, part_of in enumerate(SEAM_LIGHT, VISIBLE - len(SEAM_LIGHT)):
-            arrives[lips[ring]] *= 1 - (1 - part_of) * np.maximum(closed, CORNER_SHADE * (1 - pose.roundness**2) * AT_CORNER)
+            arrives[lips[ring]] *= 1 - (1 - part_of) * np.maximum(
+                closed, CORNER_SHADE * (1 - pose.roundness**2) * AT_CORNER
+            )
         for ring, part_of in enumerate(RIM_LIGHT, VISIBLE - 3):
             arrives[lips[ring]] *= 1 - (1 - part_of) * pose.roundness
         arrives[self.rows["upper teeth"]] *= UPPER_TEETH_LIGHT

@@ -125,7 +125,7 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
 
 
 def _meeting(pose: CharacterPose, base_z: Real, inwards: float) -> Real:
-    """Return how far forward the lips meet, at places so much nearer to the middle than the columns [shape=(COLUMNS,)]."""
+    """Return how far forward the lips meet, at places that much nearer to the middle [shape=(COLUMNS,)]."""
     across = inwards * ACROSS
     between = np.interp(across, ACROSS[:_UPPER], 0.5 * (base_z[:_UPPER] + _opposite(base_z)))
     curved = ARCH * REST_HALF_WIDTH**2 * (pose.width**2 - 1)
