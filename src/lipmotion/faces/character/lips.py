@@ -121,7 +121,11 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
         (inner_x, inner_y, contact_z),
         (x * (1 - 0.88 * squeeze), inner_y + up * 0.014 * _ENVELOPE, 0.5 * (contact_z + behind)),
         (x * (1 - 0.45 * squeeze), inner_y + up * (0.05 * _ENVELOPE + 0.002), behind),
-        ((1.12 - 0.2 * pose.roundness) * x, inner_y + up * (0.13 * _ENVELOPE + 0.012), behind - 0.01),
+        (
+            (1.12 - 0.2 * pose.roundness) * x,
+            inner_y + up * ((0.13 - 0.05 * pose.roundness) * _ENVELOPE + 0.012),
+            behind - 0.01,
+        ),
     ]
     return np.stack([np.stack(row, axis=1) for row in rows])
 
