@@ -63,7 +63,13 @@ def test_closed_lips_show_nothing_of_the_mouth(front):
 def test_the_mouth_does_not_come_through_the_skin_above_protruded_lips():
     close = Stage(Camera(300, 220, (0.0, -0.71), 0.6))
     for gap in (0.0, 0.004, 0.008):
-        lips = {"gap": gap, "upper_rise": 0.48 * gap, "width": 0.82, "roundness": 1.0, "protrusion": 0.1}
+        lips: dict[str, Any] = {
+            "gap": gap,
+            "upper_rise": 0.48 * gap,
+            "width": 0.82,
+            "roundness": 1.0,
+            "protrusion": 0.1,
+        }
         skin = (
             close.picture(CharacterPose(**lips, jaw=0.4 * gap, fullness=1.08))[50:75, 140:160].astype(int).sum(axis=2)
         )
