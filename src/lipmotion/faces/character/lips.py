@@ -30,8 +30,8 @@ OVAL_SQUEEZE = 0.14
 """How much nearer to the middle the inner edge of an oval mouth lies than the corners."""
 HOLE_WIDTH = (0.014, 0.6)
 """Half the width of a round hole, round which the lips run as a ring: a length, and so much of the gap."""
-RING_GAP = 0.01
-"""Below this gap the ring of round lips becomes the line of closed ones."""
+RING_GAP, LINE_SHARE = 0.01, 0.25
+"""Below this gap the hole of round lips widens to a line, by so much: more, and sums of blendshapes fit worse."""
 ROUND_BOW = 0.0012
 """How far the middle of a round hole is raised: its middle lies before its sides, and the camera looks down on it."""
 SEAM_GAP, SEAM_FORWARD = 0.03, 0.026
@@ -175,7 +175,7 @@ def _opening(pose: CharacterPose) -> tuple[Real, Real]:
 def _squeeze(pose: CharacterPose) -> float:
     """Return how much nearer to the middle the inner edge of the lips lies than the corners, 0 to 1."""
     hole = (HOLE_WIDTH[0] + HOLE_WIDTH[1] * pose.gap) / (REST_HALF_WIDTH * pose.width)
-    as_ring = max(1 - hole, 0.0) * (1 - 0.6 * pose.press) * (1 - closed_share(pose, RING_GAP))
+    as_ring = max(1 - hole, 0.0) * (1 - 0.6 * pose.press) * (1 - LINE_SHARE * closed_share(pose, RING_GAP))
     return as_ring * pose.roundness + OVAL_SQUEEZE * pose.oval * (1 - pose.roundness)
 
 
