@@ -50,12 +50,14 @@ def test_opening_moves_chin_and_lips_but_neither_forehead_nor_eyes():
 
 
 def test_shut_eyes_cover_the_eyeballs():
-    def edge(shut: float) -> float:
-        x, y = figure().skin.lids_of_eye.opening(CharacterPose(shut=shut))
-        return float(np.ptp(y[np.abs(x - 0.315) < 0.05]))
+    def apart(**pose) -> np.ndarray:
+        height = figure().skin.lids_of_eye.opening(CharacterPose(**pose))[1]
+        return height[1:32] - height[:32:-1]
 
-    assert edge(0.0) > 0.15
-    assert edge(1.0) < 0.03
+    assert apart(shut=0.0).max() > 0.15
+    assert 0.03 < apart(shut=0.5).max() < apart(shut=0.25).max()
+    for gaze in ((0.0, 0.0), (0.1, 0.1), (0.0, -0.15)):
+        assert apart(shut=1.0, gaze=gaze) == pytest.approx(0, abs=1e-9)
 
 
 def test_turning_moves_the_head_and_not_the_body():

@@ -60,6 +60,22 @@ def test_closed_lips_show_nothing_of_the_mouth(front):
         assert seen == {"wall": 0, "tongue": 0, "teeth": 0, "upper teeth": 0}
 
 
+def test_the_mouth_does_not_come_through_the_skin_above_protruded_lips():
+    close = Stage(Camera(300, 220, (0.0, -0.71), 0.6))
+    for gap in (0.0, 0.004, 0.008):
+        lips: dict[str, Any] = {
+            "gap": gap,
+            "upper_rise": 0.48 * gap,
+            "width": 0.82,
+            "roundness": 1.0,
+            "protrusion": 0.1,
+        }
+        skin = (
+            close.picture(CharacterPose(**lips, jaw=0.4 * gap, fullness=1.08))[50:75, 140:160].astype(int).sum(axis=2)
+        )
+        assert skin.min() > np.median(skin) - 120
+
+
 def test_a_picture_of_the_moving_part_is_the_whole_picture():
     stage, pose = Stage(camera_for(320, 240)), CharacterPose(gap=0.1, turn=(0.2, 0.05, 0.0))
     drawn = stage.figure.frame(pose, stage.canvas.camera.place)

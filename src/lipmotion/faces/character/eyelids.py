@@ -32,12 +32,13 @@ def _curve(knots: list[tuple[float, float]]) -> Real:
 
 
 UPPER_LID = _curve(
-    [(-1, -0.028), (-0.75, 0.040), (-0.35, 0.086), (0.1, 0.098), (0.55, 0.080), (0.85, 0.043), (1, 0.012)]
+    [(-1, -0.022), (-0.75, 0.042), (-0.35, 0.084), (0.1, 0.097), (0.55, 0.083), (0.85, 0.049), (1, 0.018)]
 )
 LOWER_LID = _curve(
-    [(-1, -0.028), (-0.75, -0.062), (-0.3, -0.082), (0.15, -0.086), (0.6, -0.063), (0.85, -0.026), (1, 0.012)]
+    [(-1, -0.022), (-0.75, -0.058), (-0.3, -0.084), (0.15, -0.090), (0.6, -0.066), (0.85, -0.024), (1, 0.018)]
 )
-_SHUT = LOWER_LID + 0.016 * (1 - LID_ACROSS**2)
+MEETING = 0.028
+"""How far the middle of the lower lid rises to meet the upper one."""
 
 
 class Eyelids:
@@ -61,9 +62,8 @@ class Eyelids:
         gaze = 0.10 * pose.gaze[1]
         squint = 0.6 * max(pose.smile, 0.0)
         upper = UPPER_LID + gaze * (1 - LID_ACROSS**2) + 0.15 * pose.brows * (1 - LID_ACROSS**2)
-        lower = LOWER_LID + (0.5 * gaze + squint + 0.012 * pose.shut) * (1 - LID_ACROSS**2)
-        closed = _SHUT + 0.012 * pose.shut * (1 - LID_ACROSS**2)
-        upper = np.maximum(upper + min(1.12 * pose.shut, 1.0) * (closed - upper), lower)
+        lower = LOWER_LID + (0.5 * gaze * (1 - pose.shut) + squint + MEETING * pose.shut) * (1 - LID_ACROSS**2)
+        upper = np.maximum(upper + min(1.12 * pose.shut, 1.0) * (lower - upper), lower)
         return EYE[0] + HALF_WIDTH * LID_ACROSS, np.where(LID_SIDE > 0, upper, lower)
 
     def rings(self, pose: CharacterPose) -> Real:

@@ -28,12 +28,14 @@ Real = NDArray[np.float64]
 
 PIVOT = np.array([0.0, -0.75, -0.9])
 """The head turns about this place, the top of the neck."""
-TONGUE_LIGHT, LOWER_TEETH_LIGHT = 1.35, 0.5
+TONGUE_LIGHT, UPPER_TEETH_LIGHT, LOWER_TEETH_LIGHT = 1.35, 0.92, 0.45
 """The tongue is wet, and drawn brighter than the rest of the mouth; the lower teeth lie in the shade of the upper."""
 SEAM_LIGHT = (0.88, 0.72, 0.54, 0.42, 0.34)
 """The part of the light that arrives beside the seam of closed lips, at the rings that end there: a soft line."""
-RIM_LIGHT = (0.45, 0.04, 0.02)
-"""The same for the rim of a round hole and the two rings behind it, which would widen the hole in grey."""
+RIM_LIGHT = (0.93, 0.78, 0.45, 0.04, 0.02)
+"""The same for the rings before the rim of a round hole, the rim, and those behind, which would widen it in grey."""
+LIP_SHADOW, SHADOW_DEPTH = 0.24, 0.09
+"""The part of the light that arrives right under the upper lip in the mouth, and how far down its shadow reaches."""
 CORNER_SHADE = 0.6
 """How far the corners of any mouth are shaded as a seam."""
 _EYES = ((1.0, ""), (-1.0, "right "))
@@ -168,9 +170,12 @@ class Figure:
         )
         lips, closed = self.skin.lip_rows(), closed_share(pose)
         for ring, part_of in enumerate(SEAM_LIGHT, VISIBLE - len(SEAM_LIGHT)):
-            arrives[lips[ring]] *= 1 - (1 - part_of) * np.maximum(closed, CORNER_SHADE * AT_CORNER)
-        for ring, part_of in enumerate(RIM_LIGHT, VISIBLE - 1):
+            arrives[lips[ring]] *= 1 - (1 - part_of) * np.maximum(
+                closed, CORNER_SHADE * (1 - pose.roundness**2) * AT_CORNER
+            )
+        for ring, part_of in enumerate(RIM_LIGHT, VISIBLE - 3):
             arrives[lips[ring]] *= 1 - (1 - part_of) * pose.roundness
+        arrives[self.rows["upper teeth"]] *= UPPER_TEETH_LIGHT
         arrives[self.rows["teeth"]] *= LOWER_TEETH_LIGHT
         return colours, arrives
 
@@ -179,13 +184,14 @@ class Figure:
         ring = skin[self.skin.lip_rows()[VISIBLE - 1]]
         top, low, front = ring[_MIDDLE, 1], ring[_LAST, 1], 0.5 * (ring[_MIDDLE, 2] + ring[_LAST, 2])
         span, half = max(top - low, 0.0), max(0.26 * pose.width, 0.1)
+        shadow = LIP_SHADOW + 0.4 * pose.tuck  # teeth on the lip are seen
         shade, open_ = 1 - 0.92 * pose.roundness**1.1, min(span / 0.25, 1.0)
 
         def inside(places: Real) -> Real:
             depth = (0.93 - 0.27 * open_) * np.clip((front - places[:, 2] - 0.10) / (0.22 + 0.8 * span), 0, 1)
-            under = np.clip((top - places[:, 1] + 0.01) / 0.05, 0, 1)
-            aside = np.clip(1.15 - 1.15 * (places[:, 0] / half) ** 2, 0, 1)
-            return shade * (1 - depth) ** 1.5 * (0.7 + 0.3 * under) * (0.12 + 0.88 * aside)
+            under = np.clip((top - places[:, 1]) / SHADOW_DEPTH, 0, 1)
+            aside = np.clip(1.05 - 1.25 * (places[:, 0] / half) ** 2, 0, 1)
+            return shade * (1 - depth) ** 1.5 * (shadow + (1 - shadow) * under) * (0.12 + 0.88 * aside)
 
         return inside
 

@@ -60,13 +60,13 @@ def head(p: Real) -> Real:
     d = union(d, cone(q, (0.0, -0.95, -0.27), (0.33, -0.60, -0.62), 0.16, 0.22), 0.35)
     d = union(d, ellipsoid(q, (0, -0.98, -0.185), (0.19, 0.14, 0.16)), 0.22)
     d = union(d, ellipsoid(q, (0, -0.71, -0.17), (0.36, 0.27, 0.22)), 0.25)
-    d = cut(d, ellipsoid(q, (0.33, 0.0, 0.10), (0.27, 0.2, 0.14)), 0.16)
+    d = cut(d, ellipsoid(q, (0.335, 0.0, 0.115), (0.27, 0.2, 0.14)), 0.2)
     d = union(d, np.linalg.norm(q - EYE, axis=1) - LID, 0.05)
     d = union(d, cone(q, (0, 0.10, -0.07), (0, -0.35, 0.10), 0.052, 0.078), 0.14)
     d = union(d, ellipsoid(q, (0, -0.40, 0.135), (0.092, 0.082, 0.095)), 0.1)
     d = union(d, ellipsoid(q, (0.094, -0.43, 0.045), (0.06, 0.055, 0.075)), 0.06)
     d = cut(d, ellipsoid(q, (0.052, -0.495, 0.105), (0.034, 0.026, 0.05)), 0.025)
-    return cut(d, ellipsoid(q, (0, -0.565, 0.075), (0.03, 0.06, 0.03)), 0.05)
+    return cut(d, ellipsoid(q, (0, -0.57, 0.08), (0.036, 0.07, 0.036)), 0.09)
 
 
 def along_rays(form: Form, start: Real, direction: Real, *, steps: int = 70) -> Real:

@@ -28,8 +28,10 @@ ARCH = 1.15
 _UPPER_LIP, _LOWER_LIP = 0.076, 0.106
 OVAL_SQUEEZE = 0.14
 """How much nearer to the middle the inner edge of an oval mouth lies than the corners."""
-HOLE_WIDTH = (0.008, 0.55)
+HOLE_WIDTH = (0.014, 0.6)
 """Half the width of a round hole, round which the lips run as a ring: a length, and so much of the gap."""
+RING_GAP, LINE_SHARE = 0.01, 0.25
+"""Below this gap the hole of round lips widens to a line, by so much: more, and sums of blendshapes fit worse."""
 ROUND_BOW = 0.0012
 """How far the middle of a round hole is raised: its middle lies before its sides, and the camera looks down on it."""
 SEAM_GAP, SEAM_FORWARD = 0.03, 0.026
@@ -61,9 +63,9 @@ def _smooth(knots: list[tuple[float, float]]) -> Real:
     return np.asarray(CubicSpline(x, y)(ACROSS))
 
 
-_BOW = _smooth([(0, 0.80), (0.2, 0.97), (0.36, 0.93), (0.62, 0.66), (0.85, 0.3), (1, 0)])
+_BOW = _smooth([(0, 0.80), (0.2, 0.97), (0.36, 0.92), (0.62, 0.66), (0.85, 0.3), (1, 0)])
 _BELOW = _smooth([(0, 1.0), (0.25, 0.97), (0.5, 0.83), (0.72, 0.58), (0.89, 0.27), (1, 0)])
-_LINE = _smooth([(0, -0.004), (0.15, -0.002), (0.4, 0.003), (0.7, 0.005), (1, 0.004)])
+_LINE = _smooth([(0, -0.006), (0.15, -0.005), (0.4, -0.002), (0.7, 0.005), (0.88, 0.010), (1, 0.014)])
 _ENVELOPE = np.sqrt(np.maximum(1 - ACROSS**2, 0))
 _FULL = np.where(SIDE > 0, _BOW, _BELOW)
 
@@ -81,7 +83,8 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
     drop = pose.gap - rise
     middle = _between(pose)
     squeeze = _squeeze(pose)
-    belly = _ENVELOPE + squeeze * (1 - _ENVELOPE)
+    rounded = _ENVELOPE ** (1 + min(2 * pose.roundness, 1.0))
+    belly = rounded + squeeze * (1 - rounded)
     hole, contour = _opening(pose)
     inner_y = middle + np.where(upper, rise, -drop) * hole
     full = _FULL + 0.85 * pose.roundness * (_ENVELOPE - _FULL)
@@ -91,11 +94,11 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
     outer_y = middle + np.where(upper, rise, -drop) * contour + SIDE * thick * _rounded(pose)
     forward = pose.protrusion * (1 - 0.45 * ACROSS**2)
     arch = -ARCH * (x**2 - (REST_HALF_WIDTH * ACROSS) ** 2)
-    back = np.where(upper, 0.0, 0.22 * drop + 0.05 * pose.tuck * _ENVELOPE)
+    back = np.where(upper, 0.0, 0.22 * drop + 0.05 * pose.tuck) * _ENVELOPE
     outer_z = base_z + 0.85 * forward + arch - back
-    meet = np.interp(ACROSS, ACROSS[:_UPPER], 0.5 * (base_z[:_UPPER] + _opposite(base_z))) + forward + arch
-    meet = meet - np.where(upper, 0.0, 0.25 * drop) * contour
-    bulge = np.where(upper, 0.05, 0.062) * belly * pose.fullness * (1 - 0.3 * pose.press)
+    lower_back = np.where(upper, 0.0, 0.25 * drop) * contour
+    meet = _meeting(pose, base_z, 1 - squeeze) - lower_back
+    bulge = (0.056 - 0.006 * SIDE * _ENVELOPE) * belly * pose.fullness * (1 - 0.3 * pose.press)
     inner_x = x * (1 - squeeze)
     teeth = TEETH_Z - ARCH * inner_x**2
     up = SIDE * 1.0
@@ -105,7 +108,7 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
     contact_z = contact_z + tuck * (teeth + 0.02 - contact_z)
     on_teeth = np.minimum(TEETH_EDGE + 0.010, inner_y + 0.08)
     inner_y = np.where(upper, inner_y, np.maximum(inner_y, inner_y + tuck * (on_teeth - inner_y)))
-    crest = meet + bulge * (1 - 0.25 * tuck) - 0.03 * tuck
+    crest = _meeting(pose, base_z, 1 - 0.5 * squeeze) - lower_back + bulge * (1 - 0.25 * tuck) - 0.03 * tuck
     behind = np.maximum(teeth + 0.022, contact_z - 0.10)
     y, z = outer_y, outer_z
     broad = inner_y + pose.roundness * (middle + np.where(upper, rise, -drop) * contour - inner_y)
@@ -118,21 +121,34 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
         (inner_x, inner_y, contact_z),
         (x * (1 - 0.88 * squeeze), inner_y + up * 0.014 * _ENVELOPE, 0.5 * (contact_z + behind)),
         (x * (1 - 0.45 * squeeze), inner_y + up * (0.05 * _ENVELOPE + 0.002), behind),
-        (1.12 * x, inner_y + up * (0.13 * _ENVELOPE + 0.012), behind - 0.01),
+        (
+            (1.12 - 0.2 * pose.roundness) * x,
+            inner_y + up * ((0.13 - 0.05 * pose.roundness) * _ENVELOPE + 0.012),
+            behind - 0.01,
+        ),
     ]
     return np.stack([np.stack(row, axis=1) for row in rows])
 
 
-def closed_share(pose: CharacterPose) -> float:
-    """Return how nearly the lips are closed: 1 where they touch, 0 from ``SEAM_GAP`` on."""
-    share = min(max(1 - pose.gap / SEAM_GAP, 0.0), 1.0)
+def _meeting(pose: CharacterPose, base_z: Real, inwards: float) -> Real:
+    """Return how far forward the lips meet, at places that much nearer to the middle [shape=(COLUMNS,)]."""
+    across = inwards * ACROSS
+    between = np.interp(across, ACROSS[:_UPPER], 0.5 * (base_z[:_UPPER] + _opposite(base_z)))
+    curved = ARCH * REST_HALF_WIDTH**2 * (pose.width**2 - 1)
+    return np.asarray(between + pose.protrusion - (0.45 * pose.protrusion + curved) * across**2)
+
+
+def closed_share(pose: CharacterPose, apart: float = SEAM_GAP) -> float:
+    """Return how nearly the lips are closed: 1 where they touch, 0 from a gap of ``apart`` on."""
+    share = min(max(1 - pose.gap / apart, 0.0), 1.0)
     return share * share * (3 - 2 * share)
 
 
 def _between(pose: CharacterPose) -> Real:
     """Return the height of the line between the lips, closed, at every column [shape=(COLUMNS,)]."""
-    line = (1 - 0.8 * pose.roundness - 0.6 * pose.spread) * _LINE
-    raised = (pose.smile - 0.22 * pose.gap * (1 - 0.6 * pose.spread)) * ACROSS**2
+    line = (1 - pose.roundness - 0.6 * pose.spread) * _LINE
+    lowered = 0.22 * pose.gap * (1 - 0.6 * pose.spread) * (1 - 0.75 * pose.roundness)
+    raised = (pose.smile - lowered) * ACROSS**2
     bowed = ROUND_BOW * (1 - ACROSS**2) - ROUND_DROP - 0.2 * pose.gap
     return np.asarray(MOUTH_Y + line + raised + bowed * pose.roundness)
 
@@ -159,7 +175,7 @@ def _opening(pose: CharacterPose) -> tuple[Real, Real]:
 def _squeeze(pose: CharacterPose) -> float:
     """Return how much nearer to the middle the inner edge of the lips lies than the corners, 0 to 1."""
     hole = (HOLE_WIDTH[0] + HOLE_WIDTH[1] * pose.gap) / (REST_HALF_WIDTH * pose.width)
-    as_ring = max(1 - hole, 0.0) * (1 - 0.6 * pose.press)
+    as_ring = max(1 - hole, 0.0) * (1 - 0.6 * pose.press) * (1 - LINE_SHARE * closed_share(pose, RING_GAP))
     return as_ring * pose.roundness + OVAL_SQUEEZE * pose.oval * (1 - pose.roundness)
 
 

@@ -122,7 +122,7 @@ class Skin:
         """
         rows, closed = self.lip_rows(), closed_share(pose)
         normals[rows[VISIBLE - 1]] += closed * (normals[rows[VISIBLE - 2]] - normals[rows[VISIBLE - 1]])
-        beside = AT_CORNER * CORNER_JOINED
+        beside = AT_CORNER * (CORNER_JOINED + (1 - CORNER_JOINED) * pose.roundness)
         for ring in range(1, VISIBLE):
             own = normals[rows[ring]]
             share = np.maximum(closed * _JOINED.get(ring, 0.0), beside)

@@ -20,7 +20,7 @@ class LipDesign:
     half_width   : half the distance of the corners at rest
     upper, lower : thickness of the lips
     seam         : half the thickness of the line between the closed lips
-    smile        : how far the corners lie below the middle at rest; negative: above
+    smile        : how far the corners lie below the middle; negative: above. Round, oval and tucked lips have none
     outline      : thickness of a line around lips and mouth; 0: none
     """
 
@@ -63,7 +63,7 @@ class EyeDesign:
         (0.51, -0.01),
     )
     lashes: float = 1.0
-    brow: Path = "0.145 -0.245, 0.27 -0.275, 0.42 -0.295, 0.575 -0.225"
+    brow: Path = "0.145 -0.237, 0.27 -0.272, 0.42 -0.29, 0.575 -0.238"
     brow_widths: tuple[float, ...] = (0.03, 0.058, 0.056, 0.045, 0.006)
 
 

@@ -20,6 +20,8 @@ Heights = NDArray[np.float64]
 
 TEETH_EDGE = 0.024
 """The upper incisors end this far below the line of the closed lips; they belong to the skull."""
+TUCKED_LIP = 0.05
+"""Least thickness of a lower lip under the upper teeth: thin lips are drawn thicker there, to be seen."""
 _LINE = [(0, 0.006), (0.16, 0.005), (0.4, -0.005), (0.72, -0.004), (1, 0.004)]
 _CUPIDS_BOW = [(0, 0.82), (0.08, 0.87), (0.22, 1.0), (0.36, 0.94), (0.62, 0.66), (0.85, 0.29), (1, 0)]
 _LOWER = [(0, 1), (0.25, 0.975), (0.5, 0.855), (0.72, 0.61), (0.89, 0.29), (1, 0)]
@@ -64,13 +66,14 @@ def lip_outlines(lips: LipDesign, pose: MouthPose, x: Heights) -> LipOutlines:
     u = np.minimum(np.abs(x) / half_width, 1)
     out, wide = pose.protrusion, pose.spread
     rise = float(upper_share(pose.gap))
-    rise += pose.tuck * (1 - out) * max(min(0.8 * pose.gap, 0.036) - rise, 0) + out * (0.42 * pose.gap - rise)
+    rise += pose.tuck * (1 - out) * max(min(0.9 * pose.gap, 0.045) - rise, 0) + out * (0.42 * pose.gap - rise)
     drop = pose.gap - rise
     middle = lips.line_y + pose.tuck * max(TEETH_EDGE - 0.018 - drop, -0.03) - 0.008 * out
     sag = (0.5 - 0.3 * wide) * drop * (1 - pose.tuck) + 0.018 * out - 0.012 * wide * (1 - pose.press)
     sag += pose.oval * (0.5 * (drop - rise) - sag) + 0.014 * pose.tuck
     bend = sag * u * u
-    line = middle + (1 - 0.7 * out) * _on("line", u) + lips.smile * u**3 + bend
+    smile = lips.smile * (1 - out) * (1 - pose.oval) * (1 - pose.tuck)
+    line = middle + (1 - 0.7 * out) * _on("line", u) + smile * u**3 + bend
     inner_share = _inner_share(pose)
     inner = u / inner_share
     open_share = min(pose.gap / 0.05, 1)
@@ -82,11 +85,12 @@ def lip_outlines(lips: LipDesign, pose: MouthPose, x: Heights) -> LipOutlines:
     thin = 1 - 0.28 * pose.press * (1 - out)
     upper = lips.upper * pose.fullness * thin * (1 - 0.12 * pose.tuck - 0.02 * out - 0.14 * wide)
     lower = lips.lower * pose.fullness * thin * (1 - 0.5 * pose.tuck + 0.1 * out - 0.16 * wide * (1 - pose.tuck))
+    lower = max(lower, TUCKED_LIP * pose.tuck)
     follow = 0.85 * (1 - 0.35 * out)
     return LipOutlines(
         half_width=half_width,
         inner_half_width=half_width * inner_share,
-        corner_y=float(middle + (1 - 0.7 * out) * _LINE[-1][1] + lips.smile + sag),
+        corner_y=float(middle + (1 - 0.7 * out) * _LINE[-1][1] + smile + sag),
         upper_outer=np.minimum(line - rise * _arch(u, follow) - upper * _thickness("upper", u, out), upper_inner),
         upper_inner=upper_inner,
         lower_inner=lower_inner,
@@ -155,8 +159,8 @@ def _inner_share(pose: MouthPose) -> float:
 
 def _seam_beside(pose: MouthPose, u: Heights, inner_share: float) -> Heights:
     """Return how thick the line is where the lips touch beside a round hole, 0..1: it fades towards the corners."""
-    beyond = np.clip((u - inner_share) / (0.55 * (1 - inner_share)), 0, 1)
-    return 1 - pose.protrusion * min(pose.gap / 0.03, 1) * beyond**0.7
+    beyond = np.clip((u - inner_share) / (0.22 * (1 - inner_share)), 0, 1)
+    return 1 - pose.protrusion * min(pose.gap / 0.03, 1) * beyond**0.5
 
 
 def _tongue(pose: MouthPose, x: Heights, edge: float, low_lip: float) -> tuple[Heights, Heights]:

@@ -97,10 +97,14 @@ class MouthPainter:
         on.paint(top, low, across, art.upper_teeth, min(5 * seen, 1))
         on.paint(top, np.minimum(top + 0.028 * (1 - 0.4 * pose.tuck), bottom), across, art.lip_shadow)
         if line := self._lips.outline:
-            part = (0.8 - 0.35 * pose.tuck) * line * np.minimum((bottom - top) / 0.01, 1)
+            part = 0.8 * line * np.minimum((bottom - top) / 0.01, 1)
             front = np.maximum(bottom, within.tongue_bottom) if pose.tongue > 0.6 else bottom
-            for edge in (top, front):
-                on.paint(edge - part / 2, edge + part / 2, across, art.outline)
+            for edge, share in (
+                (top, 1 - 0.3 * pose.tuck),
+                (front, 1 - 0.7 * pose.tuck),
+                (shape.lower_outer, pose.tuck),
+            ):
+                on.paint(edge - share * part / 2, edge + share * part / 2, across, art.outline)
 
 
 def _seen(pose: MouthPose) -> float:

@@ -51,7 +51,7 @@ def mouth_textures(design: Design) -> MouthTextures:
             lower_lip=_flat(colours.lower_lip_light),
             seam=_flat(colours.line),
             cavity=_flat(colours.cavity),
-            upper_teeth=_flat(colours.tooth),
+            upper_teeth=_flat_teeth(colours.tooth, colours.lower_lip_dark),
             lower_teeth=_flat(colours.lower_tooth),
             tongue=_flat(colours.tongue),
             tongue_tip=_flat_tip(colours.tongue),
@@ -66,7 +66,7 @@ def mouth_textures(design: Design) -> MouthTextures:
         lower_lip=_lower_lip(design),
         seam=_seam(colours.seam),
         cavity=_cavity(colours.cavity, colours.tongue),
-        upper_teeth=_teeth(colours.tooth, colours.mouth_shadow, UPPER_TOOTH_GAPS, 0.3),
+        upper_teeth=_teeth(colours.tooth, colours.mouth_shadow, UPPER_TOOTH_GAPS, 0.5),
         lower_teeth=_teeth(colours.lower_tooth, colours.mouth_shadow, LOWER_TOOTH_GAPS, 0.45)[::-1].copy(),
         tongue=_tongue(colours.tongue, colours.cavity),
         tongue_tip=_tongue_tip(colours.tongue, colours.lower_lip_light, colours.cavity),
@@ -142,8 +142,15 @@ def _teeth(colour: Colour, shadow: Colour, gaps: tuple[float, ...], dark: float)
     away = np.abs(np.abs(x) * SPAN - np.array(gaps)[:, None, None]).min(axis=0)
     paint = _mix(colour, shadow, 0.2 * np.exp(-((away / 0.0032) ** 2)) * (0.35 + 0.65 * depth))
     paint = _mix(paint, shadow, dark * (1 - depth) ** 2.2 + 0.0 * x)
-    side = np.exp(-((x * SPAN / 0.19) ** 4))
+    side = np.exp(-((x * SPAN / 0.175) ** 4))
     return _texture(paint, side + 0 * depth)
+
+
+def _flat_teeth(colour: Colour, line: Colour) -> Texture:
+    """Return teeth of one colour, with lines between the incisors."""
+    _, x = _grid(1, 261)
+    away = np.abs(np.abs(x) * SPAN - np.array(UPPER_TOOTH_GAPS[:3])[:, None, None]).min(axis=0)
+    return _texture(_mix(colour, line, 0.6 * np.exp(-((away / 0.003) ** 2))), 1.0)
 
 
 def _tongue(colour: Colour, dark: Colour) -> Texture:
@@ -179,7 +186,7 @@ def _pucker(colour: Colour, deep: Colour) -> Texture:
     """Return the folds of protruded lips, from their outer edge to the hole, and the shade of their corners."""
     depth, x = _grid(24, 129)
     folds = np.abs(np.sin(np.pi * 6.5 * (np.abs(x) + 0.035 * np.sin(9 * x)))) ** 5 * (1 - x**4)
-    strength = 0.34 * folds * np.sin(np.pi * np.clip(0.15 + 0.9 * depth, 0, 1)) * np.clip(np.abs(x) / 0.1, 0, 1)
+    strength = 0.1 * folds * np.sin(np.pi * np.clip(0.15 + 0.9 * depth, 0, 1)) * np.clip(np.abs(x) / 0.1, 0, 1)
     return _texture(_mix(colour, deep, 0.25 + 0 * depth * x), strength)
 
 

@@ -40,7 +40,7 @@ WOMAN = Design(
             ),
         ),
     ),
-    lips=LipDesign(smile=-0.011),
+    lips=LipDesign(smile=-0.03),
     earrings=True,
     collarbones=True,
 )
