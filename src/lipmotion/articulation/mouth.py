@@ -43,6 +43,8 @@ UPPER_MOST, UPPER_RATE = 0.058, 5.2
 """The upper lip rises by at most the first length (5 mm), for small gaps by the product of both times the gap."""
 JAW_SHARE = 0.85
 """Share of the lower lip's way that the chin goes: the lip also turns outwards."""
+LEAST_JAW = 0.85
+"""Least drop of the chin, as a share of the usual one: trackers of small jaws, and models of them, show less."""
 CORNERS = (f"x_{RIGHT_CORNER}", f"x_{LEFT_CORNER}")
 """Where the lip corners are across, in motion that has points."""
 DRAWN = ("opening", "width", "outer", "y_152", *GESTURES)
@@ -240,4 +242,4 @@ def _jaw(motion: Motion, rest: NDArray[np.bool_], gap: Curve) -> Curve:
     if "y_152" not in motion.names:
         return np.asarray(usual)
     chin = motion["y_152"].astype(np.float64)
-    return np.clip(np.median(chin[rest]) - chin, 0.7 * usual, 1.15 * usual + 0.01)
+    return np.clip(np.median(chin[rest]) - chin, LEAST_JAW * usual, 1.15 * usual + 0.01)

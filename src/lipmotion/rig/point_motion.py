@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.lip_points import CHIN, FACING, LEFT_CORNER, RIGHT_CORNER, mouth_template
-from lipmotion.articulation.mouth import SpokenMouth, spoken_mouth, upper_share
+from lipmotion.articulation.mouth import LEAST_JAW, SpokenMouth, jaw_drop, spoken_mouth, upper_share
 from lipmotion.articulation.rest import rest_frames
 from lipmotion.errors import InputError
 from lipmotion.rig.blendshape_motion import with_mouth
@@ -75,6 +75,8 @@ def _as_spoken(displacements: Array, mouth: SpokenMouth) -> Array:
     forward = np.maximum(FORWARD * mouth.protrusion - moved[:, lips, 2].mean(axis=1), 0) * mouth.protrusion
     moved[:, lips, 2] += forward[:, None]
     moved[:, :, 1] += _parting(moved[:, :, 1], across, mouth.gap)
+    higher = moved[:, template.row(CHIN), 1] + LEAST_JAW * jaw_drop(mouth.gap) * (1 - mouth.tuck)
+    moved[:, template.jaw, 1] -= np.maximum(higher, 0)[:, None]
     return moved
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -93,11 +94,12 @@ def _closed_as_spoken(weights: Array, motion: Motion, mouth: SpokenMouth, shapes
     return result
 
 
-def with_gap(weights: Array, shapes: FaceShapes, gap: Array) -> Array:
+def with_gap(weights: Array, shapes: FaceShapes, gap: Array, kept: Collection[str] = NOT_FROM_POINTS) -> Array:
     """Return the nearest weights under which the middle of the lips is apart by the gap [shape=(T, S)].
 
     weights : 0 to 1, ``mouthClose`` at most ``jawOpen`` [shape=(T, S)]
     gap     : eye distances; where it is 0 the lips meet [shape=(T,)]
+    kept    : known names of shapes that stay as they are
     The projection onto the weights with that gap: as smooth as the weights and the gap are. Shapes that hardly part the
     lips remain. ``mouthClose`` takes its part by closing the lips in front of an open jaw. Where no weights between
     0 and 1
@@ -108,7 +110,7 @@ def with_gap(weights: Array, shapes: FaceShapes, gap: Array) -> Array:
     if jaw is not None and close is not None:  # until the end: the jaw with the lips, and behind closed lips
         weights[:, jaw] -= weights[:, close]
         apart[close] += apart[jaw]
-    still = (np.abs(apart) < LEAST_PARTING) | np.isin(shapes.known, list(NOT_FROM_POINTS))
+    still = (np.abs(apart) < LEAST_PARTING) | np.isin(shapes.known, list(kept))
     way = np.where(still, 0.0, apart)
     low, high = np.full(len(weights), -1 / LEAST_PARTING), np.full(len(weights), 1 / LEAST_PARTING)
     for _ in range(BISECTIONS):

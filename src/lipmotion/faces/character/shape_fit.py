@@ -21,7 +21,9 @@ Real = NDArray[np.float64]
 FROM_POSE = {"tongueOut": "tongue_out", "tongueUp": "tongue_up", "mouthPressLeft": "press", "mouthPressRight": "press"}
 """Shapes whose weight is a number of the pose."""
 _NOT_OF_LIPS = ("eye", "brow", *FROM_POSE)
-APART = 30.0
+PARTING = ("jawOpen", "mouthClose", "mouthLowerDown", "mouthUpperUp")
+"""Shapes that are changed first so that the lips are apart as in the pose; the others where that is not enough."""
+APART = 12.0
 """How much the distance between the lips counts against the places of their vertices."""
 COSTS = CurveCosts(ridge=1e-3, smooth=2e-3)
 
@@ -30,7 +32,7 @@ def mouth_weights(figure: Figure, mesh: Mesh, poses: Sequence[CharacterPose]) ->
     """Return the weights of the shapes of lips, jaw and tongue in every pose, 0 to 1 [each shape=(T,)].
 
     mesh : of this figure, from ``head_mesh``
-    The middles of the lips are apart by the gap of the pose.
+    The middles of the lips are apart as in the pose.
     """
     names = [name for name in mesh.shape_names if not name.startswith(_NOT_OF_LIPS)]
     fixed = {name: np.array([getattr(pose, field) for pose in poses], float) for name, field in FROM_POSE.items()}
@@ -40,7 +42,10 @@ def mouth_weights(figure: Figure, mesh: Mesh, poses: Sequence[CharacterPose]) ->
     # of targets only what the shapes span counts, so they are projected at once: (T, S) numbers, not (T, vertices)
     spanned, triangle = np.linalg.qr(matrix.T)
     rest = figure.skin.places(REST)
-    targets = np.stack([_rows(figure, figure.skin.places(pose) - rest) @ spanned for pose in poses])
+    targets, gap = np.empty((len(poses), spanned.shape[1])), np.empty(len(poses))
+    for number, pose in enumerate(poses):
+        change = figure.skin.places(pose) - rest
+        targets[number], gap[number] = _rows(figure, change) @ spanned, lip_gap(figure, change)
     for name, curve in fixed.items():
         targets -= np.outer(curve, rows[name] @ spanned)
     weights = bounded_curves(triangle.T, targets, COSTS)
@@ -48,7 +53,8 @@ def mouth_weights(figure: Figure, mesh: Mesh, poses: Sequence[CharacterPose]) ->
     weights[:, close] = np.minimum(weights[:, close], weights[:, jaw])
     parting = np.array([lip_gap(figure, moved[mesh.shape_names.index(name)]) for name in names])
     shapes = FaceShapes(tuple(names), tuple(names), np.zeros((len(names), 0, 3)), parting, "arkit")
-    weights = with_gap(weights, shapes, np.array([pose.gap for pose in poses]))
+    kept = [name for name in names if not name.startswith(PARTING)]
+    weights = with_gap(with_gap(weights, shapes, gap, kept), shapes, gap)
     return dict(zip(names, weights.T, strict=True)) | fixed
 
 

@@ -21,7 +21,7 @@ POSES = {
     "jawOpen": CharacterPose(gap=0.3, upper_rise=0.03, jaw=0.23),
     "mouthClose": CharacterPose(jaw=0.23),
     "mouthFunnel": CharacterPose(gap=0.1, upper_rise=0.042, jaw=0.05, width=0.8, roundness=1, protrusion=0.09),
-    "mouthPucker": CharacterPose(width=0.7, roundness=1, protrusion=0.1, fullness=1.1),
+    "mouthPucker": CharacterPose(gap=0.02, upper_rise=0.01, width=0.7, roundness=1, protrusion=0.1, fullness=1.1),
     "mouthRollLower": CharacterPose(gap=0.054, upper_rise=0.054, tuck=1),
     "tongueOut": CharacterPose(tongue_out=1),
     "tongueUp": CharacterPose(tongue_up=1),
