@@ -11,6 +11,7 @@ from lipmotion.articulation.contact import (
     LEAST_CONTACT_S,
     LEAST_GAP,
     MEANT,
+    UNSEEN,
     WIDEST,
     closed_lips,
     closures,
@@ -45,7 +46,7 @@ def test_the_gap_is_0_where_trackers_see_closed_lips_and_grows_with_the_opening(
     assert np.diff(gap).max() < 0.004
     assert gap[-1] <= WIDEST
     people = np.array([0.05, 0.1, 0.25])
-    assert gap_of(people) == pytest.approx(people + 0.01, abs=1e-3)
+    assert gap_of(people) == pytest.approx(people + UNSEEN, abs=1e-3)
 
 
 def test_an_opening_has_the_gap_that_it_was_made_of():

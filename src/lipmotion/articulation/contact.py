@@ -19,15 +19,15 @@ Mask = NDArray[np.bool_]
 
 CLOSED_BELOW: Final = 0.012
 """Trackers measure openings up to this on lips that touch, in eye distances."""
-UNSEEN, SEEN_FROM = 0.01, 0.035
+UNSEEN, SEEN_FROM = 0.006, 0.03
 """Trackers measure this much less than the distance of parted lips; from the second length on, all of it is added."""
-BEND, WIDEST = 0.27, 0.45
+BEND, WIDEST = 0.3, 0.48
 """Up to the first gap, lips are as far apart as measured; further ones approach the second, in eye distances."""
 LEAST_GAP: Final = 0.006
 """Lips that do not touch are at least this far apart, in eye distances (0.5 mm on a face)."""
-LEAST_CONTACT_S: Final = 0.06
+LEAST_CONTACT_S: Final = 0.05
 """The lips touch for at least this long in p, b and m: longer than a picture at 24 a second."""
-FADE_S: Final = 0.05
+FADE_S: Final = 0.04
 """Lips that are made to touch come together, and part, within this time."""
 MEANT: Final = 0.15
 """Lips that are further apart than this in all of a p, b or m are left so: somebody edited or pinned them."""

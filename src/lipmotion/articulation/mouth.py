@@ -21,22 +21,22 @@ from lipmotion.types import Motion, Timeline, Unit
 
 Curve = NDArray[np.float64]
 
-TUCKED_GAP = (0.04, 0.052)
+TUCKED_GAP = (0.04, 0.062)
 """Range of the gap while the lower lip is on the upper teeth, which are seen."""
-TONGUE_GAP = (0.055, 0.085)
+TONGUE_GAP = (0.05, 0.1)
 """Range of the gap while the tongue is between the teeth."""
 PURSED_GAP = (0.034, 0.043)
 """Range of the gap of w: a small hole."""
 ROUND_GAP, TEETH_GAP = 0.05, 0.045
 """Least gap of protruded lips, and where both rows of teeth are seen."""
-ROUND_WIDTH, SPREAD_WIDTH, OVAL_WIDTH = 0.86, 1.06, 0.94
+ROUND_WIDTH, SPREAD_WIDTH, OVAL_WIDTH = 0.89, 1.05, 0.97
 """Protruded lips are at most so wide, spread ones at least, and those of an oval mouth at most, against rest."""
 OVAL_GAPS = (0.08, 0.18)
 """The gap at which an opening begins to be an oval, and at which it is one, where the phone asks for it."""
 WIDTH_REACH = 0.3
 """Changes of width approach this."""
-LIP_SPEED = 2.2
-"""The gap changes no faster than this beside f and v, in eye distances a second (20 cm/s on a face)."""
+LIP_SPEED = 3.0
+"""The gap changes no faster than this beside f and v, in eye distances a second (27 cm/s on a face)."""
 TUCKED_CHIN = 0.6
 """Share of its drop by which the chin rises while the lower lip is on the teeth."""
 UPPER_MOST, UPPER_RATE = 0.058, 5.2
