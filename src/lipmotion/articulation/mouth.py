@@ -21,16 +21,16 @@ from lipmotion.types import Motion, Timeline, Unit
 
 Curve = NDArray[np.float64]
 
-TUCKED_GAP = (0.04, 0.072)
+TUCKED_GAP = (0.04, 0.065)
 """Range of the gap while the lower lip is on the upper teeth, which are seen."""
 TONGUE_GAP = (0.05, 0.1)
 """Range of the gap while the tongue is between the teeth."""
-PURSED_GAP = (0.034, 0.045)
+PURSED_GAP = (0.028, 0.038)
 """Range of the gap of w: a small hole."""
 ROUND_GAP, TEETH_GAP = 0.05, 0.045
 """Least gap of protruded lips, and where both rows of teeth are seen."""
-ROUND_WIDTH, SPREAD_WIDTH, OVAL_WIDTH = 0.89, 1.05, 0.97
-"""Protruded lips are at most so wide, spread ones at least, and those of an oval mouth at most, against rest."""
+ROUND_WIDTH, PURSED_WIDTH, SPREAD_WIDTH, OVAL_WIDTH = 0.89, 0.82, 1.05, 0.97
+"""Protruded lips and those of w are at most so wide, spread ones at least, those of an oval mouth at most."""
 OVAL_GAPS = (0.08, 0.18)
 """The gap at which an opening begins to be an oval, and at which it is one, where the phone asks for it."""
 WIDTH_REACH = 0.3
@@ -223,7 +223,7 @@ def _width(motion: Motion, rest: NDArray[np.bool_], said: dict[str, Curve], oval
     else:
         change = -0.25 * np.clip(motion["opening"].astype(np.float64), 0, 0.4)
     width = 1 + WIDTH_REACH * np.tanh(change / WIDTH_REACH)
-    for weight, most in ((said["protrusion"], ROUND_WIDTH), (oval, OVAL_WIDTH)):
+    for weight, most in ((said["protrusion"], ROUND_WIDTH), (said["pursed"], PURSED_WIDTH), (oval, OVAL_WIDTH)):
         width = width + weight * (np.minimum(width, most) - width)
     spread = said["spread"] * (1 - said["protrusion"])
     return np.asarray(width + spread * (np.maximum(width, SPREAD_WIDTH) - width))

@@ -84,6 +84,7 @@ _TARGETS: dict[str, tuple[GestureTarget, Targets]] = {
         | _steady({"sh zh ch jh": 0.5}, 1.4, 0.04)
         | _steady({"r": 0.55, "er axr": 0.4}, 1.2, 0.04)
         | _steady({"iy ih ey ae eh ay aa ah": 0.0}, 1.2, 0.035)
+        | _steady({"th dh": 0.0}, 1.6, 0.03)
         | _steady({"f v": 0.0, "s z": 0.0, "sil sp": 0.0}, 0.7, 0.03),
     ),
     "spread": (

@@ -63,7 +63,7 @@ def size(mask: np.ndarray) -> tuple[int, int]:
 def test_oo_is_a_small_round_hole_without_lower_teeth(mouths):
     oo = mouths["uw"]
     width, height = oo.hole
-    assert 0.8 < width / height < 2.2
+    assert 0.8 < width / height < 3.0
     assert oo.seen["teeth"] == 0
     assert oo.seen["upper teeth"] < 0.2 * oo.inside
     assert oo.lips[0] < 0.9 * mouths["aa"].lips[0]

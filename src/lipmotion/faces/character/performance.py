@@ -20,6 +20,8 @@ BITTEN_GAP = (0.12, 0.2)
 """Teeth stay together up to the first gap, and part until the second one."""
 BITTEN = (0.8, 0.95)
 """Teeth are apart up to the first value of ``teeth``, and together from the second on."""
+ROUND = 0.86
+"""How round the lips of oo are; those of w are a ring."""
 NARROW, WIDE = 0.16, 0.12
 """Changes of width at which lips are round, and spread, whatever the phones ask for."""
 
@@ -58,7 +60,7 @@ def posed(mouth: SpokenMouth, moved: Liveliness) -> list[CharacterPose]:
         "bite": np.maximum(bite, closing),
         "width": mouth.width,
         "fullness": mouth.fullness * (1 + 0.08 * roundness),
-        "roundness": 0.8 * roundness,
+        "roundness": roundness * (ROUND + (1 - ROUND) * mouth.pursed),
         "spread": wide,
         "oval": mouth.oval,
         "protrusion": 0.06 * roundness + 0.02 * mouth.pursed,
