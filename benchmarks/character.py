@@ -33,6 +33,7 @@ from numpy.typing import NDArray
 import lipmotion
 from lipmotion.export.video import write_mp4
 from lipmotion.faces import face_named
+from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.faces.portrait.pose import mouth_poses
 from lipmotion.types import Audio, Motion, Timeline, Unit
 
@@ -84,7 +85,7 @@ def retracked(face: str, spoken: Sequence[Spoken], still: bool) -> dict[str, Any
             names = ("opening", "width", "outer")
             given.append(np.stack([motion.resampled(25.0)[name][:frames][seen] for name in names], axis=1))
             measured.append(np.stack([found.motion[name][:frames][seen] for name in names], axis=1))
-            poses = mouth_poses(motion, units, 25.0)[:frames]
+            poses = mouth_poses(spoken_mouth(motion, units, 25.0))[:frames]
             told.append(np.array([(pose.gap, pose.width) for pose in poses])[seen])
             coloured.append(np.array([colour_measures(picture, tones) for picture in pictures[:frames]])[seen])
     one, other = np.concatenate(given), np.concatenate(measured)

@@ -40,6 +40,7 @@ from lipmotion import Corpus, Selection, animate, evaluate, load_model
 from lipmotion.articulation.lip_points import CHIN, LOWER_MIDDLE, UPPER_MIDDLE
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.articulation.pauses import PAUSE_STYLES, with_pauses
+from lipmotion.articulation.symmetry import symmetrical
 from lipmotion.faces.character.performance import head_poses
 from lipmotion.faces.character.pose import CharacterPose
 from lipmotion.faces.character.shapes import head_mesh
@@ -160,6 +161,7 @@ def take(audio: Audio, tracked: Track, model: Model, recogniser: str) -> Take:
     """Return a recording with what is generated for its sound."""
     speech = understood_speech(model, SpeechRequest(audio, recogniser=recogniser)).speech
     generation = generate_for(None, model.engine, model.learned, speech)
+    generation = replace(generation, motion=symmetrical(generation.motion))
     lag_s = lag_of(generation.motion, tracked, LAG_S)
     time_s = generation.motion.time_s - lag_s
     person = Motion(tracked.motion.at(time_s), generation.motion.rate_hz, tracked.motion.channels)

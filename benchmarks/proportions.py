@@ -31,6 +31,7 @@ import lipmotion
 from lipmotion.export.video import write_mp4
 from lipmotion.faces import face_named
 from lipmotion.faces.portrait.geometry import lip_outlines
+from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.faces.portrait.pose import MouthPose, mouth_poses
 from lipmotion.faces.portrait.rasteriser import FacePose, Rasteriser
 from lipmotion.types import Audio, Motion, Timeline, Unit, Utterance
@@ -105,7 +106,7 @@ def measured(corpus: lipmotion.Corpus, every: int, faces: list[str]) -> dict[str
     for name in names:
         utterance = corpus.utterance(name)
         units, motion = units_of(utterance), utterance.track.motion
-        poses = mouth_poses(motion, units, motion.rate_hz)
+        poses = mouth_poses(spoken_mouth(motion, units))
         for span in units:
             sound = sounds.get(span.label.phone)
             if sound and span.duration_s >= LEAST_S:

@@ -32,7 +32,7 @@ from lipmotion.pipeline.corpus.prompts import prompts
 from lipmotion.speech.voices import espeak
 from lipmotion.speech.voices.installed import default_voice, speak_sentence
 from lipmotion.speech.voices.phone_maps import ESPEAK_PHONES
-from lipmotion.speech.voices.synthesiser import program_output
+from lipmotion.speech.voices.programs import program_output
 from lipmotion.types import Unit
 from lipmotion.units import LIP_CLOSING, phone_classes
 from lipmotion.units.stress import stress_of
