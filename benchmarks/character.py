@@ -31,9 +31,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import lipmotion
+from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.export.video import write_mp4
 from lipmotion.faces import face_named
-from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.faces.portrait.pose import mouth_poses
 from lipmotion.types import Audio, Motion, Timeline, Unit
 

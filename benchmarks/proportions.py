@@ -28,10 +28,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import lipmotion
+from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.export.video import write_mp4
 from lipmotion.faces import face_named
 from lipmotion.faces.portrait.geometry import lip_outlines
-from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.faces.portrait.pose import MouthPose, mouth_poses
 from lipmotion.faces.portrait.rasteriser import FacePose, Rasteriser
 from lipmotion.types import Audio, Motion, Timeline, Unit, Utterance

@@ -16,7 +16,7 @@ from lipmotion.types import Motion, Timeline, Unit
 
 Array = NDArray[np.float64]
 
-FORWARD = 0.045
+FORWARD = 0.03
 """Protruded lips are at least so far in front of their rest pose, in eye distances."""
 
 
