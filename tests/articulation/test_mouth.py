@@ -87,8 +87,8 @@ def test_the_tracked_chin_moves_the_jaw_within_reason():
     chin = np.r_[np.full(20, -1.4), np.full(20, -1.475), np.full(20, -1.4), np.full(20, -2.0)]
     jaw = spoken_mouth(motion(opening=opening, y_152=chin), NOTHING_SAID).jaw
     usual = float(jaw_drop(gap_of(np.array(0.1))))
-    assert 0.85 * usual < jaw[30] < 1.15 * usual + 0.01
-    assert jaw[50] == pytest.approx(0.85 * usual)
+    assert 0.75 * usual < jaw[30] < 1.15 * usual + 0.01
+    assert jaw[50] == pytest.approx(0.75 * usual)
     assert jaw[70] == pytest.approx(1.15 * usual + 0.01)
 
 
@@ -202,3 +202,13 @@ def test_a_mouth_at_its_own_rate_is_itself():
     mouth = spoken_mouth(motion(100.0, opening=np.linspace(0, 0.2, 201)), NOTHING_SAID)
     assert isinstance(mouth, SpokenMouth)
     assert mouth.at(100.0) is mouth
+
+
+def test_future_is_not_spread():
+    phones, lengths_s = ("f", "y", "uw", "ch", "axr"), (0.09, 0.06, 0.12, 0.1, 0.12)
+    ends_s = 0.3 + np.cumsum(lengths_s)
+    spans = [(float(end - length), float(end), p) for p, length, end in zip(phones, lengths_s, ends_s, strict=True)]
+    moved = motion(100.0, opening=np.full(101, 0.06), width=np.full(101, 0.57))
+    mouth = spoken_mouth(moved, said((0, 0.3, "sil"), *spans))
+    assert mouth.width.max() < 1.02
+    assert mouth.width[round(100 * (ends_s[1] - 0.03))] < 0.95  # y rounds for the vowel behind it

@@ -9,9 +9,12 @@ from hypothesis import strategies as st
 
 from lipmotion.articulation.crossfade import FADE_S, phone_weights
 from lipmotion.articulation.mouth import spoken_mouth
+from lipmotion.articulation.pauses import with_pauses
+from lipmotion.rig.reference_mouth import arkit_mouth
 from lipmotion.rig.shape_names import VISEMES_15
+from lipmotion.rig.shape_weights import shape_weights
 from lipmotion.rig.visemes import MOST_CLOSED, VISEME_OF_PHONE, viseme_motion
-from lipmotion.types import Channel, Motion, Span, Timeline, Unit
+from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 from lipmotion.units import PHONES
 from rig.speech import motion, units
 
@@ -64,3 +67,14 @@ def test_phones_fade_around_their_border():
 def test_without_units_there_is_silence():
     closed = Motion(np.zeros((5, 1)), 25.0, (Channel("opening"),))
     assert viseme_motion(Timeline(()), spoken_mouth(closed, Timeline(())))["viseme_sil"] == pytest.approx(np.ones(5))
+
+
+def test_visemes_rest_where_the_curves_do():
+    said = Timeline(tuple(Span(a, b, Unit(p)) for a, b, p in ((0, 0.5, "aa"), (0.5, 1.1, "sp"), (1.1, 1.6, "aa"))))
+    held = Motion(np.full((161, 1), 0.1), 100.0, (Channel("opening"),))
+    generation = Generation(held, np.zeros((161, 1)), said, StateTrace(("",), np.zeros(161, np.intp)))
+    for style, rests in (("rest", True), ("natural", False)):
+        moved = with_pauses(generation, style).motion
+        found, arkit = viseme_motion(said, spoken_mouth(moved, said)), shape_weights(moved, said, arkit_mouth())
+        assert (found["viseme_sil"][80] > 0.99) == rests
+        assert (arkit["jawOpen"][80] < 0.01) == rests

@@ -43,7 +43,7 @@ UPPER_MOST, UPPER_RATE = 0.058, 5.2
 """The upper lip rises by at most the first length (5 mm), for small gaps by the product of both times the gap."""
 JAW_SHARE = 0.85
 """Share of the lower lip's way that the chin goes: the lip also turns outwards."""
-LEAST_JAW = 0.85
+LEAST_JAW = 0.75
 """Least drop of the chin, as a share of the usual one: trackers of small jaws, and models of them, show less."""
 CORNERS = (f"x_{RIGHT_CORNER}", f"x_{LEFT_CORNER}")
 """Where the lip corners are across, in motion that has points."""
