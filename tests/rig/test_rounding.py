@@ -1,6 +1,8 @@
 import numpy as np
 import pytest
 
+from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER, mouth_template
+from lipmotion.rig.point_motion import point_motion
 from lipmotion.rig.reference_mouth import arkit_mouth
 from lipmotion.rig.rounding import rounded_weights
 from lipmotion.rig.shape_weights import shape_weights
@@ -23,3 +25,13 @@ def test_the_solved_weights_pucker_in_oo():
     weights = shape_weights(motion(), units(), arkit_mouth())
     assert weights["mouthPucker"][115] > 0.38
     assert weights["mouthPucker"][75] < 0.3
+
+
+def test_points_of_round_lips_come_together_and_forward():
+    template = mouth_template()
+    moved = point_motion(motion(points=False), units()).displacements
+    right, left = moved[115, template.row(RIGHT_CORNER)], moved[115, template.row(LEFT_CORNER)]  # uw
+    assert right[0] > 0.03
+    assert left[0] < -0.03
+    assert min(right[2], left[2]) > 0.02
+    assert np.abs(moved[20]).max() < 1e-6  # silence
