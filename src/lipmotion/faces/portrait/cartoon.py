@@ -46,7 +46,7 @@ CARTOON = Design(
         "-0.46 1.7, -0.8 1.78, -1.15 1.92, -1.4 2.2, -1.5 2.8, 1.5 2.8, 1.4 2.2, 1.15 1.92, 0.8 1.78, 0.46 1.7,"
         "0.3 1.86, 0.14 1.95, 0 1.98, -0.14 1.95, -0.3 1.86"
     ),
-    lips=LipDesign(line_y=0.9, half_width=0.3, upper=0.036, lower=0.05, seam=0.012, smile=-0.052, outline=0.024),
+    lips=LipDesign(line_y=0.9, half_width=0.3, upper=0.036, lower=0.05, seam=0.012, smile=-0.058, outline=0.024),
     eyes=EyeDesign(
         x=0.35,
         y=0.0,

@@ -135,7 +135,7 @@ def mouth_interior(lips: LipDesign, pose: MouthPose, x: Heights, outlines: LipOu
 
 
 def drawn_half_width(lips: LipDesign, pose: MouthPose) -> float:
-    """Return half the width of the drawn lips: the corners of protruded lips are drawn in, those of closed ones less."""
+    """Return half the width of the drawn lips: protruded lips draw their corners in, closed ones less."""
     flat = lips.half_width * pose.width
     ring = min(DRAWN_IN * flat, _round_hole(pose) + RING * (lips.upper + lips.lower))
     return flat + pose.protrusion * (0.3 + 0.7 * min(pose.gap / 0.03, 1)) * (ring - flat)
