@@ -119,10 +119,10 @@ def test_round_lips_have_a_narrower_hole_and_lie_further_forward():
     assert round_z > flat_z + 0.06
 
 
-def test_the_lower_lip_of_f_touches_the_upper_teeth():
+def test_the_lower_lip_of_f_lies_on_the_upper_teeth():
     pose = CharacterPose(gap=0.05, upper_rise=0.036, tuck=1)
     lower = contact(pose)[60]
-    assert lower[1] == pytest.approx(TEETH_EDGE, abs=0.012)
+    assert 0.015 < lower[1] - TEETH_EDGE < 0.035
     assert 0 < lower[2] - TEETH_Z < 0.035
     assert contact(CharacterPose(gap=0.05, upper_rise=0.036))[60][2] > lower[2] + 0.02
 
@@ -135,11 +135,16 @@ def test_pressed_lips_are_thinner():
     assert height(CharacterPose(press=1)) == pytest.approx(0.65 * height(CharacterPose()), rel=0.05)
 
 
-def test_the_line_of_closed_lips_rises_a_little_to_the_corners_and_that_of_round_ones_is_level():
-    for pose in (CharacterPose(), CharacterPose(press=1), CharacterPose(width=1.1, press=1)):
+def test_the_line_of_closed_lips_rises_to_the_corners_less_when_pressed_and_that_of_round_ones_is_level():
+    pressed = (0.011, 0.03)
+    for pose, (least, most) in (
+        (CharacterPose(), (0.035, 0.055)),
+        (CharacterPose(press=1), pressed),
+        (CharacterPose(width=1.1, press=1), pressed),
+    ):
         height = contact(pose)[20:41, 1]
         assert np.diff(height).min() > 0
-        assert 0.011 < height[-1] - height[0] < 0.03
+        assert least < height[-1] - height[0] < most
     assert np.ptp(contact(CharacterPose(roundness=1, protrusion=0.08, width=0.8))[:, 1]) < 0.005
 
 

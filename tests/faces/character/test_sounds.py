@@ -132,8 +132,8 @@ def test_the_tongue_of_th_is_seen_and_is_narrower_than_the_mouth():
 
 @pytest.mark.parametrize("pose", [CharacterPose(), CharacterPose(press=1, bite=1)])
 def test_the_seam_of_closed_lips_is_a_smooth_line(pose):
-    """The darkest pixel of each column changes little from column to column, in a picture of 720 lines."""
+    """The darkest place, three pixels high, changes little from column to column, in a picture of 720 lines."""
     mouth = Stage(camera_for(1280, 720)).picture(pose)[490:540, 600:680].mean(axis=2)
-    darkest = mouth.min(axis=0)
-    assert np.abs(np.diff(darkest)).mean() < 3.0
+    darkest = ((mouth[:-2] + mouth[1:-1] + mouth[2:]) / 3).min(axis=0)
+    assert np.abs(np.diff(darkest)).mean() < 1.3
     assert darkest.mean() < 0.75 * mouth.mean()

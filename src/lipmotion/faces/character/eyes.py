@@ -120,10 +120,10 @@ def brow() -> Part:
     """Return the left brow."""
     share = np.linspace(0, 1, 30)
     x = 0.135 + 0.40 * share
-    y = 0.238 + 0.066 * np.sin(0.90 * np.pi * share)
+    y = 0.28 - 0.018 * share + 0.033 * np.sin(np.pi * share)
     z = seen_from_front(head, x, y)
     path = np.stack([x, y, z + 0.004], axis=1)
-    wide = 0.033 * np.clip(1.02 - share, 0.01, 1) ** 0.6 * np.clip(share / 0.2, 0.02, 1) ** 0.5
+    wide = 0.033 * np.clip(1.02 - share, 0.01, 1) ** 0.6 * np.clip(share / 0.4, 0.02, 1) ** 0.6
     upward = np.broadcast_to([0.25, 0.1, 1.0], path.shape)
     places, triangles, strands = tube(path, wide, 0.45 * wide + 0.006, upward, sides=12)
     return part("brow", places, triangles, palette.BROW, palette.BROW_FINISH, strands)

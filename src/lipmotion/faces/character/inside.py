@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.faces.character import palette
+from lipmotion.faces.character.forms import MOUTH_Y
 from lipmotion.faces.character.lips import ARCH, TEETH_EDGE, TEETH_Z
 from lipmotion.faces.character.part import Part, grid_triangles, joined_parts, part
 from lipmotion.faces.character.pose import CharacterPose
@@ -22,6 +23,8 @@ LOWER_EDGE = TEETH_EDGE + 0.006
 """Height of the edge of the lower incisors, behind the upper ones, when the jaw is closed."""
 PARTED_TEETH = 0.035
 """Distance of the teeth behind closed lips."""
+TIP_ON_LIP, TIP_HEIGHTS = 0.02, (TEETH_EDGE - 0.028, TEETH_EDGE - 0.013)
+"""How far above the lower lip the middle of the tongue's tip is between the teeth, and the range of its height."""
 _TONGUE_RINGS, _TONGUE_SIDES = 24, 32
 
 
@@ -79,7 +82,7 @@ def lower_drop(pose: CharacterPose) -> float:
 
     Round and oval lips hide the lower teeth, which drop further there than the chin shows.
     """
-    return pose.jaw + PARTED_TEETH * (1 - pose.bite) * (1 + max(pose.roundness, 0.7 * pose.oval))
+    return pose.jaw + PARTED_TEETH * (1 - pose.bite) * (1 + max(pose.roundness, 1.4 * pose.oval))
 
 
 def tongue_triangles() -> NDArray[np.int32]:
@@ -93,7 +96,8 @@ def tongue(pose: CharacterPose) -> Real:
     root, body = np.array([0, floor - 0.05, -0.46]), np.array([0, floor + 0.060, -0.36])
     blade, tip = np.array([0, floor + 0.03, -0.22]), np.array([0, floor - 0.012, TEETH_Z - 0.085])
     points = jaw_moved(np.stack([root, body, blade, tip]), pose.jaw + PARTED_TEETH * (1 - pose.bite))
-    tooth = np.array([0, TEETH_EDGE - 0.013, TEETH_Z + 0.135])
+    on_lip = MOUTH_Y - (pose.gap - pose.upper_rise) + TIP_ON_LIP
+    tooth = np.array([0, np.clip(on_lip, *TIP_HEIGHTS), TEETH_Z + 0.115])
     ridge = np.array([0, TEETH_EDGE + 0.035, TEETH_Z - 0.075])
     for weight, to_tip, lift in ((pose.tongue_up, ridge, 0.01), (pose.tongue_out, tooth, -0.008)):
         points[3] += weight * (to_tip - points[3])
@@ -107,8 +111,8 @@ def tongue(pose: CharacterPose) -> Real:
         + share**3 * points[3]
     )
     blunt = np.sqrt(np.clip(1 - np.clip((share - 0.45) / 0.55, 0, 1) ** 2.4, 0, 1)) + 1e-3
-    wide = (0.195 - 0.045 * share) * blunt * (1 - 0.12 * pose.tongue_out)
-    thick = (0.080 - (0.045 - 0.018 * pose.tongue_out) * share) * blunt**0.7
+    wide = (0.195 - 0.045 * share) * blunt * (1 - 0.18 * pose.tongue_out)
+    thick = (0.080 - (0.045 + 0.002 * pose.tongue_out) * share) * blunt**0.7
     angle = 2 * np.pi * np.arange(_TONGUE_SIDES) / _TONGUE_SIDES
     x = wide * np.cos(angle)
     groove = 0.10 * thick * np.exp(-((np.cos(angle) / 0.3) ** 2)) * (np.sin(angle) > 0)

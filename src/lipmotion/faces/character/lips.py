@@ -38,6 +38,10 @@ SEAM_GAP, SEAM_FORWARD = 0.03, 0.026
 """Below this gap the seam of the lips comes forward, at most so far: the crease between closed lips is shallow."""
 ROUND_DROP = 0.025
 """How far the line between round lips sinks: the upper lip hides the teeth."""
+REST_SMILE, SMILE_GAP = 0.027, 0.05
+"""How far the corners rise at rest; parted, pressed, round and tucked lips do not smile, from this gap on."""
+ON_TEETH = TEETH_EDGE + 0.028
+"""Height of the edge of the lower lip on the upper teeth."""
 _KNOTS = np.array([0, 0.22, 0.5, 0.72, 0.88, 0.98, 1.12, 1.4])
 _AT = np.array([0.0, 0.09, 0.2, 0.31, 0.41, 0.5, 0.58, 0.66, 0.74, 0.81, 0.88, 0.94, 1.0, 1.12, 1.4])
 _SECTION: Real = np.asarray(CubicSpline(_KNOTS, np.eye(len(_KNOTS)))(_AT))
@@ -63,8 +67,8 @@ def _smooth(knots: list[tuple[float, float]]) -> Real:
     return np.asarray(CubicSpline(x, y)(ACROSS))
 
 
-_BOW = _smooth([(0, 0.80), (0.2, 0.97), (0.36, 0.92), (0.62, 0.66), (0.85, 0.3), (1, 0)])
-_BELOW = _smooth([(0, 1.0), (0.25, 0.97), (0.5, 0.83), (0.72, 0.58), (0.89, 0.27), (1, 0)])
+_BOW = _smooth([(0, 0.80), (0.2, 0.97), (0.36, 0.92), (0.62, 0.66), (0.85, 0.39), (1, 0)])
+_BELOW = _smooth([(0, 1.0), (0.25, 0.97), (0.5, 0.83), (0.72, 0.59), (0.89, 0.35), (1, 0)])
 _LINE = _smooth([(0, -0.006), (0.15, -0.005), (0.4, -0.002), (0.7, 0.005), (0.88, 0.010), (1, 0.014)])
 _ENVELOPE = np.sqrt(np.maximum(1 - ACROSS**2, 0))
 _FULL = np.where(SIDE > 0, _BOW, _BELOW)
@@ -106,7 +110,7 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
     contact_z = meet - 0.002 + 0.02 * belly * pose.roundness
     contact_z = contact_z + SEAM_FORWARD * (1 - 0.45 * pose.press) * belly * closed_share(pose)
     contact_z = contact_z + tuck * (teeth + 0.02 - contact_z)
-    on_teeth = np.minimum(TEETH_EDGE + 0.010, inner_y + 0.08)
+    on_teeth = np.minimum(middle + np.minimum(ON_TEETH - middle, rise) * hole, inner_y + 0.08)
     inner_y = np.where(upper, inner_y, np.maximum(inner_y, inner_y + tuck * (on_teeth - inner_y)))
     crest = _meeting(pose, base_z, 1 - 0.5 * squeeze) - lower_back + bulge * (1 - 0.25 * tuck) - 0.03 * tuck
     behind = np.maximum(teeth + 0.022, contact_z - 0.10)
@@ -148,7 +152,8 @@ def _between(pose: CharacterPose) -> Real:
     """Return the height of the line between the lips, closed, at every column [shape=(COLUMNS,)]."""
     line = (1 - pose.roundness - 0.6 * pose.spread) * _LINE
     lowered = 0.22 * pose.gap * (1 - 0.6 * pose.spread) * (1 - 0.75 * pose.roundness)
-    raised = (pose.smile - lowered) * ACROSS**2
+    at_rest = REST_SMILE * closed_share(pose, SMILE_GAP) * (1 - pose.press) * (1 - pose.roundness) * (1 - pose.tuck)
+    raised = (pose.smile + at_rest - lowered) * ACROSS**2
     bowed = ROUND_BOW * (1 - ACROSS**2) - ROUND_DROP - 0.2 * pose.gap
     return np.asarray(MOUTH_Y + line + raised + bowed * pose.roundness)
 

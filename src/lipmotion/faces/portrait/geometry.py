@@ -20,6 +20,12 @@ Heights = NDArray[np.float64]
 
 TEETH_EDGE = 0.024
 """The upper incisors end this far below the line of the closed lips; they belong to the skull."""
+SPREAD_RISE = (0.5, 0.06)
+"""The upper lip of spread lips rises by this part of the gap, at most so far: more of the upper teeth shows."""
+DRAWN_IN, RING = 0.9, 0.8
+"""Protruded lips are a ring round a hole, this part of both lips thick; they are at most so much of their own width."""
+ROUND_HOLE = (0.012, 0.85)
+"""Half the width of the hole of protruded lips: a length, and so much of the gap."""
 TUCKED_LIP = 0.05
 """Least thickness of a lower lip under the upper teeth: thin lips are drawn thicker there, to be seen."""
 _LINE = [(0, 0.006), (0.16, 0.005), (0.4, -0.005), (0.72, -0.004), (1, 0.004)]
@@ -62,19 +68,21 @@ class MouthInterior:
 
 def lip_outlines(lips: LipDesign, pose: MouthPose, x: Heights) -> LipOutlines:
     """Return the outlines of the lips of a pose over the columns ``x`` [shape=(C, ...)]."""
-    half_width = lips.half_width * pose.width
+    half_width = drawn_half_width(lips, pose)
     u = np.minimum(np.abs(x) / half_width, 1)
     out, wide = pose.protrusion, pose.spread
     rise = float(upper_share(pose.gap))
-    rise += pose.tuck * (1 - out) * max(min(0.9 * pose.gap, 0.045) - rise, 0) + out * (0.42 * pose.gap - rise)
+    rise += wide * max(min(SPREAD_RISE[0] * pose.gap, SPREAD_RISE[1]) - rise, 0)
+    rise += pose.tuck * (1 - out) * max(min(0.9 * pose.gap, 0.045) - rise, 0) + out * (0.47 * pose.gap - rise)
     drop = pose.gap - rise
     middle = lips.line_y + pose.tuck * max(TEETH_EDGE - 0.018 - drop, -0.03) - 0.008 * out
-    sag = (0.5 - 0.3 * wide) * drop * (1 - pose.tuck) + 0.018 * out - 0.012 * wide * (1 - pose.press)
+    sag = (0.5 - 0.3 * wide) * drop * (1 - pose.tuck) - 0.012 * wide * (1 - pose.press)
+    sag += out * (0.5 * (drop - rise) + 0.004 - sag)
     sag += pose.oval * (0.5 * (drop - rise) - sag) + 0.014 * pose.tuck
     bend = sag * u * u
-    smile = lips.smile * (1 - out) * (1 - pose.oval) * (1 - pose.tuck)
-    line = middle + (1 - 0.7 * out) * _on("line", u) + smile * u**3 + bend
-    inner_share = _inner_share(pose)
+    smile = lips.smile * (1 - out) * (1 - pose.oval) * (1 - pose.tuck) * calm_share(pose)
+    line = middle + (1 - 0.7 * out) * _on("line", u) + smile * u * u + bend
+    inner_share = _inner_share(pose, half_width)
     inner = u / inner_share
     open_share = min(pose.gap / 0.05, 1)
     free = wide * (1 - pose.tuck)
@@ -83,8 +91,8 @@ def lip_outlines(lips: LipDesign, pose: MouthPose, x: Heights) -> LipOutlines:
     upper_inner = line - rise * _arch(inner, upper_power + pose.tuck * (0.85 - upper_power))
     lower_inner = line + drop * _arch(inner, lower_power + pose.tuck * (0.85 - lower_power))
     thin = 1 - 0.28 * pose.press * (1 - out)
-    upper = lips.upper * pose.fullness * thin * (1 - 0.12 * pose.tuck - 0.02 * out - 0.14 * wide)
-    lower = lips.lower * pose.fullness * thin * (1 - 0.5 * pose.tuck + 0.1 * out - 0.16 * wide * (1 - pose.tuck))
+    upper = lips.upper * pose.fullness * thin * (1 - 0.12 * pose.tuck + 0.2 * out - 0.14 * wide)
+    lower = lips.lower * pose.fullness * thin * (1 - 0.5 * pose.tuck + 0.16 * out - 0.16 * wide * (1 - pose.tuck))
     lower = max(lower, TUCKED_LIP * pose.tuck)
     follow = 0.85 * (1 - 0.35 * out)
     return LipOutlines(
@@ -107,7 +115,7 @@ def mouth_interior(lips: LipDesign, pose: MouthPose, x: Heights, outlines: LipOu
     outlines : of the lips of this pose
     """
     edge = lips.line_y + TEETH_EDGE
-    upper_edge = edge - 0.05 * pose.protrusion - 0.05 * max(0.5 - pose.teeth, 0) * (1 - far_open(pose))
+    upper_edge = edge - 0.06 * pose.protrusion - 0.05 * max(0.5 - pose.teeth, 0) * (1 - far_open(pose))
     upper = upper_edge - 0.35 * x * x
     reveal = min(max(2.8 * pose.teeth - 1.4, 0), 1) * (1 - pose.tuck)
     low_lip = float(outlines.lower_inner.max())
@@ -116,7 +124,7 @@ def mouth_interior(lips: LipDesign, pose: MouthPose, x: Heights, outlines: LipOu
     met += max(0.86 - pose.teeth, 0) * (0.1 + 3 * max(pose.gap - 0.07, 0))
     lower = below_lip + reveal * (min(met, below_lip) - below_lip) + (0.2 - 0.55 * reveal) * x * x
     top, bottom = _tongue(pose, x, edge, low_lip)
-    over = max(pose.tongue - 0.6, 0) / 0.4 * 0.03 * _arch(x / min(0.13, 0.9 * outlines.inner_half_width), 0.5)
+    over = max(pose.tongue - 0.6, 0) / 0.4 * 0.009 * _arch(x / min(0.09, 0.9 * outlines.inner_half_width), 0.5)
     cut = outlines.upper_inner, outlines.lower_inner
     return MouthInterior(
         np.clip(upper, cut[0], cut[1]),
@@ -124,6 +132,23 @@ def mouth_interior(lips: LipDesign, pose: MouthPose, x: Heights, outlines: LipOu
         np.clip(top, *cut),
         np.clip(np.maximum(top, bottom), cut[0], cut[1] + over),
     )
+
+
+def drawn_half_width(lips: LipDesign, pose: MouthPose) -> float:
+    """Return half the width of the drawn lips: protruded lips draw their corners in, closed ones less."""
+    flat = lips.half_width * pose.width
+    ring = min(DRAWN_IN * flat, _round_hole(pose) + RING * (lips.upper + lips.lower))
+    return flat + pose.protrusion * (0.3 + 0.7 * min(pose.gap / 0.03, 1)) * (ring - flat)
+
+
+def _round_hole(pose: MouthPose) -> float:
+    """Return half the width of the hole of protruded lips."""
+    return ROUND_HOLE[0] + ROUND_HOLE[1] * pose.gap
+
+
+def calm_share(pose: MouthPose) -> float:
+    """Return how far the smile of the rest pose is there, 0..1: it fades as lips part or press."""
+    return (1 - 0.6 * min(pose.gap / 0.05, 1)) * (1 - 0.5 * pose.press)
 
 
 def far_open(pose: MouthPose) -> float:
@@ -137,7 +162,8 @@ def _on(curve: str, u: Heights) -> Heights:
 
 def _thickness(lip: str, u: Heights, out: float) -> Heights:
     """Return the thickness of a lip along its half width; rounded lips stay thick towards their corners."""
-    return (1 - 0.6 * out) * _on(lip, u) + 0.6 * out * _arch(u, 0.5)
+    round_ = min(1.15 * out, 1)
+    return (1 - round_) * _on(lip, u) + round_ * _arch(u, 0.5)
 
 
 def _arch(u: Heights, power: float) -> Heights:
@@ -145,7 +171,7 @@ def _arch(u: Heights, power: float) -> Heights:
     return np.maximum(1 - u * u, 0) ** power
 
 
-def _inner_share(pose: MouthPose) -> float:
+def _inner_share(pose: MouthPose, half_width: float) -> float:
     """Return the share of the mouth's width along which the lips are apart; it grows with the gap.
 
     The hole of protruded lips is round, that above a tucked lip is as wide as the teeth that show in it.
@@ -153,14 +179,14 @@ def _inner_share(pose: MouthPose) -> float:
     gap, wide = pose.gap, pose.spread
     share = min(0.72 + 0.2 * min(gap / 0.12, 1) + 0.1 * wide * min(gap / 0.05, 1), 0.95)
     share += pose.tuck * (0.64 - share)
-    hole = 0.05 + 0.28 * np.sqrt(min(gap / 0.05, 1)) + 5 * min(max(gap - 0.05, 0), 0.04) + max(gap - 0.09, 0)
+    hole = _round_hole(pose) / half_width
     return float(share + min(pose.protrusion / 0.85, 1) * (min(hole, share) - share))
 
 
 def _seam_beside(pose: MouthPose, u: Heights, inner_share: float) -> Heights:
     """Return how thick the line is where the lips touch beside a round hole, 0..1: it fades towards the corners."""
-    beyond = np.clip((u - inner_share) / (0.22 * (1 - inner_share)), 0, 1)
-    return 1 - pose.protrusion * min(pose.gap / 0.03, 1) * beyond**0.5
+    beyond = np.clip((u - inner_share) / (0.08 * (1 - inner_share)), 0, 1)
+    return 1 - min(pose.protrusion / 0.7, 1) * min(pose.gap / 0.03, 1) * (0.6 + 0.4 * beyond**0.5)
 
 
 def _tongue(pose: MouthPose, x: Heights, edge: float, low_lip: float) -> tuple[Heights, Heights]:
@@ -168,7 +194,7 @@ def _tongue(pose: MouthPose, x: Heights, edge: float, low_lip: float) -> tuple[H
     up, out = min(pose.tongue / 0.6, 1), max(pose.tongue - 0.6, 0) / 0.4
     rest = max(low_lip - (0.3 * pose.gap + 0.012) * (1 - pose.protrusion) + 0.02 * pose.protrusion, edge - 0.01)
     top = rest + up * (min(edge - 0.01, rest) - rest) + 0.004 * out
-    half_width = 0.2 - 0.085 * up + 0.015 * out
+    half_width = 0.2 - 0.085 * up - 0.015 * out
     across = (x / half_width) ** 2
     bulge = (1 - up) * 0.05 * (across + across**2) + up * 0.05 * across**2 * (0.5 + 0.5 * across)
     return top + bulge, low_lip + 0.03 - 0.03 * across

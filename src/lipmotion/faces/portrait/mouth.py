@@ -12,6 +12,7 @@ from lipmotion.faces.portrait.geometry import (
     Heights,
     LipOutlines,
     MouthInterior,
+    drawn_half_width,
     far_open,
     lip_outlines,
     mouth_interior,
@@ -40,7 +41,7 @@ class MouthPainter:
 
     def paint(self, layer: NDArray[np.float32], pose: MouthPose) -> None:
         """Paint the mouth of a pose on the window's pixels [shape=(h, w, 4)], in place."""
-        half_width = self._lips.half_width * pose.width
+        half_width = drawn_half_width(self._lips, pose)
         columns = np.flatnonzero(np.abs(self._x).max(axis=0) < half_width * CORNER_REACH)
         on = _Columns(layer, columns[0], columns[-1] + 1, self._scale, self._first_row)
         x = self._x[:, on.first : on.last]
@@ -90,21 +91,29 @@ class MouthPainter:
         across = _place(x, SPAN)
         if pose.tongue > 0.6:
             tip, out = within.tongue_bottom, (pose.tongue - 0.6) / 0.4
-            on.paint(tip, np.where(tip > bottom, tip + 0.022, tip), across, art.lip_shadow, out)
+            on.paint(tip, np.where(tip > bottom, tip + 0.012, tip), across, art.lip_shadow, out)
             on.paint(within.tongue_top, tip, across, art.tongue_tip, out)
         seen = _seen(pose)  # teeth that are hardly seen are covered by the lip, from above; they are never grey
         low = top + min(1.2 * seen, 1) * (within.teeth_upper - top)
         on.paint(top, low, across, art.upper_teeth, min(5 * seen, 1))
         on.paint(top, np.minimum(top + 0.028 * (1 - 0.4 * pose.tuck), bottom), across, art.lip_shadow)
-        if line := self._lips.outline:
-            part = 0.8 * line * np.minimum((bottom - top) / 0.01, 1)
+        if self._lips.outline:
             front = np.maximum(bottom, within.tongue_bottom) if pose.tongue > 0.6 else bottom
-            for edge, share in (
-                (top, 1 - 0.3 * pose.tuck),
-                (front, 1 - 0.7 * pose.tuck),
-                (shape.lower_outer, pose.tuck),
-            ):
-                on.paint(edge - share * part / 2, edge + share * part / 2, across, art.outline)
+            self._outlines(on, shape, front, pose, across)
+
+    def _outlines(self, on: _Columns, shape: LipOutlines, front: Heights, pose: MouthPose, across: Heights) -> None:
+        """Paint lines round the hole, below a tucked lip, and round the ring of protruded lips."""
+        line, top = 0.8 * self._lips.outline, shape.upper_inner
+        hole = line * np.minimum((shape.lower_inner - top) / 0.01, 1)
+        ring = line * np.minimum((shape.lower_outer - shape.upper_outer) / 0.01, 1)
+        tucked, out = (min(max((share - 0.3) / 0.5, 0), 1) for share in (pose.tuck, pose.protrusion))
+        for edge, thick in (
+            (top, (1 - 0.3 * pose.tuck) * hole),
+            (front, (1 - 0.7 * pose.tuck) * hole),
+            (shape.upper_outer, out * ring),
+            (shape.lower_outer, np.maximum(tucked * hole, out * ring)),
+        ):
+            on.paint(edge - thick / 2, edge + thick / 2, across, self._textures.outline)
 
 
 def _seen(pose: MouthPose) -> float:

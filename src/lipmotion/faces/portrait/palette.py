@@ -43,7 +43,7 @@ class Palette:
     seam: Colour = (112, 36, 40)
     cavity: Colour = (58, 14, 22)
     tooth: Colour = (240, 230, 216)
-    lower_tooth: Colour = (216, 202, 190)
+    lower_tooth: Colour = (232, 218, 204)
     tongue: Colour = (230, 124, 138)
     mouth_shadow: Colour = (150, 76, 58)
     beard: Colour = (150, 112, 100)

@@ -142,7 +142,7 @@ def _teeth(colour: Colour, shadow: Colour, gaps: tuple[float, ...], dark: float)
     away = np.abs(np.abs(x) * SPAN - np.array(gaps)[:, None, None]).min(axis=0)
     paint = _mix(colour, shadow, 0.2 * np.exp(-((away / 0.0032) ** 2)) * (0.35 + 0.65 * depth))
     paint = _mix(paint, shadow, dark * (1 - depth) ** 2.2 + 0.0 * x)
-    side = np.exp(-((x * SPAN / 0.175) ** 4))
+    side = np.exp(-((x * SPAN / 0.21) ** 4))
     return _texture(paint, side + 0 * depth)
 
 
@@ -169,8 +169,8 @@ def _tongue_tip(colour: Colour, lip: Colour, dark: Colour) -> Texture:
     away = x * SPAN
     flesh = 0.6 * np.array(colour) + 0.4 * np.array(lip) + 8
     light = np.array(colour) + (255 - np.array(colour)) * 0.75
-    paint = _mix(flesh, dark, 0.45 * (1 - depth) ** 2.5 + 0.35 * (np.abs(away) / 0.11) ** 3 + 0.4 * depth**8)
-    paint = _mix(paint, light, 0.9 * np.exp(-(((depth - 0.66) / 0.09) ** 2) - ((away + 0.018) / 0.03) ** 2))
+    paint = _mix(flesh, dark, 0.4 * (1 - depth) ** 2 + 0.3 * (np.abs(away) / 0.1) ** 4)
+    paint = _mix(paint, light, 0.3 * np.exp(-(((depth - 0.7) / 0.16) ** 2) - ((away + 0.012) / 0.045) ** 2))
     return _texture(paint, 1.0)
 
 

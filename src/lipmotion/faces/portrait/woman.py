@@ -40,7 +40,7 @@ WOMAN = Design(
             ),
         ),
     ),
-    lips=LipDesign(smile=-0.03),
+    lips=LipDesign(smile=-0.048),
     earrings=True,
     collarbones=True,
 )
