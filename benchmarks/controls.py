@@ -66,7 +66,7 @@ def larger(spoken: list[Generation], intensity: float) -> None:
     for each in spoken:
         after, before = intensified(each, intensity).motion, each.motion
         ratios.append(float(np.std(after["opening"]) / np.std(before["opening"])))
-        frames = closures(each.motion, each.units)
+        frames = [each.frame for each in closures(each.motion, each.units)]
         closures.append(float(np.abs(after["opening"][frames] - before["opening"][frames]).max(initial=0.0)))
         apart = [
             float(np.abs(np.hypot(*(m[f"{axis}_13"] - m[f"{axis}_14"] for axis in "xy")) - m["opening"]).max())

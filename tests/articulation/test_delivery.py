@@ -92,7 +92,7 @@ def test_movements_grow_and_closures_stay(said: Generation, intensity: float) ->
     before, after = said.motion["opening"], larger.motion["opening"]
     assert after.max() > before.max() if intensity > 1 else after.max() < before.max()
     assert after.max() <= 2 * before.max()
-    closed = closures(said.motion, said.units)
+    closed = [each.frame for each in closures(said.motion, said.units)]
     assert after[closed] == pytest.approx(before[closed])
     silent = said.motion.time_s < 0.45
     assert larger.motion.values[silent] == pytest.approx(said.motion.values[silent])

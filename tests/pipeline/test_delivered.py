@@ -91,7 +91,10 @@ def test_closures_between_two_frames_of_a_slow_file_are_kept(
     generation: Generation, rate_hz: float, tmp_path: Path
 ) -> None:
     narrow = generation.motion.values.copy()
-    column, closed = generation.motion.column("opening"), closures(generation.motion, generation.units)
+    column, closed = (
+        generation.motion.column("opening"),
+        [each.frame for each in closures(generation.motion, generation.units)],
+    )
     narrow[50:100, column] = 0.1
     narrow[closed, column] = 0.0
     spiky = replace(generation, motion=replace(generation.motion, values=narrow))

@@ -5,7 +5,7 @@ This module alone decides whether lips are closed. Faces, meshes and curve sets 
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +25,10 @@ BEND, WIDEST = 0.3, 0.48
 """Up to the first gap, lips are as far apart as measured; further ones approach the second, in eye distances."""
 LEAST_GAP: Final = 0.006
 """Lips that do not touch are at least this far apart, in eye distances (0.5 mm on a face)."""
-LEAST_CONTACT_S: Final = 0.05
-"""The lips touch for at least this long in p, b and m: longer than a picture at 24 a second."""
+CONTACT_S: Final = (0.05, 0.09)
+"""The lips are made to touch in p, b and m for ``CONTACT_SHARE`` of the phone, but for at least the first time, which is
+longer than a picture at 24 a second, and for no longer than the second one."""
+CONTACT_SHARE: Final = 0.6
 FADE_S: Final = 0.04
 """Lips that are made to touch come together, and part, within this time."""
 MEANT: Final = 0.15
@@ -59,14 +61,22 @@ def gap_in(motion: Motion) -> Curve:
     return gap_of(motion["opening"].astype(np.float64))
 
 
-def closures(motion: Motion, units: Timeline[Unit]) -> list[int]:
-    """Return the frame of every p, b and m in which the lips are closest together, ascending.
+class Closure(NamedTuple):
+    """A p, b or m: the frame in which the lips are closest together, and when the phone begins and ends, in seconds."""
 
-    None where the motion has no ``opening``. Where they touch in several frames, the middle of the longest contact.
+    frame: int
+    start_s: float
+    end_s: float
+
+
+def closures(motion: Motion, units: Timeline[Unit]) -> list[Closure]:
+    """Return the closures of p, b and m, of the frame of least gap each, ascending; one for phones of one frame.
+
+    None where the motion has no ``opening``. Where the lips touch in several frames, it is the middle one.
     """
     if "opening" not in motion.names:
         return []
-    gap, found = gap_in(motion), set()
+    gap, found = gap_in(motion), dict[int, Closure]()
     for span in units:
         if span.label.phone in LIP_CLOSING:
             first = max(int(np.ceil(span.start_s * motion.rate_hz - 1e-6)), 0)
@@ -75,25 +85,27 @@ def closures(motion: Motion, units: Timeline[Unit]) -> list[int]:
                 first = min(max(round((span.start_s + span.end_s) / 2 * motion.rate_hz), 0), len(gap) - 1)
                 stop = first + 1
             least = np.flatnonzero(gap[first:stop] <= gap[first:stop].min() + 1e-9)
-            found.add(first + int(least[len(least) // 2]))
-    return sorted(found)
+            frame = first + int(least[len(least) // 2])
+            found.setdefault(frame, Closure(frame, span.start_s, span.end_s))
+    return [found[frame] for frame in sorted(found)]
 
 
 def closed_lips(gap: Curve, motion: Motion, units: Timeline[Unit]) -> Curve:
-    """Return a gap with the lips in contact for ``LEAST_CONTACT_S`` in every p, b and m [shape=(T,)].
+    """Return a gap with the lips in contact in every p, b and m, for ``CONTACT_S`` or longer [shape=(T,)].
 
     gap : of the frames of the motion, with all that phones but p, b and m ask of it [shape=(T,)]
     It is 0 where the lips touch, and at least ``LEAST_GAP`` where not.
     """
     time_s, open_share = motion.time_s, np.ones(len(gap))
     shut = gap < LEAST_GAP / 2
-    for frame in closures(motion, units):
-        if gap[frame] > MEANT:
+    for frame, begin_s, end_s in closures(motion, units):
+        length_s = float(np.clip(CONTACT_SHARE * (end_s - begin_s), *CONTACT_S))
+        if gap[frame] > MEANT or (shut[frame] and _contact_s(shut, frame, motion.rate_hz) >= length_s - 1e-9):
             continue
-        if shut[frame] and _contact_s(shut, frame, motion.rate_hz) >= LEAST_CONTACT_S - 1e-9:
-            continue
-        near = slice(*np.searchsorted(time_s, (time_s[frame] - 0.2, time_s[frame] + 0.2)))
-        outside = np.abs(time_s[near] - time_s[frame]) - LEAST_CONTACT_S / 2 - 1e-9
+        # as near to the middle of the phone as the least open frame lets it be
+        at_s = float(np.clip((begin_s + end_s) / 2, time_s[frame] - length_s / 2, time_s[frame] + length_s / 2))
+        near = slice(*np.searchsorted(time_s, (at_s - 0.2, at_s + 0.2)))
+        outside = np.abs(time_s[near] - at_s) - length_s / 2 - 1e-9
         share = np.clip(outside / FADE_S, 0, 1)
         open_share[near] = np.minimum(open_share[near], share * share * (3 - 2 * share))
     gap = gap * open_share

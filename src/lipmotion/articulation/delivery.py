@@ -105,7 +105,7 @@ def moved_in_time(generation: Generation, delivery: Delivery) -> Generation:
     else:
         values = motion.at(position / rate_hz)
         spread = _rows_of(generation, nearest)
-        for frame in closures(motion, generation.units):
+        for frame, *_ in closures(motion, generation.units):
             at = round(frame + by_s * rate_hz)
             if 0 <= at < len(values):
                 values[at] = motion.values[frame]
@@ -205,7 +205,7 @@ def closed_on_grid(generation: Generation, rate_hz: float) -> Generation:
     """
     motion = generation.motion
     values = motion.values.copy()
-    for frame in closures(motion, generation.units):
+    for frame, *_ in closures(motion, generation.units):
         position = round(frame / motion.rate_hz * rate_hz) / rate_hz * motion.rate_hz
         first, last = int(np.floor(position + 1e-6)), int(np.ceil(position - 1e-6))
         values[min(first, len(values) - 1) : last + 1] = motion.values[frame]
@@ -214,7 +214,7 @@ def closed_on_grid(generation: Generation, rate_hz: float) -> Generation:
 
 def closed_times(generation: Generation) -> list[float]:
     """Return the time in seconds at which each p, b and m closes the lips; none where no opening is known."""
-    return [frame / generation.motion.rate_hz for frame in closures(generation.motion, generation.units)]
+    return [each.frame / generation.motion.rate_hz for each in closures(generation.motion, generation.units)]
 
 
 def _factors(further: Curve, touching: float, intensity: float) -> Curve:

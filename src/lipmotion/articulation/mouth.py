@@ -21,13 +21,13 @@ from lipmotion.types import Motion, Timeline, Unit
 
 Curve = NDArray[np.float64]
 
-TUCKED_GAP = (0.04, 0.065)
+TUCKED_GAP = (0.04, 0.072)
 """Range of the gap while the lower lip is on the upper teeth, which are seen."""
 TONGUE_GAP = (0.05, 0.1)
 """Range of the gap while the tongue is between the teeth."""
-PURSED_GAP = (0.028, 0.038)
+PURSED_GAP = (0.03, 0.043)
 """Range of the gap of w: a small hole."""
-ROUND_GAP, TEETH_GAP = 0.05, 0.045
+ROUND_GAP, TEETH_GAP = 0.06, 0.045
 """Least gap of protruded lips, and where both rows of teeth are seen."""
 ROUND_WIDTH, PURSED_WIDTH, SPREAD_WIDTH, OVAL_WIDTH = 0.89, 0.82, 1.05, 0.97
 """Protruded lips and those of w are at most so wide, spread ones at least, those of an oval mouth at most."""

@@ -74,7 +74,7 @@ _TARGETS: dict[str, tuple[GestureTarget, Targets]] = {
     ),
     "protrusion": (
         GestureTarget(0, 0, 0.25, 0.03),
-        _steady({"uw w": 1.0}, 3.0, 0.05)
+        _steady({"uw w": 1.0}, 3.0, 0.045)
         | _steady({"uh": 0.65, "ao": 0.4}, 1.6, 0.05)
         | {
             "ow": GestureTarget(0.55, 1.0, 2.2, 0.05),
@@ -83,7 +83,7 @@ _TARGETS: dict[str, tuple[GestureTarget, Targets]] = {
         }
         | _steady({"sh zh ch jh": 0.5}, 1.4, 0.04)
         | _steady({"r": 0.55, "er axr": 0.4}, 1.2, 0.04)
-        | _steady({"iy ih ey ae eh ay aa ah": 0.0}, 1.2, 0.035)
+        | _steady({"iy ih ey ae eh ay aa ah": 0.0}, 2.2, 0.035)
         | _steady({"th dh": 0.0}, 1.6, 0.03)
         | _steady({"f v": 0.0, "s z": 0.0, "sil sp": 0.0}, 0.7, 0.03),
     ),

@@ -20,7 +20,7 @@ BITTEN_GAP = (0.12, 0.2)
 """Teeth stay together up to the first gap, and part until the second one."""
 BITTEN = (0.8, 0.95)
 """Teeth are apart up to the first value of ``teeth``, and together from the second on."""
-ROUND = 0.86
+ROUND = 0.8
 """How round the lips of oo are; those of w are a ring."""
 NARROW, WIDE = 0.16, 0.12
 """Changes of width at which lips are round, and spread, whatever the phones ask for."""
