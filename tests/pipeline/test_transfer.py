@@ -230,5 +230,7 @@ def test_onto_a_real_person(recordings: Path) -> None:
 
     video = recordings / "grid-others" / "brbk7n.mpg"
     rest = np.median(track(video, crops=False).motion["opening"][:8])
-    own, mapped = (lipmotion.animate(SpeechRequest(video, onto=onto)).motion["opening"] for onto in (None, video))
+    own, mapped = (
+        lipmotion.animate(SpeechRequest(video, onto=onto, pauses="natural")).motion["opening"] for onto in (None, video)
+    )
     assert abs(np.median(mapped[:20]) - rest) < 0.5 * abs(np.median(own[:20]) - rest)

@@ -26,8 +26,8 @@ BEND, WIDEST = 0.3, 0.48
 LEAST_GAP: Final = 0.006
 """Lips that do not touch are at least this far apart, in eye distances (0.5 mm on a face)."""
 CONTACT_S: Final = (0.05, 0.09)
-"""The lips are made to touch in p, b and m for ``CONTACT_SHARE`` of the phone, but for at least the first time, which is
-longer than a picture at 24 a second, and for no longer than the second one."""
+"""The lips are made to touch in p, b and m for ``CONTACT_SHARE`` of the phone, but for at least the first time (longer
+than a picture at 24 a second), and for no longer than the second one."""
 CONTACT_SHARE: Final = 0.6
 FADE_S: Final = 0.04
 """Lips that are made to touch come together, and part, within this time."""

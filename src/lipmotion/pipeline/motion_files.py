@@ -65,8 +65,9 @@ def in_format(
     hertz = rate_hz or (form.rate_hz if abs(generation.motion.rate_hz - MODEL_HZ) < SAME_HZ else None)
     if hertz is None or abs(hertz - held.motion.rate_hz) < SAME_HZ:
         return held
-    own = held is chosen or held is generation
-    return held.resampled(hertz) if own else resampled_curves(held, generation, hertz)
+    if held is chosen or held is generation:
+        return held.resampled(hertz)
+    return resampled_curves(held, generation, hertz)
 
 
 def resampled_curves(held: Generation, generation: Generation, rate_hz: float) -> Generation:

@@ -32,7 +32,7 @@ def test_each_sound_has_its_own_shape():
     f, th, oo, ee, n, s = (middle(phone) for phone in ("f", "th", "uw", "iy", "n", "s"))
     aa = middle("aa", 0.18)
     assert min(f.tuck, th.tongue_out, aa.oval, s.bite) > 0.9
-    assert oo.roundness > 0.8
+    assert oo.roundness > 0.75
     assert max(pose.tuck for pose in (th, oo, aa, ee, n, s)) < 0.1
     assert max(pose.tongue_out for pose in (f, oo, aa, ee, n, s)) < 0.1
     assert max(pose.roundness for pose in (f, th, aa, ee, n, s)) < 0.2
