@@ -63,7 +63,7 @@ def curve(axes: plt.Axes, result: lipmotion.Generation) -> None:
         if SHOWN_S[0] <= (span.start_s + span.end_s) / 2 <= SHOWN_S[1]:
             axes.text((span.start_s + span.end_s) / 2, -0.018, span.label.phone, ha="center", fontsize=8)
     axes.set_xlim(*SHOWN_S)
-    axes.set_ylim(-0.03, 0.2)
+    axes.set_ylim(-0.03, 1.1 * float(opening[(time_s > 0.45) & (time_s < 2.55)].max()))
     axes.set_xlabel("time (s)")
     axes.yaxis.tick_right()
     axes.yaxis.set_label_position("right")

@@ -120,7 +120,7 @@ def brow() -> Part:
     """Return the left brow."""
     share = np.linspace(0, 1, 30)
     x = 0.135 + 0.40 * share
-    y = 0.28 - 0.018 * share + 0.033 * np.sin(np.pi * share)
+    y = 0.279 + 0.006 * share + 0.026 * np.sin(np.pi * share**1.3)
     z = seen_from_front(head, x, y)
     path = np.stack([x, y, z + 0.004], axis=1)
     wide = 0.033 * np.clip(1.02 - share, 0.01, 1) ** 0.6 * np.clip(share / 0.4, 0.02, 1) ** 0.6
