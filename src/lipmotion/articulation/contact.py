@@ -61,7 +61,7 @@ def gap_in(motion: Motion) -> Curve:
     return gap_of(motion["opening"].astype(np.float64))
 
 
-class Closure(NamedTuple):
+class ClosedPhone(NamedTuple):
     """A p, b or m: the frame in which the lips are closest together, and when the phone begins and ends, in seconds."""
 
     frame: int
@@ -69,14 +69,14 @@ class Closure(NamedTuple):
     end_s: float
 
 
-def closures(motion: Motion, units: Timeline[Unit]) -> list[Closure]:
+def closures(motion: Motion, units: Timeline[Unit]) -> list[ClosedPhone]:
     """Return the closures of p, b and m, of the frame of least gap each, ascending; one for phones of one frame.
 
     None where the motion has no ``opening``. Where the lips touch in several frames, it is the middle one.
     """
     if "opening" not in motion.names:
         return []
-    gap, found = gap_in(motion), dict[int, Closure]()
+    gap, found = gap_in(motion), dict[int, ClosedPhone]()
     for span in units:
         if span.label.phone in LIP_CLOSING:
             first = max(int(np.ceil(span.start_s * motion.rate_hz - 1e-6)), 0)
@@ -86,7 +86,7 @@ def closures(motion: Motion, units: Timeline[Unit]) -> list[Closure]:
                 stop = first + 1
             least = np.flatnonzero(gap[first:stop] <= gap[first:stop].min() + 1e-9)
             frame = first + int(least[len(least) // 2])
-            found.setdefault(frame, Closure(frame, span.start_s, span.end_s))
+            found.setdefault(frame, ClosedPhone(frame, span.start_s, span.end_s))
     return [found[frame] for frame in sorted(found)]
 
 
