@@ -97,10 +97,12 @@ def closed_lips(gap: Curve, motion: Motion, units: Timeline[Unit]) -> Curve:
     It is 0 where the lips touch, and at least ``LEAST_GAP`` where not.
     """
     time_s, open_share = motion.time_s, np.ones(len(gap))
-    shut = gap < LEAST_GAP / 2
+    parted = np.concatenate([[-1], np.flatnonzero(gap >= LEAST_GAP / 2), [len(gap)]])
     for frame, begin_s, end_s in closures(motion, units):
         length_s = float(np.clip(CONTACT_SHARE * (end_s - begin_s), *CONTACT_S))
-        if gap[frame] > MEANT or (shut[frame] and _contact_s(shut, frame, motion.rate_hz) >= length_s - 1e-9):
+        after = int(np.searchsorted(parted, frame))  # the first frame in which the lips are apart, from this one on
+        touching_s = float(parted[after] - parted[after - 1]) / motion.rate_hz if parted[after] > frame else 0.0
+        if gap[frame] > MEANT or touching_s >= length_s - 1e-9:
             continue
         # as near to the middle of the phone as the least open frame lets it be
         at_s = float(np.clip((begin_s + end_s) / 2, time_s[frame] - length_s / 2, time_s[frame] + length_s / 2))
@@ -110,14 +112,6 @@ def closed_lips(gap: Curve, motion: Motion, units: Timeline[Unit]) -> Curve:
         open_share[near] = np.minimum(open_share[near], share * share * (3 - 2 * share))
     gap = gap * open_share
     return np.where(gap < LEAST_GAP / 2, 0.0, np.maximum(gap, LEAST_GAP))
-
-
-def _contact_s(shut: Mask, frame: int, rate_hz: float) -> float:
-    """Return for how long the lips touch around a frame, in seconds, up to the frames in which they do not."""
-    parted = np.flatnonzero(~shut)
-    after = int(np.searchsorted(parted, frame))
-    before = int(parted[after - 1]) if after else -1
-    return ((int(parted[after]) if after < len(parted) else len(shut)) - before) / rate_hz
 
 
 def shown_contact(contact: Mask, rate_hz: float, time_s: Curve) -> Mask:

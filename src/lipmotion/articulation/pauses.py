@@ -56,8 +56,8 @@ def pause_weight(units: Timeline[Unit], time_s: Curve) -> Curve:
         longest_s = end_s - start_s
         share = longest_s / (CLOSING_S + OPENING_S) if after_speech and before_speech else longest_s / CLOSING_S
         share = min(share, 1.0)
-        inside = np.flatnonzero((time_s >= start_s - 1e-9) & (time_s <= end_s + 1e-9))
-        closed = np.ones(len(inside))
+        inside = slice(*np.searchsorted(time_s, (start_s - 1e-9, end_s + 1e-9)))
+        closed = np.ones(len(time_s[inside]))
         if after_speech:
             closed = _risen((time_s[inside] - start_s) / max(share * CLOSING_S, 1e-9))
         if before_speech:
@@ -68,12 +68,12 @@ def pause_weight(units: Timeline[Unit], time_s: Curve) -> Curve:
 
 def without_short_pauses(units: Timeline[Unit]) -> Timeline[Unit]:
     """Return phones in time in which each pause that the mouth does not rest in is shared by the phones beside it."""
-    resting = pauses(units)
+    starts_s, ends_s = np.array([(start_s, end_s) for start_s, end_s, *_ in pauses(units)]).reshape(-1, 2).T
     kept: list[Span[Unit]] = []
     short_s = 0.0
     for span in units:
-        inside = any(start_s - 1e-6 <= span.start_s and span.end_s <= end_s + 1e-6 for start_s, end_s, *_ in resting)
-        if is_silent(span.label.phone) and not inside:
+        last = int(np.searchsorted(starts_s, span.start_s + 1e-6)) - 1  # the last pause that begins before it
+        if is_silent(span.label.phone) and not (last >= 0 and span.end_s <= ends_s[last] + 1e-6):
             short_s += span.duration_s
         else:
             if short_s and kept:
@@ -98,26 +98,33 @@ def with_pauses(generation: Generation, style: str, pinned_s: Sequence[float] = 
     weight = pause_weight(units, time_s)
     for pin_s in pinned_s:
         weight *= np.clip(np.abs(time_s - pin_s) / PINNED_S - 1, 0, 1)
-    values = motion.values.astype(np.float64)
-    pose = np.median(values[rest_frames(motion, units)], axis=0)
+    values, resting = motion.values.copy(), np.flatnonzero(weight)
+    pose = np.median(values[rest_frames(motion, units)].astype(np.float64), axis=0)
     if "opening" in motion.names:
         pose[motion.column("opening")] = min(pose[motion.column("opening")], 0.5 * CLOSED_BELOW)
-    rested = values + weight[:, None] * (pose - values)
+    values[resting] += weight[resting, None] * (pose - values[resting])
     if "opening" in motion.names and motion.channels[motion.column("opening")].unit == EYE_DISTANCE:
         column = motion.column("opening")
-        rested[:, column] = np.maximum(rested[:, column], _breaths(units, time_s) * (weight < 1))
-    return replace(generation, motion=Motion(rested.astype(motion.values.dtype), motion.rate_hz, motion.channels))
+        values[:, column] = np.maximum(values[:, column], _breaths(units, time_s) * (weight < 1))
+    return replace(generation, motion=Motion(values, motion.rate_hz, motion.channels))
 
 
 def _breaths(units: Timeline[Unit], time_s: Curve) -> Curve:
     """Return the least opening of lips that part for a breath, in eye distances [shape=(T,)]; 0 away from breaths."""
     least = np.zeros(len(time_s))
     spoken = [span for span in units if not is_silent(span.label.phone)]
+    begins_s = np.array([span.start_s for span in spoken])
     for start_s, end_s, _, before_speech in pauses(units):
-        following = next((span.label.phone for span in spoken if span.start_s >= end_s - 1e-6), "")
-        if before_speech and end_s - start_s >= LEAST_BREATH_S and following not in LIP_CLOSING:
-            near = np.clip(1 - np.abs(time_s - end_s + BREATH_S) / (OPENING_S - BREATH_S), 0, 1)
-            least = np.maximum(least, BREATH * near * near * (3 - 2 * near))
+        following = int(np.searchsorted(begins_s, end_s - 1e-6))
+        if (
+            before_speech
+            and end_s - start_s >= LEAST_BREATH_S
+            and following < len(spoken)
+            and spoken[following].label.phone not in LIP_CLOSING
+        ):
+            near = slice(*np.searchsorted(time_s, (end_s - OPENING_S, end_s + OPENING_S)))
+            share = np.clip(1 - np.abs(time_s[near] - end_s + BREATH_S) / (OPENING_S - BREATH_S), 0, 1)
+            least[near] = np.maximum(least[near], BREATH * share * share * (3 - 2 * share))
     return least
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.types import Motion
 
@@ -17,10 +15,10 @@ def symmetrical(motion: Motion, asymmetry: float = 0.0) -> Motion:
     template, names = mouth_template(), {*motion.names}
     if asymmetry >= 1 or not names.issuperset(f"{axis}_{point}" for point in template.points for axis in "xyz"):
         return motion
-    values = motion.values.astype(np.float64)
+    values = motion.values.copy()
     for axis, sign in (("x", -1.0), ("y", 1.0), ("z", 1.0)):
         columns = [motion.column(f"{axis}_{point}") for point in template.points]
         own = values[:, columns]
         both = (own + sign * own[:, template.mirrored]) / 2
         values[:, columns] = both + asymmetry * (own - both)
-    return Motion(values.astype(motion.values.dtype), motion.rate_hz, motion.channels)
+    return Motion(values, motion.rate_hz, motion.channels)
