@@ -5,6 +5,9 @@ from __future__ import annotations
 from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.types import Motion
 
+BLOCK_FRAMES = 10_000
+"""Frames that are computed at a time, so that hours of motion take little memory beside their copy."""
+
 
 def symmetrical(motion: Motion, asymmetry: float = 0.0) -> Motion:
     """Return motion whose lip and jaw points move alike on both sides; distances and weights stay as they are.
@@ -18,7 +21,8 @@ def symmetrical(motion: Motion, asymmetry: float = 0.0) -> Motion:
     values = motion.values.copy()
     for axis, sign in (("x", -1.0), ("y", 1.0), ("z", 1.0)):
         columns = [motion.column(f"{axis}_{point}") for point in template.points]
-        own = values[:, columns]
-        both = (own + sign * own[:, template.mirrored]) / 2
-        values[:, columns] = both + asymmetry * (own - both)
+        for start in range(0, len(values), BLOCK_FRAMES):
+            own = values[start : start + BLOCK_FRAMES, columns]
+            both = (own + sign * own[:, template.mirrored]) / 2
+            values[start : start + BLOCK_FRAMES, columns] = both + asymmetry * (own - both)
     return Motion(values, motion.rate_hz, motion.channels)
