@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from lipmotion.articulation.contact import LEAST_GAP
 from lipmotion.faces.character.forms import MOUTH_Y
 from lipmotion.faces.character.pose import CharacterPose
 
@@ -110,7 +111,8 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
     contact_z = meet - 0.002 + 0.02 * belly * pose.roundness
     contact_z = contact_z + SEAM_FORWARD * (1 - 0.45 * pose.press) * belly * closed_share(pose)
     contact_z = contact_z + tuck * (teeth + 0.02 - contact_z)
-    on_teeth = np.minimum(middle + np.minimum(ON_TEETH - middle, rise) * hole, inner_y + 0.08)
+    below_upper = np.minimum(ON_TEETH - middle, rise - LEAST_GAP)  # the teeth part the lips
+    on_teeth = np.minimum(middle + below_upper * hole, inner_y + 0.08)
     inner_y = np.where(upper, inner_y, np.maximum(inner_y, inner_y + tuck * (on_teeth - inner_y)))
     crest = _meeting(pose, base_z, 1 - 0.5 * squeeze) - lower_back + bulge * (1 - 0.25 * tuck) - 0.03 * tuck
     behind = np.maximum(teeth + 0.022, contact_z - 0.10)
