@@ -28,9 +28,9 @@ from lipmotion import Corpus, animate, load_model
 from lipmotion.corpora.grid import words_of_name
 from lipmotion.motion.articulation import articulation_table
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.request import SpeechRequest
-from lipmotion.speech.audio_files import read_audio
-from lipmotion.speech.noise import noisy_audio
+from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.speech.sound.noise import noisy_audio
 from lipmotion.types import Audio, Motion, Track
 
 RATE_HZ = 16_000

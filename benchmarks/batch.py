@@ -69,7 +69,7 @@ def place(kept: Path | None) -> Iterator[Path]:
 
 def write_lines(folder: Path, options: argparse.Namespace) -> None:
     """Write the recordings of the batch, in folders of 500."""
-    from lipmotion.speech.audio_files import read_audio
+    from lipmotion.speech.sound.audio_files import read_audio
 
     sounds = [read_audio(path).samples for path in sorted(options.speech.iterdir()) if path.suffix in SUFFIXES]
     count = round(options.seconds * RATE_HZ)

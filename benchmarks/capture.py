@@ -23,7 +23,7 @@ from lipmotion.corpora.facegood import read_bare_motion, read_channels
 from lipmotion.corpora.source_recordings import MotionFile
 from lipmotion.export import read_motion
 from lipmotion.types import WEIGHT, Channel, Motion
-from rig.live_link_app import write_take
+from meshes.live_link_app import write_take
 
 HELD_OUT = "1114_2_01"
 TAKEN = {

@@ -22,7 +22,7 @@ from lipmotion.types import Generation
 RATE_HZ = 24.0
 VOICES = ("espeak-ng:en-us+f2", "espeak-ng:en-us+m1", "espeak-ng:en-us+m7", "espeak-ng:en-gb")
 CLOSED = 0.012
-"""Lips that touch have openings up to this (``rig.point_motion``)."""
+"""Lips that touch have openings up to this (``meshes.fitting.point_motion``)."""
 
 
 def main() -> None:

@@ -20,9 +20,9 @@ import numpy as np
 from pocketsphinx import Decoder, get_model_path
 
 from lipmotion import Corpus, load_model
-from lipmotion.pipeline.corpus_voice import speak_from_corpus
-from lipmotion.pipeline.request import SpeechRequest
-from lipmotion.pipeline.words import recognise_words
+from lipmotion.pipeline.generate.corpus_voice import speak_from_corpus
+from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.understand.words import recognise_words
 from lipmotion.types import Audio
 
 

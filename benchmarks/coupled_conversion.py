@@ -16,8 +16,8 @@ from time import process_time
 import numpy as np
 
 import lipmotion
-from lipmotion.pipeline.understand import recognised_speech
-from lipmotion.speech.recogniser import cached_recogniser
+from lipmotion.pipeline.understand.understood_speech import recognised_speech
+from lipmotion.speech.recognition.recogniser import cached_recogniser
 
 
 def main() -> None:

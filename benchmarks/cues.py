@@ -21,7 +21,7 @@ from lipmotion.export.cues.costs import frame_costs
 from lipmotion.export.cues.shapes import SHAPES
 from lipmotion.export.cues.sheet import CueSheet, cue_frame_count, cue_sheet
 from lipmotion.pipeline.training.train import phones_of
-from lipmotion.speech.recogniser import cached_recogniser
+from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.types import Generation, Motion, Speech, StateTrace, Timeline
 from lipmotion.units import LIP_CLOSING, VISEMES, Lexicon, is_silent
 

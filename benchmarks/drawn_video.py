@@ -35,10 +35,10 @@ import lipmotion
 from lipmotion.export.video import write_mp4
 from lipmotion.faces.base import DrawsPlanes, Face, Staging
 from lipmotion.faces.registry import staged_face
-from lipmotion.pipeline.drawn_video import load_drawing
-from lipmotion.pipeline.request import SpeechRequest
-from lipmotion.speech.audio_files import read_audio
-from lipmotion.speech.prosody import prosody_of
+from lipmotion.pipeline.outputs.drawn_video import load_drawing
+from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.speech.features.prosody import prosody_of
+from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Generation
 
 HERE = Path(__file__).parents[1]

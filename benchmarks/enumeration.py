@@ -19,7 +19,7 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from kernels.enumeration import RECURSIONS, SPREADS, is_right
-from lipmotion.kernels import factorial, forward_backward, network, viterbi, windowed_viterbi
+from lipmotion.kernels.sequences import factorial, forward_backward, network, viterbi, windowed_viterbi
 
 in_logs = [0]
 

@@ -22,8 +22,8 @@ from anyone import best_lag, compared, conditions, pieces
 from lipmotion import Corpus, load_model
 from lipmotion.measures.closures import closed_threshold, closure_figures
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.request import SpeechRequest
-from lipmotion.pipeline.understand import understand
+from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.understand.understood_speech import understand
 from lipmotion.types import Audio, Motion, Track
 from lipmotion.vision.track import track
 

@@ -23,16 +23,16 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import lipmotion
 from lipmotion.addons.blender.curves import at_frames
 from lipmotion.export.addon import write_addon
-from lipmotion.faces.character.lips import COLUMNS, VISIBLE
-from lipmotion.faces.character.performance import head_poses
-from lipmotion.faces.character.shape_fit import mouth_weights
-from lipmotion.faces.character.shapes import head_mesh
-from lipmotion.faces.character.stage import figure
-from lipmotion.pipeline.characters import with_curves
-from lipmotion.pipeline.drawn_video import prosody_heard
-from lipmotion.pipeline.scenes import character_scene, head_scene, write_scene
-from lipmotion.rig.driven import driven_character
-from lipmotion.rig.scene import Scene
+from lipmotion.faces.head.lips import COLUMNS, VISIBLE
+from lipmotion.faces.head.performance import head_poses
+from lipmotion.faces.head.shape_fit import mouth_weights
+from lipmotion.faces.head.shapes import head_mesh
+from lipmotion.faces.head.stage import figure
+from lipmotion.meshes.fitting.driven import driven_character
+from lipmotion.meshes.model.scene import Scene
+from lipmotion.pipeline.outputs.curve_sets import with_curves
+from lipmotion.pipeline.outputs.drawn_video import prosody_heard
+from lipmotion.pipeline.outputs.scenes import character_scene, head_scene, write_scene
 from lipmotion.types import Generation
 from programs import gltf_report, gltf_validator, python_with, run_with
 

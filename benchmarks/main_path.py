@@ -73,7 +73,7 @@ def gemm_seconds() -> float:
 
 def sixty_seconds(path: Path) -> Path:
     """Write 60 s of sound: the example sentence repeated; return the path."""
-    from lipmotion.speech.audio_files import read_audio
+    from lipmotion.speech.sound.audio_files import read_audio
 
     audio = read_audio(EXAMPLE)
     samples = np.resize(audio.samples, 60 * audio.rate_hz)

@@ -20,8 +20,8 @@ from typing import Any
 import av
 import numpy as np
 
-from lipmotion.speech.audio_files import read_audio
-from lipmotion.speech.mfcc import mfcc
+from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.sound.audio_files import read_audio
 
 CODECS = {"wav": "pcm_s16le", "flac": "flac", "mp3": "libmp3lame", "m4a": "aac", "opus": "libopus"}
 RATE_HZ = 48_000

@@ -41,24 +41,24 @@ from lipmotion.articulation.lip_points import CHIN, LOWER_MIDDLE, UPPER_MIDDLE
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.articulation.pauses import PAUSE_STYLES, with_pauses
 from lipmotion.articulation.symmetry import symmetrical
-from lipmotion.faces.character.performance import head_poses
-from lipmotion.faces.character.pose import CharacterPose
-from lipmotion.faces.character.shapes import head_mesh
-from lipmotion.faces.character.stage import figure
+from lipmotion.faces.head.performance import head_poses
+from lipmotion.faces.head.pose import CharacterPose
+from lipmotion.faces.head.shapes import head_mesh
+from lipmotion.faces.head.stage import figure
+from lipmotion.meshes.files.gltf_writer import write_glb
+from lipmotion.meshes.fitting.driven import driven_character
+from lipmotion.meshes.fitting.lip_placement import LipPlacement, placed_by_shape
+from lipmotion.meshes.model.mesh import Blendshape, Mesh
+from lipmotion.meshes.model.surface import mesh_surface
 from lipmotion.motion.predictors import Predictor
 from lipmotion.motion.reliability import phone_reliability
-from lipmotion.pipeline.characters import curves_of
+from lipmotion.pipeline.generate.generation_for import generate_for
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.request import SpeechRequest
-from lipmotion.pipeline.scenes import METRES
-from lipmotion.pipeline.speakers import generate_for
-from lipmotion.pipeline.understand import understood_speech
-from lipmotion.rig.driven import driven_character
-from lipmotion.rig.gltf_writer import write_glb
-from lipmotion.rig.lip_placement import LipPlacement, placed_by_shape
-from lipmotion.rig.mesh import Blendshape, Mesh
-from lipmotion.rig.surface import mesh_surface
-from lipmotion.speech.audio_files import read_audio
+from lipmotion.pipeline.outputs.curve_sets import curves_of
+from lipmotion.pipeline.outputs.scenes import METRES
+from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.understand.understood_speech import understood_speech
+from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Generation, Motion, Speech, Timeline, Track, Unit
 from lipmotion.units import is_silent
 from lipmotion.units.classes import CLASSES

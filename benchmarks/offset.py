@@ -17,7 +17,7 @@ import numpy as np
 import lipmotion
 from lipmotion.measures.offset import Offset, best_offset, pooled_offset
 from lipmotion.pipeline.corpus.sync import clip_scores
-from lipmotion.speech.mfcc import mfcc
+from lipmotion.speech.features.mfcc import mfcc
 from lipmotion.types import FRAME_RATE_HZ, Audio, Utterance
 
 

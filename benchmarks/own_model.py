@@ -28,8 +28,8 @@ from lipmotion import Corpus, animate, load_model, train
 from lipmotion.corpora.store import Selection
 from lipmotion.errors import CorpusError
 from lipmotion.pipeline.model import Model
-from lipmotion.speech.mfcc import mfcc
-from lipmotion.speech.spectrum import spectrum
+from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.features.spectrum import spectrum
 from lipmotion.types import Audio, Motion, Track, Utterance
 
 RIDGES = tuple(10.0**power for power in range(1, 7))

@@ -28,8 +28,8 @@ from lipmotion.corpora.store import Selection
 from lipmotion.engines import engine_from_settings
 from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.request import SpeechRequest
 from lipmotion.pipeline.training.train import train
+from lipmotion.pipeline.understand.request import SpeechRequest
 
 MAIN = "s1"
 KINDS = ["alone", "pooled", "maps", "nearest"]

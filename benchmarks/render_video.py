@@ -39,7 +39,7 @@ from lipmotion.appearance.lower_face import FaceShape, best_scale, region_map, r
 from lipmotion.appearance.placing import cut, feather, place
 from lipmotion.appearance.poisson import CloningSystem, cloning_system
 from lipmotion.export.sound import write_sound
-from lipmotion.speech.audio_files import read_audio
+from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio
 from lipmotion.vision.footage import footage_frames, track_footage
 from lipmotion.vision.frames import open_video

@@ -31,10 +31,10 @@ import numpy as np
 from lipmotion import animate, load_model
 from lipmotion.corpora.grid import words_of_name
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.request import SpeechRequest
-from lipmotion.speech.audio_files import read_audio
-from lipmotion.speech.mfcc import mfcc
-from lipmotion.speech.recogniser import RECOGNISER_KINDS, cached_recogniser
+from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, cached_recogniser
+from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio
 from lipmotion.units import Lexicon, is_silent, words_of
 from lipmotion.vision.track import track

@@ -16,12 +16,12 @@ import numpy as np
 import lipmotion
 from lipmotion.corpora.labels import read_labels, read_phones
 from lipmotion.export import read_motion, write_motion
-from lipmotion.pipeline.characters import curves_of
-from lipmotion.pipeline.given_units import read_units
-from lipmotion.pipeline.motion_files import in_format
-from lipmotion.pipeline.motion_input import read_generation
-from lipmotion.speech.audio_files import read_audio
-from lipmotion.speech.noise import noisy_audio
+from lipmotion.pipeline.outputs.curve_sets import curves_of
+from lipmotion.pipeline.outputs.motion_files import in_format
+from lipmotion.pipeline.outputs.motion_input import read_generation
+from lipmotion.pipeline.understand.given_units import read_units
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.speech.sound.noise import noisy_audio
 from lipmotion.types import Audio, Generation, Motion, Timeline
 from lipmotion.units import is_silent
 

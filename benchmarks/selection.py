@@ -36,8 +36,8 @@ from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.targets import target_of
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.request import SpeechRequest
-from lipmotion.pipeline.understand import understand
+from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.understand.understood_speech import understand
 from lipmotion.types import Features, Speech, Timeline, Utterance
 from lipmotion.units import PHONES
 

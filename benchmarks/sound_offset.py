@@ -16,8 +16,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from lipmotion.errors import InputError
-from lipmotion.speech.audio_files import read_audio
-from lipmotion.speech.sound_offset import sound_offset
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.speech.sound.sound_offset import sound_offset
 from speech.recorded_twice import RATE_HZ, beep, clap, recorded_twice
 
 

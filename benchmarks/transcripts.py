@@ -28,10 +28,10 @@ from numpy.typing import NDArray
 
 import lipmotion
 from lipmotion.pipeline.corpus.prompts import prompts
-from lipmotion.pipeline.transcribe import read_transcript, transcribe
-from lipmotion.speech.analysed_audio import analysed
-from lipmotion.speech.audio_files import read_audio
-from lipmotion.speech.recogniser import Recogniser
+from lipmotion.pipeline.understand.transcribe import read_transcript, transcribe
+from lipmotion.speech.features.analysed_audio import analysed
+from lipmotion.speech.recognition.recogniser import Recogniser
+from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.installed import installed_voices, speak_sentences
 from lipmotion.types import Audio, TimedTranscript, Timeline, Unit
 from lipmotion.units import Lexicon, words_of

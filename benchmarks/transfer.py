@@ -29,9 +29,9 @@ from lipmotion.motion.closure import closable_ranges
 from lipmotion.motion.rest import away_from_speech, speech_intervals
 from lipmotion.motion.speakers import FAR_FROM_SPEECH_S, NEAR_SPEECH_S, SpeakerMap
 from lipmotion.motion.transfer import transfer_map
-from lipmotion.pipeline import transfer
-from lipmotion.pipeline.speakers import generate_for
-from lipmotion.pipeline.understand import understand
+from lipmotion.pipeline.generate import transfer
+from lipmotion.pipeline.generate.generation_for import generate_for
+from lipmotion.pipeline.understand.understood_speech import understand
 from lipmotion.types import Speech, Utterance
 
 CHANNELS = ("opening", "width", "outer")

@@ -38,8 +38,8 @@ from lipmotion.pipeline.training.voices import (
     synthetic_sentences,
     voice_examples,
 )
-from lipmotion.speech.mfcc import mfcc
-from lipmotion.speech.recogniser import Recogniser
+from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.voices.installed import installed_voices
 from lipmotion.types import Example, Speech, Timeline, Unit, Utterance, silent_monitor
 from lipmotion.units import VISEME_OF, Lexicon, is_silent

@@ -68,10 +68,10 @@ from lipmotion.measures.curves import pooled_correlation
 from lipmotion.measures.pictures import outline_figures, picture_figures, psnr_db
 from lipmotion.pipeline.evaluation.figures import BILABIAL
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.request import SpeechRequest
 from lipmotion.pipeline.training.train import phones_of
+from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.workers import worker_pool
-from lipmotion.speech.recogniser import cached_recogniser
+from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.types import Audio, Motion, Track
 from lipmotion.units import Lexicon, is_silent
 from lipmotion.vision.frames import open_video

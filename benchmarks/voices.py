@@ -21,8 +21,8 @@ import lipmotion
 from lipmotion.errors import AlignmentError
 from lipmotion.pipeline.corpus.prompts import prompts
 from lipmotion.pipeline.training.voices import SpokenSentence, is_held_out_speaker, synthetic_sentences, voice_examples
-from lipmotion.speech.mfcc import mfcc
-from lipmotion.speech.recogniser import Recogniser
+from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.voices.installed import installed_voices
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import is_silent

@@ -16,7 +16,7 @@ import numpy as np
 
 import lipmotion
 from lipmotion.motion.resample import to_model_frames
-from lipmotion.speech.lip_speed import (
+from lipmotion.speech.features.lip_speed import (
     FRAME_OFFSETS,
     STATIC_FEATURES,
     WEIGHTS,

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 import lipmotion
 from lipmotion.faces import Staging, staged_face
-from lipmotion.pipeline.characters import curves_of
+from lipmotion.pipeline.outputs.curve_sets import curves_of
 
 IMAGES = Path(__file__).parent.parent / "docs" / "images"
 SENTENCE = "Five big boats follow you far up the little river. My father will call."

@@ -17,20 +17,20 @@ if TYPE_CHECKING:
     from lipmotion.export.base import read_motion
     from lipmotion.export.cues.sheet import CueSheet
     from lipmotion.faces.filmed.face import FilmedFace, load_face, save_face
-    from lipmotion.pipeline.adapt import adapt
-    from lipmotion.pipeline.animate import animate, write
     from lipmotion.pipeline.corpus.prepare import prepare
-    from lipmotion.pipeline.cues import cues, write_cues
     from lipmotion.pipeline.evaluation.evaluate import evaluate
-    from lipmotion.pipeline.explain import explain
     from lipmotion.pipeline.film.build import build_face
     from lipmotion.pipeline.film.video import FilmOptions
+    from lipmotion.pipeline.generate.animate import animate, write
+    from lipmotion.pipeline.generate.explain import explain
+    from lipmotion.pipeline.generate.speak import speak
+    from lipmotion.pipeline.generate.state_runs import state_runs
+    from lipmotion.pipeline.generate.transfer import map_onto, with_person
     from lipmotion.pipeline.model import Model, load_model, save_model
-    from lipmotion.pipeline.request import SpeechRequest
-    from lipmotion.pipeline.speak import speak
-    from lipmotion.pipeline.state_runs import state_runs
+    from lipmotion.pipeline.outputs.cues import cues, write_cues
+    from lipmotion.pipeline.training.adapt import adapt
     from lipmotion.pipeline.training.train import Run, train
-    from lipmotion.pipeline.transfer import map_onto, with_person
+    from lipmotion.pipeline.understand.request import SpeechRequest
     from lipmotion.types import (
         Audio,
         Constraints,
@@ -89,35 +89,35 @@ __all__ = [
 
 _HOMES = {
     "Run": "lipmotion.pipeline.training.train",
-    "SpeechRequest": "lipmotion.pipeline.request",
+    "SpeechRequest": "lipmotion.pipeline.understand.request",
     "Selection": "lipmotion.corpora.store",
     "Corpus": "lipmotion.corpora.store",
     "CueSheet": "lipmotion.export.cues.sheet",
     "Lexicon": "lipmotion.units",
     "Model": "lipmotion.pipeline.model",
-    "adapt": "lipmotion.pipeline.adapt",
+    "adapt": "lipmotion.pipeline.training.adapt",
     "FilmOptions": "lipmotion.pipeline.film.video",
     "FilmedFace": "lipmotion.faces.filmed.face",
-    "animate": "lipmotion.pipeline.animate",
+    "animate": "lipmotion.pipeline.generate.animate",
     "build_face": "lipmotion.pipeline.film.build",
-    "cues": "lipmotion.pipeline.cues",
+    "cues": "lipmotion.pipeline.outputs.cues",
     "engine_named": "lipmotion.engines",
     "evaluate": "lipmotion.pipeline.evaluation.evaluate",
-    "explain": "lipmotion.pipeline.explain",
+    "explain": "lipmotion.pipeline.generate.explain",
     "load_face": "lipmotion.faces.filmed.face",
     "load_model": "lipmotion.pipeline.model",
-    "map_onto": "lipmotion.pipeline.transfer",
+    "map_onto": "lipmotion.pipeline.generate.transfer",
     "prepare": "lipmotion.pipeline.corpus.prepare",
     "read_motion": "lipmotion.export.base",
     "save_face": "lipmotion.faces.filmed.face",
     "save_model": "lipmotion.pipeline.model",
     "SpokenText": "lipmotion.types",
-    "speak": "lipmotion.pipeline.speak",
-    "state_runs": "lipmotion.pipeline.state_runs",
+    "speak": "lipmotion.pipeline.generate.speak",
+    "state_runs": "lipmotion.pipeline.generate.state_runs",
     "train": "lipmotion.pipeline.training.train",
-    "with_person": "lipmotion.pipeline.transfer",
-    "write": "lipmotion.pipeline.animate",
-    "write_cues": "lipmotion.pipeline.cues",
+    "with_person": "lipmotion.pipeline.generate.transfer",
+    "write": "lipmotion.pipeline.generate.animate",
+    "write_cues": "lipmotion.pipeline.outputs.cues",
 }
 
 

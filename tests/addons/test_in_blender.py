@@ -11,11 +11,11 @@ import pytest
 
 from lipmotion.addons.blender.curves import at_frames
 from lipmotion.export.addon import write_addon
-from lipmotion.pipeline.animate import write
-from lipmotion.pipeline.characters import with_curves
+from lipmotion.pipeline.generate.animate import write
+from lipmotion.pipeline.outputs.curve_sets import with_curves
 from lipmotion.types import Audio, Generation, StateTrace
+from meshes.speech import motion, units
 from programs import python_with, run_with
-from rig.speech import motion, units
 
 pytestmark = [
     pytest.mark.skipif(python_with("bpy") is None, reason="needs bpy (tests/programs)"),

@@ -24,7 +24,7 @@ FORBIDDEN = [
     (DOWN, "types/audio.py", "import lipmotion.storage.files"),
     (DOWN, "storage/files.py", "import lipmotion.units"),
     (DOWN, "hmm/model.py", "from lipmotion.motion import space"),
-    (DOWN, "speech/audio_files.py", "def late():\n    from lipmotion.vision import track"),
+    (DOWN, "speech/sound/audio_files.py", "def late():\n    from lipmotion.vision import track"),
     (DOWN, "pipeline/training/train.py", "from lipmotion.testing import toy"),
     (ENGINES, "engines/trajectory/model.py", "from lipmotion.engines.joint import engine"),
     (ENGINES, "engines/base.py", "from lipmotion.engines import registry"),

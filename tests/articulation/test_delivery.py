@@ -19,7 +19,7 @@ from lipmotion.articulation.delivery import (
 )
 from lipmotion.errors import InputError
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
-from rig.speech import motion, units
+from meshes.speech import motion, units
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from lipmotion.articulation.symmetry import symmetrical
-from rig.speech import motion
+from meshes.speech import motion
 
 
 def test_both_sides_move_alike_by_as_much_as_is_asked_for():

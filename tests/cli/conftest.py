@@ -78,7 +78,7 @@ def newer_model(toy_model_file: Path, tmp_path_factory: pytest.TempPathFactory) 
 @pytest.fixture
 def bad_speech(here: Path) -> dict[str, Path]:
     """Unusable recordings, by their defect."""
-    from speech.sound import write_pictures
+    from speech.sounds import write_pictures
 
     folder = here.parent / "bad"
     (folder / "folder").mkdir(parents=True)

@@ -11,10 +11,10 @@ import pytest
 
 from cli.conftest import RunCommand, is_one_error
 from lipmotion.export.base import read_motion
-from lipmotion.rig.character_files import read_character
-from lipmotion.rig.gltf_writer import write_glb
-from lipmotion.rig.obj_files import write_obj
-from rig.heads import head, lip_points
+from lipmotion.meshes.files.character_files import read_character
+from lipmotion.meshes.files.gltf_writer import write_glb
+from lipmotion.meshes.files.obj_files import write_obj
+from meshes.heads import head, lip_points
 
 
 @pytest.fixture

@@ -10,9 +10,9 @@ import pytest
 
 from cli.conftest import Done, RunCommand, is_one_error
 from lipmotion.cli.main import main
-from lipmotion.pipeline.animate import animate
-from lipmotion.pipeline.cues import cue_text, cues, write_cues
+from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import load_model
+from lipmotion.pipeline.outputs.cues import cue_text, cues, write_cues
 
 
 @pytest.fixture

@@ -7,7 +7,8 @@ import pytest
 
 from children import PIPE, child
 from cli.conftest import RunCommand
-from lipmotion.cli import info, main
+from lipmotion.cli import main
+from lipmotion.cli.verbs import info
 from lipmotion.errors import AlignmentError, LipMotionError, MissingDependencyError
 
 STOPPED = "lipmotion: stopped; run the same command again to go on"

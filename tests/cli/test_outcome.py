@@ -5,7 +5,7 @@ import os
 import pytest
 
 from lipmotion.cli.command_line import parser
-from lipmotion.cli.outcome import outcome
+from lipmotion.cli.terminal.outcome import outcome
 from lipmotion.errors import InputError
 
 

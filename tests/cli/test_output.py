@@ -19,15 +19,15 @@ import numpy as np
 import pytest
 
 from cli.conftest import RunCommand
-from lipmotion.cli import info
-from lipmotion.cli.events import Events
 from lipmotion.cli.main import main
-from lipmotion.cli.output import print_json, print_line, print_lines
-from lipmotion.cli.progress import reporting
-from lipmotion.cli.stop import Stopper
+from lipmotion.cli.terminal.events import Events
+from lipmotion.cli.terminal.output import print_json, print_line, print_lines
+from lipmotion.cli.terminal.progress import reporting
+from lipmotion.cli.terminal.stop import Stopper
+from lipmotion.cli.verbs import info
 from lipmotion.corpora.store import Corpus
 from lipmotion.measures.report import figures_table
-from lipmotion.pipeline.explain import explanation_text
+from lipmotion.pipeline.generate.explain import explanation_text
 from lipmotion.types import ChannelValue, Explanation, Item, Progress, Span, Unit
 
 EVIL = "q\x1b]52;c;aGk=\x07\x9b31m\r\nlipmotion: error: forged\n\x85\u202e\u2028\x7f"

@@ -12,7 +12,7 @@ import pytest
 from cli.conftest import RunCommand, is_one_error
 from lipmotion.errors import InputError
 from lipmotion.export.base import read_motion
-from lipmotion.pipeline.motion_input import read_generation
+from lipmotion.pipeline.outputs.motion_input import read_generation
 
 
 @pytest.fixture
@@ -86,7 +86,7 @@ def test_what_cannot_be_drawn(run: RunCommand, motion_file: Path, here: Path) ->
 
 
 def test_motion_of_more_than_a_day_is_refused(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("lipmotion.pipeline.motion_input.LONGEST_S", 4.0)
+    monkeypatch.setattr("lipmotion.pipeline.outputs.motion_input.LONGEST_S", 4.0)
     (here / "long.csv").write_text("time_s,opening\n0,0.1\n1,0\n2,0\n3,0\n4,0\n5,0\n")
     with pytest.raises(InputError, match="lasts 5 s, required at most 4; cut it"):
         read_generation(here / "long.csv")
@@ -94,7 +94,7 @@ def test_motion_of_more_than_a_day_is_refused(here: Path, monkeypatch: pytest.Mo
 
 def test_files_without_sound_get_no_silence(run: RunCommand, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     heard = []
-    monkeypatch.setattr("lipmotion.cli.render.write_results", lambda *given: heard.append(given[2]))
+    monkeypatch.setattr("lipmotion.cli.verbs.render.write_results", lambda *given: heard.append(given[2]))
     (here / "rig.csv").write_text("time_s,opening\n0,0\n0.1,0.1\n")
     for name in ("a.json", "a.mp4"):
         assert run("render", "rig.csv", "-o", name).code == 0

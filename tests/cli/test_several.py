@@ -16,10 +16,10 @@ import pytest
 from cli.conftest import RunCommand, is_one_error
 from lipmotion.cli.main import main
 from lipmotion.export.base import read_motion
-from lipmotion.rig.driven import DrivenCharacter, driven_character
-from lipmotion.rig.gltf_writer import write_glb
+from lipmotion.meshes.files.gltf_writer import write_glb
+from lipmotion.meshes.fitting.driven import DrivenCharacter, driven_character
 from lipmotion.testing.toy import ToySentence
-from rig.heads import head
+from meshes.heads import head
 
 
 @pytest.fixture
@@ -96,7 +96,7 @@ def test_a_character_is_opened_once(
         opened.append(path)
         return driven_character(path, **how)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("lipmotion.rig.driven.driven_character", counted)
+    monkeypatch.setattr("lipmotion.meshes.fitting.driven.driven_character", counted)
     done = run("animate", takes, "--model", toy_model_file, "-o", "out/", "--character", "head.glb")
     assert done == (0, ["out/a.json", "out/b.json"], [])
     assert opened == [Path("head.glb")]
@@ -120,7 +120,7 @@ def test_events_go_to_standard_error_beside_motion(
     run: RunCommand, toy_model_file: Path, toy_speech: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     kept = io.BytesIO()
-    monkeypatch.setattr("lipmotion.cli.pipes.write_bytes", lambda path: kept.write(path.read_bytes()))
+    monkeypatch.setattr("lipmotion.cli.arguments.pipes.write_bytes", lambda path: kept.write(path.read_bytes()))
     done = run("animate", toy_speech, "--model", toy_model_file, "-o", "-", "--machine-readable")
     assert (done.code, done.out) == (0, [])
     assert [json.loads(line)["type"] for line in done.err][0 :: len(done.err) - 1] == ["start", "success"]

@@ -17,8 +17,8 @@ from children import LIPMOTION, PIPE, child, environment, run_child
 from children import Done as Completed
 from cli import signalled
 from cli.conftest import RunCommand
-from lipmotion.cli import info
-from lipmotion.cli.stop import Stopped, Stopper
+from lipmotion.cli.terminal.stop import Stopped, Stopper
+from lipmotion.cli.verbs import info
 from lipmotion.corpora.store import Corpus
 
 LINE = "lipmotion: stopped; run the same command again to go on"
@@ -95,7 +95,7 @@ def test_while_packages_are_imported(toy_speech: Path, here: Path) -> None:
 
 PAUSING = """
 import os, signal, sys
-from lipmotion.cli.events import JsonLines
+from lipmotion.cli.terminal.events import JsonLines
 from lipmotion.cli.main import main
 
 def pausing(self, kind, /, emit=JsonLines.emit, **fields):
@@ -263,8 +263,8 @@ def test_little_is_loaded_before_signals_are_listened_to() -> None:
     assert {name for name in loaded if name.startswith("lipmotion")} == {
         "lipmotion",
         "lipmotion.cli",
-        "lipmotion.cli.events",
+        "lipmotion.cli.terminal.events",
         "lipmotion.cli.main",
-        "lipmotion.cli.stop",
+        "lipmotion.cli.terminal.stop",
     }
     assert not loaded & {"typing", "re", "json", "argparse", "logging", "numpy", "pathlib"}

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.cli.texts import text_or_file_content
+from lipmotion.cli.arguments.texts import text_or_file_content
 from lipmotion.errors import InputError
 from lipmotion.types import TimedTranscript
 

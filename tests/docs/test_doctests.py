@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 import lipmotion
-from lipmotion.speech.recogniser import Recogniser
-from lipmotion.speech.recognition import Recognition
+from lipmotion.speech.recognition.recognised_speech import Recognition
+from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.types import Audio, Features, ParallelMap
 
 ROOT = Path(__file__).parents[2]

@@ -77,7 +77,7 @@ def test_the_readme_leads_to_the_index() -> None:
 
 
 def test_named_files_of_the_source_exist() -> None:
-    """Paths such as `speech/mfcc.py` in spans of code: of the package, of the tests, or of the repository."""
+    """Paths such as `speech/features/mfcc.py` in spans of code: of the package, of the tests, or of the repository."""
     first = {path.name for root in CODE_ROOTS for path in root.iterdir()}
     for page in PAGES:
         if page.parent == DOCS / "extend":

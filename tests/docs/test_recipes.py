@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from lipmotion.cli.command_line import parser
-from lipmotion.pipeline.characters import curves_of
-from lipmotion.rig.rig_tables import read_rig_table
-from rig.speech import motion, units
+from lipmotion.meshes.files.rig_tables import read_rig_table
+from lipmotion.pipeline.outputs.curve_sets import curves_of
+from meshes.speech import motion, units
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted((ROOT / "docs" / "recipes").glob("*.md"))

@@ -21,7 +21,7 @@ from lipmotion.measures.closures import closings
 from lipmotion.pipeline.evaluation.conditions import ComparedClip, compared_clips, held_out_recordings
 from lipmotion.pipeline.evaluation.figures import BILABIAL
 from lipmotion.pipeline.training.train import train
-from lipmotion.speech.recogniser import cached_recogniser
+from lipmotion.speech.recognition.recogniser import cached_recogniser
 
 PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
 SMALL = ExperimentSettings(recogniser=PHONE_MODELS)

@@ -10,9 +10,9 @@ from lipmotion.errors import InputError
 from lipmotion.experiments.noise import LONGEST_S, read_talkers, recordings_in_noise
 from lipmotion.pipeline.evaluation.conditions import HeldOutRecordings, held_out_recordings
 from lipmotion.pipeline.model import Model
-from lipmotion.speech.mfcc import mfcc
-from lipmotion.speech.noise import noisy_audio
-from lipmotion.speech.recogniser import Recogniser
+from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.recognition.recogniser import Recogniser
+from lipmotion.speech.sound.noise import noisy_audio
 
 
 @pytest.fixture(scope="module")

@@ -23,14 +23,14 @@ from lipmotion.export.cues.base import write_cue_file
 from lipmotion.export.cues.sheet import CueSheet
 from lipmotion.export.synthetic_mark import mark_metadata
 from lipmotion.export.timed_labels import write_labels
+from lipmotion.meshes.files.gltf_container import read_gltf_document
+from lipmotion.meshes.files.gltf_writer import write_gltf_scene
+from lipmotion.meshes.files.obj_files import read_obj, write_obj
+from lipmotion.meshes.files.usd_writer import write_usda
+from lipmotion.meshes.model.mesh import Blendshape, Material, Mesh, MeshPart
+from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.batch.report import _field, _for_page
 from lipmotion.printable import is_line, printable
-from lipmotion.rig.gltf_container import read_gltf_document
-from lipmotion.rig.gltf_writer import write_gltf_scene
-from lipmotion.rig.mesh import Blendshape, Material, Mesh, MeshPart
-from lipmotion.rig.obj_files import read_obj, write_obj
-from lipmotion.rig.scene import Scene
-from lipmotion.rig.usd_writer import write_usda
 from lipmotion.storage.files import as_text
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 

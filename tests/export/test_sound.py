@@ -10,8 +10,8 @@ import pytest
 
 from lipmotion.errors import ExportError
 from lipmotion.export.sound import write_sound
-from lipmotion.speech.audio_files import read_audio
-from lipmotion.speech.resampling import at_speech_rate
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.speech.sound.resampling import at_speech_rate
 from lipmotion.types import Audio, from_sixteen_bits
 
 RATE_HZ = 22_050

@@ -13,7 +13,7 @@ import numpy as np
 from PIL import Image
 
 from fuzz.inputs import Files
-from rig.gltf import document, glb, packed_attributes, textured_document
+from meshes.gltf import document, glb, packed_attributes, textured_document
 
 Change = Callable[[dict[str, Any]], None]
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fuzz.inputs import digest
 from fuzz.mutators import arrays, boxes, documents, json_text, mutated, raw, riff, text, zips
-from rig.gltf import document, glb
+from meshes.gltf import document, glb
 from robustness.case import npy
 from robustness.motion_cases import GOOD
 

@@ -12,13 +12,13 @@ from collections.abc import Callable
 import numpy as np
 
 from kernels import extremes
-from lipmotion.kernels import forward_backward, viterbi, windowed_viterbi
-from lipmotion.kernels.arcs import NetworkArrays
-from lipmotion.kernels.factorial import factorial_posteriors
-from lipmotion.kernels.factorial_path import factorial_best_path
-from lipmotion.kernels.network import ForwardBackwardNetwork
-from lipmotion.kernels.sampling import sample_paths
-from lipmotion.kernels.trellis import cheapest_arrivals, trace_back
+from lipmotion.kernels.sequences import forward_backward, viterbi, windowed_viterbi
+from lipmotion.kernels.sequences.arcs import NetworkArrays
+from lipmotion.kernels.sequences.factorial import factorial_posteriors
+from lipmotion.kernels.sequences.factorial_path import factorial_best_path
+from lipmotion.kernels.sequences.network import ForwardBackwardNetwork
+from lipmotion.kernels.sequences.sampling import sample_paths
+from lipmotion.kernels.sequences.trellis import cheapest_arrivals, trace_back
 from oracles import chains, networks, paths, trellis
 from oracles import factorial as factorial_oracle
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.kernels import affine
+from lipmotion.kernels.pixels import affine
 from oracles import resampling as oracle
 
 TURNED = np.array([[0.7, -0.1, 2.3], [0.12, 0.68, -3.6]])

@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.kernels import banded
-from lipmotion.kernels.banded import generate, normal_equations, pin, solve
+from lipmotion.kernels.sequences import banded
+from lipmotion.kernels.sequences.banded import generate, normal_equations, pin, solve
 from oracles import trajectories
 
 SEEDS = st.integers(0, 2**32 - 1)

@@ -38,7 +38,7 @@ def test_without_numba_all_work_is_numpys():
 import sys
 sys.modules["numba"] = None  # importing it fails
 import numpy as np
-from lipmotion.kernels import banded
+from lipmotion.kernels.sequences import banded
 from lipmotion.kernels.choice import compiled_pays
 assert not compiled_pays(1e9)
 assert banded.generate(np.ones((4, 3, 2)), np.ones((4, 3, 2)))[0].shape == (4, 2)
@@ -51,7 +51,7 @@ assert banded.generate(np.ones((4, 3, 2)), np.ones((4, 3, 2)))[0].shape == (4, 2
     [
         "import lipmotion",
         "from lipmotion.cli import command_line",
-        "import lipmotion.kernels.banded, lipmotion.kernels.viterbi, lipmotion.kernels.forward_backward",
+        "from lipmotion.kernels.sequences import banded, forward_backward, viterbi",
         "import lipmotion; lipmotion.animate('examples/welcome.flac')",
     ],
 )

@@ -1,7 +1,7 @@
 import pytest
 
 from kernels.enumeration import RECURSIONS, SPREADS, is_right
-from lipmotion.kernels import factorial, forward_backward, network, viterbi, windowed_viterbi
+from lipmotion.kernels.sequences import factorial, forward_backward, network, viterbi, windowed_viterbi
 
 ONCE_WRONG = {
     "network, double": [(30, 1), (300, 261), (1e4, 291), (1e5, 113)],

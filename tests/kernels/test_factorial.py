@@ -6,10 +6,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from kernels.networks import network_posteriors
-from lipmotion.kernels import factorial
-from lipmotion.kernels.factorial import factorial_posteriors
-from lipmotion.kernels.factorial_path import factorial_best_path
-from lipmotion.kernels.loops import FactorialLogLikelihoods, Loop
+from lipmotion.kernels.sequences import factorial
+from lipmotion.kernels.sequences.factorial import factorial_posteriors
+from lipmotion.kernels.sequences.factorial_path import factorial_best_path
+from lipmotion.kernels.sequences.loops import FactorialLogLikelihoods, Loop
 from oracles import factorial as oracle
 from oracles.paths import path_score
 

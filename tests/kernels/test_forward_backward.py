@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.kernels import forward_backward
-from lipmotion.kernels.forward_backward import IMPOSSIBLE, chain_posteriors
+from lipmotion.kernels.sequences import forward_backward
+from lipmotion.kernels.sequences.forward_backward import IMPOSSIBLE, chain_posteriors
 from oracles import chains
 
 

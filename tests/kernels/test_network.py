@@ -4,8 +4,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from kernels.networks import arrays_of, network_posteriors, phone_loop, random_network
-from lipmotion.kernels import network
-from lipmotion.kernels.network import ForwardBackwardNetwork
+from lipmotion.kernels.sequences import network
+from lipmotion.kernels.sequences.network import ForwardBackwardNetwork
 from oracles import networks
 
 SEEDS = st.integers(0, 2**32 - 1)

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from lipmotion.kernels import painting
 from lipmotion.kernels.choice import numba_works
+from lipmotion.kernels.pixels import painting
 
 needs_numba = pytest.mark.skipif(not numba_works(), reason="numba is not installed")
 

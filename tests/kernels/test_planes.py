@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from lipmotion.kernels import painting, planes
 from lipmotion.kernels.choice import numba_works
-from lipmotion.kernels.planes import Box, EyeLayers, StillLayers
+from lipmotion.kernels.pixels import painting, planes
+from lipmotion.kernels.pixels.planes import Box, EyeLayers, StillLayers
 
 needs_numba = pytest.mark.skipif(not numba_works(), reason="numba is not installed")
 HEIGHT, WIDTH = 60, 84

@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.kernels import raster
 from lipmotion.kernels.choice import numba_works
+from lipmotion.kernels.pixels import raster
 
 TONE = np.arange(256).astype(np.uint8)
 HEIGHT, WIDTH = 40, 56

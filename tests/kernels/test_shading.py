@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.kernels import shading
 from lipmotion.kernels.choice import numba_works
+from lipmotion.kernels.pixels import shading
 
 
 def unit(vectors):

@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.kernels import textured
 from lipmotion.kernels.choice import numba_works
-from lipmotion.kernels.textured import CLEAR, CUT, SOLID, TexturedTriangles
+from lipmotion.kernels.pixels import textured
+from lipmotion.kernels.pixels.textured import CLEAR, CUT, SOLID, TexturedTriangles
 
 TONE = np.arange(256).astype(np.uint8)
 HEIGHT, WIDTH = 40, 56

@@ -4,8 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kernels.networks import phone_loop, random_network
-from lipmotion.kernels import viterbi
-from lipmotion.kernels.arcs import NetworkArrays
+from lipmotion.kernels.sequences import viterbi
+from lipmotion.kernels.sequences.arcs import NetworkArrays
 from oracles import paths
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from kernels.networks import random_network
-from lipmotion.kernels import viterbi, windowed_viterbi
-from lipmotion.kernels.arcs import NetworkArrays
-from lipmotion.kernels.windowed_viterbi import Windows, best_path_within
+from lipmotion.kernels.sequences import viterbi, windowed_viterbi
+from lipmotion.kernels.sequences.arcs import NetworkArrays
+from lipmotion.kernels.sequences.windowed_viterbi import Windows, best_path_within
 from oracles import paths
 
 

@@ -13,9 +13,9 @@ from lipmotion.motion.closure import REACH_S, closable_ranges
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.unknown_voice import INSET_S, closing_reach_s, typical_range
 from lipmotion.pipeline.model import load_model
-from lipmotion.pipeline.request import SpeechRequest
-from lipmotion.pipeline.understand import understand
-from lipmotion.speech.recogniser import voice_knowledge
+from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.understand.understood_speech import understand
+from lipmotion.speech.recognition.recogniser import voice_knowledge
 from lipmotion.testing.examples import timeline
 from lipmotion.types import Constraints, Generation, Motion, Pin, Speech
 from lipmotion.units import VOWELS

@@ -12,7 +12,7 @@ from lipmotion.appearance.eigenlips import eigenlips_from_arrays
 from lipmotion.errors import ModelFormatError
 from lipmotion.hmm.model import hmm_from_arrays
 from lipmotion.pipeline.model import Model
-from lipmotion.speech.adaptation import adaptation_from_arrays
+from lipmotion.speech.recognition.adaptation import adaptation_from_arrays
 from lipmotion.types import Generation, Speech
 
 Array = NDArray[Any]

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.pipeline.adapt import adapt
-from lipmotion.pipeline.animate import animate
+from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import Model, load_model, read_header, save_model
-from lipmotion.pipeline.request import SpeechRequest
+from lipmotion.pipeline.training.adapt import adapt
+from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Audio
 from pipeline.test_model import npy, rewritten

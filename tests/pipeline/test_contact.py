@@ -15,25 +15,25 @@ from lipmotion.articulation.delivery import Delivery
 from lipmotion.articulation.lip_points import FACING
 from lipmotion.articulation.mouth import frame_times, spoken_mouth
 from lipmotion.faces.base import Staging
-from lipmotion.faces.character.performance import head_poses
-from lipmotion.faces.character.shape_fit import lip_gap
-from lipmotion.faces.character.shapes import head_mesh
-from lipmotion.faces.character.stage import figure
+from lipmotion.faces.head.performance import head_poses
+from lipmotion.faces.head.shape_fit import lip_gap
+from lipmotion.faces.head.shapes import head_mesh
+from lipmotion.faces.head.stage import figure
 from lipmotion.faces.portrait.frames import face_poses
-from lipmotion.pipeline.characters import ARKIT, WHOLE_FACE, curves_of
-from lipmotion.pipeline.delivered import delivered
-from lipmotion.pipeline.motion_files import in_format, resampled_curves
-from lipmotion.pipeline.scenes import character_scene, head_scene
-from lipmotion.rig.blendshape_motion import with_mouth
-from lipmotion.rig.driven import DrivenCharacter, driven_character
-from lipmotion.rig.facial_animation import FAP
-from lipmotion.rig.gltf_writer import write_glb
-from lipmotion.rig.mesh import Mesh
-from lipmotion.rig.obj_files import write_obj
-from lipmotion.rig.reference_mouth import arkit_mouth
+from lipmotion.meshes.files.gltf_writer import write_glb
+from lipmotion.meshes.files.obj_files import write_obj
+from lipmotion.meshes.fitting.blendshape_motion import with_mouth
+from lipmotion.meshes.fitting.driven import DrivenCharacter, driven_character
+from lipmotion.meshes.fitting.facial_animation import FAP
+from lipmotion.meshes.fitting.reference_mouth import arkit_mouth
+from lipmotion.meshes.model.mesh import Mesh
+from lipmotion.pipeline.outputs.curve_sets import ARKIT, WHOLE_FACE, curves_of
+from lipmotion.pipeline.outputs.delivered import delivered
+from lipmotion.pipeline.outputs.motion_files import in_format, resampled_curves
+from lipmotion.pipeline.outputs.scenes import character_scene, head_scene
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
-from rig.heads import head, lip_points
-from rig.speech import motion, units
+from meshes.heads import head, lip_points
+from meshes.speech import motion, units
 
 Mask = NDArray[np.bool_]
 Reader = Callable[[Generation, float], Mask]

@@ -12,7 +12,7 @@ from lipmotion.corpora.store import Selection
 from lipmotion.engines import engine_named
 from lipmotion.errors import InputError
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.pipeline.corpus_voice import REST_S, speak_from_corpus
+from lipmotion.pipeline.generate.corpus_voice import REST_S, speak_from_corpus
 from lipmotion.pipeline.model import Model
 from lipmotion.units import Lexicon
 

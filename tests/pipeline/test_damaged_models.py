@@ -12,9 +12,9 @@ from lipmotion.appearance.eigenlips import eigenlips_arrays
 from lipmotion.errors import ModelFormatError
 from lipmotion.hmm.model import hmm_arrays
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.request import SpeechRequest
-from lipmotion.pipeline.understand import understand
-from lipmotion.speech.adaptation import adaptation_arrays, identity_adaptation
+from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.understand.understood_speech import understand
+from lipmotion.speech.recognition.adaptation import adaptation_arrays, identity_adaptation
 from lipmotion.testing.toy import ToySentence
 from pipeline.damage import DAMAGES, FAR, QUICK, UNREADABLE, animated, damaged, distance, refused
 

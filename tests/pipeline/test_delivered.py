@@ -14,14 +14,14 @@ from lipmotion.articulation.delivery import Delivery
 from lipmotion.export.base import read_motion
 from lipmotion.faces import Face, Staging
 from lipmotion.faces.registry import face_named
-from lipmotion.pipeline.animate import write
-from lipmotion.pipeline.characters import with_curves
-from lipmotion.pipeline.delivered import delivered_scene, held_mouth, moved_prosody, shown
-from lipmotion.rig.driven import driven_character
-from lipmotion.rig.gltf_writer import write_glb
+from lipmotion.meshes.files.gltf_writer import write_glb
+from lipmotion.meshes.fitting.driven import driven_character
+from lipmotion.pipeline.generate.animate import write
+from lipmotion.pipeline.outputs.curve_sets import with_curves
+from lipmotion.pipeline.outputs.delivered import delivered_scene, held_mouth, moved_prosody, shown
 from lipmotion.types import Generation, Prosody, StateTrace
-from rig.heads import head
-from rig.speech import motion, units
+from meshes.heads import head
+from meshes.speech import motion, units
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +67,7 @@ def test_brows_and_head_of_pictures_come_later_with_the_mouth(
             heard.append(prosody.level_db)
         return face
 
-    monkeypatch.setattr("lipmotion.pipeline.drawn_video.staged_face", staged)
+    monkeypatch.setattr("lipmotion.pipeline.outputs.drawn_video.staged_face", staged)
     monkeypatch.setattr("lipmotion.export.transparent.write_pictures", lambda *_: None)
     for offset_ms in (0, 500):
         path = tmp_path / "a%d.png"

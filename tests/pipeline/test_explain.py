@@ -10,9 +10,9 @@ import pytest
 
 import lipmotion
 from lipmotion.errors import InputError
-from lipmotion.pipeline.explain import explanation_document, explanation_text
+from lipmotion.pipeline.generate.explain import explanation_document, explanation_text
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.request import SpeechRequest
+from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.testing.toy import ToySentence
 
 WORDS = "See Bob, papa & mama!"

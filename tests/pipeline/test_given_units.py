@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.pipeline.given_units import read_units
+from lipmotion.pipeline.understand.given_units import read_units
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import without_gaps
 

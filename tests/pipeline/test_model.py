@@ -12,7 +12,7 @@ import pytest
 
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.pipeline import model as module
-from lipmotion.pipeline.animate import animate
+from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import VERSION, Model, load_model, read_header, save_model
 from lipmotion.storage.archive import HEADER
 from lipmotion.types import Audio

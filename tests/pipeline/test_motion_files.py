@@ -15,14 +15,14 @@ from lipmotion.articulation.delivery import Delivery
 from lipmotion.articulation.liveliness import Liveliness
 from lipmotion.errors import ExportError
 from lipmotion.faces import Staging
-from lipmotion.pipeline.animate import check_outputs, write
-from lipmotion.pipeline.characters import curves_of
-from lipmotion.pipeline.living_curves import HEAD, living_curves
-from lipmotion.pipeline.motion_files import in_format, needs_prosody
-from lipmotion.rig.eyes_and_brows import FULL_LOOK, eye_and_brow_weights
-from lipmotion.rig.shape_names import ARKIT_MOUTH
+from lipmotion.meshes.fitting.eyes_and_brows import FULL_LOOK, eye_and_brow_weights
+from lipmotion.meshes.model.shape_names import ARKIT_MOUTH
+from lipmotion.pipeline.generate.animate import check_outputs, write
+from lipmotion.pipeline.outputs.curve_sets import curves_of
+from lipmotion.pipeline.outputs.living_curves import HEAD, living_curves
+from lipmotion.pipeline.outputs.motion_files import in_format, needs_prosody
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
-from rig.speech import motion, units
+from meshes.speech import motion, units
 
 TAKE = Path("a.livelink.csv")
 

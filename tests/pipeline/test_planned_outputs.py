@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.pipeline.recordings import is_for_several, planned_outputs, recordings_of
+from lipmotion.pipeline.understand.recordings import is_for_several, planned_outputs, recordings_of
 
 
 def test_files_stay_in_order_and_folders_are_listed(tmp_path: Path) -> None:

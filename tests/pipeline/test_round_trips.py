@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 
 from lipmotion.export.base import read_motion
-from lipmotion.pipeline.animate import animate, write
-from lipmotion.pipeline.cues import cue_text, cues
-from lipmotion.pipeline.given_units import read_units
+from lipmotion.pipeline.generate.animate import animate, write
+from lipmotion.pipeline.generate.speak import speak
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.motion_input import read_generation
-from lipmotion.pipeline.request import SpeechRequest
-from lipmotion.pipeline.speak import speak
-from lipmotion.pipeline.understand import recognised_with, understand
+from lipmotion.pipeline.outputs.cues import cue_text, cues
+from lipmotion.pipeline.outputs.motion_input import read_generation
+from lipmotion.pipeline.understand.given_units import read_units
+from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.understand.understood_speech import recognised_with, understand
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Generation, Span, StateTrace, Timeline, Unit
-from rig.speech import motion, units
+from meshes.speech import motion, units
 from speech import stand_in_voice
 
 LEFT_CORNER = "y_291"

@@ -10,19 +10,19 @@ import pytest
 
 from lipmotion.errors import InputError
 from lipmotion.faces import Staging
-from lipmotion.faces.character.lips import VISIBLE
-from lipmotion.faces.character.shapes import head_mesh
-from lipmotion.faces.character.stage import figure
-from lipmotion.pipeline.scenes import character_scene, head_scene, is_scene, sound_reference, write_scene
-from lipmotion.rig.driven import driven_character
-from lipmotion.rig.gltf_accessors import GltfArrays
-from lipmotion.rig.gltf_container import read_gltf_document
-from lipmotion.rig.gltf_writer import write_glb
-from lipmotion.rig.scene import Scene
+from lipmotion.faces.head.lips import VISIBLE
+from lipmotion.faces.head.shapes import head_mesh
+from lipmotion.faces.head.stage import figure
+from lipmotion.meshes.files.gltf_accessors import GltfArrays
+from lipmotion.meshes.files.gltf_container import read_gltf_document
+from lipmotion.meshes.files.gltf_writer import write_glb
+from lipmotion.meshes.fitting.driven import driven_character
+from lipmotion.meshes.model.scene import Scene
+from lipmotion.pipeline.outputs.scenes import character_scene, head_scene, is_scene, sound_reference, write_scene
 from lipmotion.types import Channel, Generation, Motion, StateTrace
+from meshes.heads import head
+from meshes.speech import motion, units
 from programs import gltf_report, gltf_validator, python_with, run_with
-from rig.heads import head
-from rig.speech import motion, units
 
 TIMES_S = (0.0, 0.31, 0.555, 0.75, 0.95, 1.15, 1.62, 2.0)
 """Times at which other programs are asked for values; most lie between two keys."""

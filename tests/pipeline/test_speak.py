@@ -11,10 +11,10 @@ import pytest
 
 from lipmotion.errors import ExportError, InputError, MissingDependencyError
 from lipmotion.export.base import read_motion
-from lipmotion.pipeline import speak as module
-from lipmotion.pipeline.animate import write
+from lipmotion.pipeline.generate import speak as module
+from lipmotion.pipeline.generate.animate import write
+from lipmotion.pipeline.generate.speak import REST_S, speak
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.speak import REST_S, speak
 from lipmotion.speech.voices import installed
 from lipmotion.speech.voices.installed import default_voice, installed_voices
 from lipmotion.types import Constraints, Pin, Span, SpokenText, Unit

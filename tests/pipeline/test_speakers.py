@@ -16,13 +16,13 @@ from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion.closure import closable_ranges
 from lipmotion.motion.speakers import speaker_arrays
-from lipmotion.pipeline.animate import animate
 from lipmotion.pipeline.evaluation.evaluate import evaluate
-from lipmotion.pipeline.explain import explain
+from lipmotion.pipeline.generate.animate import animate
+from lipmotion.pipeline.generate.explain import explain
+from lipmotion.pipeline.generate.posteriors import animate_with_posteriors
 from lipmotion.pipeline.model import Model, load_model, save_model
-from lipmotion.pipeline.posteriors import animate_with_posteriors
-from lipmotion.pipeline.request import SpeechRequest
 from lipmotion.pipeline.training.train import train
+from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.testing.toy import ToySentence, toy_utterances
 from lipmotion.types import Channel, Constraints, Motion, Pin, ReducedVariance, Utterance
 

@@ -7,12 +7,12 @@ import pytest
 
 from lipmotion.errors import AlignmentError
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.transcribe import MOST_WARNINGS, transcribe, warn_of_guesses, warn_of_misfit
-from lipmotion.speech.agreement import TranscriptFit
-from lipmotion.speech.analysed_audio import AnalysedAudio, analysed
-from lipmotion.speech.audio_files import read_audio
-from lipmotion.speech.mfcc import mfcc
-from lipmotion.speech.recogniser import Recogniser
+from lipmotion.pipeline.understand.transcribe import MOST_WARNINGS, transcribe, warn_of_guesses, warn_of_misfit
+from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
+from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.recognition.agreement import TranscriptFit
+from lipmotion.speech.recognition.recogniser import Recogniser
+from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Audio, Features, TimedTranscript, TimedWord, TranscriptLine
 from lipmotion.units import Lexicon, words_of

@@ -15,12 +15,12 @@ from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion.closure import closable_ranges
-from lipmotion.pipeline.animate import animate
-from lipmotion.pipeline.explain import explain
+from lipmotion.pipeline.generate.animate import animate
+from lipmotion.pipeline.generate.explain import explain
+from lipmotion.pipeline.generate.transfer import map_onto, with_person
 from lipmotion.pipeline.model import Model, load_model, save_model
-from lipmotion.pipeline.request import Onto, SpeechRequest
 from lipmotion.pipeline.training.train import train
-from lipmotion.pipeline.transfer import map_onto, with_person
+from lipmotion.pipeline.understand.request import Onto, SpeechRequest
 from lipmotion.testing.toy import ToySentence, toy_motion, toy_utterances
 from lipmotion.types import Channel, Constraints, Motion, Pin, Track, Utterance
 from lipmotion.vision.frames import VideoSpan
@@ -149,7 +149,7 @@ def test_onto_the_person_of_a_video(
         tracked.append((path, crops, span.end_s))
         return of_ben(toy_utterances(3)[0]).track
 
-    monkeypatch.setattr("lipmotion.pipeline.transfer.track", track)
+    monkeypatch.setattr("lipmotion.pipeline.generate.transfer.track", track)
     own, mapped = (animate(request(toy_sentence, onto), model=toy_model).motion for onto in (None, toy_speech))
     assert tracked == [(toy_speech, False, 60.0)]
     ratio = np.ptp(mapped["opening"]) / np.ptp(own["opening"])

@@ -12,16 +12,22 @@ import pytest
 
 from lipmotion.engines import Engine
 from lipmotion.errors import InputError
-from lipmotion.pipeline import understand as pipeline_understand
+from lipmotion.pipeline.generate.outlook import WHOLE_TRANSCRIPT, outlook_of
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.outlook import WHOLE_TRANSCRIPT, outlook_of
-from lipmotion.pipeline.request import SpeechRequest, request_of
-from lipmotion.pipeline.understand import recognised_speech, recognised_with, speech_of, understand, understood_speech
-from lipmotion.speech.agreement import TranscriptFit
-from lipmotion.speech.f0 import log_f0
-from lipmotion.speech.mfcc import mfcc
-from lipmotion.speech.recogniser import Recogniser
-from lipmotion.speech.recognition import Recognition
+from lipmotion.pipeline.understand.request import SpeechRequest, request_of
+from lipmotion.pipeline.understand.understood_speech import (
+    recognised_speech,
+    recognised_with,
+    speech_of,
+    understand,
+    understood_speech,
+)
+from lipmotion.pipeline.understand.understood_speech import understood_speech as pipeline_understand
+from lipmotion.speech.features.f0 import log_f0
+from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.recognition.agreement import TranscriptFit
+from lipmotion.speech.recognition.recognised_speech import Recognition
+from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Audio, Speech, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
 

@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 
 from lipmotion.errors import ExportError
-from lipmotion.pipeline.animate import animate
+from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import load_model
-from lipmotion.pipeline.request import SpeechRequest
-from lipmotion.pipeline.understand import understand, understood_speech
-from lipmotion.pipeline.words import recognise_words, words_as_text, write_words
-from lipmotion.speech.recognition import HeardWord, Recognition
+from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.understand.understood_speech import understand, understood_speech
+from lipmotion.pipeline.understand.words import recognise_words, words_as_text, write_words
+from lipmotion.speech.recognition.recognised_speech import HeardWord, Recognition
 from lipmotion.types import Span, Timeline, Unit
 
 WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
@@ -83,5 +83,5 @@ def test_speech_is_as_reliable_as_its_words(found: Recognition) -> None:
 
 @pytest.mark.long
 def test_words_do_not_depend_on_the_processes(monkeypatch: pytest.MonkeyPatch, found: Recognition) -> None:
-    monkeypatch.setattr("lipmotion.speech.word_search.SHORT_FRAMES", 0)
+    monkeypatch.setattr("lipmotion.speech.recognition.word_search.SHORT_FRAMES", 0)
     assert recognise_words(WELCOME, workers=2).words == found.words

@@ -16,8 +16,8 @@ from lipmotion.engines import engine_named
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.training.train import train
-from lipmotion.speech.f0 import log_f0
-from lipmotion.speech.mfcc import mfcc
+from lipmotion.speech.features.f0 import log_f0
+from lipmotion.speech.features.mfcc import mfcc
 from lipmotion.testing.toy import toy_sentences, toy_utterances
 from lipmotion.types import Audio, Generation
 

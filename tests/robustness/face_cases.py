@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from robustness.case import Bench, case, npy
-from speech.sound import tone, write_pictures, write_sound
+from speech.sounds import tone, write_pictures, write_sound
 
 GROUP = "faces"
 

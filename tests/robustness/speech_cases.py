@@ -11,7 +11,7 @@ import numpy as np
 from PIL import Image
 
 from robustness.case import Bench, case
-from speech.sound import tone, write_constant_flac, write_pictures, write_sound, write_stamped
+from speech.sounds import tone, write_constant_flac, write_pictures, write_sound, write_stamped
 
 GROUP = "recordings"
 NO_RECORDING = ("not a readable recording", "give an audio or video file")

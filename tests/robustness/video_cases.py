@@ -10,7 +10,7 @@ import numpy as np
 from PIL import Image
 
 from robustness.case import Bench, case
-from speech.sound import tone
+from speech.sounds import tone
 
 GROUP = "videos"
 NONE = "none of 1 recordings is usable; the first, a:"

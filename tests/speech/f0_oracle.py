@@ -1,4 +1,4 @@
-"""The slow, readable twin of the correlations of ``speech.f0``: one frame, one lag, one sample at a time.
+"""The slow, readable twin of the correlations of ``speech.features.f0``: one frame, one lag, one sample at a time.
 
 Written from its description: a windowed-sinc band pass of 255 taps from 50 to 1200 Hz that stops 0 Hz, every fourth
 sample; 160 of them centred on the frame, weighted by a Hann window; correlated with itself, normalised. A thousandth of

@@ -1,4 +1,4 @@
-"""The slow, readable twin of ``speech.mfcc``: one frame, one filter, one coefficient at a time, in double precision.
+"""The slow, readable twin of ``features.mfcc``: one frame, one filter, one coefficient at a time, in double precision.
 
 Written from the project's conventions: 16 kHz, 25 ms Hamming, pre-emphasis 0.97, 512-point FFT, 26 mel filters from 0
 to 8 kHz, orthonormal DCT, lifter 22, c1–c12 and log energy; Δ and ΔΔ by regression over ±2 frames; mean and variance

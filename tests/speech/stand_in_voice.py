@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.speech.audio_files import read_audio
-from lipmotion.speech.formant_synthesiser import synthesise
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.speech.sound.formant_synthesiser import synthesise
 from lipmotion.speech.voices import installed
 from lipmotion.speech.voices.phone_maps import ARPABET_PHONES
 from lipmotion.speech.voices.synthesiser import SynthesisedSentence, Synthesiser, SyntheticVoice

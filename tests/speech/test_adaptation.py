@@ -6,10 +6,15 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import ModelFormatError
-from lipmotion.speech.adaptation import Adaptation, adaptation_arrays, adaptation_from_arrays, identity_adaptation
-from lipmotion.speech.analysed_audio import analysed
-from lipmotion.speech.general.front_end import general_features
-from lipmotion.speech.mfcc import mfcc
+from lipmotion.speech.features.analysed_audio import analysed
+from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.recognition.adaptation import (
+    Adaptation,
+    adaptation_arrays,
+    adaptation_from_arrays,
+    identity_adaptation,
+)
+from lipmotion.speech.recognition.general.front_end import general_features
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Audio
 
@@ -76,5 +81,7 @@ def test_damaged_arrays() -> None:
 
 def test_a_warp_of_one_needs_no_other_features(audio: Audio, monkeypatch: pytest.MonkeyPatch) -> None:
     features = mfcc(audio)
-    monkeypatch.setattr("lipmotion.speech.analysed_audio.mfcc_of_warps", lambda *_: pytest.fail("computed twice"))
+    monkeypatch.setattr(
+        "lipmotion.speech.features.analysed_audio.mfcc_of_warps", lambda *_: pytest.fail("computed twice")
+    )
     assert replace(some(), warp=1.0).own_features(analysed(audio, features)).shape == features.values.shape

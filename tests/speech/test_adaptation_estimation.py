@@ -6,10 +6,10 @@ from scipy.signal import butter, lfilter
 
 from lipmotion.errors import InputError
 from lipmotion.pipeline.model import Model
-from lipmotion.speech.adaptation_estimation import EstimatedAdaptation, estimate_adaptation
-from lipmotion.speech.analysed_audio import analysed
-from lipmotion.speech.mfcc import mfcc
-from lipmotion.speech.recogniser import Recogniser
+from lipmotion.speech.features.analysed_audio import analysed
+from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.recognition.adaptation_estimation import EstimatedAdaptation, estimate_adaptation
+from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.stats.affine import log_determinant
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Audio

@@ -8,7 +8,8 @@ import pytest
 
 from lipmotion.corpora.grid import words_of_name
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.speech.agreement import (
+from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.recognition.agreement import (
     DOUBTFUL_SCORE,
     FRAME_STEP,
     TranscriptFit,
@@ -16,11 +17,10 @@ from lipmotion.speech.agreement import (
     agreement_score,
     transcript_fit,
 )
-from lipmotion.speech.audio_files import read_audio
-from lipmotion.speech.general.acoustic import PHONES, general_model
-from lipmotion.speech.general.front_end import general_features
-from lipmotion.speech.mfcc import mfcc
-from lipmotion.speech.recogniser import Recogniser
+from lipmotion.speech.recognition.general.acoustic import PHONES, general_model
+from lipmotion.speech.recognition.general.front_end import general_features
+from lipmotion.speech.recognition.recogniser import Recogniser
+from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence, toy_sentences
 from lipmotion.types import Audio, Span, Timeline, Unit
 from lipmotion.units import Lexicon

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.pipeline.animate import animate
+from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.speech import analysed_audio as module
-from lipmotion.speech import mfcc as front_end
-from lipmotion.speech.agreement import agreement_score
-from lipmotion.speech.analysed_audio import AnalysedAudio, analysed
-from lipmotion.speech.general.front_end import general_features
-from lipmotion.speech.mfcc import log_energy, mfcc
-from lipmotion.speech.recogniser import Recogniser
-from lipmotion.speech.speaker_similarity import JUDGED_FRAMES, WARPS
+from lipmotion.speech.features import analysed_audio as module
+from lipmotion.speech.features import mfcc as front_end
+from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
+from lipmotion.speech.features.mfcc import log_energy, mfcc
+from lipmotion.speech.features.speaker_similarity import JUDGED_FRAMES, WARPS
+from lipmotion.speech.recognition.agreement import agreement_score
+from lipmotion.speech.recognition.general.front_end import general_features
+from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.testing.toy import ToySentence, toy_sentences
 from lipmotion.types import Audio
 from lipmotion.units import Lexicon

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
 from lipmotion.hmm.align import PlacedWord, SpokenWord
-from lipmotion.kernels.windowed_viterbi import Windows
-from lipmotion.speech import anchors as module
-from lipmotion.speech.anchors import (
+from lipmotion.kernels.sequences.windowed_viterbi import Windows
+from lipmotion.speech.recognition import anchors as module
+from lipmotion.speech.recognition.anchors import (
     FREE_FRAMES,
     LINE_TOLERANCE_S,
     WORD_TOLERANCE_S,

@@ -18,11 +18,11 @@ from PIL import Image
 
 from children import run_child
 from lipmotion.errors import InputError
-from lipmotion.speech.audio_decoding import _TrackDecoder
-from lipmotion.speech.audio_files import read_audio
+from lipmotion.speech.sound.audio_decoding import _TrackDecoder
+from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.media import open_media
 from speech.opened import opened_in
-from speech.sound import babble, write_constant_flac, write_pictures, write_sound, write_stamped
+from speech.sounds import babble, write_constant_flac, write_pictures, write_sound, write_stamped
 
 Samples = NDArray[np.float32]
 MS = 16
@@ -282,7 +282,7 @@ PEAK = """
 import sys
 from pathlib import Path
 from lipmotion.errors import InputError
-from lipmotion.speech.audio_files import read_audio
+from lipmotion.speech.sound.audio_files import read_audio
 try:
     read_audio(Path(sys.argv[1]))
 except InputError as error:

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.speech.audio_files import SPEECH_RATE_HZ, read_audio
+from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ, read_audio
 from lipmotion.types import Audio
-from speech.sound import LEVEL, ONSET_S, tone, write_pictures, write_sound
+from speech.sounds import LEVEL, ONSET_S, tone, write_pictures, write_sound
 
 
 def onset_s(audio: Audio) -> float:

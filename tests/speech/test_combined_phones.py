@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from lipmotion.pipeline.model import Model
-from lipmotion.speech import combined_phones as module
-from lipmotion.speech.combined_phones import NOISES, combine_phones, combined_log_likelihoods
-from lipmotion.speech.general.acoustic import general_model
+from lipmotion.speech.recognition import combined_phones as module
+from lipmotion.speech.recognition.combined_phones import NOISES, combine_phones, combined_log_likelihoods
+from lipmotion.speech.recognition.general.acoustic import general_model
 from lipmotion.units import PHONES, SILENCE
 
 

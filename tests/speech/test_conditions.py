@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.speech.conditions import heard_spectra, in_condition
-from lipmotion.speech.spectrum import spectrum
+from lipmotion.speech.features.spectrum import spectrum
+from lipmotion.speech.sound.conditions import heard_spectra, in_condition
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import SPECTRUM_BANDS, Audio
 

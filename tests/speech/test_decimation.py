@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.signal import resample_poly
 
-from lipmotion.speech.decimation import decimated
+from lipmotion.speech.sound.decimation import decimated
 
 
 def test_it_is_what_scipy_computes():

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError, MissingDependencyError
-from lipmotion.speech import installed_recognisers
-from lipmotion.speech.installed_recognisers import recognise_words
+from lipmotion.speech.recognition import installed_recognisers
+from lipmotion.speech.recognition.installed_recognisers import recognise_words
 from lipmotion.types import Audio, TimedTranscript
 
 WORDS = [(" See", 0.1, 0.5), (" five,", 0.6, 1.0), (" 20-foot", 1.0, 1.6)]

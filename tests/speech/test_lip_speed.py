@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.speech.lip_speed import (
+from lipmotion.speech.features.lip_speed import (
     FRAME_OFFSETS,
     STATIC_FEATURES,
     fit_opening_speed,

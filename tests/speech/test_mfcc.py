@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.speech import mfcc as module
-from lipmotion.speech.mfcc import ROUNDING, mfcc, normalised, regression_delta
+from lipmotion.speech.features import mfcc as module
+from lipmotion.speech.features.mfcc import ROUNDING, mfcc, normalised, regression_delta
 from lipmotion.types import Audio
 from speech.mfcc_oracle import features as slow_features
 

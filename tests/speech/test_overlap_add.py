@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lipmotion.speech.overlap_add import REACH_S, overlapped
+from lipmotion.speech.sound.overlap_add import REACH_S, overlapped
 
 RATE_HZ = 16_000
 

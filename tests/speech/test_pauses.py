@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.speech.pauses import QUIETEST_DB, levels_db, levels_db_at, quietest_s, spoken_spans
+from lipmotion.speech.sound.pauses import QUIETEST_DB, levels_db, levels_db_at, quietest_s, spoken_spans
 from lipmotion.types import Audio
 
 RATE = 16_000

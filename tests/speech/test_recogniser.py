@@ -11,19 +11,19 @@ import pytest
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.speech import recogniser as module
-from lipmotion.speech import word_search
-from lipmotion.speech.audio_files import read_audio
-from lipmotion.speech.combined_phones import combined_log_likelihoods
-from lipmotion.speech.formant_synthesiser import synthesise
-from lipmotion.speech.mfcc import mfcc
-from lipmotion.speech.recogniser import (
+from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.features.speaker_similarity import SpeakerSimilarity
+from lipmotion.speech.recognition import recogniser as module
+from lipmotion.speech.recognition import word_search
+from lipmotion.speech.recognition.combined_phones import combined_log_likelihoods
+from lipmotion.speech.recognition.recogniser import (
     FULL_WEIGHT_SCORE,
     NO_WEIGHT_SCORE,
     SHORT_PAUSE_S,
     Recogniser,
 )
-from lipmotion.speech.speaker_similarity import SpeakerSimilarity
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.speech.sound.formant_synthesiser import synthesise
 from lipmotion.testing.toy import WORDS, ToySentence, toy_sentences
 from lipmotion.types import Audio, Timeline, Unit
 from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, words_of

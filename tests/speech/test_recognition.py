@@ -3,8 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.speech.heard_words import AlignedWords
-from lipmotion.speech.recognition import (
+from lipmotion.speech.recognition.recognised_speech import (
     SLIVER_FRAMES,
     HeardWord,
     LabelledFrames,
@@ -12,7 +11,8 @@ from lipmotion.speech.recognition import (
     recognition_of,
     spliced,
 )
-from lipmotion.speech.voice_activity import Stretch
+from lipmotion.speech.recognition.word_fit import AlignedWords
+from lipmotion.speech.sound.voice_activity import Stretch
 from lipmotion.types import Span, Timeline, Unit
 
 BASE = [LabelledFrames(0, "sil"), LabelledFrames(20, "aa"), LabelledFrames(50, "t"), LabelledFrames(70, "sil")]

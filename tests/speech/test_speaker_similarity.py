@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from lipmotion.pipeline.model import Model
-from lipmotion.speech import speaker_similarity as module
-from lipmotion.speech.analysed_audio import analysed
-from lipmotion.speech.mfcc import mfcc
-from lipmotion.speech.speaker_similarity import WARPS, speaker_similarity
+from lipmotion.speech.features import speaker_similarity as module
+from lipmotion.speech.features.analysed_audio import analysed
+from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.features.speaker_similarity import WARPS, speaker_similarity
 from lipmotion.stats.mixture import QuadraticForm
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Audio

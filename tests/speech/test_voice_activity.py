@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from lipmotion.speech.voice_activity import (
+from lipmotion.speech.sound.voice_activity import (
     LEAST_FRAMES,
     LONGEST_FRAMES,
     MARGIN_FRAMES,

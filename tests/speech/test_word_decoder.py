@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import MissingDependencyError
-from lipmotion.speech import word_decoder
-from lipmotion.speech.audio_files import read_audio
-from lipmotion.speech.voice_activity import Stretch
-from lipmotion.speech.word_decoder import is_filler, stretch_samples, words_in
+from lipmotion.speech.recognition import word_decoder
+from lipmotion.speech.recognition.word_decoder import is_filler, stretch_samples, words_in
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.speech.sound.voice_activity import Stretch
 from lipmotion.types import Audio
 from lipmotion.units import Lexicon
 

@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 
 from lipmotion.pipeline.model import load_model
-from lipmotion.speech import word_search
-from lipmotion.speech.audio_files import read_audio
-from lipmotion.speech.mfcc import mfcc
-from lipmotion.speech.recogniser import Recogniser
-from lipmotion.speech.recognition import Recognition
-from lipmotion.speech.word_decoder import FoundWord
-from lipmotion.speech.word_search import confidence_of
+from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.recognition.recognised_speech import Recognition, word_search
+from lipmotion.speech.recognition.recogniser import Recogniser
+from lipmotion.speech.recognition.word_decoder import FoundWord
+from lipmotion.speech.recognition.word_search import confidence_of
+from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio
 from lipmotion.units import Lexicon, is_silent
 

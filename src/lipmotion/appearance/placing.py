@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.kernels import affine
+from lipmotion.kernels.pixels import affine
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]

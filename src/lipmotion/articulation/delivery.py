@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from lipmotion.articulation.contact import CLOSED_BELOW, closures
 from lipmotion.articulation.rest import rest_frames
 from lipmotion.errors import InputError
-from lipmotion.kernels.holds import best_holds
+from lipmotion.kernels.sequences.holds import best_holds
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Generation, Motion, Span, StateTrace, Timeline, Unit
 from lipmotion.types.generation import ReducedVariance
 from lipmotion.units import is_silent
@@ -175,7 +175,7 @@ def held(generation: Generation, frames: int, closed_s: Sequence[float] = ()) ->
 
     frames   : less than 2: the curves stay as they are
     closed_s : times in seconds at which the lips are closed in p, b and m (``closed_times``)
-    Where the poses begin is chosen so that they differ least from the curves (``kernels.holds.best_holds``). The pose
+    Where the poses begin is chosen so that they differ least from the curves (``sequences.holds.best_holds``). The pose
     that shows p, b or m is that of the frame in which the lips are closed; every other pose is the mean of its frames.
     """
     motion = generation.motion

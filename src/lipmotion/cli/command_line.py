@@ -11,7 +11,12 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 from typing import Any, NoReturn
 
-from lipmotion.cli import (
+from lipmotion.cli.arguments.paths import check_paths
+from lipmotion.cli.terminal.events import Events
+from lipmotion.cli.terminal.outcome import one_line
+from lipmotion.cli.terminal.output import flush_output, print_line, print_usage, with_program_name
+from lipmotion.cli.terminal.stop import Stopper
+from lipmotion.cli.verbs import (
     adapt,
     addon,
     animate,
@@ -30,11 +35,6 @@ from lipmotion.cli import (
     train,
     words,
 )
-from lipmotion.cli.events import Events
-from lipmotion.cli.outcome import one_line
-from lipmotion.cli.output import flush_output, print_line, print_usage, with_program_name
-from lipmotion.cli.paths import check_paths
-from lipmotion.cli.stop import Stopper
 from lipmotion.errors import ExportError
 
 VERBS = (

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import sys
 
-from lipmotion.cli.events import Events, events_of
-from lipmotion.cli.stop import MESSAGE, Stopper
+from lipmotion.cli.terminal.events import Events, events_of
+from lipmotion.cli.terminal.stop import MESSAGE, Stopper
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -46,13 +46,13 @@ def _run(arguments: Sequence[str] | None, stopper: Stopper, events: Events) -> i
 
         command_line.run(arguments, stopper, events)
     except BrokenPipeError:  # the reader of standard output has gone
-        from lipmotion.cli.output import discard_pending_output
+        from lipmotion.cli.terminal.output import discard_pending_output
 
         stopper.settle()
         discard_pending_output()
     except Exception as error:
         stopper.check()  # interrupted work may fail in any way
-        from lipmotion.cli.outcome import outcome
+        from lipmotion.cli.terminal.outcome import outcome
 
         known = outcome(error)
         stopper.settle()
@@ -62,7 +62,7 @@ def _run(arguments: Sequence[str] | None, stopper: Stopper, events: Events) -> i
         code, reason = known
         return _report_failure(events, code, f"error: {reason}")
     except SystemExit as end:  # argparse: help, version, a wrong command line; or an extension
-        from lipmotion.cli.outcome import outcome
+        from lipmotion.cli.terminal.outcome import outcome
 
         known = outcome(end)
         stopper.settle()
@@ -78,7 +78,7 @@ def _run(arguments: Sequence[str] | None, stopper: Stopper, events: Events) -> i
 
 def _report_failure(events: Events, code: int, text: str) -> int:
     """Report an error as an event and as a line; return the exit code."""
-    from lipmotion.cli.output import print_error
+    from lipmotion.cli.terminal.output import print_error
 
     events.fail(text.removeprefix("error: "), code)
     if not events.replaces_errors:

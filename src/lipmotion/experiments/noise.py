@@ -8,9 +8,9 @@ from pathlib import Path
 
 from lipmotion.errors import InputError
 from lipmotion.pipeline.evaluation.conditions import AUDIO_ONLY, HeldOutRecordings
-from lipmotion.speech.audio_files import SPEECH_RATE_HZ, read_audio
-from lipmotion.speech.mfcc import mfcc
-from lipmotion.speech.noise import noisy_audio
+from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ, read_audio
+from lipmotion.speech.sound.noise import noisy_audio
 from lipmotion.storage.files import check_listable
 from lipmotion.types import Audio, Monitor, silent_monitor, with_progress
 
@@ -28,8 +28,8 @@ def recordings_in_noise(
 ) -> HeldOutRecordings:
     """Return recordings with noise added, in the condition ``audio only``; every clip has its own noise.
 
-    kind, snr_db, talkers, seed : as in ``speech.noise.noisy_audio``
-    Raises InputError: as ``speech.noise.noisy_audio``.
+    kind, snr_db, talkers, seed : as in ``speech.sound.noise.noisy_audio``
+    Raises InputError: as ``speech.sound.noise.noisy_audio``.
     """
     utterances, recognitions = [], []
     for number, utterance in enumerate(with_progress(recordings.utterances, "adding noise", monitor)):

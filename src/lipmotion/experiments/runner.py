@@ -21,7 +21,7 @@ from lipmotion.pipeline.evaluation.conditions import (
     held_out_recordings,
 )
 from lipmotion.pipeline.training.train import Run, train
-from lipmotion.speech.recogniser import cached_recogniser
+from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.types import Monitor, silent_monitor, sub_monitor, with_progress
 from lipmotion.units import Lexicon
 

@@ -18,7 +18,7 @@ FACES: Registry[type[Face]] = Registry(
         "woman": f"{_DRAWN}:Woman",
         "man": f"{_DRAWN}:Man",
         "cartoon": f"{_DRAWN}:Cartoon",
-        "head": "lipmotion.faces.character:Head",
+        "head": "lipmotion.faces.head:Head",
     },
 )
 

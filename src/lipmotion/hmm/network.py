@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError
 from lipmotion.hmm.log_likelihoods import LogLikelihoods
-from lipmotion.kernels.arcs import ArcLayout, NetworkArrays, arc_layout
-from lipmotion.kernels.viterbi import best_path
-from lipmotion.kernels.windowed_viterbi import Windows, best_path_within
+from lipmotion.kernels.sequences.arcs import ArcLayout, NetworkArrays, arc_layout
+from lipmotion.kernels.sequences.viterbi import best_path
+from lipmotion.kernels.sequences.windowed_viterbi import Windows, best_path_within
 
 KEPT_FRAMES = 12_000
 """Up to so many frames (two minutes), log densities are computed once and kept; those of longer recordings twice."""
@@ -20,7 +20,7 @@ KEPT_FRAMES = 12_000
 
 @dataclass(frozen=True, eq=False)
 class Network:
-    """States joined by arcs, in the form that ``kernels.viterbi.best_path`` takes."""
+    """States joined by arcs, in the form that ``kernels.sequences.viterbi.best_path`` takes."""
 
     emission: NDArray[np.intp]
     arc_from: NDArray[np.intp]

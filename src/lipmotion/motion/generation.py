@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
-from lipmotion.kernels.banded import generate
+from lipmotion.kernels.sequences.banded import generate
 from lipmotion.motion.articulation import ArticulationPrior
 from lipmotion.motion.closure import OPENING, REACH_S, Closure, closable_ranges, frames_to_close
 from lipmotion.motion.limits import MotionLimits

@@ -17,8 +17,8 @@ from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.hmm.model import HmmConfig, UnitHmm, hmm_arrays, hmm_from_arrays
 from lipmotion.motion.speakers import SpeakerMaps, speaker_arrays, speakers_from_arrays
 from lipmotion.pipeline.training.channels import EIGENLIPS, GEOMETRY
-from lipmotion.speech.adaptation import Adaptation, adaptation_arrays, adaptation_from_arrays
-from lipmotion.speech.mfcc import FEATURES
+from lipmotion.speech.features.mfcc import FEATURES
+from lipmotion.speech.recognition.adaptation import Adaptation, adaptation_arrays, adaptation_from_arrays
 from lipmotion.storage.archive import UNREADABLE, read_archive, read_archive_header, write_archive
 from lipmotion.storage.schema import arrays_under, refuse_undeclared
 

@@ -9,8 +9,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from lipmotion.export.base import MotionFormat
-from lipmotion.pipeline.characters import curves_of
-from lipmotion.rig.facial_animation import FAP
+from lipmotion.meshes.fitting.facial_animation import FAP
+from lipmotion.pipeline.outputs.curve_sets import curves_of
 from lipmotion.testing.contract import require
 from lipmotion.testing.examples import example
 from lipmotion.types import Generation, StateTrace

@@ -18,8 +18,8 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.export.video import write_mp4
 from lipmotion.faces import Staging
 from lipmotion.faces.portrait import Woman
-from lipmotion.speech.formant_synthesiser import synthesise
-from lipmotion.speech.mfcc import mfcc
+from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.sound.formant_synthesiser import synthesise
 from lipmotion.storage.files import whole_file
 from lipmotion.testing.toy_mouth import toy_mouths
 from lipmotion.types import Audio, Channel, Motion, Timeline, Track, Unit, Utterance

@@ -71,7 +71,7 @@ def open_video(path: Path, span: VideoSpan = WHOLE, *, longest_px: int | None = 
 
     span       : the part that is wanted, which the times and the duration then refer to; it is sought in the file
     longest_px : reduce larger pictures to this while they are converted, for a quick look; decode in several threads
-    Time 0 is the container's start, as in ``speech.audio_files``, so sound and picture agree.
+    Time 0 is the container's start, as in ``speech.sound.audio_files``, so sound and picture agree.
     Raises InputError: no such file, empty, not a video, no video stream, or no picture that can be decoded (in a span
     there may be none).
     Packets and pictures that are damaged later are left out, and listed in ``OpenVideo.damage``.

@@ -16,9 +16,9 @@ from lipmotion.hmm.multistream.model import JointConfig
 from lipmotion.hmm.multistream.recognise import JointRecogniser
 from lipmotion.hmm.multistream.streams import stream_observations
 from lipmotion.hmm.multistream.train import TrainingUtterance, train_joint
-from lipmotion.speech.audio_files import read_audio
-from lipmotion.speech.f0 import log_f0
-from lipmotion.speech.mfcc import LOG_ENERGY, mfcc
+from lipmotion.speech.features.f0 import log_f0
+from lipmotion.speech.features.mfcc import LOG_ENERGY, mfcc
+from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Progress, Span, Timeline, Unit
 from lipmotion.units import PHONES, Lexicon
 from lipmotion.units.classes import phone_classes

@@ -7,7 +7,7 @@ import pytest
 
 from lipmotion.errors import CorpusError
 from lipmotion.experiments.baselines.regression import REACH, ContextRidge, LoudnessRegression, MeanPose
-from lipmotion.speech.mfcc import LOG_ENERGY
+from lipmotion.speech.features.mfcc import LOG_ENERGY
 from lipmotion.testing.examples import CHANNELS
 from lipmotion.testing.examples import examples as sentences
 from lipmotion.types import Example, silent_monitor

@@ -17,7 +17,7 @@ from lipmotion.measures import curves
 from lipmotion.pipeline.evaluation.conditions import HeldOutRecordings, compared_clips, held_out_recordings
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.training.train import model_motion
-from lipmotion.speech.recogniser import Recogniser
+from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.testing.examples import examples
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Example, Speech, silent_monitor

@@ -29,7 +29,7 @@ from lipmotion.measures import curves
 from lipmotion.pipeline.evaluation.conditions import compared_clips, held_out_recordings
 from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.training.train import train
-from lipmotion.speech.recogniser import cached_recogniser
+from lipmotion.speech.recognition.recogniser import cached_recogniser
 
 LONG = pytest.mark.long
 PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)

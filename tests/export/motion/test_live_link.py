@@ -9,7 +9,7 @@ import pytest
 
 from lipmotion.export.base import write_motion
 from lipmotion.export.motion.live_link import CURVES, timecode
-from lipmotion.rig.shape_names import ARKIT_MOUTH, ARKIT_OTHERS
+from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
 
 APP = (

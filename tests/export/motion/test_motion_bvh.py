@@ -14,7 +14,7 @@ from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import ExportError
 from lipmotion.export import write_motion
 from lipmotion.export.motion.motion_bvh import CENTIMETRES
-from lipmotion.rig.point_motion import point_motion
+from lipmotion.meshes.fitting.point_motion import point_motion
 from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 
 FRAMES = 60

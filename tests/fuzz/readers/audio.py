@@ -9,9 +9,9 @@ import numpy as np
 
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import LONGEST_S, require
-from lipmotion.speech.audio_files import read_audio
-from lipmotion.speech.mfcc import mfcc
-from speech.sound import tone, write_sound
+from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.sound.audio_files import read_audio
+from speech.sounds import tone, write_sound
 
 SECONDS = 0.6
 CODECS = {

@@ -15,16 +15,16 @@ from PIL import Image
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import require
 from lipmotion.faces.mesh import MeshStage
-from lipmotion.pipeline.characters import curves_of
-from lipmotion.rig.binding_files import save_binding, write_weights
-from lipmotion.rig.character_files import read_character
-from lipmotion.rig.drawn_surface import drawn_surface
-from lipmotion.rig.driven import driven_character
-from lipmotion.rig.gltf_writer import write_glb
-from lipmotion.rig.obj_files import write_obj
-from rig.gltf import data_uri, document, glb, packed_attributes, textured_document, with_colours
-from rig.heads import head, lip_points
-from rig.speech import motion, units
+from lipmotion.meshes.files.binding_files import save_binding, write_weights
+from lipmotion.meshes.files.character_files import read_character
+from lipmotion.meshes.files.gltf_writer import write_glb
+from lipmotion.meshes.files.obj_files import write_obj
+from lipmotion.meshes.fitting.driven import driven_character
+from lipmotion.meshes.rendering.drawn_surface import drawn_surface
+from lipmotion.pipeline.outputs.curve_sets import curves_of
+from meshes.gltf import data_uri, document, glb, packed_attributes, textured_document, with_colours
+from meshes.heads import head, lip_points
+from meshes.speech import motion, units
 
 HEADS = ("head.glb", "head.gltf", "head.obj", "head.vrm")
 TABLE = "control,source,gain,offset,low,high\nJaw,jawOpen,-25,,-20,0\nLips,viseme_oh,0.5\n"

@@ -12,7 +12,7 @@ import numpy as np
 from fuzz.inputs import Files, Good, picked_up
 from fuzz.readers.plausible import check_motion, require
 from lipmotion.corpora.store import Corpus
-from lipmotion.speech.mfcc import mfcc
+from lipmotion.speech.features.mfcc import mfcc
 from lipmotion.types import Audio, Motion, Timeline, Track, Utterance
 
 SAMPLES, FRAMES = 8000, 13

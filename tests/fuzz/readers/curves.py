@@ -21,7 +21,7 @@ from lipmotion.export.motion.c3d_file import C3dFile
 from lipmotion.export.motion.c3d_writing import write_c3d
 from lipmotion.pipeline.corpus.supplied_motion import supplied_track
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
-from rig.live_link_app import write_take
+from meshes.live_link_app import write_take
 from robustness.case import npy
 from robustness.motion_cases import GOOD
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from fuzz.inputs import Good, ImplausibleError
 from lipmotion.corpora.store import Corpus
-from lipmotion.pipeline.animate import write
+from lipmotion.pipeline.generate.animate import write
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.types import Audio, Generation, Motion
 from lipmotion.types.motion import LARGEST

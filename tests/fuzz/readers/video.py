@@ -15,7 +15,7 @@ from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import require
 from lipmotion.vision.frames import open_video
 from lipmotion.vision.timing import nominal_rate_hz
-from speech.sound import tone, write_pictures, write_sound
+from speech.sounds import tone, write_pictures, write_sound
 
 CODECS = {
     **{"mp4": ("libx264", "yuv420p"), "mkv": ("libx264", "yuv420p"), "webm": ("libvpx", "yuv420p")},

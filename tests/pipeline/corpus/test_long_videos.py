@@ -15,7 +15,7 @@ from lipmotion.errors import CorpusError
 from lipmotion.pipeline.corpus import long_videos
 from lipmotion.pipeline.corpus import prepare as module
 from lipmotion.pipeline.corpus.prepare import prepare
-from lipmotion.speech.audio_files import read_audio
+from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Channel, Motion, Progress, Track
 from lipmotion.vision.frames import WHOLE, VideoSpan
 from lipmotion.vision.track import track

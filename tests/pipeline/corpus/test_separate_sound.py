@@ -16,7 +16,7 @@ from lipmotion.export.sound import write_sound
 from lipmotion.pipeline.corpus import long_videos as module
 from lipmotion.pipeline.corpus.prepare import prepare
 from lipmotion.pipeline.corpus.separate_sound import SeparateSound, in_step, on_own_time
-from lipmotion.speech.audio_files import read_audio
+from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Generation, Motion, StateTrace, Timeline, Track
 from speech.recorded_twice import RATE_HZ, clap, recorded_twice, speech_like
 

@@ -15,13 +15,13 @@ from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.export.base import write_motion
 from lipmotion.export.motion.c3d_file import C3dFile
 from lipmotion.export.motion.c3d_writing import write_c3d
+from lipmotion.meshes.files.live_link_table import SPEECH_CURVES
 from lipmotion.pipeline.corpus import prepare as module
 from lipmotion.pipeline.corpus.prepare import prepare
 from lipmotion.pipeline.corpus.supplied_motion import source_digests, supplied_phones, supplied_track
-from lipmotion.rig.live_link_table import SPEECH_CURVES
 from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 from lipmotion.units import is_silent
-from rig.live_link_app import write_take
+from meshes.live_link_app import write_take
 
 CHANNELS = (Channel("jaw", "weight"), Channel("brow", "weight"))
 
@@ -167,8 +167,8 @@ def test_labels_that_go_on_after_the_sound():
 @pytest.mark.recordings
 def test_facegood_from_recordings_to_figures(recordings: Path, tmp_path: Path) -> None:
     """Two recordings to train on, the third to test: Mandarin, 30 Hz, 116 blendshapes, no transcript."""
-    from lipmotion.pipeline.animate import animate
     from lipmotion.pipeline.evaluation.evaluate import evaluate
+    from lipmotion.pipeline.generate.animate import animate
     from lipmotion.pipeline.model import load_model, save_model
     from lipmotion.pipeline.training.train import train
 

@@ -13,8 +13,8 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.measures.offset import best_offset
 from lipmotion.pipeline.corpus import sync as module
 from lipmotion.pipeline.corpus.sync import clip_scores, offsets, sync
-from lipmotion.speech.audio_files import read_audio
-from lipmotion.speech.mfcc import mfcc
+from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Motion, Span, Timeline, Track, Unit, Utterance
 from lipmotion.vision.track import track
 
@@ -49,7 +49,7 @@ def corpus(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Corpus:
     """Two collections: one in step, one whose sound is 120 ms late; loudness is all that their lips follow."""
     energy = np.zeros((11, 13))
     energy[4, 12], energy[6, 12] = -1, 1
-    monkeypatch.setattr("lipmotion.speech.lip_speed._weights", energy.ravel)
+    monkeypatch.setattr("lipmotion.speech.features.lip_speed._weights", energy.ravel)
     made = Corpus.create(tmp_path / "corpus")
     for seed in range(COUNT):
         made.add(utterance(seed, 0.0, "here"), {"recipe": "9"})

@@ -13,7 +13,7 @@ from lipmotion.faces.filmed.face import FilmedFace, load_face, save_face
 from lipmotion.pipeline.film import build
 from lipmotion.pipeline.film.build import build_face
 from lipmotion.pipeline.film.takes import Take
-from lipmotion.speech.pauses import QUIETEST_DB
+from lipmotion.speech.sound.pauses import QUIETEST_DB
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.testing.toy_face import toy_chin_px
 from lipmotion.types import Audio, Channel, Item, Motion, Progress, Track

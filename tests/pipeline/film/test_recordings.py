@@ -9,10 +9,10 @@ import pytest
 
 from cli.conftest import RunCommand, here, run
 from lipmotion.faces.filmed.face import load_face
-from lipmotion.pipeline.animate import animate
 from lipmotion.pipeline.film.video import film_of, write_film
-from lipmotion.pipeline.request import SpeechRequest
-from lipmotion.speech.audio_files import read_audio
+from lipmotion.pipeline.generate.animate import animate
+from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Motion
 from lipmotion.vision.track import track
 

@@ -14,7 +14,7 @@ from lipmotion.pipeline.film import takes
 from lipmotion.pipeline.film.takes import MOST_FOOTAGE_S, takes_of
 from lipmotion.storage.files import sha256_of
 from lipmotion.testing.toy import toy_utterances
-from speech.sound import tone, write_sound
+from speech.sounds import tone, write_sound
 
 MakeVideos = Callable[..., Path]
 

@@ -16,16 +16,16 @@ from lipmotion.export.synthetic_mark import SOURCE_TYPE
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.faces.filmed.renderer import Stitcher, StitchingOptions
 from lipmotion.faces.registry import face_named
-from lipmotion.pipeline.animate import animate, write
 from lipmotion.pipeline.film import video as module
 from lipmotion.pipeline.film.background import stored_sequence
 from lipmotion.pipeline.film.video import FilmOptions, check_film, film_of, write_film
+from lipmotion.pipeline.generate.animate import animate, write
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.request import SpeechRequest
+from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.testing.toy import ToySentence, toy_motion
 from lipmotion.testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH
 from lipmotion.types import Audio, Channel, Item, Motion, Progress
-from speech.sound import tone, write_sound
+from speech.sounds import tone, write_sound
 
 MIDDLE = (slice(150, 230), slice(70, 154))
 """Rows and columns of the background in which the mouth is."""

@@ -16,13 +16,13 @@ from lipmotion.errors import CorpusError, ExportError, InputError, ModelFormatEr
 from lipmotion.export.base import read_motion
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.report import figures_table
-from lipmotion.pipeline.animate import animate, write
 from lipmotion.pipeline.evaluation.conditions import compared_clips, held_out_recordings
 from lipmotion.pipeline.evaluation.evaluate import evaluate
+from lipmotion.pipeline.generate.animate import animate, write
 from lipmotion.pipeline.model import Model, load_model, save_model
 from lipmotion.pipeline.training.channels import BOTH, EIGENLIPS, GEOMETRY, train_eigenlips, with_visual_channels
 from lipmotion.pipeline.training.train import train
-from lipmotion.speech.recogniser import Recogniser
+from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.testing.toy import toy_utterances
 from lipmotion.types import Utterance
 

@@ -15,8 +15,8 @@ from lipmotion.pipeline.model import Model, save_model
 from lipmotion.pipeline.training import train as module
 from lipmotion.pipeline.training.train import Run, about_training, model_motion, phones_of, train
 from lipmotion.pipeline.training.voices import VoiceExample
-from lipmotion.speech.mfcc import mfcc
-from lipmotion.speech.recogniser import Recogniser
+from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Channel, Motion, Timeline, Track, Unit, Utterance
 from lipmotion.units import Lexicon

@@ -16,7 +16,7 @@ from lipmotion.pipeline.training.transcripts import (
     warn_of_doubtful_transcripts,
     warn_of_missing_transcripts,
 )
-from lipmotion.speech.agreement import DOUBTFUL_SCORE, TranscriptFit
+from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit
 from lipmotion.testing.toy import toy_sentences, toy_utterances
 from lipmotion.types import Timeline, Unit, Utterance
 

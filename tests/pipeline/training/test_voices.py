@@ -20,10 +20,10 @@ from lipmotion.pipeline.training.voices import (
     synthetic_sentences,
     voice_examples,
 )
-from lipmotion.speech.formant_synthesiser import synthesise
-from lipmotion.speech.mfcc import FEATURES
-from lipmotion.speech.noise import spoken_samples
-from lipmotion.speech.recogniser import Recogniser
+from lipmotion.speech.features.mfcc import FEATURES
+from lipmotion.speech.recognition.recogniser import Recogniser
+from lipmotion.speech.sound.formant_synthesiser import synthesise
+from lipmotion.speech.sound.noise import spoken_samples
 from lipmotion.speech.voices.installed import installed_voices
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.testing.toy import ToySentence, toy_sentences

@@ -11,9 +11,9 @@ import pytest
 
 from lipmotion.errors import InputError, LipMotionError, MissingDependencyError
 from lipmotion.pipeline.model import Model
-from lipmotion.speech.mfcc import mfcc
-from lipmotion.speech.noise import noisy_audio
-from lipmotion.speech.recogniser import Recogniser
+from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.recognition.recogniser import Recogniser
+from lipmotion.speech.sound.noise import noisy_audio
 from lipmotion.speech.voices import espeak_events
 from lipmotion.speech.voices.flite import parse_phone_ends
 from lipmotion.speech.voices.installed import (

@@ -29,7 +29,7 @@ from lipmotion.pipeline.evaluation.conditions import (
     speech_of_condition,
 )
 from lipmotion.pipeline.evaluation.figures import figures_of
-from lipmotion.speech.recogniser import cached_recogniser
+from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import sub_monitor, with_progress
 

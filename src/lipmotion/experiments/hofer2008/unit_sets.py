@@ -27,7 +27,7 @@ from lipmotion.pipeline.evaluation.conditions import (
 from lipmotion.pipeline.evaluation.figures import figures_of
 from lipmotion.pipeline.training.train import UTTERANCES_PER_WORKER, phones_and_examples
 from lipmotion.pipeline.workers import worker_pool
-from lipmotion.speech.recogniser import cached_recogniser
+from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.checkpoint import NO_CHECKPOINT
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import Example, Monitor, silent_monitor, sub_monitor, with_progress

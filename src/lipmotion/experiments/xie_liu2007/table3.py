@@ -48,8 +48,8 @@ from lipmotion.pipeline.training.channels import (
 )
 from lipmotion.pipeline.training.train import UTTERANCES_PER_WORKER, phones_and_examples
 from lipmotion.pipeline.workers import worker_pool
-from lipmotion.speech.noise import FEWEST_TALKERS, NOISE_KINDS
-from lipmotion.speech.recogniser import cached_recogniser
+from lipmotion.speech.recognition.recogniser import cached_recogniser
+from lipmotion.speech.sound.noise import FEWEST_TALKERS, NOISE_KINDS
 from lipmotion.stats.rounding import varies
 from lipmotion.storage.checkpoint import NO_CHECKPOINT
 from lipmotion.storage.json_text import nan_as_null
@@ -68,7 +68,7 @@ RATIOS_DB = (20.0, 10.0, 5.0, 0.0)
 class NoiseConditions:
     """Noise that is added to the held-out recordings.
 
-    kinds     : of ``speech.noise.NOISE_KINDS``
+    kinds     : of ``speech.sound.noise.NOISE_KINDS``
     ratios_db : signal-to-noise ratios
     talkers   : recordings for the babble
     """

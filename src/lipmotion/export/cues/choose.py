@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from lipmotion.export.cues.costs import frame_costs
 from lipmotion.export.cues.shapes import OPTIONAL, SHAPES, drawn_shape
 from lipmotion.export.cues.sheet import CueSheet, cue_frame_count, cue_sheet, drawn_shapes
-from lipmotion.kernels.segments import best_segments
+from lipmotion.kernels.sequences.segments import best_segments
 from lipmotion.types import Generation, Timeline
 from lipmotion.units import words_in_time
 
@@ -37,7 +37,7 @@ def choose_cues(
     hold_frames : minimum length of a cue in frames, > 0; a shorter recording has one cue
     optional    : which of the shapes G, H and X the character has
     intensity   : openings and spread so many times as large, before shapes are chosen
-    The result is exact: of all sequences that keep the hold, the one of least cost (``costs``, ``kernels.segments``).
+    The result is exact: of all sequences that keep the hold, the one of least cost (``costs``, ``sequences.segments``).
     Cost: about 10 µs a frame.
     """
     motion, drawn = generation.motion, drawn_shapes(optional)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
-from lipmotion.rig.steady_rate import exact_rate
+from lipmotion.meshes.files.steady_rate import exact_rate
 
 Array = NDArray[np.float64]
 Values = list[str] | NDArray[np.floating[Any]] | NDArray[np.integer[Any]]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion.export.base import MotionFormat
-from lipmotion.rig.live_link_table import read_live_link
+from lipmotion.meshes.files.live_link_table import read_live_link
 from lipmotion.types import Generation
 
 CURVES = (

@@ -17,7 +17,7 @@ from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import ExportError
 from lipmotion.export.base import MotionFormat
 from lipmotion.export.motion.rounded import formatted_rows
-from lipmotion.rig.point_motion import point_motion
+from lipmotion.meshes.fitting.point_motion import point_motion
 from lipmotion.types import Generation, Motion
 
 Array = NDArray[np.float64]
@@ -36,7 +36,7 @@ def check(motion: Motion) -> None:
 
 
 def write(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
-    """Write the points; of motion with distances alone, they move as mouths usually do (``rig.point_motion``)."""
+    """Write the points; of motion with distances alone, they move as mouths usually do (``fitting.point_motion``)."""
     motion, template = generation.motion, mouth_template()
     moved = point_motion(motion, generation.units).displacements
     offsets = [_point(place) for place in template.places]

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from lipmotion.errors import ExportError, InputError, shortened
 from lipmotion.export.base import MotionFormat
 from lipmotion.export.motion.rounded import formatted_rows
-from lipmotion.rig.live_link_table import is_live_link, read_live_link
-from lipmotion.rig.shape_names import ARKIT_MOUTH, ARKIT_OTHERS
-from lipmotion.rig.steady_rate import exact_rate, steady_rows
+from lipmotion.meshes.files.live_link_table import is_live_link, read_live_link
+from lipmotion.meshes.files.steady_rate import exact_rate, steady_rows
+from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Generation, Motion, Timeline, Unit
 
 LONGEST_HEAD = 1 << 20

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError, InputError, shortened
 from lipmotion.export.base import MotionFormat
-from lipmotion.rig.facial_animation import FAP, PARAMETERS
-from lipmotion.rig.steady_rate import exact_rate
+from lipmotion.meshes.files.steady_rate import exact_rate
+from lipmotion.meshes.fitting.facial_animation import FAP, PARAMETERS
 from lipmotion.types import Channel, Generation, Motion, Timeline, Unit
 
 VERSION = "2.1"

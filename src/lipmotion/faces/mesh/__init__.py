@@ -14,9 +14,9 @@ from lipmotion.articulation.mouth import frame_times
 from lipmotion.errors import InputError
 from lipmotion.faces.base import SMALLEST, TRANSPARENT, Face, Staging, alive
 from lipmotion.faces.mesh.stage import MeshStage
-from lipmotion.rig.blendshape_motion import with_mouth
-from lipmotion.rig.driven import DrivenCharacter
-from lipmotion.rig.eyes_and_brows import eye_and_brow_weights
+from lipmotion.meshes.fitting.blendshape_motion import with_mouth
+from lipmotion.meshes.fitting.driven import DrivenCharacter
+from lipmotion.meshes.fitting.eyes_and_brows import eye_and_brow_weights
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 
 __all__ = ["MeshFace", "MeshStage"]

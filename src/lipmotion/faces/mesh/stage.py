@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER
 from lipmotion.faces.turning import turned
-from lipmotion.rig.bones import HEAD, LEFT_EYE, NECK, RIGHT_EYE, Bone
-from lipmotion.rig.drawn_surface import drawn_surface
-from lipmotion.rig.driven import DrivenCharacter
-from lipmotion.rig.rasteriser import Camera, flat, normals_of
-from lipmotion.rig.single_sided import single_sided
-from lipmotion.rig.surface import mesh_surface
-from lipmotion.rig.textured_canvas import TexturedCanvas
+from lipmotion.meshes.fitting.driven import DrivenCharacter
+from lipmotion.meshes.model.bones import HEAD, LEFT_EYE, NECK, RIGHT_EYE, Bone
+from lipmotion.meshes.model.single_sided import single_sided
+from lipmotion.meshes.model.surface import mesh_surface
+from lipmotion.meshes.rendering.drawn_surface import drawn_surface
+from lipmotion.meshes.rendering.rasteriser import Camera, flat, normals_of
+from lipmotion.meshes.rendering.textured_canvas import TexturedCanvas
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]

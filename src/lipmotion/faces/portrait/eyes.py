@@ -12,7 +12,7 @@ from lipmotion.faces.portrait.layer import Glow, Layer, Rim
 from lipmotion.faces.portrait.outlines import Points, ellipse, mirrored, open_curve, stroke
 from lipmotion.faces.portrait.palette import WHITE
 from lipmotion.faces.portrait.view import Pixels, Window
-from lipmotion.kernels.painting import warp
+from lipmotion.kernels.pixels.painting import warp
 
 LID_POSITIONS = 16
 GAZE_STEPS = 8

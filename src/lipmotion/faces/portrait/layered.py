@@ -19,7 +19,7 @@ from lipmotion.faces.portrait.pose import MouthPose
 from lipmotion.faces.portrait.rasteriser import FacePose
 from lipmotion.faces.portrait.svg_document import Drawing, Shape, read_drawing
 from lipmotion.faces.portrait.svg_painting import Pixels, over, painted
-from lipmotion.kernels.painting import warp_bytes
+from lipmotion.kernels.pixels.painting import warp_bytes
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 
 OWN_SIZE = 640

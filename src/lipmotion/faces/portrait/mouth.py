@@ -20,7 +20,7 @@ from lipmotion.faces.portrait.geometry import (
 from lipmotion.faces.portrait.pose import MouthPose
 from lipmotion.faces.portrait.textures import SPAN, MouthTextures, Texture, mouth_textures
 from lipmotion.faces.portrait.view import Window
-from lipmotion.kernels.painting import paint_band
+from lipmotion.kernels.pixels.painting import paint_band
 
 COLUMNS = 4
 """Places in each column of pixels at which heights are computed."""

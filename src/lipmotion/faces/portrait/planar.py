@@ -22,7 +22,7 @@ from lipmotion.faces.portrait.palette import Colour
 from lipmotion.faces.portrait.rasteriser import BROW_STEPS, SCENE, FacePose, moving_parts, still_layers
 from lipmotion.faces.portrait.textures import MouthTextures, mouth_textures
 from lipmotion.faces.portrait.view import View, Window
-from lipmotion.kernels.planes import (
+from lipmotion.kernels.pixels.planes import (
     Box,
     EyeLayers,
     StillLayers,

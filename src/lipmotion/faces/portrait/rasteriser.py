@@ -18,7 +18,7 @@ from lipmotion.faces.portrait.movement import STEP, BrowField, HeadField, HeadPl
 from lipmotion.faces.portrait.palette import Colour
 from lipmotion.faces.portrait.pose import MouthPose
 from lipmotion.faces.portrait.view import View, Window
-from lipmotion.kernels.painting import stack, warp, warp_bytes
+from lipmotion.kernels.pixels.painting import stack, warp, warp_bytes
 
 Pixels = NDArray[np.float32]
 Bytes = NDArray[np.uint8]

@@ -14,7 +14,7 @@ from lipmotion.hmm.multistream.densities import LEAST_POSTERIOR, GaussianStatist
 from lipmotion.hmm.multistream.inventory import Inventory, TriphoneState, triphone_states
 from lipmotion.hmm.multistream.model import JointHmm
 from lipmotion.hmm.multistream.streams import StreamObservations
-from lipmotion.kernels.forward_backward import IMPOSSIBLE, chain_posteriors
+from lipmotion.kernels.sequences.forward_backward import IMPOSSIBLE, chain_posteriors
 
 LEAST_STAY = 0.05
 """Least probability of staying in a state."""

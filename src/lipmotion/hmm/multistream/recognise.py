@@ -18,7 +18,7 @@ from lipmotion.hmm.multistream.inventory import TriphoneState, triphone_states
 from lipmotion.hmm.multistream.model import JointHmm
 from lipmotion.hmm.multistream.streams import ACOUSTIC_STREAMS, MOTION, SPEECH, StreamObservations, StreamWeights
 from lipmotion.hmm.states import StateTable, plain_states
-from lipmotion.kernels.sampling import sample_paths
+from lipmotion.kernels.sequences.sampling import sample_paths
 from lipmotion.stats.bigram import Bigram
 from lipmotion.stats.trees import Context
 

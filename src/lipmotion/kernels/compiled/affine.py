@@ -1,6 +1,6 @@
 """Cubic resampling by affine maps, compiled for pictures of three colours.
 
-The operations and their order are those of ``kernels.affine``, and so the results are the same to the bit.
+The operations and their order are those of ``kernels.pixels.affine``, and so the results are the same to the bit.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def resample(picture: Picture, to_source: Array, new: Floats) -> None:
     """Fill in the new picture.
 
     picture   : contiguous uint8 or float32 array [shape=(H, W, 3)]
-    to_source : as of ``kernels.affine.resample``
+    to_source : as of ``kernels.pixels.affine.resample``
     new       : [shape=(h, w, 3)]
     """
     width = new.shape[1]

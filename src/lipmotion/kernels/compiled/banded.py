@@ -1,6 +1,6 @@
 """Parameter generation, compiled: vectorised over channels, without storing the system.
 
-The operations and their order are those of ``kernels.banded``, and so the results are the same to the bit. Functions
+The operations and their order are those of ``sequences.banded``, and so the results are the same to the bit. Functions
 take their arrays as separate arguments, more than eight in places: numba compiles that to the fastest code.
 """
 
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 @compiled
 def generate(mean: Array, precision: Array) -> tuple[Array, Array]:
-    """Return trajectory and variance [shape=(T, P)]; see ``kernels.banded.generate``."""
+    """Return trajectory and variance [shape=(T, P)]; see ``kernels.sequences.banded.generate``."""
     T, _, P = mean.shape
     values, variance, lower1, lower2, previous = _room(T, P)
     bands = np.empty((4, 1, P))
@@ -30,7 +30,7 @@ def generate(mean: Array, precision: Array) -> tuple[Array, Array]:
 
 @compiled
 def solve(main: Array, first: Array, second: Array, right: Array) -> tuple[Array, Array]:
-    """Return solution and diagonal of the inverse [shape=(T, P)]; see ``kernels.banded.solve``."""
+    """Return solution and diagonal of the inverse [shape=(T, P)]; see ``kernels.sequences.banded.solve``."""
     T, P = main.shape
     values, variance, lower1, lower2, previous = _room(T, P)
     for t in range(T):

@@ -2,7 +2,7 @@
 
 Densities are multiplied in double precision, and products under a least value are set to 0: none is denormal, which
 would be many times slower. Probabilities of a frame sum to ``whole``, and are raised to 1 / ``whole`` where they are
-less (``kernels.factorial``): so products of two of them are no denormal either.
+less (``kernels.sequences.factorial``): so products of two of them are no denormal either.
 Arrays with suffix ``_0`` or ``_1`` belong to that axis; U is the number of units of an axis. Functions take their
 arrays as separate arguments, more than eight in places: numba compiles that to the fastest code.
 """

@@ -1,4 +1,4 @@
-"""Posteriors of chains, compiled: the same operations in the same order as in ``kernels.forward_backward``.
+"""Posteriors of chains, compiled: the same operations in the same order as in ``kernels.sequences.forward_backward``.
 
 Where NumPy and numba call the same C library for exp and log1p, as on Linux, the results are the same to the bit.
 """

@@ -93,7 +93,7 @@ def forward_backward(
                    best of each frame; its precision, which the weights have too, is that of the computation
     edges        : [shape=(U + 1,)], the first frame of each recording, and T
     initial, final : [shape=(S,)], in double precision, the greatest 1
-    runs, run_weight : of the layout and its weights (``kernels.arcs``), padded with arcs of weight 0; weights up to 1
+    runs, run_weight : of the layout and its weights (``sequences.arcs``), padded with arcs of weight 0; weights up to 1
     blocks ... block_weight : of the layout and its weights
     transposed   : the weights of blocks, targets as rows
     least, least_scale, off : least probability, least scale of a frame, and largest error of N (see above)

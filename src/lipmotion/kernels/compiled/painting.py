@@ -1,4 +1,4 @@
-"""Painting of pictures, compiled: the same operations in the same order as in ``kernels.painting``."""
+"""Painting of pictures, compiled: the same operations in the same order as in ``kernels.pixels.painting``."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ONE = 1 << 16
 def paint_band(
     layer: Layer, first: int, last: int, top: Floats, bottom: Floats, across: Floats, texture: Floats
 ) -> None:
-    """Paint a texture between two heights on rows of a layer, as ``kernels.painting.paint_band``."""
+    """Paint a texture between two heights on rows of a layer, as ``kernels.pixels.painting.paint_band``."""
     places, columns = top.shape
     deep, wide = texture.shape[0], texture.shape[1]
     for column in range(columns):
@@ -60,7 +60,7 @@ def paint_band(
 
 @compiled
 def warp_floats(source: Layer, shift_x: Floats, shift_y: Floats, step: int, target: Layer) -> None:
-    """Fill a float32 picture with another one that is shifted, as ``kernels.painting.warp``."""
+    """Fill a float32 picture with another one that is shifted, as ``kernels.pixels.painting.warp``."""
     height, width, channels = target.shape
     last_x, last_y = source.shape[1] - 1.0, source.shape[0] - 1.0
     row_x, row_y = np.empty(shift_x.shape[1]), np.empty(shift_x.shape[1])
@@ -85,7 +85,7 @@ def warp_floats(source: Layer, shift_x: Floats, shift_y: Floats, step: int, targ
 
 @compiled
 def warp_packed(source: Packed, shift_x: Floats, shift_y: Floats, step: int, target: Bytes) -> None:
-    """Fill a picture of bytes with one of packed pixels that is shifted, as ``kernels.painting.warp_bytes``.
+    """Fill a picture of bytes with one of packed pixels that is shifted, as ``kernels.pixels.painting.warp_bytes``.
 
     All four channels are mixed at once, in the parts of a number; no sum needs more than 16 bits.
     """
@@ -127,7 +127,7 @@ def _row_of_grids(shift_x: Floats, shift_y: Floats, down: float, row_x: Floats, 
 
 @compiled
 def stack(below: Layer, shade: Layer, skin: Layer, above: Layer, target: NDArray[np.uint16]) -> None:
-    """Fill in the bytes of layers over one another, as ``kernels.painting.stack``."""
+    """Fill in the bytes of layers over one another, as ``kernels.pixels.painting.stack``."""
     for row in range(target.shape[0]):
         for column in range(target.shape[1]):
             shadow = np.float64(skin[row, column, 4])

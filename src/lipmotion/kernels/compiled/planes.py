@@ -1,4 +1,4 @@
-"""Warps of planes of bytes, compiled: the same operations in the same order as in ``kernels.planes``.
+"""Warps of planes of bytes, compiled: the same operations in the same order as in ``kernels.pixels.planes``.
 
 The work of a row is divided into short loops over neighbouring pixels, of 32-bit numbers alone (hence the conversions),
 so that each but the one that fetches pixels from memory becomes vector instructions: five times as fast as one loop.
@@ -18,7 +18,7 @@ Singles = NDArray[np.float32]
 Packed = NDArray[np.uint32]
 Whole = NDArray[np.int32]
 STEP = 8
-"""As ``kernels.planes.STEP``; a constant here, so that the loop over a cell is one instruction."""
+"""As ``kernels.pixels.planes.STEP``; a constant here, so that the loop over a cell is one instruction."""
 SEGMENT = 64
 """Pixels of a row of skin that are laid at once; a multiple of ``STEP``."""
 BOTH = np.uint32(0x00FF00FF)
@@ -28,7 +28,7 @@ ONE, LOW, HALF = np.uint32(256), np.uint32(0xFFFF), np.uint32(32768)
 
 @compiled
 def pack(plane: Bytes, y0: int, x0: int, y1: int, x1: int, mean: bool, packed: Packed) -> None:
-    """Pack every pixel of a window with its three neighbours, as ``kernels.planes.pack``."""
+    """Pack every pixel of a window with its three neighbours, as ``kernels.pixels.planes.pack``."""
     width, last_x, last_y = x1 - x0, plane.shape[1] - 1, plane.shape[0] - 1
     above, below = np.zeros(width + 1, np.uint32), np.zeros(width + 1, np.uint32)
     inside = min(x1 + 1, last_x if mean else last_x + 1) - x0
@@ -124,7 +124,7 @@ def warp_planes(
     blue: Bytes,
     red: Bytes,
 ) -> None:
-    """Fill a window of three planes with packed ones that are shifted, as ``kernels.planes.warp_planes``."""
+    """Fill a window of three planes with packed ones that are shifted, as ``kernels.pixels.planes.warp_planes``."""
     height, width = y1 - y0, x1 - x0
     row_x, row_y = np.empty(shift_x.shape[1]), np.empty(shift_x.shape[1])
     index, found = np.empty(width + STEP, np.int32), np.empty(width, np.uint32)
@@ -159,7 +159,7 @@ def lay_skin(
     x0: int,
     target: Bytes,
 ) -> None:
-    """Lay shifted skin between still layers, as ``kernels.planes.lay_skin``."""
+    """Lay shifted skin between still layers, as ``kernels.pixels.planes.lay_skin``."""
     _, height, width = skin.shape
     flat = skin.reshape(5, height * width)
     row_x, row_y = np.empty(shift_x.shape[1]), np.empty(shift_x.shape[1])
@@ -217,7 +217,7 @@ def lay_eyes(
     x0: int,
     target: Bytes,
 ) -> None:
-    """Lay eyes on planes, as ``kernels.planes.lay_eyes``."""
+    """Lay eyes on planes, as ``kernels.pixels.planes.lay_eyes``."""
     height, width = opening.shape
     last_x, last_y, none, whole = np.float32(width - 1), np.float32(height - 1), np.float32(0), np.float32(1)
     eye = np.empty(4, np.float32)
@@ -253,7 +253,7 @@ def lay_eyes(
 
 @compiled
 def to_layer(planes: Bytes, y0: int, x0: int, layer: Singles) -> None:
-    """Copy a window of planes to an opaque layer, as ``kernels.planes.to_layer``."""
+    """Copy a window of planes to an opaque layer, as ``kernels.pixels.planes.to_layer``."""
     for row in range(layer.shape[0]):
         for column in range(layer.shape[1]):
             for channel in range(3):
@@ -263,7 +263,7 @@ def to_layer(planes: Bytes, y0: int, x0: int, layer: Singles) -> None:
 
 @compiled
 def from_layer(layer: Singles, y0: int, x0: int, planes: Bytes) -> None:
-    """Copy an opaque layer to a window of planes, as ``kernels.planes.from_layer``."""
+    """Copy an opaque layer to a window of planes, as ``kernels.pixels.planes.from_layer``."""
     for row in range(layer.shape[0]):
         for column in range(layer.shape[1]):
             for channel in range(3):

@@ -1,4 +1,4 @@
-"""Triangles to pixels, compiled: the pictures are those of ``kernels.raster`` to the bit."""
+"""Triangles to pixels, compiled: the pictures are those of ``kernels.pixels.raster`` to the bit."""
 
 # Functions take their arrays as separate arguments, more than eight in places: numba compiles that to the fastest code.
 
@@ -21,7 +21,7 @@ def draw(
     x: Real, y: Real, z: Real, colours: Colours, triangles: NDArray[np.int32], area: NDArray[np.intp],
     background: Colours, tone: NDArray[np.uint8], picture: NDArray[np.uint8],
 ) -> None:  # fmt: skip
-    """Draw triangles over the background into an area of a picture, in place; arguments as of ``kernels.raster``."""
+    """Draw triangles over the background into an area of a picture, in place; arguments as of ``pixels.raster``."""
     left, top, right, bottom = area
     bands = (bottom - top + BAND - 1) // BAND
     faces, starts = _by_band(x, y, triangles, 2 * left, 2 * right, 2 * top, bands)

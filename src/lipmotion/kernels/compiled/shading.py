@@ -1,4 +1,4 @@
-"""Light on vertices, compiled: the results are those of ``kernels.shading`` to the bit."""
+"""Light on vertices, compiled: the results are those of ``kernels.pixels.shading`` to the bit."""
 
 # Functions take their arrays as separate arguments, more than eight in places: numba compiles that to the fastest code.
 
@@ -19,7 +19,7 @@ def shade(
     normals: Real, places: Real, viewer: Real, colours: Real, reaches: Real, strands: Real,
     kinds: NDArray[np.intp], finishes: Real, lamps: Real, light: NDArray[np.float32],
 ) -> None:  # fmt: skip
-    """Fill in the light that vertices send to the viewer; arguments as of ``kernels.shading``."""
+    """Fill in the light that vertices send to the viewer; arguments as of ``kernels.pixels.shading``."""
     for v in range(len(normals)):
         nx, ny, nz = normals[v]
         ex, ey, ez = _towards(viewer, places[v])

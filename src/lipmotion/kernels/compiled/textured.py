@@ -1,4 +1,4 @@
-"""Triangles with textures to pixels, compiled: the pictures are those of ``kernels.textured`` to the bit."""
+"""Triangles with textures to pixels, compiled: the pictures are those of ``kernels.pixels.textured`` to the bit."""
 
 # Functions take their arrays as separate arguments, more than eight in places: numba compiles that to the fastest code.
 
@@ -31,7 +31,7 @@ def draw(
     texels: NDArray[np.uint16], levels: NDArray[np.int64], area: NDArray[np.intp], background: Light,
     tone: NDArray[np.uint8], picture: NDArray[np.uint8], opacity: NDArray[np.uint8],
 ) -> None:  # fmt: skip
-    """Draw triangles over the background into an area of a picture, in place; arguments as of ``kernels.textured``."""
+    """Draw triangles over the background into an area of a picture, in place; arguments as of ``pixels.textured``."""
     left, top, right, bottom = area
     bands = (bottom - top + BAND - 1) // BAND
     faces, starts = _by_band(x, y, triangles, 2 * left, 2 * right, 2 * top, bands)

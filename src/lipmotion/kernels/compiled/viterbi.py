@@ -1,4 +1,4 @@
-"""The scores of best paths, compiled: the results are those of ``kernels.viterbi`` to the bit."""
+"""The scores of best paths, compiled: the results are those of ``kernels.sequences.viterbi`` to the bit."""
 
 # Functions take their arrays as separate arguments, more than eight in places: numba compiles that to the fastest code.
 
@@ -23,7 +23,7 @@ def scores(
 
     delta        : scores relative to the best of each frame
     log_emission : [shape=(T, G)];  columns : [shape=(S,)], the column of the state at each place
-    runs ... block_log : of the layout and its weights (``kernels.arcs``)
+    runs ... block_log : of the layout and its weights (``kernels.sequences.arcs``)
     least        : relative scores under this become -inf
     """
     shift = 0.0

@@ -27,7 +27,6 @@ from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.measures.closures import CLOSED_SHARE
 from lipmotion.motion.closure import OPENING, closable_ranges
 from lipmotion.motion.speakers import SpeakerMap
-from lipmotion.pipeline.animate import animate, check_outputs, opened_face, with_articulation, write
 from lipmotion.pipeline.batch.ledger import (
     Place,
     are_in_place,
@@ -38,13 +37,14 @@ from lipmotion.pipeline.batch.ledger import (
 from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.batch.record import DONE, FAILED, Record
 from lipmotion.pipeline.batch.settings import CUES, BatchSettings, input_files, line_fingerprint
-from lipmotion.pipeline.characters import check_curve_set
-from lipmotion.pipeline.cues import check_cue_options, cues, write_cues
 from lipmotion.pipeline.film.video import is_person_of, person_shown
+from lipmotion.pipeline.generate.animate import animate, check_outputs, opened_face, with_articulation, write
+from lipmotion.pipeline.generate.transfer import map_onto
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.request import SpeechRequest
-from lipmotion.pipeline.transfer import map_onto
-from lipmotion.speech.audio_files import SPEECH_RATE_HZ
+from lipmotion.pipeline.outputs.cues import check_cue_options, cues, write_cues
+from lipmotion.pipeline.outputs.curve_sets import check_curve_set
+from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.storage.files import check_target, sha256_of
 from lipmotion.types import Audio, Generation, Span, Timeline, Unit
 from lipmotion.units import Lexicon

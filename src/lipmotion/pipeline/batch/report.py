@@ -15,7 +15,7 @@ from lipmotion.pipeline.batch.ledger import Ledger
 from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.batch.record import FAILED, Record
 from lipmotion.printable import printable
-from lipmotion.speech.recognition import NOISY_DB
+from lipmotion.speech.recognition.recognised_speech import NOISY_DB
 from lipmotion.storage.files import as_text, whole_file
 from lipmotion.types.generation import ALL_FITS
 

@@ -19,9 +19,9 @@ from lipmotion.export.timed_labels import LABEL_SUFFIXES
 from lipmotion.extensions import installed_version
 from lipmotion.faces.base import Staging
 from lipmotion.pipeline.batch.lines import BatchLine
-from lipmotion.pipeline.drawn_video import VIDEO_SUFFIXES
 from lipmotion.pipeline.model import shipped_path
-from lipmotion.pipeline.scenes import SCENE_SUFFIXES
+from lipmotion.pipeline.outputs.drawn_video import VIDEO_SUFFIXES
+from lipmotion.pipeline.outputs.scenes import SCENE_SUFFIXES
 from lipmotion.storage.files import check_source, sha256_of
 from lipmotion.storage.json_text import as_json
 

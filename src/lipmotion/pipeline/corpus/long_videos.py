@@ -19,8 +19,8 @@ from lipmotion.errors import InputError
 from lipmotion.pipeline.corpus.separate_sound import on_own_time, separate_sound
 from lipmotion.pipeline.corpus.spoken_lines import spoken_lines, transcript_beside
 from lipmotion.pipeline.corpus.utterance_spans import SpokenPart, utterance_spans
-from lipmotion.speech.audio_files import read_audio
-from lipmotion.speech.pauses import levels_db, quietest_s, spoken_spans
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.speech.sound.pauses import levels_db, quietest_s, spoken_spans
 from lipmotion.storage.media import open_media, stated_duration_s, video_streams
 from lipmotion.types import Audio, Monitor, Progress
 from lipmotion.vision.video_scan import VideoScan, scan_video

@@ -24,8 +24,8 @@ from lipmotion.pipeline.corpus.long_videos import DIVIDING_SHARE, VideoPart, sin
 from lipmotion.pipeline.corpus.separate_sound import earlier_phones, in_step, separate_sound
 from lipmotion.pipeline.corpus.supplied_motion import DIGESTS, source_digests, supplied_phones, supplied_track
 from lipmotion.pipeline.workers import worker_pool
-from lipmotion.speech.audio_files import read_audio
-from lipmotion.speech.mfcc import mfcc
+from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.files import locked, remove_unfinished, sha256_of
 from lipmotion.storage.sources import Source, check_apart, is_folder
 from lipmotion.types import Item, Monitor, Progress, Track, Utterance, silent_monitor

@@ -9,9 +9,9 @@ import numpy as np
 
 from lipmotion.corpora.source_recordings import SourceRecording
 from lipmotion.errors import InputError
-from lipmotion.speech.audio_files import read_audio
-from lipmotion.speech.mfcc import WINDOW
-from lipmotion.speech.sound_offset import sound_offset
+from lipmotion.speech.features.mfcc import WINDOW
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.speech.sound.sound_offset import sound_offset
 from lipmotion.types import Audio, Timeline, Track, Unit
 
 GIVEN = "as given"

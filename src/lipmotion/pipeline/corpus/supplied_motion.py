@@ -12,8 +12,8 @@ from lipmotion.corpora.facegood import read_bare_motion
 from lipmotion.corpora.source_recordings import MotionFile, SourceRecording
 from lipmotion.errors import InputError
 from lipmotion.export.base import read_motion
-from lipmotion.rig.live_link_table import is_live_link_file, speech_curves
-from lipmotion.speech.recogniser import SHORT_PAUSE_S
+from lipmotion.meshes.files.live_link_table import is_live_link_file, speech_curves
+from lipmotion.speech.recognition.recogniser import SHORT_PAUSE_S
 from lipmotion.storage.files import sha256_of
 from lipmotion.types import Span, Timeline, Track, Unit
 from lipmotion.units import PAUSE, SILENCE, check_phones, is_silent

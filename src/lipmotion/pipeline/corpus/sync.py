@@ -13,8 +13,8 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.kernels.threads import one_thread
 from lipmotion.measures.offset import Offset, best_offset, pooled_offset, shift_scores
 from lipmotion.motion.resample import to_model_frames
-from lipmotion.speech.lip_speed import measured_opening_speed, predicted_opening_speed
-from lipmotion.speech.mfcc import WINDOW, mfcc
+from lipmotion.speech.features.lip_speed import measured_opening_speed, predicted_opening_speed
+from lipmotion.speech.features.mfcc import WINDOW, mfcc
 from lipmotion.storage.files import locked
 from lipmotion.types import FRAME_RATE_HZ, Audio, Timeline, Unit, Utterance
 

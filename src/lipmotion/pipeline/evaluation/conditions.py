@@ -16,15 +16,15 @@ from lipmotion.errors import AlignmentError, CorpusError
 from lipmotion.measures import curves
 from lipmotion.measures.closures import closed_threshold
 from lipmotion.motion.speakers import SpeakerMap, SpeakerMaps
+from lipmotion.pipeline.generate.generation_for import generate_for
+from lipmotion.pipeline.generate.prior import with_prior
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.prior import with_prior
-from lipmotion.pipeline.speakers import generate_for
 from lipmotion.pipeline.training.channels import GEOMETRY, with_visual_channels
 from lipmotion.pipeline.training.train import phones_of
-from lipmotion.pipeline.transcribe import warn_of_guesses
-from lipmotion.pipeline.understand import known_voice, recognised_speech, speech_of
-from lipmotion.speech.recogniser import Recogniser
-from lipmotion.speech.recognition import Recognition
+from lipmotion.pipeline.understand.transcribe import warn_of_guesses
+from lipmotion.pipeline.understand.understood_speech import known_voice, recognised_speech, speech_of
+from lipmotion.speech.recognition.recognised_speech import Recognition
+from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.types import (
     GREY,
     Monitor,

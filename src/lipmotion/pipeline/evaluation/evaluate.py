@@ -19,7 +19,7 @@ from lipmotion.pipeline.evaluation.conditions import (
 )
 from lipmotion.pipeline.evaluation.figures import figures_of
 from lipmotion.pipeline.model import Model
-from lipmotion.speech.recogniser import cached_recogniser
+from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import Monitor, Utterance, silent_monitor
 from lipmotion.units import Lexicon

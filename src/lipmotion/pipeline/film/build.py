@@ -22,8 +22,8 @@ from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.film.background import best_background, chin_px
 from lipmotion.pipeline.film.takes import Take, takes_of
 from lipmotion.pipeline.workers import worker_pool
-from lipmotion.speech.audio_files import read_audio
-from lipmotion.speech.pauses import QUIETEST_DB, levels_db_at
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.speech.sound.pauses import QUIETEST_DB, levels_db_at
 from lipmotion.types import Audio, Item, Monitor, Progress, silent_monitor
 from lipmotion.vision.footage import Footage, footage_frames, track_footage
 

@@ -24,7 +24,7 @@ from lipmotion.faces.filmed.renderer import BATCH, STITCHING, Stitcher, Stitchin
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.film.background import BackgroundSequence, open_background, stored_sequence
 from lipmotion.pipeline.model import Model
-from lipmotion.speech.pauses import levels_db_at
+from lipmotion.speech.sound.pauses import levels_db_at
 from lipmotion.storage.files import check_source
 from lipmotion.storage.media import has_video
 from lipmotion.types import GREY, Audio, Monitor, Motion, silent_monitor

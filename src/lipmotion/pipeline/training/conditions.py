@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from lipmotion.speech.conditions import heard_spectra
+from lipmotion.speech.sound.conditions import heard_spectra
 from lipmotion.types import Audio, Example, HeardSpectrum, Monitor, ParallelMap, Progress
 
 BLOCK = 16

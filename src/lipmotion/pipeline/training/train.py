@@ -21,8 +21,8 @@ from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.resample import to_model_frames
 from lipmotion.motion.speakers import SpeakerMaps, mean_person_examples, with_habits
+from lipmotion.pipeline.generate.prior import with_prior
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.prior import with_prior
 from lipmotion.pipeline.training.channels import (
     GEOMETRY,
     check_visual,
@@ -35,12 +35,12 @@ from lipmotion.pipeline.training.fingerprint import fingerprint
 from lipmotion.pipeline.training.labels import label_utterances
 from lipmotion.pipeline.training.transcripts import warn_of_doubtful_transcripts, warn_of_missing_transcripts
 from lipmotion.pipeline.training.voices import VoiceExample
-from lipmotion.pipeline.transcribe import phones_in_time, warn_of_guesses
+from lipmotion.pipeline.understand.transcribe import phones_in_time, warn_of_guesses
 from lipmotion.pipeline.workers import worker_pool
-from lipmotion.speech.f0 import log_f0
-from lipmotion.speech.phone_models import train_phone_models
-from lipmotion.speech.recogniser import Recogniser
-from lipmotion.speech.spectrum import spectrum
+from lipmotion.speech.features.f0 import log_f0
+from lipmotion.speech.features.spectrum import spectrum
+from lipmotion.speech.recognition.phone_models import train_phone_models
+from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import (

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 from lipmotion.errors import AlignmentError, MissingDependencyError
 from lipmotion.printable import printable
-from lipmotion.speech.agreement import DOUBTFUL_SCORE, LEAST_FITTING_SHARE, TranscriptFit, transcript_fit
+from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, LEAST_FITTING_SHARE, TranscriptFit, transcript_fit
 from lipmotion.types import Timeline, Unit, Utterance
 
 LOG = logging.getLogger("lipmotion")
@@ -24,7 +24,7 @@ def warn_of_doubtful_transcripts(
     labelled : utterances with their aligned phones; those without words, or with labelled phones, are passed over
     realigned : aligns the words of an utterance once more, by the models of many voices: what little speech has taught
                may place them badly. A transcript is doubtful if it fits neither way
-    The measure is that of ``animate`` (``speech.agreement``). Without pocketsphinx nothing is measured.
+    The measure is that of ``animate`` (``speech.recognition.agreement``). Without pocketsphinx nothing is measured.
     """
     wrong, short, count = list[str](), list[str](), 0
     try:

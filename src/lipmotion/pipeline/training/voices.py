@@ -20,12 +20,12 @@ from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES
 from lipmotion.errors import AlignmentError, CorpusError, InputError, MissingDependencyError, shortened
 from lipmotion.pipeline.corpus.prompts import prompts
 from lipmotion.pipeline.model import load_model
-from lipmotion.pipeline.transcribe import phones_in_time
-from lipmotion.speech.agreement import DOUBTFUL_SCORE, agreement_score
-from lipmotion.speech.audio_files import read_audio
-from lipmotion.speech.mfcc import mfcc
-from lipmotion.speech.noise import noisy_audio
-from lipmotion.speech.recogniser import Recogniser
+from lipmotion.pipeline.understand.transcribe import phones_in_time
+from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, agreement_score
+from lipmotion.speech.recognition.recogniser import Recogniser
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.speech.sound.noise import noisy_audio
 from lipmotion.speech.voices.installed import SYNTHESISERS, installed_voices, speak_sentences
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.storage.files import check_listable

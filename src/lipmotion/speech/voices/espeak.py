@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from lipmotion.errors import InputError, LipMotionError
-from lipmotion.speech.audio_files import read_audio
+from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.espeak_events import PART, SILENCE
 from lipmotion.speech.voices.espeak_times import corrected_phone_times
 from lipmotion.speech.voices.ipa_phones import complete_map

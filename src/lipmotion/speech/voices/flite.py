@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from lipmotion.errors import InputError
-from lipmotion.speech.audio_files import read_audio
+from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.phone_maps import ARPABET_PHONES
 from lipmotion.speech.voices.programs import program_output
 from lipmotion.speech.voices.synthesiser import SynthesisedSentence, Synthesiser, SyntheticVoice

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lipmotion.errors import InputError, LipMotionError, MissingDependencyError, shortened
-from lipmotion.speech.audio_files import read_audio
+from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.espeak import ESPEAK_NG
 from lipmotion.speech.voices.festival import FESTIVAL
 from lipmotion.speech.voices.flite import FLITE

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from itertools import groupby
 
 from lipmotion.errors import InputError
-from lipmotion.speech.recogniser import SHORT_PAUSE_S
+from lipmotion.speech.recognition.recogniser import SHORT_PAUSE_S
 from lipmotion.speech.voices.phone_maps import PhoneMap
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, VISEME_OF, Lexicon, Pronunciation, is_silent, phone_classes, words_in

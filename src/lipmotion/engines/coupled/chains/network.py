@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from lipmotion.engines.coupled.chains.densities import Single
 from lipmotion.engines.coupled.chains.lattice import JointPosteriors, Lattice, LatticePosteriors, tied_posteriors
 from lipmotion.engines.coupled.chains.transitions import Transitions
-from lipmotion.kernels.arcs import NetworkArrays
-from lipmotion.kernels.network import ForwardBackwardNetwork
-from lipmotion.kernels.viterbi import best_path
+from lipmotion.kernels.sequences.arcs import NetworkArrays
+from lipmotion.kernels.sequences.network import ForwardBackwardNetwork
+from lipmotion.kernels.sequences.viterbi import best_path
 
 Index = NDArray[np.intp]
 

@@ -39,7 +39,7 @@ from lipmotion.engines.coupled.training.alignment import AlignedUtterance
 from lipmotion.engines.coupled.training.speech_only import SpeechOnlySchedule, train_on_speech
 from lipmotion.engines.coupled.training.train import MixtureSchedule, TrainingStep, growing_chains
 from lipmotion.errors import CorpusError
-from lipmotion.kernels.banded import generate
+from lipmotion.kernels.sequences.banded import generate
 from lipmotion.motion.articulation import fit_articulation_prior
 from lipmotion.motion.closure import fit_closure
 from lipmotion.motion.rest import away_from_speech, speech_intervals

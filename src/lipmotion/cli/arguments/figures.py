@@ -1,0 +1,46 @@
+"""Figures that a verb computes: their options, their file and their table."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from lipmotion.cli.arguments.options import add_machine_readable
+from lipmotion.cli.arguments.paths import add_output
+from lipmotion.cli.arguments.speech import add_lexicon_argument
+
+if TYPE_CHECKING:
+    from lipmotion.types import Monitor
+    from lipmotion.units import Lexicon
+
+Figures = dict[str, Any]
+
+
+def add_figures_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add ``--lexicon``, ``--output`` and ``--machine-readable``."""
+    add_lexicon_argument(parser)
+    add_output(parser, "-o", "--output", force=True, metavar="FILE.json", help="also write all figures to this file")
+    add_machine_readable(parser)
+
+
+def report_figures(
+    options: argparse.Namespace,
+    compute: Callable[[Lexicon | None, Monitor], Figures],
+    table: Callable[[Figures], str],
+) -> None:
+    """Call ``compute(lexicon, monitor)``, write its figures, and print their table."""
+    from lipmotion.cli.terminal.progress import reporting
+    from lipmotion.storage.files import check_target, whole_file
+    from lipmotion.storage.json_text import as_json, nan_as_null
+    from lipmotion.units import Lexicon
+
+    with reporting(options) as report:
+        if options.output:
+            check_target(options.output)
+        lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
+        figures = compute(lexicon, report.receive)
+        if options.output:
+            with whole_file(options.output) as unfinished:
+                unfinished.write_text(as_json(nan_as_null(figures), indent=1) + "\n")
+        report.finish(table(figures), figures=figures)

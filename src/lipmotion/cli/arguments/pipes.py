@@ -1,0 +1,99 @@
+"""Standard input as a recording, and standard output as a motion file: ``-``."""
+
+from __future__ import annotations
+
+import argparse
+import stat
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO
+
+from lipmotion.cli.terminal.output import write_bytes
+
+PIPE = "-"
+OPENED = ("/dev/fd/", "/dev/stdin", "/proc/self/fd/")
+"""Where pipes are that the shell has opened for this process."""
+LARGEST = 1 << 32
+"""Most bytes of a recording from a pipe."""
+BLOCK = 1 << 20
+FORMATS = ("json", "csv")
+
+
+def add_pipe_format(parser: argparse.ArgumentParser) -> None:
+    """Add ``--format``: of motion on standard output."""
+    parser.add_argument("--format", choices=FORMATS, default="json", help="of '-o -', standard output (default: json)")
+
+
+def is_pipe(path: Path | str) -> bool:
+    """Return whether a path is ``-``, or a pipe that the shell has opened (``/dev/stdin``, ``<(...)``).
+
+    Not a named pipe: nobody may ever write to it.
+    """
+    if str(path) == PIPE:
+        return True
+    if not str(path).startswith(OPENED):
+        return False
+    try:
+        return stat.S_ISFIFO(Path(path).stat().st_mode)
+    except (OSError, ValueError):
+        return False
+
+
+@contextmanager
+def read_pipe(path: Path) -> Iterator[Path]:
+    """Yield the path of a recording; what comes through a pipe is kept in a temporary file meanwhile.
+
+    Raises InputError: nothing comes, or more than ``LARGEST`` bytes.
+    """
+    if not is_pipe(path):
+        yield path
+        return
+    with tempfile.TemporaryDirectory(prefix="lipmotion-") as folder:
+        kept = Path(folder) / "standard-input"
+        with kept.open("wb") as file:
+            if str(path) == PIPE:
+                _copy(_standard_input(), file)
+            else:
+                with path.open("rb") as source:
+                    _copy(source, file)
+        yield kept
+
+
+@contextmanager
+def written_pipe(options: argparse.Namespace) -> Iterator[bool]:
+    """Let ``-`` among the outputs be a temporary file, and write it to standard output at the end.
+
+    Yields whether standard output is an output; then nothing else may be printed there.
+    """
+    if PIPE not in options.output:
+        yield False
+        return
+    with tempfile.TemporaryDirectory(prefix="lipmotion-") as folder:
+        kept = Path(folder) / f"motion.{options.format}"
+        options.output = [str(kept) if output == PIPE else output for output in options.output]
+        yield True
+        write_bytes(kept)
+
+
+def _standard_input() -> IO[bytes]:
+    from lipmotion.errors import InputError
+
+    if sys.stdin is None:
+        raise InputError("standard input is closed; required: a recording, as of 'ffmpeg ... -f wav -'")
+    return sys.stdin.buffer
+
+
+def _copy(source: IO[bytes], target: IO[bytes]) -> None:
+    from lipmotion.errors import InputError
+
+    size = 0
+    while block := source.read(BLOCK):
+        size += len(block)
+        if size > LARGEST:
+            raise InputError(f"more than {LARGEST} bytes come through the pipe; save the recording as a file first")
+        target.write(block)
+    if not size:
+        raise InputError("nothing comes through the pipe; required: a recording, as of 'ffmpeg ... -f wav -'")

@@ -1,0 +1,51 @@
+"""Arguments that are either a text or the path of a file with the text."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from lipmotion.pipeline.understand.transcribe import read_transcript
+from lipmotion.types import TimedTranscript
+
+LONGEST_NAME, LONGEST_PATH = 255, 1000
+"""Most bytes of the name of a file on any usual system; most letters of an argument that may be a path."""
+_SUFFIX = re.compile(r"\.[A-Za-z]{1,10}")
+
+
+def text_or_file_content(argument: str) -> str | TimedTranscript:
+    """Return the content of the file that the argument names, else the argument itself.
+
+    Raises InputError: the argument looks like a file name but no such file exists, or the file cannot be read.
+    """
+    path = Path(argument)
+    looks_like_path = _may_be_name(argument) and (_SUFFIX.fullmatch(path.suffix) or _is_in_a_folder(argument))
+    return read_transcript(path) if looks_like_path or _file_exists(path) else argument
+
+
+def _may_be_name(argument: str) -> bool:
+    """Return whether the system may have a file of that name: no blank in it, and no part too long."""
+    parts = argument.encode("utf-8", "surrogatepass").split(b"/")
+    return (
+        " " not in argument
+        and "\0" not in argument
+        and max(map(len, parts)) <= LONGEST_NAME
+        and len(argument) < LONGEST_PATH
+    )
+
+
+def _is_in_a_folder(argument: str) -> bool:
+    """Return whether an argument without blanks names a place in a folder that exists, as ``subtitles/take1``."""
+    folder, separator, name = argument.rpartition("/")
+    try:
+        return bool(separator and name) and not any(map(str.isspace, argument)) and Path(folder or "/").is_dir()
+    except (OSError, ValueError):  # too long for a path, or with a character that no path has
+        return False
+
+
+def _file_exists(path: Path) -> bool:
+    """Return whether a file, a pipe or a device of that name exists; a folder does not count."""
+    try:
+        return path.exists() and not path.is_dir()
+    except (OSError, ValueError):  # too long for a file name, or with a character that no file name has
+        return False

@@ -1,0 +1,121 @@
+"""Events of ``--machine-readable``: JSON objects for the calling program; the last one says how the command ended.
+
+This module is loaded before signals are handled, so it imports nothing that takes time.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from argparse import Namespace
+    from collections.abc import Sequence
+    from typing import Any
+
+OPTIONS = ("--machine-readable", "--machineReadable")
+STATUS_VERBS, LINES_VERBS = (
+    ("cues",),
+    ("animate", "batch", "render", "face", "speak", "words", "corpus", "train", "evaluate", "experiment"),
+)
+
+STANDARD_OUTPUT = "-"
+
+
+class Events:
+    """No events, and the interface of the classes below.
+
+    replaces_errors : whether the events take the place of error lines on standard error
+    """
+
+    replaces_errors = False
+
+    def start(self, options: Namespace) -> None:
+        """Report that the command starts."""
+
+    def fail(self, reason: str, code: int) -> None:
+        """Report why the command failed, unless its end has been reported already."""
+
+
+class JsonLines(Events):
+    """One JSON object per line on standard output (docs/long-work.md), or on standard error if ``-`` is an output."""
+
+    def __init__(self) -> None:
+        self._ended = False
+        self._on_error = False
+
+    def start(self, options: Namespace) -> None:  # noqa: D102
+        outputs = getattr(options, "output", None)
+        self._on_error = isinstance(outputs, list) and STANDARD_OUTPUT in outputs
+        self.emit("start")
+
+    def emit(self, kind: str, /, **fields: Any) -> None:
+        """Write one event; nothing after the last one. Raises ExportError: standard output cannot be written."""
+        if self._ended:
+            return
+        from lipmotion.cli.terminal.output import output_error, print_error_json, print_json
+        from lipmotion.errors import ExportError
+
+        try:
+            (print_error_json if self._on_error else print_json)({"type": kind, **fields})
+        except ExportError:  # a full disk: nobody would receive the result
+            self._ended = True
+            raise
+        except BrokenPipeError as error:  # nor if the reader has gone
+            self._ended = True
+            raise output_error(error) from error
+
+    def succeed(self, **figures: Any) -> None:
+        """Report success with the figures of the result."""
+        self.emit("success", **figures)
+        self._ended = True
+
+    def fail(self, reason: str, code: int) -> None:  # noqa: D102
+        from lipmotion.errors import ExportError
+
+        with suppress(ExportError):
+            self.emit("failure", reason=reason, exit_code=code)
+        self._ended = True
+
+
+class RhubarbStatus(Events):
+    """One JSON object per line on standard error, and nothing else there: as Rhubarb's ``--machineReadable``."""
+
+    replaces_errors = True
+
+    def __init__(self) -> None:
+        self._ended = False
+
+    def start(self, options: Namespace) -> None:  # noqa: D102
+        from lipmotion.storage.files import as_text
+
+        name = as_text(options.speech)
+        self.emit("start", "Info", f'Application startup. Input file: "{name}".', file=name)
+
+    def emit(self, kind: str, level: str, message: str, **data: Any) -> None:
+        """Write one event; nothing after the last one."""
+        if not self._ended:
+            from lipmotion.cli.terminal.output import print_error_json
+
+            print_error_json({"type": kind, **data, "log": {"level": level, "message": message}})
+
+    def succeed(self) -> None:
+        """Report success."""
+        self.emit("success", "Info", "Application terminating normally.")
+        self._ended = True
+
+    def fail(self, reason: str, code: int) -> None:  # noqa: D102, ARG002
+        from lipmotion.errors import ExportError
+
+        with suppress(ExportError):  # nobody reads standard error
+            self.emit("failure", "Fatal", f"Application terminating with error: {reason}", reason=reason)
+        self._ended = True
+
+
+def events_of(words: Sequence[str]) -> Events:
+    """Return the events that a command line asks for, before it is parsed: parsing errors are events, too."""
+    asked = any(len(word) > 2 and option.startswith(word) for option in OPTIONS for word in words)
+    verb = next((word for word in words if not word.startswith("-")), "")
+    if asked and verb in STATUS_VERBS:
+        return RhubarbStatus()
+    return JsonLines() if asked and verb in LINES_VERBS else Events()

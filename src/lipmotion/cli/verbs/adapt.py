@@ -1,0 +1,34 @@
+"""``lipmotion adapt``: adapt the phone models of a model to the voice of some recordings."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from lipmotion.cli.arguments.paths import add_input, add_output
+from lipmotion.cli.arguments.speech import add_model_argument
+from lipmotion.cli.terminal.output import print_line
+
+
+def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the verb to the parser of the command line."""
+    parser = verbs.add_parser("adapt", help="adapt a model to a voice, from recordings without transcripts")
+    recordings: dict[str, Any] = {"nargs": "+", "metavar": "RECORDING", "help": "audio or video of this voice"}
+    add_input(parser, "recordings", what="recording", **recordings)
+    add_model_argument(parser)
+    add_output(parser, "-o", "--output", force=True, required=True, metavar="MODEL")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Call ``lipmotion.adapt`` and ``lipmotion.save_model``; print how much speech was used."""
+    from lipmotion.pipeline.model import save_model
+    from lipmotion.pipeline.training.adapt import adapt
+    from lipmotion.storage.files import check_target
+
+    check_target(options.output)
+    model = adapt(options.model, options.recordings)
+    save_model(model, options.output)
+    used = model.about["adapted"]
+    text = f"{used['recordings']} recordings, {used['speech_s']} s of speech"
+    print_line(f"{options.output}: {text}; use it: lipmotion animate SPEECH -o FILE --model {options.output}")

@@ -1,0 +1,64 @@
+"""``lipmotion cues``: turn speech into held mouth shapes for 2D animation."""
+
+from __future__ import annotations
+
+import argparse
+from contextlib import nullcontext
+from typing import Any
+
+from lipmotion.cli.arguments.delivery import add_delivery_arguments, delivery_of
+from lipmotion.cli.arguments.paths import add_output
+from lipmotion.cli.arguments.pipes import is_pipe, read_pipe
+from lipmotion.cli.arguments.speech import add_speech_arguments, request_and_model
+from lipmotion.cli.terminal.output import flush_output, print_line, print_lines
+from lipmotion.cli.terminal.status import status_lines
+
+
+def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the verb to the parser of the command line."""
+    parser = verbs.add_parser(
+        "cues", help="turn speech into mouth shapes for 2D animation (Rhubarb, Moho, OpenToonz, Papagayo)"
+    )
+    add_speech_arguments(parser)
+    add = parser.add_argument
+    outputs: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
+    add_output(parser, "-o", "--output", force=True, help="FILE.tsv .xml .json .dat .pgo, or several", **outputs)
+    add(
+        "-f",
+        "--format",
+        choices=("tsv", "xml", "json", "dat", "pgo"),
+        help="(default: that of the suffix; tsv on standard output)",
+    )
+    add("--fps", type=float, default=24.0, help="frames per second of the animation (default: 24)")
+    add("--hold", type=int, metavar="FRAMES", help="minimum length of a shape (default: that of two frames at 24 fps)")
+    add("--shapes", default="GHX", help="optional shapes that the character has (default: GHX; none: '')")
+    add("--machine-readable", "--machineReadable", action="store_true", help="progress as JSON lines on standard error")
+    add_delivery_arguments(parser, steps=False)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Call ``lipmotion.animate``, ``lipmotion.cues`` and ``lipmotion.write_cues``; print the cues or their paths."""
+    from lipmotion.pipeline.generate.animate import animate
+    from lipmotion.pipeline.outputs.cues import check_cue_options, check_cue_outputs, cue_text, cues, write_cues
+
+    status = status_lines(options) if options.machine_readable else nullcontext(lambda _: None)
+    piped = is_pipe(options.speech)
+    with status as set_progress, read_pipe(options.speech) as options.speech:
+        delivery = delivery_of(options)
+        check_cue_options(options.fps, options.hold, options.shapes)
+        check_cue_outputs(options.output, options.speech, options.format)
+        set_progress(0.0)
+        request, model = request_and_model(options)
+        set_progress(0.1)
+        result = animate(request, model=model)
+        set_progress(0.9)
+        sheet = cues(result, fps=options.fps, hold_frames=options.hold, shapes=options.shapes, delivery=delivery)
+        heard_in = "" if piped else options.speech
+        write_cues(sheet, options.output, speech=heard_in, form=options.format)
+        set_progress(1.0)
+        for path in options.output:
+            print_line(path)
+        if not options.output:
+            print_lines(cue_text(sheet, speech=heard_in, form=options.format or "tsv").removesuffix("\n"))
+        flush_output()

@@ -1,0 +1,46 @@
+"""``lipmotion explain``: states, probabilities and Gaussians behind a generated frame, or the states of all frames."""
+
+from __future__ import annotations
+
+import argparse
+
+from lipmotion.cli.arguments.paths import add_input
+from lipmotion.cli.arguments.speech import add_speech_arguments, request_and_model
+from lipmotion.cli.terminal.output import print_json, print_lines
+
+RUNS = 2000
+
+
+def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the verb to the parser of the command line."""
+    parser = verbs.add_parser("explain", help="print which states and Gaussians the motion of a frame comes from")
+    add_input(
+        parser, "former_model", what="model", nargs="?", help=argparse.SUPPRESS
+    )  # explain MODEL SPEECH, before 0.2
+    add_speech_arguments(parser)
+    times = "time of a frame (repeatable; default: list the states of the whole recording)"
+    parser.add_argument("--at", type=float, action="append", metavar="SECONDS", help=times)
+    most = f"without --at: print at most N lines (default: {RUNS})"
+    parser.add_argument("--count", type=int, default=RUNS, metavar="N", help=most)
+    parser.add_argument("--json", action="store_true", help="print one JSON object per time, with all channels, or run")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Call ``lipmotion.explain`` and print the explanations; without a time, ``lipmotion.state_runs`` and the runs."""
+    from lipmotion.pipeline.generate.explain import explain, explanation_document, explanation_text
+    from lipmotion.pipeline.generate.state_runs import run_document, run_lines, state_runs
+
+    options.model = options.former_model or options.model
+    request, model = request_and_model(options)
+    if options.at is not None:
+        explanations = explain(request, at=options.at, model=model)
+        documents, text = map(explanation_document, explanations), "\n\n".join(map(explanation_text, explanations))
+    else:
+        runs = state_runs(request, model=model)
+        documents, text = map(run_document, runs), "\n".join(run_lines(runs, options.count))
+    if not options.json:
+        print_lines(text)
+        return
+    for document in documents:
+        print_json(document)

@@ -1,0 +1,32 @@
+"""``lipmotion experiment folds``: cross-validation on the training list."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from lipmotion.cli.arguments.experiment_options import add_experiment_arguments, run_experiment
+
+if TYPE_CHECKING:
+    from lipmotion.corpora.store import Corpus
+    from lipmotion.experiments.runner import ExperimentSettings
+
+
+def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the experiment to ``lipmotion experiment``."""
+    parser = actions.add_parser(
+        "folds", help="cross-validation: generate each part of the training list by a model of the others"
+    )
+    parser.add_argument("--folds", type=int, default=5, metavar="K", help="number of parts (default: 5)")
+    add_experiment_arguments(parser)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Call ``experiment.folds`` and print its table."""
+    from lipmotion.experiments.folds import folds, table
+
+    def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
+        return folds(corpus, count=options.folds, settings=settings)
+
+    run_experiment(options, experiment, table)

@@ -1,0 +1,69 @@
+"""``lipmotion speak``: text to speech of a synthetic voice, with the lip motion for it."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from lipmotion.cli.arguments.options import add_machine_readable
+from lipmotion.cli.arguments.paths import add_input
+from lipmotion.cli.arguments.results import add_result_arguments, check_results, write_results
+from lipmotion.cli.arguments.speech import add_text_arguments, style_of
+from lipmotion.printable import printable
+from lipmotion.storage.sources import is_file
+
+if TYPE_CHECKING:
+    from lipmotion.cli.terminal.progress import Report
+
+
+def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the verb to the parser of the command line."""
+    parser = verbs.add_parser("speak", help="turn text into speech, and into lip motion or an animated face")
+    parser.add_argument("words", nargs="?", metavar="TEXT", help="what to say")
+    add_input(parser, "--text", what="text", replaceable=True, metavar="FILE", help="what to say, as a UTF-8 text file")
+    named = "as flite:slt, espeak-ng:de, its name alone, or corpus (default: espeak-ng:en-us+f2)"
+    parser.add_argument("--voice", metavar="NAME", help=named)
+    add_input(parser, "--corpus", what="corpus", metavar="FOLDER", help="whose recordings speak, for --voice corpus")
+    parser.add_argument("--voices", action="store_true", help="list the installed voices")
+    add_text_arguments(parser)
+    suffixes = "FILE.mp4 .webm .mov %%05d.png .wav .flac .ogg .json .csv .npz .TextGrid .vtt, ... (docs/formats.md)"
+    add_result_arguments(parser, suffixes, required=False)
+    add_machine_readable(parser)
+    parser.set_defaults(run=run, wrong=parser.error)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Call ``lipmotion.speak`` and ``lipmotion.write``; print the paths that were written, or the installed voices."""
+    if options.voices == bool(options.output):
+        options.wrong("required: -o FILE, or --voices")
+    if not options.voices and (options.words is None) == (options.text is None):
+        options.wrong("required: a text, or --text FILE, not both")
+    if options.words is not None and is_file(Path(options.words)):
+        options.wrong(f"{options.words} is the name of a file; to say what is in it: --text {options.words}")
+    from lipmotion.cli.terminal.progress import reporting
+    from lipmotion.cli.verbs.voices import list_voices
+
+    with reporting(options) as report:
+        if options.voices:
+            list_voices(report)
+        else:
+            _speak(options, report)
+
+
+def _speak(options: argparse.Namespace, report: Report) -> None:
+    from lipmotion.corpora.store import Corpus
+    from lipmotion.pipeline.film.video import person_shown
+    from lipmotion.pipeline.generate.speak import read_text, speak
+    from lipmotion.pipeline.model import load_model
+    from lipmotion.units import Lexicon
+
+    check_results(options)
+    text = read_text(options.text) if options.text else options.words
+    lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
+    model, corpus = load_model(options.model), Corpus.open(options.corpus) if options.corpus else None
+    how = {"voice": options.voice, "corpus": corpus, "model": model, "lexicon": lexicon, "speaker": options.speaker}
+    onto = options.onto or person_shown(model, options.face, options.speaker)
+    sound, result = speak(text, **how, onto=onto, onto_speaker=options.onto_speaker, **style_of(options))
+    write_results(options, result, sound, model, report)
+    report.finish("\n".join(map(printable, options.output)), files=options.output, seconds=round(sound.duration_s, 3))

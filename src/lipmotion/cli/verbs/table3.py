@@ -1,0 +1,76 @@
+"""``lipmotion experiment table3``: Table 3 of Xie & Liu 2007, on a corpus."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from lipmotion.cli.arguments.experiment_options import add_experiment_arguments, run_experiment
+from lipmotion.cli.arguments.options import list_or_all, numbers
+from lipmotion.cli.arguments.paths import add_input, add_output
+
+if TYPE_CHECKING:
+    from lipmotion.corpora.store import Corpus
+    from lipmotion.experiments.runner import ExperimentSettings
+
+
+def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the experiment to ``lipmotion experiment``."""
+    parser = actions.add_parser("table3", help="which structure of chains predicts lips best (Xie & Liu 2007, Table 3)")
+    parser.add_argument("--split", default="test", help="compare on test, or another list (default: test)")
+    order = "names of recordings, one per line (default: train, shuffled)"
+    add_input(parser, "--order", what="list", replaceable=True, metavar="FILE", help=order)
+    parser.add_argument(
+        "--sizes", type=numbers, metavar="N,N,...", help="numbers of recordings to train on (default: all)"
+    )
+    systems = "only these systems, separated by semicolons (default: all)"
+    parser.add_argument("--systems", type=lambda text: text.split(";"), metavar="NAME;NAME", help=systems)
+    parser.add_argument("--states", type=int, default=5, help="states per unit, in the paper's systems (default: 5)")
+    gaussians = "Gaussians per state, in the paper's systems, selected on the list val (default: 1,2,4,8)"
+    parser.add_argument("--mixtures", type=numbers, default=[1, 2, 4, 8], metavar="K,K,...", help=gaussians)
+    parser.add_argument("--visual", default="geometry", metavar="KIND", help="geometry, eigenlips or both")
+    parser.add_argument("--transcripts", action="store_true", help="compare also with known transcripts")
+    parser.add_argument("--noise", default="", metavar="KIND,KIND", help="compare also in noise: white, babble")
+    parser.add_argument(
+        "--snr",
+        type=numbers,
+        default=[20, 10, 5, 0],
+        metavar="DB,...",
+        help="signal-to-noise ratios (default: 20,10,5,0)",
+    )
+    talkers = "recordings of other people, for the babble"
+    add_input(parser, "--talkers", what="folder of recordings", metavar="FOLDER", help=talkers)
+    add_output(parser, "--plots", metavar="FOLDER", help="write pictures like Figs. 7, 10 and 11 there")
+    add_experiment_arguments(parser)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Call ``experiment.table3`` and print its table."""
+    from lipmotion.corpora.splits import read_names
+    from lipmotion.experiments.noise import read_talkers
+    from lipmotion.experiments.xie_liu2007.table3 import ComparisonOptions, NoiseConditions, table3
+    from lipmotion.experiments.xie_liu2007.table3_text import table
+
+    def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
+        kinds = tuple(kind for kind in options.noise.split(",") if kind)
+        talkers = tuple(read_talkers(options.talkers)) if options.talkers else ()
+        compared = ComparisonOptions(
+            systems=options.systems,
+            states=options.states,
+            mixtures=options.mixtures,
+            visual=options.visual,
+            transcripts=options.transcripts,
+            noise=NoiseConditions(kinds, tuple(map(float, options.snr)), talkers),
+        )
+        return table3(
+            corpus,
+            compared,
+            split=list_or_all(options.split),
+            order=read_names(options.order) if options.order else None,
+            sizes=options.sizes,
+            plots=options.plots,
+            settings=settings,
+        )
+
+    run_experiment(options, experiment, table)

@@ -1,0 +1,70 @@
+"""``lipmotion train``: train a model on a corpus."""
+
+from __future__ import annotations
+
+import argparse
+
+from lipmotion.cli.arguments.options import add_execution, list_or_all, worker_count
+from lipmotion.cli.arguments.paths import add_input, add_output
+from lipmotion.cli.arguments.speech import add_lexicon_argument
+from lipmotion.cli.arguments.starting_model import add_start_argument, model_to_start_from
+
+ENGINE = "trajectory (default), coupled (chains of states for speech and for lips) or joint (one model, five streams)"
+SYSTEM = "structure of the coupled engine: ph-HMM, ph-MSHMM, ph-FHMM, ph-vi-FHMM, ph-CHMM or ph-vi-CHMM (default)"
+UNITS = "modelled units: phone (default), eVis, sVis, pbVis, 2vis, or a table file (docs/unit-sets.md)"
+OTHERS = "also train on transcribed recordings without motion (coupled)"
+
+
+def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the verb to the parser of the command line."""
+    parser = verbs.add_parser("train", help="train a model on a prepared corpus; run it again to go on after a stop")
+    add_input(parser, "corpus", what="corpus")
+    add_output(parser, "-o", "--output", force=True, keeps_work=True, required=True, metavar="MODEL")
+    parser.add_argument("--split", default="train", help="train, val, test or all (default: train)")
+    parser.add_argument("--speaker", action="append", default=[], metavar="NAME", help="only this speaker (repeatable)")
+    add_lexicon_argument(parser)
+    parser.add_argument("--engine", default="trajectory", help=ENGINE)
+    parser.add_argument("--system", metavar="NAME", help=SYSTEM)
+    add_input(parser, "--units", what="table of units", replaceable=True, type=str, metavar="SET", help=UNITS)
+    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="engine option (repeatable)")
+    parser.add_argument("--visual", default="geometry", metavar="KIND", help="geometry (default), eigenlips or both")
+    parser.add_argument("--voices", action="store_true", help="also train on synthetic voices (coupled)")
+    add_input(parser, "--recordings", what="folder of recordings", metavar="FOLDER", help=OTHERS)
+    add_start_argument(parser)
+    add_execution(parser)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Call ``lipmotion.train`` and ``lipmotion.save_model``; report what was used."""
+    from lipmotion.cli.terminal.progress import reporting
+    from lipmotion.corpora.store import Corpus, Selection
+    from lipmotion.engines import engine_from_settings
+    from lipmotion.pipeline.model import save_model
+    from lipmotion.pipeline.training.train import Run, train
+    from lipmotion.pipeline.training.voices import other_voices
+    from lipmotion.storage.files import unfinished_work
+    from lipmotion.units import Lexicon
+
+    with reporting(options) as report:
+        lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
+        engine = engine_from_settings(options.engine, preset=options.system, units=options.units, settings=options.set)
+        voices = other_voices(
+            synthetic=options.voices, recordings=options.recordings, lexicon=lexicon, monitor=report.receive
+        )
+        with unfinished_work(options.output) as work:
+            model, result = train(
+                Corpus.open(options.corpus),
+                selection=Selection(list_or_all(options.split), tuple(options.speaker)),
+                engine=engine,
+                lexicon=lexicon,
+                visual=options.visual,
+                voices=voices,
+                prior=model_to_start_from(options.start, engine),
+                run=Run(report.receive, work, worker_count(options)),
+            )
+            save_model(model, options.output)
+        figures = {"used": len(result.used), "minutes": model.about["minutes"], "skipped": len(result.skipped)}
+        text = ", ".join(f"{value} {name}" for name, value in figures.items())
+        text += f"; use it: lipmotion animate SPEECH -o FILE --model {options.output}"
+        report.finish(f"{options.output}: {text}", model=str(options.output), **figures)

@@ -1,0 +1,52 @@
+"""``lipmotion words``: the English words of a recording, in time."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from lipmotion.cli.arguments.options import add_execution, worker_count
+from lipmotion.cli.arguments.paths import add_input, add_output
+from lipmotion.cli.arguments.speech import add_model_argument
+
+
+def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the verb to the parser of the command line."""
+    parser = verbs.add_parser("words", help="recognise the English words of a recording, as a transcript to edit")
+    add_input(parser, "speech", what="recording", help="audio or video file")
+    outputs: dict[str, Any] = {"type": str, "nargs": "+", "action": "extend", "default": []}
+    written = "FILE.txt, or FILE.json with times and confidences (default: text on standard output)"
+    add_output(parser, "-o", "--output", force=True, help=written, **outputs)
+    kinds = "words: all; auto: those that fit the sound (default: words)"
+    parser.add_argument("--recogniser", default="words", metavar="KIND", help=kinds)
+    add_model_argument(parser)
+    add_execution(parser)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Call ``recognise_words`` and ``write_words``; print the words or the paths that were written."""
+    from lipmotion.cli.terminal.progress import reporting
+    from lipmotion.pipeline.understand.request import SpeechRequest
+    from lipmotion.pipeline.understand.words import (
+        check_word_outputs,
+        recognise_words,
+        word_record,
+        words_as_text,
+        write_words,
+    )
+
+    with reporting(options) as report:
+        check_word_outputs(options.output, options.speech)
+        request = SpeechRequest(options.speech, recogniser=options.recogniser)
+        found = recognise_words(request, model=options.model, workers=worker_count(options))
+        write_words(found.words, options.output, options.speech)
+        text = "\n".join(map(str, options.output)) or words_as_text(found.words).removesuffix("\n")
+        report.finish(
+            text,
+            words=[word_record(span) for span in found.words],
+            word_s=round(found.word_s, 2),
+            phone_s=round(found.phone_s, 2),
+            confidence=round(found.confidence or 0.0, 3),
+            similarity=None if found.similarity is None else round(found.similarity, 2),
+        )

@@ -1,0 +1,96 @@
+"""A three-dimensional head: a friendly character made by this code, drawn without a graphics card.
+
+The spoken mouth and what moves beside it (``articulation``) become poses (``performance``); a pose moves the surfaces
+(``skin`` with ``lips`` and ``eyelids``, ``inside``, ``eyes``), which ``figure`` puts together, lights and gives to the
+rasteriser. The forms are made once: ``forms`` (skin), ``hair``, ``body``.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import TYPE_CHECKING, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.faces.base import SMALLEST, TRANSPARENT, Face, Staging
+from lipmotion.faces.head.performance import head_poses
+from lipmotion.faces.head.pose import CharacterPose
+from lipmotion.types import Motion, Prosody, Timeline, Unit
+
+if TYPE_CHECKING:
+    from lipmotion.meshes.rendering.rasteriser import Camera
+
+__all__ = ["Head", "render"]
+
+OWN_SIZE = 720
+"""Height of pictures whose size is not given."""
+THREADS = 2
+"""Frames that are drawn at the same time."""
+
+
+@final
+class Head(Face):
+    """The three-dimensional head, 1280 × 720 pixels if no size is asked for, as ``render`` draws it."""
+
+    def __init__(self, staging: Staging | None = None, prosody: Prosody | None = None) -> None:
+        self.staging, self.prosody = staging or Staging(), prosody
+
+    def staged(self, staging: Staging, prosody: Prosody | None = None) -> Head:
+        """Return the same character with other settings; pictures are 16 to 9.
+
+        prosody : of the speech that will be rendered, for accents of brows and head; None: not known
+        """
+        return Head(staging, prosody)
+
+    def render(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> Iterator[NDArray[np.uint8]]:  # noqa: D102
+        height = self.staging.size or OWN_SIZE
+        width = max(2 * round(height * 8 / 9), SMALLEST)
+        staging, prosody = self.staging, self.prosody
+        return render(motion, units, fps=fps, width=width, height=height, staging=staging, prosody=prosody)
+
+
+def render(
+    motion: Motion,
+    units: Timeline[Unit],
+    *,
+    fps: float = 25.0,
+    width: int = 1280,
+    height: int = OWN_SIZE,
+    staging: Staging | None = None,
+    prosody: Prosody | None = None,
+) -> Iterator[NDArray[np.uint8]]:
+    """Yield frames [shape=(height, width, 3)] of a motion to its end, frame n at ``n / fps`` seconds.
+
+    motion  : needs ``opening``; ``width``, ``outer``, the chin ``y_152`` and the articulatory channels are used where
+              they exist. ``width`` and ``outer`` count relative to the rest pose in silence, so they suit any speaker
+    units   : the phones, for tongue, teeth and the shape of the lips; may be empty
+    width, height : even numbers of pixels, at least 64; the size of the staging does not count here
+    staging : background, seed, and what moves on its own; None: everything moves
+    prosody : of the speech, for accents of brows and head; None: not known
+    Returns RGB, or RGBA [shape=(height, width, 4)] with straight alpha where the background is transparent.
+    Raises InputError: no ``opening``, no frames, values that are not finite, a size that is odd or under 64,
+    or fps not positive.
+    The same input gives the same pixels.
+    """
+    from lipmotion.faces.head.stage import camera_for
+
+    chosen = staging or Staging()
+    return _frames(head_poses(motion, units, fps, chosen, prosody), camera_for(width, height), chosen)
+
+
+def _frames(poses: list[CharacterPose], camera: Camera, staging: Staging) -> Iterator[NDArray[np.uint8]]:
+    from lipmotion.faces.head.stage import Stage
+
+    stage = Stage(camera, staging.colour)
+    draw = stage.cut_out if staging.background == TRANSPARENT else stage.picture
+    with ThreadPoolExecutor(THREADS) as threads:
+        waiting: deque[Future[NDArray[np.uint8]]] = deque()
+        for pose in poses:
+            waiting.append(threads.submit(draw, pose))
+            if len(waiting) > THREADS:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()

@@ -1,0 +1,212 @@
+"""The whole character: its parts put together, and the places and the light of all vertices in a pose."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.faces.head import palette
+from lipmotion.faces.head.body import clothing, collar, ear, earring, neck
+from lipmotion.faces.head.eyes import LASHES, brow, catchlights, eyeball, lash_triangles, lashes
+from lipmotion.faces.head.forms import EYE
+from lipmotion.faces.head.hair import hair
+from lipmotion.faces.head.inside import lower_drop, lower_teeth, tongue, tongue_triangles, upper_teeth
+from lipmotion.faces.head.lips import RINGS, VISIBLE, closed_share
+from lipmotion.faces.head.part import part
+from lipmotion.faces.head.pose import CharacterPose
+from lipmotion.faces.head.skin import AT_CORNER, REST, Skin, jaw_moved
+from lipmotion.faces.head.tint import skin_colours
+from lipmotion.faces.turning import turned
+from lipmotion.meshes.rendering.lighting import Lighting
+from lipmotion.meshes.rendering.occlusion import reaches
+from lipmotion.meshes.rendering.rasteriser import normals_of
+
+Real = NDArray[np.float64]
+
+PIVOT = np.array([0.0, -0.75, -0.9])
+"""The head turns about this place, the top of the neck."""
+TONGUE_LIGHT, UPPER_TEETH_LIGHT, LOWER_TEETH_LIGHT = 1.35, 0.92, 0.52
+"""The tongue is wet, and drawn brighter than the rest of the mouth; the lower teeth lie in the shade of the upper."""
+SEAM_LIGHT = (0.88, 0.72, 0.54, 0.42, 0.34)
+"""The part of the light that arrives beside the seam of closed lips, at the rings that end there: a soft line."""
+RIM_LIGHT = (0.93, 0.78, 0.45, 0.04, 0.02)
+"""The same for the rings before the rim of a round hole, the rim, and those behind, which would widen it in grey."""
+LIP_SHADOW, SHADOW_DEPTH = 0.24, 0.09
+"""The part of the light that arrives right under the upper lip in the mouth, and how far down its shadow reaches."""
+CORNER_SHADE = 0.6
+"""How far the corners of any mouth are shaded as a seam."""
+_EYES = ((1.0, ""), (-1.0, "right "))
+_MIDDLE, _LAST = 20, 60
+"""Columns of the lips in the middle of the upper and of the lower lip."""
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """The vertices of one frame: places, and their light as parts of white [shape=(V, 3), both]."""
+
+    places: Real
+    light: NDArray[np.float32]
+
+
+class Figure:
+    """The character.
+
+    triangles : of all parts [shape=(F, 3)]
+    head      : the rows of the vertices that move; those of the body, behind them, never do
+    colours   : diffuse reflection of the vertices, linear [shape=(V, 3)]
+    parts, rows : the parts, and the rows of the vertices of each by its name
+    """
+
+    def __init__(self) -> None:
+        self.skin = Skin()
+        self._eye, self._light = eyeball(), catchlights()
+        left_brow, left_ear, ring, tongue_at_rest = brow(), ear(), earring(), tongue(REST)
+        lash = np.zeros((3 * LASHES, 3))
+        parts = [
+            self.skin.as_part(skin_colours(self.skin)),
+            part("tongue", tongue_at_rest, tongue_triangles(), palette.TONGUE, palette.TONGUE_FINISH),
+            lower_teeth(), upper_teeth(),
+            self._eye, self._eye.mirrored("right eye"), self._light, replace(self._light, name="right catchlights"),
+            part("lashes", lash, lash_triangles(), palette.LASH, palette.BROW_FINISH),
+            part("right lashes", lash, lash_triangles(), palette.LASH, palette.BROW_FINISH),
+            left_brow, left_brow.mirrored("right brow"),
+            hair(), left_ear, left_ear.mirrored("right ear"), ring, ring.mirrored("right earring"),
+            neck(), clothing(), collar(),
+        ]  # fmt: skip
+        self.parts = tuple(parts)
+        names = [each.name for each in parts]
+        stops = np.cumsum([0, *(len(each.places) for each in parts)]).tolist()
+        self.rows = {each.name: slice(a, b) for each, a, b in zip(parts, stops, stops[1:], strict=False)}
+        self.head = slice(0, self.rows["clothing"].start)
+        self.first_still_triangle = sum(len(each.triangles) for each in parts[: names.index("clothing")])
+        self.triangles = np.concatenate(
+            [each.triangles + first for each, first in zip(parts, stops, strict=False)]
+        ).astype(np.int32)
+        self._places = np.concatenate([each.places for each in parts])
+        self._normals = np.concatenate([each.normals for each in parts])
+        self.colours = np.concatenate([each.colours for each in parts])
+        none = [np.zeros_like(each.places) if each.strands is None else each.strands for each in parts]
+        self._strands = np.concatenate(none)
+        kinds = [np.full(len(each.places), palette.FINISHES.index(each.finish)) for each in parts]
+        self._kinds = np.concatenate(kinds).astype(np.intp)
+        lips = self.skin.lip_rows()
+        self._kinds[lips[1 : VISIBLE + 2].ravel()] = palette.FINISHES.index(palette.LIP_FINISH)
+        self._wall = lips[VISIBLE + 1 : RINGS].ravel()
+        self._kinds[lips[VISIBLE + 2 :].ravel()] = palette.FINISHES.index(palette.MOUTH_FINISH)
+        self._lighting = Lighting(palette.FINISHES)
+        self._reaches = self._baked()
+        self._held = np.zeros((stops[-1], 1))
+        share = np.clip((-1.0 - self._places[self.rows["neck"], 1]) / 0.6, 0, 1)
+        self._held[self.rows["neck"], 0] = share * share * (3 - 2 * share)
+
+    def placed(self, pose: CharacterPose) -> tuple[Real, Real]:
+        """Return places and normals of all vertices in a pose, the head not turned [shape=(V, 3), both]."""
+        places, normals = self._places.copy(), self._normals.copy()
+        places[self.rows["skin"]], normals[self.rows["skin"]] = self.skin.posed(pose)
+        licked = tongue(pose)
+        places[self.rows["tongue"]], normals[self.rows["tongue"]] = licked, normals_of(licked, tongue_triangles())
+        places[self.rows["teeth"]] = jaw_moved(places[self.rows["teeth"]], lower_drop(pose))
+        for name in ("brow", "right brow"):
+            places[self.rows[name], 1] += pose.brows
+        self._look(pose, places, normals)
+        return places, normals
+
+    def frame(self, pose: CharacterPose, viewer: Real) -> Drawn:
+        """Return places and light of all vertices in a pose, seen from a place [shape=(3,)]."""
+        places, normals = self.placed(pose)
+        colours, arrives = self._shaded(pose, places)
+        turn, held, moving = turned(*pose.turn), self._held[self.head], self.head
+        strands = self._strands.copy()
+        places[moving] = held * places[moving] + (1 - held) * ((places[moving] - PIVOT) @ turn.T + PIVOT)
+        normals[moving] = held * normals[moving] + (1 - held) * (normals[moving] @ turn.T)
+        strands[moving] = strands[moving] @ turn.T
+        light = self._lighting.light(places, normals, colours, self._kinds, viewer, reaches=arrives, strands=strands)
+        return Drawn(places, light)
+
+    def turning(self) -> Real:
+        """Return how far each vertex turns with the head about ``PIVOT``: 0 the body, 1 the head [shape=(V,)]."""
+        share = np.zeros(len(self._places))
+        share[self.head] = 1 - self._held[self.head, 0]
+        return share
+
+    def mouth_rows(self) -> dict[str, NDArray[np.intp]]:
+        """Return the vertices of the parts of the mouth: lips, wall, tongue, teeth (the lower ones), upper teeth."""
+        rows = {
+            name: np.arange(*self.rows[name].indices(len(self._places))) for name in ("tongue", "teeth", "upper teeth")
+        }
+        lips = self.skin.lip_rows()
+        return {"lips": lips[1 : VISIBLE + 1].ravel(), "wall": self._wall, **rows}
+
+    def _look(self, pose: CharacterPose, places: Real, normals: Real) -> None:
+        """Place eyeballs, reflections and lashes."""
+        look, half = turned(*pose.gaze), turned(0.35 * pose.gaze[0], 0.35 * pose.gaze[1])
+        lid = places[self.skin.lid_rows(0)[1][:LASHES]]
+        for side, name in _EYES:
+            flip = np.array([side, 1.0, 1.0])
+            eye = self.rows[name + "eye"]
+            places[eye] = places[eye] @ look.T + EYE * flip
+            normals[eye] = normals[eye] @ look.T
+            places[self.rows[name + "catchlights"]] = self._light.places @ half.T + EYE * flip
+            places[self.rows[name + "lashes"]] = lashes(lid, pose.shut) * flip
+            normals[self.rows[name + "lashes"]] = [0.0, 0.0, 1.0]
+
+    def _shaded(self, pose: CharacterPose, places: Real) -> tuple[Real, Real]:
+        """Return colours and arriving light: eyes are darker under their lids, the mouth is darker inside."""
+        colours, arrives = self.colours.copy(), self._reaches.copy()
+        x, y = self.skin.lids_of_eye.opening(pose)
+        for side, name in _EYES:
+            eye = self.rows[name + "eye"]
+            upper = np.interp(side * places[eye, 0], x[:LASHES], y[:LASHES])
+            under = np.clip((upper - places[eye, 1] + 0.01) / 0.085, 0, 1)
+            colours[eye] *= (0.6 + 0.4 * under)[:, None]
+        inside = self._lit_inside(pose, places[self.rows["skin"]])
+        for rows in (self.rows["tongue"], self.rows["teeth"], self.rows["upper teeth"], self._wall):
+            arrives[rows] = inside(places[rows])[:, None]
+        arrives[self.rows["tongue"]] = np.minimum(
+            1.0, TONGUE_LIGHT * (1 - 0.35 * pose.tongue_up) * arrives[self.rows["tongue"]]
+        )
+        lips, closed = self.skin.lip_rows(), closed_share(pose)
+        for ring, part_of in enumerate(SEAM_LIGHT, VISIBLE - len(SEAM_LIGHT)):
+            arrives[lips[ring]] *= 1 - (1 - part_of) * np.maximum(
+                closed, CORNER_SHADE * (1 - pose.roundness**2) * AT_CORNER
+            )
+        for ring, part_of in enumerate(RIM_LIGHT, VISIBLE - 3):
+            arrives[lips[ring]] *= 1 - (1 - part_of) * pose.roundness
+        arrives[self.rows["upper teeth"]] *= UPPER_TEETH_LIGHT
+        arrives[self.rows["teeth"]] *= LOWER_TEETH_LIGHT
+        return colours, arrives
+
+    def _lit_inside(self, pose: CharacterPose, skin: Real) -> Callable[[Real], Real]:
+        """Return the function from places in the mouth to the part of the light that arrives there."""
+        ring = skin[self.skin.lip_rows()[VISIBLE - 1]]
+        top, low, front = ring[_MIDDLE, 1], ring[_LAST, 1], 0.5 * (ring[_MIDDLE, 2] + ring[_LAST, 2])
+        span, half = max(top - low, 0.0), max(0.26 * pose.width, 0.1)
+        shadow = LIP_SHADOW + 0.4 * pose.tuck  # teeth on the lip are seen
+        shade, open_ = 1 - 0.92 * pose.roundness**1.1, min(span / 0.25, 1.0)
+
+        def inside(places: Real) -> Real:
+            depth = (0.93 - 0.27 * open_) * np.clip((front - places[:, 2] - 0.10) / (0.22 + 0.8 * span), 0, 1)
+            under = np.clip((top - places[:, 1]) / SHADOW_DEPTH, 0, 1)
+            aside = np.clip(1.05 - 1.25 * (places[:, 0] / half) ** 2, 0, 1)
+            return shade * (1 - depth) ** 1.5 * (shadow + (1 - shadow) * under) * (0.12 + 0.88 * aside)
+
+        return inside
+
+    def _baked(self) -> Real:
+        """Return the parts of sky and key light that reach the vertices at rest [shape=(V, 2)]."""
+        eyes = ("eye", "right eye")
+        places, normals = self.placed(REST)
+        inner = {"tongue", "teeth", "upper teeth", *eyes, "catchlights", "right catchlights", "lashes", "right lashes"}
+        hiding = np.ones(len(places), bool)
+        for name in sorted(inner):
+            hiding[self.rows[name]] = False
+        hiding[self._wall] = False
+        lit = reaches(places, normals, self.triangles, hiding)
+        for name in sorted(inner - set(eyes)):
+            lit[self.rows[name]] = 1
+        lit[self._wall] = 1
+        lit[:, 0] = np.clip(1.08 * lit[:, 0], 0.12, 1) ** 1.15
+        return lit

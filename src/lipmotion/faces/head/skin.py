@@ -1,0 +1,277 @@
+"""The skin of the face with lips and eyelids: one surface, its binding to lips and jaw, and its places in a pose."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import Delaunay, cKDTree
+
+from lipmotion.faces.head import palette
+from lipmotion.faces.head.eyelids import LID_COLUMNS, LID_RINGS, Eyelids
+from lipmotion.faces.head.forms import MIDDLE, MOUTH_Y, head, outward, seen_from_front, seen_from_middle
+from lipmotion.faces.head.lips import (
+    ACROSS,
+    COLUMNS,
+    RINGS,
+    SIDE,
+    VISIBLE,
+    closed_share,
+    lip_surface,
+    section_points,
+)
+from lipmotion.faces.head.part import Part
+from lipmotion.faces.head.pose import CharacterPose
+from lipmotion.meshes.rendering.rasteriser import normals_of
+
+Real = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+SPACING = 0.033
+"""Distance of the vertices in the middle of the face, in radians about ``MIDDLE``."""
+HINGE = np.array([0.0, -0.32, -0.82])
+"""The axis of the jaw goes through here, from ear to ear."""
+REST = CharacterPose()
+CHEEKS_SPREAD, CHEEKS_ROUND = 0.035, 0.025
+"""How far cheeks come forward beside spread lips, and sink beside round ones."""
+_LEFT_CORNER = 40
+_OPPOSITE = -np.arange(COLUMNS) % COLUMNS
+"""For every column of the lips the one of the other lip that it meets."""
+_JOINED = {VISIBLE - 1: 0.3}
+"""By rings of the lips: how far the light on both sides of the seam is the same."""
+AT_CORNER = (np.clip((np.abs(ACROSS) - 0.72) / 0.28, 0, 1) ** 2)[:, None]
+"""How near each column of the lips is to a corner, 0 to 1 [shape=(COLUMNS, 1)]."""
+_NEAR_CORNER = np.clip((np.abs(ACROSS) - 0.5) / 0.5, 0, 1)[:, None]
+CORNER_JOINED, CORNER_FLAT = 0.6, 0.75
+"""How far the light at the corners is the same on both lips, and that of the skin before them."""
+CALM_RADIUS = 0.035
+"""Round the corners of the lips, where the surface folds, the shading changes less than the surface."""
+
+
+class Skin:
+    """The skin: vertices of face, lips, wall of the mouth and lids, in this order.
+
+    triangles : [shape=(F, 3)];  rest : places at rest [shape=(V, 3)];  normals : at rest [shape=(V, 3)]
+    pieces    : the number of triangles of the face, the lips, the wall of the mouth and the lids, in this order
+    """
+
+    def __init__(self) -> None:
+        self.lids_of_eye = Eyelids()
+        contour = section_points(REST, np.zeros(COLUMNS))[0]
+        self.base_z = seen_from_front(head, contour[:, 0], contour[:, 1])
+        contour[:, 2] = self.base_z
+        edge = self.lids_of_eye.edge()
+        edges = np.concatenate([edge, edge * [-1, 1, 1]])
+        fill = _fill(contour, edges)
+        self.face = np.concatenate([contour, edges, fill])
+        triangles = _triangles(self.face, len(contour), len(edges) // 2)
+        self._first_lip = len(self.face)
+        self._first_lid = self._first_lip + (RINGS - 1) * COLUMNS
+        grids = [_closed_grid(self.lip_rows())]
+        for eye in range(2):
+            rows = self.lid_rows(eye)
+            grids.append(_closed_grid(rows[::-1]) if eye == 0 else _closed_grid(rows))
+        self.triangles = np.concatenate([triangles, *grids]).astype(np.int32)
+        front = 2 * VISIBLE * COLUMNS
+        self.pieces = {
+            "skin": len(triangles),
+            "lips": front,
+            "wall": len(grids[0]) - front,
+            "lids": len(grids[1]) + len(grids[2]),
+        }
+        self._bind(contour)
+        self._cheeks = _cheeks(fill, len(self.face))
+        self.rest = self.places(REST)
+        meshed = normals_of(self.rest, self.triangles)
+        self.normals = meshed.copy()
+        self.normals[len(contour) + len(edges) : len(self.face)] = outward(head, fill)
+        self._meshed_rest = meshed
+        self._before_lips = outward(head, contour)
+        corners = self.rest[[0, _LEFT_CORNER]]
+        beside = np.linalg.norm(self.rest[: len(self.face), None] - corners, axis=2).min(axis=1)
+        self._calm = np.ones((len(self.rest), 1))
+        self._calm[: len(self.face), 0] -= 0.85 * np.exp(-((beside / CALM_RADIUS) ** 2))
+
+    def lip_rows(self) -> Index:
+        """Return the vertices of the lips, ring by ring from the skin inwards [shape=(RINGS, COLUMNS)]."""
+        inner = self._first_lip + np.arange((RINGS - 1) * COLUMNS).reshape(RINGS - 1, COLUMNS)
+        return np.concatenate([np.arange(COLUMNS)[None], inner])
+
+    def lid_rows(self, eye: int) -> Index:
+        """Return the vertices of the lids of the left (0) or right (1) eye [shape=(LID_RINGS + 1, LID_COLUMNS)]."""
+        outer = COLUMNS + eye * LID_COLUMNS + np.arange(LID_COLUMNS)
+        first = self._first_lid + eye * LID_RINGS * LID_COLUMNS
+        inner = first + np.arange(LID_RINGS * LID_COLUMNS).reshape(LID_RINGS, LID_COLUMNS)
+        return np.concatenate([inner, outer[None]])
+
+    def as_part(self, colours: Real) -> Part:
+        """Return the skin at rest with the diffuse reflection of its vertices, linear [shape=(V, 3)]."""
+        return Part("skin", self.rest, self.triangles, colours, palette.SKIN_FINISH, self.normals)
+
+    def posed(self, pose: CharacterPose) -> tuple[Real, Real]:
+        """Return places and normals of all vertices [shape=(V, 3), both], the head not turned."""
+        places = self.places(pose)
+        change = normals_of(places, self.triangles) - self._meshed_rest
+        normals = self.normals + self._calm * change
+        self._join_lips(normals, pose)
+        return places, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+
+    def _join_lips(self, normals: Real, pose: CharacterPose) -> None:
+        """Turn normals beside the seam of closed lips, and at the corners, to those of the other lip.
+
+        What meets there has no edge of light between its two sides then.
+        """
+        rows, closed = self.lip_rows(), closed_share(pose)
+        normals[rows[VISIBLE - 1]] += closed * (normals[rows[VISIBLE - 2]] - normals[rows[VISIBLE - 1]])
+        beside = AT_CORNER * (CORNER_JOINED + (1 - CORNER_JOINED) * pose.roundness)
+        for ring in range(1, VISIBLE):
+            own = normals[rows[ring]]
+            share = np.maximum(closed * _JOINED.get(ring, 0.0), beside)
+            normals[rows[ring]] += 0.5 * share * (own[_OPPOSITE] - own)
+        outer = rows[1:VISIBLE]
+        normals[outer] += CORNER_FLAT * (1 - pose.roundness) * _NEAR_CORNER * (self._before_lips - normals[outer])
+
+    def _bind(self, contour: Real) -> None:
+        """Bind every vertex of the face to two columns of the lips, and to the jaw."""
+        self._contour = contour
+        self.jaw_weight = jaw_weight(self.face)
+        away = self.face[:, None, :2] - contour[None, :, :2]
+        nearest, across = cKDTree(contour[:, :2]).query(self.face[:, :2])[0], np.linalg.norm(away, axis=2)
+        angle = np.arctan2(self.face[:, 1] - MOUTH_Y, np.abs(self.face[:, 0]))
+        up = np.sin(angle) ** 2
+        reach = np.where(angle > 0, 0.18, 0.36) * up + 0.44 * (1 - up)
+        near = np.clip(1 - nearest / reach, 0, 1) * (self.face[:, 2] > -0.65)
+        self.lip_weight = near * near * (3 - 2 * near)
+        self._bound = np.flatnonzero(self.lip_weight)
+        length = np.linalg.norm(np.roll(contour, -1, axis=0) - np.roll(contour, 1, axis=0), axis=1)
+        width = (0.016 + 0.55 * nearest[self._bound])[:, None]
+        shares = length * np.exp(-0.5 * ((across[self._bound] - nearest[self._bound, None]) / width) ** 2)
+        shares *= np.exp(-across[self._bound] / 0.5)
+        self._shares = shares / shares.sum(axis=1, keepdims=True) * self.lip_weight[self._bound, None]
+
+    def places(self, pose: CharacterPose) -> Real:
+        """Return the places of all vertices [shape=(V, 3)], the head not turned."""
+        points = section_points(pose, self.base_z)
+        lips = lip_surface(points)
+        moved = lips[0] - self._contour
+        turned = jaw_moved(self.face, pose.jaw) - self.face
+        by_jaw = self.jaw_weight[:, None] * turned
+        own = moved - by_jaw[:COLUMNS]
+        face = self.face + by_jaw
+        face[self._bound] += self._shares @ own
+        face += (CHEEKS_SPREAD * pose.spread - CHEEKS_ROUND * pose.roundness) * self._cheeks
+        face[:COLUMNS] = lips[0]
+        left = self.lids_of_eye.rings(pose).reshape(-1, 3)
+        return np.concatenate([face, lips[1:].reshape(-1, 3), left, left * [-1, 1, 1]])
+
+
+def _cheeks(fill: Real, count: int) -> Real:
+    """Return how cheeks move, out and up, for all vertices of the face, of which these are the last [shape=(N, 3)]."""
+    away = np.stack([(np.abs(fill[:, 0]) - 0.40) / 0.15, (fill[:, 1] + 0.47) / 0.15], axis=1)
+    share = np.exp(-np.sum(away**2, axis=1)) * (fill[:, 2] > -0.75)
+    moved = np.zeros((count, 3))
+    moved[count - len(fill) :] = share[:, None] * (outward(head, fill) + np.array([0.0, 0.4, 0.0]))
+    return moved
+
+
+def jaw_weight(places: Real) -> Real:
+    """Return how far places at rest belong to the jaw, 0 to 1 [shape=(N,)]."""
+    down = _step((-0.47 - places[:, 1]) / 0.40)
+    front = _step((places[:, 2] + 0.98) / 0.45)
+    return down * front
+
+
+def jaw_moved(places: Real, drop: float) -> Real:
+    """Return places turned with the jaw about its hinge, so that the chin drops by a length [shape=(N, 3)]."""
+    angle = drop / 0.72
+    y, z = (places - HINGE)[:, 1], (places - HINGE)[:, 2]
+    moved = places.copy()
+    moved[:, 1] = HINGE[1] + y * np.cos(angle) - z * np.sin(angle)
+    moved[:, 2] = HINGE[2] + y * np.sin(angle) + z * np.cos(angle)
+    return moved
+
+
+def _step(share: Real) -> Real:
+    clipped = np.clip(share, 0, 1)
+    return np.asarray(clipped * clipped * (3 - 2 * clipped))
+
+
+def _fill(contour: Real, edges: Real) -> Real:
+    """Return the vertices between mouth, eyes and the back of the head [shape=(N, 3)]."""
+    rings = []
+    for away in (0.016, 0.036, 0.06, 0.09):
+        x = contour[:, 0] * (1 + away / 0.27)
+        y = MOUTH_Y + (contour[:, 1] - MOUTH_Y) + SIDE * away * np.sqrt(np.maximum(1 - 0.94 * ACROSS**2, 0))
+        step = 1 if away < 0.05 else 2
+        rings.append(np.stack([x, y], axis=1)[::step])
+    near = np.concatenate(rings)
+    near3 = np.column_stack([near, seen_from_front(head, near[:, 0], near[:, 1])])
+    count = int(1.75 / SPACING)
+    i, j = np.meshgrid(np.arange(-count, count + 1), np.arange(-int(count * 1.2), int(count * 1.2) + 1))
+    u, v = SPACING * (i + 0.5 * (j % 2)).ravel(), SPACING * 0.866 * j.ravel()
+    radius = np.hypot(u, v)
+    u, v = u[radius < 1.72], v[radius < 1.72]
+    places = seen_from_middle(head, _directions(u, v))
+    close = cKDTree(near3).query(places)[0] < 0.024
+    inside = (np.abs(places[:, 0]) < 0.36) & _within(places[:, :2], near[-len(rings[-1]) :]) & (places[:, 2] > -0.5)
+    at_eye = cKDTree(edges).query(places)[0] < 0.02
+    for side in (1, -1):
+        ring = edges[: len(edges) // 2, :2] * [side, 1]
+        at_eye |= _within(places[:, :2], ring) & (places[:, 2] > -0.6)
+    return np.concatenate([near3, places[~(close | inside | at_eye)]])
+
+
+def _directions(u: Real, v: Real) -> Real:
+    """Return the directions of places of the map of the head, whose middle is the front [shape=(N, 3)]."""
+    radius = np.hypot(u, v)
+    angle = radius + 0.11 * radius**3
+    flat = np.sin(angle) / np.maximum(radius, 1e-9)
+    return np.stack([u * flat, v * flat, np.cos(angle)], axis=1)
+
+
+def _on_map(places: Real) -> Real:
+    """Return the place of places in space on the map of the head [shape=(N, 2)], without the stretching of its rim."""
+    away = places - MIDDLE
+    away = away / np.linalg.norm(away, axis=1, keepdims=True)
+    angle = np.arccos(np.clip(away[:, 2], -1, 1))
+    across = np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-9)
+    return away[:, :2] / across[:, None] * angle[:, None]
+
+
+def _triangles(face: Real, contour: int, edge: int) -> NDArray[np.int32]:
+    """Return the triangles between the vertices of the face, none in mouth and eyes [shape=(F, 3)]."""
+    flat = _on_map(face)
+    found = Delaunay(flat).simplices
+    middle = flat[found].mean(axis=1)
+    hole = _within(middle, flat[:contour]) | _under_hair(face[found].mean(axis=1))
+    for eye in range(2):
+        hole |= _within(middle, flat[contour + eye * edge : contour + (eye + 1) * edge])
+    found = found[~hole]
+    a, b, c = (flat[found[:, n]] for n in range(3))
+    turned = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
+    found[turned] = found[turned][:, ::-1]
+    return found.astype(np.int32)
+
+
+def _under_hair(places: Real) -> NDArray[np.bool_]:
+    """Return which places of the head the hair always hides [shape=(N,)]."""
+    x, y, z = np.abs(places[:, 0]), places[:, 1], places[:, 2]
+    return (y > 1.0 - 0.6 * np.maximum(x - 0.2, 0)) | ((y > 0.1) & (z < -0.75)) | (z < -1.2)
+
+
+def _within(points: Real, polygon: Real) -> NDArray[np.bool_]:
+    """Return which points lie in a closed polygon [shape=(N,)]."""
+    following = np.roll(polygon, -1, axis=0)
+    inside = np.zeros(len(points), bool)
+    for (xa, ya), (xb, yb) in zip(polygon.tolist(), following.tolist(), strict=True):
+        if ya != yb:
+            crosses = (ya > points[:, 1]) != (yb > points[:, 1])
+            inside ^= crosses & (points[:, 0] < (xb - xa) * (points[:, 1] - ya) / (yb - ya) + xa)
+    return inside
+
+
+def _closed_grid(rows: Index) -> NDArray[np.int32]:
+    """Return the triangles between successive closed rings of vertices [shape=(rings, columns)]; (F, 3)."""
+    a, b = rows[:-1], rows[1:]
+    c, d = np.roll(b, -1, axis=1), np.roll(a, -1, axis=1)
+    quads = np.stack([a, b, c, a, c, d], axis=-1)
+    return quads.reshape(-1, 3).astype(np.int32)

@@ -1,0 +1,1 @@
+"""Inner loops over pixels and vertices."""

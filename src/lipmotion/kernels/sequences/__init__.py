@@ -1,0 +1,1 @@
+"""Inner loops over sequences: state networks, chains, parameter generation."""

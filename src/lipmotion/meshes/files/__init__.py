@@ -1,0 +1,1 @@
+"""Files of characters and rigs: glTF, VRM, OBJ, USD, tables."""

@@ -1,0 +1,170 @@
+"""Files of bindings: the binding itself, and a table of weights that can be looked at and painted."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from lipmotion.articulation.lip_points import mouth_template
+from lipmotion.errors import InputError, ModelFormatError, shortened
+from lipmotion.meshes.fitting.lip_placement import LipPlacement
+from lipmotion.meshes.model.binding import MOST_WEIGHTS, ControlBinding
+from lipmotion.meshes.model.limits import MOST_VERTICES
+from lipmotion.meshes.model.mesh import Mesh
+from lipmotion.storage.archive import UNREADABLE, read_archive, read_archive_header, write_archive
+from lipmotion.storage.files import check_source, read_text_file, whole_file
+from lipmotion.storage.schema import ArraySpec, checked_arrays, format_errors
+
+BINDING_FORMAT, BINDING_VERSION = "lipmotion.binding", 1
+BINDING_SUFFIX = ".binding"
+WEIGHT_COLUMNS = ("vertex", "point", "weight")
+POINT_COLUMNS = ("point", "vertex")
+LARGEST_TABLE = 1 << 26
+BINDING_ARRAYS = {
+    "points": ArraySpec(np.int64, "C", 0, 1000),
+    "vertices": ArraySpec(np.int64, "C", 0, MOST_VERTICES),
+    "scale": ArraySpec(np.float64, "", 1e-12, 1e12),
+    "axes": ArraySpec(np.float64, "3 3", -1.0001, 1.0001),
+    "rows": ArraySpec(np.int64, "n", 0, MOST_VERTICES),
+    "controls": ArraySpec(np.int64, "n K", 0, 1000),
+    "weights": ArraySpec(np.float64, "n K", 0, 1),
+    "vertex_count": ArraySpec(np.int64, "", 1, MOST_VERTICES),
+}
+"""The arrays of a binding file; fields of ``ControlBinding`` and ``LipPlacement``."""
+
+
+def save_binding(path: Path, binding: ControlBinding, mesh: Mesh) -> None:
+    """Write a binding of a mesh to a file. Raises ExportError: it cannot be written."""
+    placement = binding.placement
+    arrays = {
+        "points": np.array(placement.points, np.int64),
+        "vertices": placement.vertices,
+        "scale": np.array(placement.scale),
+        "axes": placement.axes,
+        "rows": binding.rows,
+        "controls": binding.controls,
+        "weights": binding.weights,
+        "vertex_count": np.array(len(mesh.vertices)),
+    }
+    write_archive(path, {"format": BINDING_FORMAT, "version": BINDING_VERSION}, arrays)
+
+
+def load_binding(path: Path, mesh: Mesh) -> ControlBinding:
+    """Return the binding of a file, for the mesh that it was made for.
+
+    Raises InputError: no such file, or it was made for a mesh of another number of vertices. Raises
+    ModelFormatError: it
+    is no binding, damaged, or of another version.
+    """
+    check_source(path, "binding")
+    try:
+        header = read_archive_header(path)
+        if not isinstance(header, dict) or header.get("format") != BINDING_FORMAT:
+            raise ModelFormatError(f"{path}: is no binding; bind the character again")
+        if header.get("version") != BINDING_VERSION:
+            version = shortened(str(header.get("version")))
+            raise ModelFormatError(f"{path}: version {version}, required {BINDING_VERSION}; bind the character again")
+        with format_errors(f"{path}: the binding", "bind the character again"):
+            arrays = checked_arrays(read_archive(path), BINDING_ARRAYS)
+    except UNREADABLE as error:
+        raise ModelFormatError(f"{path}: is no binding ({shortened(str(error))}); bind the character again") from error
+    count = int(arrays["vertex_count"])
+    if count != len(mesh.vertices):
+        raise InputError(f"{path}: made for {count} vertices, the character has {len(mesh.vertices)}; bind it again")
+    template = mouth_template()
+    with format_errors(f"{path}: the binding", "bind the character again"):
+        if tuple(arrays["points"].tolist()) != template.points:
+            raise ValueError("its points are not those of motion")
+        if max(arrays["vertices"].max(), arrays["rows"].max(initial=0)) >= count:
+            raise ValueError("it names vertices that do not exist")
+        if arrays["controls"].max(initial=0) >= len(template.points) or arrays["controls"].shape[1] > MOST_WEIGHTS:
+            raise ValueError("it names control points that do not exist")
+        if (np.diff(arrays["rows"]) <= 0).any() or arrays["weights"].sum(axis=1).max(initial=0.0) > 1 + 1e-6:
+            raise ValueError("its vertices are not in order, or weights are more than 1")
+    placement = LipPlacement(template.points, arrays["vertices"], float(arrays["scale"]), arrays["axes"])
+    return ControlBinding(placement, arrays["rows"], arrays["controls"], arrays["weights"])
+
+
+def write_weights(path: Path, binding: ControlBinding) -> None:
+    """Write the weights as a table, one row a vertex and point: ``vertex,point,weight``.
+
+    Raises ExportError: it cannot be written.
+    """
+    with whole_file(path) as unfinished, unfinished.open("w", encoding="ascii", newline="\n") as file:
+        file.write(",".join(WEIGHT_COLUMNS) + "\n")
+        for row, controls, weights in zip(binding.rows, binding.controls, binding.weights, strict=True):
+            for control, weight in zip(controls.tolist(), weights.tolist(), strict=True):
+                if weight > 0:
+                    file.write(f"{row},{binding.placement.points[control]},{weight:.6g}\n")
+
+
+def read_weights(path: Path) -> dict[int, dict[int, float]]:
+    """Return a table of weights: for each vertex that it names, the weight of each point; for ``painted``.
+
+    A vertex that follows nothing has one row, with any point and weight 0.
+    Raises InputError: no such file, other columns, a row that is damaged, or a vertex and point that occur twice.
+    """
+    paint: dict[int, dict[int, float]] = {}
+    for number, row in _rows(path, WEIGHT_COLUMNS, "table of weights"):
+        vertex, point = (_whole(path, number, text) for text in row[:2])
+        given = paint.setdefault(vertex, {})
+        if point in given:
+            raise InputError(f"{path}: line {number}: vertex {vertex} and point {point} occur twice; remove one")
+        try:
+            given[point] = float(row[2])
+        except ValueError as error:
+            raise InputError(f"{path}: line {number}: {shortened(row[2])!r} is no number") from error
+    return paint
+
+
+def write_points(path: Path, placement: LipPlacement) -> None:
+    """Write the vertex of each lip and jaw point as a table: ``point,vertex``. Raises ExportError: it cannot be
+    written."""
+    with whole_file(path) as unfinished, unfinished.open("w", encoding="ascii", newline="\n") as file:
+        file.write(",".join(POINT_COLUMNS) + "\n")
+        file.writelines(
+            f"{point},{vertex}\n" for point, vertex in zip(placement.points, placement.vertices, strict=True)
+        )
+
+
+def read_points(path: Path) -> dict[int, int]:
+    """Return the vertices of lip points from a table ``point,vertex``, for ``placed_by_points``.
+
+    Raises InputError: no such file, other columns, a row that is damaged, or a point that occurs twice.
+    """
+    named: dict[int, int] = {}
+    for number, row in _rows(path, POINT_COLUMNS, "table of lip points"):
+        point, vertex = (_whole(path, number, text) for text in row)
+        if point in named:
+            raise InputError(f"{path}: line {number}: the point {point} occurs twice; remove one")
+        named[point] = vertex
+    return named
+
+
+def _whole(path: Path, line: int, text: str) -> int:
+    try:
+        return int(text)
+    except ValueError as error:
+        raise InputError(f"{path}: line {line}: {shortened(text)!r} is no whole number") from error
+
+
+def _rows(path: Path, columns: tuple[str, ...], kind: str) -> Iterator[tuple[int, list[str]]]:
+    """Yield the rows of a table with their line numbers; empty lines and lines that begin with # are left out."""
+    reader = csv.reader(io.StringIO(read_text_file(path, kind, LARGEST_TABLE)))
+    try:
+        table = [(reader.line_num, row) for row in reader]
+    except csv.Error as error:
+        raise InputError(f"{path}: no table ({shortened(str(error))}); required {','.join(columns)}") from error
+    header = [word.strip() for word in table[0][1]] if table else []
+    if header != list(columns):
+        found = shortened(",".join(header))
+        raise InputError(f"{path}: the columns are {found!r}, required {','.join(columns)}")
+    for line, row in table[1:]:
+        if row and not row[0].startswith("#"):
+            if len(row) != len(columns):
+                raise InputError(f"{path}: line {line}: {len(row)} columns, required {','.join(columns)}")
+            yield line, row

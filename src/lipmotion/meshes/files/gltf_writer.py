@@ -1,0 +1,242 @@
+"""Writing of glTF: a mesh with its blendshapes, and their weights over time, as one ``.glb`` file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import ExportError
+from lipmotion.meshes.files.gltf_container import write_container
+from lipmotion.meshes.model.mesh import Blendshape, Mesh, MeshPart
+from lipmotion.meshes.model.scene import HeadTurn, Scene, ShadingNormals, shading_normals
+from lipmotion.types import Motion
+
+FLOAT, UNSIGNED, UNSIGNED_BYTE = 5126, 5125, 5121
+VERTICES, INDICES = 34962, 34963
+"""Uses of buffer views, as viewers want them named."""
+
+
+class _Buffer:
+    """Arrays so far, and their descriptions."""
+
+    def __init__(self) -> None:
+        self.chunks: list[bytes] = []
+        self.views: list[dict[str, Any]] = []
+        self.accessors: list[dict[str, Any]] = []
+        self.size = 0
+
+    def add(self, values: NDArray[Any], kind: str, *, target: int | None = None, limits: bool = False) -> int:
+        """Add an array [shape=(N,) or (N, width)] and return the number of its accessor."""
+        stored = np.ascontiguousarray(values, "<u4" if values.dtype.kind in "iu" else "<f4")
+        view: dict[str, Any] = {"buffer": 0, "byteOffset": self.size, "byteLength": stored.nbytes}
+        accessor: dict[str, Any] = {
+            "bufferView": len(self.views),
+            "componentType": UNSIGNED if stored.dtype.kind == "u" else FLOAT,
+            "count": len(stored),
+            "type": kind,
+        }
+        if target is not None:
+            view["target"] = target
+        if limits and len(stored):
+            rows = stored.reshape(len(stored), -1)
+            accessor |= {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()}
+        self.chunks.append(stored.tobytes())
+        self.size += stored.nbytes
+        self.views.append(view)
+        self.accessors.append(accessor)
+        return len(self.accessors) - 1
+
+    def add_bytes(self, values: NDArray[np.uint8], kind: str, *, target: int) -> int:
+        """Add an array of small whole numbers [shape=(N, 4)] and return the number of its accessor."""
+        number = self.add(np.ascontiguousarray(values).view("<u4").reshape(-1), kind, target=target)
+        self.accessors[number] |= {"componentType": UNSIGNED_BYTE, "count": len(values)}
+        return number
+
+    def add_few(self, values: NDArray[np.float64]) -> int:
+        """Add displacements [shape=(N, 3)] of which most are 0, as a sparse array; return the number of its
+        accessor."""
+        rows = np.flatnonzero(values.any(axis=1))
+        if 2 * len(rows) > len(values):
+            return self.add(values, "VEC3", target=VERTICES, limits=True)
+        few = values[rows].astype("<f4").astype(np.float64)
+        ends = np.concatenate([few, np.zeros((1, 3))])
+        accessor: dict[str, Any] = {"componentType": FLOAT, "count": len(values), "type": "VEC3"}
+        accessor |= {"min": ends.min(axis=0).tolist(), "max": ends.max(axis=0).tolist()}
+        if len(rows):
+            numbers, moved = self.add(rows, "SCALAR"), self.add(few, "VEC3")
+            accessor["sparse"] = {
+                "count": len(rows),
+                "indices": {"bufferView": self.accessors[numbers]["bufferView"], "componentType": UNSIGNED},
+                "values": {"bufferView": self.accessors[moved]["bufferView"]},
+            }
+            del self.accessors[numbers:]
+        self.accessors.append(accessor)
+        return len(self.accessors) - 1
+
+
+def write_glb(path: Path, mesh: Mesh, weights: Motion | None = None) -> None:
+    """Write a mesh with its blendshapes, and their weights over time, as ``write_gltf_scene`` does.
+
+    weights : channels by the names of the blendshapes; None: no animation
+    Raises ExportError: a channel that is no blendshape, or the file cannot be written.
+    """
+    try:
+        scene = Scene(mesh, weights)
+    except ExportError as error:
+        raise ExportError(f"{path}: {error}") from error
+    write_gltf_scene(path, scene)
+
+
+def write_gltf_scene(path: Path, scene: Scene) -> None:
+    """Write a scene as ``.glb``: its mesh with blendshapes, and their weights over time as its animation.
+
+    Every part becomes a primitive with its own vertices; those that no blendshape moves are a mesh of their own.
+    Textures are not written, colours of vertices are. A sound is named as ``extras`` of the scene, which programs that
+    do not know it pass on: ``{"audio": {"uri": ..., "start_s": ...}}``.
+    Raises ExportError: the file cannot be written.
+    """
+    buffer = _Buffer()
+    document = _document(scene, buffer, shading_normals(scene.mesh, split=scene.split))
+    write_container(path, document, b"".join(buffer.chunks))
+
+
+def _document(scene: Scene, buffer: _Buffer, normals: ShadingNormals) -> dict[str, Any]:
+    """Return the JSON part; its arrays are added to the buffer."""
+    mesh = scene.mesh
+    moved = np.zeros(len(mesh.vertices), bool)
+    for shape in mesh.shapes:
+        moved[shape.rows] = True
+    materials: list[dict[str, Any]] = []
+    meshes: list[dict[str, Any]] = []
+    nodes: list[dict[str, Any]] = []
+    shown = [part for part in mesh.parts if part.stop > part.first]
+    moving = [part for part in shown if moved[mesh.triangles[part.first : part.stop]].any()] or shown[:1]
+    for name, parts, shapes in (
+        ("character", moving, mesh.shapes),
+        ("still", [part for part in shown if part not in moving], ()),
+    ):
+        if parts:
+            primitives = [_primitive(buffer, materials, scene, part, normals, shapes) for part in parts]
+            meshes.append({"name": name, "primitives": primitives})
+            nodes.append({"name": name, "mesh": len(meshes) - 1})
+    if mesh.shapes:
+        meshes[0] |= {"weights": [0.0] * len(mesh.shapes), "extras": {"targetNames": list(mesh.shape_names)}}
+    document: dict[str, Any] = {
+        "asset": {"version": "2.0", "generator": "lipmotion"},
+        "scene": 0,
+        "scenes": [{"nodes": list(range(len(nodes)))}],
+        "nodes": nodes,
+        "meshes": meshes,
+        "materials": materials,
+    }
+    if scene.sound:
+        document["scenes"][0]["extras"] = {"audio": {"uri": scene.sound, "start_s": scene.sound_s}}
+    if scene.turn is not None:
+        _add_joints(document, buffer, scene.turn)
+    if scene.weights is not None and len(scene.weights.values) and (mesh.shapes or scene.turn):
+        document["animations"] = [_animation(buffer, scene, len(nodes) - 1)]
+    arrays = {"buffers": [{"byteLength": buffer.size}], "bufferViews": buffer.views, "accessors": buffer.accessors}
+    return document | arrays
+
+
+def _primitive(
+    buffer: _Buffer,
+    materials: list[dict[str, Any]],
+    scene: Scene,
+    part: MeshPart,
+    normals: ShadingNormals,
+    shapes: tuple[Blendshape, ...],
+) -> dict[str, Any]:
+    mesh = scene.mesh
+    rows, corners = np.unique(mesh.triangles[part.first : part.stop], return_inverse=True)
+    attributes = {
+        "POSITION": buffer.add(mesh.vertices[rows], "VEC3", target=VERTICES, limits=True),
+        "NORMAL": buffer.add(normals.rest[rows], "VEC3", target=VERTICES),
+    }
+    colour = np.array(part.material.colour) if mesh.colours is None else np.ones(3)
+    if mesh.colours is not None:
+        attributes["COLOR_0"] = buffer.add(_linear(mesh.colours[rows]), "VEC3", target=VERTICES)
+    if scene.turn is not None:
+        attributes |= _joint_attributes(buffer, scene.turn.share[rows])
+    moved = np.zeros((len(mesh.vertices), 3))
+    targets = []
+    for shape, (turned, change) in zip(shapes, normals.turned, strict=False):
+        target = {}
+        for name, which, values in (("POSITION", shape.rows, shape.displacements), ("NORMAL", turned, change)):
+            moved[which] = values
+            target[name] = buffer.add_few(moved[rows])
+            moved[which] = 0.0
+        targets.append(target)
+    look = {
+        "baseColorFactor": [*_linear(colour).tolist(), 1.0],
+        "metallicFactor": 0.0,
+        "roughnessFactor": 1.0 - part.material.gloss,
+    }
+    materials.append({"name": part.name or part.material.name or "part", "pbrMetallicRoughness": look})
+    primitive: dict[str, Any] = {
+        "attributes": attributes,
+        "indices": buffer.add(corners.reshape(-1), "SCALAR", target=INDICES),
+        "material": len(materials) - 1,
+    }
+    return primitive | ({"targets": targets} if targets else {})
+
+
+def _joint_attributes(buffer: _Buffer, share: NDArray[np.float64]) -> dict[str, int]:
+    """Add how far vertices follow the body (joint 0) and the head (joint 1); return the numbers of the accessors."""
+    joints = np.zeros((len(share), 4), np.uint8)
+    joints[:, 1] = share > 0
+    weights = np.zeros((len(share), 4))
+    weights[:, 1] = share.astype("<f4")
+    weights[:, 0] = 1 - weights[:, 1]
+    joints[weights == 0] = 0
+    return {
+        "JOINTS_0": buffer.add_bytes(joints, "VEC4", target=VERTICES),
+        "WEIGHTS_0": buffer.add(weights, "VEC4", target=VERTICES),
+    }
+
+
+def _add_joints(document: dict[str, Any], buffer: _Buffer, turn: HeadTurn) -> None:
+    """Add the joints of body and head, as the last two nodes, and let all meshes follow them."""
+    nodes, pivot = document["nodes"], turn.pivot.astype("<f4").astype(np.float64)
+    first = len(nodes)
+    for node in nodes:
+        node["skin"] = 0
+    nodes += [
+        {"name": "body", "children": [first + 1]},
+        {"name": "head", "translation": pivot.tolist(), "rotation": [0.0, 0.0, 0.0, 1.0]},
+    ]
+    document["scenes"][0]["nodes"].append(first)
+    bound = np.tile(np.eye(4), (2, 1, 1))
+    bound[1, :3, 3] = -pivot
+    matrices = buffer.add(bound.transpose(0, 2, 1).reshape(2, 16), "MAT4")
+    document["skins"] = [{"joints": [first, first + 1], "skeleton": first, "inverseBindMatrices": matrices}]
+
+
+def _animation(buffer: _Buffer, scene: Scene, head: int) -> dict[str, Any]:
+    """Return the animation of the weights of node 0, and of the rotation of the node of the head."""
+    time_s, table = scene.keys()
+    frames_s = scene.weights.time_s if scene.weights else np.zeros(0)
+    times = buffer.add(time_s, "SCALAR", limits=True)
+    curves: list[tuple[int, str, int, int]] = []
+    if scene.mesh.shapes:
+        curves.append((0, "weights", times, buffer.add(table.reshape(-1), "SCALAR")))
+    if scene.turn is not None:
+        if len(frames_s) < len(time_s):
+            times = buffer.add(frames_s, "SCALAR", limits=True)
+        curves.append((head, "rotation", times, buffer.add(scene.turn.rotations, "VEC4")))
+    return {
+        "name": "speech",
+        "channels": [
+            {"sampler": number, "target": {"node": node, "path": path}}
+            for number, (node, path, *_) in enumerate(curves)
+        ],
+        "samplers": [{"input": times, "output": output, "interpolation": "LINEAR"} for *_, times, output in curves],
+    }
+
+
+def _linear(colour: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the light of sRGB colours."""
+    return np.where(colour <= 0.04045, colour / 12.92, ((np.clip(colour, 0, 1) + 0.055) / 1.055) ** 2.4)

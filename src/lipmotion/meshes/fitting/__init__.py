@@ -1,0 +1,1 @@
+"""Motion to the points and blendshapes of a mesh, and back."""

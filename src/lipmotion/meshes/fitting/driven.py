@@ -1,0 +1,175 @@
+"""A character that motion moves: a mesh with blendshapes, or with control points, from its files to its vertices."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.articulation.contact import in_pictures
+from lipmotion.errors import InputError
+from lipmotion.meshes.files.binding_files import BINDING_SUFFIX, load_binding, read_points, read_weights
+from lipmotion.meshes.files.character_files import read_character
+from lipmotion.meshes.fitting.lip_placement import LipPlacement, placed_by_points, placed_by_shape, surface_of_named
+from lipmotion.meshes.fitting.point_motion import point_motion
+from lipmotion.meshes.fitting.shape_weights import shape_weights
+from lipmotion.meshes.model.binding import ControlBinding, bind, painted
+from lipmotion.meshes.model.face_shapes import FaceShapes, face_shapes
+from lipmotion.meshes.model.jaw_bone import with_jaw
+from lipmotion.meshes.model.mesh import Mesh
+from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, by_arkit_name
+from lipmotion.meshes.model.surface import mesh_surface
+from lipmotion.types import Motion, Timeline, Unit
+
+Array = NDArray[np.float64]
+
+METRIC = (".glb", ".gltf", ".vrm")
+"""Suffixes of characters whose unit is the metre."""
+EYES_AND_BROWS = tuple(name for name in ARKIT_OTHERS if name.startswith(("eyeBlink", "eyeLook", "brow")))
+
+
+@dataclass(frozen=True, eq=False)
+class DrivenCharacter:
+    """A mesh, where its lip points are, and what moves it: its own blendshapes, or else control points.
+
+    shapes  : the blendshapes of its mouth; None: control points move it
+    binding : weights of control points; None: blendshapes move it
+    file    : where it was read from; None: from no file
+    """
+
+    mesh: Mesh
+    placement: LipPlacement
+    shapes: FaceShapes | None
+    binding: ControlBinding | None
+    file: Path | None = None
+
+    def weights(self, motion: Motion, units: Timeline[Unit]) -> Motion:
+        """Return the weights of the blendshapes over time, channels by the names of the mesh, 0 to 1.
+
+        Raises InputError: the character has no blendshapes of the mouth, or as ``shape_weights``.
+        """
+        if self.shapes is None:
+            raise InputError(
+                "the character is moved by control points and has no weights of blendshapes; write a video, or the "
+                "motion without --character"
+            )
+        return shape_weights(motion, units, self.shapes)
+
+    def vertices(
+        self,
+        motion: Motion,
+        units: Timeline[Unit],
+        time_s: Array,
+        others: Mapping[str, Array] | None = None,
+    ) -> Iterator[Array]:
+        """Yield the vertices at some times in seconds, evenly spaced [each shape=(V, 3)].
+
+        others : weights of ARKit's blendshapes of eyes and brows, 0 to 1 [each shape=(T,)]; those that the mesh does
+                 not have are left out; None: they stay at rest
+        A closure between two times is shown at the nearer one (``articulation.contact.shown_contact``).
+        Raises InputError: as ``point_motion``.
+        """
+        points = point_motion(motion, units)
+        beside, contact = self._beside(others or {}, len(time_s)), points.mouth.contact
+        if self.shapes is not None:
+            weights = shape_weights(motion, units, self.shapes).values.astype(np.float64)
+            for row, other in zip(in_pictures(weights, contact, motion.rate_hz, time_s), beside, strict=True):
+                yield self._shaped(row @ self._displacements, other)
+        elif self.binding is not None:
+            rows = in_pictures(points.displacements, contact, motion.rate_hz, time_s)
+            for row, other in zip(rows, beside, strict=True):
+                vertices = self.binding.moved(self.mesh, row)
+                vertices[self.moving] += (other @ self._others).reshape(-1, 3)
+                yield vertices
+
+    @cached_property
+    def moving(self) -> NDArray[np.int64]:
+        """The vertices that ever move, but for the turning of the head, ascending [shape=(N,)]."""
+        names = {*(self.shapes.names if self.shapes else ()), *self._other_names.values()}
+        rows = [shape.rows for shape in self.mesh.shapes if shape.name in names]
+        if self.binding is not None:
+            rows.append(self.binding.rows)
+        return np.unique(np.concatenate(rows)) if rows else np.zeros(0, np.int64)
+
+    def has_shape(self, known: str) -> bool:
+        """Return whether the mesh has a blendshape that moves something, by its name of ARKit."""
+        return known in self._other_names or (self.shapes is not None and known in self.shapes.known)
+
+    @cached_property
+    def _other_names(self) -> dict[str, str]:
+        """The mesh's names of ARKit's blendshapes of eyes and brows, by ARKit's."""
+        known = by_arkit_name(shape.name for shape in self.mesh.shapes if len(shape.rows))
+        return {name: known[name] for name in EYES_AND_BROWS if name in known}
+
+    @cached_property
+    def _displacements(self) -> Array:
+        """What every blendshape of the mouth does to the moving vertices [shape=(S, N · 3)]."""
+        return self._moved(self.shapes.names if self.shapes else ())
+
+    @cached_property
+    def _others(self) -> Array:
+        """What the blendshapes of eyes and brows do to the moving vertices [shape=(S, N · 3)]."""
+        return self._moved(tuple(self._other_names.values()))
+
+    def _moved(self, names: Sequence[str]) -> Array:
+        return self.mesh.displacements(self.moving, names).reshape(len(names), 3 * len(self.moving))
+
+    def _beside(self, others: Mapping[str, Array], count: int) -> Array:
+        """Return the weights of the blendshapes of eyes and brows over time [shape=(T, S)]."""
+        columns = [others.get(known, np.zeros(count)) for known in self._other_names]
+        return np.stack(columns, axis=1) if columns else np.zeros((count, 0))
+
+    def _shaped(self, moved: Array, other: Array) -> Array:
+        vertices = self.mesh.vertices.copy()
+        vertices[self.moving] += moved.reshape(-1, 3)
+        if other.any():
+            vertices[self.moving] += (other @ self._others).reshape(-1, 3)
+        return vertices
+
+
+def driven_character(
+    path: str | Path,
+    *,
+    points: Path | None = None,
+    binding: Path | None = None,
+    by_points: bool = False,
+    only: Sequence[str] = (),
+) -> DrivenCharacter:
+    """Return a character from its files, ready to be moved.
+
+    path      : ``.glb``, ``.gltf``, ``.vrm``, ``.obj``, or a folder of OBJ files
+    points    : a table of the vertices of lip points; None: they are found by the blendshape that opens the mouth
+    binding   : a binding file, or a table of painted weights (``.csv``); both mean control points
+    by_points : move it by control points, though it has blendshapes
+    only      : the names of the blendshapes to use; empty: those that are understood
+    Raises InputError: a file is damaged, or what moves the mouth is not found in it.
+    Raises ModelFormatError: the binding is damaged.
+    """
+    mesh, in_metres = with_jaw(read_character(path)), Path(path).suffix.lower() in METRIC
+    is_stored = binding is not None and binding.suffix.lower() == BINDING_SUFFIX
+    try:
+        if is_stored and binding is not None:
+            stored = load_binding(binding, mesh)
+            return DrivenCharacter(mesh, stored.placement, None, stored, Path(path))
+        if points is not None:
+            named = read_points(points)
+            surface = surface_of_named(mesh, named)
+            placement = placed_by_points(mesh, surface, named)
+        else:
+            surface = mesh_surface(mesh)
+            placement = placed_by_shape(mesh, surface)
+        if mesh.shapes and not by_points and binding is None:
+            return DrivenCharacter(
+                mesh, placement, face_shapes(mesh, placement, only, in_metres=in_metres), None, Path(path)
+            )
+        bound = bind(mesh, surface, placement)
+        if binding is not None:
+            bound = painted(bound, mesh, read_weights(binding))
+        return DrivenCharacter(mesh, placement, None, bound, Path(path))
+    except InputError as error:
+        text = str(error)
+        raise InputError(text if str(path) in text else f"{path}: {text}") from error

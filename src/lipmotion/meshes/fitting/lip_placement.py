@@ -1,0 +1,326 @@
+"""Where the lip and jaw points of motion are on a mesh: found from a blendshape that opens the mouth, or named."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import chain
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.articulation.lip_points import (
+    LEFT_CORNER,
+    LOWER_MIDDLE,
+    RIGHT_CORNER,
+    UPPER_MIDDLE,
+    MouthTemplate,
+    mouth_template,
+)
+from lipmotion.errors import InputError, shortened
+from lipmotion.meshes.model.mesh import Blendshape, Mesh
+from lipmotion.meshes.model.shape_names import arkit_name, viseme_name, vowel_name
+from lipmotion.meshes.model.surface import MeshSurface, mesh_surface
+
+Rows = NDArray[np.int64]
+Places = NDArray[np.float64]
+
+SLIT_REACH = 0.06
+"""The lips meet where vertices closer than this share of the width of the jaw go different ways as the mouth opens."""
+SLIT_STEP = 0.2
+"""How different: this share of how far the jaw goes."""
+DETOUR = 2.0
+"""They are on two lips if the way along the surface is this many times as long as the straight one, and more than the
+distance between neighbours."""
+LIP_LINE = 0.1
+"""Vertices this close to the line between the corners, in widths of the mouth, are not joined with others at their
+place
+where no blendshape tells the lips apart."""
+FRONT = 0.04
+"""Behind the foremost of such pairs by more than this share are the insides of the mouth."""
+DEPTH_WEIGHT = 0.35
+"""Distances in depth count so much where a point is looked for, for lips protrude differently."""
+EYE_CORNERS = (33, 263)
+"""The outer corners of the eyes, right and left; in a list of named points they give the upright direction."""
+MOST_PAIRS, MOST_DISTANCES = 1_000_000, 1 << 30
+"""Pairs of vertices that are compared, about, and distances that are looked at for it: of meshes that are so dense
+around the mouth, only some vertices are compared."""
+DISTANCES_AT_ONCE = 1 << 22
+NEEDED = (RIGHT_CORNER, LEFT_CORNER, UPPER_MIDDLE, LOWER_MIDDLE)
+"""The points that a list must name, where nothing is found by blendshapes."""
+
+
+@dataclass(frozen=True, eq=False)
+class LipPlacement:
+    """The vertex of each lip and jaw point, and how motion maps to the mesh.
+
+    points   : numbers of the points, those of the template [52]
+    vertices : the vertex of each [shape=(52,)]
+    scale    : units of the mesh in one eye distance of motion: widths of the two mouths, divided
+    axes     : the x, y and z of motion, as columns in the frame of the mesh [shape=(3, 3)]
+    """
+
+    points: tuple[int, ...]
+    vertices: Rows
+    scale: float
+    axes: Places
+
+    def row(self, point: int) -> int:
+        """Return the row of a point."""
+        return self.points.index(point)
+
+    def to_mesh(self, displacements: Places) -> Places:
+        """Return displacements of motion, eye distances, in the mesh [shape=(..., 3), both]."""
+        return self.scale * displacements @ self.axes.T
+
+    def to_motion(self, displacements: Places) -> Places:
+        """Return displacements of the mesh in eye distances of motion [shape=(..., 3), both]."""
+        return displacements @ self.axes / self.scale
+
+
+def placed_by_shape(mesh: Mesh, surface: MeshSurface) -> LipPlacement:
+    """Return where the lip points are, from the blendshape that opens the mouth.
+
+    The lips meet where neighbours go apart as the mouth opens; the ends of that line are the inner corners. The
+    character must stand upright and look along +z, as files of OBJ and glTF have it.
+    Raises InputError: no blendshape opens the mouth, or the lips are not found.
+    """
+    shape = opening_shape(mesh)
+    drop = np.zeros(len(mesh.vertices))
+    drop[shape.rows] = -shape.displacements[:, 1]
+    skin = _skin(surface, drop)
+    drop = np.where(skin, drop, 0.0) / max(float(drop[skin].max(initial=0.0)), 1e-12)
+    middle = _slit(mesh.vertices, surface, drop, skin)
+    if len(middle) < 3:
+        raise InputError(
+            f"the blendshape {shortened(shape.name)!r} parts no lips; name the lip points by their vertices "
+            "(docs/meshes.md)"
+        )
+    template = mouth_template()
+    right, left = middle[middle[:, 0].argmin()], middle[middle[:, 0].argmax()]
+    scale = float(left[0] - right[0]) / template.inner_width
+    order = np.argsort(middle[:, 0], kind="stable")
+    targets = _targets(template, scale, (right + left) / 2, middle[order])
+    upper = drop < _share_at_slit(mesh.vertices, drop, skin, middle)
+    vertices = _nearest(mesh, surface, template, targets, skin, upper)
+    return LipPlacement(template.points, vertices, scale, np.eye(3))
+
+
+def placed_by_points(mesh: Mesh, surface: MeshSurface, named: Mapping[int, int]) -> LipPlacement:
+    """Return where the lip points are, from some that are named; the others are the nearest to the template.
+
+    named : vertex of each point; the corners (61, 291) and the middles of the inner lips (13, 14) are required.
+            With the
+            eye corners (33, 263) the head may be turned any way; without them it must stand upright and look along +z
+    Raises InputError: a required point is missing, a vertex does not exist, or the lips are one surface without a slit.
+    """
+    template = mouth_template()
+    _check_named(named, len(mesh.vertices), template)
+    place = {point: mesh.vertices[vertex] for point, vertex in named.items()}
+    centre = (place[RIGHT_CORNER] + place[LEFT_CORNER]) / 2
+    axes = _axes(place, centre)
+    scale = float(np.linalg.norm(place[LEFT_CORNER] - place[RIGHT_CORNER])) / template.width
+    upright = Mesh(mesh.vertices @ axes, mesh.triangles)
+    lips = [place[point] @ axes for point in (RIGHT_CORNER, LEFT_CORNER)]
+    lips.append((place[UPPER_MIDDLE] + place[LOWER_MIDDLE]) / 2 @ axes)
+    middle = np.array(sorted(lips, key=lambda p: float(p[0])))
+    apart = surface.distances(np.array([named[UPPER_MIDDLE], named[LOWER_MIDDLE]]), np.inf)
+    if apart[0, named[LOWER_MIDDLE]] < 0.2 * scale * template.width:
+        raise InputError(
+            f"vertices {named[UPPER_MIDDLE]} and {named[LOWER_MIDDLE]} hang together: the lips have no slit between "
+            "them; cut the mouth open, or name other vertices of the inner lips"
+        )
+    skin = surface.pieces == surface.pieces[named[RIGHT_CORNER]]
+    skin |= surface.pieces == surface.pieces[named[LOWER_MIDDLE]]
+    targets = _targets(template, scale, centre @ axes, middle)
+    vertices = _nearest(upright, surface, template, targets, skin, apart[0] < apart[1], axes)
+    for point, vertex in named.items():
+        if point in template.points:
+            vertices[template.row(point)] = vertex
+    return LipPlacement(template.points, vertices, scale, axes)
+
+
+def surface_of_named(mesh: Mesh, named: Mapping[int, int]) -> MeshSurface:
+    """Return how a mesh hangs together whose lip points are named: its lips are apart, also where they touch.
+
+    Raises InputError: as ``placed_by_points``.
+    """
+    _check_named(named, len(mesh.vertices), mouth_template())
+    surface = mesh_surface(mesh)
+    if surface.places[named[UPPER_MIDDLE]] != surface.places[named[LOWER_MIDDLE]]:
+        return surface
+    right, left = mesh.vertices[named[RIGHT_CORNER]], mesh.vertices[named[LEFT_CORNER]]
+    width = float(np.linalg.norm(left - right))
+    along = (left - right) / max(width, 1e-12)
+    from_middle = mesh.vertices - (left + right) / 2
+    across = from_middle @ along
+    lips = mesh.vertices[named[UPPER_MIDDLE]] - (left + right) / 2
+    off = from_middle - across[:, None] * along
+    bend = (1 - np.square(np.clip(2 * across / max(width, 1e-12), -1, 1)))[:, None] * (lips - (lips @ along) * along)
+    split = (np.abs(across) < 0.499 * width) & (np.linalg.norm(off - bend, axis=1) < LIP_LINE * width)
+    return mesh_surface(mesh, split)
+
+
+def opening_shape(mesh: Mesh) -> Blendshape:
+    """Return the blendshape that opens the mouth most plainly. Raises InputError: there is none.
+
+    ARKit's ``jawOpen``, else the vowel or viseme ``aa``, else another whose name says so.
+    """
+    tests: tuple[Callable[[str], bool], ...] = (
+        lambda name: arkit_name(name) == "jawOpen",
+        lambda name: viseme_name(name) == "aa",
+        lambda name: vowel_name(name) == "aa",
+        lambda name: "open" in name.lower() and ("mouth" in name.lower() or "jaw" in name.lower()),
+    )
+    for test in tests:
+        found = next((shape for shape in mesh.shapes if len(shape.rows) and test(shape.name)), None)
+        if found is not None:
+            return found
+    names = shortened(", ".join(mesh.shape_names)) or "none"
+    raise InputError(
+        f"no blendshape opens the mouth, required jawOpen, viseme_aa or aa; the mesh has: {names}. Rename one, or name "
+        "the lip points by their vertices (docs/meshes.md)"
+    )
+
+
+def _skin(surface: MeshSurface, drop: Places) -> NDArray[np.bool_]:
+    """Return the vertices of the face: the piece of the surface with both moved and still vertices, most of them."""
+    still, moved = drop < 0.1 * drop.max(initial=0.0), drop > 0.5 * drop.max(initial=0.0)
+    count = int(surface.pieces.max(initial=-1)) + 1
+    counts = [np.bincount(surface.pieces[chosen], minlength=count) for chosen in (still, moved)]
+    return surface.pieces == int(np.minimum(*counts).argmax())
+
+
+def _slit(vertices: Places, surface: MeshSurface, drop: Places, skin: NDArray[np.bool_]) -> Places:
+    """Return points along the line where the lips meet: middles of pairs that go apart [shape=(N, 3)]."""
+    moved = vertices[skin & (drop > 0.5)]
+    reach = SLIT_REACH * float(np.ptp(moved[:, 0])) if len(moved) else 0.0
+    low, high = np.flatnonzero(skin & (drop > SLIT_STEP)), np.flatnonzero(skin & (drop < 1 - SLIT_STEP))
+    if not reach or not len(low) or not len(high):
+        return np.zeros((0, 3))
+    tree = _tree(vertices[high])
+    count = int(tree.count_neighbors(_tree(vertices[low]), reach))
+    crowd = 1 + max(count // MOST_PAIRS, len(low) * len(vertices) // MOST_DISTANCES)
+    if crowd > 1:
+        low = np.sort(np.random.default_rng(0).choice(low, -(-len(low) // crowd), replace=False))
+    found = tree.query_ball_point(vertices[low], reach)
+    near = np.fromiter(chain.from_iterable(found), np.int64)
+    pairs = np.stack([np.repeat(low, [len(each) for each in found]), high[near]], axis=1)
+    pairs = pairs[drop[pairs[:, 0]] - drop[pairs[:, 1]] > SLIT_STEP]
+    pairs = pairs[_apart(vertices, surface, pairs, reach)]
+    middle = (vertices[pairs[:, 0]] + vertices[pairs[:, 1]]) / 2
+    return middle[middle[:, 2] > _foremost(middle, reach / 4) - FRONT * reach / SLIT_REACH]
+
+
+def _foremost(places: Places, reach: float) -> Places:
+    """Return the largest z of all places whose x is within a reach of that of each [shape=(N,)]."""
+    order = np.argsort(places[:, 0], kind="stable")
+    across = places[order, 0]
+    first, stop = np.searchsorted(across, across - reach), np.searchsorted(across, across + reach, "right")
+    doubled = [places[order, 2]]  # the largest of 1, 2, 4, ... that follow one another
+    while 2 ** len(doubled) <= len(places):
+        half = 2 ** (len(doubled) - 1)
+        doubled.append(np.maximum(doubled[-1], np.append(doubled[-1][half:], np.full(half, -np.inf))))
+    level = np.log2(np.maximum(stop - first, 1)).astype(int)
+    table = np.stack(doubled)
+    largest = np.empty(len(places))
+    largest[order] = np.maximum(table[level, first], table[level, stop - 2**level])
+    return largest
+
+
+def _apart(vertices: Places, surface: MeshSurface, pairs: Rows, reach: float) -> NDArray[np.bool_]:
+    """Return which pairs are far from one another along the surface [shape=(N,)]."""
+    far = np.zeros(len(pairs), bool)
+    straight = np.linalg.norm(vertices[pairs[:, 0]] - vertices[pairs[:, 1]], axis=1)
+    longest = np.maximum(DETOUR * straight, reach / 2)
+    sources, number = np.unique(pairs[:, 0], return_inverse=True)
+    at_once = max(1, DISTANCES_AT_ONCE // len(vertices))
+    for first in range(0, len(sources), at_once):
+        along = surface.distances(sources[first : first + at_once], float(longest.max(initial=0.0)) + reach)
+        here = (number >= first) & (number < first + at_once)
+        far[here] = along[number[here] - first, pairs[here, 1]] > longest[here]
+    return far
+
+
+def _share_at_slit(vertices: Places, drop: Places, skin: NDArray[np.bool_], middle: Places) -> Places:
+    """Return the share of the jaw's way that divides the lips, at every vertex: less near the corners [shape=(V,)]."""
+    rows = np.flatnonzero(skin)
+    near = _tree(vertices[rows]).query(middle, k=min(12, len(rows)))[1].reshape(len(middle), -1)
+    share = (drop[rows][near].max(axis=1) + drop[rows][near].min(axis=1)) / 2
+    return share[_tree(middle).query(vertices)[1]]
+
+
+def _targets(template: MouthTemplate, scale: float, centre: Places, middle: Places) -> Places:
+    """Return where the points should be on a mouth whose lips meet along ``middle``, from right to left [shape=(52,
+    3)]."""
+    targets = centre + scale * (template.places - template.centre)
+    seam = np.interp(targets[:, 0], middle[:, 0], middle[:, 1])
+    depth = np.interp(targets[:, 0], middle[:, 0], middle[:, 2])
+    lips = ~template.jaw
+    above = template.places[:, 1] - template.seam(template.places[:, 0])
+    targets[lips, 1] = (seam + scale * above)[lips]
+    targets[lips & template.inner, 2] = depth[lips & template.inner]
+    return targets
+
+
+def _nearest(
+    mesh: Mesh,
+    surface: MeshSurface,
+    template: MouthTemplate,
+    targets: Places,
+    skin: NDArray[np.bool_],
+    upper: NDArray[np.bool_],
+    axes: Places | None = None,
+) -> Rows:
+    """Return the vertex of each point: the nearest one of the skin on its side of the lips that faces forwards."""
+    stretch = np.array([1.0, 1.0, DEPTH_WEIGHT])
+    forward = surface.normals[:, 2] if axes is None else surface.normals @ axes[:, 2]
+    facing = skin & (forward > 0.0)
+    found = np.zeros(len(targets), np.int64)
+    sides = ((template.upper, upper), (template.lower | template.jaw, ~upper), (template.corner, np.ones_like(upper)))
+    for chosen, side in sides:
+        for edge, candidates in ((template.inner, skin & side), (~template.inner, facing & side)):
+            rows = np.flatnonzero(candidates)
+            if (chosen & edge).any():
+                if not len(rows):
+                    raise InputError("no vertices are on one side of the lips; name the lip points by their vertices")
+                tree = _tree(mesh.vertices[rows] * stretch)
+                found[chosen & edge] = rows[tree.query(targets[chosen & edge] * stretch)[1]]
+    return found
+
+
+def _axes(place: Mapping[int, Places], centre: Places) -> Places:
+    """Return x, y and z of the head as columns, from the eye corners; without them, those of the mesh."""
+    if not all(point in place for point in EYE_CORNERS):
+        return np.eye(3)
+    eyes = (place[EYE_CORNERS[0]] + place[EYE_CORNERS[1]]) / 2
+    left = place[EYE_CORNERS[1]] - place[EYE_CORNERS[0]]
+    left = left / np.linalg.norm(left)
+    up = eyes - centre
+    up = up - left * (up @ left)
+    up = up / np.linalg.norm(up)
+    return np.stack([left, up, np.cross(left, up)], axis=1)
+
+
+def _check_named(named: Mapping[int, int], vertices: int, template: MouthTemplate) -> None:
+    missing = [point for point in NEEDED if point not in named]
+    if missing:
+        raise InputError(
+            f"the lip points {', '.join(map(str, missing))} are missing, required: 61 and 291 (right and left corner), "
+            "13 and 14 (middles of the upper and lower inner lip)"
+        )
+    for point, vertex in named.items():
+        if point not in template.points and point not in EYE_CORNERS:
+            raise InputError(f"{point} is no lip or jaw point, required one of {', '.join(map(str, template.points))}")
+        if not 0 <= vertex < vertices:
+            raise InputError(f"the point {point} is vertex {vertex}, required 0 to {vertices - 1}")
+    if len({named[point] for point in NEEDED}) < len(NEEDED):
+        raise InputError("two of the points 61, 291, 13, 14 are one vertex; name four different ones")
+
+
+def _tree(places: Places) -> Any:
+    """Return a tree of places [shape=(N, D)] that finds the nearest ones."""
+    from scipy.spatial import cKDTree  # a tenth of a second, which those who only draw faces need not wait
+
+    return cKDTree(places)

@@ -1,0 +1,1 @@
+"""A character's surface, bones, blendshapes and control points, as values."""

@@ -1,0 +1,248 @@
+"""A character's surface: vertices, triangles, parts with a material, and named blendshapes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError, shortened
+from lipmotion.meshes.model.bones import Bone
+from lipmotion.meshes.model.textures import Texture
+
+OPAQUE, MASK, BLEND = "OPAQUE", "MASK", "BLEND"
+"""How the opacity of a texture counts: not at all; there is a hole where it is low; what is behind shines through."""
+
+
+@dataclass(frozen=True)
+class Material:
+    """How a part of a mesh looks.
+
+    name     : any text, for people
+    colour   : red, green and blue of the diffuse reflection, sRGB, 0 to 1
+    gloss    : 0 is dull as cloth, 1 shines as a wet eye
+    opacity  : 0 is clear as air, 1 hides what is behind
+    texture  : the picture on it, whose colours are multiplied by ``colour``; None: it has one colour
+    alpha    : how the opacity of the texture counts: ``OPAQUE``, ``MASK`` or ``BLEND``
+    cutoff   : with ``MASK``, there is a hole where the opacity is below this
+    two_sided : it is seen from behind as well
+    """
+
+    name: str = ""
+    colour: tuple[float, float, float] = (0.8, 0.8, 0.8)
+    gloss: float = 0.2
+    opacity: float = 1.0
+    texture: Texture | None = None
+    alpha: str = OPAQUE
+    cutoff: float = 0.5
+    two_sided: bool = False
+
+
+@dataclass(frozen=True)
+class MeshPart:
+    """A named range of triangles of a mesh, all of one material.
+
+    first, stop : the triangles ``first`` to ``stop - 1``
+    """
+
+    name: str
+    first: int
+    stop: int
+    material: Material = Material()
+
+
+class PartNames:
+    """Gives parts names that no other part has."""
+
+    def __init__(self) -> None:
+        self._numbers: dict[str, int] = {}
+
+    def unused(self, owner: str, material: str) -> str:
+        """Return the name of the owner, with that of the material where it is taken, and a number where both are."""
+        both = f"{owner} {material}".strip()
+        name = owner if owner not in self._numbers else both
+        while name in self._numbers:
+            self._numbers[both] += 1
+            name = f"{both} {self._numbers[both]}"
+        self._numbers[name] = 1
+        return name
+
+
+@dataclass(frozen=True, eq=False)
+class Blendshape:
+    """A named displacement of some of the vertices of a mesh.
+
+    rows          : the vertices that move, ascending [shape=(N,)]
+    displacements : how far they move at weight 1, in the mesh's own unit of length [shape=(N, 3)]
+    """
+
+    name: str
+    rows: NDArray[np.int64]
+    displacements: NDArray[np.float64]
+
+    @classmethod
+    def between(
+        cls, name: str, neutral: NDArray[np.float64], shape: NDArray[np.float64], *, least: float = 0.0
+    ) -> Blendshape:
+        """Return the blendshape that moves the vertices ``neutral`` to ``shape`` [shape=(V, 3), both].
+
+        least : vertices that move no further than this, in the unit of the mesh, are left where they are
+        """
+        moved = shape - neutral
+        rows = np.flatnonzero(np.abs(moved).max(axis=1, initial=0.0) > least)
+        return cls(name, rows, moved[rows])
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A surface of triangles, with blendshapes.
+
+    vertices  : places in the mesh's own frame and unit of length [shape=(V, 3)]; +y is up, +z is out of the face, +x is
+                to the character's left, as in lipmotion's head frame
+    triangles : three vertices each, counterclockwise where the surface is seen from outside [shape=(F, 3)]
+    parts     : ranges of triangles that follow one another and together are all triangles; none stands for one
+                part without a name
+    shapes    : blendshapes, in the order of their weights
+    uv        : the place of each triangle's corners in a texture, 0 to 1, v upwards [shape=(F, 3, 2)], or None
+    colours   : of every vertex, sRGB, 0 to 1, in place of the materials' [shape=(V, 3)], or None
+    bones     : of head, neck, jaw and eyes, where a file has a skeleton; at most one of each kind
+    tints     : of every vertex, the light (linear) and the opacity by which those of textures and materials are
+                multiplied, 0 to 1 [shape=(V, 4)], or None; ``colours`` are multiplied by it already
+    Raises InputError: shapes of arrays that do not fit, values that are not finite, a triangle or a blendshape of a
+    vertex that does not exist, parts that do not follow one another, or two blendshapes of one name.
+    """
+
+    vertices: NDArray[np.float64]
+    triangles: NDArray[np.int32]
+    parts: tuple[MeshPart, ...] = ()
+    shapes: tuple[Blendshape, ...] = ()
+    uv: NDArray[np.float64] | None = None
+    colours: NDArray[np.float64] | None = None
+    bones: tuple[Bone, ...] = ()
+    tints: NDArray[np.float64] | None = None
+
+    def __post_init__(self) -> None:
+        _check_places("vertices", self.vertices)
+        _check_rows("triangles", self.triangles, len(self.vertices))
+        if self.triangles.ndim != 2 or self.triangles.shape[1] != 3:
+            raise InputError(f"triangles have shape {self.triangles.shape}, required (F, 3)")
+        if self.uv is not None and self.uv.shape != (*self.triangles.shape, 2):
+            raise InputError(f"uv has shape {self.uv.shape}, required {(*self.triangles.shape, 2)}")
+        if self.colours is not None and self.colours.shape != self.vertices.shape:
+            raise InputError(f"colours have shape {self.colours.shape}, required {self.vertices.shape}")
+        if self.tints is not None and self.tints.shape != (len(self.vertices), 4):
+            raise InputError(f"tints have shape {self.tints.shape}, required {(len(self.vertices), 4)}")
+        if not self.parts:
+            object.__setattr__(self, "parts", (MeshPart("", 0, len(self.triangles)),))
+        self._check_parts()
+        for shape in self.shapes:
+            _check_places(f"the blendshape {shortened(shape.name)!r}", shape.displacements)
+            _check_rows(f"the blendshape {shortened(shape.name)!r}", shape.rows, len(self.vertices))
+            if shape.rows.shape != shape.displacements.shape[:1]:
+                raise InputError(
+                    f"the blendshape {shortened(shape.name)!r} moves {shape.rows.shape} vertices by "
+                    f"{shape.displacements.shape} displacements, required as many"
+                )
+        if len(set(self.shape_names)) != len(self.shapes):
+            raise InputError(
+                f"two blendshapes have one name among {shortened(', '.join(self.shape_names))}; rename one"
+            )
+
+    @property
+    def shape_names(self) -> tuple[str, ...]:
+        """The names of the blendshapes, in order."""
+        return tuple(shape.name for shape in self.shapes)
+
+    def shaped(self, weights: Mapping[str, float]) -> NDArray[np.float64]:
+        """Return the vertices under weights of blendshapes [shape=(V, 3)]; shapes that are not named have weight 0.
+
+        Raises InputError: there is no blendshape of such a name.
+        """
+        unknown = sorted(set(weights) - set(self.shape_names))
+        if unknown:
+            raise InputError(
+                f"there is no blendshape {shortened(unknown[0])!r}, required one of "
+                f"{shortened(', '.join(self.shape_names)) or 'none: the mesh has no blendshapes'}"
+            )
+        vertices = self.vertices.copy()
+        for shape in self.shapes:
+            if weights.get(shape.name):
+                vertices[shape.rows] += weights[shape.name] * shape.displacements
+        return vertices
+
+    def displacements(self, rows: NDArray[np.int64], names: Sequence[str] | None = None) -> NDArray[np.float64]:
+        """Return how far blendshapes move the vertices ``rows`` [shape=(N,)] at weight 1 [shape=(S, N, 3)].
+
+        names : of blendshapes that it has; None: all of them
+        """
+        by_name = {shape.name: shape for shape in self.shapes}
+        shapes = self.shapes if names is None else [by_name[name] for name in names]
+        moved = np.zeros((len(shapes), len(rows), 3))
+        dense = np.zeros_like(self.vertices)
+        for shape, chosen in zip(shapes, moved, strict=True):
+            dense[shape.rows] = shape.displacements
+            chosen[:] = dense[rows]
+            dense[shape.rows] = 0.0
+        return moved
+
+    def part(self, name: str) -> MeshPart:
+        """Return a part by its name. Raises InputError: there is none of this name."""
+        found = next((part for part in self.parts if part.name == name), None)
+        if found is None:
+            names = ", ".join(part.name for part in self.parts)
+            raise InputError(f"there is no part {shortened(name)!r} in the mesh, required one of {shortened(names)}")
+        return found
+
+    def _check_parts(self) -> None:
+        edges = [0, *(part.stop for part in self.parts)]
+        if [part.first for part in self.parts] != edges[:-1] or edges[-1] != len(self.triangles):
+            raise InputError(f"the parts of the mesh end at {edges[1:]}, required ranges of {len(self.triangles)}")
+
+
+def joined(meshes: Mapping[str, Mesh]) -> Mesh:
+    """Return one mesh of several ones; each gives one part of its name, of the material of its first part.
+
+    Blendshapes of one name become one. Texture coordinates remain where one has some, and are 0 in the others; colours
+    remain where all have some.
+    """
+    offsets = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes.values())])
+    triangles = [mesh.triangles + offset for mesh, offset in zip(meshes.values(), offsets, strict=False)]
+    stops = np.cumsum([0, *(len(rows) for rows in triangles)])
+    parts = [
+        MeshPart(name, int(first), int(stop), mesh.parts[0].material)
+        for (name, mesh), first, stop in zip(meshes.items(), stops, stops[1:], strict=False)
+    ]
+    shapes: dict[str, list[tuple[NDArray[np.int64], NDArray[np.float64]]]] = {}
+    for mesh, offset in zip(meshes.values(), offsets, strict=False):
+        for shape in mesh.shapes:
+            shapes.setdefault(shape.name, []).append((shape.rows + offset, shape.displacements))
+    uv = [np.zeros((*mesh.triangles.shape, 2)) if mesh.uv is None else mesh.uv for mesh in meshes.values()]
+    mapped = any(mesh.uv is not None for mesh in meshes.values())
+    colours = [mesh.colours for mesh in meshes.values() if mesh.colours is not None]
+    return Mesh(
+        np.concatenate([mesh.vertices for mesh in meshes.values()]),
+        np.concatenate(triangles).astype(np.int32),
+        tuple(parts),
+        tuple(
+            Blendshape(name, np.concatenate([rows for rows, _ in moved]), np.concatenate([way for _, way in moved]))
+            for name, moved in shapes.items()
+        ),
+        np.concatenate(uv) if mapped else None,
+        np.concatenate(colours) if len(colours) == len(meshes) else None,
+    )
+
+
+def _check_places(what: str, values: NDArray[np.float64]) -> None:
+    if values.ndim != 2 or values.shape[1] != 3 or values.dtype != np.float64:
+        raise InputError(f"{what} have shape {values.shape} of {values.dtype}, required (N, 3) of float64")
+    if not np.isfinite(values).all():
+        raise InputError(f"{what} have values that are not finite; repair the mesh")
+
+
+def _check_rows(what: str, rows: NDArray[np.integer], vertices: int) -> None:
+    if rows.dtype.kind not in "iu":
+        raise InputError(f"{what} count vertices in {rows.dtype}, required whole numbers")
+    if rows.size and not 0 <= rows.min() <= rows.max() < vertices:
+        raise InputError(f"{what} name vertices {rows.min()} to {rows.max()}, required 0 to {vertices - 1}")

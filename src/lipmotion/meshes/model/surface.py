@@ -1,0 +1,122 @@
+"""The surface of a mesh: vertices that are one place, pieces that hang together, distances along the surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components, dijkstra
+
+from lipmotion.meshes.model.mesh import Mesh
+
+Rows = NDArray[np.int64]
+
+SAME_PLACE = 1e-5
+"""Vertices closer than this share of the size of the mesh are one place: files split vertices along seams of
+textures."""
+SAME_WAY = 1e-3
+"""They must be moved alike by all blendshapes, to this share of the largest displacement: lips that touch are not."""
+SAME_SIDE = -0.2
+"""Their normals must not point apart (cosine): so lips that touch remain apart in a mesh without blendshapes."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeshSurface:
+    """How the vertices of a mesh hang together.
+
+    places  : the place of every vertex; vertices that files split share one [shape=(V,)]
+    edges   : lengths of the edges between places, a symmetric sparse matrix [shape=(P, P)]
+    pieces  : the piece of the surface that each vertex belongs to [shape=(V,)]
+    normals : unit normals of the vertices [shape=(V, 3)]; 0 where no triangle is
+    """
+
+    places: Rows
+    edges: csr_array
+    pieces: Rows
+    normals: NDArray[np.float64]
+
+    def distances(self, sources: Rows, limit: float) -> NDArray[np.float64]:
+        """Return the distance along edges from each source vertex to every vertex [shape=(len(sources), V)].
+
+        limit : beyond this distance, in the unit of the mesh, infinity is returned
+        """
+        return self.place_distances(sources, limit)[:, self.places]
+
+    def place_distances(self, sources: Rows, limit: float) -> NDArray[np.float64]:
+        """Return the distance along edges from each source vertex to every place [shape=(len(sources), P)].
+
+        limit : as of ``distances``
+        Cost: O(N · P' log P') for N sources and the P' places within the limit.
+        """
+        return np.asarray(dijkstra(self.edges, directed=False, indices=self.places[sources], limit=limit))
+
+
+def mesh_surface(mesh: Mesh, split: NDArray[np.bool_] | None = None) -> MeshSurface:
+    """Return how the vertices of a mesh hang together.
+
+    split : vertices that are places of their own, even where others are at the same place, as along closed lips that no
+            blendshape opens [shape=(V,)]; None: none
+    """
+    normals = vertex_normals(mesh.vertices, mesh.triangles)
+    places = _places(mesh, normals)
+    if split is not None:
+        places = np.unique(np.where(split, len(places) + np.arange(len(places)), places), return_inverse=True)[1]
+        places = places.reshape(-1).astype(np.int64)
+    triangles = places[mesh.triangles]
+    count = int(places.max(initial=-1)) + 1
+    low, high = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1).T
+    pairs = np.stack(np.divmod(np.unique((low * count + high)[low != high]), max(count, 1)), axis=1)
+    first = np.zeros(count, np.int64)
+    first[places[::-1]] = np.arange(len(places))[::-1]
+    lengths = np.linalg.norm(mesh.vertices[first[pairs[:, 0]]] - mesh.vertices[first[pairs[:, 1]]], axis=1)
+    lengths = np.maximum(lengths, 1e-12)  # an edge of length 0 would be none
+    edges = csr_array((lengths, (pairs[:, 0], pairs[:, 1])), shape=(len(first), len(first)))
+    edges = edges + edges.T
+    _, pieces = connected_components(edges, directed=False)
+    return MeshSurface(places, edges, pieces[places].astype(np.int64), normals)
+
+
+def vertex_normals(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.float64]:
+    """Return unit normals [shape=(V, 3)], means of those of the triangles weighted by their areas.
+
+    vertices : [shape=(V, 3)]; triangles : [shape=(F, 3)]; vertices without a triangle have the normal 0
+    """
+    corners = vertices[triangles]
+    faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = np.stack(
+        [np.bincount(triangles.reshape(-1), np.repeat(faces[:, axis], 3), len(vertices)) for axis in range(3)], axis=1
+    )
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    return normals / np.where(lengths > 0, lengths, 1.0)
+
+
+def _places(mesh: Mesh, normals: NDArray[np.float64]) -> Rows:
+    """Return the number of each vertex's place: the same for vertices at one place that move alike and face alike."""
+    size = float(np.ptp(mesh.vertices, axis=0).max(initial=0.0)) or 1.0
+    keys = [np.rint(mesh.vertices / (SAME_PLACE * size)), *_movements(mesh)]
+    together = np.zeros(len(mesh.vertices), np.int64)
+    for column in np.concatenate(keys, axis=1).T:  # one after another: many times faster than rows at once
+        _, ranks = np.unique(column, return_inverse=True)
+        _, together = np.unique(together * (int(ranks.max(initial=0)) + 1) + ranks.reshape(-1), return_inverse=True)
+        together = together.reshape(-1)
+    # of the vertices of one place, those that face apart from the first one are another place
+    first = np.full(int(together.max(initial=-1)) + 1, -1, np.int64)
+    first[together[::-1]] = np.arange(len(together))[::-1]
+    apart = np.einsum("ij,ij->i", normals, normals[first[together]]) < SAME_SIDE
+    _, places = np.unique(2 * together + apart, return_inverse=True)
+    return places.reshape(-1).astype(np.int64)
+
+
+def _movements(mesh: Mesh) -> list[NDArray[np.float64]]:
+    """Return two numbers of each vertex that differ where blendshapes move vertices differently [shape=(V, 2)]."""
+    if not mesh.shapes:
+        return []
+    sums = np.zeros((len(mesh.vertices), 2))
+    weights = np.random.default_rng(0).normal(size=(len(mesh.shapes), 3, 2))
+    largest = 0.0
+    for shape, weight in zip(mesh.shapes, weights, strict=True):
+        sums[shape.rows] += shape.displacements @ weight
+        largest = max(largest, float(np.abs(shape.displacements).max(initial=0.0)))
+    return [np.rint(sums / (SAME_WAY * (largest or 1.0)))]

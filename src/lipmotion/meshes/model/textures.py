@@ -1,0 +1,206 @@
+"""Textures: pictures that lie on surfaces, and all of them with their reductions in one table."""
+
+from __future__ import annotations
+
+import io
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion.meshes.model.limits import Budget
+
+if TYPE_CHECKING:
+    from PIL import Image
+
+MOST_BYTES = 400_000_000
+"""Most bytes that decoding a picture may take: a larger one is not looked at."""
+MOST_SCANS = 100
+"""Most passes over a JPEG; each takes as long as a picture."""
+DIRECT = {"RGB", "L"}
+"""Modes of pictures that are reduced as they are; all others get an opacity first."""
+PICTURES = ("PNG", "JPEG", "WEBP")
+WIDEST = 1024
+"""Textures are reduced to this many pixels across: a head of 720 rows shows no more."""
+FULL = 65535
+
+
+Extremes = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+
+@dataclass(frozen=True, eq=False)
+class Texture:
+    """A picture on a surface.
+
+    pixels : red, green and blue as sRGB, and opacity, 0 to 255; the first row is at the top [shape=(H, W, 4)]
+    Raises InputError: another shape or type, or no pixels.
+    """
+
+    pixels: NDArray[np.uint8]
+
+    def __post_init__(self) -> None:
+        shape = self.pixels.shape
+        if self.pixels.dtype != np.uint8 or len(shape) != 3 or shape[2] != 4 or not self.pixels.size:
+            raise InputError(f"a texture has shape {shape} of {self.pixels.dtype}, required (H, W, 4) of uint8")
+
+    def range_of_opacity(
+        self, low: NDArray[np.float64], high: NDArray[np.float64], reach: NDArray[np.int64]
+    ) -> Extremes:
+        """Return the least and the largest opacity in boxes of the texture, 0 to 1 [shape=(N,), both].
+
+        low, high : corners of the boxes, v downwards [shape=(N, 2)]
+        reach     : pixels around them that count [shape=(N,)]
+        Boxes that lead over an edge of the texture get 0 and 1.
+        """
+        size = np.array(self.pixels.shape[1::-1])
+        shift = np.floor(low)
+        first = np.floor((low - shift) * size).astype(np.int64) - reach[:, None]
+        last = np.ceil((high - shift) * size).astype(np.int64) + reach[:, None]
+        inside = (first >= 0).all(axis=1) & (last <= size).all(axis=1)
+        least, most = np.zeros(len(low)), np.ones(len(low))
+        (x0, y0), (x1, y1) = first[inside].T, last[inside].T
+        count = (x1 - x0) * (y1 - y0)
+        for levels, result, solid in (((250, 242, 128), least, True), ((2, 13, 128), most, False)):
+            for level in levels[::-1]:  # the strictest one last
+                marked = self.pixels[..., 3] >= level if solid else self.pixels[..., 3] < level
+                table = np.pad(np.cumsum(np.cumsum(marked, axis=0, dtype=np.int64), axis=1), ((1, 0), (1, 0)))
+                all_of_it = table[y1, x1] - table[y0, x1] - table[y1, x0] + table[y0, x0] == count
+                rows = np.flatnonzero(inside)[all_of_it]
+                result[rows] = level / 255
+        return least, most
+
+    def at(self, uv: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the nearest pixels at some places, 0 to 1 [shape=(N, 4)].
+
+        uv : places, v downwards, repeated beyond 0 to 1 [shape=(N, 2)]
+        """
+        height, width = self.pixels.shape[:2]
+        at = uv % 1.0 * (width, height)
+        column = np.minimum(at[:, 0].astype(int), width - 1)
+        row = np.minimum(at[:, 1].astype(int), height - 1)
+        return np.asarray(self.pixels[row, column] / 255.0)
+
+
+def read_texture(content: bytes | memoryview, budget: Budget | None = None) -> Texture | None:
+    """Return the texture in the bytes of a picture, reduced to ``WIDEST`` pixels across.
+
+    budget : counts its pixels before they are decoded; None: of this picture alone
+    None: the picture is damaged, too large, or of another format than PNG, JPEG and WebP.
+    Raises InputError: with those that were read before, there are too many pixels.
+    """
+    from PIL import Image
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            with Image.open(io.BytesIO(content), formats=PICTURES) as picture:
+                pixels = picture.width * picture.height
+                picture.draft("RGB", (WIDEST, WIDEST))
+                if _bytes_to_decode(picture, pixels) > MOST_BYTES or _scans(picture, content) > MOST_SCANS:
+                    return None
+                (budget or Budget()).spend("pixels of pictures", pixels)
+                small = picture if _is_direct(picture) else picture.convert("RGBA")
+                small.thumbnail((WIDEST, WIDEST))
+                return Texture(np.asarray(small.convert("RGBA")))
+    except InputError:
+        raise
+    except (OSError, ValueError, SyntaxError, MemoryError, Image.DecompressionBombError):
+        return None
+
+
+def _is_direct(picture: Image.Image) -> bool:
+    return picture.mode in DIRECT and "transparency" not in picture.info
+
+
+def _scans(picture: Image.Image, content: bytes | memoryview) -> int:
+    return bytes(content).count(b"\xff\xda") if picture.format == "JPEG" else 1
+
+
+def _bytes_to_decode(picture: Image.Image, pixels: int) -> int:
+    """Return about how many bytes it takes to decode and to reduce a picture that is open.
+
+    pixels : in the file; those of the picture are fewer where a JPEG is reduced as it is decoded
+    """
+    if picture.format == "WEBP":
+        return 20 * pixels
+    coefficients = 2 * len(picture.getbands()) * pixels if "progressive" in picture.info else 0
+    return coefficients + (4 if _is_direct(picture) else 9) * picture.width * picture.height
+
+
+@dataclass(frozen=True, eq=False)
+class TextureTable:
+    """Some textures, each reduced by half again and again, down to one pixel, in one array.
+
+    texels : reflected light and opacity, 0 to 65535 [shape=(N, 4)]
+    levels : first texel, width and height of every reduction [shape=(L, 3)]
+    first  : the row of ``levels`` that is each texture in full; the following rows are its reductions
+    """
+
+    texels: NDArray[np.uint16]
+    levels: NDArray[np.int64]
+    first: tuple[int, ...]
+
+    def level(self, texture: int, in_texture: NDArray[np.float64], on_screen: NDArray[np.float64]) -> NDArray[np.int32]:
+        """Return the row of ``levels`` that suits triangles: about one of its pixels to a pixel of the screen.
+
+        texture    : its number
+        in_texture : areas of the triangles, as parts of the texture's [shape=(F,)]
+        on_screen  : their areas in pixels of the screen [shape=(F,)]
+        """
+        first = self.first[texture]
+        last = (*self.first, len(self.levels))[texture + 1] - 1
+        pixels = in_texture * float(self.levels[first, 1] * self.levels[first, 2])
+        halvings = 0.5 * np.log2(np.maximum(pixels, 1e-12) / np.maximum(on_screen, 1e-12))
+        return (first + np.clip(np.rint(halvings), 0, last - first)).astype(np.int32)
+
+
+def texture_table(textures: Sequence[Texture]) -> TextureTable:
+    """Return textures with their reductions; each pixel of a reduction is the mean of four, weighted by opacity."""
+    texels: list[NDArray[np.uint16]] = []
+    levels: list[tuple[int, int, int]] = []
+    first: list[int] = []
+    count = 0
+    for texture in textures:
+        first.append(len(levels))
+        image = _reflected(texture.pixels)
+        while True:
+            height, width = image.shape[:2]
+            levels.append((count, width, height))
+            texels.append(np.rint(FULL * image).astype(np.uint16).reshape(-1, 4))
+            count += height * width
+            if height == width == 1:
+                break
+            image = _halved(image)
+    if not levels:
+        texels, levels = [np.full((1, 4), FULL, np.uint16)], [(0, 1, 1)]
+    return TextureTable(np.concatenate(texels), np.array(levels, np.int64), tuple(first))
+
+
+def _reflected(pixels: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """Return sRGB as reflected light, and opacity, 0 to 1 [shape=(H, W, 4)]."""
+    grey = np.arange(256) / 255
+    table = np.where(grey <= 0.04045, grey / 12.92, ((grey + 0.055) / 1.055) ** 2.4).astype(np.float32)
+    image = table[pixels]
+    image[..., 3] = pixels[..., 3] / np.float32(255)
+    return image
+
+
+def _halved(image: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return a picture of half the height and width, at least 1 [shape=(max(H // 2, 1), max(W // 2, 1), 4)]."""
+    height, width = (max(size // 2, 1) for size in image.shape[:2])
+    weighted = image.copy()
+    weighted[..., :3] *= image[..., 3:]
+    total, plain = np.zeros((height, width, 4), np.float32), np.zeros((height, width, 3), np.float32)
+    for row in range(min(2, image.shape[0])):
+        for column in range(min(2, image.shape[1])):
+            window = slice(row, row + 2 * height - 1, 2), slice(column, column + 2 * width - 1, 2)
+            total += weighted[window]
+            plain += image[window][..., :3]
+    parts = min(2, image.shape[0]) * min(2, image.shape[1])
+    alpha = total[..., 3:] / parts
+    colour = np.where(alpha > 0, total[..., :3] / np.maximum(total[..., 3:], 1e-6), plain / parts)
+    return np.concatenate([np.minimum(colour, 1), alpha], axis=2)

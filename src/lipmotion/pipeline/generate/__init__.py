@@ -1,0 +1,1 @@
+"""Understood speech, or text, to motion."""

@@ -1,0 +1,163 @@
+"""Explanations of frames: ``explain(speech, at=…) → explanations``, and their text and JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from textwrap import wrap
+from typing import Any
+
+from lipmotion.engines.base import Explains, explain_by_trace
+from lipmotion.errors import InputError
+from lipmotion.kernels.threads import one_thread
+from lipmotion.pipeline.generate.generation_for import explanation_for, generate_for
+from lipmotion.pipeline.generate.transfer import person_of
+from lipmotion.pipeline.model import Model, load_model
+from lipmotion.pipeline.understand.request import SpeechInput, request_of
+from lipmotion.pipeline.understand.understood_speech import audio_of, understand
+from lipmotion.printable import printable
+from lipmotion.speech.features.mfcc import frame_count
+from lipmotion.types import (
+    FRAME_RATE_HZ,
+    ChainStates,
+    ChannelValue,
+    DominantGaussian,
+    Explanation,
+    NamedProbability,
+    RegressedMean,
+    frame_of,
+)
+
+LINE = 110
+"""Width of the text of a row, without its name, in characters."""
+SHOWN = 6
+"""Largest number of channels in a text; points are left out if there are other channels."""
+
+
+@one_thread()
+def explain(
+    speech: SpeechInput,
+    *,
+    at: float | Sequence[float],
+    model: Model | str | Path | None = None,
+    transcript: str | Path | None = None,
+) -> tuple[Explanation, ...]:
+    """Return what determined some frames of the motion that ``animate`` generates for the same speech.
+
+    speech, transcript : as of ``animate``
+    at    : one or several times, in seconds; the nearest 10 ms frame of each is explained
+    model : from ``load_model``, or the path of a model file; None: the shipped model
+    Raises InputError: a time lies outside the recording; else as ``animate``.
+    Raises AlignmentError: the transcript cannot be aligned with the recording.
+
+    >>> import lipmotion
+    >>> first, second = lipmotion.explain("examples/welcome.flac", at=[0.0, 1.0])
+    >>> first.state, second.frame
+    ('rest', 100)
+    """
+    chosen = model if isinstance(model, Model) else load_model(model)
+    request = request_of(speech, transcript)
+    audio = audio_of(request)
+    times = [at] if isinstance(at, int | float) else at
+    count = frame_count(audio.samples)
+    frames = [_frame(time_s, count) for time_s in times]
+    person = person_of(chosen, request)
+    understood = understand(chosen, replace(request, recording=audio))
+    if isinstance(chosen.engine, Explains):
+        explained = chosen.engine.explain(chosen.learned, understood, frames)
+        return tuple(explanation_for(person, explanation, understood) for explanation in explained)
+    generation = generate_for(person, chosen.engine, chosen.learned, understood)
+    return tuple(explain_by_trace(generation, frame) for frame in frames)
+
+
+def _frame(time_s: float, frames: int) -> int:
+    """Return the frame nearest to a time. Raises InputError: the time lies outside the recording."""
+    frame = frame_of(time_s, frames, FRAME_RATE_HZ)
+    if frame is None:
+        raise InputError(f"{time_s} s lies outside the recording (0 to {(frames - 1) / FRAME_RATE_HZ:.2f} s)")
+    return frame
+
+
+def explanation_document(explanation: Explanation) -> dict[str, Any]:
+    """Return an explanation as an object of JSON (docs/explain.md)."""
+    document = asdict(explanation)
+    for written, chain in zip(document["chains"], explanation.chains, strict=True):
+        if chain.lead:
+            written["expected_lead"] = chain.expected_lead
+    return document
+
+
+def explanation_text(explanation: Explanation) -> str:
+    """Return an explanation as lines of text for people to read."""
+    rows = list(_rows(explanation))
+    width = max(len(name) for name, _ in rows) + 2
+    lines = [f"{explanation.time_s:.2f} s (frame {explanation.frame})"]
+    for name, text in rows:
+        first, *others = wrap(text, LINE, break_long_words=False, break_on_hyphens=False) or [""]
+        lines += [f"  {name:{width}}{first}", *(f"  {'':{width}}{other}" for other in others)]
+    return "\n".join(map(printable, lines))
+
+
+def _rows(explanation: Explanation) -> Iterator[tuple[str, str]]:
+    yield "phone", _phone(explanation)
+    yield "state", explanation.state
+    for number, chain in enumerate(explanation.chains):
+        yield f"chain {number + 1}: {chain.name}", _listed(chain.states)
+    if explanation.joint is not None and len(explanation.chains) > 1:
+        yield "together", _listed([explanation.joint])
+    for chain in explanation.chains:
+        if chain.lead:
+            yield "asynchrony", _lead(chain, explanation.chains[0].name)
+    for gaussian in explanation.gaussians:
+        yield f"Gaussian of {gaussian.stream}", _gaussian(gaussian)
+        yield from _values(gaussian.channels)
+    for regression in explanation.regressions:
+        yield f"mean of {regression.stream}", _regression(regression)
+        yield from _values(regression.channels)
+    values = _values(explanation.motion)
+    yield "generated", next(values)[1]
+    yield from values
+
+
+def _phone(explanation: Explanation) -> str:
+    span = explanation.span
+    if span is None:
+        return "none"
+    word = f" in {span.label.word!r}" if span.label.word else ""
+    phone = span.label.phone or "not known"
+    return f"{phone}{word}, {span.start_s:.2f} to {span.end_s:.2f} s, modelled by {span.label.unit}"
+
+
+def _listed(probabilities: Sequence[NamedProbability]) -> str:
+    return "   ".join(f"{item.name} {item.probability:.2f}" for item in probabilities)
+
+
+def _lead(chain: ChainStates, first: str) -> str:
+    shares = "   ".join(
+        f"{states:+d}: {share:.2f}" if states else f"0: {share:.2f}" for states, share in chain.lead.items()
+    )
+    side = "ahead of" if chain.expected_lead >= 0 else "behind"
+    return f"{chain.name} {abs(chain.expected_lead):.2f} states {side} {first}   ({shares})"
+
+
+def _gaussian(gaussian: DominantGaussian) -> str:
+    number = f" number {gaussian.component} of {gaussian.components}" if gaussian.components > 1 else ""
+    distance = f", {gaussian.distance:.2f} deviations away" if gaussian.distance is not None else ""
+    return f"{gaussian.density}{number}, responsible for {gaussian.responsibility:.2f}{distance}"
+
+
+def _regression(regression: RegressedMean) -> str:
+    if regression.shares[0].name == "rest":
+        return "the rest pose: silence away from speech"
+    return f"regression on the acoustic features and posteriors around the frame: {_listed(regression.shares)}"
+
+
+def _values(channels: Mapping[str, ChannelValue]) -> Iterator[tuple[str, str]]:
+    names = [name for name in channels if name[:2] not in ("x_", "y_", "z_")] or list(channels)
+    for start in range(0, min(len(names), SHOWN), 3):
+        shown = names[start : min(start + 3, SHOWN)]
+        text = "   ".join(f"{name} {channels[name].value:6.3f} ± {channels[name].deviation:.3f}" for name in shown)
+        yield "", text
+    if len(channels) > min(len(names), SHOWN):
+        yield "", f"and {len(channels) - min(len(names), SHOWN)} more channels (--json has all)"

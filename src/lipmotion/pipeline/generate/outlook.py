@@ -1,0 +1,46 @@
+"""What to expect of generated motion: how well a model knows a voice and its words, and what would help most."""
+
+from __future__ import annotations
+
+from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.understand.understood_speech import UnderstoodSpeech
+from lipmotion.speech.recognition.agreement import LEAST_FITTING_SHARE
+from lipmotion.speech.recognition.recognised_speech import CONFIDENCES, NOISY_DB
+from lipmotion.speech.recognition.recogniser import FULL_WEIGHT_SCORE, own_model_weight
+from lipmotion.types import Outlook
+
+TRANSCRIPT = "the words that are spoken (--transcript)"
+OWN_MODEL = "recordings of this person (lipmotion adapt for the sound alone, lipmotion train with video)"
+WHOLE_TRANSCRIPT = "a transcript of all that is said, and of nothing else"
+LESS_NOISE = "a recording with less noise"
+
+
+def outlook_of(request: SpeechRequest, understood: UnderstoodSpeech) -> Outlook:
+    """Return what to expect of the motion of some speech."""
+    found, speech = understood.recognition, understood.speech
+    if understood.is_without_speech:
+        return Outlook("no speech", 0.0, None, understood.range_db, ())
+    if found is None:
+        words = "given units" if request.units is not None else "transcript" if speech.units_known else "own model"
+        share = understood.fit.share if understood.fit else 1.0
+        return Outlook(words, share, 1.0 if words == "own model" else None, understood.range_db, _advice(understood))
+    words = "words" if found.word_s > found.phone_s else "phones"
+    voice = own_model_weight(found.similarity) if found.similarity is not None else None
+    confidence = (found.confidence or 0.0) * found.word_s / max(found.word_s + found.phone_s, 1e-9)
+    return Outlook(words, confidence, voice, understood.range_db, _advice(understood))
+
+
+def _advice(understood: UnderstoodSpeech) -> tuple[str, ...]:
+    """Return what would help, the most helpful first."""
+    found, advice = understood.recognition, []
+    if found is not None:
+        if found.reliability < 1:
+            advice.append(TRANSCRIPT)
+        if found.similarity is None or found.similarity < FULL_WEIGHT_SCORE:
+            advice.append(OWN_MODEL)
+    if understood.range_db < NOISY_DB:
+        unsure = found is None or (found.confidence or 0.0) < CONFIDENCES[0]
+        advice.insert(0 if unsure else len(advice), LESS_NOISE)
+    if understood.fit is not None and understood.fit.share < LEAST_FITTING_SHARE:
+        advice.insert(0, WHOLE_TRANSCRIPT)
+    return tuple(advice)

@@ -1,0 +1,57 @@
+"""Posterior probabilities of the chains of a model over time, and their picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from lipmotion.engines import ENGINES
+from lipmotion.engines.base import HasPosteriors
+from lipmotion.errors import ExportError, InputError
+from lipmotion.kernels.threads import one_thread
+from lipmotion.pipeline.generate.animate import generation_of
+from lipmotion.pipeline.generate.transfer import person_of
+from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.understand.request import SpeechInput, request_of
+from lipmotion.pipeline.understand.understood_speech import understood_speech
+from lipmotion.storage.files import check_target, whole_file
+from lipmotion.types import ChainPosteriors, Generation
+
+SUFFIX = ".png"
+
+
+@one_thread()
+def animate_with_posteriors(speech: SpeechInput, *, model: Model) -> tuple[Generation, tuple[ChainPosteriors, ...]]:
+    """Return generated motion as ``animate`` does, and the posterior probabilities of every chain of the model.
+
+    Raises InputError: as ``animate``, or the model's engine has no chains of states.
+    """
+    engine, learned = model.engine, model.learned
+    if not isinstance(engine, HasPosteriors):
+        having = [name for name in ENGINES.names if hasattr(ENGINES.load(name), "posteriors")]
+        raise InputError(
+            f"the engine {engine.name!r} has no chains of states whose posteriors could be shown; give a model that "
+            f"was trained with --engine {' or '.join(having)}"
+        )
+    request = request_of(speech)
+    person = person_of(model, request)
+    understood = understood_speech(model, request)
+    return generation_of(request, person, model, understood), engine.posteriors(learned, understood.speech)
+
+
+def check_picture(path: Path, speech: Path | None = None) -> None:
+    """Raise ExportError if a picture cannot be written to a path."""
+    if path.suffix.lower() != SUFFIX:
+        raise ExportError(f"{path}: unknown format {path.suffix!r}; required: {SUFFIX}")
+    check_target(path, speech)
+
+
+def write_posteriors(path: Path, generation: Generation, posteriors: tuple[ChainPosteriors, ...]) -> None:
+    """Write a picture of the posterior probabilities of chains over time (docs/explain.md).
+
+    Raises ExportError: another suffix, or the file cannot be written.
+    """
+    from lipmotion.export.posterior_plot import draw_posteriors
+
+    check_picture(path)
+    with whole_file(path) as unfinished:
+        draw_posteriors(generation, posteriors).save(unfinished, optimize=True)

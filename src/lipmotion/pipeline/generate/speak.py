@@ -1,0 +1,186 @@
+"""Text to sound and motion: ``speak(text) → sound, generation``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.articulation.pauses import REST
+from lipmotion.corpora.entry import quantise
+from lipmotion.corpora.store import Corpus
+from lipmotion.errors import InputError
+from lipmotion.kernels.threads import one_thread
+from lipmotion.pipeline.generate.animate import animate
+from lipmotion.pipeline.generate.corpus_voice import speak_from_corpus
+from lipmotion.pipeline.generate.generation_for import speaker_map
+from lipmotion.pipeline.model import Model, load_model
+from lipmotion.pipeline.understand.request import Onto, SpeechRequest
+from lipmotion.speech.recognition.recogniser import SHORT_PAUSE_S
+from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
+from lipmotion.speech.sound.resampling import at_speech_rate
+from lipmotion.speech.voices.installed import default_voice, voice_named, voiced_sentences
+from lipmotion.speech.voices.synthesiser import SyntheticVoice
+from lipmotion.storage.files import read_text_file
+from lipmotion.types import Audio, Constraints, Span, SpokenText, Timeline, Unit
+from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent
+from lipmotion.units.sentences import MOST_CHARACTERS, sentences_of
+
+CORPUS_VOICE = "corpus"
+"""The name of the voice that is a corpus."""
+REST_S = 0.25
+"""Silence before the first and after the last sound."""
+FLOOR_DB = 50.0
+"""Noise under the speech, in decibels of what lies under 8 kHz, as in training: a synthesiser's silence has no sound at
+all, which would shift features that are normalised over the recording. The sound that is returned has it, too: what
+the model hears is what a ``.wav`` of it holds, so that its motion is generated again from that file and the phones."""
+AT_ONCE = 20
+"""Sentences that one run of a synthesiser speaks; only their files are on the disk at a time."""
+BLOCK = 1 << 20
+"""Samples of noise that are drawn at a time."""
+_Part = tuple[int, NDArray[np.float32]]
+LARGEST_TEXT = 4 * MOST_CHARACTERS
+"""Most bytes of a text file: a character takes up to four."""
+
+
+@one_thread()
+def speak(
+    text: str,
+    *,
+    voice: str | SyntheticVoice | None = None,
+    corpus: Corpus | None = None,
+    model: Model | str | Path | None = None,
+    constraints: Constraints | None = None,
+    lexicon: Lexicon | None = None,
+    speaker: str = "",
+    onto: Onto | None = None,
+    onto_speaker: str = "",
+    pauses: str = REST,
+    asymmetry: float = 0.0,
+) -> SpokenText:
+    """Return a text as sound of a synthetic voice, and the lip motion for it, with 0.25 s of rest at both ends.
+
+    text        : one sentence or many, at most 50,000 characters; the synthesiser reads numbers and abbreviations
+    voice       : ``flite:slt``, ``espeak-ng:de``, or a name alone where only one synthesiser has it; None: the first of
+                  ``DEFAULT_VOICES`` that is installed; ``corpus``: the recordings of ``corpus``
+    corpus      : the corpus that a model of unit selection was trained on, for the voice ``corpus``
+    model       : from ``load_model``, or the path of a model file; None: the shipped model
+    constraints : values that the motion must take exactly, in the units of the speaker
+    lexicon     : pronunciations of English words; they tell which vowels are reduced, not how the voice says the words
+    speaker     : whose motion is generated, of the people whom the model was trained on; empty: the mean person
+    onto, onto_speaker, pauses, asymmetry : as of ``SpeechRequest``
+    The phones and their times are the synthesiser's, so nothing is recognised. The sound is one of 16 bits, at the
+    synthesiser's rate or 16 kHz if that is less; ``animate`` of a ``.wav`` or ``.flac`` of it, with the units, returns
+    the same motion.
+    Raises MissingDependencyError: no synthesiser is installed, or not the one that was asked for.
+    Raises InputError: no such voice or speaker, or a text that is too long, has no word, or cannot be spoken.
+
+    >>> import lipmotion
+    >>> sound, result = lipmotion.speak("Please speak.")  # doctest: +SKIP
+    >>> lipmotion.write(result, ["hello.mp4", "hello.wav"], speech=sound)  # doctest: +SKIP
+    """
+    if voice == CORPUS_VOICE or corpus is not None:
+        if voice != CORPUS_VOICE or corpus is None:
+            raise InputError("a corpus that speaks needs both: the voice 'corpus', and the corpus (--corpus FOLDER)")
+        if onto is not None:
+            raise InputError("a corpus speaks with the motion that was recorded; it is not mapped onto another person")
+        loaded = model if isinstance(model, Model) else load_model(model)
+        return speak_from_corpus(
+            text,
+            corpus,
+            loaded,
+            constraints=constraints,
+            lexicon=lexicon,
+            speaker=speaker,
+            pauses=pauses,
+            asymmetry=asymmetry,
+        )
+    sentences = sentences_of(text)
+    chosen = voice_named(voice) if isinstance(voice, str) else voice or default_voice()
+    loaded = model if isinstance(model, Model) else load_model(model)
+    speaker_map(loaded.speakers, speaker)  # an unknown one is reported before anything is spoken
+    sound, units = _said(sentences, chosen, lexicon)
+    sound = quantise(_with_floor(sound, units))
+    request = SpeechRequest(
+        at_speech_rate(sound),
+        units=units,
+        speaker=speaker,
+        onto=onto,
+        onto_speaker=onto_speaker,
+        pauses=pauses,
+        asymmetry=asymmetry,
+    )
+    return SpokenText(sound, animate(request, model=loaded, constraints=constraints))
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a UTF-8 file. Raises InputError: no such file, too large, or not UTF-8."""
+    return read_text_file(path, "text", LARGEST_TEXT)
+
+
+def _said(sentences: Sequence[str], voice: SyntheticVoice, lexicon: Lexicon | None) -> tuple[Audio, Timeline[Unit]]:
+    """Return sentences one after the other, at the synthesiser's rate or 16 kHz, and their phones in time."""
+    sounds: list[_Part] = []
+    spans: list[Span[Unit]] = []
+    rate_hz, at = SPEECH_RATE_HZ, 0
+    for start in range(0, len(sentences), AT_ONCE):
+        with closing(voiced_sentences(sentences[start : start + AT_ONCE], voice, lexicon)) as said:
+            for sentence in said:
+                sound = sentence.own_sound()
+                sound = sentence.audio if sound.rate_hz < SPEECH_RATE_HZ else sound
+                if not spans:
+                    rate_hz = sound.rate_hz
+                    at = _rest_samples(sentence.units[0], rate_hz)
+                sounds.append((at, sound.samples))
+                spans += sentence.units.shifted(at / rate_hz)
+                at += len(sound.samples)
+    count = at + _rest_samples(spans[-1], rate_hz)
+    return Audio(_placed(sounds, count), rate_hz), Timeline(tuple(_joined(spans, count / rate_hz)))
+
+
+def _rest_samples(edge: Span[Unit], rate_hz: int) -> int:
+    """Return how many samples a first or last span lacks to ``REST_S`` of silence."""
+    rest_s = REST_S - (edge.duration_s if is_silent(edge.label.phone) else 0.0)
+    return max(round(rest_s * rate_hz), 0)
+
+
+def _placed(parts: list[_Part], count: int) -> NDArray[np.float32]:
+    """Return parts of sound as one sound [shape=(count,)], silent between them; the list is empty afterwards."""
+    samples = np.zeros(count, np.float32)
+    while parts:
+        first, part = parts.pop()
+        samples[first : first + len(part)] = part[: max(count - first, 0)]
+    return samples
+
+
+def _with_floor(speech: Audio, units: Timeline[Unit]) -> Audio:
+    """Return speech with white noise ``FLOOR_DB`` under its phones; the samples are changed in place."""
+    samples, rate_hz = speech.samples, speech.rate_hz
+    spoken = [span for span in units if not is_silent(span.label.phone)]
+    slices = [samples[round(span.start_s * rate_hz) : round(span.end_s * rate_hz)] for span in spoken]
+    power = sum(float(part @ part) for part in slices) / max(sum(map(len, slices)), 1)
+    gain = np.float32(np.sqrt(power * rate_hz / SPEECH_RATE_HZ) * 10 ** (-FLOOR_DB / 20))
+    rng = np.random.default_rng(0)
+    for start in range(0, len(samples), BLOCK):
+        part = samples[start : start + BLOCK]
+        part += gain * rng.standard_normal(len(part), np.float32)
+    return speech
+
+
+def _joined(spans: Sequence[Span[Unit]], duration_s: float) -> Iterator[Span[Unit]]:
+    """Yield phones from 0 s to the end of the sound, every gap and every row of silences as one silence."""
+    now_s, last_s = 0.0, 0.0  # where the silence begins, and where the next phone
+    for span in spans:
+        if is_silent(span.label.phone):
+            continue
+        last_s = max(span.start_s, now_s)
+        if last_s - now_s > 1e-6:
+            inside = now_s > 0 and last_s - now_s < SHORT_PAUSE_S
+            yield Span(now_s, last_s, Unit(PAUSE if inside else SILENCE))
+        now_s = min(max(span.end_s, last_s), duration_s)
+        yield Span(min(last_s, now_s), now_s, span.label)
+    if duration_s > now_s:
+        yield Span(now_s, duration_s, Unit(SILENCE))

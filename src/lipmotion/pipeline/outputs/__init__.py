@@ -1,0 +1,1 @@
+"""Motion to what files, videos and scenes hold."""

@@ -1,0 +1,110 @@
+"""Mouth shapes for 2D animation: ``cues(generation) → cue sheet``; cue sheets to files: ``write_cues``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from lipmotion.articulation.delivery import Delivery, moved_in_time
+from lipmotion.errors import ExportError, InputError
+from lipmotion.export.cues import CUE_FORMATS, OPTIONAL, CueSheet, choose_cues, format_of, write_cue_file
+from lipmotion.meshes.fitting.blendshape_motion import with_mouth
+from lipmotion.storage.files import as_text, check_distinct, check_target
+from lipmotion.types import Generation
+
+FASTEST_FPS = 60.0
+"""Largest frame rate: times in cue files are in hundredths of a second, and two frames must not share one."""
+
+
+def cues(
+    generation: Generation,
+    *,
+    fps: float = 24.0,
+    hold_frames: int | None = None,
+    shapes: str = OPTIONAL,
+    delivery: Delivery | None = None,
+) -> CueSheet:
+    """Return the mouth shapes of generated motion for 2D animation, each held for a least number of frames.
+
+    generation  : from ``animate``; without a channel ``opening``, shapes are chosen from the phones alone
+    fps         : frames per second of the animation, 1 to 60
+    hold_frames : smallest number of frames of a shape; None: as many as last two frames at 24 frames per second
+    shapes      : the optional shapes among ``G``, ``H`` and ``X`` that the character has, besides A to F
+    delivery    : intensity, anticipation and offset of the shapes, and the least time of each (docs/controls.md); of
+                  this and ``hold_frames`` the longer one counts. None: as generated
+    Raises InputError: an argument out of its range.
+    Raises ExportError: the generation has no phones, or has values that are not finite.
+
+    >>> import lipmotion
+    >>> sheet = lipmotion.cues(lipmotion.animate("examples/welcome.flac"))
+    >>> sheet.cues[0]
+    Span(start_s=0.0, end_s=0.5, label='X')
+    """
+    check_cue_options(fps, hold_frames, shapes)
+    if len(generation.motion.values) and not len(generation.units):
+        raise ExportError("the generation has no phones, and cues need them; use one of lipmotion.animate")
+    if not np.isfinite(generation.motion.values).all():
+        raise ExportError("the motion has values that are not finite; interpolate them first")
+    chosen = delivery or Delivery()
+    if chosen.hold_ms:
+        hold_frames = max(hold_frames or 1, chosen.hold_frames(fps))
+    generation = replace(generation, motion=with_mouth(generation.motion))
+    return choose_cues(moved_in_time(generation, chosen), fps, hold_frames, shapes, intensity=chosen.intensity)
+
+
+def write_cues(
+    sheet: CueSheet, outputs: str | Path | Sequence[str | Path], *, speech: str | Path = "", form: str | None = None
+) -> None:
+    """Write a cue sheet to one or several files, each in the format of its suffix.
+
+    sheet   : from ``cues``
+    outputs : paths of files: ``.tsv``, ``.xml``, ``.json`` (formats of Rhubarb), ``.dat`` (Moho) or ``.pgo`` (Papagayo)
+    speech  : the recording that was animated; ``.xml`` and ``.json`` files name it
+    form    : ``tsv``, ``xml``, ``json``, ``dat`` or ``pgo``: the format of all files; None: that of the suffix
+    Raises ExportError: unknown format, no such folder, or a file that cannot be written.
+    Formats and folders are checked before the first file is written.
+
+    >>> import lipmotion, tempfile
+    >>> from pathlib import Path
+    >>> sheet = lipmotion.cues(lipmotion.animate("examples/welcome.flac"))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     lipmotion.write_cues(sheet, Path(folder) / "welcome.tsv")
+    ...     print((Path(folder) / "welcome.tsv").read_text().splitlines()[0].split())
+    ['0.00', 'X']
+    """
+    paths = [Path(output) for output in ([outputs] if isinstance(outputs, str | Path) else outputs)]
+    check_cue_outputs(paths, speech, form)
+    for path in paths:
+        write_cue_file(path, sheet, as_text(speech), form or format_of(path))
+
+
+def cue_text(sheet: CueSheet, *, speech: str | Path = "", form: str = "tsv") -> str:
+    """Return the text of the file that ``write_cues`` would write.
+
+    speech : the recording that was animated;  form : ``tsv``, ``xml``, ``json``, ``dat`` or ``pgo``
+    """
+    return CUE_FORMATS[form](sheet, as_text(speech))
+
+
+def check_cue_options(fps: float, hold_frames: int | None, shapes: str) -> None:
+    """Raise InputError if an argument of ``cues`` is out of its range."""
+    if not 1 <= fps <= FASTEST_FPS:
+        raise InputError(f"the frame rate is {fps}, required 1 to {FASTEST_FPS:.0f} a second")
+    if hold_frames is not None and hold_frames < 1:
+        raise InputError(f"the hold is {hold_frames} frames, required 1 or more")
+    if set(shapes) - set(OPTIONAL):
+        raise InputError(f"the optional shapes are {shapes!r}, required letters out of {OPTIONAL!r}, or none")
+
+
+def check_cue_outputs(outputs: Sequence[Path], speech: str | Path, form: str | None) -> None:
+    """Raise ExportError if an output of ``write_cues`` cannot be written."""
+    if form is not None and form not in CUE_FORMATS:
+        raise ExportError(f"unknown cue format {form!r}; required one of: {' '.join(CUE_FORMATS)}")
+    check_distinct(outputs)
+    for path in outputs:
+        if form is None:
+            format_of(path)
+        check_target(path, speech or None)

@@ -1,0 +1,136 @@
+"""Motion for characters: weights of blendshapes, visemes, MPEG-4 parameters, controls of a user's rig."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from lipmotion.articulation.mouth import spoken_mouth
+from lipmotion.errors import InputError
+from lipmotion.faces.base import Staging
+from lipmotion.meshes.files.rig_tables import read_rig_table, rig_motion
+from lipmotion.meshes.fitting.blendshape_motion import with_mouth
+from lipmotion.meshes.fitting.driven import DrivenCharacter
+from lipmotion.meshes.fitting.facial_animation import fap_motion
+from lipmotion.meshes.fitting.reference_mouth import arkit_mouth
+from lipmotion.meshes.fitting.shape_weights import shape_weights
+from lipmotion.meshes.fitting.visemes import viseme_motion
+from lipmotion.pipeline.outputs.living_curves import living_curves
+from lipmotion.storage.files import whole_file
+from lipmotion.types import Generation, Motion, Prosody, Timeline, Unit
+
+ARKIT, WHOLE_FACE = "arkit", "face"
+SHAPE_SETS = (ARKIT, WHOLE_FACE, "visemes", "fap")
+"""Sets of curves that need no mesh: ARKit's blendshapes of the mouth, the same with eyes, brows and head (which move on
+their own), the 15 visemes of Oculus and OpenXR, and MPEG-4's facial animation parameters of lips and jaw."""
+
+
+def check_curve_set(curves: str | Path) -> None:
+    """Raise InputError unless there is such a set of curves, or such a table of a rig, for ``curves_of``."""
+    if Path(curves).suffix.lower() == ".csv":
+        read_rig_table(Path(curves))
+    elif curves not in SHAPE_SETS:
+        raise InputError(f"no set of curves {str(curves)!r}, required one of {', '.join(SHAPE_SETS)}, or a FILE.csv")
+
+
+def curves_of(
+    motion: Motion,
+    units: Timeline[Unit],
+    curves: str | Path | DrivenCharacter,
+    *,
+    staging: Staging | None = None,
+    prosody: Prosody | None = None,
+) -> Motion:
+    """Return motion as curves that drive a character.
+
+    Motion of blendshapes keeps its weights.
+    curves : ``arkit``, ``face``, ``visemes``, ``fap``, a table of a rig's controls (``.csv``), or a character with
+             blendshapes
+    staging, prosody : of the eyes, brows and head of ``face``, as of ``living_curves``
+    Raises InputError: no such set or file, the character has no blendshapes, or the motion has no channel ``opening``.
+    """
+    if isinstance(curves, DrivenCharacter):
+        return curves.weights(motion, units)
+    check_curve_set(curves)
+    if curves == ARKIT:
+        return shape_weights(motion, units, arkit_mouth())
+    motion = with_mouth(motion)
+    if curves == WHOLE_FACE:
+        return beside(curves_of(motion, units, ARKIT), living_curves(motion, units, staging, prosody))
+    if curves == "visemes":
+        return viseme_motion(units, spoken_mouth(motion, units))
+    if curves == "fap":
+        return fap_motion(motion, units)
+    rows = read_rig_table(Path(curves))
+    sets = [motion, curves_of(motion, units, ARKIT), curves_of(motion, units, "visemes")]
+    if not all(row.source in {"", *(name for each in sets for name in each.names)} for row in rows):
+        sets.append(living_curves(motion, units, staging, prosody))
+    sources = {name: each[name].astype(np.float64) for each in sets for name in each.names}
+    return rig_motion(rows, sources, motion.rate_hz)
+
+
+def beside(first: Motion, second: Motion) -> Motion:
+    """Return two motions of the same frames as one, the channels of the first one before those of the second one.
+
+    Raises InputError: other numbers of frames, or a channel that both have.
+    """
+    if len(first.values) != len(second.values):
+        raise InputError(f"motions have {len(first.values)} and {len(second.values)} frames, required the same number")
+    return Motion(
+        np.concatenate([first.values, second.values], axis=1), first.rate_hz, first.channels + second.channels
+    )
+
+
+def with_curves(
+    generation: Generation,
+    curves: str | Path | DrivenCharacter,
+    *,
+    staging: Staging | None = None,
+    prosody: Prosody | None = None,
+) -> tuple[Generation, tuple[str, ...]]:
+    """Return a generation with the channels of ``curves_of`` after its own, and the names of those channels.
+
+    Channels that the motion has already are replaced. The variance of all channels of ``curves_of`` is 0.
+    Raises InputError: as ``curves_of``.
+    """
+    added = curves_of(generation.motion, generation.units, curves, staging=staging, prosody=prosody)
+    kept = [name for name in generation.motion.names if name not in added.names]
+    if len(kept) < len(generation.motion.names):
+        generation = generation.selected(kept)
+    motion = generation.motion
+    both = beside(motion, added)
+    variance = np.pad(generation.variance, ((0, 0), (0, len(added.channels))))
+    return replace(generation, motion=both, spread=variance), added.names
+
+
+def write_picture(path: Path, character: DrivenCharacter) -> None:
+    """Write a picture of a character at rest as PNG. Raises ExportError: it cannot be written."""
+    from PIL import Image
+
+    from lipmotion.faces.mesh import HEIGHT, WIDTH, MeshStage
+
+    picture = MeshStage(character, WIDTH, HEIGHT).picture(character.mesh.vertices)
+    with whole_file(path) as unfinished:
+        Image.fromarray(picture).save(unfinished, format="PNG")
+
+
+def described(character: DrivenCharacter) -> Iterator[str]:
+    """Yield what was found in a character's files, line by line."""
+    mesh, placement = character.mesh, character.placement
+    parts = ", ".join(part.name or "(no name)" for part in mesh.parts)
+    yield f"{'vertices':14} {len(mesh.vertices)}, triangles {len(mesh.triangles)}"
+    yield f"{'parts':14} {parts}"
+    yield f"{'blendshapes':14} {len(mesh.shapes)}"
+    yield f"{'eye distance':14} {placement.scale:.6g} units of the mesh, by the width of the mouth"
+    if character.shapes is not None:
+        named = zip(character.shapes.names, character.shapes.known, strict=True)
+        listed = ", ".join(name if known in {"", name} else f"{name} = {known}" for name, known in named)
+        yield f"{'moved by':14} {character.shapes.style}: {listed}"
+        widest = int(character.shapes.gap.argmax())
+        opens = f"{character.shapes.names[widest]} opens the lips by {character.shapes.gap[widest]:.3g} eye distances"
+        yield f"{'opening':14} {opens}"
+    elif character.binding is not None:
+        yield f"{'moved by':14} {len(placement.points)} control points, {len(character.binding.rows)} vertices follow"

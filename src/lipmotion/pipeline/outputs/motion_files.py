@@ -1,0 +1,168 @@
+"""What a motion file holds: the channels that were asked for, or the curves of its format."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from lipmotion.articulation.contact import in_pictures
+from lipmotion.articulation.mouth import spoken_mouth
+from lipmotion.errors import ExportError
+from lipmotion.export.base import motion_format, motion_suffix
+from lipmotion.faces.base import Staging
+from lipmotion.meshes.files.rig_tables import CONTROL
+from lipmotion.meshes.fitting.blendshape_motion import with_mouth
+from lipmotion.meshes.fitting.facial_animation import FAP
+from lipmotion.meshes.model.shape_names import arkit_name
+from lipmotion.pipeline.outputs.curve_sets import ARKIT, WHOLE_FACE, beside, curves_of
+from lipmotion.pipeline.outputs.living_curves import RADIAN, living_curves
+from lipmotion.speech.sound.audio_files import stated_length_s
+from lipmotion.types import WEIGHT, Channel, Generation, Motion, Prosody
+
+LOG = logging.getLogger("lipmotion")
+CURVES = (WEIGHT, CONTROL, RADIAN)
+"""The units of curves that drive a character."""
+MODEL_HZ = 100
+"""Frames per second of generated motion."""
+SAME_HZ = 1e-6
+OPENING = "opening"
+
+
+def in_format(
+    path: Path,
+    generation: Generation,
+    chosen: Generation,
+    rate_hz: float | None,
+    staging: Staging | None = None,
+    prosody: Prosody | None = None,
+    channels: Sequence[str] | None = None,
+) -> Generation:
+    """Return a generation as a motion file of that name holds it.
+
+    chosen  : the generation with the channels, and at the rate, that the user asked for: what most formats hold
+    rate_hz : the rate that the user asked for; None: that of the format for motion at the model's rate, else its own
+    staging, prosody : of what moves on its own, in formats that hold a whole face; None: everything moves; not known
+    channels : those that the user asked for by name: of a format's own curves only these are held, if any of them is
+               one; None: all
+    Where the lips close between two frames of curves, the nearer one shows it. Blendshapes that the motion has
+    already, by any spelling of ARKit's names, are taken as they are.
+    Raises ExportError: unknown suffix. Raises InputError: curves that cannot be computed.
+    """
+    form = motion_format(path)
+    held = chosen
+    others = form.other_curves and all(channel.unit in CURVES for channel in held.motion.channels)
+    if form.curves and not others:
+        curves = _curves(generation, form.curves, staging, prosody)
+        held = replace(generation, motion=curves, spread=np.zeros(curves.values.shape))
+        own = [name for name in channels or () if name in curves.names]
+        held = held.selected(own) if own else held
+    elif form.mouth and OPENING not in held.motion.names:
+        held = generation
+    hertz = rate_hz or (form.rate_hz if abs(generation.motion.rate_hz - MODEL_HZ) < SAME_HZ else None)
+    if hertz is None or abs(hertz - held.motion.rate_hz) < SAME_HZ:
+        return held
+    if held is chosen or held is generation:
+        return held.resampled(hertz)
+    return resampled_curves(held, generation, hertz)
+
+
+def resampled_curves(held: Generation, generation: Generation, rate_hz: float) -> Generation:
+    """Return curves at another rate, in whose frames the lips touch as in pictures of the motion at that rate.
+
+    held       : the curves;  generation : the motion that they are of, with as many frames
+    """
+    resampled, shown = held.resampled(rate_hz), with_mouth(generation.motion)
+    if OPENING not in shown.names or len(held.motion.values) != len(shown.values):
+        return resampled
+    contact = spoken_mouth(shown, generation.units).contact
+    rows = in_pictures(held.motion.values.astype(np.float64), contact, held.motion.rate_hz, resampled.motion.time_s)
+    return replace(resampled, motion=replace(resampled.motion, values=rows))
+
+
+def warn_of_unused(path: Path, held: Generation, asked: Sequence[str]) -> None:
+    """Log a warning if a motion file holds none of the channels that were asked for: its format says what it holds.
+
+    asked : the channels, or the curves, that the user named
+    """
+    names = held.motion.names
+    replaced = motion_format(path).mouth and OPENING in names and OPENING not in asked
+    if asked and (replaced or not {*asked} & {*names}):
+        kind = motion_suffix(path)
+        LOG.warning("%s: %s holds channels of its own, none of those that were asked for", path.name, kind)
+
+
+def check_length(path: Path, speech: Path, rate_hz: float | None, later_s: float = 0.0) -> None:
+    """Raise ExportError if a motion file has no room for all frames of a recording, by the length that this states.
+
+    rate_hz : the rate that the user asked for; None: that of the format, or else ``MODEL_HZ``
+    later_s : how much later than the recording the motion ends, by its offset; negative: earlier
+    """
+    form = motion_format(path)
+    if form.most_frames is None:
+        return
+    frames = int((stated_length_s(speech) + later_s) * (rate_hz or form.rate_hz or MODEL_HZ))
+    if frames > form.most_frames + MODEL_HZ:  # a second less may be said than stated
+        kind = motion_suffix(path)
+        required = f"required at most {form.most_frames} in {kind}; give a lower --rate"
+        raise ExportError(f"{path}: about {frames} frames, {required}")
+
+
+def needs_prosody(path: Path) -> bool:
+    """Return whether a motion file of that name holds movements that follow loudness and pitch."""
+    return bool(motion_suffix(path)) and motion_format(path).curves == WHOLE_FACE
+
+
+def _curves(generation: Generation, name: str, staging: Staging | None, prosody: Prosody | None) -> Motion:
+    """Return a set of curves, with those that the motion has already."""
+    motion, units = generation.motion, generation.units
+    own = _held_already(motion, name)
+    if own is None:
+        return curves_of(motion, units, name, staging=staging, prosody=prosody)
+    if name in (ARKIT, WHOLE_FACE):
+        own = _closed(own, curves_of(own, units, ARKIT))
+    if name != WHOLE_FACE:
+        return own
+    living = living_curves(with_mouth(motion), units, staging, prosody)
+    added = [column for column, name in enumerate(living.names) if name not in own.names]
+    channels = tuple(living.channels[column] for column in added)
+    return beside(own, Motion(living.values[:, added], motion.rate_hz, channels))
+
+
+def _closed(own: Motion, mouth: Motion) -> Motion:
+    """Return blendshapes with those of the mouth as another motion has them, and those that this one has in addition.
+
+    mouth : the same weights, but where lips close that would not (``shape_weights``)
+    """
+    curves = {name: own[name] for name in own.names}
+    curves |= {name: mouth[name] for name in mouth.names if name in curves or mouth[name].any()}
+    channels = {channel.name: channel for channel in (*mouth.channels, *own.channels)}
+    values = np.stack([curve.astype(np.float64) for curve in curves.values()], axis=1)
+    return Motion(values, own.rate_hz, tuple(channels[name] for name in curves))
+
+
+def _held_already(motion: Motion, curves: str) -> Motion | None:
+    """Return the channels of a motion that are curves of a set already; None: there are none."""
+    if curves in (ARKIT, WHOLE_FACE):
+        return _blendshapes(motion)
+    columns = [column for column, channel in enumerate(motion.channels) if channel.unit == curves == FAP]
+    if not columns:
+        return None
+    return Motion(motion.values[:, columns], motion.rate_hz, tuple(motion.channels[column] for column in columns))
+
+
+def _blendshapes(motion: Motion) -> Motion | None:
+    """Return the channels of a motion that are ARKit's blendshapes, by ARKit's names, and angles of head and eyes.
+
+    None: it has no jawOpen.
+    """
+    angles = {channel.name: channel.name for channel in motion.channels if channel.unit == RADIAN}
+    known = {angles.get(name) or arkit_name(name): n for n, name in reversed(list(enumerate(motion.names)))}
+    columns = [(name, column) for name, column in sorted(known.items(), key=lambda each: each[1]) if name]
+    if "jawOpen" not in known:
+        return None
+    channels = tuple(Channel(name, motion.channels[column].unit) for name, column in columns)
+    return Motion(motion.values[:, [column for _, column in columns]], motion.rate_hz, channels)

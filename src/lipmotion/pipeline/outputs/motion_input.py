@@ -1,0 +1,72 @@
+"""Motion from files, ready to be drawn and written again: edited curves, captures, what other programs exported."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from lipmotion.errors import InputError
+from lipmotion.export.base import read_motion
+from lipmotion.meshes.model.shape_names import is_known
+from lipmotion.pipeline.understand.given_units import read_units
+from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Generation, Motion, StateTrace
+
+LOG = logging.getLogger("lipmotion")
+TOLERATED_S = 0.1
+"""Sound and motion may differ so much in length without a warning."""
+SLOWEST_HZ, FASTEST_HZ = 1.0, 10_000.0
+"""Smallest and largest frame rate of motion that is read: a mistyped one must not fill the memory."""
+LONGEST_S = 86_400.0
+"""Longest motion that is read."""
+STATE = "file"
+"""The state of every frame of motion that was read."""
+
+
+def read_generation(path: str | Path, units: str | Path | None = None) -> Generation:
+    """Return the motion of a file as ``write`` takes it: with its phones, if it has them, and without variance.
+
+    path  : ``.json``, ``.csv``, ``.npz``, or another motion file that can be read
+    units : a file with phones in time (``read_units``), for motion files that have none; None: those of the motion file
+    Blendshapes, visemes and vowels count as weights, whatever unit the file gives them.
+    Raises InputError: a file that cannot be read, motion without frames, of an unlikely rate, or of more than a day.
+    """
+    motion, found = read_motion(path)
+    if not len(motion.values):
+        raise InputError(f"{path}: the motion has no frames; export it again")
+    if not SLOWEST_HZ <= motion.rate_hz <= FASTEST_HZ:
+        required = f"required {SLOWEST_HZ:.0f} to {FASTEST_HZ:.0f}; export it again"
+        raise InputError(f"{path}: {motion.rate_hz:g} frames a second, {required}")
+    lasts_s = (len(motion.values) - 1) / motion.rate_hz
+    if lasts_s > LONGEST_S:
+        raise InputError(f"{path}: the motion lasts {lasts_s:.0f} s, required at most {LONGEST_S:.0f}; cut it")
+    phones = found if units is None else read_units(units)
+    channels = tuple(
+        Channel(each.name, WEIGHT) if each.unit == EYE_DISTANCE and is_known(each.name) else each
+        for each in motion.channels
+    )
+    states = np.zeros(len(motion.values), np.intp)
+    nothing = np.broadcast_to(0.0, motion.values.shape)
+    return Generation(replace(motion, channels=channels), nothing, phones, StateTrace((STATE,), states))
+
+
+def as_long_as(generation: Generation, duration_s: float) -> Generation:
+    """Return a generation that lasts as long as its sound: the last pose stays, or the rest is cut.
+
+    A difference of more than ``TOLERATED_S`` is logged as a warning.
+    """
+    motion = generation.motion
+    lasts_s = (len(motion.values) - 1) / motion.rate_hz
+    if abs(lasts_s - duration_s) > TOLERATED_S:
+        what = "the last pose stays" if lasts_s < duration_s else "what comes after the sound is left out"
+        LOG.warning("the motion lasts %.2f s, the sound %.2f s: %s", lasts_s, duration_s, what)
+    count = int(np.floor(duration_s * motion.rate_hz + 1e-6)) + 1
+    frames = np.minimum(np.arange(count), len(motion.values) - 1)
+    return replace(
+        generation,
+        motion=Motion(motion.values[frames], motion.rate_hz, motion.channels),
+        spread=np.broadcast_to(0.0, (count, len(motion.channels))),
+        trace=StateTrace(generation.trace.states, generation.trace.frames[frames]),
+    )

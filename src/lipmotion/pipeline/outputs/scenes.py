@@ -1,0 +1,167 @@
+"""Files for 3D programs: a character with its animation and a reference to the sound, as ``.glb`` or ``.usda``."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.articulation.contact import in_pictures
+from lipmotion.articulation.mouth import frame_times, spoken_mouth
+from lipmotion.faces.base import Staging
+from lipmotion.faces.mesh import MeshFace
+from lipmotion.meshes.files.gltf_animator import write_animated_gltf
+from lipmotion.meshes.files.gltf_writer import write_gltf_scene
+from lipmotion.meshes.files.usd_text import asset
+from lipmotion.meshes.files.usd_writer import write_usda
+from lipmotion.meshes.fitting.blendshape_motion import with_mouth
+from lipmotion.meshes.fitting.driven import DrivenCharacter
+from lipmotion.meshes.model.mesh import Blendshape
+from lipmotion.meshes.model.scene import HeadTurn, Scene
+from lipmotion.meshes.model.shape_names import by_arkit_name
+from lipmotion.pipeline.outputs.living_curves import living_curves
+from lipmotion.storage.files import as_text
+from lipmotion.types import Channel, Generation, Motion, Prosody
+from lipmotion.types.motion import WEIGHT
+
+GLTF, USD = ".glb", ".usda"
+SCENE_SUFFIXES = (GLTF, USD)
+KEPT = (GLTF, ".vrm")
+"""Suffixes of files of characters that are kept as they are, with an animation more."""
+METRES = 0.09
+"""The distance between the outer eye corners of the 3D head, in metres."""
+
+
+def is_scene(path: Path) -> bool:
+    """Return whether a path is that of a character with its animation."""
+    return path.suffix.lower() in SCENE_SUFFIXES
+
+
+def scene_of(
+    generation: Generation,
+    face: object,
+    rate_hz: float | None = None,
+    *,
+    staging: Staging | None = None,
+    prosody: Prosody | None = None,
+) -> Scene:
+    """Return the scene of a face: ``character_scene`` of a ``MeshFace``, or else ``head_scene``."""
+    if isinstance(face, MeshFace):
+        return character_scene(generation, face.character, rate_hz, staging=staging, prosody=prosody)
+    return head_scene(generation, rate_hz, staging=staging, prosody=prosody)
+
+
+def write_scene(path: Path, scene: Scene, sound: Path | None = None) -> None:
+    """Write a character with its animation as ``.glb`` or ``.usda``, by the suffix.
+
+    A ``.glb`` of a character from a ``.glb`` or ``.vrm`` is that file with one animation more, where that is possible.
+    sound : the file that is referred to, by its path from the folder of the output; None: none
+    Raises ExportError: the file cannot be written.
+    """
+    heard = replace(scene, sound="" if sound is None else sound_reference(sound, path))
+    if _keeps_original(path, heard):
+        return
+    if path.suffix.lower() == USD:
+        write_usda(path, heard)
+    else:
+        write_gltf_scene(path, heard)
+
+
+def _keeps_original(path: Path, scene: Scene) -> bool:
+    """Write the user's file with its animation, and return whether that was possible."""
+    if path.suffix.lower() != GLTF or scene.original is None or scene.original.suffix.lower() not in KEPT:
+        return False
+    return scene.weights is not None and write_animated_gltf(
+        path, scene.original, scene.weights, scene.sound, sound_s=scene.sound_s, stepped=scene.stepped
+    )
+
+
+def head_scene(
+    generation: Generation,
+    rate_hz: float | None = None,
+    *,
+    staging: Staging | None = None,
+    prosody: Prosody | None = None,
+) -> Scene:
+    """Return the 3D head of ``--face head`` with its animation: what its videos show, as weights of blendshapes.
+
+    rate_hz : keys a second; None: those of the motion
+    staging, prosody : as of videos; size and background do not count
+    The mesh is in metres. Raises InputError: the motion has no channel ``opening``.
+    """
+    from scipy.spatial.transform import Rotation
+
+    from lipmotion.faces.head.figure import PIVOT
+    from lipmotion.faces.head.performance import head_poses
+    from lipmotion.faces.head.shape_fit import mouth_weights
+    from lipmotion.faces.head.shapes import head_mesh
+    from lipmotion.faces.head.stage import figure
+    from lipmotion.faces.turning import turned
+
+    motion, hertz = generation.motion, rate_hz or generation.motion.rate_hz
+    poses = head_poses(motion, generation.units, hertz, staging, prosody)
+    character = figure()
+    mesh = head_mesh(character)
+    living = living_curves(motion, generation.units, staging, prosody, len(poses), hertz)
+    curves = mouth_weights(character, mesh, poses) | {name: living[name].astype(np.float64) for name in living.names}
+    names = [name for name in mesh.shape_names if name in curves]
+    weights = Motion(
+        np.stack([curves[name] for name in names], axis=1), hertz, tuple(Channel(name, WEIGHT) for name in names)
+    )
+    shapes = tuple(Blendshape(each.name, each.rows, METRES * each.displacements) for each in mesh.shapes)
+    scaled = replace(mesh, vertices=METRES * mesh.vertices, shapes=shapes)
+    rotations = Rotation.from_matrix(np.stack([turned(*pose.turn) for pose in poses])).as_quat()
+    turn = HeadTurn(METRES * PIVOT, character.turning(), _continued(rotations))
+    return Scene(scaled, weights, turn, split=False)
+
+
+def character_scene(
+    generation: Generation,
+    character: DrivenCharacter,
+    rate_hz: float | None = None,
+    *,
+    staging: Staging | None = None,
+    prosody: Prosody | None = None,
+) -> Scene:
+    """Return the user's own character with its animation; eyes and brows move where it has ARKit's blendshapes.
+
+    rate_hz : keys a second; None: those of the motion. A closure between two keys is at the nearer one
+    staging, prosody : seed, and what moves on its own
+    Raises InputError: the character has no blendshapes, or the motion has no channel ``opening``.
+    """
+    motion, units = generation.motion, generation.units
+    weights = character.weights(motion, units)
+    known = by_arkit_name(character.mesh.shape_names)
+    living = living_curves(with_mouth(motion), units, staging, prosody)
+    added = [name for name in living.names if name in known and known[name] not in weights.names]
+    table = np.concatenate([weights.values, *(living[name][:, None] for name in added)], axis=1)
+    channels = weights.channels + tuple(Channel(known[name], WEIGHT) for name in added)
+    hertz = rate_hz or motion.rate_hz
+    contact = spoken_mouth(with_mouth(motion), units).contact
+    rows = in_pictures(table, contact, motion.rate_hz, frame_times(len(table), motion.rate_hz, hertz))
+    return Scene(character.mesh, Motion(rows, hertz, channels), original=character.file)
+
+
+def _continued(rotations: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return unit quaternions, each with the sign that is nearer to the one before [shape=(T, 4)]."""
+    same = np.einsum("tq,tq->t", rotations[1:], rotations[:-1]) >= 0
+    signs = np.concatenate([[1.0], np.cumprod(np.where(same, 1.0, -1.0))])
+    return rotations * signs[:, None]
+
+
+def check_sound_name(path: Path, sound: Path) -> None:
+    """Raise ExportError if a scene cannot refer to a sound: its name holds what ``.usda`` cannot."""
+    if path.suffix.lower() == USD:
+        asset(sound_reference(sound, path))
+
+
+def sound_reference(sound: Path, path: Path) -> str:
+    """Return the path of a sound from the folder of another file, with slashes; on another drive its name alone."""
+    try:
+        relative = os.path.relpath(sound, path.parent)
+    except ValueError:
+        relative = sound.name
+    return as_text(relative.replace(os.sep, "/"))

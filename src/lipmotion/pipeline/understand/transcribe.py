@@ -1,0 +1,131 @@
+"""Phones in time of recordings: by forced alignment of a transcript, or by recognition."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from lipmotion.corpora.labels import check_plain_text, read_transcript
+from lipmotion.errors import shortened
+from lipmotion.hmm.loudness import loud_frames
+from lipmotion.speech.features.mfcc import LOG_ENERGY
+from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit, transcript_fit
+from lipmotion.speech.recognition.anchors import anchors_of, fitted
+from lipmotion.speech.recognition.recogniser import ENERGY_SMOOTHING_FRAMES, Recogniser
+from lipmotion.storage.files import read_text_file
+from lipmotion.types import Audio, Features, TimedTranscript, Timeline, Unit
+from lipmotion.units import Lexicon, check_words
+from lipmotion.units.length_limits import LARGEST_TRANSCRIPT
+
+__all__ = ["Transcription", "phones_in_time", "read_plain_text", "read_transcript", "transcribe", "warn_of_guesses"]
+LOG = logging.getLogger("lipmotion")
+MOST_WARNINGS = 20
+"""Largest number of guessed pronunciations that are reported one by one."""
+MOST_STRETCHES = 3
+"""Largest number of stretches without words that are named in one warning."""
+
+
+class Transcription(NamedTuple):
+    """Phones in time of a recording, and how well the transcript fits.
+
+    fit : None where there was no transcript, or it was not compared with the sound (general phone models are needed)
+    """
+
+    units: Timeline[Unit]
+    fit: TranscriptFit | None
+
+
+def transcribe(
+    phones: Recogniser,
+    audio: Audio,
+    features: Features,
+    words: Sequence[str] | TimedTranscript | None,
+    lexicon: Lexicon,
+) -> Transcription:
+    """Return the phones in time of a recording, with warnings for the user.
+
+    phones   : the recogniser
+    features : of the audio, from ``mfcc``
+    words    : the spoken words in lower case, also with times, within which they are aligned; or None
+    Warnings are logged for guessed pronunciations and, with general phone models, for words that do not agree with the
+    sound, and speech that the words leave out.
+    Raises AlignmentError: the words cannot be aligned with the recording.
+    """
+    if isinstance(words, TimedTranscript):
+        loud = loud_frames(features.values[:, LOG_ENERGY], ENERGY_SMOOTHING_FRAMES)
+        words = fitted(words, loud, audio.duration_s)
+    warn_of_guesses(words.words if isinstance(words, TimedTranscript) else words or (), lexicon)
+    units = phones_in_time(phones, audio, features, words, lexicon)
+    if words is None or phones.kind == "own":
+        return Transcription(units, None)
+    fit = transcript_fit(audio, units)
+    warn_of_misfit(fit)
+    return Transcription(units, fit)
+
+
+def phones_in_time(
+    phones: Recogniser,
+    audio: Audio,
+    features: Features,
+    words: Sequence[str] | TimedTranscript | None,
+    lexicon: Lexicon,
+) -> Timeline[Unit]:
+    """Return the phones in time of a recording as ``transcribe`` does, without warnings."""
+    if words is None:
+        return phones.recognise(audio, features)
+    anchors = None
+    if isinstance(words, TimedTranscript):
+        anchors, words = anchors_of(words) if words.has_times else None, words.words
+    check_words(words, audio.duration_s)
+    return phones.align(audio, features, words, lexicon, anchors)
+
+
+def read_plain_text(path: Path) -> str:
+    """Return the text of a file of words alone.
+
+    Raises InputError: no such file, larger than ``LARGEST_TRANSCRIPT``, not UTF-8 text, or labels in time.
+    """
+    text = read_text_file(path, "transcript", LARGEST_TRANSCRIPT)
+    check_plain_text(text, str(path))
+    return text
+
+
+def warn_of_misfit(fit: TranscriptFit) -> None:
+    """Log a warning if a transcript seems to be of something else, or to leave out speech."""
+    if fit.score < DOUBTFUL_SCORE:
+        LOG.warning(
+            "the transcript seems not to be what is said (its phones agree with the sound at %.1f, required %.1f or "
+            "more)%s; check it, or leave it out",
+            *(fit.score, DOUBTFUL_SCORE, f" or to leave out words {_places(fit)}" if fit.missing else ""),
+        )
+    elif fit.missing:
+        LOG.warning(
+            "the transcript seems to leave out words %s: the lips are wrong there; add the words, or leave the whole "
+            "transcript out",
+            _places(fit),
+        )
+
+
+def _places(fit: TranscriptFit) -> str:
+    """Return where words are missing, the longest stretches, and how much of the speech that is, for a message."""
+    longest = sorted(fit.missing, key=lambda stretch: stretch[0] - stretch[1])[:MOST_STRETCHES]
+    named = ", ".join(f"{start_s:.1f} to {end_s:.1f} s" for start_s, end_s in sorted(longest))
+    more = len(fit.missing) - MOST_STRETCHES
+    others = f" and at {more} more places" if more > 0 else ""
+    return f"at {named}{others} ({fit.missing_s:.1f} of {fit.speech_s:.1f} s of speech)"
+
+
+def warn_of_guesses(words: Sequence[str], lexicon: Lexicon) -> None:
+    """Log a warning for every word whose pronunciation is a guess; after ``MOST_WARNINGS``, for how many more."""
+    unknown = [word for word in dict.fromkeys(words) if not lexicon.known(word)]
+    for word in unknown[:MOST_WARNINGS]:
+        guessed = " ".join(lexicon.pronunciations(word)[0])
+        LOG.warning(
+            "%r is not in the dictionary; read as %r; a lexicon file can say better", *map(shortened, (word, guessed))
+        )
+    if len(unknown) > MOST_WARNINGS:
+        LOG.warning(
+            "%d more words are not in the dictionary; a lexicon file can say better", len(unknown) - MOST_WARNINGS
+        )

@@ -1,0 +1,283 @@
+"""Recordings to the input of engines: acoustic features, phones in time, F0."""
+
+from __future__ import annotations
+
+import logging
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from lipmotion.engines import Animator
+from lipmotion.engines.base import HearsConditions, RecognisesPhones, WantsF0
+from lipmotion.errors import AlignmentError, InputError
+from lipmotion.hmm.model import UnitHmm
+from lipmotion.pipeline.generate.prior import with_prior
+from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.understand.transcribe import read_transcript, transcribe
+from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
+from lipmotion.speech.features.f0 import log_f0
+from lipmotion.speech.features.speaker_similarity import speaker_similarity
+from lipmotion.speech.recognition.agreement import TranscriptFit
+from lipmotion.speech.recognition.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
+from lipmotion.speech.recognition.recognised_speech import Recognition, level_range_db
+from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, Recogniser, cached_recogniser, voice_knowledge
+from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ, read_audio
+from lipmotion.storage.sources import is_file
+from lipmotion.types import (
+    FRAME_RATE_HZ,
+    Audio,
+    Features,
+    Monitor,
+    ParallelMap,
+    Progress,
+    Speech,
+    TimedTranscript,
+    Timeline,
+    Unit,
+    silent_monitor,
+)
+from lipmotion.units import Lexicon, check_phones, check_text, is_silent, without_gaps, words_of
+
+ItemT = TypeVar("ItemT")
+ResultT = TypeVar("ResultT")
+
+LATE_S = 0.1
+"""Seconds by which given units may end after the sound; editing programs round times."""
+LATEST_S = 1e15
+"""Later units are refused: frames of such times cannot be counted."""
+LEAST_SPEECH_S = 0.2
+"""Less recognised speech than this is none: the edge of a tone or of noise, taken as a consonant."""
+WORDS = (0.2, 0.9)
+"""Shares of the work at which the recognition of words begins and ends, in reports."""
+LOG = logging.getLogger("lipmotion")
+
+
+@dataclass(frozen=True, eq=False)
+class UnderstoodSpeech:
+    """The speech of a recording as input of an engine, and what was recognised in it.
+
+    recognition : None where words or phones were given, or the engine's own model recognised the speaker
+    range_db    : decibels between the loud and the quiet moments of the recording
+    fit         : of the transcript; None where there was none, or it was not compared with the sound
+    """
+
+    speech: Speech
+    recognition: Recognition | None
+    range_db: float
+    fit: TranscriptFit | None = None
+
+    @property
+    def speech_s(self) -> float:
+        """Seconds of speech, by the phones in time."""
+        return sum(span.duration_s for span in self.speech.units if not is_silent(span.label.phone))
+
+    @property
+    def is_without_speech(self) -> bool:
+        """Whether no speech was recognised."""
+        return not self.speech.units_known and self.speech_s < LEAST_SPEECH_S
+
+
+def understand(model: Model, request: SpeechRequest, each: ParallelMap = map) -> Speech:
+    """Return the speech of a request as input of a model's engine: features, phones in time, and what else it needs.
+
+    each : applies a function to many items, perhaps in several processes
+    Raises InputError: the recording, the transcript or the units are not usable, or there is no such recogniser.
+    Raises AlignmentError: the transcript cannot be aligned with the recording.
+    """
+    return understood_speech(model, request, each).speech
+
+
+def understood_speech(
+    model: Model, request: SpeechRequest, each: ParallelMap = map, monitor: Monitor = silent_monitor
+) -> UnderstoodSpeech:
+    """Return the speech of a request as ``understand`` does, with what was recognised.
+
+    monitor : receives reports of the progress; the share is that of recognition, up to ``WORDS[1]``
+    """
+    monitor(Progress("reading the sound", 0, 1, 0.0))
+    audio = analysed(audio_of(request))
+    monitor(Progress("recognising phones", 0, 1, 0.02))
+    understood = _understood(model, request, audio, _reported(each, audio.duration_s, monitor))
+    if understood.is_without_speech:
+        LOG.warning("no speech found in the recording: the mouth rests; give a recording in which something is said")
+    speech, found = understood.speech, understood.recognition
+    voice = known_voice(model.phones, audio, speech, found, given=request.units is not None)
+    speech = replace(with_prior(model.prior, speech), voice=voice)
+    return replace(understood, speech=speech)
+
+
+def known_voice(
+    phones: UnitHmm, audio: Audio, speech: Speech, found: Recognition | None, *, given: bool = False
+) -> float:
+    """Return how well a model knows the voice of a recording, 0 to 1; 1 if its engine recognised the speaker.
+
+    phones : the model's own phone models
+    speech : of the recording
+    found  : what was recognised in it; None: words or phones were given, or the engine recognised the speaker
+    given  : whether the phones in time were given
+    """
+    recognised_by_engine = found is None and not given and not speech.units_known
+    if recognised_by_engine or not speech.features.values.any():
+        return 1.0
+    if found is not None and found.similarity is not None:
+        return voice_knowledge(found.similarity)
+    return voice_knowledge(speaker_similarity(phones, analysed(audio)).score)
+
+
+def _reported(each: ParallelMap, duration_s: float, monitor: Monitor) -> ParallelMap:
+    """Return a map over stretches of samples (16 bit, 16 kHz) that reports how far into the sound it is."""
+
+    def mapped(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
+        lengths_s: deque[float] = deque()
+
+        def measured() -> Iterator[ItemT]:
+            for item in items:
+                lengths_s.append(len(item) / 2 / SPEECH_RATE_HZ if isinstance(item, bytes) else 0.0)
+                yield item
+
+        done_s = 0.0
+        for result in each(function, measured()):
+            done_s += lengths_s.popleft()
+            share = WORDS[0] + (WORDS[1] - WORDS[0]) * min(done_s / duration_s, 1.0)
+            monitor(Progress("recognising words, seconds", int(done_s), int(duration_s), share))
+            yield result
+
+    return mapped
+
+
+def _understood(model: Model, request: SpeechRequest, audio: AnalysedAudio, each: ParallelMap) -> UnderstoodSpeech:
+    """Return the speech of a request, without what the model that this one stands on makes of it."""
+    kinds = (*RECOGNISER_KINDS, *INSTALLED_RECOGNISERS)
+    if request.recogniser not in kinds:
+        raise InputError(f"unknown recogniser {request.recogniser!r}; required one of: {', '.join(kinds)}")
+    range_db = level_range_db(audio.log_energy)
+    installed = request.recogniser in INSTALLED_RECOGNISERS
+    phones = cached_recogniser(model.phones, "auto" if installed else request.recogniser, model.adaptation)
+    if request.units is not None:
+        if request.transcript is not None:
+            LOG.warning("the transcript is not used: the units already say what is spoken; leave one of them out")
+        _check_units(request.units, audio.duration_s)
+        units = without_gaps(request.units, audio.duration_s)
+        return UnderstoodSpeech(speech_of(model.engine, audio, audio.mfcc(), units), None, range_db)
+    words = _words(request.transcript, audio.duration_s)
+    if installed and words is None:
+        words = recognise_words(audio, request.recogniser)
+    features = audio.mfcc()
+    if words is not None:
+        units, fit = transcribe(phones, audio, features, words, request.lexicon or Lexicon())
+        return UnderstoodSpeech(speech_of(model.engine, audio, features, units), None, range_db, fit)
+    found: list[Recognition] = []
+
+    def recognise() -> Recognition:
+        found.append(phones.recognition(audio, features, each))
+        return found[-1]
+
+    speech = recognised_speech(model.engine, model.learned, audio, features, phones, recognise)
+    return UnderstoodSpeech(speech, found[0] if found else None, range_db)
+
+
+def audio_of(request: SpeechRequest) -> Audio:
+    """Return the samples of a request's recording. Raises InputError: it cannot be read."""
+    recording = request.recording
+    if isinstance(recording, Audio):
+        return recording
+    if not isinstance(recording, str | Path):
+        kind = type(recording).__name__
+        raise InputError(f"the recording is a {kind}, required a path, or samples as lipmotion.Audio(samples, rate_hz)")
+    return read_audio(Path(recording))
+
+
+def speech_of(engine: Animator[Any], audio: Audio, features: Features, units: Timeline[Unit]) -> Speech:
+    """Return speech of features and phones in time, with F0 and spectrum of the recording if the engine needs them."""
+    f0 = log_f0(audio) if isinstance(engine, WantsF0) and engine.wants_f0 else None
+    hears = isinstance(engine, HearsConditions) and engine.conditions(np.inf)
+    spectrum = analysed(audio).spectrum if hears else None
+    return with_units(Speech(features, Timeline(()), f0, spectrum=spectrum), units)
+
+
+def with_units(speech: Speech, units: Timeline[Unit]) -> Speech:
+    """Return speech with other phones in time, which are known or recognised as their labels say.
+
+    Where only some of them are known, those of a user who corrected the others, ``confidence`` is one of each frame.
+    """
+    found = [span.label.confidence for span in units]
+    first = found[0] if found else None
+    if found.count(first) == len(found):
+        return replace(speech, units=units, units_known=first is None, confidence=1.0 if first is None else first)
+    confidence = np.ones(len(speech.features.values))
+    for span, sure in zip(units, found, strict=True):
+        frames = np.ceil(np.array([span.start_s, span.end_s]) * FRAME_RATE_HZ - 1e-6).astype(int)
+        confidence[slice(*np.clip(frames, 0, len(confidence)))] = 1.0 if sure is None else sure
+    return replace(speech, units=units, units_known=False, confidence=confidence)
+
+
+def recognised_with(units: Timeline[Unit], confidence: float) -> Timeline[Unit]:
+    """Return phones in time as recognised ones of a confidence."""
+    return Timeline(tuple(replace(span, label=replace(span.label, confidence=confidence)) for span in units))
+
+
+def recognised_speech(
+    engine: Animator[Any],
+    learned: Any,
+    audio: Audio,
+    features: Features,
+    phones: Recogniser,
+    recognise: Callable[[], Recognition],
+) -> Speech:
+    """Return the speech of a recording whose words are not known, with recognised phones in time.
+
+    learned   : the engine's model of motion
+    phones    : the recogniser
+    recognise : recognises phones in time, for speakers that the engine does not recognise itself
+    If the engine's own model recognises phones of this speaker, these are aligned by ``phones``, as the phones of the
+    training were; else the result of ``recognise`` is used.
+    """
+    speech = speech_of(engine, audio, features, Timeline(()))
+    recognised = None
+    if isinstance(engine, RecognisesPhones) and phones.kind not in ("general", "words"):
+        recognised = engine.recognise(learned, speech)
+    if recognised is not None:
+        try:
+            units = phones.align_phones(audio, features, recognised)
+            return with_units(speech, recognised_with(units, 0.0))
+        except AlignmentError:
+            pass
+    found = recognise()
+    return with_units(speech, recognised_with(found.units, found.reliability))
+
+
+def _words(
+    transcript: str | Path | TimedTranscript | None, duration_s: float
+) -> tuple[str, ...] | TimedTranscript | None:
+    """Return the words of a transcript. Raises AlignmentError: a text that is too long for the recording."""
+    text = read_transcript(transcript) if isinstance(transcript, Path) else transcript
+    if text is None or isinstance(text, TimedTranscript):
+        return text
+    if text is transcript and "." in text and not any(map(str.isspace, text)) and is_file(Path(text)):
+        raise InputError(f"the transcript {text!r} is the name of a file; give Path({text!r}), or the words themselves")
+    check_text(text, duration_s)
+    return words_of(text)
+
+
+def _check_units(units: Timeline[Unit], duration_s: float) -> None:
+    """Raise InputError if given units are empty or too many; log a warning if they end after the recording."""
+    if not len(units):
+        raise InputError(
+            "the units are an empty list (a .csv has none); give those of a .json, .npz or label file, or leave "
+            "them out"
+        )
+    check_phones(len(units), duration_s)
+    first_s, last_s, end_s = units[0].start_s, units[-1].start_s, units[-1].end_s
+    if not -LATEST_S <= first_s <= last_s <= LATEST_S or LATEST_S < end_s < np.inf:
+        raise InputError(f"the units last from {first_s} to {end_s} s, required times of this recording")
+    if duration_s + LATE_S < end_s < np.inf:
+        LOG.warning(
+            "the units go on to %.2f s, the recording ends at %.2f s: are they those of another recording?",
+            units[-1].end_s,
+            duration_s,
+        )

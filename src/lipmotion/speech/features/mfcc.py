@@ -1,0 +1,225 @@
+"""The acoustic front end of the papers: 12 MFCC and the log energy of every frame, their Δ and ΔΔ."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
+from lipmotion.types import ENERGY_FEATURE, FRAME_RATE_HZ, Audio, Features
+
+WINDOW = 400  # 25 ms
+HOP = 160  # 10 ms
+FFT_SIZE = 512
+FILTERS = 26
+CEPSTRA = 12
+FEATURES = 39
+"""12 cepstra and the log energy, their Δ and ΔΔ."""
+LOG_ENERGY = ENERGY_FEATURE
+"""The column of the features that holds the log energy."""
+LIFTER = 22
+PRE_EMPHASIS = 0.97
+DYNAMIC_RANGE = 1e-8
+"""Powers are floored this far below the loudest of the recording (80 dB): digital silence has a logarithm."""
+ROUNDING = 1e-5
+"""Features that deviate by less than this share of the largest log power are constant but for rounding. In silence and
+in a constant they deviate by up to 4e-7 of it, on every processor by another amount; in speech by 8e-4 or more."""
+LOUDEST = 1e6
+"""Samples beyond are damage, whatever their full scale was; their squares would not be finite."""
+KNEE_HZ = 6500.0
+"""Frequencies are warped in full up to here, or until they are as high as this."""
+BLOCK = 4096
+"""Frames transformed at a time: memory stays bounded for any length."""
+
+
+def mfcc(audio: Audio, warp: float = 1.0) -> Features:
+    """Return 39 normalised features of every frame: c1–c12, log energy, their Δ and ΔΔ.
+
+    warp : factor by which frequencies are stretched before the filters, to make vocal tracts of other lengths alike
+    Frame n is centred at n · 10 ms, the signal reflected at both ends: T = floor(duration · 100) + 1.
+    Mean and variance are normalised over the recording.
+    Raises InputError: the rate is not 16 kHz, the recording is shorter than one window, or not one channel of
+    finite samples.
+    Source: Xie & Liu 2007, §5.1; details in the project's conventions.
+    """
+    (features,) = mfcc_of_warps(audio, (warp,), log_energy(checked_samples(audio)))
+    return features
+
+
+def mfcc_of_warps(audio: Audio, warps: Sequence[float], energy: NDArray[np.float32]) -> list[Features]:
+    """Return the features of ``mfcc`` for every warp; the spectra are computed once for all of them.
+
+    energy : ``log_energy`` of the recording [shape=(T,)]
+    Raises InputError: as ``mfcc``.
+    """
+    log_powers = log_mels(checked_samples(audio), [_filters(warp) for warp in warps])
+    features = []
+    while log_powers:
+        cepstra, rounding = _cepstra(log_powers.pop(0))  # the log powers of a long recording are freed here
+        static = np.concatenate([cepstra, energy[:, None]], axis=1)
+        features.append(Features(normalised(_with_deltas(static), rounding), audio.duration_s))
+    return features
+
+
+def _cepstra(log_powers: NDArray[np.float32]) -> tuple[NDArray[np.float32], float]:
+    """Return c1–c12 [shape=(T, 12)] and the standard deviation up to which a feature is constant but for rounding.
+
+    log_powers : of the mel filters [shape=(T, 26)]
+    """
+    rounding = ROUNDING * max(float(log_powers.max()), -float(log_powers.min()))
+    return log_powers @ liftered_cosine(FILTERS, 1, CEPSTRA + 1), rounding
+
+
+def checked_samples(audio: Audio) -> NDArray[np.float32]:
+    """Return the samples of a recording [shape=(N,)]. Raises InputError: as ``mfcc`` says."""
+    if audio.rate_hz != SPEECH_RATE_HZ:
+        raise InputError(f"speech features need {SPEECH_RATE_HZ} Hz, found {audio.rate_hz} Hz; resample first")
+    if audio.samples.ndim != 1 or len(audio.samples) < WINDOW:
+        raise InputError(f"speech features need {WINDOW} samples of one channel, found shape {audio.samples.shape}")
+    peak = float(np.maximum(audio.samples.max(), -audio.samples.min()))  # no copy of an hour
+    if not peak < LOUDEST:
+        raise InputError(f"speech features need finite samples, full scale 1, found a peak of {peak:g}")
+    return audio.samples.astype(np.float32, copy=False)
+
+
+def _with_deltas(static: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return static features [shape=(T, D)] with their Δ and ΔΔ [shape=(T, 3·D)]."""
+    width = static.shape[1]
+    values = np.empty((len(static), 3 * width), np.float32)
+    values[:, :width] = static
+    for first in (width, 2 * width):
+        values[:, first : first + width] = regression_delta(values[:, first - width : first])
+    return values
+
+
+def regression_delta(values: NDArray[np.float32], reach: int = 2) -> NDArray[np.float32]:
+    """Return the slope of the regression line through ±``reach`` frames around every frame [shape=(T, D)].
+
+    values : [shape=(T, D)]; the first and the last frame are repeated beyond the ends
+    """
+    padded = np.pad(values, ((reach, reach), (0, 0)), mode="edge")
+    count = len(values)
+    slope = np.zeros_like(values)
+    for step in range(1, reach + 1):
+        rise = padded[reach + step : reach + step + count] - padded[reach - step : reach - step + count]
+        rise *= step
+        slope += rise
+    slope /= 2 * sum(step * step for step in range(1, reach + 1))
+    return slope
+
+
+def normalised(values: NDArray[np.float32], rounding: float) -> NDArray[np.float32]:
+    """Return the columns with mean 0 and standard deviation 1 [shape=(T, D)]; a constant column becomes exactly 0.
+
+    rounding : the standard deviation up to which a column is constant but for rounding
+    """
+    scaled = values - values.mean(axis=0, dtype=np.float64).astype(np.float32)
+    deviation = np.sqrt(np.square(scaled).mean(axis=0, dtype=np.float64))  # single precision loses count in an hour
+    moves = deviation > rounding
+    scaled /= np.where(moves, deviation, 1).astype(np.float32)
+    scaled[:, ~moves] = 0
+    return scaled
+
+
+def log_mel(samples: NDArray[np.float32], filters: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the log power in every filter, floored 80 dB under the loudest [shape=(T, F)].
+
+    filters : weights of the powers from 0 to 8 kHz [shape=(257, F)]
+    """
+    (log_powers,) = log_mels(samples, [filters])
+    return log_powers
+
+
+def log_mels(samples: NDArray[np.float32], filter_banks: Sequence[NDArray[np.float32]]) -> list[NDArray[np.float32]]:
+    """Return ``log_mel`` of every filter bank [each shape=(T, F)]; the spectra are computed once for all of them."""
+    window = np.hamming(WINDOW).astype(np.float32)
+    powers = [np.empty((frame_count(samples), filters.shape[1]), np.float32) for filters in filter_banks]
+    for block in _blocks(frame_count(samples)):
+        padded = _padded(samples, block)
+        emphasised = padded[1:] - np.float32(PRE_EMPHASIS) * padded[:-1]
+        spectrum = np.fft.rfft(_frames(emphasised) * window, FFT_SIZE)
+        power_spectrum = np.square(spectrum.real) + np.square(spectrum.imag)
+        for power, filters in zip(powers, filter_banks, strict=True):
+            power[block] = power_spectrum @ filters
+    return [_log_power(power) for power in powers]
+
+
+def log_energy(samples: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the logarithm of the energy around every frame, floored 80 dB under the loudest [shape=(T,)]."""
+    energy = np.empty(frame_count(samples), np.float32)
+    for block in _blocks(len(energy)):
+        energy[block] = np.square(_frames(_padded(samples, block)[1:])).sum(axis=1)
+    return _log_power(energy)
+
+
+def _padded(samples: NDArray[np.float32], block: slice) -> NDArray[np.float32]:
+    """Return the samples under a block of frames, and the one before; beyond both ends the signal is reflected."""
+    half = WINDOW // 2
+    first, last = block.start * HOP - half - 1, (block.stop - 1) * HOP + half
+    inside = samples[max(first, 0) : min(last, len(samples))]
+    return np.pad(inside, (max(-first, 0), max(last - len(samples), 0)), mode="reflect")
+
+
+def frame_count(samples: NDArray[np.float32]) -> int:
+    """Return the number of frames of a recording: T = floor(duration · 100) + 1."""
+    return int(len(samples) / SPEECH_RATE_HZ * FRAME_RATE_HZ + 1e-9) + 1
+
+
+def _blocks(frames: int) -> Iterator[slice]:
+    """Return slices of at most ``BLOCK`` frames that cover all frames in order."""
+    return (slice(start, min(start + BLOCK, frames)) for start in range(0, frames, BLOCK))
+
+
+def _frames(samples: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the windows of samples, one every 10 ms [shape=(n, 400)]; a view."""
+    return sliding_window_view(samples, WINDOW)[::HOP]
+
+
+def _log_power(power: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the natural logarithm of powers, floored 80 dB under the largest; it overwrites them."""
+    floor = np.float32(max(DYNAMIC_RANGE * float(power.max()), 1e-30))
+    log_power: NDArray[np.float32] = np.log(np.maximum(power, floor, out=power), out=power)
+    return log_power
+
+
+@cache
+def _filters(warp: float) -> NDArray[np.float32]:
+    """Return triangular filters, equally spaced in mel from 0 to 8 kHz, of warped frequencies [shape=(257, 26)]."""
+    bins = mel(warped(np.arange(FFT_SIZE // 2 + 1) * SPEECH_RATE_HZ / FFT_SIZE, warp))
+    edges = np.linspace(0, mel(np.array(SPEECH_RATE_HZ / 2)), FILTERS + 2)
+    return triangles(bins, edges).astype(np.float32)
+
+
+def triangles(bins: NDArray[np.floating[Any]], edges: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+    """Return triangular filters [shape=(bins, F)]: each rises from one edge [shape=(F + 2,)] to the next and falls
+    to the one after.
+    """
+    rising = (bins[:, None] - edges[:-2]) / (edges[1:-1] - edges[:-2])
+    falling = (edges[2:] - bins[:, None]) / (edges[2:] - edges[1:-1])
+    return np.maximum(0, np.minimum(rising, falling))
+
+
+def warped(hertz: NDArray[np.float64], warp: float) -> NDArray[np.float64]:
+    """Return stretched frequencies: by ``warp`` up to a knee, then a straight line to 8 kHz, which stays."""
+    knee, top = KNEE_HZ * min(1.0, 1 / warp), SPEECH_RATE_HZ / 2
+    return np.where(hertz <= knee, hertz * warp, warp * knee + (top - warp * knee) * (hertz - knee) / (top - knee))
+
+
+def mel(hertz: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return frequencies in mel."""
+    return 1127 * np.log1p(hertz / 700)
+
+
+@cache
+def liftered_cosine(filters: int, first: int, end: int) -> NDArray[np.float32]:
+    """Return the orthonormal DCT-II to cepstra ``first``..``end`` - 1, liftered [shape=(filters, end - first)]."""
+    order = np.arange(first, end)
+    basis = np.cos(np.pi * (np.arange(filters)[:, None] + 0.5) * order / filters) * np.sqrt(2 / filters)
+    basis /= np.where(order == 0, np.sqrt(2), 1)
+    return (basis * (1 + LIFTER / 2 * np.sin(np.pi * order / LIFTER))).astype(np.float32)

@@ -1,0 +1,41 @@
+"""The log mel spectrum of a recording, normalised: the input of acoustic networks."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.speech.features.mfcc import FFT_SIZE, checked_samples, log_mel, mel, triangles, warped
+from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
+from lipmotion.types import SPECTRUM_BANDS, Audio
+
+LOWEST_HZ, HIGHEST_HZ = 60.0, 7600.0
+DYNAMIC_RANGE_DB = 60.0
+"""Powers are floored this far below the loudest of the recording: what is under the noise of most rooms is the same."""
+LEAST_DEVIATION = 1e-3
+
+
+def spectrum(audio: Audio, warp: float = 1.0) -> NDArray[np.float32]:
+    """Return the log power in ``SPECTRUM_BANDS`` mel bands [shape=(T, 40)], frames as in ``mfcc``.
+
+    warp : factor by which frequencies are stretched, as in ``mfcc``
+    Each band has mean 0 over the recording; it is divided by the mean of its own standard deviation and that of the
+    whole spectrum, so that bands without speech stay small.
+    Raises InputError: as ``mfcc``.
+    """
+    powers = log_mel(checked_samples(audio), _filters(warp))
+    powers = np.maximum(powers, powers.max() - np.float32(DYNAMIC_RANGE_DB / 10 * np.log(10)))
+    powers -= powers.mean(axis=0, dtype=float).astype(np.float32)
+    squares = np.square(powers).mean(axis=0, dtype=float)
+    powers /= (np.sqrt(squares) / 2 + np.sqrt(squares.mean()) / 2 + LEAST_DEVIATION).astype(np.float32)
+    return powers
+
+
+@cache
+def _filters(warp: float) -> NDArray[np.float32]:
+    """Return triangular filters, equally spaced in mel, of warped frequencies [shape=(257, 40)]."""
+    bins = mel(warped(np.arange(FFT_SIZE // 2 + 1) * SPEECH_RATE_HZ / FFT_SIZE, warp))
+    edges = np.linspace(mel(np.array(LOWEST_HZ)), mel(np.array(HIGHEST_HZ)), SPECTRUM_BANDS + 2)
+    return triangles(bins, edges).astype(np.float32)

@@ -1,0 +1,1 @@
+"""Phones and words in time: forced alignment, recognition, adaptation."""

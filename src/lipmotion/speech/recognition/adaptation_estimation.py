@@ -1,0 +1,151 @@
+"""Unsupervised speaker adaptation: transforms estimated from recordings of a speaker, without transcripts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion.hmm.model import UnitHmm
+from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
+from lipmotion.speech.features.mfcc import FEATURES, mfcc
+from lipmotion.speech.features.speaker_similarity import WARPS, SpeakerSimilarity, best_warp
+from lipmotion.speech.recognition.adaptation import Adaptation, identity_adaptation
+from lipmotion.speech.recognition.combined_phones import NOISES
+from lipmotion.speech.recognition.general.acoustic import STREAMS, general_model
+from lipmotion.speech.recognition.recogniser import Recogniser, own_model_weight
+from lipmotion.stats.affine import AffineStatistics, Array, improved_transform, prior_statistics, transform_statistics
+from lipmotion.stats.em import run_em
+from lipmotion.stats.mixture import Mixtures
+from lipmotion.types import FRAME_RATE_HZ, Audio, Features
+from lipmotion.units import is_silent
+
+PASSES, ITERATIONS = 2, 4
+"""In every pass all recordings are recognised anew, and every transform is improved this many times."""
+OWN_RELEVANCE, GENERAL_RELEVANCE = 300.0, 30.0
+"""Frames that the prior of a transform, the identity, counts for (docs/adaptation.md says how they were chosen)."""
+SHORT_S, SHORT_RELEVANCE = 10.0, 1000.0
+"""From less speech than this, the own models' features, Δ and ΔΔ are transformed each by themselves, with a stronger
+prior."""
+LEAST_SPEECH_S = 1.0
+
+
+class EstimatedAdaptation(NamedTuple):
+    """An adaptation to a speaker, and the seconds of speech that it was estimated from."""
+
+    adaptation: Adaptation
+    speech_s: float
+
+
+def estimate_adaptation(own: UnitHmm, recordings: Sequence[Audio]) -> EstimatedAdaptation:
+    """Return the adaptation of phone models to the speaker of some recordings.
+
+    own        : the phone models of a corpus, not adapted
+    recordings : of one speaker
+    All recordings are recognised with the own and the general models. The features of both then get the affine
+    transform that makes the recognised states most probable, with the identity as prior mean. The frequencies are
+    stretched first, by one factor for all recordings.
+    Raises InputError: less speech than ``LEAST_SPEECH_S``.
+    Raises MissingDependencyError: pocketsphinx is not installed.
+    Source: Gales 1998 (constrained MLLR); Lei, Hamaker & He 2006 (a prior for it; ours is the models' own statistics).
+    """
+    audios = [analysed(audio) for audio in recordings]
+    similarity = _common_similarity(own, audios)
+    own_features = np.concatenate([audio.mfcc(similarity.warp).values for audio in audios])
+    general_features = np.concatenate([audio.general_features for audio in audios])
+    adaptation, speech_s = identity_adaptation(similarity.warp, own_model_weight(similarity.score)), 0.0
+    for _ in range(PASSES):
+        recogniser = Recogniser(own, adaptation=adaptation)
+        densities = np.concatenate([recogniser.best_path_densities(audio, audio.mfcc()) for audio in audios])
+        combined = recogniser.combined
+        speech_s = _checked_speech_s(combined.hmm.table.names, densities)
+        prior, free = _own_prior(own, short=speech_s < SHORT_S)
+        matrix = _improved(combined.hmm.mixtures, prior, own_features, densities, adaptation.own, free)
+        streams = _general_improved(general_features, combined.columns[densities], adaptation.general)
+        adaptation = replace(adaptation, own=matrix, general=streams)
+    return EstimatedAdaptation(adaptation, speech_s)
+
+
+def _checked_speech_s(names: Sequence[str], densities: NDArray[np.intp]) -> float:
+    """Return how many seconds of speech some frames hold.
+
+    names     : of all densities: unit, point, state
+    densities : of the frames [shape=(T,)]
+    Raises InputError: less than ``LEAST_SPEECH_S``.
+    """
+    units = [name.partition(".")[0] for name in names]
+    silent = np.array([is_silent(unit) or unit in NOISES for unit in units])
+    speech_s = float((~silent[densities]).sum() / FRAME_RATE_HZ)
+    if not speech_s:
+        raise InputError("no speech found in the recordings; give some of the voice to adapt to")
+    if speech_s < LEAST_SPEECH_S:
+        raise InputError(
+            f"found {speech_s:.1f} s of speech, required at least {LEAST_SPEECH_S:.0f} s; give more of this voice"
+        )
+    return speech_s
+
+
+def _common_similarity(own: UnitHmm, audios: Sequence[AnalysedAudio]) -> SpeakerSimilarity:
+    """Return the speaker similarity of all recordings together, at one warp for all of them."""
+    scores = {
+        warp: own.fit(np.concatenate([_features_once(audio, warp).values for audio in audios])) - own.typical_fit
+        for warp in WARPS
+    }
+    warp = best_warp(scores)
+    return SpeakerSimilarity(warp, scores[warp])
+
+
+def _features_once(audio: AnalysedAudio, warp: float) -> Features:
+    """Return the features at a warp; only those without one are needed again, others would fill the memory."""
+    return audio.mfcc() if warp == 1 else mfcc(audio, warp)
+
+
+def _own_prior(own: UnitHmm, *, short: bool) -> tuple[AffineStatistics, NDArray[np.bool_]]:
+    """Return the prior statistics of the own models' transform, and its entries that may change [shape=(39, 40)]."""
+    group = np.arange(FEATURES + 1) // (FEATURES // 3 if short else FEATURES)
+    free = (group[:-1, None] == group) | (np.arange(FEATURES + 1) == FEATURES)
+    plain = np.arange(len(own.log_stay), dtype=np.intp)
+    return prior_statistics(own.mixtures, plain).times(SHORT_RELEVANCE if short else OWN_RELEVANCE), free
+
+
+def _general_improved(features: NDArray[np.float32], densities: NDArray[np.intp], transforms: Array) -> Array:
+    """Return the transform of each stream of the general models [shape=(3, 13, 14)], improved.
+
+    features  : not transformed [shape=(T, 39)]
+    densities : the state of the general models in each frame [shape=(T,)]
+    """
+    streams = []
+    for number, (stream, transform) in enumerate(zip(STREAMS, transforms, strict=True)):
+        mixtures = general_model().mixtures(number)
+        prior = prior_statistics(mixtures, np.arange(mixtures.size[0])).times(GENERAL_RELEVANCE)
+        free = np.ones(transform.shape, bool)
+        streams.append(_improved(mixtures, prior, features[:, stream], densities, transform, free))
+    return np.stack(streams)
+
+
+def _improved(
+    mixtures: Mixtures,
+    prior: AffineStatistics,
+    features: NDArray[np.float32],
+    densities: NDArray[np.intp],
+    transform: Array,
+    free: NDArray[np.bool_],
+) -> Array:
+    """Return a transform [shape=(D, D + 1)] that makes frames more probable under the densities of their states.
+
+    prior     : statistics that are added to those of the frames
+    features  : not transformed [shape=(T, D)]
+    densities : of each frame [shape=(T,)]
+    transform : to begin with [shape=(D, D + 1)]
+    free      : its entries that may change [shape=(D, D + 1)]
+    """
+    return run_em(
+        transform,
+        lambda transform: transform_statistics(mixtures, features, densities, transform),
+        lambda transform, expected: improved_transform(transform, expected.statistics + prior, free),
+        ITERATIONS,
+    ).model

@@ -1,0 +1,138 @@
+"""The fit of a transcript: whether it is what is said in a recording, and where speech is missing in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.hmm.loudness import loud_frames
+from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
+from lipmotion.speech.recognition.general.acoustic import STATES, density_column, general_model
+from lipmotion.types import FRAME_RATE_HZ, Audio, Span, Timeline, Unit
+from lipmotion.units import is_silent
+
+DOUBTFUL_SCORE = -4.2
+"""Under this score the transcript is probably wrong: right ones score -1 to -4, wrong ones -2 to -9
+(docs/robustness.md)."""
+FRAME_STEP = 4
+"""Only every fourth frame is scored: its neighbours are much like it."""
+LONG_PHONE_S, LONG_PHONE_SCORE = 0.4, -4.0
+"""A phone that lasts as long and agrees with the sound less is stretched over speech that the transcript leaves out. A
+sound that is drawn out lasts longer, too, but agrees."""
+LEAST_VOICE_S = 1.0
+"""Silence with so much loud sound in it is speech that the transcript leaves out; breath and coughs are shorter."""
+LEAST_FITTING_SHARE = 0.9
+"""A transcript that fits less of the speech is worth a remark."""
+JOINED_S = 0.5
+"""Places nearer than this are one stretch."""
+SMOOTHING_FRAMES = 11
+"""The energy is averaged over so many frames before loud frames are told from quiet ones."""
+
+
+@dataclass(frozen=True)
+class TranscriptFit:
+    """How well a transcript fits a recording.
+
+    score    : the agreement score (``agreement_score``)
+    missing  : stretches with speech that the transcript leaves out: their starts and ends in seconds, in order
+    speech_s : seconds of speech in the recording, those that are missing included
+    """
+
+    score: float
+    missing: tuple[tuple[float, float], ...]
+    speech_s: float
+
+    @property
+    def missing_s(self) -> float:
+        """Seconds that the stretches of ``missing`` last together."""
+        return sum(end_s - start_s for start_s, end_s in self.missing)
+
+    @property
+    def share(self) -> float:
+        """The share of the speech that the transcript fits, 0 to 1; 0 where the transcript is of something else."""
+        if self.score < DOUBTFUL_SCORE:
+            return 0.0
+        return 1.0 - min(self.missing_s / max(self.speech_s, 1e-9), 1.0)
+
+
+def transcript_fit(audio: Audio, units: Timeline[Unit]) -> TranscriptFit:
+    """Return how well the aligned phones of a transcript fit a recording.
+
+    audio, units : as of ``agreement_score``
+    Forced alignment finds a place for every word, and fills the recording with them: where the transcript leaves words
+    out, it stretches phones of their neighbours (``LONG_PHONE_S``), or calls loud sound silence (``LEAST_VOICE_S``).
+    Raises MissingDependencyError: pocketsphinx is not installed.
+    """
+    heard = analysed(audio)
+    frames, scores = _frame_scores(heard, units)
+    loud = loud_frames(heard.log_energy, SMOOTHING_FRAMES)
+    missing, speech_s = [], 0.0
+    for span in units:
+        if is_silent(span.label.phone):
+            voiced = (_first_frame(span.start_s) + np.flatnonzero(loud[_frames_of(span)])) / FRAME_RATE_HZ
+            if len(voiced) < LEAST_VOICE_S * FRAME_RATE_HZ:
+                continue
+            missing.append((float(voiced[0]), float(voiced[-1]) + 1 / FRAME_RATE_HZ))
+            speech_s += missing[-1][1] - missing[-1][0]
+        else:
+            speech_s += span.duration_s
+            inside = slice(*np.searchsorted(frames, [_first_frame(span.start_s), _first_frame(span.end_s)]))
+            if span.duration_s >= LONG_PHONE_S and float(scores[inside].mean()) < LONG_PHONE_SCORE:
+                missing.append((span.start_s, span.end_s))
+    return TranscriptFit(float(scores.mean()) if len(scores) else 0.0, _joined(missing), speech_s)
+
+
+def _joined(places: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
+    """Return places in time, those near one another as one."""
+    joined: list[tuple[float, float]] = []
+    for start_s, end_s in places:
+        if joined and start_s - joined[-1][1] <= JOINED_S:
+            joined[-1] = (joined[-1][0], end_s)
+        else:
+            joined.append((start_s, end_s))
+    return tuple(joined)
+
+
+def agreement_score(audio: Audio, units: Timeline[Unit]) -> float:
+    """Return how well a recording agrees with phones in time, by the general models.
+
+    audio : an ``AnalysedAudio`` shares its features with what else is computed of it
+    units : of the audio, as ``Recogniser.align`` returns them
+    Returns the mean, over frames of speech, of the log density of the frame's phone less that of the best phone: 0
+    where no other phone is more probable, or nothing is spoken.
+    Raises MissingDependencyError: pocketsphinx is not installed.
+    """
+    scores = _frame_scores(analysed(audio), units)[1]
+    return float(scores.mean()) if len(scores) else 0.0
+
+
+def _frame_scores(audio: AnalysedAudio, units: Timeline[Unit]) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
+    """Return every fourth frame of speech, and how well its phone agrees with the sound there [shapes=(S,), (S,)]."""
+    frames, states = (rows[::FRAME_STEP] for rows in _spoken_frames(units))
+    if not len(frames):
+        return frames, np.zeros(0, np.float32)
+    log_densities = general_model().log_density(audio.general_features[frames])
+    of_phone = np.take_along_axis(log_densities, states[:, None] + np.arange(STATES), axis=1)
+    return frames, of_phone.max(axis=1)
+
+
+def _first_frame(time_s: float) -> int:
+    """Return the first frame at or after a time."""
+    return int(np.ceil(time_s * FRAME_RATE_HZ - 1e-6))
+
+
+def _frames_of(span: Span[Unit]) -> slice:
+    return slice(_first_frame(span.start_s), _first_frame(span.end_s))
+
+
+def _spoken_frames(units: Timeline[Unit]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the frames of speech, and in each the general density of its phone's first state [shapes=(S,), (S,)]."""
+    frames, states = [np.zeros(0, np.intp)], [np.zeros(0, np.intp)]
+    for span in units:
+        if not is_silent(span.label.phone):
+            of_span = _frames_of(span)
+            frames.append(np.arange(of_span.start, of_span.stop))
+            states.append(np.full(len(frames[-1]), density_column(span.label.phone, 0, STATES)))
+    return np.concatenate(frames), np.concatenate(states)

@@ -1,0 +1,328 @@
+"""Times of a transcript as anchors of its alignment: the frames that each word may have."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion.hmm.align import PlacedWord
+from lipmotion.kernels.sequences.windowed_viterbi import Windows
+from lipmotion.types import FRAME_RATE_HZ, TimedTranscript
+
+LOG = logging.getLogger("lipmotion")
+LINE_TOLERANCE_S, WORD_TOLERANCE_S = 0.5, 0.25
+"""By how much lines and words may be earlier or later than their times say, at first."""
+WIDER, LEAST_IMPROVEMENT = (2, 4, 8, 16), 0.2
+"""Where words press against their windows or fit badly, the tolerance becomes so many times as wide, step by step, and
+stays so if the words then fit better, in nats a frame."""
+BAD_FIT, WORST_FIT = -3.5, -6.0
+"""Words that fit worse than the first, in nats a frame, may be elsewhere; worse than the second, they are not there."""
+FREE_FRAMES = 60_000
+"""A recording of up to so many frames, ten minutes, is aligned without times where these are of something else."""
+NEIGHBOURS = 3
+"""So many words on each side of one without room, and all that share its time, get a wider window, too."""
+MOST_SHIFT_S, LEAST_CORRELATION, LEAST_GAIN, FEWEST_TIMES = 120.0, 0.3, 0.15, 20
+"""A shift of all times, of so many or more, is searched up to the first, and corrected from these correlations on."""
+MOST_WIDENINGS = 40
+"""Windows without room are doubled so many times; then they are opened altogether."""
+
+
+@dataclass(frozen=True, eq=False)
+class Anchors:
+    """Times of words [each of shape=(W,)].
+
+    start_s, end_s : NaN where they are not known
+    tolerance_s    : by how much the word may be earlier or later
+    groups         : the number of the time that it has, which it may share with other words of its line
+    """
+
+    start_s: NDArray[np.float64]
+    end_s: NDArray[np.float64]
+    tolerance_s: NDArray[np.float64]
+    groups: NDArray[np.intp]
+
+
+def anchors_of(transcript: TimedTranscript) -> Anchors:
+    """Return the times of the words of a transcript.
+
+    Words have the times of their line; if some words of a line have times of their own, the others lie between these.
+    """
+    rows: list[tuple[float, float, float]] = []
+    for line in transcript.lines:
+        own = any(word.start_s is not None or word.end_s is not None for word in line.words)
+        for place, word in enumerate(line.words):
+            timed = word.start_s is not None or word.end_s is not None
+            start_s = line.start_s if word.start_s is None and (not own or place == 0) else word.start_s
+            last = place == len(line.words) - 1
+            end_s = line.end_s if word.end_s is None and (not own or last) else word.end_s
+            tolerance_s = WORD_TOLERANCE_S if timed else LINE_TOLERANCE_S
+            rows.append((_number(start_s), _number(end_s), tolerance_s))
+    table = np.array(rows, float).reshape(-1, 3)
+    differs = ~np.isclose(table[1:, :2], table[:-1, :2], equal_nan=True).all(axis=1)
+    return Anchors(table[:, 0], table[:, 1], table[:, 2], np.append(0, np.cumsum(differs)))
+
+
+def _number(time_s: float | None) -> float:
+    return np.nan if time_s is None else time_s
+
+
+def fitted(transcript: TimedTranscript, loud: NDArray[np.bool_], duration_s: float) -> TimedTranscript:
+    """Return a transcript whose times fit a recording as a whole.
+
+    If all are late or early they are corrected; lines that begin after the end of the recording are left out. Both are
+    logged as warnings.
+    loud       : which frames are loud [shape=(T,)]
+    duration_s : of the recording
+    Raises InputError: all lines begin after the end.
+    """
+    late_s = lateness_s(transcript, loud)
+    if late_s:
+        which = "late" if late_s > 0 else "early"
+        LOG.warning("the times of the transcript are %.1f s %s; corrected", abs(late_s), which)
+        transcript = transcript.shifted(-late_s)
+    return _within(transcript, duration_s)
+
+
+def _within(transcript: TimedTranscript, duration_s: float) -> TimedTranscript:
+    """Return the lines of a transcript that begin within a recording. Raises InputError: none does."""
+    latest_s = duration_s + LINE_TOLERANCE_S
+    lines = [line for line in transcript.lines if line.start_s is None or line.start_s <= latest_s]
+    left_out = len(transcript.lines) - len(lines)
+    if not lines:
+        raise InputError(
+            f"the transcript begins at {transcript.lines[0].start_s:.2f} s, the recording ends at {duration_s:.2f} s; "
+            "give the transcript of this recording"
+        )
+    if left_out:
+        LOG.warning(
+            "the transcript goes on after the recording ends at %.2f s; its last %d lines are left out",
+            duration_s,
+            left_out,
+        )
+    return TimedTranscript(tuple(lines))
+
+
+def lateness_s(transcript: TimedTranscript, loud: NDArray[np.bool_]) -> float:
+    """Return by how much all times of a transcript are late, as those of subtitles for another cut; 0: not by much.
+
+    loud : which frames are loud [shape=(T,)]
+    It is the shift at which the spans of the times and the loud frames correlate best, up to ``MOST_SHIFT_S``, if it is
+    larger than the tolerance of lines, and the correlation at least ``LEAST_CORRELATION``, and by ``LEAST_GAIN`` better
+    than without a shift.
+    """
+    anchors = anchors_of(transcript)
+    known = ~np.isnan(anchors.start_s) & ~np.isnan(anchors.end_s)
+    most = min(round(MOST_SHIFT_S * FRAME_RATE_HZ), len(loud) // 4)
+    if len(np.unique(anchors.groups[known])) < FEWEST_TIMES or most == 0:
+        return 0.0
+    spoken = np.zeros(len(loud) + 2 * most)
+    edges = np.round(np.stack([anchors.start_s, anchors.end_s])[:, known] * FRAME_RATE_HZ) + most
+    for first, end in np.unique(np.clip(edges, 0, len(spoken)).astype(np.intp), axis=1).T:
+        spoken[first:end] = 1
+    correlation = _correlations(loud.astype(float), spoken)
+    best = int(correlation.argmax())
+    late_s = (best - most) / FRAME_RATE_HZ
+    gain = correlation[best] - max(correlation[most], 0.0)
+    is_sure = correlation[best] >= LEAST_CORRELATION and gain >= LEAST_GAIN
+    return late_s if is_sure and abs(late_s) > LINE_TOLERANCE_S else 0.0
+
+
+def _correlations(heard: NDArray[np.float64], spoken: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the correlation of ``heard`` with every stretch of ``spoken`` as long [shape=(S - T + 1,)]."""
+    count = len(heard)
+    deviation = heard - heard.mean()
+    size = 1 << (len(spoken) + count - 1).bit_length()
+    product = np.fft.irfft(np.fft.rfft(spoken, size) * np.conj(np.fft.rfft(deviation, size)), size)
+    total = np.cumsum(np.append(0.0, spoken))
+    mean = (total[count:] - total[:-count]) / count
+    scale = count * heard.std() * np.sqrt(np.maximum(mean - mean**2, 0.0))  # of zeros and ones
+    product = product[: len(mean)]
+    return np.divide(product, scale, out=np.zeros_like(product), where=scale > 1e-6)
+
+
+def windows_of(anchors: Anchors, tolerance_s: NDArray[np.float64], frames: int) -> Windows:
+    """Return the frames that each word may have.
+
+    A word without a time has those between the words with times around it. No word may begin before those ahead of it
+    may, nor end after those behind it may; where times are out of order that leaves no room (``feasible_windows``).
+    """
+    first = np.floor((anchors.start_s - tolerance_s) * FRAME_RATE_HZ)
+    end = np.ceil((anchors.end_s + tolerance_s) * FRAME_RATE_HZ) + 1
+    first, end = _filled(first, 0.0), _filled(end[::-1], float(frames))[::-1]
+    first, end = np.maximum.accumulate(first), np.minimum.accumulate(end[::-1])[::-1]
+    return Windows(np.clip(first, 0, frames).astype(np.intp), np.clip(end, 0, frames).astype(np.intp))
+
+
+def _filled(values: NDArray[np.float64], before: float) -> NDArray[np.float64]:
+    """Return values with the last known one in place of those that are not known; ``before`` those, a given one."""
+    known = np.append(True, ~np.isnan(values))
+    latest = np.maximum.accumulate(np.where(known, np.arange(len(known)), 0))
+    return np.append(before, values)[latest][1:]
+
+
+def feasible_windows(
+    anchors: Anchors, tolerance_s: NDArray[np.float64], least: NDArray[np.intp], edge: int, frames: int
+) -> tuple[Windows, NDArray[np.float64]]:
+    """Return windows in which all words have room, and the tolerances, doubled around words that had none.
+
+    least : the fewest frames of each word
+    edge  : the fewest frames of the silence at both ends
+    If there is no room after ``MOST_WIDENINGS``, the windows are the whole recording.
+    """
+    for _ in range(MOST_WIDENINGS):
+        windows = windows_of(anchors, tolerance_s, frames)
+        crowded = _crowded(windows, least, edge, frames)
+        if not crowded.any():
+            return windows, tolerance_s
+        tolerance_s = _widened(anchors, tolerance_s, crowded)
+    tolerance_s = np.full(len(least), np.inf)
+    return windows_of(anchors, tolerance_s, frames), tolerance_s
+
+
+def _crowded(windows: Windows, least: NDArray[np.intp], edge: int, frames: int) -> NDArray[np.bool_]:
+    """Return which words have no room in their windows, after the words before them [shape=(W,)]."""
+    crowded = np.zeros(len(least), bool)
+    earliest = edge
+    ends = np.minimum(windows.end, frames - edge).tolist()
+    for word, (first, end, count) in enumerate(zip(windows.first.tolist(), ends, least.tolist(), strict=True)):
+        begin = max(first, earliest)
+        crowded[word] = begin + count > end
+        earliest = min(begin + count, max(end, first))  # the words after it are judged as if it had room
+    return crowded
+
+
+def _widened(anchors: Anchors, tolerance_s: NDArray[np.float64], chosen: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Return tolerances, doubled for some words, for all that share their times, and for their neighbours."""
+    near = np.convolve(chosen, np.ones(2 * NEIGHBOURS + 1), "same") > 0 if len(chosen) > 2 * NEIGHBOURS else chosen
+    near = near | np.isin(anchors.groups, anchors.groups[chosen])
+    return np.where(near, 2 * tolerance_s, tolerance_s)
+
+
+def pressed_words(placed: Sequence[PlacedWord], windows: Windows, frames: int) -> NDArray[np.bool_]:
+    """Return which words begin with their window, or end with it: they might belong outside [shape=(W,)]."""
+    pressed = np.zeros(len(windows.first), bool)
+    ends = [item.start for item in placed[1:]] + [frames]
+    for item, stop in zip(placed, ends, strict=True):
+        word = item.spoken.word
+        if word >= 0:
+            first, end = windows.first[word], windows.end[word]
+            pressed[word] = (0 < first == item.start) or (frames > end == stop)
+    return pressed
+
+
+def group_fits(placed: Sequence[PlacedWord], groups: NDArray[np.intp], frames: int) -> NDArray[np.float64]:
+    """Return the fit of the words of each time, the mean over their frames [shape=(groups,)]."""
+    total, count = np.zeros(int(groups[-1]) + 1), np.zeros(int(groups[-1]) + 1)
+    ends = [item.start for item in placed[1:]] + [frames]
+    for item, stop in zip(placed, ends, strict=True):
+        if item.spoken.word >= 0:
+            group = groups[item.spoken.word]
+            total[group] += item.fit * (stop - item.start)
+            count[group] += stop - item.start
+    return total / np.maximum(count, 1)
+
+
+def align_within(
+    anchors: Anchors,
+    least: NDArray[np.intp],
+    edge: int,
+    frames: int,
+    search: Callable[[Windows], list[PlacedWord]],
+) -> tuple[list[PlacedWord], Windows]:
+    """Return words aligned within their windows, and these.
+
+    least, edge : as of ``feasible_windows``
+    search      : aligns within windows, with the fit of each word
+    Where words press against their windows, or fit badly, these are widened step by step, and stay so if the words then
+    fit better by ``LEAST_IMPROVEMENT``: words also press where speech beside them is not in the transcript. If all fit
+    badly even so, the words of a recording of up to ``FREE_FRAMES`` are aligned without times; if they fit better then,
+    the times are not used. What fits badly in the end is logged as a warning.
+    """
+    placed, windows, tolerance_s = _placed(anchors, anchors.tolerance_s, least, edge, frames, search)
+    for factor in WIDER:
+        fits = group_fits(placed, anchors.groups, frames)
+        wider_s = np.maximum(factor * anchors.tolerance_s, tolerance_s)
+        doubted = fits < BAD_FIT
+        doubted[anchors.groups[pressed_words(placed, windows, frames)]] = True
+        doubted &= np.isin(np.arange(len(fits)), anchors.groups[tolerance_s < wider_s])
+        if not doubted.any():
+            break
+        wide_s = np.where(doubted[anchors.groups], wider_s, tolerance_s)
+        wide = _placed(anchors, wide_s, least, edge, frames, search)
+        gain = group_fits(wide[0], anchors.groups, frames) - fits
+        better = doubted & (np.maximum(gain, _beside(gain)) >= LEAST_IMPROVEMENT)
+        if (better == doubted).all():
+            placed, windows, tolerance_s = wide
+        elif better.any():
+            kept_s = np.where(better[anchors.groups], wider_s, tolerance_s)
+            placed, windows, tolerance_s = _placed(anchors, kept_s, least, edge, frames, search)
+    free = _free(placed, anchors, frames, search)
+    if free is not None:
+        return free
+    _warn_of_misfits(group_fits(placed, anchors.groups, frames), anchors)
+    return placed, windows
+
+
+def _placed(
+    anchors: Anchors,
+    tolerance_s: NDArray[np.float64],
+    least: NDArray[np.intp],
+    edge: int,
+    frames: int,
+    search: Callable[[Windows], list[PlacedWord]],
+) -> tuple[list[PlacedWord], Windows, NDArray[np.float64]]:
+    """Return words aligned within windows that have room, these windows, and their tolerances."""
+    windows, tolerance_s = feasible_windows(anchors, tolerance_s, least, edge, frames)
+    return search(windows), windows, tolerance_s
+
+
+def _free(
+    placed: list[PlacedWord], anchors: Anchors, frames: int, search: Callable[[Windows], list[PlacedWord]]
+) -> tuple[list[PlacedWord], Windows] | None:
+    """Return words aligned without times, if those that are aligned within them fit badly, and fit better so."""
+    everywhere = np.zeros(len(anchors.groups), np.intp)
+    fit = float(group_fits(placed, everywhere, frames)[0])
+    if fit >= BAD_FIT or frames > FREE_FRAMES:
+        return None
+    windows = Windows(everywhere, np.full(len(everywhere), frames, np.intp))
+    free = search(windows)
+    if float(group_fits(free, everywhere, frames)[0]) < fit + LEAST_IMPROVEMENT:
+        return None
+    LOG.warning("the times of the transcript do not fit the sound; they are not used")
+    return free, windows
+
+
+def _warn_of_misfits(fits: NDArray[np.float64], anchors: Anchors) -> None:
+    """Log a warning of the times whose words, and those beside them, fit the sound very badly."""
+    wrong = np.flatnonzero(_beside(fits) < WORST_FIT)
+    if len(wrong):
+        LOG.warning(
+            "at %d of the %d times of the transcript the words do not fit the sound, first at %.2f s; check them",
+            *(len(wrong), len(fits), _first_time(anchors, int(wrong[0]))),
+        )
+
+
+def _beside(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the mean of each value and those beside it."""
+    count = np.convolve(np.ones(len(values)), np.ones(3))[1:-1]
+    return np.convolve(values, np.ones(3))[1:-1] / count
+
+
+def _first_time(anchors: Anchors, group: int) -> float:
+    """Return the start of the words of one time, or of what is before them."""
+    known = anchors.start_s[(anchors.groups <= group) & ~np.isnan(anchors.start_s)]
+    return float(known[-1]) if len(known) else 0.0
+
+
+def least_frames(words: Sequence[Sequence[Sequence[str]]], counts: dict[str, int]) -> NDArray[np.intp]:
+    """Return the fewest frames of each word, given its pronunciations: the states of the shortest.
+
+    counts : the number of states by unit
+    """
+    of_words = {id(word): min(sum(counts[unit] for unit in variant) for variant in word) for word in words}
+    return np.array([of_words[id(word)] for word in words], np.intp)

@@ -1,0 +1,341 @@
+"""Phone recognition and forced alignment of recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property, lru_cache
+from itertools import groupby
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import AlignmentError, InputError
+from lipmotion.hmm.align import PlacedWord, SpokenWord, align_units, place_words, unit_windows
+from lipmotion.hmm.decode import UnitLoop, unit_loop
+from lipmotion.hmm.log_likelihoods import (
+    LogLikelihoods,
+    log_likelihoods_of,
+    penalise_silence,
+    penalise_speech,
+)
+from lipmotion.hmm.loudness import loud_frames, quiet_frames
+from lipmotion.hmm.model import UnitHmm
+from lipmotion.kernels.sequences.windowed_viterbi import Windows
+from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
+from lipmotion.speech.features.mfcc import LOG_ENERGY
+from lipmotion.speech.features.speaker_similarity import SpeakerSimilarity, speaker_similarity
+from lipmotion.speech.recognition.adaptation import Adaptation
+from lipmotion.speech.recognition.anchors import Anchors, align_within, least_frames
+from lipmotion.speech.recognition.combined_phones import CombinedPhones, combine_phones, combined_log_likelihoods
+from lipmotion.speech.recognition.recognised_speech import (
+    HeardWord,
+    LabelledFrames,
+    Recognition,
+    recognition_of,
+    spliced,
+)
+from lipmotion.speech.recognition.word_search import WordSearch, begun_decoding, free_labels
+from lipmotion.types import FRAME_RATE_HZ, Audio, Features, ParallelMap, Span, Timeline, Unit
+from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, most_similar_phone
+
+RECOGNISER_KINDS = ("auto", "words", "fast", "own", "general")
+"""Phones are recognised by: ``own``: the model's own phone models alone; ``general``: those of many voices alone;
+``fast``: both, the own ones weighted by how similar the speaker is to those of their training data. ``words``: English
+words are recognised and aligned. ``auto``: as ``fast``, and words where they fit."""
+USING_WORDS, WEIGHTED = ("auto", "words"), ("auto", "words", "fast")
+OWN_VOICE_SCORE, SMALL_PERPLEXITY = -3.0, 9.0
+"""A voice with the first speaker similarity score or more is that of the own models; if the perplexity of their bigram
+is less than the second one, their corpus has few words, which no language model of English expects. Then the phones
+alone decide. The perplexity is 5.3 for GRID's 51 words, 18.6 for English."""
+NO_WEIGHT_SCORE, FULL_WEIGHT_SCORE = -9.0, -5.0
+"""Own models have no weight for recordings with the first speaker similarity score or less, and the weight of the
+general models from the second one on. The score of another speaker in the same studio is -4 to -6 for GRID's models, of
+other voices in other rooms -7 to -15."""
+FEW_GAUSSIANS = 2
+"""Own models of so few Gaussians a state were trained on less than two minutes: forced alignment uses the general ones
+alone then. With 20 clips of GRID that raises ACC of opening on the validation list from 0.767 to 0.786 (audio only),
+from 0.806 to 0.841 (transcripts)."""
+ENERGY_SMOOTHING_FRAMES = 11
+"""The energy is averaged over so many frames before it rules silence out."""
+SHORT_PAUSE_S = 0.2
+"""Silence shorter than this is a pause between words."""
+
+
+class Recogniser:
+    """Forced alignment and recognition with a model's own phone models and those of many voices.
+
+    own        : the phone models of a corpus
+    kind       : one of ``RECOGNISER_KINDS``
+    adaptation : to one speaker, or None; with one, the speaker similarity is not computed
+    Raises InputError: another kind.
+    """
+
+    def __init__(self, own: UnitHmm, kind: str = "auto", adaptation: Adaptation | None = None):
+        if kind not in RECOGNISER_KINDS:
+            raise InputError(f"unknown recogniser {kind!r}; required one of: {', '.join(RECOGNISER_KINDS)}")
+        self.own = own
+        self.kind = kind
+        self.adaptation = adaptation
+
+    def recognise(self, audio: Audio, features: Features) -> Timeline[Unit]:
+        """Return the most probable phones of a recording in time: Viterbi with a back-off bigram.
+
+        audio    : an ``AnalysedAudio`` shares its features with what else is computed of it
+        features : of the audio, as ``mfcc`` returns them
+        Digital silence, of which all normalised features are 0, is recognised as silence.
+        With words, see ``recognition``.
+        Raises MissingDependencyError: general models or words are wanted and pocketsphinx is not installed.
+        Source: Hofer 2008, Eq. 5.
+        """
+        return self.recognition(audio, features).units
+
+    def recognition(self, audio: Audio, features: Features, each: ParallelMap = map) -> Recognition:
+        """Return the recognised phones of a recording in time, with the words that decided them.
+
+        audio, features : as of ``recognise``
+        each            : applies a function to many items, perhaps in several processes
+        Words are recognised in every stretch of sound and aligned by our models. ``auto`` compares their likelihood
+        with that of the best path of phones without words: words that fit decide their phones; of the other words, the
+        phones only become more probable (``speech.recognition.word_search``).
+        Raises MissingDependencyError: as ``recognise``.
+        """
+        if not features.values.any():
+            silence = _timeline([(SILENCE, "")], np.array([0, len(features.values)]), features.duration_s)
+            return recognition_of(silence, [LabelledFrames(0, SILENCE)], (), None)
+        audio = analysed(audio, features)
+        similarity = self._similarity(audio)
+        with_words = self.kind in USING_WORDS and not self._knows_voice_and_words(similarity)
+        spoken = begun_decoding(audio, each) if with_words else None
+        hmm, log_likelihoods = self._log_likelihoods(audio, similarity)
+        path = self._loop.network.best_path(log_likelihoods)
+        labels, heard = self._free_labels(audio, features, path), list[HeardWord]()
+        if spoken is not None:
+            parts, heard = self._word_search(audio, hmm, log_likelihoods, path).words_of(spoken)
+            labels = spliced(labels if self.kind == "auto" else [LabelledFrames(0, SILENCE)], parts, len(path))
+        units = _timeline(
+            [(label.phone, heard[label.word].text if label.word >= 0 else "") for label in labels],
+            np.array([*(label.first for label in labels), len(path)]),
+            features.duration_s,
+        )
+        return recognition_of(units, labels, heard, similarity.score if similarity is not None else None)
+
+    def _free_labels(self, audio: AnalysedAudio, features: Features, path: NDArray[np.intp]) -> list[LabelledFrames]:
+        """Return the phones of a recording as they are recognised without words, of their best path."""
+        labels = free_labels(self._loop, path)
+        if self.kind not in WEIGHTED or not self._has_few_gaussians:
+            return labels
+        named, bounds = [(label.phone, "") for label in labels], [label.first for label in labels]
+        phones = _timeline(named, np.array([*bounds, len(path)]), features.duration_s)
+        try:
+            aligned = self.align_phones(audio, features, phones)
+        except AlignmentError:
+            return labels
+        return [LabelledFrames(_first_frame(span.start_s), span.label.phone) for span in aligned]
+
+    def _word_search(
+        self, audio: AnalysedAudio, hmm: UnitHmm, log_likelihoods: LogLikelihoods, path: NDArray[np.intp]
+    ) -> WordSearch:
+        """Return the search for words in a recording whose phones without words have a path through ``_loop``."""
+        aligning = self._log_likelihoods(audio, aligning=True)[1] if self._has_few_gaussians else log_likelihoods
+        loud = loud_frames(audio.mfcc().values[:, LOG_ENERGY], ENERGY_SMOOTHING_FRAMES)
+        free = self._loop.network.emission[path]
+        return WordSearch(hmm, self._loop, log_likelihoods, aligning, free, loud, believing=self.kind == "words")
+
+    def _knows_voice_and_words(self, similarity: SpeakerSimilarity | None) -> bool:
+        """Return whether a voice is that of the own models, and their corpus one of few words."""
+        return (
+            self.kind == "auto"
+            and similarity is not None
+            and similarity.score > OWN_VOICE_SCORE
+            and self.own.bigram.perplexity < SMALL_PERPLEXITY
+        )
+
+    def align(
+        self,
+        audio: Audio,
+        features: Features,
+        words: Sequence[str],
+        lexicon: Lexicon,
+        anchors: Anchors | None = None,
+    ) -> Timeline[Unit]:
+        """Return the phones of a known transcript in time: forced alignment.
+
+        audio, features : as of ``recognise``
+        words           : of the transcript, lower case
+        anchors         : times of the words, within which they are aligned (``recognition.anchors``); None: anywhere
+        The pronunciation of each word, and the pauses between words, are those with the most probable path. A phone
+        without a model borrows that of the most similar phone with one (``units.SIMILAR_PHONES``).
+        Raises AlignmentError: the transcript does not fit into the recording.
+        Raises MissingDependencyError: as ``recognise``.
+        """
+        hmm, log_likelihoods = self._log_likelihoods(analysed(audio, features), aligning=True)
+        loud = loud_frames(features.values[:, LOG_ENERGY], ENERGY_SMOOTHING_FRAMES)
+        log_likelihoods = penalise_silence(hmm, log_likelihoods, loud)
+        variants_of = {word: lexicon.pronunciations(word) for word in set(words)}
+        modelled = [unit for unit in hmm.table.units if not is_silent(unit)]
+        units_of = {
+            word: [tuple(most_similar_phone(phone, modelled) for phone in variant) for variant in variants]
+            for word, variants in variants_of.items()
+        }
+        spoken, bounds = _aligned(hmm, log_likelihoods, [units_of[word] for word in words], anchors)
+        labels = [
+            (phone, words[item.word] if item.word >= 0 else "")
+            for item in spoken
+            for phone in (variants_of[words[item.word]][item.variant] if item.word >= 0 else item.units)
+        ]
+        return _timeline(labels, bounds, features.duration_s)
+
+    def best_path_densities(self, audio: Audio, features: Features) -> NDArray[np.intp]:
+        """Return the density of each frame's state on the most probable path [shape=(T,)].
+
+        They are numbered as in ``combined``, with the kind ``own`` as in the own models. Digital silence has that of
+        silence.
+        Raises MissingDependencyError: as ``recognise``.
+        """
+        if not features.values.any():
+            return np.full(len(features.values), self.own.table.density(SILENCE, 0), np.intp)
+        _, log_likelihoods = self._log_likelihoods(analysed(audio, features))
+        network = self._loop.network
+        return network.emission[network.best_path(log_likelihoods)]
+
+    def align_phones(self, audio: Audio, features: Features, phones: Timeline[Unit]) -> Timeline[Unit]:
+        """Return known phones in time: forced alignment, with optional pauses where ``phones`` has silence.
+
+        audio, features : as of ``recognise``
+        phones          : in order; their times are not used
+        Raises AlignmentError: they do not fit into the recording.
+        """
+        names = (span.label.phone for span in phones)
+        runs = [tuple(run) for silent, run in groupby(names, key=is_silent) if not silent]
+        words = [" ".join(run) for run in runs]
+        lexicon = Lexicon({word: (run,) for word, run in zip(words, runs, strict=True)})
+        aligned = self.align(audio, features, words, lexicon)
+        return Timeline(tuple(replace(span, label=replace(span.label, word="")) for span in aligned))
+
+    @cached_property
+    def combined(self) -> CombinedPhones:
+        """The own models extended to all phones. Raises MissingDependencyError: pocketsphinx is not installed."""
+        return combine_phones(self.own)
+
+    @cached_property
+    def _loop(self) -> UnitLoop:
+        hmm = self.own if self.kind == "own" else self.combined.hmm
+        return unit_loop(hmm, [unit for unit in hmm.table.units if unit != PAUSE])
+
+    @property
+    def _has_few_gaussians(self) -> bool:
+        return self.own.mixtures.size[1] <= FEW_GAUSSIANS
+
+    def _log_likelihoods(
+        self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None = None, aligning: bool = False
+    ) -> tuple[UnitHmm, LogLikelihoods]:
+        """Return the models that are used, and the log likelihoods of a recording under them.
+
+        similarity : of the recording, if it is known
+        """
+        hmm, log_likelihoods = self._unpenalised(audio, similarity, aligning)
+        return hmm, penalise_speech(hmm, log_likelihoods, quiet_frames(audio.log_energy))
+
+    def _unpenalised(
+        self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None, aligning: bool
+    ) -> tuple[UnitHmm, LogLikelihoods]:
+        if self.kind == "own":
+            warp, _ = self._own_transform(audio, similarity)
+            return self.own, log_likelihoods_of(self.own, self._own_features(audio, warp))
+        general_alone = self.kind == "general" or (aligning and self._has_few_gaussians)
+        warp, weight = (1.0, 0.0) if general_alone else self._own_transform(audio, similarity)
+        # own models without weight are not evaluated: any features will do, and those of a long recording are large
+        own = self._own_features(audio, warp) if weight > 0 else audio.mfcc().values
+        general = audio.general_features if self.adaptation is None else self.adaptation.general_features(audio)
+        return self.combined.hmm, combined_log_likelihoods(self.combined, own, weight, general)
+
+    def _similarity(self, audio: AnalysedAudio) -> SpeakerSimilarity | None:
+        """Return the speaker similarity of a recording; None where nothing depends on it."""
+        if self.adaptation is not None or self.kind == "general":
+            return None
+        return speaker_similarity(self.own, audio)
+
+    def _own_transform(self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None) -> tuple[float, float]:
+        """Return the warp of the frequencies for the own models, and the weight of these models, 0 to 1."""
+        if self.adaptation is not None:
+            return self.adaptation.warp, self.adaptation.own_weight
+        similarity = similarity or speaker_similarity(self.own, audio)
+        return similarity.warp, own_model_weight(similarity.score)
+
+    def _own_features(self, audio: AnalysedAudio, warp: float) -> NDArray[np.float32]:
+        """Return the features for the own models, warped and, where there is an adaptation, transformed."""
+        return audio.mfcc(warp).values if self.adaptation is None else self.adaptation.own_features(audio)
+
+
+def _aligned(
+    hmm: UnitHmm, log_likelihoods: LogLikelihoods, words: list[list[tuple[str, ...]]], anchors: Anchors | None
+) -> tuple[list[SpokenWord], NDArray[np.intp]]:
+    """Return words as they were pronounced, with silences and pauses, and the bounds of their units in frames."""
+
+    def search(windows: Windows | None) -> list[PlacedWord]:
+        return place_words(hmm, log_likelihoods, words, PAUSE, windows)
+
+    of_units = None
+    if anchors is None:
+        spoken = [item.spoken for item in search(None)]
+    else:
+        counts = dict(zip(hmm.table.units, hmm.table.counts, strict=True))
+        edge, frames = counts[hmm.table.free[0]], log_likelihoods.frames
+        placed, windows = align_within(anchors, least_frames(words, counts), edge, frames, search)
+        spoken = [item.spoken for item in placed]
+        of_units = unit_windows(spoken, windows, frames)
+    return spoken, align_units(hmm, log_likelihoods, [unit for item in spoken for unit in item.units], of_units)
+
+
+@lru_cache(maxsize=4)
+def cached_recogniser(own: UnitHmm, kind: str = "auto", adaptation: Adaptation | None = None) -> Recogniser:
+    """Return the recogniser of some models; the last four are kept, with the networks that they search."""
+    return Recogniser(own, kind, adaptation)
+
+
+def own_model_weight(score: float) -> float:
+    """Return the weight of own models beside the general ones, 0 to 1, at a speaker similarity score."""
+    return min(max((score - NO_WEIGHT_SCORE) / (FULL_WEIGHT_SCORE - NO_WEIGHT_SCORE), 0.0), 1.0)
+
+
+def voice_knowledge(score: float) -> float:
+    """Return how well a model knows a voice, 0 (as little as any) to 1 (its own), at a speaker similarity score."""
+    return min(max((score - NO_WEIGHT_SCORE) / (OWN_VOICE_SCORE - NO_WEIGHT_SCORE), 0.0), 1.0)
+
+
+def _first_frame(start_s: float) -> int:
+    """Return the first frame of a phone that ``_timeline`` made."""
+    return round(start_s * FRAME_RATE_HZ + 0.5) if start_s > 0 else 0
+
+
+def _timeline(labels: list[tuple[str, str]], bounds: NDArray[np.intp], duration_s: float) -> Timeline[Unit]:
+    """Return phones in time, each with its word.
+
+    labels : phones and words
+    bounds : the first frame of each, and the frame count [shape=(len(labels) + 1,)]; frame n covers (n ± ½) · 10 ms
+    Silence at both ends stays silence however short; shorter than ``SHORT_PAUSE_S`` between words, it is a pause.
+    """
+    labels, bounds = _one_silence(labels, bounds)
+    edges = np.clip((bounds - 0.5) / FRAME_RATE_HZ, 0, duration_s)
+    edges[-1] = duration_s
+    spans = []
+    for i, ((phone, word), start_s, end_s) in enumerate(
+        zip(labels, edges[:-1].tolist(), edges[1:].tolist(), strict=True)
+    ):
+        name = phone
+        if is_silent(phone):
+            inside = 0 < i < len(labels) - 1
+            name = PAUSE if inside and end_s - start_s < SHORT_PAUSE_S else SILENCE
+        spans.append(Span(start_s, end_s, Unit(name, word=word)))
+    return Timeline(tuple(spans))
+
+
+def _one_silence(
+    labels: list[tuple[str, str]], bounds: NDArray[np.intp]
+) -> tuple[list[tuple[str, str]], NDArray[np.intp]]:
+    """Return labels and bounds in which silences that follow one another, as noise beside silence, are one."""
+    first = [
+        i for i, (phone, _) in enumerate(labels) if i == 0 or not (is_silent(phone) and is_silent(labels[i - 1][0]))
+    ]
+    return [labels[i] for i in first], np.append(bounds[first], bounds[-1])

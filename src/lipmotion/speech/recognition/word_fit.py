@@ -1,0 +1,113 @@
+"""Words that were heard in a stretch of a recording, aligned, and how well they fit beside freely recognised phones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.hmm.align import choose_pronunciations, state_path, state_sequence
+from lipmotion.hmm.log_likelihoods import LogLikelihoods
+from lipmotion.hmm.model import UnitHmm
+from lipmotion.speech.recognition.combined_phones import NOISES
+from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, most_similar_phone
+
+GENERAL_FORM = {"ax": "ah", "axr": "er", "ix": "ih", "el": "l", "em": "m", "en": "n", PAUSE: SILENCE} | dict.fromkeys(
+    NOISES, SILENCE
+)
+"""Phones that count as another one when phones of words and phones without words are compared."""
+REACH_FRAMES = 2
+"""A phone of a word may be so many frames earlier or later than in its alignment; its bonus falls linearly."""
+
+
+@dataclass(frozen=True, eq=False)
+class AlignedWords:
+    """Words aligned with a stretch of N frames.
+
+    words     : the words
+    phones    : phones, pauses and silences, in order
+    of_word   : the word of each phone, by number; -1: none [shape=(len(phones),)]
+    bounds    : the first frame of each phone, from that of the stretch, and N [shape=(len(phones) + 1,)]
+    densities : the density of every frame [shape=(N,)]
+    """
+
+    words: tuple[str, ...]
+    phones: tuple[str, ...]
+    of_word: NDArray[np.intp]
+    bounds: NDArray[np.intp]
+    densities: NDArray[np.intp]
+
+    @property
+    def of_frame(self) -> NDArray[np.intp]:
+        """The phone of every frame, by number [shape=(N,)]."""
+        return np.repeat(np.arange(len(self.phones)), np.diff(self.bounds))
+
+    def fits(self, log_density: NDArray[np.float32], free: NDArray[np.intp]) -> tuple[NDArray[np.float64], float]:
+        """Return by how much each word is less probable than freely recognised phones [shape=(W,)], and all together.
+
+        log_density : of the stretch [shape=(N, G)]
+        free        : the density of every frame on the best path of phones without words [shape=(N,)]
+        A fit is the mean over frames of the difference of log densities: a log likelihood ratio in nats, seldom over 0.
+        """
+        frames = np.arange(len(free))
+        gain = log_density[frames, self.densities].astype(float) - log_density[frames, free]
+        word = self.of_word[self.of_frame]
+        spoken = word >= 0
+        count = np.bincount(word[spoken], minlength=len(self.words))
+        total = np.bincount(word[spoken], gain[spoken], minlength=len(self.words))
+        return total / np.maximum(count, 1), float(gain.mean())
+
+
+def align_heard_words(
+    hmm: UnitHmm, log_likelihoods: LogLikelihoods, words: Sequence[str], lexicon: Lexicon
+) -> AlignedWords:
+    """Return words aligned with a stretch, as a transcript is.
+
+    log_likelihoods : of the stretch
+    Raises AlignmentError: the words do not fit into the stretch.
+    """
+    modelled = [unit for unit in hmm.table.units if not is_silent(unit)]
+    variants = {word: lexicon.pronunciations(word) for word in set(words)}
+    units = {
+        word: [tuple(most_similar_phone(phone, modelled) for phone in variant) for variant in of_word]
+        for word, of_word in variants.items()
+    }
+    spoken = choose_pronunciations(hmm, log_likelihoods, [units[word] for word in words], PAUSE)
+    sequence = [unit for item in spoken for unit in item.units]
+    _, path = state_path(hmm, log_likelihoods, sequence)
+    states = state_sequence(hmm, sequence)
+    phones = [(phone, item.word) for item in spoken for phone in (
+        variants[words[item.word]][item.variant] if item.word >= 0 else item.units)]  # fmt: skip
+    bounds = np.searchsorted(states.positions[path], np.arange(len(sequence) + 1)).astype(np.intp)
+    return AlignedWords(
+        tuple(words),
+        tuple(phone for phone, _ in phones),
+        np.array([word for _, word in phones], np.intp),
+        bounds,
+        states.densities[path],
+    )
+
+
+def phone_bonus(hmm: UnitHmm, aligned: AlignedWords, bonus: float) -> NDArray[np.float32]:
+    """Return what is added to the log densities of a stretch, so that its words' phones become more probable.
+
+    bonus : in nats, where the phone is in the alignment
+    The result has the shape (N, G).
+    """
+    names = sorted({_form(name) for name in hmm.table.names})
+    columns = np.array([names.index(_form(name)) for name in hmm.table.names])
+    phone = np.array([names.index(_form(each)) for each in aligned.phones])[aligned.of_frame]
+    share = np.zeros((len(phone), len(names)), np.float32)
+    for shift in range(-REACH_FRAMES, REACH_FRAMES + 1):
+        frames = np.arange(max(0, shift), len(phone) + min(0, shift))
+        least = np.float32(1 - abs(shift) / (REACH_FRAMES + 1))
+        share[frames, phone[frames - shift]] = np.maximum(share[frames, phone[frames - shift]], least)
+    return np.float32(bonus) * share[:, columns]
+
+
+def _form(name: str) -> str:
+    """Return the general form of the phone of a density."""
+    phone = name.partition(".")[0]
+    return GENERAL_FORM.get(phone, phone)

@@ -1,0 +1,215 @@
+"""By how much one recording of a sound is later than another one, from claps or beeps in both, or from all of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion.speech.sound.sound_marks import BEEP, SoundMark, sound_marks
+from lipmotion.types import Audio
+
+Array = NDArray[np.float64]
+
+ALIKE = "the sound of both"
+STEP_S = 0.01
+"""Distance of the levels that are compared."""
+LEAST_OVERLAP = 0.5
+"""Share of the shorter recording that the other one must cover, where levels are compared."""
+SAME_S = 0.03
+"""Marks whose offsets differ by less are of one offset."""
+SAME_PITCH_HZ = 40.0
+"""Beeps whose pitches differ by less are the same beep."""
+LEAST_ALIKE, LEAST_MARGIN, PEAK_S = 0.5, 0.1, 0.25
+"""Least correlation of levels at which the sounds alone decide, by how much it must exceed all others, and how far from
+the best an offset is another one."""
+UNLIKE = 0.15
+"""Marks alone decide, without any likeness of the sounds, only where no other offset is possible."""
+RATHER_ALIKE = 0.3
+"""Where sounds around beeps correlate by this much, their waveforms are more exact than the beginnings of beeps."""
+FOR_MARKS = 0.3
+"""What each of up to two marks at one offset counts, besides the correlation."""
+FINE_S, FINE_MARK_S, FINE_BEEP_S = 0.06, 0.01, 0.003
+"""How far the fine search goes around the coarse offset: of whole sounds, of claps, and of sounds around beeps."""
+FINE_WINDOW_S = 20.0
+MARK_WINDOW_S = (0.03, 0.12)
+"""What is compared before and after a clap, or looked at around the beginning of a beep."""
+SMOOTH_S, PLATEAU_S = 0.004, (0.04, 0.1)
+"""The loudness of a beep is smoothed over the first; the second is the part of it whose loudness is its own."""
+
+
+@dataclass(frozen=True)
+class SoundOffset:
+    """The offset of a recording from another one of the same sounds.
+
+    late_s : what is heard at t in the first is heard at t + ``late_s`` in the second
+    how    : ``clap``, ``beep``, or ``the sound of both``
+    alike  : correlation of the levels at this offset, −1 to 1
+    """
+
+    late_s: float
+    how: str
+    alike: float
+
+
+def sound_offset(first: Audio, second: Audio) -> SoundOffset:
+    """Return by how much the second recording is later than the first.
+
+    first, second : the same sounds, recorded by two machines that began at different times; at the same rate
+    A clap or a beep in both is found, and checked against all that is heard; without one, the levels of both are
+    compared at every offset. Then it is refined by the waveforms to a fraction of a millisecond.
+    Raises InputError: neither tells: no clap and no beep in both, and sounds that are not alike.
+    """
+    if first.rate_hz != second.rate_hz:
+        raise InputError(f"sounds of {first.rate_hz} and {second.rate_hz} Hz, required one rate")
+    levels = _levels(first), _levels(second)
+    likeness = _Likeness(*levels)
+    hypotheses = _marked(sound_marks(first), sound_marks(second))
+    best_s, best, second_best = likeness.best()
+    candidates = [(likeness.at(late_s) + FOR_MARKS * min(len(pairs), 2), late_s, pairs) for late_s, pairs in hypotheses]
+    certain = best >= LEAST_ALIKE and best - second_best >= LEAST_MARGIN
+    if candidates:
+        score, late_s, pairs = max(candidates, key=lambda each: each[0])
+        alike = likeness.at(late_s)
+        alone = len(candidates) == 1 or len(pairs) > 1
+        if not (certain and best > score) and (alike >= UNLIKE or alone):
+            kind = pairs[0][0].kind
+            at_mark = _between_beeps if kind == BEEP else _between_claps
+            fine_s = float(np.median([at_mark(first, second, *pair) for pair in pairs]))
+            if kind == BEEP and alike >= RATHER_ALIKE:
+                fine_s = _refined(first, second, fine_s, FINE_BEEP_S)
+            return SoundOffset(fine_s, kind, alike)
+    if certain:
+        return SoundOffset(_refined(first, second, best_s, FINE_S), ALIKE, best)
+    marks = f"{len(candidates)} offsets fit claps or beeps" if candidates else "no clap and no beep is in both"
+    raise InputError(
+        f"the offset of the two sounds is not clear: {marks}, and their levels correlate by {best:.2f} at most, "
+        f"required {LEAST_ALIKE}; give the offset (--offset-ms, or offsets.csv)"
+    )
+
+
+class _Likeness:
+    """Correlation of two rows of levels at every offset that leaves ``LEAST_OVERLAP`` of both."""
+
+    def __init__(self, first: Array, second: Array) -> None:
+        from scipy.signal import fftconvolve
+
+        ones = np.ones(len(first)), np.ones(len(second))
+        flipped, ones_flipped = first[::-1], ones[0][::-1]
+        count = np.maximum(fftconvolve(ones[1], ones_flipped), 1e-9)
+        sums = fftconvolve(ones[1], flipped), fftconvolve(second, ones_flipped)
+        squares = fftconvolve(ones[1], flipped**2), fftconvolve(second**2, ones_flipped)
+        spread = [np.maximum(square - total**2 / count, 1e-9) for square, total in zip(squares, sums, strict=True)]
+        scores = (fftconvolve(second, flipped) - sums[0] * sums[1] / count) / np.sqrt(spread[0] * spread[1])
+        long = LEAST_OVERLAP * min(len(first), len(second))
+        # a short overlap is alike by chance; it counts less
+        self.scores = np.where(count >= long, scores * np.sqrt(1 - long / (2 * np.maximum(count, long))), 0.0)
+        self.zero = len(first) - 1
+
+    def at(self, late_s: float) -> float:
+        """Return the correlation near an offset; 0 where there is no overlap."""
+        middle = self.zero + round(late_s / STEP_S)
+        near = self.scores[max(middle - 1, 0) : max(middle + 2, 0)]
+        return float(near.max()) if len(near) else 0.0
+
+    def best(self) -> tuple[float, float, float]:
+        """Return the best offset in seconds, its correlation, and the highest one elsewhere."""
+        top = int(self.scores.argmax())
+        away = np.abs(np.arange(len(self.scores)) - top) > PEAK_S / STEP_S
+        return (top - self.zero) * STEP_S, float(self.scores[top]), float(self.scores[away].max(initial=-1.0))
+
+
+def _levels(audio: Audio) -> Array:
+    """Return the level of every 10 ms, without what is quieter than the quiet tenth [shape=(N,)]."""
+    size = round(STEP_S * audio.rate_hz)
+    frames = audio.samples[: len(audio.samples) // size * size].reshape(-1, size)
+    if not len(frames):
+        raise InputError(f"{audio.duration_s * 1000:.0f} ms of sound, required more than {STEP_S * 1000:.0f}")
+    power = np.einsum("ts,ts->t", frames, frames, dtype=np.float64) / size
+    levels = np.log10(power + 1e-10)
+    levels = np.maximum(levels, np.percentile(levels, 10))
+    return levels - levels.mean()
+
+
+def _marked(
+    first: tuple[SoundMark, ...], second: tuple[SoundMark, ...]
+) -> list[tuple[float, list[tuple[SoundMark, SoundMark]]]]:
+    """Return offsets at which marks of both fall together, each with the pairs of marks that do."""
+    pairs = [
+        (one, other)
+        for one in first
+        for other in second
+        if one.kind == other.kind and abs(one.hertz - other.hertz) <= SAME_PITCH_HZ
+    ]
+    pairs.sort(key=lambda pair: pair[1].time_s - pair[0].time_s)
+    groups: list[list[tuple[SoundMark, SoundMark]]] = []
+    for pair in pairs:
+        late_s = pair[1].time_s - pair[0].time_s
+        if groups and late_s - (groups[-1][0][1].time_s - groups[-1][0][0].time_s) <= SAME_S:
+            groups[-1].append(pair)
+        else:
+            groups.append([pair])
+    return [(float(np.median([b.time_s - a.time_s for a, b in group])), group) for group in groups]
+
+
+def _between_claps(first: Audio, second: Audio, one: SoundMark, other: SoundMark) -> float:
+    """Return the offset of one clap in both recordings, by their waveforms around it."""
+    span_s = (one.time_s - MARK_WINDOW_S[0], one.time_s + MARK_WINDOW_S[1])
+    return _matched(first, second, span_s, other.time_s - one.time_s, FINE_MARK_S)
+
+
+def _between_beeps(first: Audio, second: Audio, one: SoundMark, other: SoundMark) -> float:
+    """Return the offset of one beep in both recordings, by its beginnings; its waves are all alike."""
+    return _beginning_s(second, other) - _beginning_s(first, one)
+
+
+def _beginning_s(audio: Audio, beep: SoundMark) -> float:
+    """Return when a beep has first half of its loudness."""
+    rate = audio.rate_hz
+    begin = round((beep.time_s - MARK_WINDOW_S[1]) * rate)
+    samples = _cut(audio.samples, begin, round((beep.time_s + MARK_WINDOW_S[1]) * rate))
+    turned = samples * np.exp(-2j * np.pi * beep.hertz * np.arange(len(samples)) / rate)
+    width = round(SMOOTH_S * rate)
+    loudness = np.abs(np.convolve(turned, np.hanning(width + 2), mode="same"))
+    own = [round((MARK_WINDOW_S[1] + time_s) * rate) for time_s in PLATEAU_S]
+    return (begin + int(np.argmax(loudness >= 0.5 * np.median(loudness[own[0] : own[1]])))) / rate
+
+
+def _refined(first: Audio, second: Audio, late_s: float, reach_s: float) -> float:
+    """Return an offset, refined around its coarse value by the loudest part of what both have."""
+    low, high = max(0.0, -late_s), min(first.duration_s, second.duration_s - late_s)
+    if high - low > FINE_WINDOW_S:
+        size = round(STEP_S * first.rate_hz)
+        power = first.samples[round(low * first.rate_hz) : round(high * first.rate_hz)].astype(np.float64) ** 2
+        sums = np.concatenate([[0.0], np.cumsum(power[: len(power) // size * size].reshape(-1, size).sum(axis=1))])
+        width = round(FINE_WINDOW_S / STEP_S)
+        low += int((sums[width:] - sums[:-width]).argmax()) * STEP_S
+        high = low + FINE_WINDOW_S
+    return _matched(first, second, (low, high), late_s, reach_s)
+
+
+def _matched(first: Audio, second: Audio, span_s: tuple[float, float], late_s: float, reach_s: float) -> float:
+    """Return the offset at which the waveforms of a span agree best, within ``reach_s`` of a coarse one.
+
+    The spectra are whitened: rooms and microphones change how loud each frequency is, not when it is heard.
+    Source: Knapp and Carter 1976, "The generalized correlation method for estimation of time delay" (PHAT).
+    """
+    rate = first.rate_hz
+    begin, end = (round(time_s * rate) for time_s in span_s)
+    shift, reach = round(late_s * rate), round(reach_s * rate)
+    one = _cut(first.samples, begin, end)
+    other = _cut(second.samples, begin + shift - reach, end + shift + reach)
+    size = 1 << int(np.ceil(np.log2(len(one) + len(other))))
+    cross = np.fft.rfft(other, size) * np.conj(np.fft.rfft(one, size))
+    cross /= np.abs(cross) + 0.05 * np.abs(cross).mean() + 1e-20
+    scores = np.fft.irfft(cross, size)[: 2 * reach + 1]
+    return (shift - reach + int(scores.argmax())) / rate
+
+
+def _cut(samples: NDArray[np.float32], begin: int, end: int) -> Array:
+    """Return the samples from ``begin`` to ``end``; where there are none, silence."""
+    inner = samples[max(begin, 0) : max(end, 0)].astype(np.float64)
+    front = max(0, min(-begin, end - begin))
+    return np.pad(inner, (front, max(0, end - begin - front - len(inner))))

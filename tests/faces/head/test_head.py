@@ -1,0 +1,108 @@
+"""The pictures of the 3D head."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from faces.head.motions import NOTHING_SAID, opening
+from lipmotion.errors import InputError
+from lipmotion.faces import face_named
+from lipmotion.faces.base import Staging
+from lipmotion.faces.head import Head, render
+from lipmotion.faces.head.pose import CharacterPose
+from lipmotion.faces.head.stage import Stage, camera_for
+from lipmotion.meshes.rendering.rasteriser import Camera
+from lipmotion.testing import check_face
+
+SMALL: dict[str, Any] = {"width": 160, "height": 120}
+
+
+def test_the_number_of_frames_follows_the_frame_rate():
+    moved = opening(*np.zeros(21), rate_hz=100.0)
+    assert [sum(1 for _ in render(moved, NOTHING_SAID, fps=fps, **SMALL)) for fps in (25, 30)] == [6, 7]
+
+
+@pytest.mark.long
+def test_the_same_input_gives_the_same_pixels_and_another_seed_others():
+    moved = opening(*np.linspace(0, 0.2, 8))
+    first, second, other = (
+        np.array(list(render(moved, NOTHING_SAID, staging=Staging(seed=seed), width=64, height=64)))
+        for seed in (1, 1, 2)
+    )
+    assert np.array_equal(first, second)
+    assert not np.array_equal(first, other)
+
+
+def test_the_head_is_a_face_like_all_others():
+    check_face(face_named("head"))
+
+
+def test_an_unusable_size_is_refused_at_once():
+    for size in ({"width": 63}, {"height": 0}, {"width": 129}):
+        with pytest.raises(InputError, match="even number of at least 64"):
+            render(opening(0), NOTHING_SAID, **{**SMALL, **size})
+
+
+@pytest.fixture(scope="module")
+def front() -> Stage:
+    return Stage(Camera(240, 200, (0.0, -0.68), 0.8))
+
+
+def areas(stage: Stage, **pose: Any) -> dict[str, int]:
+    return {name: int(mask.sum()) for name, mask in stage.parts_seen(CharacterPose(**pose)).items()}
+
+
+def test_closed_lips_show_nothing_of_the_mouth(front):
+    for pose in ({}, {"press": 1.0}, {"roundness": 1.0, "width": 0.7, "protrusion": 0.085}):
+        seen = areas(front, **pose)
+        assert seen.pop("lips") > 800
+        assert seen == {"wall": 0, "tongue": 0, "teeth": 0, "upper teeth": 0}
+
+
+def test_the_mouth_does_not_come_through_the_skin_above_protruded_lips():
+    close = Stage(Camera(300, 220, (0.0, -0.71), 0.6))
+    for gap in (0.0, 0.004, 0.008):
+        lips: dict[str, Any] = {
+            "gap": gap,
+            "upper_rise": 0.48 * gap,
+            "width": 0.82,
+            "roundness": 1.0,
+            "protrusion": 0.1,
+        }
+        skin = (
+            close.picture(CharacterPose(**lips, jaw=0.4 * gap, fullness=1.08))[50:75, 140:160].astype(int).sum(axis=2)
+        )
+        assert skin.min() > np.median(skin) - 120
+
+
+def test_a_picture_of_the_moving_part_is_the_whole_picture():
+    stage, pose = Stage(camera_for(320, 240)), CharacterPose(gap=0.1, turn=(0.2, 0.05, 0.0))
+    drawn = stage.figure.frame(pose, stage.canvas.camera.place)
+    whole = stage.canvas.picture(drawn.places, drawn.light, stage.figure.triangles)
+    assert np.array_equal(stage.picture(pose), whole)
+
+
+def first(motion=None, **settings: Any) -> np.ndarray:
+    face = Head(Staging(size=120, **settings))
+    return next(iter(face.render(opening(*[0.1] * 5) if motion is None else motion, NOTHING_SAID)))
+
+
+def test_a_transparent_picture_over_a_colour_is_the_picture_on_that_colour():
+    clear, on_grey = first(background="transparent").astype(float), first(background="#808080").astype(float)
+    alpha = clear[..., 3:] / 255
+    over = alpha * clear[..., :3] + (1 - alpha) * 128
+    whole = (alpha[..., 0] == 0) | (alpha[..., 0] == 1)
+    assert np.abs(over - on_grey)[whole].max() <= 1
+    assert np.abs(over - on_grey).max() < 40  # edges are mixed as light, not as grey levels
+    assert 0.2 < (alpha == 0).mean() < 0.9
+
+
+@pytest.mark.long
+def test_what_is_switched_off_does_not_move():
+    moved = opening(*[0.0] * 60)
+    still = Staging(size=64, blinks=False, gaze=False, brows=False, head=False)
+    frames = list(Head(still).render(moved, NOTHING_SAID))
+    assert all(np.array_equal(frame, frames[0]) for frame in frames[1:])
+    lively = list(Head().staged(Staging(size=64)).render(moved, NOTHING_SAID))
+    assert not np.array_equal(lively[0], lively[30])

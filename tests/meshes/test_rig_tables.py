@@ -1,0 +1,54 @@
+"""A user's table of controls: rows add up, limits hold, damaged tables are refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lipmotion.errors import InputError
+from lipmotion.meshes.files.rig_tables import read_rig_table, rig_motion
+
+SOURCES = {"jawOpen": np.array([0.0, 0.5, 1.0]), "mouthPucker": np.array([0.0, 1.0, 0.0])}
+
+
+def _table(tmp_path, text):
+    (tmp_path / "rig.csv").write_text(text)
+    return read_rig_table(tmp_path / "rig.csv")
+
+
+def test_controls_follow_their_sources(tmp_path):
+    text = (
+        "control,source,gain,offset,low,high\nJaw.rz,jawOpen,-25,,-20,0\nLips,mouthPucker,0.5\nLips,jawOpen,-0.25,0.1\n"
+    )
+    motion = rig_motion(_table(tmp_path, text), SOURCES, 25.0)
+    assert motion.names == ("Jaw.rz", "Lips")
+    np.testing.assert_allclose(motion["Jaw.rz"], [0, -12.5, -20])
+    np.testing.assert_allclose(motion["Lips"], [0.1, 0.475, -0.15])
+
+
+def test_a_control_may_be_constant(tmp_path):
+    motion = rig_motion(_table(tmp_path, "control,source,offset\n# a comment\nBrow,,0.3\n\n"), SOURCES, 25.0)
+    np.testing.assert_allclose(motion["Brow"], 0.3)
+
+
+def test_an_unknown_source_is_named(tmp_path):
+    with pytest.raises(InputError, match="'Jaw' follows 'jawopen', required one of jawOpen"):
+        rig_motion(_table(tmp_path, "control,source\nJaw,jawopen\n"), SOURCES, 25.0)
+
+
+WRONG = [
+    ("", "required control,source"),
+    ("control,from\nJaw,jawOpen\n", "required control,source"),
+    ("control,source\n", "0 rows"),
+    ("control,source,gain\nJaw,jawOpen,much\n", "line 2"),
+    ("control,source,gain\nJaw,jawOpen,nan\n", "required at most"),
+    ("control,source,gain\nJaw,jawOpen,1e9\n", "required at most"),
+    ("control,source,low,high\nJaw,jawOpen,2,1\n", "goes from 2 to 1"),
+    ("control,source\n,jawOpen\n", "without a control"),
+]
+
+
+def test_damaged_tables_are_refused(tmp_path):
+    for text, message in WRONG:
+        with pytest.raises(InputError, match=message):
+            _table(tmp_path, text)

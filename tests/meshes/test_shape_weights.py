@@ -1,0 +1,129 @@
+"""Weights follow the points, stay in range, and close the lips where they should."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lipmotion.articulation.lip_points import mouth_template
+from lipmotion.meshes.fitting.bounded_curves import CurveCosts
+from lipmotion.meshes.fitting.lip_placement import placed_by_shape
+from lipmotion.meshes.fitting.point_motion import point_motion
+from lipmotion.meshes.fitting.reference_mouth import arkit_mouth
+from lipmotion.meshes.fitting.shape_weights import SolverOptions, shape_weights
+from lipmotion.meshes.model.face_shapes import face_shapes
+from lipmotion.meshes.model.mesh import Mesh
+from lipmotion.meshes.model.surface import mesh_surface
+from lipmotion.types import Channel, Motion, Timeline
+from meshes.heads import head
+from meshes.speech import motion, units
+
+
+def _head_shapes():
+    mesh = head()
+    return face_shapes(mesh, placed_by_shape(mesh, mesh_surface(mesh)))
+
+
+@pytest.fixture(scope="module", params=["mesh", "reference"])
+def shapes(request):
+    return _head_shapes() if request.param == "mesh" else arkit_mouth()
+
+
+@pytest.fixture(scope="module")
+def weights(shapes):
+    """Of motion with points for the mesh, of distances alone for the reference."""
+    return shape_weights(motion(points=shapes is not arkit_mouth()), units(), shapes)
+
+
+def test_weights_are_between_0_and_1_and_smooth(weights):
+    assert weights.values.min() >= 0
+    assert weights.values.max() <= 1
+    assert np.abs(np.diff(weights.values, axis=0)).max() < 0.25
+
+
+def test_the_gap_is_that_of_the_motion(weights, shapes):
+    gap = weights.values @ shapes.gap
+    wanted = point_motion(motion(), units()).mouth.gap
+    phone = np.array([name for name, start, end in _phones() for _ in range(round(100 * (end - start)))] + ["sil"])
+    free = ~np.isin(phone, ["p", "m"])
+    assert np.abs(gap - wanted)[free].max() < 0.012
+    assert np.corrcoef(gap, wanted)[0, 1] > 0.995
+
+
+def test_lips_close_in_p_and_m_and_in_silence(weights, shapes):
+    gap = weights.values @ shapes.gap
+    assert gap[[55, 95]].max() < 1e-6
+    assert gap[:40].max() < 1e-6
+    assert weights.values[5:40].max() < 0.03
+
+
+def test_the_jaw_is_never_less_open_than_the_lips_are_closed(weights):
+    assert (weights["mouthClose"] - weights["jawOpen"]).max() < 1e-9
+
+
+def test_the_jaw_stays_open_behind_closed_lips(shapes):
+    weights = shape_weights(motion(), units(), shapes)
+    assert weights["jawOpen"][95] > 0.05
+    assert weights["mouthClose"][95] > 0.05
+
+
+def test_oo_is_puckered_and_aa_is_not(weights):
+    assert weights["mouthPucker"][115] > weights["mouthPucker"][75] + 0.04
+
+
+def test_gestures_can_be_left_out(shapes):
+    plain = shape_weights(motion(), units(), shapes, SolverOptions(gestures=False))
+    pressed = shape_weights(motion(), units(), shapes)
+    assert np.abs(plain["mouthPressLeft"]).max() < 1e-9
+    assert pressed["mouthPressLeft"][95] > 0.15
+
+
+def test_known_weights_come_back():
+    shapes = _head_shapes()
+    known = np.zeros((60, len(shapes.names)))
+    wave = np.clip(np.sin(np.arange(60) / 9), 0, 1)
+    known[:, shapes.row("jawOpen")] = 0.4 * wave
+    known[:, shapes.row("mouthPucker")] = 0.5 * wave[::-1]
+    placed = np.einsum("ts,spc->tpc", known, shapes.moved)
+    found = shape_weights(_of(placed, known @ shapes.gap), Timeline(()), shapes, _EXACT)
+    found = Motion(found.values[30:], 100.0, found.channels)  # before: the rest pose
+    assert np.abs(found["jawOpen"] - known[:, shapes.row("jawOpen")]).max() < 0.08
+    assert np.abs(found["mouthPucker"] - known[:, shapes.row("mouthPucker")]).max() < 0.08
+
+
+def test_visemes_are_used_where_there_is_no_jaw_shape():
+    mesh = head()
+    names = {"jawOpen": "viseme_aa", "mouthPucker": "viseme_U", "mouthFunnel": "viseme_O", "mouthSmileLeft": "viseme_E"}
+    names |= {"mouthStretchLeft": "viseme_I", "mouthRollLower": "viseme_FF", "mouthPressLeft": "viseme_PP"}
+    names |= {"mouthLowerDownLeft": "viseme_DD", "mouthUpperUpLeft": "viseme_SS"}
+    kept = tuple(type(s)(names[s.name], s.rows, s.displacements) for s in mesh.shapes if s.name in names)
+    spoken = Mesh(mesh.vertices, mesh.triangles, mesh.parts, kept)
+    shapes = face_shapes(spoken, placed_by_shape(spoken, mesh_surface(spoken)))
+    assert shapes.style == "visemes"
+    found = shape_weights(motion(), units(), shapes)
+    assert found["viseme_aa"][75] > 0.2
+    assert found["viseme_aa"][:40].max() < 0.02
+    assert found["viseme_U"][115] > found["viseme_U"][75]
+    gap = found.values @ shapes.gap
+    assert gap[[55, 95]].max() < 1e-6
+
+
+_EXACT = SolverOptions(CurveCosts(ridge=1e-7, smooth=0.0), gestures=False)
+
+
+def _of(displacements, gap):
+    """Motion whose points are displaced so."""
+    template = mouth_template()
+    places = template.places + displacements
+    rest = np.tile(template.places, (30, 1, 1))
+    places = np.concatenate([rest, places])
+    channels = [Channel(f"{axis}_{point}") for point in template.points for axis in "xyz"]
+    opening = np.concatenate([np.zeros(30), np.maximum(gap, 0)])[:, None]
+    values = np.concatenate([opening, opening, places.reshape(len(places), -1)], axis=1)
+    return Motion(values, 100.0, (Channel("opening"), Channel("lip_gap"), *channels))
+
+
+def _phones():
+    from meshes.speech import PHONES
+
+    return PHONES
