@@ -138,7 +138,7 @@ def test_a_second_signal_later_ends_the_program() -> None:
     """A second signal ends the program at once, even where the first one was swallowed."""
     program = (
         "import time\n"
-        "from lipmotion.cli import stop\n"
+        "from lipmotion.cli.terminal import stop\n"
         "stop.SAME_SIGNAL_S = 0.0\n"
         "stop.Stopper().listen()\n"
         "while True:\n"
@@ -263,6 +263,7 @@ def test_little_is_loaded_before_signals_are_listened_to() -> None:
     assert {name for name in loaded if name.startswith("lipmotion")} == {
         "lipmotion",
         "lipmotion.cli",
+        "lipmotion.cli.terminal",
         "lipmotion.cli.terminal.events",
         "lipmotion.cli.main",
         "lipmotion.cli.terminal.stop",

@@ -14,6 +14,7 @@ from lipmotion.engines import Engine
 from lipmotion.errors import InputError
 from lipmotion.pipeline.generate.outlook import WHOLE_TRANSCRIPT, outlook_of
 from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.understand import understood_speech as pipeline_understand
 from lipmotion.pipeline.understand.request import SpeechRequest, request_of
 from lipmotion.pipeline.understand.understood_speech import (
     recognised_speech,
@@ -22,7 +23,6 @@ from lipmotion.pipeline.understand.understood_speech import (
     understand,
     understood_speech,
 )
-from lipmotion.pipeline.understand.understood_speech import understood_speech as pipeline_understand
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import mfcc
 from lipmotion.speech.recognition.agreement import TranscriptFit

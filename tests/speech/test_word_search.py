@@ -8,7 +8,8 @@ import pytest
 
 from lipmotion.pipeline.model import load_model
 from lipmotion.speech.features.mfcc import mfcc
-from lipmotion.speech.recognition.recognised_speech import Recognition, word_search
+from lipmotion.speech.recognition import word_search
+from lipmotion.speech.recognition.recognised_speech import Recognition
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.recognition.word_decoder import FoundWord
 from lipmotion.speech.recognition.word_search import confidence_of
