@@ -92,7 +92,7 @@ def verb_table() -> str:
 
 
 def option_table() -> str:
-    """Return the table of the options that several verbs take, each once for each meaning."""
+    """Return the table of the options that three verbs or more take, each once for each meaning."""
     found: dict[tuple[str, str], dict[str, None]] = {}
     for name, _, part in verbs(whole_parser()):
         for action in actions(part):
@@ -100,7 +100,7 @@ def option_table() -> str:
                 says = re.sub(r"\s+", " ", part._get_formatter()._expand_help(action))
                 found.setdefault((shown(action), says), {})[name.split()[0]] = None
     rows = (
-        [f"`{option}`", says, ", ".join(names)] for (option, says), names in sorted(found.items()) if len(names) > 1
+        [f"`{option}`", says, ", ".join(names)] for (option, says), names in sorted(found.items()) if len(names) > 2
     )
     return table(["option", "what it does", "verbs"], rows)
 
@@ -136,17 +136,17 @@ def cue_formats() -> str:
 
 
 def character_limits() -> str:
-    """Return the table of what the files of a character may hold."""
+    """Return what the files of a character may hold."""
     from lipmotion.rig.limits import MOST
 
-    return table(["a character's", "at most"], ([what, f"{most:,}"] for what, most in MOST.items()))
+    return "At most " + ", ".join(f"{most:,} {what}" for what, most in MOST.items()) + "."
 
 
 def bad_input() -> str:
-    """Return the table of the groups of bad input that are tested, with the number of rows of each."""
+    """Return the groups of bad input that are tested, with the number of command lines of each."""
     text = (ROOT / "tests" / "robustness" / "table.md").read_text(encoding="utf-8")
     groups = (part.partition("\n") for part in text.split("\n### ")[1:])
-    return table(["group", "command lines"], ([name, str(rows.count("\n| ") - 1)] for name, _, rows in groups))
+    return "; ".join(f"{name.lower()} {rows.count(chr(10) + '| ') - 1}" for name, _, rows in groups) + "."
 
 
 TABLES: dict[str, Callable[[], str]] = {
