@@ -1,9 +1,11 @@
 """Writes the figures that pages state, from ``docs/results/figures/*.json``, and the page ``docs/results/figures.md``.
 
 A sheet is one JSON file: ``page``, the page that it belongs to; ``tables`` by name, each with ``columns``, ``rows`` and
-its stamp; ``stated``, what the text of that page says in figures beside the tables. A stamp is ``commit`` and ``date``,
-where the table was made; ``model``, what made it; and ``command``. A model is ``shipped`` and the first digits of the
-SHA-256 of its file; an engine and the digest of its default options; ``none``, where no model takes part; or words.
+its stamp; ``stated``, what the text of that page says in figures beside the tables. The stamp of that is the table
+``text``, which has no columns; a stamp alone stands also where an experiment prints the table itself. A stamp is
+``commit`` and ``date``, where the table was made; ``model``, what made it; and ``command``. A model is ``shipped`` and
+the first digits of the SHA-256 of its file; an engine and the digest of its default options; ``none``, where no model
+takes part; or words.
 
 In a page a table stands between ``<!-- figures: SHEET.TABLE -->`` and ``<!-- end -->``. Run
 ``python scripts/figures_page.py`` after a change; ``--check`` writes nothing, and fails where something would change.
@@ -65,11 +67,12 @@ def made_by(model: str, current: frozenset[str]) -> str:
 def stamp(table: Sheet, current: frozenset[str]) -> str:
     """Return the line below a table: its commit, its model and the command that made it."""
     command = f" · `{table['command']}`" if table.get("command") else ""
-    return f"*{table['commit']}, {table['date']}{made_by(table['model'], current)}{command}*"
+    title = f"{table['title']}: " if table.get("title") and not table["columns"] else ""
+    return f"*{title}{table['commit']}, {table['date']}{made_by(table['model'], current)}{command}*"
 
 
 def rendered(table: Sheet, current: frozenset[str]) -> str:
-    """Return a table in Markdown, with its stamp; the stamp alone where an experiment prints the table itself."""
+    """Return a table in Markdown, with its stamp; of one without columns the stamp alone."""
     if not table["columns"]:
         return stamp(table, current) + "\n"
     cells = [table["columns"], *table["rows"]]

@@ -52,6 +52,7 @@ def test_sheets_are_stamped_and_shown() -> None:
     shown = "".join(page.read_text(encoding="utf-8") for page in FIGURES.pages())
     for name, sheet in FIGURES.sheets().items():
         assert (ROOT / "docs" / sheet["page"]).is_file(), name
+        assert not sheet["stated"] or not sheet["tables"]["text"]["columns"], name
         for key, table in sheet["tables"].items():
             assert all(table[part] for part in ("commit", "date", "model")), (name, key)
             assert name == "glance" or f"<!-- figures: {name}.{key} -->" in shown, (name, key)
