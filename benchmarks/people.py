@@ -7,7 +7,7 @@ times. ``alone``: s1 without the others; ``pooled``: all as one person; ``maps``
 the mean person; ``nearest``: the same models, with the motion of the person whose voice is most like the fifth's.
 ACC of opening, width and outer: of the fifth person the mean over clips, at the best lag within 60 ms (as
 ``anyone.py``), of s1 the figures of ``evaluate`` on ``val``. Distance: mean absolute difference of the three channels
-without a lag, their sum. Corpus: docs/results/voices-people.md.
+without a lag, their sum. Corpus: docs/results/voices.md.
 """
 
 from __future__ import annotations

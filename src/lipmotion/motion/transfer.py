@@ -34,7 +34,7 @@ def transfer_map(source: Sequence[Example], target: Sequence[Example]) -> Speake
       gains lie between 1 / ``MOST_GAIN`` and ``MOST_GAIN``: a short recording gives place and shape alone.
     - In silence away from speech the rest pose maps onto the target's.
     The map has no habits (``SpeakerMap.habits`` is 0).
-    Alternatives that were measured: docs/results/selection-transfer.md.
+    Alternatives that were measured: docs/results/selection.md.
     """
     channels = source[0].motion.channels
     names = [channel.name for channel in channels]

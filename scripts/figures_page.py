@@ -1,0 +1,155 @@
+"""Writes the figures that pages state, from ``docs/results/figures/*.json``, and the page ``docs/results/figures.md``.
+
+A sheet is one JSON file: ``page``, the page that it belongs to; ``tables`` by name, each with ``columns``, ``rows`` and
+its stamp; ``stated``, what the text of that page says in figures beside the tables. The stamp of that is the table
+``text``, which has no columns; a stamp alone stands also where an experiment prints the table itself. A stamp is
+``commit`` and ``date``, where the table was made; ``model``, what made it; and ``command``. A model is ``shipped`` and
+the first digits of the SHA-256 of its file; an engine and the digest of its default options; ``none``, where no model
+takes part; or words.
+
+In a page a table stands between ``<!-- figures: SHEET.TABLE -->`` and ``<!-- end -->``. Run
+``python scripts/figures_page.py`` after a change; ``--check`` writes nothing, and fails where something would change.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+SHEETS, OVERVIEW, SHIPPED = DOCS / "results" / "figures", DOCS / "results" / "figures.md", "grid-s1.lipmotion"
+REGION = re.compile(r"(<!-- figures: ([\w-]+)\.([\w-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
+UNITS = "%|ms|MB|GB|kB|dB|s|frames a second|times as fast"
+FIGURE = re.compile(rf"(?<![\w.,])\d[\d,]*(?:\.\d+(?![\w]|\.\d)|(?= (?:{UNITS})(?!\w)))")
+EXACT = re.compile(r"(?<![\w.,])0\.\d{3}(?!\d)")
+"""In guides: numbers of three decimals, as correlations have; constants stand in spans of code."""
+
+Sheet = Mapping[str, Any]
+
+
+def sheets() -> dict[str, Sheet]:
+    """Return all sheets by name."""
+    return {path.stem: json.loads(path.read_text(encoding="utf-8")) for path in sorted(SHEETS.glob("*.json"))}
+
+
+def digest(content: bytes) -> str:
+    """Return the digits that name a model file or the default options of an engine."""
+    return hashlib.sha256(content).hexdigest()[:8]
+
+
+def current_models() -> frozenset[str]:
+    """Return the stamps of what makes figures now: the shipped model, every engine with its defaults, no model."""
+    from lipmotion.engines import ENGINES
+
+    (model,) = (ROOT / "src" / "lipmotion").rglob(SHIPPED)
+    found = {"none", f"shipped {digest(model.read_bytes())}"}
+    for name in ENGINES.built_in:
+        options = json.dumps(ENGINES.load(name).Config().as_mapping(), sort_keys=True)
+        found.add(f"{name} {digest(options.encode())}")
+    return frozenset(found)
+
+
+def made_by(model: str, current: frozenset[str]) -> str:
+    """Return what a page says of the models of a stamp; of one that is not the current one it says so."""
+    parts = model.split(", ")
+    earlier = [part for part in parts if part not in current]
+    if model == "none":
+        return ""
+    return f" · from an earlier model: {', '.join(earlier)}" if earlier else f" · {model}"
+
+
+def stamp(table: Sheet, current: frozenset[str]) -> str:
+    """Return the line below a table: its commit, its model and the command that made it."""
+    command = f" · `{table['command']}`" if table.get("command") else ""
+    title = f"{table['title']}: " if table.get("title") and not table["columns"] else ""
+    return f"*{title}{table['commit']}, {table['date']}{made_by(table['model'], current)}{command}*"
+
+
+def rendered(table: Sheet, current: frozenset[str]) -> str:
+    """Return a table in Markdown, with its stamp; of one without columns the stamp alone."""
+    if not table["columns"]:
+        return stamp(table, current) + "\n"
+    cells = [table["columns"], *table["rows"]]
+    head, *rows = (re.sub(r"\| +(?=\|)", "| ", f"| {' | '.join(row)} |") for row in cells)
+    return "\n".join([head, "|" + "---|" * len(table["columns"]), *rows, "", stamp(table, current), ""])
+
+
+def written(text: str, found: Mapping[str, Sheet], current: frozenset[str]) -> str:
+    """Return a page with its tables as the sheets have them. Raises KeyError: there is no such sheet or table."""
+    return REGION.sub(lambda m: m[1] + rendered(found[m[2]]["tables"][m[3]], current) + m[4], text)
+
+
+def prose(text: str) -> str:
+    """Return a page without tables of sheets, code, comments and the targets of links."""
+    text = re.sub(r"^( *)```.*?^\1```", "", REGION.sub("", text), flags=re.MULTILINE | re.DOTALL)
+    text = re.sub(r"^ {4}.*$", "", text, flags=re.MULTILINE)
+    return re.sub(r"<!--.*?-->|`[^`\n]*`|\]\([^)]*\)", "", text, flags=re.DOTALL)
+
+
+def held(chosen: Iterator[Sheet]) -> str:
+    """Return everything that sheets hold, as text."""
+    parts = [[*(cell for t in s["tables"].values() for row in [t["columns"], *t["rows"]] for cell in row), *s["stated"]]
+             for s in chosen]  # fmt: skip
+    return "\n".join(cell for cells in parts for cell in cells)
+
+
+def not_held(page: Path, text: str, found: Mapping[str, Sheet]) -> list[str]:
+    """Return the figures that a page states outside of its tables, and that no sheet of it holds.
+
+    Of results every figure counts, and the page's own sheet holds it, or one of those whose tables it shows; of guides
+    numbers of three decimals, and any sheet may hold them. Decisions tell what was known then: not looked at.
+    """
+    name = page.relative_to(DOCS).as_posix() if page.is_relative_to(DOCS) else page.name
+    shown = {match[2] for match in REGION.finditer(text)}
+    own = (sheet for key, sheet in found.items() if sheet["page"] == name or key in shown)
+    results = name.startswith("results/")
+    pattern, chosen = (FIGURE, own) if results else (EXACT, iter(found.values()))
+    known = set(pattern.findall(held(chosen)))
+    return [figure for figure in pattern.findall(prose(text)) if figure not in known]
+
+
+def overview(found: Mapping[str, Sheet], current: frozenset[str]) -> str:
+    """Return the page of all figures: those at a glance, then where each is, from which commit and model."""
+    glance = found["glance"]
+    lines = ["# Figures at a glance", "", *glance["text"], ""]
+    for table in glance["tables"].values():
+        lines += [f"## {table['title']}", "", *table.get("text", []), "", rendered(table, current)]
+    lines += ["## All figures", "", *glance["all"], "", "| page | tables | commits | models |", "|---|---|---|---|"]
+    for name, sheet in found.items():
+        if name != "glance":
+            tables = list(sheet["tables"].values())
+            commits = " ".join(dict.fromkeys(t["commit"] for t in tables))
+            made = dict.fromkeys(made_by(t["model"], current).removeprefix(" · ") or "none" for t in tables)
+            target = f"../{sheet['page']}".replace("../results/", "")
+            lines.append(f"| [{name}]({target}) | {len(tables)} | {commits} | {'; '.join(made)} |")
+    return re.sub(r"\n{3,}", "\n\n", "\n".join(lines)) + "\n"
+
+
+def pages() -> list[Path]:
+    """Return the pages that are looked at."""
+    return [ROOT / "README.md", *(p for p in sorted(DOCS.rglob("*.md")) if p.parent.name != "decisions")]
+
+
+def main() -> int:
+    """Write all pages; with ``--check`` none. Return 1 where a page differed, or states what no sheet holds."""
+    found, current, wrong = sheets(), current_models(), 0
+    for page in pages():
+        before = page.read_text(encoding="utf-8") if page.exists() else ""
+        after = overview(found, current) if page == OVERVIEW else written(before, found, current)
+        unknown = [] if page == OVERVIEW else not_held(page, after, found)
+        if unknown or ("--check" in sys.argv and after != before):
+            print(f"{page.relative_to(ROOT)}: {', '.join(unknown) or 'not as its sheets say'}")
+            wrong = 1
+        if "--check" not in sys.argv and after != before:
+            page.write_text(after, encoding="utf-8")
+    return wrong
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,185 @@
+"""Writes the tables of the reference that follow from the code: verbs and options, formats, limits, bad input.
+
+In a page such a table stands between ``<!-- made: NAME -->`` and ``<!-- end made -->``. Run
+``python scripts/reference_pages.py`` after a change of the command line or of a registry.
+``--check`` writes nothing, and fails where something would change.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from collections.abc import Callable, Iterator
+from importlib import import_module
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+REGION = re.compile(r"(<!-- made: ([\w-]+) -->\n).*?(<!-- end made -->)", re.DOTALL)
+SEE = {
+    "animate": "faces controls formats transcripts meshes filmed-face",
+    "batch": "batch",
+    "speak": "speak",
+    "render": "controls",
+    "explain": "explain",
+    "cues": "cues",
+    "words": "start",
+    "corpus": "corpora",
+    "train": "own-model unit-sets voices long-work",
+    "adapt": "adaptation",
+    "face": "filmed-face consent",
+    "character": "meshes",
+    "addon": "formats",
+    "evaluate": "measures",
+    "experiment": "measures",
+    "info": "start",
+    "cite": "glossary",
+}
+"""The pages on each verb, without suffix."""
+
+
+def table(head: list[str], rows: Iterator[list[str]]) -> str:
+    """Return a table in Markdown; bars in cells are escaped."""
+    cells = ([cell.replace("|", "\\|") for cell in row] for row in rows)
+    lines = [f"| {' | '.join(head)} |", "|" + "---|" * len(head), *(f"| {' | '.join(row)} |" for row in cells)]
+    return re.sub(r"\| +(?=\|)", "| ", "\n".join(lines))
+
+
+def verbs(parser: argparse.ArgumentParser, before: str = "") -> Iterator[tuple[str, str, argparse.ArgumentParser]]:
+    """Yield name, help and parser of every verb, and of the actions of verbs that have some."""
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            helps = {choice.dest: choice.help or "" for choice in action._choices_actions}
+            for name, part in action.choices.items():
+                inner = list(verbs(part, f"{before}{name} "))
+                yield from inner or [(before + name, helps.get(name, ""), part)]
+
+
+def shown(action: argparse.Action) -> str:
+    """Return an option, or an argument, as one types it."""
+    names = action.option_strings
+    value = action.metavar or (action.dest.upper() if not action.choices else "|".join(map(str, action.choices)))
+    value = " ".join(dict.fromkeys(value)) if isinstance(value, tuple) else value
+    value += "…" if action.nargs in ("+", "*") else ""
+    if not names:
+        value = value.upper() if value.islower() else value
+        return f"[{value}]" if action.nargs == "?" else value
+    name = "-o" if "-o" in names else next(name for name in names if name.startswith("--"))
+    return name if action.nargs == 0 else f"{name} {value}"
+
+
+def whole_parser() -> argparse.ArgumentParser:
+    """Return the parser of the command line."""
+    from lipmotion.cli.command_line import parser
+
+    return parser()
+
+
+def actions(part: argparse.ArgumentParser) -> list[argparse.Action]:
+    """Return the arguments and options of a verb but for ``--help`` and hidden ones."""
+    return [action for action in part._actions if action.dest != "help" and action.help != argparse.SUPPRESS]
+
+
+def verb_table() -> str:
+    """Return the table of all verbs: what they must be given, what they do, the pages on them."""
+    rows = []
+    for name, says, part in verbs(whole_parser()):
+        needed = [shown(a) for a in actions(part) if not a.option_strings or a.required]
+        see = ", ".join(f"[{page}]({page}.md)" for page in SEE.get(name.split()[0], "").split())
+        rows.append([f"`{' '.join([name, *needed])}`", says, see])
+    return table(["verb", "what it does", "more"], iter(rows))
+
+
+def option_table() -> str:
+    """Return the table of the options that three verbs or more take, each once for each meaning."""
+    found: dict[tuple[str, str], dict[str, None]] = {}
+    for name, _, part in verbs(whole_parser()):
+        for action in actions(part):
+            if action.option_strings and not action.required:
+                says = re.sub(r"\s+", " ", part._get_formatter()._expand_help(action))
+                found.setdefault((shown(action), says), {})[name.split()[0]] = None
+    rows = (
+        [f"`{option}`", says, ", ".join(names)] for (option, says), names in sorted(found.items()) if len(names) > 2
+    )
+    return table(["option", "what it does", "verbs"], rows)
+
+
+def exit_codes() -> str:
+    """Return the exit codes as the command line lists them."""
+    return re.sub(r"\s+", " ", whole_parser().epilog or "").capitalize() + "."
+
+
+def first_sentence(module: str) -> str:
+    """Return what the first line of a module's docstring says after the name of its format."""
+    return (import_module(module).__doc__ or "").splitlines()[0].partition(": ")[2].rstrip(".")
+
+
+def motion_formats() -> str:
+    """Return the table of motion files that are built in."""
+    from lipmotion.export.base import MOTION_FORMATS
+
+    rows = []
+    for name in MOTION_FORMATS.built_in:
+        chosen = MOTION_FORMATS.load(name)
+        rate = f"{chosen.rate_hz:g}" if chosen.rate_hz else "the motion's"
+        rows.append([f"`.{name}`", first_sentence(chosen.write.__module__), "yes" if chosen.read else "no", rate])
+    return table(["file", "what it holds", "read back", "frames a second"], iter(rows))
+
+
+def cue_formats() -> str:
+    """Return the table of cue files."""
+    from lipmotion.export.cues.base import CUE_FORMATS
+
+    rows = ([f"`.{name}`", first_sentence(text.__module__)] for name, text in CUE_FORMATS.items())
+    return table(["file", "what it holds"], rows)
+
+
+def character_limits() -> str:
+    """Return what the files of a character may hold."""
+    from lipmotion.meshes.model.limits import MOST
+
+    return "At most " + ", ".join(f"{most:,} {what}" for what, most in MOST.items()) + "."
+
+
+def bad_input() -> str:
+    """Return the groups of bad input that are tested, with the number of command lines of each."""
+    text = (ROOT / "tests" / "robustness" / "table.md").read_text(encoding="utf-8")
+    groups = (part.partition("\n") for part in text.split("\n### ")[1:])
+    return "; ".join(f"{name.lower()} {rows.count(chr(10) + '| ') - 1}" for name, _, rows in groups) + "."
+
+
+TABLES: dict[str, Callable[[], str]] = {
+    "verbs": verb_table,
+    "options": option_table,
+    "exit-codes": exit_codes,
+    "motion-formats": motion_formats,
+    "cue-formats": cue_formats,
+    "character-limits": character_limits,
+    "bad-input": bad_input,
+}
+
+
+def written(text: str) -> str:
+    """Return a page with its tables as the code has them. Raises KeyError: there is no table of a name."""
+    return REGION.sub(lambda match: f"{match[1]}{TABLES[match[2]]()}\n{match[3]}", text)
+
+
+def main() -> int:
+    """Write all pages; with ``--check`` none. Return 1 where a page differed."""
+    wrong = 0
+    for page in sorted(DOCS.rglob("*.md")):
+        before = page.read_text(encoding="utf-8")
+        after = written(before)
+        if after == before:
+            continue
+        if "--check" in sys.argv:
+            print(f"{page.relative_to(ROOT)}: not as the code has it")
+            wrong = 1
+        else:
+            page.write_text(after, encoding="utf-8")
+    return wrong
+
+
+if __name__ == "__main__":
+    sys.exit(main())
