@@ -1,9 +1,9 @@
-"""Size, error and speed of the stores of motion and of mouth pictures.
+"""Size, error and speed of the store of motion.
 
-    python benchmarks/motion_store.py CORPUS --grid ../shared/corpora/grid-s1 [--only tracks paper pictures]
-        [--clips 150] [--mesh FILE.npz] [--minutes 40] [--psnr 30 34 38]
+    python benchmarks/motion_store.py CORPUS --grid ../shared/corpora/grid-s1 [--only tracks paper]
+        [--clips 150] [--mesh FILE.npz] [--minutes 40]
 
-CORPUS is a prepared corpus with mouth pictures. Prints one JSON object per case. ``paper`` is the scale of Minnis &
+CORPUS is a prepared corpus. Prints one JSON object per case. ``paper`` is the scale of Minnis &
 Breen 2000, 2,000 vertices at 30 Hz for 40 minutes, made of the clips in --grid (``paper_scale`` says how); --mesh keeps
 their tracked meshes for the next time.
 """
@@ -16,7 +16,7 @@ import tempfile
 import time
 import warnings
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,11 +24,11 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.appearance.picture_store import compress_pictures, picture_store_arrays
 from lipmotion.corpora.store import Corpus
 from lipmotion.motion.resample import to_model_frames
-from lipmotion.motion.store import compress, lip_tolerance, motion_store_arrays, point_distances, point_groups
+from lipmotion.motion.store import compress, lip_tolerance, motion_store_arrays, point_distances
 from lipmotion.storage.archive import write_archive
+from lipmotion.types import Channel
 from lipmotion.vision.mesh import quiet_stderr
 from lipmotion.vision.packages import import_face_mesh
 from lipmotion.vision.pose import without_head_motion
@@ -37,7 +37,6 @@ Array = NDArray[Any]
 POINTS, VERTICES, VIDEO_HZ, PAPER_HZ = 468, 2000, 25.0, 30.0
 CORNERS = (61, 291)
 PIECES, PIECE_S = 1000, 0.1
-CRFS = (16, 20, 24, 28, 32, 36)
 
 
 def main() -> None:
@@ -45,11 +44,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("corpus", type=Path)
     parser.add_argument("--grid", type=Path, default=Path("../shared/corpora/grid-s1"))
-    parser.add_argument("--only", nargs="*", default=["tracks", "paper", "pictures"])
+    parser.add_argument("--only", nargs="*", default=["tracks", "paper"])
     parser.add_argument("--clips", type=int, default=150)
     parser.add_argument("--mesh", type=Path)
     parser.add_argument("--minutes", type=float, default=40)
-    parser.add_argument("--psnr", type=float, nargs="*", default=[30, 34, 38])
     options = parser.parse_args()
     corpus = Corpus.open(options.corpus)
     names = corpus.names()[: options.clips]
@@ -58,8 +56,6 @@ def main() -> None:
             report(f"tracks at {rate_hz:g} Hz", *tracks(corpus, names, rate_hz))
     if "paper" in options.only:
         report("paper", *paper_scale(meshes(options.grid, options.mesh), options.minutes))
-    if "pictures" in options.only:
-        pictures(corpus, names, options.psnr)
 
 
 def tracks(corpus: Corpus, names: tuple[str, ...], rate_hz: float) -> tuple[Array, float, float, Array, list[Any]]:
@@ -72,6 +68,18 @@ def tracks(corpus: Corpus, names: tuple[str, ...], rate_hz: float) -> tuple[Arra
     ]
     values = np.concatenate(curves).astype(np.float32)
     return values, rate_hz, lip_tolerance(values, channels), point_groups(channels), ranges(curves)
+
+
+def point_groups(channels: Sequence[Channel]) -> Array:
+    """Return the number of the point that each channel belongs to [shape=(P,)].
+
+    ``x_17``, ``y_17`` and ``z_17`` are one point; all other channels are each on their own.
+    """
+    names = [
+        channel.name[2:] if channel.name.startswith(("x_", "y_", "z_")) else f" {channel.name}" for channel in channels
+    ]
+    numbers = {name: number for number, name in enumerate(dict.fromkeys(names))}
+    return np.array([numbers[name] for name in names], np.intp)
 
 
 def meshes(grid: Path, cache: Path | None) -> dict[str, Array]:
@@ -170,7 +178,7 @@ def report(case: str, values: Array, rate_hz: float, tolerance: float, groups: A
             "in memory": store.nbytes,
             "bytes a second": round(size / (len(values) / rate_hz)),
             "components": len(store.table.basis),
-            "knots, Hz": round(store.knot_rate_hz, 2),
+            "knots, Hz": round(store.rate_hz / layout.spacing, 2),
             "block": layout.length,
             "error, % of lip width": {
                 "99th percentile": percent(np.percentile(errors, 99), tolerance),
@@ -183,59 +191,6 @@ def report(case: str, values: Array, rate_hz: float, tolerance: float, groups: A
             f"{PIECES} pieces of 100 ms, ms": round(1e3 * median_s(lambda: store.rows(scattered(kept, rate_hz))), 1),
         }
     )
-
-
-def pictures(corpus: Corpus, names: tuple[str, ...], targets: list[float]) -> None:
-    """Print sizes and PSNR of mouth pictures in the store and as H.264."""
-    clips = [np.array(corpus.utterance(name).track.crops) for name in names]
-    values, kept = np.concatenate(clips), ranges(clips)
-    show({"pictures": len(values), "raw": values.nbytes, "gzip": deflated(values, np.uint8)})
-    for target in targets:
-        start = time.perf_counter()
-        store = compress_pictures(values, target, kept=kept)
-        encode_s = time.perf_counter() - start
-        arrays = picture_store_arrays(store)
-        psnr = np.concatenate([psnr_db(store.rows(slice(*span)), values[slice(*span)]) for span in kept])
-        wanted = np.random.default_rng(0).choice(len(values), PIECES)
-        show(
-            {
-                "promised, dB": target,
-                "store": archived(arrays),
-                "of it basis": archived({"basis": arrays["basis"]}),
-                "components": len(arrays["basis"]),
-                "in memory": store.nbytes,
-                "PSNR, mean": round(float(psnr.mean()), 2),
-                "PSNR, 1st percentile": round(float(np.percentile(psnr, 1)), 2),
-                "encode, s": round(encode_s, 1),
-                f"{PIECES} scattered, ms": round(1e3 * median_s(lambda s=store, w=wanted: s.rows(w))),
-            }
-        )
-    for crf in CRFS:
-        size, restored = as_h264(values, crf)
-        psnr = psnr_db(restored, values)
-        figures = {"PSNR, mean": psnr.mean(), "PSNR, 1st percentile": np.percentile(psnr, 1)}
-        show({"H.264, CRF": crf, "bytes": size} | {name: round(float(value), 2) for name, value in figures.items()})
-
-
-def as_h264(values: Array, crf: int) -> tuple[int, Array]:
-    """Return the bytes of an MP4 of some pictures, a key frame every 75, and the pictures decoded again."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "pictures.mp4"
-        with av.open(str(path), "w") as file:
-            stream = file.add_stream("libx264", rate=25, options={"crf": str(crf), "preset": "medium", "g": "75"})
-            stream.height, stream.width, stream.pix_fmt = *values.shape[1:3], "yuv444p"
-            for picture in values:
-                file.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
-            file.mux(stream.encode())
-        with av.open(str(path)) as file:
-            restored = np.stack([frame.to_ndarray(format="rgb24") for frame in file.decode(video=0)])
-        return path.stat().st_size, restored
-
-
-def psnr_db(restored: Array, true: Array) -> Array:
-    """Return the PSNR of each picture, dB."""
-    square = np.square(restored.astype(np.float32) - true).mean(axis=(1, 2, 3))
-    return 10 * np.log10(255**2 / np.maximum(square, 1e-9))
 
 
 def scattered(kept: list[Any], rate_hz: float) -> Array:

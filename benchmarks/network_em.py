@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.hmm.network import Network
 from lipmotion.kernels.sequences.network import ForwardBackwardNetwork
-from lipmotion.stats.mixture import Mixtures, QuadraticForm, with_squares
+from lipmotion.stats.mixture import Mixtures, QuadraticForm, normalised_components, with_squares
 from lipmotion.types import ParallelMap
 
 CELLS = 1_000_000
@@ -127,7 +127,9 @@ def _accumulated(job: tuple[_Model, list[NDArray[np.float32]]]) -> _Statistics:
     model, data = job
     frames = np.array([len(x) for x in data])
     features = with_squares(np.concatenate(data))
-    log_density, shares = model.form.log_density_and_shares(features)
+    whole = np.concatenate([model.form.form, model.form.constant.reshape(1, -1)])
+    components = (features @ whole).reshape(len(features), *model.form.constant.shape)
+    log_density, shares = normalised_components(components)
     expected = model.network.posteriors(log_density, model.columns, frames)
     possible = np.isfinite(expected.log_likelihood)
     begins = np.append(0, np.cumsum(frames[:-1]))

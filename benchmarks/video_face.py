@@ -12,7 +12,7 @@ a table in Markdown, with 95 % bootstrap intervals over clips in the JSON:
 
 psnr_db, ssim, sharpness, colour_edges, flicker : of the mouth region, in the pose of the recorded head; ``lips_`` of
                    the middle of it, where lips and teeth are
-seam, seam_ratio, colour_offset, colour_drift   : at the outline of what was put in (``lipmotion.measures.pictures``)
+seam, seam_ratio, colour_offset, colour_drift   : at the outline of what was put in (``picture_measures.py``)
 acc_*, driver_*  : correlation of opening, width and outer lips, when the result is tracked again, with those of the
                    recording, and with those of the motion that drove it; pooled over all frames
 engine_opening   : correlation of the driving motion itself with the recording
@@ -39,6 +39,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from picture_measures import outline_figures, picture_figures, psnr_db
 from video_results import Judged, load_judged, save_judged
 from video_sheets import Sheets, face_crop, write_sheets
 from video_ways import (
@@ -65,7 +66,6 @@ from lipmotion.faces.filmed.face import load_face
 from lipmotion.measures.bootstrap import bootstrap_interval
 from lipmotion.measures.closures import closed_threshold, phone_closures
 from lipmotion.measures.curves import pooled_correlation
-from lipmotion.measures.pictures import outline_figures, picture_figures, psnr_db
 from lipmotion.pipeline.evaluation.figures import BILABIAL
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.training.train import phones_of

@@ -8,7 +8,7 @@ import pytest
 from appearance.test_eigenlips import pictures
 from lipmotion.appearance.candidates import choose_candidates, make_candidates
 from lipmotion.appearance.eigenlips import Eigenlips, fit_eigenlips
-from lipmotion.appearance.refinement import PAPER, RefinementOptions, Refiner, best_sequence, moving_average
+from lipmotion.appearance.refinement import PAPER, RefinementOptions, Refiner, best_sequence
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
 from lipmotion.stats.pca import fit_pca
@@ -112,21 +112,6 @@ def test_a_change_is_worth_its_cost() -> None:
     change = np.array([[[0.0, 1.0], [1.0, 0.0]]], np.float32)
     assert best_sequence(costs, numbers, change).tolist() == [[0, 1, 0]]
     assert best_sequence(costs, numbers, 2 * change).tolist() == [[0, 0, 0]]
-
-
-def test_the_moving_average_is_that_of_the_definition() -> None:
-    values = np.random.default_rng(0).normal(0, 100, (9, 2))
-    for frames in (1, 3, 5, 21):
-        averages = moving_average(values, frames)
-        for t in range(9):
-            half = min(frames // 2, t, 8 - t)
-            assert averages[t] == pytest.approx(values[t - half : t + half + 1].mean(axis=0))
-    assert moving_average(np.zeros((0, 2))).shape == (0, 2)
-    for frames in (0, 2, -1):
-        with pytest.raises(InputError, match="required an odd number"):
-            moving_average(values, frames)
-    with pytest.raises(InputError, match="curves of shape"):
-        moving_average(values[:, 0])
 
 
 def test_the_mouths_of_a_corpus_become_sharper(toy_corpus: Corpus) -> None:

@@ -13,8 +13,8 @@ from cli.conftest import RunCommand, is_one_error
 from lipmotion.export.base import read_motion
 from lipmotion.meshes.files.character_files import read_character
 from lipmotion.meshes.files.gltf_writer import write_glb
-from lipmotion.meshes.files.obj_files import write_obj
 from meshes.heads import head, lip_points
+from meshes.obj_writing import write_obj
 
 
 @pytest.fixture

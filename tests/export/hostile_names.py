@@ -25,7 +25,6 @@ from lipmotion.export.synthetic_mark import mark_metadata
 from lipmotion.export.timed_labels import write_labels
 from lipmotion.meshes.files.gltf_container import read_gltf_document
 from lipmotion.meshes.files.gltf_writer import write_gltf_scene
-from lipmotion.meshes.files.obj_files import read_obj, write_obj
 from lipmotion.meshes.files.usd_writer import write_usda
 from lipmotion.meshes.model.mesh import Blendshape, Material, Mesh, MeshPart
 from lipmotion.meshes.model.scene import Scene
@@ -207,18 +206,6 @@ def _glb(folder: Path, name: str) -> None:
     assert document["materials"][0]["name"] == (name or "part")
 
 
-def _obj(folder: Path, name: str) -> None:
-    path = folder / "a.obj"
-    write_obj(path, mesh(f"x{name}x"))
-    found = read_obj(path)
-    assert len(found.parts) == 1
-    assert len(found.vertices) == 3
-    assert len(found.triangles) == 1
-    assert found.parts[0].name == as_text(" ".join(f"x{name}x".split()))
-    write_obj(path, mesh(name))
-    assert len(read_obj(path).parts) == 1
-
-
 def _report(_: Path, name: str) -> None:
     record = {"outputs": [name], "name": name}
     page = _for_page(record, [name])
@@ -252,7 +239,7 @@ WRITERS: dict[str, Callable[[Path, str], None]] = {
     "rhubarb xml": _cues("xml", _of_xml),
     "rhubarb json": _cues("json", _of_json),
     "pgo": _cues("pgo", _of_pgo),
-    **{"usda": _usda, "glb": _glb, "obj": _obj, "reports": _report, "xmp": _xmp, "bibtex": _bibtex},
+    **{"usda": _usda, "glb": _glb, "reports": _report, "xmp": _xmp, "bibtex": _bibtex},
 }
 """By format: writes a name into a file of a folder, and reads it back; asserts that it is the same."""
 

@@ -4,9 +4,9 @@ import av
 import numpy as np
 import pytest
 
-from lipmotion.errors import ExportError, InputError
+from lipmotion.errors import ExportError
 from lipmotion.export import write_mp4
-from lipmotion.export.xmp import LARGEST_PACKET, XMP_UUID, append_xmp, read_xmp
+from lipmotion.export.xmp import LARGEST_PACKET, XMP_UUID, append_xmp
 from lipmotion.types import Audio
 
 
@@ -24,6 +24,11 @@ def brightness(path):
         return [int(frame.to_ndarray(format="gray").mean()) for frame in container.decode(video=0)]
 
 
+def read_xmp(path):
+    with av.open(str(path), options={"export_xmp": "1"}) as container:
+        return container.metadata.get("xmp")
+
+
 def test_what_is_appended_is_read_and_the_video_stays(video):
     before, shown = video.read_bytes(), brightness(video)
     assert read_xmp(video) is None
@@ -31,14 +36,6 @@ def test_what_is_appended_is_read_and_the_video_stays(video):
     assert read_xmp(video) == "<größe/>"
     assert video.read_bytes().startswith(before)
     assert brightness(video) == shown
-    with av.open(str(video), options={"export_xmp": "1"}) as container:
-        assert container.metadata["xmp"] == "<größe/>"
-
-
-def test_the_first_of_several_packets_counts(video):
-    append_xmp(video, "one")
-    append_xmp(video, "two")
-    assert read_xmp(video) == "one"
 
 
 def test_long_boxes_and_other_uuids_are_passed_over(tmp_path):
@@ -46,9 +43,9 @@ def test_long_boxes_and_other_uuids_are_passed_over(tmp_path):
     path.write_bytes(
         struct.pack(">I4sQ", 1, b"mdat", 20) + b"abcd" + struct.pack(">I4s", 26, b"uuid") + bytes(16) + b"no"
     )
-    assert read_xmp(path) is None
+    before = path.read_bytes()
     append_xmp(path, "yes")
-    assert read_xmp(path) == "yes"
+    assert path.read_bytes() == before + struct.pack(">I4s", 27, b"uuid") + XMP_UUID + b"yes"
 
 
 def test_what_does_not_end_with_a_whole_box_is_left_alone(tmp_path):
@@ -65,25 +62,8 @@ def test_what_does_not_end_with_a_whole_box_is_left_alone(tmp_path):
         with pytest.raises(ExportError, match="not whole boxes"):
             append_xmp(path, "x")
         assert path.read_bytes() == content
-        if content:
-            assert read_xmp(path) is None
-
-
-def test_a_file_that_is_not_there_is_refused(tmp_path):
-    with pytest.raises(InputError, match="no such file"):
-        read_xmp(tmp_path / "a.mp4")
-    (tmp_path / "a.mp4").touch()
-    with pytest.raises(InputError, match="empty"):
-        read_xmp(tmp_path / "a.mp4")
 
 
 def test_packets_that_cannot_be_are_refused(video):
     with pytest.raises(ExportError, match="at most"):
         append_xmp(video, "x" * (LARGEST_PACKET + 1))
-    whole = video.read_bytes()
-    video.write_bytes(whole + struct.pack(">I4s", 26, b"uuid") + XMP_UUID + b"\xff\xfe")
-    with pytest.raises(InputError, match="not UTF-8"):
-        read_xmp(video)
-    video.write_bytes(whole + struct.pack(">I4s", 1 << 31, b"uuid") + XMP_UUID)
-    with pytest.raises(InputError, match="at most"):
-        read_xmp(video)

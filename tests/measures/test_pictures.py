@@ -2,10 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.ndimage import gaussian_filter
-
-from lipmotion.errors import InputError
-from lipmotion.measures.pictures import (
+from picture_measures import (  # type: ignore[import-not-found]
     colour_change,
     colour_edges,
     contrast,
@@ -18,6 +15,9 @@ from lipmotion.measures.pictures import (
     skin_beside,
     structural_similarity,
 )
+from scipy.ndimage import gaussian_filter
+
+from lipmotion.errors import InputError
 
 HEIGHT, WIDTH = 56, 72
 

@@ -7,8 +7,9 @@ import pytest
 
 from lipmotion.errors import InputError
 from lipmotion.meshes.files.character_files import read_character
-from lipmotion.meshes.files.obj_files import read_obj, write_obj
+from lipmotion.meshes.files.obj_files import read_obj
 from meshes.heads import head
+from meshes.obj_writing import write_obj
 
 QUAD = (
     "mtllib look.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"

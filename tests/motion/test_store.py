@@ -17,8 +17,6 @@ from lipmotion.motion.store import (
     motion_store_arrays,
     motion_store_from_arrays,
     point_distances,
-    point_groups,
-    ranges_without_silence,
 )
 from lipmotion.storage.archive import read_archive, write_archive
 from lipmotion.types import Channel
@@ -99,7 +97,7 @@ def test_motion_that_was_interpolated_is_stored_at_the_rate_of_the_camera(tmp_pa
     slow = motion(200, noise=0.1)
     fast = CubicSpline(np.arange(200) / 25, slow)(np.arange(797) / 100)
     store = compress(fast, 100.0, 0.05, groups=GROUPS)
-    assert store.knot_rate_hz == pytest.approx(25.0)
+    assert store.rate_hz / store.table.code.layout.spacing == pytest.approx(25.0)
     assert packed(store, tmp_path / "spline") < 1.3 * packed(
         compress(slow, 25.0, 0.05, groups=GROUPS), tmp_path / "camera"
     )
@@ -123,43 +121,6 @@ def test_frames_that_are_left_out_take_no_space_and_keep_their_numbers(tmp_path)
         short.rows([5, 300])
     with pytest.raises(InputError, match="frame 200 was left out"):
         short.rows(slice(190, 201))
-
-
-def without_silence_slowly(silent: list[bool], longest: int, ranges: list[tuple[int, int]]) -> set[int]:
-    """Walk through all frames: one is kept if speech is near enough on either side, or the silence is short."""
-    kept = set()
-    for first, stop in ranges:
-        for frame in range(first, stop):
-            before = next((n for n in range(frame, first - 1, -1) if not silent[n]), None)
-            after = next((n for n in range(frame, stop) if not silent[n]), None)
-            near = (before is not None and frame - before <= (longest + 1) // 2) or (
-                after is not None and after - frame <= longest // 2
-            )
-            short = before is not None and after is not None and after - before - 1 <= longest
-            if near or short:
-                kept.add(frame)
-    return kept
-
-
-@settings(max_examples=30)
-@given(
-    silent=st.lists(st.booleans() | st.just(True), min_size=1, max_size=60),
-    longest=st.integers(0, 12),
-    cut=st.integers(0, 60),
-)
-def test_long_silence_is_left_out(silent, longest, cut) -> None:
-    ranges = [span for span in ((0, min(cut, len(silent))), (cut, len(silent))) if span[0] < span[1]]
-    found = ranges_without_silence(np.array(silent), longest, ranges)
-    frames = [frame for first, stop in found for frame in range(first, stop)]
-    assert len(set(frames)) == len(frames)
-    assert set(frames) == without_silence_slowly(silent, longest, ranges)
-    assert len(compress(np.ones((len(silent), 2)), 25.0, 0.1, kept=found).kept) == len(found)
-
-
-def test_bad_silence_is_refused() -> None:
-    for silent, longest in ((np.zeros(3), 1), (np.zeros((3, 1), bool), 1), (np.zeros(3, bool), -1)):
-        with pytest.raises(InputError, match="truth values"):
-            ranges_without_silence(silent, longest)  # type: ignore[arg-type]
 
 
 def test_all_shapes() -> None:
@@ -188,9 +149,6 @@ def test_all_shapes() -> None:
 
 
 def test_points_are_channels_of_one_number() -> None:
-    assert np.array_equal(point_groups(CHANNELS), GROUPS)
-    assert point_groups([Channel("x_1"), Channel("x_2"), Channel("y_1")]).tolist() == [0, 1, 0]
-    assert point_groups([Channel("1"), Channel("x_1")]).tolist() == [0, 1]
     assert point_distances(np.array([[3.0, 1.0, 4.0]]), np.array([1, 0, 1])).tolist() == [[1.0, 5.0]]
 
 
@@ -250,7 +208,8 @@ def test_the_arrays_survive_a_file(tmp_path) -> None:
     store = compress(values, 100.0, 0.02, groups=GROUPS, kept=[(0, 100), (150, 500)])
     write_archive(tmp_path / "m", {}, motion_store_arrays(store))
     again = motion_store_from_arrays(read_archive(tmp_path / "m"))
-    assert (again.rate_hz, again.knot_rate_hz) == pytest.approx((100.0, store.knot_rate_hz))
+    assert again.rate_hz == pytest.approx(100.0)
+    assert again.table.code.layout.spacing == pytest.approx(store.table.code.layout.spacing)
     assert again.error == pytest.approx(store.error)
     assert np.array_equal(again.kept, [(0, 100), (150, 500)])
     assert np.array_equal(again.rows([3, 499]), store.rows([3, 499]))

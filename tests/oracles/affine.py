@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from lipmotion.stats.affine import AffineStatistics
 from lipmotion.stats.mixture import Mixtures
 
 
@@ -49,3 +50,13 @@ def statistics(
                 quadratic[row] += precision * np.outer(extended, extended)
                 linear[row] += precision * mixtures.means[density, m, row] * extended
     return quadratic, linear
+
+
+def objective(statistics: AffineStatistics, transform: np.ndarray) -> float:
+    """Return the part of the expected log likelihood that depends on a transform [shape=(D, D + 1)].
+
+    Source: Gales 1998, Eq. 25.
+    """
+    _, log_determinant = np.linalg.slogdet(transform[:, :-1])
+    squared = np.einsum("ij,ijk,ik->", transform, statistics.quadratic, transform)
+    return float(statistics.count * log_determinant - 0.5 * squared + (statistics.linear * transform).sum())

@@ -17,9 +17,6 @@ Costs = NDArray[np.float32]
 Index = NDArray[np.intp]
 Pictures = NDArray[np.uint8]
 
-FILTER_FRAMES = 3
-"""Width of the moving average, in frames of the video. Source: Xie & Liu 2007, §6."""
-
 
 @dataclass(frozen=True)
 class RefinementOptions:
@@ -169,22 +166,3 @@ def best_sequence(costs: Costs, numbers: Index, changes: Costs) -> Index:
         path[:, frame] = numbers[row[:, 0], frame, place]
         place = before[frame, row[:, 0], place]
     return path
-
-
-def moving_average(coefficients: Values, frames: int = FILTER_FRAMES) -> NDArray[np.float64]:
-    """Return curves [shape=(T, C)] smoothed by a moving average, at the frame rate of the video.
-
-    frames : its width, odd; at the ends it is narrower, so that it stays centred
-    Raises InputError: a width that is even or below 1, or no table of curves.
-    Source: Xie & Liu 2007, §6.
-    """
-    if frames < 1 or frames % 2 == 0:
-        raise InputError(f"a moving average of {frames} frames, required an odd number from 1")
-    if coefficients.ndim != 2:
-        raise InputError(f"curves of shape {coefficients.shape}, required (T, C)")
-    count = len(coefficients)
-    sums = np.concatenate([np.zeros((1, coefficients.shape[1])), np.cumsum(coefficients, axis=0, dtype=np.float64)])
-    middle = np.arange(count)
-    half = np.minimum(frames // 2, np.minimum(middle, count - 1 - middle))
-    averages: NDArray[np.float64] = (sums[middle + half + 1] - sums[middle - half]) / (2 * half + 1)[:, None]
-    return averages

@@ -27,7 +27,6 @@ LIP_WIDTH_SHARE = 0.005
 """Allowed error of a point, as a share of the width of the lips."""
 CAMERA_RATES_HZ = (25.0, 30.0, 50.0, 60.0)
 """Motion at a higher rate may have been interpolated from these: a spline with as many knots is tried."""
-AXES = ("x_", "y_", "z_")
 """Beginnings of the names of a point's channels."""
 
 
@@ -64,11 +63,6 @@ class MotionStore:
         return self.table.code.layout.kept
 
     @property
-    def knot_rate_hz(self) -> float:
-        """The rate at which values are stored; where it is below ``rate_hz``, a cubic spline is between them."""
-        return self.rate_hz / self.table.code.layout.spacing
-
-    @property
     def nbytes(self) -> int:
         """Bytes in memory; archives (``storage.archive``) compress them further."""
         return self.table.nbytes
@@ -97,7 +91,7 @@ def compress(
     rate_hz   : frames per second
     tolerance : largest distance of a point from where it was, in the unit of the values; one for all channels, or of
                 the point of each channel [shape=(P,)]. ``lip_tolerance`` gives the usual one.
-    groups    : the number of the point that each channel belongs to [shape=(P,)], of ``point_groups``; channels of
+    groups    : the number of the point that each channel belongs to [shape=(P,)]; channels of
                 one number are coordinates of one point. None: each channel is a point of its own.
     kept      : ranges of frames that are stored, in order: first frame and the one after the last of each
                 [shape=(R, 2)]. None: one range of all frames. Motion of several utterances is smallest with one range
@@ -125,49 +119,6 @@ def compress(
 
     coded = compress_table(values, ranges, allowed, numbers, excess, spacings=spacings)
     return MotionStore(coded.code, float(rate_hz), allowed, numbers, coded.error)
-
-
-def ranges_without_silence(
-    is_silent: NDArray[np.bool_],
-    longest: int,
-    ranges: Sequence[tuple[int, int]] | NDArray[np.integer[Any]] | None = None,
-) -> NDArray[np.intp]:
-    """Return the ranges of frames that are kept when long silence is left out [shape=(R', 2)], for ``compress``.
-
-    is_silent : whether each frame is silent [shape=(T,)]
-    longest   : of each silence so many frames stay: half of them at its beginning and half at its end, except where
-                a range begins or ends
-    ranges    : utterances, as ``kept`` of ``compress``; ranges that are silent throughout are left out. None: one
-                range of all frames
-    Raises InputError: not truth values in a row, a negative number of frames, or ranges that do not fit.
-    Frames keep their numbers: motion and sound of the frames that are kept stay in step.
-    Source: Minnis & Breen 2000, §6 (silence is edited out, synchronisation maintained).
-    """
-    silent = np.asarray(is_silent)
-    if silent.ndim != 1 or silent.dtype != np.bool_ or longest < 0:
-        raise InputError(
-            f"silence of shape {silent.shape} and type {silent.dtype}, at most {longest} frames of it: required a row "
-            "of truth values, and 0 frames or more"
-        )
-    kept = []
-    for first, stop in checked_ranges(ranges, len(silent)):
-        spoken = np.flatnonzero(~silent[first:stop]) + first
-        if len(spoken):
-            gaps = np.flatnonzero(np.diff(spoken) - 1 > longest)
-            starts = np.append(spoken[0], spoken[gaps + 1]) - longest // 2
-            stops = np.append(spoken[gaps], spoken[-1]) + 1 + (longest + 1) // 2
-            kept += list(zip(np.maximum(starts, first), np.minimum(stops, stop), strict=True))
-    return np.array(kept, np.intp).reshape(-1, 2)
-
-
-def point_groups(channels: Sequence[Channel]) -> NDArray[np.intp]:
-    """Return the number of the point that each channel belongs to [shape=(P,)].
-
-    ``x_17``, ``y_17`` and ``z_17`` are one point; all other channels are each on their own.
-    """
-    names = [channel.name[2:] if channel.name.startswith(AXES) else f" {channel.name}" for channel in channels]
-    numbers = {name: number for number, name in enumerate(dict.fromkeys(names))}
-    return np.array([numbers[name] for name in names], np.intp)
 
 
 def lip_tolerance(values: NDArray[np.floating[Any]], channels: Sequence[Channel]) -> float:

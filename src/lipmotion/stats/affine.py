@@ -36,15 +36,6 @@ class AffineStatistics:
         """Return the statistics of ``factor`` times as many such frames."""
         return AffineStatistics(factor * self.count, factor * self.quadratic, factor * self.linear)
 
-    def objective(self, transform: Array) -> float:
-        """Return the part of the expected log likelihood that depends on a transform [shape=(D, D + 1)].
-
-        Source: Gales 1998, Eq. 25.
-        """
-        _, log_determinant = np.linalg.slogdet(transform[:, :-1])
-        squared = np.einsum("ij,ijk,ik->", transform, self.quadratic, transform)
-        return float(self.count * log_determinant - 0.5 * squared + (self.linear * transform).sum())
-
 
 class TransformStatistics(NamedTuple):
     """The result of the E-step for a transform.
@@ -126,7 +117,7 @@ def prior_statistics(mixtures: Mixtures, densities: NDArray[np.intp]) -> AffineS
 def improved_transform(
     transform: Array, statistics: AffineStatistics, free: NDArray[np.bool_], sweeps: int = SWEEPS
 ) -> Array:
-    """Return a transform [shape=(D, D + 1)] whose ``AffineStatistics.objective`` is at least as high (the M-step).
+    """Return a transform [shape=(D, D + 1)] whose expected log likelihood (Gales 1998, Eq. 25) is at least as high.
 
     Each row in turn is set to its best values given the others.
     free : the entries that may change [shape=(D, D + 1)], the diagonal among them; others stay

@@ -204,17 +204,6 @@ class QuadraticForm:
             result[start : start + BLOCK] = best + np.log(components.sum(axis=1))
         return result
 
-    def log_density_and_shares(
-        self, features: NDArray[np.float32]
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
-        """Return log densities and component posteriors; see ``normalised_components``.
-
-        features : from ``with_squares`` [shape=(T, 2 D + 1)]
-        """
-        whole = np.concatenate([self.form, self.constant.reshape(1, -1)])
-        components = (features @ whole).reshape(len(features), *self.constant.shape)
-        return normalised_components(components)
-
 
 def normalised_components(
     components: NDArray[np.float32],

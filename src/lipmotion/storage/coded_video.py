@@ -34,7 +34,6 @@ MOST_FRAMES = 100_000
 MOST_PICTURE_BYTES = 1 << 29
 """Most bytes of a stack of decoded pictures."""
 _BT601, _LIMITED = 5, 1
-_START = np.array([0, 0, 1], np.uint8)
 _DELIMITER, _PARAMETERS = 9, 7
 """Types of the unit that begins every frame, and of the one that begins every group."""
 

@@ -18,12 +18,12 @@ from lipmotion.faces.mesh import MeshStage
 from lipmotion.meshes.files.binding_files import save_binding, write_weights
 from lipmotion.meshes.files.character_files import read_character
 from lipmotion.meshes.files.gltf_writer import write_glb
-from lipmotion.meshes.files.obj_files import write_obj
 from lipmotion.meshes.fitting.driven import driven_character
 from lipmotion.meshes.rendering.drawn_surface import drawn_surface
 from lipmotion.pipeline.outputs.curve_sets import curves_of
 from meshes.gltf import data_uri, document, glb, packed_attributes, textured_document, with_colours
 from meshes.heads import head, lip_points
+from meshes.obj_writing import write_obj
 from meshes.speech import motion, units
 
 HEADS = ("head.glb", "head.gltf", "head.obj", "head.vrm")

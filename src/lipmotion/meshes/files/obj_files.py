@@ -16,7 +16,6 @@ from lipmotion.errors import InputError, shortened
 from lipmotion.meshes.model.limits import Budget
 from lipmotion.meshes.model.mesh import MASK, OPAQUE, Blendshape, Material, Mesh, MeshPart
 from lipmotion.meshes.model.textures import Texture, read_texture
-from lipmotion.storage.files import as_text, whole_file
 from lipmotion.storage.sources import is_file
 
 NEUTRAL = "neutral"
@@ -149,25 +148,6 @@ def read_obj_folder(folder: Path, wanted: Callable[[str], bool] = lambda _: True
     return replace(mesh, shapes=tuple(shapes))
 
 
-def write_obj(path: Path, mesh: Mesh, vertices: NDArray[np.float64] | None = None) -> None:
-    """Write a mesh as an OBJ file, without blendshapes: give their result as ``vertices`` [shape=(V, 3)].
-
-    Parts are written as objects, with their names. Raises ExportError: it cannot be written.
-    """
-    places = mesh.vertices if vertices is None else vertices
-    with whole_file(path) as unfinished, unfinished.open("w", encoding="utf-8", newline="\n") as file:
-        file.writelines(f"v {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in places.tolist())
-        if mesh.uv is not None:
-            file.writelines(f"vt {u:.7g} {v:.7g}\n" for u, v in mesh.uv.reshape(-1, 2).tolist())
-        for part in mesh.parts:
-            file.write(f"o {_one_line(part.name)}\nusemtl {_one_line(part.material.name)}\n")
-            for number in range(part.first, part.stop):
-                corners = (mesh.triangles[number] + 1).tolist()
-                textures = range(3 * number + 1, 3 * number + 4)
-                words = [f"{v}/{t}" for v, t in zip(corners, textures, strict=True)] if mesh.uv is not None else corners
-                file.write(f"f {' '.join(map(str, words))}\n")
-
-
 def _mesh(
     surface: _Surface,
     vertices: NDArray[np.float64],
@@ -263,10 +243,6 @@ def _index(word: bytes, count: int) -> int:
 
 def _text(words: list[bytes]) -> str:
     return b" ".join(words).decode("utf-8", "replace")
-
-
-def _one_line(text: str) -> str:
-    return as_text(" ".join(text.split())).rstrip("\\") or "part"  # a backslash at the end continues the line
 
 
 def _materials(folder: Path, library: str, used: Collection[str], budget: Budget) -> dict[str, Material]:

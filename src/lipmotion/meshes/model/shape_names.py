@@ -6,11 +6,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-SIDED = (
-    *("mouthSmile", "mouthFrown", "mouthDimple", "mouthStretch", "mouthPress", "mouthLowerDown", "mouthUpperUp"),
-    *("cheekSquint", "noseSneer", "eyeBlink", "eyeLookDown", "eyeLookIn", "eyeLookOut", "eyeLookUp", "eyeSquint"),
-    *("eyeWide", "browDown", "browOuterUp"),
-)
 ARKIT_MOUTH = (
     *("jawForward", "jawLeft", "jawRight", "jawOpen", "mouthClose", "mouthFunnel", "mouthPucker"),
     *("mouthLeft", "mouthRight", "mouthSmileLeft", "mouthSmileRight", "mouthFrownLeft", "mouthFrownRight"),

@@ -13,7 +13,7 @@ from lipmotion.engines.coupled.chains.joint_densities import with_joint_state_de
 from lipmotion.engines.coupled.chains.model import Chains
 from lipmotion.engines.coupled.chains.structures import FACTORIAL
 from lipmotion.engines.coupled.conversion.em import ConversionSettings, convert
-from lipmotion.engines.coupled.training.train import MixtureSchedule, train_chains
+from lipmotion.engines.coupled.training.train import MixtureSchedule, growing_chains
 
 
 def both(seed=0) -> tuple[Chains, Chains]:
@@ -100,7 +100,7 @@ def test_only_allowed_units_are_in_the_lattice_and_visual_ones_a_little_before_a
 def test_training_without_a_limit_rises_at_every_step():
     steps = []
     of = structure(FACTORIAL, (THREE, TWO), states=3, limit=None)
-    trained = train_chains(
+    *_, trained = growing_chains(
         of, ("speech", "seen"), sentences(), MixtureSchedule((2, 2), (1.0, 1.0), most_steps=6), steps.append
     )
     assert isinstance(trained.transitions, FactorialTransitions)

@@ -17,7 +17,7 @@ from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance
 from lipmotion.engines.coupled.training.em_steps import e_step, lattice_utterance, variance_floors
 from lipmotion.engines.coupled.training.speech_only import SpeechOnlySchedule, train_on_speech
-from lipmotion.engines.coupled.training.train import MixtureSchedule, TrainingStep, train_chains
+from lipmotion.engines.coupled.training.train import MixtureSchedule, TrainingStep, growing_chains
 from lipmotion.stats.mixture import Mixtures
 from lipmotion.testing.examples import RATE_HZ, examples
 from lipmotion.types import Example, Motion, Span, Timeline, Unit, silent_monitor
@@ -52,7 +52,8 @@ def trained(kind: str = "coupled", mixtures: int = 2) -> Chains:
     structure = structure_of(kind, STRUCTURES[kind], 2, 1, True)
     groups = 1 if kind == "hmm" else 2
     how = MixtureSchedule((mixtures, 1)[:groups], (1.0, 1.0))
-    return train_chains(structure, ("speech", "lips"), aligned(examples(4)), how)
+    *_, grown = growing_chains(structure, ("speech", "lips"), aligned(examples(4)), how)
+    return grown
 
 
 def other_speaker(example: Example, seed: int = 5) -> Example:

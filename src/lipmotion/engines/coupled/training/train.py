@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -64,23 +63,6 @@ class MixtureSchedule:
     most_steps: int = 6
 
 
-def train_chains(
-    structure: Structure,
-    streams: tuple[str, ...],
-    data: Sequence[AlignedUtterance],
-    schedule: MixtureSchedule,
-    report: Report = no_report,
-    workers: int = 1,
-) -> Chains:
-    """Return chains trained by EM, started by Viterbi training.
-
-    streams : the names of the streams
-    report  : is called after every step; while the number of components stays, the log likelihood never falls
-    Source: Xie & Liu 2007, §3.4 and Appendix A, with scaled recursions.
-    """
-    return deque(growing_chains(structure, streams, data, schedule, report, workers), maxlen=1)[0]
-
-
 def growing_chains(
     structure: Structure,
     streams: tuple[str, ...],
@@ -89,9 +71,11 @@ def growing_chains(
     report: Report = no_report,
     workers: int = 1,
 ) -> Iterator[Chains]:
-    """Yield the chains that ``train_chains`` passes through with 1, 2, 4, … Gaussians, each trained to convergence.
+    """Yield chains trained by EM, started by Viterbi training, with 1, 2, 4, … Gaussians, each to convergence.
 
-    Arguments as in ``train_chains``.
+    streams : the names of the streams
+    report  : is called after every step; while the number of components stays, the log likelihood never falls
+    Source: Xie & Liu 2007, §3.4 and Appendix A, with scaled recursions.
     """
     floors = variance_floors([utterance.observations for utterance in data])
     chains = initial_chains(structure, streams, data, schedule.weights, floors)

@@ -14,13 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, gaussian_filter
 
-from lipmotion.appearance.picture_store import EQUAL_DB, WHITE
 from lipmotion.errors import InputError
 
 Pictures = NDArray[np.uint8] | NDArray[np.floating[Any]]
 Mask = NDArray[np.bool_]
 Curve = NDArray[np.float64]
 
+WHITE = 255
+"""The largest level of a colour."""
+EQUAL_DB = 100.0
+"""Stated for equal pictures."""
 WINDOW_PX = 1.5
 """Standard deviation of the window of ``structural_similarity``. Source: Wang et al. 2004."""
 STABLE = (0.01, 0.03)
