@@ -31,7 +31,7 @@ from lipmotion.faces.head.stage import figure
 from lipmotion.meshes.fitting.driven import driven_character
 from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.curve_sets import with_curves
-from lipmotion.pipeline.outputs.drawn_video import prosody_heard
+from lipmotion.pipeline.outputs.prosody import prosody_of_speech
 from lipmotion.pipeline.outputs.scenes import character_scene, head_scene, write_scene
 from lipmotion.types import Generation
 from programs import gltf_report, gltf_validator, python_with, run_with
@@ -50,7 +50,7 @@ def main() -> None:
         sound = folder / "welcome.flac"
         sound.write_bytes((EXAMPLES / sound.name).read_bytes())
         result = lipmotion.animate(sound, transcript=EXAMPLES / "welcome.txt")
-        heard = prosody_heard(sound)
+        heard = prosody_of_speech(sound)
         print(json.dumps(fit(result)), flush=True)
         makers = {"head": lambda: head_scene(result, prosody=heard)}
         for path in options.characters:
@@ -144,7 +144,7 @@ def largest_error(scene: Scene, times_s: np.ndarray, values: list[dict[str, floa
 
 def keyed(folder: Path, result: Generation, sound: Path) -> None:
     """Print how far the keys that the add-on and the script make are from the motion, at all frames."""
-    curves, names = with_curves(result, "face", prosody=prosody_heard(sound))
+    curves, names = with_curves(result, "face", prosody=prosody_of_speech(sound))
     lipmotion.write(curves, [folder / "face.json", folder / "face.blender.py"], speech=sound, channels=names)
     lipmotion.write(curves, folder / "face.livelink.csv", speech=sound, rate_hz=100.0)
     write_addon("blender", folder / "addon.zip")

@@ -21,13 +21,14 @@ if TYPE_CHECKING:
     from lipmotion.pipeline.evaluation.evaluate import evaluate
     from lipmotion.pipeline.film.build import build_face
     from lipmotion.pipeline.film.video import FilmOptions
-    from lipmotion.pipeline.generate.animate import animate, write
+    from lipmotion.pipeline.generate.animate import animate
     from lipmotion.pipeline.generate.explain import explain
     from lipmotion.pipeline.generate.speak import speak
     from lipmotion.pipeline.generate.state_runs import state_runs
     from lipmotion.pipeline.generate.transfer import map_onto, with_person
     from lipmotion.pipeline.model import Model, load_model, save_model
     from lipmotion.pipeline.outputs.cues import cues, write_cues
+    from lipmotion.pipeline.outputs.write import write
     from lipmotion.pipeline.training.adapt import adapt
     from lipmotion.pipeline.training.train import Run, train
     from lipmotion.pipeline.understand.request import SpeechRequest
@@ -116,7 +117,7 @@ _HOMES = {
     "state_runs": "lipmotion.pipeline.generate.state_runs",
     "train": "lipmotion.pipeline.training.train",
     "with_person": "lipmotion.pipeline.generate.transfer",
-    "write": "lipmotion.pipeline.generate.animate",
+    "write": "lipmotion.pipeline.outputs.write",
     "write_cues": "lipmotion.pipeline.outputs.cues",
 }
 

@@ -19,7 +19,10 @@ from typing import Generic, TypeVar
 from lipmotion.errors import InputError
 
 ExtensionT = TypeVar("ExtensionT")
-GROUPS = ("lipmotion.engines", "lipmotion.faces", "lipmotion.exporters", "lipmotion.corpus_readers")
+GROUPS = (
+    *("lipmotion.engines", "lipmotion.faces", "lipmotion.exporters", "lipmotion.corpus_readers"),
+    "lipmotion.outputs",
+)
 """Every group of entry points that is read."""
 OWN = {"lipmotion", "argparse"}
 SOURCE = "source"

@@ -11,8 +11,8 @@ import pytest
 
 from lipmotion.addons.blender.curves import at_frames
 from lipmotion.export.addon import write_addon
-from lipmotion.pipeline.generate.animate import write
 from lipmotion.pipeline.outputs.curve_sets import with_curves
+from lipmotion.pipeline.outputs.write import write
 from lipmotion.types import Audio, Generation, StateTrace
 from meshes.speech import motion, units
 from programs import python_with, run_with

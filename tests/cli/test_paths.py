@@ -15,9 +15,10 @@ from lipmotion.cli.command_line import parser
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import ExportError
 from lipmotion.pipeline.corpus.prepare import prepare
-from lipmotion.pipeline.generate.animate import animate, write
+from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import load_model, shipped_path
 from lipmotion.pipeline.outputs.cues import cues, write_cues
+from lipmotion.pipeline.outputs.write import write
 from lipmotion.pipeline.training.train import Run, train
 from lipmotion.pipeline.understand.request import SpeechRequest
 

@@ -8,9 +8,9 @@ import pytest
 
 from cli.conftest import RunCommand, is_one_error
 from lipmotion.export.base import read_motion
-from lipmotion.pipeline.generate.animate import write
 from lipmotion.pipeline.generate.speak import speak
 from lipmotion.pipeline.model import load_model
+from lipmotion.pipeline.outputs.write import write
 from lipmotion.speech.voices import installed
 from speech import stand_in_voice
 

@@ -10,8 +10,9 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from lipmotion.errors import AlignmentError, InputError
-from lipmotion.pipeline.generate.animate import animate, write
+from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.outputs.write import write
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence, toy_motion

@@ -13,12 +13,15 @@ from lipmotion.articulation.contact import closures
 from lipmotion.articulation.delivery import Delivery
 from lipmotion.export.base import read_motion
 from lipmotion.faces import Face, Staging
-from lipmotion.faces.registry import face_named
 from lipmotion.meshes.files.gltf_writer import write_glb
 from lipmotion.meshes.fitting.driven import driven_character
-from lipmotion.pipeline.generate.animate import write
 from lipmotion.pipeline.outputs.curve_sets import with_curves
-from lipmotion.pipeline.outputs.delivered import delivered_scene, held_mouth, moved_prosody, shown
+from lipmotion.pipeline.outputs.delivered import held_mouth, shown
+from lipmotion.pipeline.outputs.output import OutputSettings, Performance
+from lipmotion.pipeline.outputs.prosody import moved_prosody
+from lipmotion.pipeline.outputs.scenes import delivered_scene
+from lipmotion.pipeline.outputs.shown_faces import shown_face
+from lipmotion.pipeline.outputs.write import write
 from lipmotion.types import Generation, Prosody, StateTrace
 from meshes.heads import head
 from meshes.speech import motion, units
@@ -40,7 +43,9 @@ def test_files_say_when_the_sound_begins(
     write(generation, paths, speech=toy_speech, delivery=delivery, curves="arkit", channels=["jawOpen"])
     assert json.loads(paths[0].read_text())["source"] == {"file": toy_speech.name, "start_s": f"{offset_ms / 1000:g}"}
     assert f"SOUND_S = {offset_ms / 1000!r}\n" in paths[1].read_text()
-    scene = delivered_scene(generation, delivery, face_named("head"), 12.0, staging=Staging(), prosody=None)
+    scene = delivered_scene(
+        Performance(generation, OutputSettings(shown_face("head"), rate_hz=12.0, delivery=delivery))
+    )
     assert scene.sound_s == pytest.approx(offset_ms / 1000)
 
 

@@ -17,10 +17,12 @@ from lipmotion.errors import ExportError
 from lipmotion.faces import Staging
 from lipmotion.meshes.fitting.eyes_and_brows import FULL_LOOK, eye_and_brow_weights
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH
-from lipmotion.pipeline.generate.animate import check_outputs, write
 from lipmotion.pipeline.outputs.curve_sets import curves_of
 from lipmotion.pipeline.outputs.living_curves import HEAD, living_curves
-from lipmotion.pipeline.outputs.motion_files import in_format, needs_prosody
+from lipmotion.pipeline.outputs.motion_files import in_format
+from lipmotion.pipeline.outputs.output import OutputSettings, checked_outputs
+from lipmotion.pipeline.outputs.shown_faces import shown_face
+from lipmotion.pipeline.outputs.write import write
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
 from meshes.speech import motion, units
 
@@ -79,11 +81,6 @@ def test_the_script_takes_controls_that_were_asked_for(generation: Generation) -
     chosen = replace(generation, motion=control, spread=np.zeros((201, 1)))
     assert in_format(Path("a.blender.py"), generation, chosen, None).motion.names == ("Jaw.rotation.x",)
     assert "jawOpen" in in_format(Path("a.blender.py"), generation, generation, None).motion.names
-
-
-@pytest.mark.parametrize(("name", "needs"), [("a.livelink.csv", True), ("a.csv", False), ("a.mp4", False)])
-def test_only_whole_faces_need_the_prosody(name: str, needs: bool) -> None:
-    assert needs_prosody(Path(name)) == needs
 
 
 def test_what_moves_on_its_own_can_be_switched_off(generation: Generation) -> None:
@@ -155,8 +152,9 @@ def test_a_recording_that_is_too_long_is_refused_before_the_work(
         file.setsampwidth(1)
         file.setframerate(8000)
         file.writeframes(bytes(8000 * 700))
+    face = shown_face("portrait")
     message = r"about 70000 frames, required at most 65535 in \.c3d; give a lower --rate"
     with nullcontext() if fits else pytest.raises(ExportError, match=message):
-        check_outputs([tmp_path / name], tmp_path / "a.wav", rate_hz=rate_hz)
+        checked_outputs([tmp_path / name], OutputSettings(face, tmp_path / "a.wav", rate_hz=rate_hz))
     earlier = Delivery(offset_ms=-60_000)
-    check_outputs([tmp_path / name], tmp_path / "a.wav", rate_hz=rate_hz, delivery=earlier)
+    checked_outputs([tmp_path / name], OutputSettings(face, tmp_path / "a.wav", rate_hz=rate_hz, delivery=earlier))

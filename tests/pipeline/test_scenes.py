@@ -18,7 +18,9 @@ from lipmotion.meshes.files.gltf_container import read_gltf_document
 from lipmotion.meshes.files.gltf_writer import write_glb
 from lipmotion.meshes.fitting.driven import driven_character
 from lipmotion.meshes.model.scene import Scene
-from lipmotion.pipeline.outputs.scenes import character_scene, head_scene, is_scene, sound_reference, write_scene
+from lipmotion.pipeline.outputs.output import OutputSettings
+from lipmotion.pipeline.outputs.scenes import SceneOutput, character_scene, head_scene, sound_reference, write_scene
+from lipmotion.pipeline.outputs.shown_faces import shown_face
 from lipmotion.types import Channel, Generation, Motion, StateTrace
 from meshes.heads import head
 from meshes.speech import motion, units
@@ -55,7 +57,7 @@ def scene(request: pytest.FixtureRequest) -> Scene:
 
 @pytest.mark.parametrize(("name", "is_one"), [("a.glb", True), ("a.USDA", True), ("a.usd", False), ("glb", False)])
 def test_scenes_are_known_by_their_suffix(name: str, is_one: bool) -> None:
-    assert is_scene(Path(name)) == is_one
+    assert SceneOutput.takes(Path(name), OutputSettings(shown_face("head"))) == is_one
 
 
 def test_the_head_closes_its_lips_in_m_and_p_and_opens_them_in_aa(own_head: Scene) -> None:

@@ -1,4 +1,4 @@
-"""``pipeline.generate.animate.write``: one result, several files, all or none."""
+"""``pipeline.outputs.write``: one result, several files, all or none."""
 
 from __future__ import annotations
 
@@ -17,8 +17,10 @@ from lipmotion.articulation.phone_targets import GESTURES
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import read_motion
 from lipmotion.faces import Staging
-from lipmotion.pipeline.generate.animate import animate, with_articulation, write
+from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.outputs.motion_files import with_articulation
+from lipmotion.pipeline.outputs.write import write
 from lipmotion.types import Audio, Generation
 
 
@@ -63,7 +65,7 @@ def test_the_sound_of_a_video_is_read_without_a_second_warning(
         warns.append(warn)
         return Audio(np.zeros(16_000, np.float32), 16_000)
 
-    monkeypatch.setattr("lipmotion.pipeline.generate.animate.read_audio", read)
+    monkeypatch.setattr("lipmotion.pipeline.outputs.drawn_video.read_audio", read)
     monkeypatch.setattr("lipmotion.export.video.write_mp4", lambda *_, **__: None)
     write(result, [tmp_path / "a.mp4"], speech=toy_speech)
     assert warns == [False]
@@ -168,7 +170,7 @@ def test_scenes_name_no_sound_that_will_be_gone(
     result: Generation, toy_speech: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, temporary: bool
 ) -> None:
     named = []
-    monkeypatch.setattr("lipmotion.pipeline.generate.animate.delivered_scene", lambda *_, **__: True)
-    monkeypatch.setattr("lipmotion.pipeline.generate.animate.write_scene", lambda *_, sound: named.append(sound))
+    monkeypatch.setattr("lipmotion.pipeline.outputs.scenes.delivered_scene", lambda _: True)
+    monkeypatch.setattr("lipmotion.pipeline.outputs.scenes.write_scene", lambda *_, sound: named.append(sound))
     write(result, [tmp_path / "a.glb"], speech=toy_speech, temporary=temporary)
     assert named == [None if temporary else toy_speech]

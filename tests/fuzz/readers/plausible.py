@@ -14,8 +14,8 @@ import numpy as np
 
 from fuzz.inputs import Good, ImplausibleError
 from lipmotion.corpora.store import Corpus
-from lipmotion.pipeline.generate.animate import write
 from lipmotion.pipeline.model import Model, load_model
+from lipmotion.pipeline.outputs.write import write
 from lipmotion.types import Audio, Generation, Motion
 from lipmotion.types.motion import LARGEST
 

@@ -27,6 +27,7 @@ from lipmotion.pipeline.batch.ledger import Place
 from lipmotion.pipeline.batch.one_line import LineWork, finished_line
 from lipmotion.pipeline.batch.pool import WorkerDied
 from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.outputs.shown_faces import shown_face
 from lipmotion.types import Item
 
 pytest.importorskip("joblib")
@@ -86,7 +87,7 @@ def test_the_face_of_another_person_is_mapped_onto_once(
     filmed_face: FilmedFace, toy_model: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     mapped: list[str] = []
-    monkeypatch.setattr(one_line, "_face", lambda *_: filmed_face)
+    monkeypatch.setattr(one_line, "_face", lambda *_: shown_face(filmed_face))
     monkeypatch.setattr(one_line, "map_onto", lambda *_, speaker: mapped.append(speaker) or "a map")
     other = replace(toy_model, about=toy_model.about | {"corpus": ["another"]})
     lines = [BatchLine(name, f"/{name}.wav", "hello") for name in "ab"]

@@ -15,12 +15,14 @@ from lipmotion.errors import ExportError, InputError, ModelFormatError
 from lipmotion.export.synthetic_mark import SOURCE_TYPE
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.faces.filmed.renderer import Stitcher, StitchingOptions
-from lipmotion.faces.registry import face_named
 from lipmotion.pipeline.film import video as module
 from lipmotion.pipeline.film.background import stored_sequence
-from lipmotion.pipeline.film.video import FilmOptions, check_film, film_of, write_film
-from lipmotion.pipeline.generate.animate import animate, write
+from lipmotion.pipeline.film.video import FilmOptions, film_of, write_film
+from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.outputs.output import OutputSettings
+from lipmotion.pipeline.outputs.shown_faces import shown_face
+from lipmotion.pipeline.outputs.write import write
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.testing.toy import ToySentence, toy_motion
 from lipmotion.testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH
@@ -161,7 +163,7 @@ def test_progress_is_that_of_the_frames(
 
 
 def test_options_of_filmed_faces_alone(tmp_path: Path, toy_speech: Path) -> None:
-    drawn = face_named("portrait")
+    drawn = shown_face("portrait")
     video = tmp_path / "a.mp4"
     video.touch()
     for options, words in (
@@ -171,9 +173,9 @@ def test_options_of_filmed_faces_alone(tmp_path: Path, toy_speech: Path) -> None
         (FilmOptions(mark="visible"), "a visible mark"),
     ):
         with pytest.raises(InputError, match=rf"{words} is for filmed faces; give one: --face FILE\.face"):
-            check_film(drawn, options, toy_speech)
+            drawn.check(OutputSettings(drawn, toy_speech, film=options))
     for unmarked in ("metadata", "none"):
-        check_film(drawn, FilmOptions(mark=unmarked), toy_speech)  # a drawn face needs no mark
+        drawn.check(OutputSettings(drawn, toy_speech, film=FilmOptions(mark=unmarked)))  # a drawn face needs no mark
 
 
 def test_an_inset_on_the_video_of_the_speech(filmed_face: FilmedFace, motion: Motion, tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ import pytest
 from lipmotion.errors import InputError
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.pipeline.film.video import is_person_of, person_shown
+from lipmotion.pipeline.outputs.shown_faces import shown_face
 
 
 def model_of(*speakers: str, corpus: str = "filmed/many") -> Any:
@@ -42,7 +43,8 @@ def test_without_speech_nothing_is_mapped(filmed_face: FilmedFace, caplog: pytes
     assert person_shown(model_of("ben"), replace(face, takes=())) is None
     assert "built from footage without sound" in caplog.text
     assert person_shown(model_of("anna"), face) is None
-    assert person_shown(model_of("ben"), "portrait") is None  # type: ignore[arg-type]
+    assert shown_face(face).other_person(model_of("ben")) is face
+    assert shown_face("portrait").other_person(model_of("ben")) is None
 
 
 def test_mouth_pictures_cannot_be_mapped_onto_another_person(filmed_face: FilmedFace) -> None:

@@ -18,8 +18,9 @@ from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.report import figures_table
 from lipmotion.pipeline.evaluation.conditions import compared_clips, held_out_recordings
 from lipmotion.pipeline.evaluation.evaluate import evaluate
-from lipmotion.pipeline.generate.animate import animate, write
+from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import Model, load_model, save_model
+from lipmotion.pipeline.outputs.write import write
 from lipmotion.pipeline.training.channels import BOTH, EIGENLIPS, GEOMETRY, train_eigenlips, with_visual_channels
 from lipmotion.pipeline.training.train import train
 from lipmotion.speech.recognition.recogniser import Recogniser

@@ -40,6 +40,4 @@ def film_options(options: argparse.Namespace) -> FilmOptions:
 
 def is_filmed(options: argparse.Namespace) -> bool:
     """Return whether the face is a filmed one."""
-    from lipmotion.faces.filmed.face import FilmedFace
-
-    return isinstance(options.face, FilmedFace)
+    return getattr(options.face, "has_own_background", False)  # a batch has the name of a face

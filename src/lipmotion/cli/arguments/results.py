@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -56,21 +55,29 @@ def check_results(options: argparse.Namespace, speech: Path | None = None) -> No
     A face and a character that are open already stay so: several recordings share them.
     speech : the recording (None: there will be a sound that is in no file)
     """
-    from lipmotion.pipeline.generate.animate import check_outputs
+    from lipmotion.pipeline.outputs.output import OutputSettings, checked_outputs
 
     open_faces(options)
-    checked = {"rate_hz": rate_of(options), "fps": options.fps, "face": options.face, "film": film_options(options)}
-    checked["delivery"] = delivery_of(options)
-    check_outputs(options.output, speech, **checked, staging=staging_of(options), with_sound=speech is None)
+    settings = OutputSettings(
+        options.face,
+        speech,
+        sounded=speech is None,
+        rate_hz=rate_of(options),
+        fps=options.fps,
+        film=film_options(options),
+        staging=staging_of(options),
+        delivery=delivery_of(options),
+    )
+    checked_outputs(options.output, settings)
 
 
 def open_faces(options: argparse.Namespace) -> None:
     """Replace the name of a face by the face, or by the character that was asked for; once."""
-    from lipmotion.pipeline.generate.animate import opened_face
+    from lipmotion.pipeline.outputs.shown_faces import shown_face
 
     if getattr(options, "driven", None) is None:
         open_character(options)
-    options.face = opened_face(options.face)
+    options.face = shown_face(options.face)
 
 
 def write_results(
@@ -87,7 +94,8 @@ def write_results(
     report    : receives the progress of videos
     temporary : whether the recording is a file that will be gone
     """
-    from lipmotion.pipeline.generate.animate import with_articulation, write
+    from lipmotion.pipeline.outputs.motion_files import with_articulation
+    from lipmotion.pipeline.outputs.write import write
     from lipmotion.types.progress import sub_monitor
 
     delivery = delivery_of(options)
@@ -114,15 +122,14 @@ def work_of(options: argparse.Namespace, report: Report) -> dict[str, Any]:
 
     Recognition is the whole work, or its first part where a video is drawn, too; what draws it is loaded meanwhile.
     """
-    from lipmotion.faces.base import Face
-    from lipmotion.pipeline.outputs.drawn_video import load_drawing, shows_face
+    from lipmotion.pipeline.outputs.drawn_video import shows_face
     from lipmotion.types.progress import sub_monitor
 
     draws = any(shows_face(Path(output)) for output in options.output)
     return {
         "workers": worker_count(options),
         "monitor": sub_monitor(report.receive, 0.0, RECOGNITION if draws else 1.0),
-        "meanwhile": partial(load_drawing, options.face) if draws and isinstance(options.face, Face) else None,
+        "meanwhile": options.face.load if draws else None,
     }
 
 

@@ -51,7 +51,6 @@ def run(options: argparse.Namespace) -> None:
 
 def _animate(load: Callable[[], Model], options: argparse.Namespace, report: Report) -> str:
     """Write the outputs of one recording; return what is to be said of it."""
-    from lipmotion.pipeline.film.video import person_shown
     from lipmotion.pipeline.generate.animate import animate
     from lipmotion.pipeline.generate.posteriors import animate_with_posteriors, check_picture, write_posteriors
 
@@ -60,7 +59,7 @@ def _animate(load: Callable[[], Model], options: argparse.Namespace, report: Rep
         check_picture(options.posteriors, options.speech)
     request, model = spoken_request(options, options.words_beside), load()
     if request.onto is None:
-        request = replace(request, onto=person_shown(model, options.face, options.speaker))
+        request = replace(request, onto=options.face.other_person(model, options.speaker))
     if options.posteriors:
         result, posteriors = animate_with_posteriors(request, model=model)
         write_posteriors(options.posteriors, result, posteriors)

@@ -53,7 +53,6 @@ def run(options: argparse.Namespace) -> None:
 
 def _speak(options: argparse.Namespace, report: Report) -> None:
     from lipmotion.corpora.store import Corpus
-    from lipmotion.pipeline.film.video import person_shown
     from lipmotion.pipeline.generate.speak import read_text, speak
     from lipmotion.pipeline.model import load_model
     from lipmotion.units import Lexicon
@@ -63,7 +62,7 @@ def _speak(options: argparse.Namespace, report: Report) -> None:
     lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
     model, corpus = load_model(options.model), Corpus.open(options.corpus) if options.corpus else None
     how = {"voice": options.voice, "corpus": corpus, "model": model, "lexicon": lexicon, "speaker": options.speaker}
-    onto = options.onto or person_shown(model, options.face, options.speaker)
+    onto = options.onto or options.face.other_person(model, options.speaker)
     sound, result = speak(text, **how, onto=onto, onto_speaker=options.onto_speaker, **style_of(options))
     write_results(options, result, sound, model, report)
     report.finish("\n".join(map(printable, options.output)), files=options.output, seconds=round(sound.duration_s, 3))

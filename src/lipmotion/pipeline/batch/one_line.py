@@ -20,9 +20,7 @@ import numpy as np
 from lipmotion.corpora.labels import labels_beside
 from lipmotion.errors import ExportError, LipMotionError
 from lipmotion.export.base import motion_suffix
-from lipmotion.export.cues import OPTIONAL
 from lipmotion.extensions import failed_extension
-from lipmotion.faces.base import Face
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.measures.closures import CLOSED_SHARE
 from lipmotion.motion.closure import OPENING, closable_ranges
@@ -37,12 +35,14 @@ from lipmotion.pipeline.batch.ledger import (
 from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.batch.record import DONE, FAILED, Record
 from lipmotion.pipeline.batch.settings import CUES, BatchSettings, input_files, line_fingerprint
-from lipmotion.pipeline.film.video import is_person_of, person_shown
-from lipmotion.pipeline.generate.animate import animate, check_outputs, opened_face, with_articulation, write
+from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.generate.transfer import map_onto
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.outputs.cues import check_cue_options, cues, write_cues
 from lipmotion.pipeline.outputs.curve_sets import check_curve_set
+from lipmotion.pipeline.outputs.motion_files import with_articulation
+from lipmotion.pipeline.outputs.output import OutputSettings, checked_outputs
+from lipmotion.pipeline.outputs.shown_faces import ShownFace, shown_face
+from lipmotion.pipeline.outputs.write import write
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.storage.files import check_target, sha256_of
@@ -53,8 +53,6 @@ LOG = logging.getLogger("lipmotion")
 ONE_AT_A_TIME = threading.Lock()
 """A worker of a cluster may have several threads: warnings and the threads of matrix products belong to a process."""
 MOST_WARNINGS = 10
-CUES_FPS = 24.0
-"""Frame rate of cues where none is given."""
 SILENCE_S = 0.5
 """Seconds of silence with which the settings are tried out."""
 
@@ -164,26 +162,19 @@ def _written(work: LineWork) -> Generation:
         check_target(Path(work.place.out) / f"{line.name}.{kind}")
     model = _model(settings.model, _stamp(settings.model))
     generation = animate(_request(line, settings, model), model=model)
-    sheets = [kind for kind in settings.kinds if kind.startswith(CUES)]
-    if sheets:
-        sheet = cues(generation, fps=settings.fps or CUES_FPS, delivery=settings.delivery)
-        for kind in sheets:
-            write_cues(sheet, staged[kind], speech=line.recording, form=kind.removeprefix(CUES))
-    plain = [path for kind, path in staged.items() if kind not in sheets]
-    if plain:
-        write(
-            with_articulation(generation) if settings.articulation else generation,
-            plain,
-            speech=line.recording,
-            model=model,
-            channels=settings.channels or None,
-            rate_hz=settings.rate_hz,
-            fps=settings.fps,
-            face=_face(settings.face, _stamp(settings.face)),
-            staging=settings.staging,
-            delivery=settings.delivery,
-            curves=settings.curves or None,
-        )
+    write(
+        with_articulation(generation) if settings.articulation else generation,
+        list(staged.values()),
+        speech=line.recording,
+        model=model,
+        channels=settings.channels or None,
+        rate_hz=settings.rate_hz,
+        fps=settings.fps,
+        face=_face(settings.face, _stamp(settings.face)),
+        staging=settings.staging,
+        delivery=settings.delivery,
+        curves=settings.curves or None,
+    )
     return generation
 
 
@@ -193,7 +184,7 @@ def _request(line: BatchLine, settings: BatchSettings, model: Model) -> SpeechRe
     Where a filmed face of another person is shown, the motion is mapped onto it, as ``lipmotion animate`` does.
     """
     speaker = line.speaker or settings.speaker
-    face = person_shown(model, _face(settings.face, _stamp(settings.face)), speaker)
+    face = _face(settings.face, _stamp(settings.face)).other_person(model, speaker)
     labels = None if line.transcript else labels_beside(Path(line.recording))
     transcript = line.transcript or (labels.transcript if labels else None)
     return SpeechRequest(
@@ -271,8 +262,8 @@ def _lexicon(path: str, _: int) -> Lexicon | None:
 
 
 @lru_cache(maxsize=1)
-def _face(name: str, _: int) -> Face | FilmedFace:
-    return opened_face(name)
+def _face(name: str, _: int) -> ShownFace:
+    return shown_face(name)
 
 
 @lru_cache(maxsize=8)
@@ -285,23 +276,21 @@ def check_line_settings(settings: BatchSettings) -> None:
     """Load what all lines need, so that a mistake in it ends the batch before its first line.
 
     Motion files of a moment of silence are made and deleted, so that channels, curves and formats are tried out.
-    Raises InputError, ModelFormatError, ExportError: as ``load_model``, ``Lexicon.from_file``, ``check_outputs``,
-    ``cues``, ``write``.
+    Raises InputError, ModelFormatError, ExportError: as ``load_model``, ``Lexicon.from_file``, ``checked_outputs``,
+    ``write``.
     """
     anywhere = Path(tempfile.gettempdir())
-    check_outputs(
-        [anywhere / f"line.{kind}" for kind in settings.kinds if not kind.startswith(CUES)],
+    outputs = OutputSettings(
+        _face(settings.face, _stamp(settings.face)),
+        sounded=True,
         rate_hz=settings.rate_hz,
         fps=settings.fps,
-        face=_face(settings.face, _stamp(settings.face)),
         staging=settings.staging,
         delivery=settings.delivery,
-        with_sound=True,
     )
+    checked_outputs([anywhere / f"line.{kind}" for kind in settings.kinds], outputs)
     if settings.curves:
         check_curve_set(settings.curves)
-    if any(kind.startswith(CUES) for kind in settings.kinds):
-        check_cue_options(settings.fps or CUES_FPS, None, OPTIONAL)
     _lexicon(settings.lexicon, _stamp(settings.lexicon))
     _try_out(settings, _model(settings.model, _stamp(settings.model)))
 
@@ -311,7 +300,7 @@ def _try_out(settings: BatchSettings, model: Model) -> None:
     kinds = [kind for kind in settings.kinds if motion_suffix(Path(f"line.{kind}"))]
     kinds = [kind for kind in kinds if not kind.startswith(CUES)]
     face = _face(settings.face, _stamp(settings.face))
-    if not kinds or (isinstance(face, FilmedFace) and not is_person_of(model, face, settings.speaker)):
+    if not kinds or face.other_person(model, settings.speaker) is not None:
         return
     silence = Audio(np.zeros(round(SPEECH_RATE_HZ * SILENCE_S), np.float32), SPEECH_RATE_HZ)
     units = Timeline((Span(0.0, SILENCE_S, Unit("sil")),))

@@ -18,7 +18,6 @@ from lipmotion.errors import InputError
 from lipmotion.export.inset import inset_box, with_inset
 from lipmotion.export.synthetic_mark import mark_frames, mark_metadata
 from lipmotion.export.video import write_mp4
-from lipmotion.faces.base import Face
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.faces.filmed.renderer import BATCH, STITCHING, Stitcher, StitchingOptions
 from lipmotion.kernels.threads import one_thread
@@ -110,7 +109,7 @@ def film_of(
     Raises InputError: motion without the channels that the face needs, no sound for ``energy``, a background in which
     there is no face, a rate that is not positive, or an overlay of a sound without video.
     """
-    check_film(face, options, speech)
+    check_film(options, speech)
     eigenlips = model.eigenlips if model is not None else None
     if options.overlay == "inset" and speech is not None:
         frames, rate_hz = untracked_frames(speech)
@@ -177,14 +176,14 @@ def _fields(codes: FaceCodes) -> tuple[Floats, Floats, Floats]:
     return codes.mouth, codes.jaw, codes.chin_px
 
 
-def person_shown(model: Model, face: Face | FilmedFace, speaker: str = "") -> FilmedFace | None:
-    """Return a filmed face if it is of another person than the motion of a model, so that it must be mapped onto it.
+def person_shown(model: Model, face: FilmedFace, speaker: str = "") -> FilmedFace | None:
+    """Return a face if it is of another person than the motion of a model, so that it must be mapped onto it.
 
     speaker : of the people of the model whose motion is generated
-    A drawn face shows anybody. A filmed face without speech (its footage has no sound) cannot be mapped onto: that is
+    A face without speech (its footage has no sound) cannot be mapped onto: that is
     logged as a warning, and the motion stays as it is. Raises InputError: as ``is_person_of``.
     """
-    if not isinstance(face, FilmedFace) or is_person_of(model, face, speaker):
+    if is_person_of(model, face, speaker):
         return None
     if not face.takes:
         LOG.warning(
@@ -256,11 +255,8 @@ def write_film(
     write_mp4(path, frames, fps=film.rate_hz, audio=sound, tags=tags, xmp=xmp)
 
 
-def check_film(face: Face | FilmedFace, options: FilmOptions, speech: str | Path | None = None) -> None:
-    """Raise InputError if options do not go with a face, or with the speech; called before long work begins.
-
-    speech : the recording; None: it is a sound that is in no file
-    """
+def refuse_film(options: FilmOptions) -> None:
+    """Raise InputError if options are given that only a filmed face has."""
     filmed = {
         "a background": options.background,
         "an overlay": options.overlay,
@@ -268,8 +264,15 @@ def check_film(face: Face | FilmedFace, options: FilmOptions, speech: str | Path
         "a visible mark": options.mark if options.mark == "visible" else None,
     }
     given = next((name for name, value in filmed.items() if value is not None), None)
-    if given is not None and not isinstance(face, FilmedFace):
+    if given is not None:
         raise InputError(f"{given} is for filmed faces; give one: --face FILE.face (docs/filmed-face.md)")
+
+
+def check_film(options: FilmOptions, speech: str | Path | None = None) -> None:
+    """Raise InputError if options do not go with the speech; called before long work begins.
+
+    speech : the recording; None: it is a sound that is in no file
+    """
     if options.background is not None:
         check_source(Path(options.background), "video")
     if options.overlay is not None and (speech is None or options.background is not None):

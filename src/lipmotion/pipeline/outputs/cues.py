@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +13,14 @@ from lipmotion.articulation.delivery import Delivery, moved_in_time
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.cues import CUE_FORMATS, OPTIONAL, CueSheet, choose_cues, format_of, write_cue_file
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
+from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
 from lipmotion.storage.files import as_text, check_distinct, check_target
 from lipmotion.types import Generation
 
+SHEET = ".cues."
+"""What the name of a cue sheet among other outputs has before its format."""
+CUES_FPS = 24.0
+"""Frame rate of cues where none is given."""
 FASTEST_FPS = 60.0
 """Largest frame rate: times in cue files are in hundredths of a second, and two frames must not share one."""
 
@@ -108,3 +114,28 @@ def check_cue_outputs(outputs: Sequence[Path], speech: str | Path, form: str | N
         if form is None:
             format_of(path)
         check_target(path, speech or None)
+
+
+class CueOutput(Output):
+    """``NAME.cues.tsv``, ``.cues.xml``, …: a cue sheet among other outputs."""
+
+    @classmethod
+    def suffixes(cls, settings: OutputSettings) -> tuple[str, ...]:  # noqa: D102, ARG003
+        return tuple(f"{SHEET}{form}" for form in CUE_FORMATS)
+
+    @classmethod
+    def takes(cls, path: Path, settings: OutputSettings) -> bool:  # noqa: D102
+        return path.name.lower().endswith(cls.suffixes(settings))
+
+    def check(self) -> None:  # noqa: D102
+        check_cue_options(self._fps, None, OPTIONAL)
+
+    def prepared(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
+        sheet = cues(performance.generation, fps=self._fps, delivery=self.settings.delivery)
+        recording = self.settings.recording
+        said = "" if recording is None else as_text(recording)
+        return partial(write_cue_file, self.path, sheet, said, self.path.suffix.lower().removeprefix("."))
+
+    @property
+    def _fps(self) -> float:
+        return CUES_FPS if self.settings.fps is None else self.settings.fps

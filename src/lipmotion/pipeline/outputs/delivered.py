@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -17,31 +16,12 @@ from lipmotion.articulation.delivery import (
     moved_in_time,
 )
 from lipmotion.articulation.phone_targets import with_gestures
-from lipmotion.errors import ExportError, InputError
-from lipmotion.faces.base import Face, Staging
-from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.meshes.fitting.blendshape_motion import is_of_blendshapes, with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
-from lipmotion.meshes.model.scene import Scene
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, arkit_name
 from lipmotion.pipeline.outputs.curve_sets import with_curves
-from lipmotion.pipeline.outputs.drawn_video import is_picture_sequence, shows_face
 from lipmotion.pipeline.outputs.living_curves import RADIAN
-from lipmotion.pipeline.outputs.scenes import scene_of
-from lipmotion.types import Generation, Motion, Prosody, StateTrace
-
-
-def check_delivery(delivery: Delivery, outputs: Iterable[Path], face: Face | FilmedFace) -> None:
-    """Raise ExportError or InputError if an output cannot be delivered so."""
-    videos = [path for path in outputs if shows_face(path)]
-    for path in videos:
-        if delivery.offset_ms and not is_picture_sequence(path):
-            raise ExportError(
-                f"{path}: a video has its own sound, which begins with it; an offset is for files that are put beside "
-                "a sound: write the video without it"
-            )
-    if videos and delivery.hold_ms and isinstance(face, FilmedFace):
-        raise InputError("the poses of a filmed face cannot be held; hold those of a drawn face, or of motion files")
+from lipmotion.types import Generation, Motion
 
 
 def delivered(generation: Generation, delivery: Delivery) -> Generation:
@@ -62,9 +42,7 @@ def shown(
 
     character : whose weights are shown, if the face is a character with blendshapes
     """
-    moved = delivered(generation, delivery)
-    if is_of_blendshapes(moved.motion):
-        moved = _with(moved, with_mouth(moved.motion))
+    moved = with_drawn_channels(delivered(generation, delivery))
     frames = delivery.hold_frames(fps)
     if not frames:
         return moved
@@ -75,28 +53,11 @@ def shown(
     return held_mouth(moved.resampled(fps), frames, closed_s)
 
 
-def delivered_scene(
-    generation: Generation,
-    delivery: Delivery,
-    face: Face | FilmedFace,
-    rate_hz: float | None,
-    *,
-    staging: Staging,
-    prosody: Prosody | None,
-) -> Scene:
-    """Return the scene of a face (``scene_of``) as it is delivered; held poses are those of the mouth."""
-    moved = delivered(generation, delivery)
-    if is_of_blendshapes(moved.motion):
-        moved = _with(moved, with_mouth(moved.motion))
-    scene = scene_of(moved, face, rate_hz, staging=staging, prosody=prosody)
-    scene = replace(scene, sound_s=delivery.offset_ms / 1000)
-    weights = scene.weights
-    if weights is None or not delivery.hold_ms:
-        return scene
-    states = StateTrace(("",), np.zeros(len(weights.values), np.intp))
-    whole = Generation(weights, np.zeros(weights.values.shape), moved.units, states)
-    steps = held_mouth(whole, delivery.hold_frames(weights.rate_hz), closed_times(moved))
-    return replace(scene, weights=steps.motion, stepped=steps.stepped)
+def with_drawn_channels(generation: Generation) -> Generation:
+    """Return a generation with the channels that faces draw: those of a mouth, where it has blendshapes."""
+    if not is_of_blendshapes(generation.motion):
+        return generation
+    return _with(generation, with_mouth(generation.motion))
 
 
 def held_mouth(generation: Generation, frames: int, closed_s: Sequence[float]) -> Generation:
@@ -119,15 +80,6 @@ def held_mouth(generation: Generation, frames: int, closed_s: Sequence[float]) -
     values, variance = motion.values.astype(np.float64), np.array(generation.variance)
     values[:, columns], variance[:, columns] = mouth.motion.values, mouth.variance
     return replace(mouth, motion=replace(motion, values=values), spread=variance)
-
-
-def moved_prosody(prosody: Prosody, delivery: Delivery) -> Prosody:
-    """Return loudness and pitch on the timeline of files: later by the offset."""
-    frames = round(delivery.offset_ms / 10)
-    if frames <= 0:
-        return Prosody(prosody.level_db[-frames:], prosody.log_f0[-frames:])
-    quiet = np.full(frames, prosody.level_db.min(initial=0.0))
-    return Prosody(np.concatenate([quiet, prosody.level_db]), np.concatenate([quiet * np.nan, prosody.log_f0]))
 
 
 def _with(generation: Generation, motion: Motion) -> Generation:

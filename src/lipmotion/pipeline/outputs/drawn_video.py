@@ -3,27 +3,79 @@
 from __future__ import annotations
 
 import re
-from fractions import Fraction
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from lipmotion.errors import ExportError, InputError
+from lipmotion.errors import ExportError
 from lipmotion.faces.base import SMALLEST, TRANSPARENT, DrawsPlanes, Face, Staging
-from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.faces.registry import staged_face
 from lipmotion.kernels.choice import numba_works
+from lipmotion.meshes.fitting.blendshape_motion import is_of_blendshapes
 from lipmotion.pipeline.film.video import RENDERING
-from lipmotion.speech.features.mfcc import WINDOW
-from lipmotion.speech.features.prosody import prosody_of
-from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ, read_audio
-from lipmotion.speech.sound.decimation import decimated
+from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
+from lipmotion.pipeline.outputs.prosody import prosody_of_speech
+from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Generation, Monitor, Motion, Prosody, Timeline
 from lipmotion.types.progress import with_reports
 
 OPAQUE_SUFFIX = ".mp4"
 VIDEO_SUFFIXES = (OPAQUE_SUFFIX, ".webm", ".mov")
 """Videos with sound; all but the first can be transparent."""
+SOUND_RATE_HZ = 48_000
+"""Sampling rate of the sound track."""
+DRAWN_HZ = 25.0
+"""Frame rate of videos of drawn faces."""
+
+
+class PicturesOutput(Output):
+    """``NAME%05d.png``: the pictures of a face, numbered, without sound."""
+
+    @classmethod
+    def suffixes(cls, settings: OutputSettings) -> tuple[str, ...]:  # noqa: D102, ARG003
+        return ("%05d.png",)
+
+    @classmethod
+    def takes(cls, path: Path, settings: OutputSettings) -> bool:  # noqa: D102, ARG003
+        return is_picture_sequence(path)
+
+    def check(self) -> None:  # noqa: D102
+        settings = self.settings
+        settings.face.check_video(self.path, settings)
+        if settings.recording is None and not settings.sounded:
+            raise ExportError(f"{self.path}: a video needs the recording: write(..., speech=FILE)")
+
+    def prepared(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
+        face = self.settings.face
+        face.check_drawable(self.path, performance.generation.motion)
+        return partial(face.write_video, self.path, performance)
+
+
+class VideoOutput(PicturesOutput):
+    """``.mp4``, ``.webm``, ``.mov``: a face that speaks, with sound."""
+
+    @classmethod
+    def suffixes(cls, settings: OutputSettings) -> tuple[str, ...]:  # noqa: D102, ARG003
+        return VIDEO_SUFFIXES
+
+    @classmethod
+    def takes(cls, path: Path, settings: OutputSettings) -> bool:  # noqa: D102
+        return path.suffix.lower() in cls.suffixes(settings)
+
+    def check(self) -> None:  # noqa: D102
+        if self.settings.delivery.offset_ms:
+            raise ExportError(
+                f"{self.path}: a video has its own sound, which begins with it; an offset is for files that are put "
+                "beside a sound: write the video without it"
+            )
+        super().check()
+
+
+def sound_track(performance: Performance) -> Audio:
+    """Return the sound of videos. Raises InputError: the recording cannot be read."""
+    return performance.sound or read_audio(Path(str(performance.settings.recording)), SOUND_RATE_HZ, warn=False)
 
 
 def shows_face(path: Path) -> bool:
@@ -44,12 +96,13 @@ def check_background(path: Path, staging: Staging) -> None:
         )
 
 
-def check_staging(face: Face | FilmedFace, staging: Staging) -> None:
-    """Raise InputError if a face cannot be staged so."""
-    if not isinstance(face, FilmedFace):
-        staged_face(face, staging)
-    elif staging != Staging():
-        raise InputError("size, colour of the background and what moves are of drawn faces; leave them out")
+def check_drawable(path: Path, motion: Motion) -> None:
+    """Raise ExportError if motion has no channel from which a face can be drawn."""
+    if "opening" not in motion.names and not is_of_blendshapes(motion):
+        raise ExportError(
+            f"{path}: the motion has no channel 'opening' to draw a face from, nor the blendshape 'jawOpen'; write "
+            "motion files"
+        )
 
 
 def write_drawn_face(
@@ -71,7 +124,7 @@ def write_drawn_face(
     from lipmotion.export.transparent import write_pictures, write_with_alpha
     from lipmotion.export.video import write_mp4
 
-    staged, drawn = staged_face(face, staging, prosody or prosody_heard(sound)), None
+    staged, drawn = staged_face(face, staging, prosody or prosody_of_speech(sound)), None
     if path.suffix.lower() == OPAQUE_SUFFIX and isinstance(staged, DrawsPlanes):
         drawn = staged.render_planes(generation.motion, generation.units, fps=fps)
     if drawn is None:
@@ -92,23 +145,3 @@ def load_drawing(face: Face) -> None:
         smallest = staged_face(face, Staging(size=SMALLEST))
         if isinstance(smallest, DrawsPlanes) and (frames := smallest.render_planes(closed, Timeline(()))) is not None:
             list(frames)
-
-
-def prosody_heard(speech: str | Path | Audio) -> Prosody:
-    """Return loudness and pitch of a recording or a sound, for movements of brows and head.
-
-    A sound that is shorter than one frame of speech is followed by silence.
-
-    Raises InputError: the recording cannot be read.
-    """
-    sound = speech if isinstance(speech, Audio) else read_audio(Path(speech), SPEECH_RATE_HZ, warn=False)
-    ratio = Fraction(SPEECH_RATE_HZ, int(sound.rate_hz))
-    samples = sound.samples.astype(np.float32)
-    if ratio.numerator == 1:
-        samples = decimated(samples, ratio.denominator)
-    else:
-        from scipy.signal import resample_poly
-
-        samples = resample_poly(samples, ratio.numerator, ratio.denominator).astype(np.float32)
-    missing = max(WINDOW - len(samples), 0)
-    return prosody_of(Audio(np.pad(samples, (0, missing)), SPEECH_RATE_HZ))

@@ -3,24 +3,33 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from lipmotion.articulation.contact import in_pictures
+from lipmotion.articulation.delivery import closed_on_grid, closed_times
 from lipmotion.articulation.mouth import spoken_mouth
+from lipmotion.articulation.phone_targets import GESTURES, with_gestures
 from lipmotion.errors import ExportError
-from lipmotion.export.base import motion_format, motion_suffix
+from lipmotion.export.base import check_motion, motion_format, motion_suffix, motion_suffixes, write_motion
 from lipmotion.faces.base import Staging
 from lipmotion.meshes.files.rig_tables import CONTROL
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
+from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.facial_animation import FAP
 from lipmotion.meshes.model.shape_names import arkit_name
-from lipmotion.pipeline.outputs.curve_sets import ARKIT, WHOLE_FACE, beside, curves_of
+from lipmotion.pipeline.outputs.curve_sets import ARKIT, WHOLE_FACE, beside, curves_of, with_curves
+from lipmotion.pipeline.outputs.delivered import delivered, held_mouth
 from lipmotion.pipeline.outputs.living_curves import RADIAN, living_curves
+from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
+from lipmotion.pipeline.outputs.prosody import recorded_prosody
+from lipmotion.pipeline.outputs.scenes import sound_reference
 from lipmotion.speech.sound.audio_files import stated_length_s
+from lipmotion.storage.files import as_text
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Prosody
 
 LOG = logging.getLogger("lipmotion")
@@ -30,6 +39,91 @@ MODEL_HZ = 100
 """Frames per second of generated motion."""
 SAME_HZ = 1e-6
 OPENING = "opening"
+
+
+class MotionOutput(Output):
+    """``.json``, ``.csv``, ``.livelink.csv``, …: the motion, or curves that follow from it (``export.base``)."""
+
+    @classmethod
+    def suffixes(cls, settings: OutputSettings) -> tuple[str, ...]:  # noqa: D102, ARG003
+        return motion_suffixes()
+
+    @classmethod
+    def takes(cls, path: Path, settings: OutputSettings) -> bool:  # noqa: D102, ARG003
+        return bool(motion_suffix(path))
+
+    def check(self) -> None:  # noqa: D102
+        settings = self.settings
+        if settings.recording is not None:
+            check_length(self.path, settings.recording, settings.rate_hz, settings.delivery.offset_ms / 1000)
+
+    def prepared(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
+        settings = self.settings
+        spoken, chosen, asked = performance.once(_chosen)
+        lives = motion_format(self.path).curves == WHOLE_FACE or settings.curves == WHOLE_FACE
+        prosody = performance.once(recorded_prosody) if lives else None
+        named = settings.channels
+        held = in_format(self.path, spoken, chosen, settings.rate_hz, settings.staging, prosody, named)
+        warn_of_unused(self.path, held, asked)
+        closed_s = closed_times(performance.once(_delivered)) if settings.delivery.hold_ms else []
+        held = held_mouth(held, settings.delivery.hold_frames(held.motion.rate_hz), closed_s)
+        check_motion(self.path, held.motion)
+        return partial(self._write, held, performance)
+
+    def _write(self, held: Generation, performance: Performance) -> None:
+        about = performance.model.about if performance.model else {}
+        kept = ("name", "corpus", "licence", "attribution")
+        model = {key: _text(about[key]) for key in kept if about.get(key)}
+        speech, sound_s = performance.heard_in, self.settings.delivery.offset_ms / 1000
+        source = {"file": as_text(speech.name)} if speech else {}
+        if speech and sound_s:
+            source["start_s"] = f"{sound_s:.9g}"
+        if speech and motion_format(self.path).names_sound:
+            source["path"] = sound_reference(speech, self.path)
+        write_motion(self.path, held, source=source, model=model)
+
+
+def _delivered(performance: Performance) -> Generation:
+    """Return the motion as delivered, with the articulatory channels that were asked for."""
+    generation, settings = performance.generation, performance.settings
+    if {*(settings.channels or ())} & {*GESTURES}:
+        generation = with_articulation(generation, settings.channels or ())
+    return delivered(generation, settings.delivery)
+
+
+def _chosen(performance: Performance) -> tuple[Generation, Generation, Sequence[str]]:
+    """Return the motion, what motion files hold of it unless their format says more, and the channels asked for."""
+    settings, spoken = performance.settings, performance.once(_delivered)
+    rate_hz, curves, channels = settings.rate_hz, settings.curves, settings.channels
+    closed_s = closed_times(spoken) if settings.delivery.hold_ms else []
+    if rate_hz is not None and (closed_s or rate_hz < spoken.motion.rate_hz):
+        spoken = closed_on_grid(spoken, rate_hz)
+    asked: Sequence[str] = channels or ()
+    names: Sequence[str] | None = channels
+    if curves is not None:
+        prosody = performance.once(recorded_prosody) if curves == WHOLE_FACE else None
+        spoken, found = with_curves(spoken, curves, staging=settings.staging, prosody=prosody)
+        asked = asked if channels or isinstance(curves, DrivenCharacter) else found
+        names = found if channels is None else channels
+    chosen = spoken.selected(names) if names is not None else spoken
+    if rate_hz is not None:
+        chosen = chosen.resampled(rate_hz) if curves is None else resampled_curves(chosen, spoken, rate_hz)
+    return spoken, chosen, asked
+
+
+def with_articulation(generation: Generation, channels: Sequence[str] = GESTURES) -> Generation:
+    """Return the generation with articulatory channels that its motion lacks, as they follow from its phones.
+
+    channels : the articulatory ones among these are added (docs/articulation.md); their variance is 0
+    """
+    motion = with_gestures(generation.motion, generation.units, channels)
+    added = len(motion.channels) - len(generation.motion.channels)
+    variance = np.pad(generation.variance, ((0, 0), (0, added))) if added else generation.spread
+    return replace(generation, motion=motion, spread=variance)
+
+
+def _text(value: object) -> str:
+    return as_text("; ".join(map(str, value)) if isinstance(value, list) else str(value))
 
 
 def in_format(
@@ -109,11 +203,6 @@ def check_length(path: Path, speech: Path, rate_hz: float | None, later_s: float
         kind = motion_suffix(path)
         required = f"required at most {form.most_frames} in {kind}; give a lower --rate"
         raise ExportError(f"{path}: about {frames} frames, {required}")
-
-
-def needs_prosody(path: Path) -> bool:
-    """Return whether a motion file of that name holds movements that follow loudness and pitch."""
-    return bool(motion_suffix(path)) and motion_format(path).curves == WHOLE_FACE
 
 
 def _curves(generation: Generation, name: str, staging: Staging | None, prosody: Prosody | None) -> Motion:

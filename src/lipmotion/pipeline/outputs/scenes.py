@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import in_pictures
+from lipmotion.articulation.delivery import closed_times
 from lipmotion.articulation.mouth import frame_times, spoken_mouth
 from lipmotion.faces.base import Staging
-from lipmotion.faces.mesh import MeshFace
 from lipmotion.meshes.files.gltf_animator import write_animated_gltf
 from lipmotion.meshes.files.gltf_writer import write_gltf_scene
 from lipmotion.meshes.files.usd_text import asset
@@ -22,9 +23,13 @@ from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.mesh import Blendshape
 from lipmotion.meshes.model.scene import HeadTurn, Scene
 from lipmotion.meshes.model.shape_names import by_arkit_name
+from lipmotion.pipeline.outputs.delivered import delivered, held_mouth, with_drawn_channels
+from lipmotion.pipeline.outputs.drawn_video import check_drawable
 from lipmotion.pipeline.outputs.living_curves import living_curves
+from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
+from lipmotion.pipeline.outputs.prosody import recorded_prosody
 from lipmotion.storage.files import as_text
-from lipmotion.types import Channel, Generation, Motion, Prosody
+from lipmotion.types import Channel, Generation, Motion, Prosody, StateTrace
 from lipmotion.types.motion import WEIGHT
 
 GLTF, USD = ".glb", ".usda"
@@ -35,23 +40,35 @@ METRES = 0.09
 """The distance between the outer eye corners of the 3D head, in metres."""
 
 
-def is_scene(path: Path) -> bool:
-    """Return whether a path is that of a character with its animation."""
-    return path.suffix.lower() in SCENE_SUFFIXES
+class SceneOutput(Output):
+    """``.glb``, ``.usda``: a character with its animation, for 3D programs."""
+
+    @classmethod
+    def suffixes(cls, settings: OutputSettings) -> tuple[str, ...]:  # noqa: D102, ARG003
+        return SCENE_SUFFIXES
+
+    def check(self) -> None:  # noqa: D102
+        if self.settings.recording is not None:
+            check_sound_name(self.path, self.settings.recording)
+
+    def prepared(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
+        check_drawable(self.path, performance.generation.motion)
+        return lambda: write_scene(self.path, performance.once(delivered_scene), sound=performance.heard_in)
 
 
-def scene_of(
-    generation: Generation,
-    face: object,
-    rate_hz: float | None = None,
-    *,
-    staging: Staging | None = None,
-    prosody: Prosody | None = None,
-) -> Scene:
-    """Return the scene of a face: ``character_scene`` of a ``MeshFace``, or else ``head_scene``."""
-    if isinstance(face, MeshFace):
-        return character_scene(generation, face.character, rate_hz, staging=staging, prosody=prosody)
-    return head_scene(generation, rate_hz, staging=staging, prosody=prosody)
+def delivered_scene(performance: Performance) -> Scene:
+    """Return the scene of a face as it is delivered; held poses are those of the mouth."""
+    settings, delivery = performance.settings, performance.settings.delivery
+    moved = with_drawn_channels(delivered(performance.generation, delivery))
+    scene = settings.face.scene(moved, settings, performance.once(recorded_prosody))
+    scene = replace(scene, sound_s=delivery.offset_ms / 1000)
+    weights = scene.weights
+    if weights is None or not delivery.hold_ms:
+        return scene
+    states = StateTrace(("",), np.zeros(len(weights.values), np.intp))
+    whole = Generation(weights, np.zeros(weights.values.shape), moved.units, states)
+    steps = held_mouth(whole, delivery.hold_frames(weights.rate_hz), closed_times(moved))
+    return replace(scene, weights=steps.motion, stepped=steps.stepped)
 
 
 def write_scene(path: Path, scene: Scene, sound: Path | None = None) -> None:

@@ -1,0 +1,180 @@
+"""Outputs: ``plan(path, settings) → Output``, one class for every kind of file.
+
+A new kind is a class of ``Output`` in a module of its own, and a line in ``OUTPUTS``, or an entry point of the group
+``lipmotion.outputs`` of an installed package (docs/extend/output.md).
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from lipmotion.articulation.delivery import Delivery
+from lipmotion.errors import ExportError, InputError
+from lipmotion.extensions import Registry
+from lipmotion.faces.base import Staging
+from lipmotion.meshes.fitting.driven import DrivenCharacter
+from lipmotion.pipeline.film.video import FILM, FilmOptions
+from lipmotion.storage.files import check_distinct, check_target
+from lipmotion.types import Audio, Generation, Monitor, silent_monitor
+
+if TYPE_CHECKING:
+    from lipmotion.pipeline.model import Model
+    from lipmotion.pipeline.outputs.shown_faces import ShownFace
+
+Made = TypeVar("Made")
+SLOWEST_HZ, FASTEST_HZ = 1.0, 1000.0
+"""Smallest and largest frame rate of a file; a mistyped rate must not fill the memory."""
+
+
+@dataclass(frozen=True)
+class OutputSettings:
+    """What outputs hold, and how they show it.
+
+    face      : of videos and scenes, from ``shown_face``
+    recording : the file that was, or will be, animated; None: there is none
+    sounded   : whether there is, or will be, a sound that is in no file
+    channels, curves, rate_hz, fps, film, staging, delivery : as of ``write``
+    Raises InputError: a frame rate out of its range.
+    """
+
+    face: ShownFace
+    recording: Path | None = None
+    sounded: bool = False
+    channels: tuple[str, ...] | None = None
+    curves: str | Path | DrivenCharacter | None = None
+    rate_hz: float | None = None
+    fps: float | None = None
+    film: FilmOptions = FILM
+    staging: Staging = field(default_factory=Staging)
+    delivery: Delivery = field(default_factory=Delivery)
+
+    def __post_init__(self) -> None:
+        for hertz in (self.fps, self.rate_hz):
+            if hertz is not None and not SLOWEST_HZ <= hertz <= FASTEST_HZ:
+                raise InputError(f"the frame rate is {hertz}, required {SLOWEST_HZ:.0f} to {FASTEST_HZ:.0f} a second")
+
+
+@dataclass(frozen=True, eq=False)
+class Performance:
+    """Generated motion with all that its outputs need of it.
+
+    sound   : the sound, where it is in no file; None: that of the recording of the settings
+    heard_in : the file of the sound that outputs refer to; None: they refer to none
+    monitor : receives reports of the progress
+    """
+
+    generation: Generation
+    settings: OutputSettings
+    sound: Audio | None = None
+    heard_in: Path | None = None
+    model: Model | None = None
+    monitor: Monitor = silent_monitor
+    _kept: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
+
+    @property
+    def speech(self) -> Path | Audio | None:
+        """The sound, or else the recording; None: there is neither."""
+        return self.sound or self.settings.recording
+
+    def once(self, make: Callable[[Performance], Made]) -> Made:
+        """Return what a function makes of this performance; outputs that need the same share it."""
+        if make not in self._kept:
+            self._kept[make] = make(self)
+        made: Made = self._kept[make]
+        return made
+
+
+class Output(ABC):
+    """A file that is written of a performance."""
+
+    def __init__(self, path: Path, settings: OutputSettings) -> None:
+        self.path, self.settings = path, settings
+
+    @classmethod
+    @abstractmethod
+    def suffixes(cls, settings: OutputSettings) -> tuple[str, ...]:
+        """Return the ends of names of such files, as messages list them."""
+
+    @classmethod
+    def takes(cls, path: Path, settings: OutputSettings) -> bool:
+        """Return whether a file of that name is such an output."""
+        return path.suffix.lower() in map(str.lower, cls.suffixes(settings))
+
+    def check(self) -> None:
+        """Raise ExportError or InputError if the file cannot be written; called before long work begins."""
+        return
+
+    @abstractmethod
+    def prepared(self, performance: Performance) -> Callable[[], None]:
+        """Return a function that writes the file; whole or not at all.
+
+        Raises ExportError or InputError: the motion does not suit the file. So nothing is written if one of several
+        outputs cannot be.
+        """
+
+    def write(self, performance: Performance) -> None:
+        """Write the file. Raises ExportError: it cannot be written, or the motion does not suit it."""
+        self.prepared(performance)()
+
+
+_HERE = "lipmotion.pipeline.outputs"
+OUTPUTS: Registry[type[Output]] = Registry(
+    "output",
+    "lipmotion.outputs",
+    {
+        "motion": f"{_HERE}.motion_files:MotionOutput",
+        "video": f"{_HERE}.drawn_video:VideoOutput",
+        "scene": f"{_HERE}.scenes:SceneOutput",
+        "labels": f"{_HERE}.label_files:LabelOutput",
+        "sound": f"{_HERE}.sound_files:SoundOutput",
+        "pictures": f"{_HERE}.drawn_video:PicturesOutput",
+        "cues": f"{_HERE}.cues:CueOutput",
+    },
+)
+"""Kinds of outputs."""
+
+
+def plan(path: str | Path, settings: OutputSettings) -> Output:
+    """Return the output of a path; the longest suffix counts. Raises ExportError: no kind of output has such a name."""
+    kinds, name = _kinds(), Path(path).name.lower()
+
+    def length(kind: type[Output]) -> int:
+        return max((len(suffix) for suffix in kind.suffixes(settings) if name.endswith(suffix.lower())), default=0)
+
+    taking = [kind for kind in kinds if kind.takes(Path(path), settings)]
+    if taking:
+        return max(taking, key=length)(Path(path), settings)
+    suffixes = " ".join(suffix for kind in kinds for suffix in kind.suffixes(settings))
+    raise ExportError(f"{path}: unknown format {Path(path).suffix!r}; required one of: {suffixes}")
+
+
+def checked_outputs(paths: Iterable[str | Path], settings: OutputSettings) -> list[Output]:
+    """Return the outputs of some paths. Raises ExportError or InputError: one cannot be written as the settings say."""
+    settings.face.check(settings)
+    planned = [plan(path, settings) for path in paths]
+    check_distinct([output.path for output in planned])
+    for output in planned:
+        check_target(output.path, settings.recording)
+        output.check()
+    return planned
+
+
+def perform(performance: Performance, planned: Sequence[Output]) -> None:
+    """Write outputs; nothing, if the motion does not suit one of them. Raises ExportError: one cannot be written."""
+    for write_file in [output.prepared(performance) for output in planned]:
+        write_file()
+
+
+def _kinds() -> list[type[Output]]:
+    """Return all kinds. Raises InputError: what an installed package adds is no class of ``Output``."""
+    kinds = []
+    for name in OUTPUTS.names:
+        kind = OUTPUTS.load(name)
+        if not (isinstance(kind, type) and issubclass(kind, Output)):
+            raise InputError(f"{kind!r} is called an output, {name!r}, by an installed package; required an Output")
+        kinds.append(kind)
+    return kinds

@@ -1,0 +1,182 @@
+"""Faces as outputs show them: drawn faces, characters and filmed people answer the same questions."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from lipmotion.errors import ExportError, InputError
+from lipmotion.faces.base import Face, Staging
+from lipmotion.faces.filmed.face import SUFFIX, FilmedFace, load_face
+from lipmotion.faces.mesh import MeshFace
+from lipmotion.faces.registry import FACES, face_named, staged_face
+from lipmotion.meshes.fitting.driven import DrivenCharacter
+from lipmotion.meshes.model.scene import Scene
+from lipmotion.pipeline.film.video import check_film, film_of, person_shown, refuse_film, write_film
+from lipmotion.pipeline.outputs.delivered import shown
+from lipmotion.pipeline.outputs.drawn_video import (
+    DRAWN_HZ,
+    OPAQUE_SUFFIX,
+    check_background,
+    check_drawable,
+    load_drawing,
+    sound_track,
+    write_drawn_face,
+)
+from lipmotion.pipeline.outputs.output import OutputSettings, Performance
+from lipmotion.pipeline.outputs.prosody import moved_prosody, prosody_of_speech
+from lipmotion.pipeline.outputs.scenes import character_scene, head_scene
+from lipmotion.storage.sources import is_file
+from lipmotion.types import Generation, Motion, Prosody
+
+if TYPE_CHECKING:
+    from lipmotion.pipeline.model import Model
+
+AnyFace = str | Path | Face | FilmedFace
+
+
+class ShownFace(ABC):
+    """A face with all that outputs ask of it."""
+
+    has_own_background = False
+    """Whether the background is footage, and not a colour."""
+
+    @abstractmethod
+    def check(self, settings: OutputSettings) -> None:
+        """Raise InputError if the face cannot be shown as the settings say; called before long work begins."""
+
+    @abstractmethod
+    def check_video(self, path: Path, settings: OutputSettings) -> None:
+        """Raise ExportError or InputError if a video or pictures of that name cannot show the face so."""
+
+    def check_drawable(self, path: Path, motion: Motion) -> None:
+        """Raise ExportError if motion has no channel from which the face can be drawn."""
+        check_drawable(path, motion)
+
+    @abstractmethod
+    def write_video(self, path: Path, performance: Performance) -> None:
+        """Write a video, or pictures. Raises InputError: the motion lacks channels. Raises ExportError: as writers."""
+
+    def scene(self, generation: Generation, settings: OutputSettings, prosody: Prosody | None) -> Scene:
+        """Return the character of files for 3D programs, with its animation: the 3D head, where it is no mesh."""
+        return head_scene(generation, settings.rate_hz, staging=settings.staging, prosody=prosody)
+
+    def other_person(self, model: Model, speaker: str = "") -> FilmedFace | None:  # noqa: ARG002
+        """Return the person onto whose face the motion of a model must be mapped; None: it stays as it is.
+
+        speaker : of the people of the model whose motion is generated
+        """
+        return None
+
+    def load(self) -> None:
+        """Load what draws the face, so that drawing begins sooner."""
+        return
+
+
+class ShownDrawing(ShownFace):
+    """A drawing: of ``faces.registry``."""
+
+    def __init__(self, face: Face) -> None:
+        self.face = face
+
+    def check(self, settings: OutputSettings) -> None:  # noqa: D102
+        refuse_film(settings.film)
+        staged_face(self.face, settings.staging)
+
+    def check_video(self, path: Path, settings: OutputSettings) -> None:  # noqa: D102
+        check_background(path, settings.staging)
+
+    def write_video(self, path: Path, performance: Performance) -> None:  # noqa: D102
+        settings, played = performance.settings, performance.once(sound_track)
+        prosody = moved_prosody(prosody_of_speech(played), settings.delivery)
+        hertz = DRAWN_HZ if settings.fps is None else settings.fps
+        seen = _seen(performance)
+        write_drawn_face(path, seen, played, hertz, self.face, settings.staging, performance.monitor, prosody)
+
+    def load(self) -> None:  # noqa: D102
+        load_drawing(self.face)
+
+
+class ShownCharacter(ShownDrawing):
+    """A character of the user's own."""
+
+    def __init__(self, face: MeshFace) -> None:
+        super().__init__(face)
+        self.character = face.character
+
+    def scene(self, generation: Generation, settings: OutputSettings, prosody: Prosody | None) -> Scene:  # noqa: D102
+        return character_scene(generation, self.character, settings.rate_hz, staging=settings.staging, prosody=prosody)
+
+
+class ShownPerson(ShownFace):
+    """A filmed face, whose mouth and jaw are stitched into footage."""
+
+    has_own_background = True
+
+    def __init__(self, face: FilmedFace) -> None:
+        self.face = face
+
+    def check(self, settings: OutputSettings) -> None:  # noqa: D102
+        check_film(settings.film, settings.recording)
+        if settings.staging != Staging():
+            raise InputError("size, colour of the background and what moves are of drawn faces; leave them out")
+
+    def check_video(self, path: Path, settings: OutputSettings) -> None:  # noqa: D102
+        if settings.delivery.hold_ms:
+            raise InputError(
+                "the poses of a filmed face cannot be held; hold those of a drawn face, or of motion files"
+            )
+        if path.suffix.lower() != OPAQUE_SUFFIX:
+            raise ExportError(f"{path}: filmed faces are written as {OPAQUE_SUFFIX}; name the output so")
+
+    def check_drawable(self, path: Path, motion: Motion) -> None:
+        """Do nothing: ``film_of`` names the channels that the face needs."""
+
+    def write_video(self, path: Path, performance: Performance) -> None:  # noqa: D102
+        settings, played = performance.settings, performance.once(sound_track)
+        film = film_of(
+            self.face,
+            _seen(performance).motion,
+            speech=settings.recording,
+            sound=played,
+            model=performance.model,
+            fps=settings.fps,
+            options=settings.film,
+        )
+        write_film(path, film, played, mark=settings.film.mark, monitor=performance.monitor)
+
+    def other_person(self, model: Model, speaker: str = "") -> FilmedFace | None:  # noqa: D102
+        return person_shown(model, self.face, speaker)
+
+
+def shown_face(face: AnyFace | ShownFace) -> ShownFace:
+    """Return a face as outputs show it: of its name, of the path of a ``.face`` file, or of a value.
+
+    Raises InputError: no such face or file. Raises ModelFormatError: the file is damaged, or of another version.
+    """
+    if isinstance(face, ShownFace):
+        return face
+    opened = _opened(face)
+    if isinstance(opened, FilmedFace):
+        return ShownPerson(opened)
+    return ShownCharacter(opened) if isinstance(opened, MeshFace) else ShownDrawing(opened)
+
+
+def _opened(face: AnyFace) -> Face | FilmedFace:
+    if isinstance(face, Face | FilmedFace):
+        return face
+    if Path(face).suffix.lower() == SUFFIX:
+        return load_face(face)
+    beside = Path(f"{face}{SUFFIX}")
+    if str(face) not in FACES.names and is_file(beside):
+        raise InputError(f"no drawn face {str(face)!r}; for the filmed face give its file: {beside}")
+    return face_named(str(face))
+
+
+def _seen(performance: Performance) -> Generation:
+    """Return the motion as videos show it."""
+    settings = performance.settings
+    hertz = DRAWN_HZ if settings.fps is None else settings.fps
+    character = settings.curves if isinstance(settings.curves, DrivenCharacter) else None
+    return shown(performance.generation, settings.delivery, hertz, character)

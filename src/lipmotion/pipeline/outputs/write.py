@@ -1,0 +1,89 @@
+"""Motion to files: ``write(generation, files)``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from lipmotion.articulation.delivery import Delivery
+from lipmotion.faces.base import Staging
+from lipmotion.meshes.fitting.driven import DrivenCharacter
+from lipmotion.pipeline.film.video import FILM, FilmOptions
+from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.outputs.output import OutputSettings, Performance, checked_outputs, perform
+from lipmotion.pipeline.outputs.shown_faces import AnyFace, ShownFace, shown_face
+from lipmotion.pipeline.outputs.sound_files import SoundOutput
+from lipmotion.types import Audio, Generation, Monitor, silent_monitor
+
+
+def write(
+    generation: Generation,
+    outputs: str | Path | Sequence[str | Path],
+    *,
+    speech: str | Path | Audio | None = None,
+    model: Model | None = None,
+    channels: Sequence[str] | None = None,
+    rate_hz: float | None = None,
+    fps: float | None = None,
+    face: AnyFace | ShownFace = "portrait",
+    film: FilmOptions = FILM,
+    staging: Staging | None = None,
+    delivery: Delivery | None = None,
+    curves: str | Path | DrivenCharacter | None = None,
+    temporary: bool = False,
+    monitor: Monitor = silent_monitor,
+) -> None:
+    """Write generated motion to one or several files, each in the format of its suffix.
+
+    generation : from ``animate``
+    outputs  : paths of files: ``.json``, ``.csv``, ``.npz`` (motion), ``.livelink.csv`` (a take of Live Link Face),
+               ``.glb``, ``.usda`` (a 3D character with its animation), ``.TextGrid`` (phones in time), ``.mp4``,
+               ``.webm``, ``.mov`` (a drawn face, with sound), or ``NAME%05d.png`` (its pictures, without sound); where
+               ``speech`` is a sound, also ``.wav``, ``.flac``, ``.ogg``
+    speech   : the recording that was animated, or the sound, as of ``speak``; a video needs it for its sound
+    model    : the model that generated the motion; motion files then name its corpus and licence
+    channels : channels of motion files, in this order, also articulatory ones as ``tongue`` (docs/articulation.md);
+               None: all of the motion
+    rate_hz  : frames per second of motion files, 1 to 1000; None: the 100 of the model (Live Link Face: 60)
+    fps      : frames per second of videos, 1 to 1000; None: 25 for drawn faces, those of the footage for filmed ones
+    face     : the face of videos: ``portrait``, ``woman``, ``man``, ``cartoon``, one of an installed package, or a
+               filmed face (a value or a ``.face`` file), which is written as ``.mp4``. ``.glb`` and ``.usda`` hold the
+               character of a ``MeshFace``, or else the 3D head
+    film     : how a filmed face is shown
+    staging  : size and background of a drawn face, and what moves on its own (docs/faces.md); None: the
+               defaults
+    delivery : intensity, anticipation, offset and held poses of every output (docs/controls.md); None: the
+               defaults
+    curves   : what motion files hold instead of the motion, unless ``channels`` asks for more: ``arkit``, ``visemes``,
+               ``fap``, a table of a rig (``.csv``), or a character with blendshapes (docs/meshes.md)
+    temporary : whether ``speech`` is a file that will be gone, which outputs then do not name
+    monitor  : receives reports of the progress of videos
+    Raises ExportError: unknown suffix, no such folder, or a file that cannot be written.
+    Raises InputError: a frame rate out of its range, or an unknown channel or face.
+    The arguments are checked before the first file is written.
+
+    >>> import lipmotion, tempfile
+    >>> from pathlib import Path
+    >>> result = lipmotion.animate("examples/welcome.flac")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     lipmotion.write(result, Path(folder) / "welcome.csv", rate_hz=25, channels=["opening", "width"])
+    ...     print((Path(folder) / "welcome.csv").read_text().splitlines()[0])
+    time_s,opening,width
+    """
+    sound = speech if isinstance(speech, Audio) else None
+    settings = OutputSettings(
+        shown_face(face),
+        None if speech is None or sound is not None else Path(str(speech)),
+        sound is not None,
+        None if channels is None else tuple(channels),
+        curves,
+        rate_hz,
+        fps,
+        film,
+        staging or Staging(),
+        delivery or Delivery(),
+    )
+    planned = checked_outputs([outputs] if isinstance(outputs, str | Path) else outputs, settings)
+    sounds = (output.path for output in planned if isinstance(output, SoundOutput))
+    heard_in = next(sounds, None) if settings.recording is None or temporary else settings.recording
+    perform(Performance(generation, settings, sound, heard_in, model, monitor), planned)

@@ -1,0 +1,112 @@
+"""``pipeline.outputs.output``: which kind of output a name asks for; kinds that packages add."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from lipmotion.errors import ExportError, InputError
+from lipmotion.extensions import Registry
+from lipmotion.pipeline.generate.animate import animate
+from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.outputs import output
+from lipmotion.pipeline.outputs.cues import CueOutput, cues, write_cues
+from lipmotion.pipeline.outputs.drawn_video import PicturesOutput, VideoOutput
+from lipmotion.pipeline.outputs.label_files import LabelOutput
+from lipmotion.pipeline.outputs.motion_files import MotionOutput
+from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, checked_outputs, plan
+from lipmotion.pipeline.outputs.scenes import SceneOutput
+from lipmotion.pipeline.outputs.shown_faces import shown_face
+from lipmotion.pipeline.outputs.sound_files import SoundOutput
+from lipmotion.pipeline.outputs.write import write
+from lipmotion.types import Generation
+
+
+class WordOutput(Output):
+    """``.words``: the phones, as an installed package may write them."""
+
+    @classmethod
+    def suffixes(cls, settings: OutputSettings) -> tuple[str, ...]:  # noqa: ARG003
+        return (".words",)
+
+    def prepared(self, performance: Performance) -> Callable[[], None]:
+        phones = [span.label.phone for span in performance.generation.units]
+        if not phones:
+            raise ExportError(f"{self.path}: no phones")
+        return lambda: self.path.write_text(" ".join(phones)) and None
+
+
+@pytest.fixture
+def settings() -> OutputSettings:
+    return OutputSettings(shown_face("portrait"), sounded=True)
+
+
+@pytest.fixture(scope="module")
+def result(toy_model: Model, toy_speech: Path) -> Generation:
+    return animate(toy_speech, model=toy_model)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("a.json", MotionOutput),
+        ("a.LIVELINK.csv", MotionOutput),
+        ("a.cues.json", CueOutput),
+        ("a.Cues.TSV", CueOutput),
+        ("cues.json", MotionOutput),
+        ("a.mp4", VideoOutput),
+        ("a.MOV", VideoOutput),
+        ("a%05d.png", PicturesOutput),
+        ("a.glb", SceneOutput),
+        ("a.textgrid", LabelOutput),
+        ("a.flac", SoundOutput),
+    ],
+)
+def test_a_name_asks_for_a_kind(name: str, kind: type[Output], settings: OutputSettings) -> None:
+    assert type(plan(name, settings)) is kind
+
+
+def test_what_no_kind_writes_is_refused(settings: OutputSettings, tmp_path: Path) -> None:
+    for name in ("a.xyz", "a.png", "a"):
+        with pytest.raises(ExportError, match=r"required one of: \.json .*\.mp4 .*\.glb .*\.wav .*%05d\.png \.cues"):
+            plan(name, settings)
+    with pytest.raises(ExportError, match=r"unknown format '\.wav'"):
+        plan("a.wav", replace(settings, sounded=False))
+    with pytest.raises(InputError, match="the frame rate is 61"):
+        checked_outputs([tmp_path / "a.cues.tsv"], replace(settings, fps=61.0))
+
+
+def test_cues_beside_other_outputs_are_those_of_the_function(result: Generation, tmp_path: Path) -> None:
+    write(result, [tmp_path / "a.cues.tsv", tmp_path / "a.csv"])
+    write_cues(cues(result), tmp_path / "b.tsv")
+    assert (tmp_path / "a.cues.tsv").read_bytes() == (tmp_path / "b.tsv").read_bytes()
+
+
+def test_a_kind_of_a_package_is_written_beside_others(
+    result: Generation, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kinds = {**output.OUTPUTS.built_in, "words": f"{__name__}:WordOutput", "wrong": f"{__name__}:settings"}
+    monkeypatch.setattr(output, "OUTPUTS", Registry("output", "lipmotion.outputs", kinds))
+    with pytest.raises(InputError, match="is called an output, 'wrong', by an installed package"):
+        write(result, tmp_path / "a.words")
+    del kinds["wrong"]
+    write(result, [tmp_path / "a.words", tmp_path / "a.json"])
+    assert (tmp_path / "a.words").read_text().split() == [span.label.phone for span in result.units]
+    silent = replace(result, units=type(result.units)(()))
+    with pytest.raises(ExportError, match="no phones"):
+        write(silent, [tmp_path / "b.json", tmp_path / "b.words"])
+    assert not (tmp_path / "b.json").exists()
+
+
+def test_outputs_share_what_is_made_once(result: Generation, settings: OutputSettings) -> None:
+    performance, made = Performance(result, settings), []
+
+    def make(_: Performance) -> list[int]:
+        made.append(1)
+        return made
+
+    assert performance.once(make) is performance.once(make)
+    assert made == [1]
