@@ -36,6 +36,16 @@ def test_both_forms_give_the_same_bits(seed):
     assert forms[0].any()
 
 
+@pytest.mark.parametrize("compiled", [False, True])
+def test_normals_are_those_of_the_triangles_around_a_vertex(monkeypatch, compiled):
+    if compiled and not numba_works():
+        pytest.skip("numba is not installed")
+    monkeypatch.setattr(shading, "compiled_pays", lambda _: compiled)
+    places = np.array([[0, 0, 0], [2, 0, 0], [0, 3, 0], [0, 0, 5], [9, 9, 9]], float)
+    sums = shading.normal_sums(places, np.array([[0, 1, 2], [0, 2, 3]], np.int32))
+    assert sums == pytest.approx(np.array([[15, 0, 6], [0, 0, 6], [15, 0, 6], [15, 0, 0], [0, 0, 0]], float))
+
+
 def light_of(normal, *, reaches=(1.0, 1.0)) -> np.ndarray:
     lamps = np.zeros((6, 6))
     lamps[0] = [0, 0, 1, 1, 1, 1]

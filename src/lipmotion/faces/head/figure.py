@@ -118,11 +118,14 @@ class Figure:
         """Return places and light of all vertices in a pose, seen from a place [shape=(3,)]."""
         places, normals = self.placed(pose)
         colours, arrives = self._shaded(pose, places)
-        turn, held, moving = turned(*pose.turn), self._held[self.head], self.head
+        turn, moving, neck = turned(*pose.turn).T, self.head, self.rows["neck"]
+        held, still = self._held[neck], (places[neck].copy(), normals[neck].copy())
         strands = self._strands.copy()
-        places[moving] = held * places[moving] + (1 - held) * ((places[moving] - PIVOT) @ turn.T + PIVOT)
-        normals[moving] = held * normals[moving] + (1 - held) * (normals[moving] @ turn.T)
-        strands[moving] = strands[moving] @ turn.T
+        places[moving] = (places[moving] - PIVOT) @ turn + PIVOT
+        normals[moving] = normals[moving] @ turn
+        strands[moving] = strands[moving] @ turn
+        for turning, unturned in zip((places, normals), still, strict=True):
+            turning[neck] = held * unturned + (1 - held) * turning[neck]
         light = self._lighting.light(places, normals, colours, self._kinds, viewer, reaches=arrives, strands=strands)
         return Drawn(places, light)
 

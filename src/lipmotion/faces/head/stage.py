@@ -44,8 +44,9 @@ class Stage:
     def picture(self, pose: CharacterPose) -> NDArray[np.uint8]:
         """Return the picture of a pose [shape=(H, W, 3)]; only the box around head and neck is drawn anew."""
         drawn = self.figure.frame(pose, self.canvas.camera.place)
-        head = drawn.places[self.figure.head]
-        return self.canvas.picture(drawn.places, drawn.light, self.figure.triangles, onto=self._still, moving=head)
+        return self.canvas.picture(
+            drawn.places, drawn.light, self.figure.triangles, onto=self._still, moving=self.figure.head
+        )
 
     def cut_out(self, pose: CharacterPose) -> NDArray[np.uint8]:
         """Return the picture of a pose without background, with straight alpha [shape=(H, W, 4)]."""

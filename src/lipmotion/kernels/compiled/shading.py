@@ -15,6 +15,26 @@ AWAY = -0.35
 
 
 @compiled
+def add_normals(places: Real, triangles: NDArray[np.int32], total: Real) -> None:
+    """Add the normals of triangles to those of their vertices, corner after corner, as ``kernels.shading``."""
+    part = np.empty(total.shape)
+    across = np.empty((len(triangles), 3))
+    for f in range(len(triangles)):
+        a, b, c = triangles[f]
+        bx, by, bz = places[b, 0] - places[a, 0], places[b, 1] - places[a, 1], places[b, 2] - places[a, 2]
+        cx, cy, cz = places[c, 0] - places[a, 0], places[c, 1] - places[a, 1], places[c, 2] - places[a, 2]
+        across[f, 0], across[f, 1], across[f, 2] = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
+    for corner in range(3):
+        part[:] = 0.0
+        for f in range(len(triangles)):
+            v = triangles[f, corner]
+            part[v, 0] += across[f, 0]
+            part[v, 1] += across[f, 1]
+            part[v, 2] += across[f, 2]
+        total += part
+
+
+@compiled
 def shade(
     normals: Real, places: Real, viewer: Real, colours: Real, reaches: Real, strands: Real,
     kinds: NDArray[np.intp], finishes: Real, lamps: Real, light: NDArray[np.float32],

@@ -1,4 +1,4 @@
-"""Light on the vertices of surfaces."""
+"""Light on the vertices of surfaces, and their normals."""
 
 from __future__ import annotations
 
@@ -12,6 +12,28 @@ AWAY = -0.35
 """Vertices that face further away than this (the cosine) are not seen, and stay dark."""
 VERTEX_S = 1.2e-6
 """Time that NumPy takes for a vertex."""
+NORMAL_S = 0.1e-6
+"""Time that NumPy takes for the normal of a triangle."""
+
+
+def normal_sums(places: Real, triangles: NDArray[np.int32]) -> Real:
+    """Return the sum of the normals of the triangles around every vertex, twice as long as their areas [shape=(V, 3)].
+
+    places : of the vertices [shape=(V, 3)];  triangles : counterclockwise from outside [shape=(F, 3)]
+    Both forms add in the same order.
+    """
+    total = np.zeros(places.shape)
+    if compiled_pays(len(triangles) * NORMAL_S):
+        from lipmotion.kernels.compiled import shading
+
+        shading.add_normals(places, triangles, total)
+        return total
+    first, second, third = (places[triangles[:, corner]] for corner in range(3))
+    across = np.cross(second - first, third - first)
+    for axis in range(3):
+        for corner in range(3):
+            total[:, axis] += np.bincount(triangles[:, corner], across[:, axis], minlength=len(places))
+    return total
 
 
 def shade(

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.kernels.pixels.raster import draw
+from lipmotion.kernels.pixels.shading import normal_sums
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.meshes.rendering.lighting import LEVELS, WHITE, Finish, Lighting, linear, tone_table
 
@@ -75,7 +76,7 @@ class Canvas:
         triangles: NDArray[np.int32],
         *,
         onto: NDArray[np.uint8] | None = None,
-        moving: Real | None = None,
+        moving: slice = slice(None),
     ) -> NDArray[np.uint8]:
         """Return a new picture of triangles before the background [shape=(H, W, 3)].
 
@@ -83,15 +84,14 @@ class Canvas:
         colours   : of the vertices, as ``Lighting`` gives them [shape=(V, 3)]
         triangles : counterclockwise from outside; those that are seen from behind are not drawn [shape=(F, 3)]
         onto      : a picture to which the new one is equal outside the box of ``moving``
-        moving    : places of vertices; only the smallest box of pixels around them is drawn
+        moving    : rows of vertices; only the smallest box of pixels around them is drawn
         """
         screen = self.camera.on_screen(places)
         picture = (self.empty if onto is None else onto).copy()
-        bounds = screen if moving is None else self.camera.on_screen(moving)
-        low, high = bounds.min(axis=0) - 2, bounds.max(axis=0) + 2
-        left, top = (max(0, int(edge)) for edge in low[:2])
-        right = min(self.camera.width, int(np.ceil(high[0])))
-        bottom = min(self.camera.height, int(np.ceil(high[1])))
+        columns, rows = screen[moving, 0], screen[moving, 1]
+        left, top = (max(0, int(edges.min() - 2)) for edges in (columns, rows))
+        right = min(self.camera.width, int(np.ceil(columns.max() + 2)))
+        bottom = min(self.camera.height, int(np.ceil(rows.max() + 2)))
         if left < right and top < bottom:
             area = (left, top, right, bottom)
             draw(screen, colours, triangles, area, self.background, self._tone, picture)
@@ -154,12 +154,7 @@ def normals_of(places: Real, triangles: NDArray[np.int32]) -> Real:
 
     A vertex without triangles gets (0, 0, 1).
     """
-    first, second, third = (places[triangles[:, corner]] for corner in range(3))
-    across = np.cross(second - first, third - first)
-    total = np.zeros_like(places)
-    for axis in range(3):
-        for corner in range(3):
-            total[:, axis] += np.bincount(triangles[:, corner], across[:, axis], minlength=len(places))
+    total = normal_sums(places, triangles)
     length = np.linalg.norm(total, axis=1, keepdims=True)
     return np.where(length > 0, total / np.where(length > 0, length, 1), [0.0, 0.0, 1.0])
 
