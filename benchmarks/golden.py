@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import shutil
 import subprocess
 import sys
 import zipfile
@@ -51,9 +52,10 @@ def main() -> int:
     parser.add_argument("-o", "--output", type=Path, required=True)
     parser.add_argument("--against", type=Path)
     parser.add_argument("--quick", action="store_true", help="the tiny corpus only, and the shipped model")
+    parser.add_argument("--kinds", action="store_true", help="the kinds of files alone, of the shipped model")
     options = parser.parse_args()
     options.work.mkdir(parents=True, exist_ok=True)
-    hashes = dict(_all(options.work, quick=options.quick))
+    hashes = dict(_kinds(options.work) if options.kinds else _all(options.work, quick=options.quick))
     options.output.write_text(json.dumps(hashes, indent=1) + "\n", encoding="utf-8")
     if options.against is None:
         return 0
@@ -65,6 +67,7 @@ def main() -> int:
 
 def _all(work: Path, *, quick: bool) -> Iterator[tuple[str, str]]:
     yield from _outputs("shipped", None, work)
+    yield from _kinds(work)
     run(work, "adapt", WELCOME, "-o", work / "adapted.lipmotion")
     yield "shipped: adapted", of_archive(work / "adapted.lipmotion")
     python(TINY, work / "tiny")
@@ -107,6 +110,49 @@ def _outputs(name: str, model: Path | None, work: Path) -> Iterator[tuple[str, s
     arguments = ("--transcript", WELCOME_WORDS, "--at", "0.5", "--at", "1.0", "--json")
     yield f"{name}: explanation", of_bytes(run(work, "explain", model or shipped, WELCOME, *arguments))
     yield f"{name}: trees", of_bytes(run(work, "info", *(() if model is None else (model,)), "--trees"))
+
+
+def _kinds(work: Path) -> Iterator[tuple[str, str]]:
+    """Yield hashes of every kind of file, as it is delivered in many ways."""
+    said, recording = ("--transcript", WELCOME_WORDS), work / "recordings" / WELCOME.name
+    recording.parent.mkdir(parents=True, exist_ok=True)
+    shutil.copyfile(WELCOME, recording)  # some files name it by its path from theirs
+    kinds = "json csv npz livelink.csv blender.py c3d fap bvh motion3.json glb usda TextGrid vtt".split()
+    for way, arguments in DELIVERIES.items():
+        made = [work / f"kinds.{kind}" for kind in kinds]
+        for file in made:
+            file.unlink(missing_ok=True)
+        output = run(work, "animate", recording, *said, *arguments, "-o", *made)
+        for kind, file in zip(kinds, made, strict=True):
+            yield f"kinds: {way}: {kind}", of_archive(file) if file.exists() else output.decode()
+    for name, arguments in PICTURES.items():
+        for file in work.glob("picture*"):
+            file.unlink()
+        made = [work / "pictures.mp4", work / "picture%03d.png"]  # .webm has a number by chance
+        run(work, "animate", recording, *said, *arguments, "--size", "128", "-o", *made)
+        yield f"pictures: {name}", of_bytes(b"".join(map(contents, sorted(work.glob("picture*")))))
+    out = work / "batch"
+    run(work, "batch", recording.parent, "--out", out, "--to", "json,cues.tsv,cues.xml,TextGrid", "--jobs", "1")
+    for file in sorted(out.glob("welcome.*")):
+        yield f"batch: {file.name}", of_archive(file)
+    run(work, "speak", "--voice", "flite:slt", "hello world", "-o", work / "said.wav", work / "said.json")
+    for file in (work / "said.wav", work / "said.json"):
+        yield f"speak: {file.suffix}", of_archive(file) if file.exists() else "no voice"
+
+
+DELIVERIES: dict[str, tuple[str, ...]] = {
+    "plain": (),
+    "curves": ("--curves", "arkit", "--rate", "30"),
+    "face": ("--curves", "face", "--intensity", "1.5", "--anticipation-ms", "40"),
+    "stepped": ("--stepped", "--rate", "25", "--face", "head"),
+    "moved": ("--offset-ms", "200", "--articulation", "--channels", "opening,tongue"),
+    "visemes": ("--curves", "visemes", "--offset-ms", "-120", "--min-hold-ms", "100"),
+}
+PICTURES: dict[str, tuple[str, ...]] = {
+    "portrait": (),
+    "head": ("--face", "head", "--background", "#40a0ff", "--fps", "30"),
+    "cartoon": ("--face", "cartoon", "--stepped", "--still", "blinks"),
+}
 
 
 def twenty_clips(folder: Path) -> Path:

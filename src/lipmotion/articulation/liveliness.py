@@ -31,7 +31,7 @@ PHRASE_PAUSE_S = 0.15
 SACCADE_S = 0.05
 """Duration of a movement of the eyes."""
 LARGEST_GLANCE = (0.2, 0.08)
-"""Of the eyes, to the side and up or down, in radians."""
+"""The furthest that the eyes turn to the side, and up or down, in radians."""
 BROW_RAISE = 0.03
 """For a strong accent, in eye distances."""
 FOLLOWING = 0.85
@@ -60,7 +60,7 @@ class Liveliness:
     turn: Curve
 
 
-def liveliness(
+def liveliness(  # noqa: PLR0913
     time_s: Curve,
     motion: Motion,
     units: Timeline[Unit],

@@ -17,7 +17,7 @@ MODULES = ("__init__.py", "curves.py", "keying.py", "panel.py", "takes.py")
 OLDEST = (1980, 1, 1, 0, 0, 0)
 """The time of every file in an archive: the same version gives the same bytes."""
 NO_VERSION = "0.0.0"
-"""Of lipmotion that is not installed; Blender takes three numbers."""
+"""The version where lipmotion is not installed; Blender takes three numbers."""
 MANIFEST = """schema_version = "1.0.0"
 id = "lipmotion"
 version = "{version}"

@@ -28,7 +28,7 @@ LEAST_TICK_DISTANCE = 80
 """Least distance between two times on the axis, in pixels."""
 WHITE, INK, GREY, PALE = (255, 255, 255), (30, 34, 42), (120, 126, 136), (228, 231, 236)
 COLOURS = ((23, 92, 166), (176, 62, 24), (38, 122, 62))
-"""Of the chains, in their order."""
+"""The colours of the chains, in their order."""
 
 
 @dataclass(frozen=True)

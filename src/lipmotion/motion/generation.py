@@ -58,7 +58,7 @@ class LearnedMotion:
     scaling: VarianceScaling | None = None
     prior: ArticulationPrior | None = None
 
-    def generate(
+    def generate(  # noqa: PLR0913
         self,
         statistics: Callable[[slice], Statistics],
         frames: int,

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 Values = NDArray[np.floating[Any]] | NDArray[np.integer[Any]]
 Excess = Callable[[Array, Values], Array]
-"""Of restored and true rows [each shape=(N, P)] the errors that count [shape=(N, G)], as multiples of what is
+"""Restored and true rows [each shape=(N, P)] to the errors that count [shape=(N, G)], as multiples of what is
 allowed."""
 
 LENGTHS = (16, 24, 40, 64)

@@ -38,7 +38,7 @@ from lipmotion.units import PHONES
 
 Array = NDArray[np.float64]
 MOST_SILENCE = 100
-"""Of so many frames one is stored, at least."""
+"""At least one of so many frames is stored."""
 LATE_S = 1.0
 """Units end at most so long after the motion of their recording."""
 STORE_PREFIX = "store_"

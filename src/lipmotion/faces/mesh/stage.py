@@ -22,8 +22,8 @@ Turn = tuple[float, float, float]
 
 BELOW = 0.55
 """The picture shows as much below the mouth as this share of what is above it, up to the top of the head."""
-TIGHT = 0.92
-"""And of all that this share: hair may leave the picture at the top."""
+KEPT_SHARE = 0.92
+"""The picture has this share of the height that follows from it: hair may leave it at the top."""
 DISTANCE = 2.8
 """The camera is this many heights of the picture away."""
 NEARBY = 1.7
@@ -56,7 +56,7 @@ class MeshStage:
         self._rest = self._placed(mesh.vertices)
         face = surface.pieces == surface.pieces[placement.vertices[0]]
         top = float(self._rest[face, 1].max())
-        across = TIGHT * (1 + BELOW) * top
+        across = KEPT_SHARE * (1 + BELOW) * top
         camera = Camera(width, height, (0.0, (1 - BELOW) / 2 * top), across, DISTANCE * across)
         near = np.linalg.norm(self._rest, axis=1) < NEARBY * across
         shown = np.asarray(near[mesh.triangles].any(axis=1))

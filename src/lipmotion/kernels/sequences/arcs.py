@@ -94,7 +94,7 @@ def arc_weights(layout: ArcLayout, values: NDArray[Any], padding: float) -> ArcW
 
 
 _Groups = list[tuple[Index, Index]]
-"""Of each block: states with the same sources, and their arcs [shape=(sources, targets)]."""
+"""Each block's states with the same sources, and their arcs [shape=(sources, targets)]."""
 
 
 def _groups(arc_from: Index, arc_start: Index) -> _Groups:

@@ -42,7 +42,7 @@ _WORD = text(1000)
 _SIZE = whole(0, _LARGEST)
 _NUMBER = number(-LARGEST_NUMBER, LARGEST_NUMBER)
 ASSET = members({"asset": members({"version": text(20)}, ["version"])}, ["asset"])
-"""Of a document of any version."""
+"""What a document of any version has."""
 
 
 def gltf_schema(json: Mapping[str, Any]) -> Schema:

@@ -110,7 +110,7 @@ class ComparedClip:
     spoken: tuple[tuple[float, float, str], ...]
 
 
-def held_out_recordings(
+def held_out_recordings(  # noqa: PLR0913
     corpus: Corpus,
     phones: Recogniser,
     *,

@@ -34,7 +34,7 @@ LEAST_FOOTAGE_S = 10.0
 GOOD_FOOTAGE_S = 60.0
 """Shorter footage is warned about."""
 MOST_PICTURES_HZ = 30.0
-"""Of faster video every second frame, or fewer, are learned from."""
+"""Every second frame, or fewer, of faster video is learned from."""
 SPOKEN_TAKES_S = 20.0
 """Seconds of speech that are kept, for motion of other people's models."""
 LEAST_SPOKEN_S = 0.5

@@ -31,7 +31,7 @@ FEATURES = 13
 
 
 @one_thread()
-def speak_from_corpus(
+def speak_from_corpus(  # noqa: PLR0913
     text: str,
     corpus: Corpus,
     model: Model,

@@ -47,7 +47,7 @@ LARGEST_TEXT = 4 * MOST_CHARACTERS
 
 
 @one_thread()
-def speak(
+def speak(  # noqa: PLR0913
     text: str,
     *,
     voice: str | SyntheticVoice | None = None,

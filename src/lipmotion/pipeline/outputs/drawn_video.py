@@ -105,7 +105,7 @@ def check_drawable(path: Path, motion: Motion) -> None:
         )
 
 
-def write_drawn_face(
+def write_drawn_face(  # noqa: PLR0913
     path: Path,
     generation: Generation,
     sound: Audio,

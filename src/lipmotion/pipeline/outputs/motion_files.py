@@ -74,7 +74,7 @@ class MotionOutput(Output):
         about = performance.model.about if performance.model else {}
         kept = ("name", "corpus", "licence", "attribution")
         model = {key: _text(about[key]) for key in kept if about.get(key)}
-        speech, sound_s = performance.heard_in, self.settings.delivery.offset_ms / 1000
+        speech, sound_s = performance.sound_file, self.settings.delivery.offset_ms / 1000
         source = {"file": as_text(speech.name)} if speech else {}
         if speech and sound_s:
             source["start_s"] = f"{sound_s:.9g}"

@@ -63,14 +63,14 @@ class Performance:
     """Generated motion with all that its outputs need of it.
 
     sound   : the sound, where it is in no file; None: that of the recording of the settings
-    heard_in : the file of the sound that outputs refer to; None: they refer to none
+    sound_file : the file of the sound that outputs refer to; None: they refer to none
     monitor : receives reports of the progress
     """
 
     generation: Generation
     settings: OutputSettings
     sound: Audio | None = None
-    heard_in: Path | None = None
+    sound_file: Path | None = None
     model: Model | None = None
     monitor: Monitor = silent_monitor
     _kept: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)

@@ -53,7 +53,7 @@ class SceneOutput(Output):
 
     def prepared(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
         check_drawable(self.path, performance.generation.motion)
-        return lambda: write_scene(self.path, performance.once(delivered_scene), sound=performance.heard_in)
+        return lambda: write_scene(self.path, performance.once(delivered_scene), sound=performance.sound_file)
 
 
 def delivered_scene(performance: Performance) -> Scene:

@@ -16,7 +16,7 @@ from lipmotion.pipeline.outputs.sound_files import SoundOutput
 from lipmotion.types import Audio, Generation, Monitor, silent_monitor
 
 
-def write(
+def write(  # noqa: PLR0913
     generation: Generation,
     outputs: str | Path | Sequence[str | Path],
     *,
@@ -85,5 +85,5 @@ def write(
     )
     planned = checked_outputs([outputs] if isinstance(outputs, str | Path) else outputs, settings)
     sounds = (output.path for output in planned if isinstance(output, SoundOutput))
-    heard_in = next(sounds, None) if settings.recording is None or temporary else settings.recording
-    perform(Performance(generation, settings, sound, heard_in, model, monitor), planned)
+    sound_file = next(sounds, None) if settings.recording is None or temporary else settings.recording
+    perform(Performance(generation, settings, sound, sound_file, model, monitor), planned)

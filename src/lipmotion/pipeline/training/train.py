@@ -103,7 +103,7 @@ DEFAULT_RUN, TRAINING_LIST = Run(), Selection("train")
 
 
 @one_thread()
-def train(
+def train(  # noqa: PLR0913
     corpus: Corpus,
     *,
     selection: Selection = TRAINING_LIST,

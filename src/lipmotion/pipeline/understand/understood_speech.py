@@ -51,7 +51,7 @@ LATE_S = 0.1
 LATEST_S = 1e15
 """Later units are refused: frames of such times cannot be counted."""
 LEAST_SPEECH_S = 0.2
-"""Less recognised speech than this is none: the edge of a tone or of noise, taken as a consonant."""
+"""A shorter time of recognised speech is none: the edge of a tone or of noise, taken as a consonant."""
 WORDS = (0.2, 0.9)
 """Shares of the work at which the recognition of words begins and ends, in reports."""
 LOG = logging.getLogger("lipmotion")

@@ -23,7 +23,7 @@ DECAY_S, LEAST_DECAY_DB = (0.15, 0.25), 15.0
 LEAST_LEVEL_DB = -15.0
 """Claps have at least this level against the loudest millisecond of the recording."""
 APART_S = 0.3
-"""Of several marks that are nearer to each other, the strongest counts."""
+"""Where several marks are nearer to each other, the strongest counts."""
 MOST_MARKS = 20
 """Most marks of a kind that are kept, the strongest."""
 BEEP_FRAME_S, BEEP_STEP_S = 0.032, 0.008
