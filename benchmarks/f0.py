@@ -25,7 +25,7 @@ from scipy.signal import lfilter
 
 from lipmotion.speech.features.f0 import HIGHEST_HZ, LOWEST_HZ, log_f0
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.speech.sound.formant_synthesiser import PHONE_TARGETS, synthesise
+from lipmotion.testing.formant_synthesiser import PHONE_TARGETS, synthesise
 from lipmotion.types import Audio
 
 Array = np.ndarray[Any, Any]

@@ -11,7 +11,7 @@ from lipmotion.errors import InputError
 from lipmotion.speech.features import f0 as module
 from lipmotion.speech.features.f0 import candidates, correlations, lags, log_f0
 from lipmotion.speech.features.mfcc import mfcc
-from lipmotion.speech.sound.formant_synthesiser import PHONE_TARGETS, synthesise
+from lipmotion.testing.formant_synthesiser import PHONE_TARGETS, synthesise
 from lipmotion.types import Audio
 from speech import f0_oracle
 

@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.speech.sound.formant_synthesiser import synthesise
 from lipmotion.speech.sound.noise import NOISE_KINDS, add_noise, babble_noise, noisy_audio, spoken_samples, white_noise
+from lipmotion.testing.formant_synthesiser import synthesise
 from lipmotion.types import Audio
 from oracles.noise import ratio_db
 

@@ -23,7 +23,7 @@ from lipmotion.speech.recognition.recogniser import (
     Recogniser,
 )
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.speech.sound.formant_synthesiser import synthesise
+from lipmotion.testing.formant_synthesiser import synthesise
 from lipmotion.testing.toy import WORDS, ToySentence, toy_sentences
 from lipmotion.types import Audio, Timeline, Unit
 from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, words_of

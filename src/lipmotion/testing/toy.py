@@ -19,8 +19,8 @@ from lipmotion.export.video import write_mp4
 from lipmotion.faces import Staging
 from lipmotion.faces.portrait import Woman
 from lipmotion.speech.features.mfcc import mfcc
-from lipmotion.speech.sound.formant_synthesiser import synthesise
 from lipmotion.storage.files import whole_file
+from lipmotion.testing.formant_synthesiser import synthesise
 from lipmotion.testing.toy_mouth import toy_mouths
 from lipmotion.types import Audio, Channel, Motion, Timeline, Track, Unit, Utterance
 from lipmotion.units import is_silent

@@ -22,10 +22,10 @@ from lipmotion.pipeline.training.voices import (
 )
 from lipmotion.speech.features.mfcc import FEATURES
 from lipmotion.speech.recognition.recogniser import Recogniser
-from lipmotion.speech.sound.formant_synthesiser import synthesise
 from lipmotion.speech.sound.noise import spoken_samples
 from lipmotion.speech.voices.installed import installed_voices
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
+from lipmotion.testing.formant_synthesiser import synthesise
 from lipmotion.testing.toy import ToySentence, toy_sentences
 from lipmotion.types import Audio, Item, Timeline, Unit
 from lipmotion.units import Lexicon, words_of

@@ -18,7 +18,7 @@ from lipmotion.speech.recognition.general.acoustic import (
 )
 from lipmotion.speech.recognition.general.front_end import general_features
 from lipmotion.speech.recognition.general.language import english_bigram
-from lipmotion.speech.sound.formant_synthesiser import synthesise
+from lipmotion.testing.formant_synthesiser import synthesise
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Audio
 from lipmotion.units import PHONES as OURS

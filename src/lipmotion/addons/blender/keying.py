@@ -29,7 +29,7 @@ def key_objects(
     return key_frames(objects, frames, scene, first=first, replace=replace, sound=sound)
 
 
-def key_frames(  # noqa: PLR0913
+def key_frames(
     objects: list[Any],
     frames: Curves,
     scene: Any,

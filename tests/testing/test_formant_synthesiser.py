@@ -11,7 +11,7 @@ from scipy.linalg import solve_toeplitz
 from scipy.signal import spectrogram
 
 from lipmotion.errors import InputError
-from lipmotion.speech.sound.formant_synthesiser import PHONE_TARGETS, synthesise
+from lipmotion.testing.formant_synthesiser import PHONE_TARGETS, synthesise
 
 RATE_HZ = 16000
 TWINS = [("p", "b"), ("t", "d"), ("k", "g"), ("f", "v"), ("th", "dh"), ("s", "z"), ("sh", "zh"), ("ch", "jh")]
