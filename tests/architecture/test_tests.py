@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -38,3 +39,13 @@ def test_the_rule_finds_what_breaks_it() -> None:
     for text in ("import subprocess", "def f():\n    from subprocess import run", "os.system('a')", "os.fork()"):
         assert list(starts(text)), text
     assert list(starts("from children import run_child\nrun_child(['a'])\nos.execute = 1\n")) == []
+
+
+def test_planted_faults_still_fit_the_source() -> None:
+    root = TESTS.parent
+    mutants = json.loads((root / "benchmarks" / "mutants.json").read_text(encoding="utf-8"))
+    assert len(mutants) > 100
+    for mutant in mutants:
+        text = (root / "src" / "lipmotion" / mutant["path"]).read_text(encoding="utf-8")
+        assert text.count(mutant["old"]) == 1, mutant["name"]
+        assert all((root / test.partition("::")[0]).exists() for test in mutant.get("tests", ())), mutant["name"]
