@@ -26,11 +26,11 @@ from lipmotion.types import Generation
 
 
 class WordOutput(Output):
-    """``.words``: the phones, as an installed package may write them."""
+    """``.words.csv``: the phones, as an installed package may write them."""
 
     @classmethod
     def suffixes(cls, settings: OutputSettings) -> tuple[str, ...]:  # noqa: ARG003
-        return (".words",)
+        return (".words.csv",)
 
     def prepared(self, performance: Performance) -> Callable[[], None]:
         phones = [span.label.phone for span in performance.generation.units]
@@ -91,13 +91,13 @@ def test_a_kind_of_a_package_is_written_beside_others(
     kinds = {**output.OUTPUTS.built_in, "words": f"{__name__}:WordOutput", "wrong": f"{__name__}:settings"}
     monkeypatch.setattr(output, "OUTPUTS", Registry("output", "lipmotion.outputs", kinds))
     with pytest.raises(InputError, match="is called an output, 'wrong', by an installed package"):
-        write(result, tmp_path / "a.words")
+        write(result, tmp_path / "a.words.csv")
     del kinds["wrong"]
-    write(result, [tmp_path / "a.words", tmp_path / "a.json"])
-    assert (tmp_path / "a.words").read_text().split() == [span.label.phone for span in result.units]
+    write(result, [tmp_path / "a.words.csv", tmp_path / "a.json"])
+    assert (tmp_path / "a.words.csv").read_text().split() == [span.label.phone for span in result.units]
     silent = replace(result, units=type(result.units)(()))
     with pytest.raises(ExportError, match="no phones"):
-        write(silent, [tmp_path / "b.json", tmp_path / "b.words"])
+        write(silent, [tmp_path / "b.json", tmp_path / "b.words.csv"])
     assert not (tmp_path / "b.json").exists()
 
 

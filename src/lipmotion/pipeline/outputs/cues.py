@@ -123,10 +123,6 @@ class CueOutput(Output):
     def suffixes(cls, settings: OutputSettings) -> tuple[str, ...]:  # noqa: D102, ARG003
         return tuple(f"{SHEET}{form}" for form in CUE_FORMATS)
 
-    @classmethod
-    def takes(cls, path: Path, settings: OutputSettings) -> bool:  # noqa: D102
-        return path.name.lower().endswith(cls.suffixes(settings))
-
     def check(self) -> None:  # noqa: D102
         check_cue_options(self._fps, None, OPTIONAL)
 

@@ -30,19 +30,22 @@ DRAWN_HZ = 25.0
 """Frame rate of videos of drawn faces."""
 
 
-class PicturesOutput(Output):
-    """``NAME%05d.png``: the pictures of a face, numbered, without sound."""
+class VideoOutput(Output):
+    """``.mp4``, ``.webm``, ``.mov``: a face that speaks, with sound."""
+
+    has_sound = True
 
     @classmethod
     def suffixes(cls, settings: OutputSettings) -> tuple[str, ...]:  # noqa: D102, ARG003
-        return ("%05d.png",)
-
-    @classmethod
-    def takes(cls, path: Path, settings: OutputSettings) -> bool:  # noqa: D102, ARG003
-        return is_picture_sequence(path)
+        return VIDEO_SUFFIXES
 
     def check(self) -> None:  # noqa: D102
         settings = self.settings
+        if settings.delivery.offset_ms and self.has_sound:
+            raise ExportError(
+                f"{self.path}: a video has its own sound, which begins with it; an offset is for files that are put "
+                "beside a sound: write the video without it"
+            )
         settings.face.check_video(self.path, settings)
         if settings.recording is None and not settings.sounded:
             raise ExportError(f"{self.path}: a video needs the recording: write(..., speech=FILE)")
@@ -53,24 +56,18 @@ class PicturesOutput(Output):
         return partial(face.write_video, self.path, performance)
 
 
-class VideoOutput(PicturesOutput):
-    """``.mp4``, ``.webm``, ``.mov``: a face that speaks, with sound."""
+class PicturesOutput(VideoOutput):
+    """``NAME%05d.png``: the pictures of a video, numbered, without sound."""
+
+    has_sound = False
 
     @classmethod
     def suffixes(cls, settings: OutputSettings) -> tuple[str, ...]:  # noqa: D102, ARG003
-        return VIDEO_SUFFIXES
+        return ("%05d.png",)
 
     @classmethod
-    def takes(cls, path: Path, settings: OutputSettings) -> bool:  # noqa: D102
-        return path.suffix.lower() in cls.suffixes(settings)
-
-    def check(self) -> None:  # noqa: D102
-        if self.settings.delivery.offset_ms:
-            raise ExportError(
-                f"{self.path}: a video has its own sound, which begins with it; an offset is for files that are put "
-                "beside a sound: write the video without it"
-            )
-        super().check()
+    def takes(cls, path: Path, settings: OutputSettings) -> bool:  # noqa: D102, ARG003
+        return is_picture_sequence(path)
 
 
 def sound_track(performance: Performance) -> Audio:

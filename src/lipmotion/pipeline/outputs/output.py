@@ -101,8 +101,10 @@ class Output(ABC):
 
     @classmethod
     def takes(cls, path: Path, settings: OutputSettings) -> bool:
-        """Return whether a file of that name is such an output."""
-        return path.suffix.lower() in map(str.lower, cls.suffixes(settings))
+        """Return whether a file of that name is such an output: whether it ends in one of the suffixes."""
+        return any(
+            len(path.name) > len(end) and path.name.lower().endswith(end.lower()) for end in cls.suffixes(settings)
+        )
 
     def check(self) -> None:
         """Raise ExportError or InputError if the file cannot be written; called before long work begins."""
