@@ -20,12 +20,13 @@ from lipmotion.extensions import installed_version
 from lipmotion.faces.base import Staging
 from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.model import shipped_path
+from lipmotion.pipeline.outputs.cues import SHEET
 from lipmotion.pipeline.outputs.drawn_video import VIDEO_SUFFIXES
 from lipmotion.pipeline.outputs.scenes import SCENE_SUFFIXES
 from lipmotion.storage.files import check_source, sha256_of
 from lipmotion.storage.json_text import as_json
 
-CUES = "cues."
+CUES = SHEET.removeprefix(".")
 """Prefix of the kinds of outputs that are cue sheets: ``cues.tsv`` is Rhubarb's table."""
 
 

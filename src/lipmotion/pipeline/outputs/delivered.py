@@ -46,7 +46,7 @@ def shown(
     frames = delivery.hold_frames(fps)
     if not frames:
         return moved
-    moved = _with(moved, with_gestures(moved.motion, moved.units))
+    moved = with_motion(moved, with_gestures(moved.motion, moved.units))
     closed_s, moved = closed_times(moved), closed_on_grid(moved, fps)
     if character is not None and character.shapes is not None:
         moved = with_curves(moved, character)[0]
@@ -57,7 +57,7 @@ def with_drawn_channels(generation: Generation) -> Generation:
     """Return a generation with the channels that faces draw: those of a mouth, where it has blendshapes."""
     if not is_of_blendshapes(generation.motion):
         return generation
-    return _with(generation, with_mouth(generation.motion))
+    return with_motion(generation, with_mouth(generation.motion))
 
 
 def held_mouth(generation: Generation, frames: int, closed_s: Sequence[float]) -> Generation:
@@ -82,7 +82,7 @@ def held_mouth(generation: Generation, frames: int, closed_s: Sequence[float]) -
     return replace(mouth, motion=replace(motion, values=values), spread=variance)
 
 
-def _with(generation: Generation, motion: Motion) -> Generation:
+def with_motion(generation: Generation, motion: Motion) -> Generation:
     """Return a generation with more channels after its own, of variance 0."""
     added = len(motion.channels) - len(generation.motion.channels)
     variance = np.pad(generation.variance, ((0, 0), (0, added))) if added else generation.spread

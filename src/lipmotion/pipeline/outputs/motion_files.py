@@ -23,7 +23,7 @@ from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.facial_animation import FAP
 from lipmotion.meshes.model.shape_names import arkit_name
 from lipmotion.pipeline.outputs.curve_sets import ARKIT, WHOLE_FACE, beside, curves_of, with_curves
-from lipmotion.pipeline.outputs.delivered import delivered, held_mouth
+from lipmotion.pipeline.outputs.delivered import delivered, held_mouth, with_motion
 from lipmotion.pipeline.outputs.living_curves import RADIAN, living_curves
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
 from lipmotion.pipeline.outputs.prosody import recorded_prosody
@@ -65,8 +65,8 @@ class MotionOutput(Output):
         named = settings.channels
         held = in_format(self.path, spoken, chosen, settings.rate_hz, settings.staging, prosody, named)
         warn_of_unused(self.path, held, asked)
-        closed_s = closed_times(performance.once(_delivered)) if settings.delivery.hold_ms else []
-        held = held_mouth(held, settings.delivery.hold_frames(held.motion.rate_hz), closed_s)
+        frames = settings.delivery.hold_frames(held.motion.rate_hz)
+        held = held_mouth(held, frames, performance.once(_closed_s))
         check_motion(self.path, held.motion)
         return partial(self._write, held, performance)
 
@@ -91,12 +91,16 @@ def _delivered(performance: Performance) -> Generation:
     return delivered(generation, settings.delivery)
 
 
+def _closed_s(performance: Performance) -> list[float]:
+    """Return the times of p, b and m that held poses show; none, where poses are not held."""
+    return closed_times(performance.once(_delivered)) if performance.settings.delivery.hold_ms else []
+
+
 def _chosen(performance: Performance) -> tuple[Generation, Generation, Sequence[str]]:
     """Return the motion, what motion files hold of it unless their format says more, and the channels asked for."""
     settings, spoken = performance.settings, performance.once(_delivered)
     rate_hz, curves, channels = settings.rate_hz, settings.curves, settings.channels
-    closed_s = closed_times(spoken) if settings.delivery.hold_ms else []
-    if rate_hz is not None and (closed_s or rate_hz < spoken.motion.rate_hz):
+    if rate_hz is not None and (performance.once(_closed_s) or rate_hz < spoken.motion.rate_hz):
         spoken = closed_on_grid(spoken, rate_hz)
     asked: Sequence[str] = channels or ()
     names: Sequence[str] | None = channels
@@ -116,10 +120,7 @@ def with_articulation(generation: Generation, channels: Sequence[str] = GESTURES
 
     channels : the articulatory ones among these are added (docs/articulation.md); their variance is 0
     """
-    motion = with_gestures(generation.motion, generation.units, channels)
-    added = len(motion.channels) - len(generation.motion.channels)
-    variance = np.pad(generation.variance, ((0, 0), (0, added))) if added else generation.spread
-    return replace(generation, motion=motion, spread=variance)
+    return with_motion(generation, with_gestures(generation.motion, generation.units, channels))
 
 
 def _text(value: object) -> str:

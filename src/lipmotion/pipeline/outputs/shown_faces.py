@@ -89,10 +89,9 @@ class ShownDrawing(ShownFace):
 
     def write_video(self, path: Path, performance: Performance) -> None:  # noqa: D102
         settings, played = performance.settings, performance.once(sound_track)
-        prosody = moved_prosody(prosody_of_speech(played), settings.delivery)
-        hertz = DRAWN_HZ if settings.fps is None else settings.fps
-        seen = _seen(performance)
-        write_drawn_face(path, seen, played, hertz, self.face, settings.staging, performance.monitor, prosody)
+        seen, prosody = performance.once(_seen), performance.once(_played_prosody)
+        monitor, hertz = performance.monitor, _frame_rate(settings)
+        write_drawn_face(path, seen, played, hertz, self.face, settings.staging, monitor, prosody)
 
     def load(self) -> None:  # noqa: D102
         load_drawing(self.face)
@@ -137,7 +136,7 @@ class ShownPerson(ShownFace):
         settings, played = performance.settings, performance.once(sound_track)
         film = film_of(
             self.face,
-            _seen(performance).motion,
+            performance.once(_seen).motion,
             speech=settings.recording,
             sound=played,
             model=performance.model,
@@ -177,6 +176,14 @@ def _opened(face: AnyFace) -> Face | FilmedFace:
 def _seen(performance: Performance) -> Generation:
     """Return the motion as videos show it."""
     settings = performance.settings
-    hertz = DRAWN_HZ if settings.fps is None else settings.fps
     character = settings.curves if isinstance(settings.curves, DrivenCharacter) else None
-    return shown(performance.generation, settings.delivery, hertz, character)
+    return shown(performance.generation, settings.delivery, _frame_rate(settings), character)
+
+
+def _played_prosody(performance: Performance) -> Prosody:
+    """Return loudness and pitch of the sound track, in the time of the motion."""
+    return moved_prosody(prosody_of_speech(performance.once(sound_track)), performance.settings.delivery)
+
+
+def _frame_rate(settings: OutputSettings) -> float:
+    return DRAWN_HZ if settings.fps is None else settings.fps
