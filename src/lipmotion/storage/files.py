@@ -130,9 +130,13 @@ def _temporary(target: Path, suffix: str) -> Path:
 
 
 def _prefix(target: Path) -> str:
-    """Return the prefix of temporary names for a target on this machine."""
+    """Return the prefix of temporary names for a target on this machine; for a temporary target, its own name first.
+
+    Who sweeps up a temporary target by its name then also finds what was written towards it.
+    """
     name = f"{platform.node()}/{target.name}".encode(errors="surrogatepass")
-    return f"{TEMPORARY}{hashlib.sha256(name).hexdigest()[:8]}-"
+    first = f"{target.stem}-" if target.name.startswith(TEMPORARY) else TEMPORARY
+    return f"{first}{hashlib.sha256(name).hexdigest()[:8]}-"
 
 
 def _sweep(target: Path) -> None:

@@ -314,6 +314,23 @@ def test_lines_that_would_wait_or_lead_elsewhere_fail_and_the_others_go_on(
     assert not (out / "two.json").is_symlink()  # replaced, not what it points to
 
 
+def test_what_a_killed_process_was_writing_is_deleted(
+    toy_speech: Path, settings: BatchSettings, tmp_path: Path
+) -> None:
+    """A process that ends within a write leaves a file of a name that no other run would write to."""
+    sounds, out = many(tmp_path / "sounds", toy_speech, 1), tmp_path / "out"
+    out.mkdir()
+    staged = Place(str(out), "of an earlier run").staged("line000", "json")
+    write = (
+        "import os, sys; from pathlib import Path; from lipmotion.storage.files import whole_file\n"
+        "with whole_file(Path(sys.argv[1])) as path:\n    path.write_text('half'); os._exit(9)"
+    )
+    assert run_child([sys.executable, "-c", write, staged]).returncode == 9
+    assert len(list(out.iterdir())) == 1
+    batch(sounds, out, settings, jobs=1)
+    assert set(contents(out)) == {"line000.json"}
+
+
 def command(*words: object) -> list[str]:
     return [*LIPMOTION, "batch", *map(str, words), "--machine-readable"]
 

@@ -255,16 +255,22 @@ def opened_ledger(place: Place, lines: Sequence[BatchLine]) -> Iterator[Ledger]:
         with file:
             ledger = Ledger(path, file, lines)
             _settle(place, ledger)
-            for inner in {PurePosixPath(line.name).parent for line in lines}:
-                if place.link_on_the_way(f"{inner}/line") is None:
-                    for path in (Path(place.out) / inner).glob(f"{STAGED}*"):
-                        _remove(path)
+            _sweep(place, lines)
             yield ledger
+        _sweep(place, lines)  # what a worker had begun that died
         shutil.rmtree(place.own / WORK, ignore_errors=True)
         for name in (RECEIPTS, RUN):
             _remove(place.own / name)
     with suppress(OSError):
         place.own.rmdir()
+
+
+def _sweep(place: Place, lines: Iterable[BatchLine]) -> None:
+    """Delete outputs that were never finished, beside those that were."""
+    for inner in {PurePosixPath(line.name).parent for line in lines}:
+        if place.link_on_the_way(f"{inner}/line") is None:
+            for path in (Path(place.out) / inner).glob(f"{STAGED}*"):
+                _remove(path)
 
 
 def _settle(place: Place, ledger: Ledger) -> None:
