@@ -6,19 +6,20 @@ from collections.abc import Callable
 from pathlib import Path
 
 from lipmotion.errors import InputError
+from lipmotion.pipeline.edit_files import EditFile, read_edits
 from lipmotion.pipeline.edits import Edits
-from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.session import Session
+from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.understand.request import SpeechInput, request_of
 from lipmotion.types import Constraints, Generation, Monitor, TimedTranscript, silent_monitor
 
 
-def animate(
+def animate(  # noqa: PLR0913
     speech: SpeechInput,
     *,
     model: Model | str | Path | None = None,
     transcript: str | Path | TimedTranscript | None = None,
     constraints: Constraints | None = None,
+    edits: Edits | str | Path | None = None,
     workers: int = 1,
     monitor: Monitor = silent_monitor,
     meanwhile: Callable[[], None] | None = None,
@@ -30,6 +31,8 @@ def animate(
     transcript  : the spoken words, or a Path of a file with them; the same as a ``SpeechRequest`` with this transcript
     constraints : values that the motion must take exactly, in the units of the request's speaker; also of curves that
                   follow from it (``Session.generated``)
+    edits       : what is changed of the motion, or the path of a file of edits (docs/edit.md), whose phones are used
+                  where the request has no words and no phones
     workers     : number of processes that recognise the words of a long recording. With more than one, a script must be
                   guarded by ``if __name__ == "__main__":``
     monitor     : receives reports of the progress
@@ -49,5 +52,8 @@ def animate(
     if not isinstance(constraints, Constraints | None):
         raise InputError(f"the constraints are a {type(constraints).__name__}, required Constraints((Pin(...),))")
     request = request_of(speech, transcript)
-    session = Session(request, model=model, workers=workers, monitor=monitor, meanwhile=meanwhile)
-    return session.generated(Edits.of_pins(constraints.pins if constraints else ()))
+    file = EditFile(edits or Edits()) if isinstance(edits, Edits | None) else read_edits(edits)
+    model = model if isinstance(model, Model) else load_model(model)
+    session = file.session(request, model=model, workers=workers, monitor=monitor, meanwhile=meanwhile)
+    pins = Edits.of_pins(constraints.pins if constraints else ())
+    return session.generated(file.edits.then(*pins.steps))
