@@ -18,9 +18,10 @@ from lipmotion.articulation.pauses import with_pauses
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
 from lipmotion.articulation.symmetry import symmetrical
 from lipmotion.errors import AlignmentError, InputError, shortened
+from lipmotion.kernels.choice import expect_more
 from lipmotion.kernels.threads import one_thread
 from lipmotion.meshes.fitting.facial_animation import PARAMETERS
-from lipmotion.meshes.fitting.visemes import VISEME_PHONES
+from lipmotion.meshes.fitting.visemes import VISEME_CHANNELS
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS
 from lipmotion.motion.speakers import SpeakerMap
 from lipmotion.pipeline.edits import CurveStep, Edits, Lock, PhoneStep, PinStep, Step, WordIs, with_span
@@ -62,10 +63,12 @@ UNDERSTANDING = 0.9
 """The share of the work that is recognition, in reports; the rest is the generation of motion."""
 MODELLED = ("opening", "width", "outer")
 """Channels, beside weights, that models generate as they are, so that motion runs smoothly through their pins."""
-KNOWN_CURVES = (*ARKIT_MOUTH, *ARKIT_OTHERS, *VISEME_PHONES, *(row[1] for row in PARAMETERS))
+KNOWN_CURVES = (*ARKIT_MOUTH, *ARKIT_OTHERS, *VISEME_CHANNELS, *(row[1] for row in PARAMETERS))
 """Curves that outputs may have, whatever the motion has: ARKit's blendshapes, visemes, MPEG-4's parameters."""
 KEPT = 4
 """Results that each stage keeps: the last ones that were asked for."""
+INTERACTIVE = 3
+"""A session that generates motion for the third time will do so often: kernels are loaded that pay then."""
 NO_EDITS = Edits()
 
 
@@ -127,6 +130,7 @@ class Session:
         self._moved: _Kept[Generation] = _Kept()
         self._generated: _Kept[Generation] = _Kept()
         self._delivered: _Kept[Generation] = _Kept()
+        self._motions = 0
         self._one_at_a_time = RLock()
 
     def units(self, edits: Edits = NO_EDITS) -> Timeline[Unit]:
@@ -275,6 +279,9 @@ class Session:
 
     def _generation(self, phone_steps: tuple[Step, ...], pins: tuple[Pin, ...]) -> Generation:
         understood = self._edited_speech(phone_steps)
+        self._motions += 1
+        if self._motions == INTERACTIVE:
+            expect_more()
         self._monitor(Progress("moving the mouth", 0, 1, UNDERSTANDING))
         generation = generation_of(self.request, self._speaker(), self.model, understood, Constraints(pins))
         self._monitor(Progress("moving the mouth", 1, 1, 1.0))
