@@ -65,6 +65,14 @@ def measured(audio: Audio) -> dict[str, float]:
                 print(f"{sentence}: {error}", file=sys.stderr)
         if times_s:
             found[kind] = statistics.median(times_s)
+    others = sentences(session, audio.duration_s)["another phone"]
+    found["first picture of the portrait"] = timed(lambda: session.picture(audio.duration_s / 2))
+    found["another picture"] = timed(lambda: session.picture(audio.duration_s / 2 + 1))
+    edited = [lipmotion.Edits().then(*others[:count]) for count in range(2, 6)]
+    found["a picture after another phone"] = statistics.median(
+        timed(lambda: session.picture(audio.duration_s / 2, edits))  # noqa: B023 # called at once
+        for edits in edited
+    )
     return {kind: round(1000 * seconds, 1) for kind, seconds in found.items()}
 
 

@@ -12,11 +12,18 @@ import pytest
 
 import lipmotion
 from lipmotion.articulation.curve_edits import GAIN_EDGE_S, LOCK_EDGE_S
+from lipmotion.articulation.delivery import Delivery
 from lipmotion.errors import InputError
+from lipmotion.faces.registry import staged_face
 from lipmotion.pipeline.edits import Edits
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.curve_sets import curves_of
+from lipmotion.pipeline.outputs.delivered import shown
+from lipmotion.pipeline.outputs.drawn_video import sound_track
+from lipmotion.pipeline.outputs.output import OutputSettings, Performance
+from lipmotion.pipeline.outputs.prosody import prosody_of_speech
+from lipmotion.pipeline.outputs.shown_faces import shown_face
 from lipmotion.pipeline.outputs.write import write
 from lipmotion.pipeline.session import Session
 from lipmotion.pipeline.understand.request import SpeechRequest
@@ -172,6 +179,22 @@ def test_edits_that_are_not_possible(session: Session, sentence: str, message: s
         return
     with pytest.raises(InputError, match=message):
         session.generated(edited(sentence))
+
+
+def test_single_pictures_are_those_of_the_video(session: Session, request_: SpeechRequest) -> None:
+    """Any frame, before and after an edit; what is not at that time is refused."""
+    for edits in (Edits(), edited("pin opening 0.2 at 1.0", "set size 64", "set background #40a0ff")):
+        performance = Performance(
+            session.generated(edits),
+            OutputSettings(shown_face("portrait"), None, sounded=True, staging=edits.staging()),
+            sound=request_.recording,  # type: ignore[arg-type]
+        )
+        seen, prosody = shown(performance.generation, Delivery(), 25.0), prosody_of_speech(sound_track(performance))
+        frames = list(staged_face("portrait", edits.staging(), prosody).render(seen.motion, seen.units, fps=25.0))
+        for number in (25, 3):
+            assert np.array_equal(session.picture(number / 25, edits), frames[number])
+    with pytest.raises(InputError, match="9 s lies outside the video"):
+        session.picture(9)
 
 
 def test_sessions_in_two_threads_do_not_disturb_each_other(toy_model: Model, toy_sentence: ToySentence) -> None:
