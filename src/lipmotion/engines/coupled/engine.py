@@ -64,9 +64,7 @@ class CoupledEngine(Engine[CoupledModel]):
         monitor: Monitor,
         checkpoint: Checkpoint = NO_CHECKPOINT,  # noqa: ARG002 - training takes a minute
     ) -> Fit[CoupledModel]:
-        model = fit_coupled(examples, self.config, monitor)
-        frames = sum(int(example.valid.sum()) for example in examples)
-        return Fit(model, {"frames": frames, "joint_states": model.chains.transitions.product.chain_states.shape[1]})
+        return fit_coupled(examples, self.config, monitor)
 
     def without_closures(self) -> CoupledEngine:  # noqa: D102
         return replace(self, config=replace(self.config, closures=False))
