@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from lipmotion.engines import Engine, engine_from_settings, engine_named
+from lipmotion.engines.trajectory.experts import NETWORK_SHARE
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.extensions import GROUPS
 from lipmotion.motion.acoustic_network import AcousticNetwork
@@ -21,6 +22,7 @@ from lipmotion.motion.predictors import (
     AUTOMATIC,
     PREDICTORS,
     Predictor,
+    PredictorFit,
     needs_conditions,
     predictor_class,
     predictor_from_arrays,
@@ -76,9 +78,20 @@ def test_the_predictor_of_the_page_is_trained_stored_and_used(
     assert np.abs(chosen.generate(fit.model, spoken).motion.values - wanted).max() > 1e-3
 
 
+def test_the_trajectory_engine_relies_on_a_predictor_as_far_as_it_is_right(
+    installed: type[Predictor], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plain = engine("trajectory", "frames").fit(examples(4), silent_monitor).model
+    assert plain.network_share == NETWORK_SHARE
+    assert plain.motion.prior is plain.prior is not None
+    fit = installed.fit
+    monkeypatch.setattr(installed, "fit", lambda training: PredictorFit(fit(training).predictor, training.values))
+    assert engine("trajectory", "frames").fit(examples(4), silent_monitor).model.network_share == pytest.approx(1)
+
+
 def test_a_model_whose_predictor_is_not_installed_says_so() -> None:
     arrays = {f"{PREFIX}coefficients": np.zeros((40, 2))}
-    with pytest.raises(ValueError, match=r"no predictor 'frames'; there are: network, prior; install its package"):
+    with pytest.raises(ModelFormatError, match=r"^no predictor 'frames'; there are: network, prior; install the pack"):
         predictor_from_arrays(arrays, 2)
     with pytest.raises(ValueError, match="prior and frames, required one of them"):
         predictor_from_arrays({**arrays, "prior_sizes": np.zeros(4)}, 2)

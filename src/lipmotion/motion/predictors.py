@@ -14,7 +14,7 @@ from typing import Any, ClassVar, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.extensions import Registry
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, checked_arrays, refuse_undeclared
@@ -196,19 +196,21 @@ def predictor_from_arrays(arrays: Arrays, dimensions: int) -> Predictor | None:
     """Deserialise a predictor; None where there is none, as in models of earlier versions.
 
     dimensions : of the motion space, Q
-    Raises KeyError, ValueError: an array is missing or undeclared, or has a wrong shape, type or range; the predictor
-    is of a package that is not installed; or there are several.
+    Raises KeyError, ValueError: an array is missing or undeclared, or has a wrong shape, type or range; or there are
+    several predictors. ModelFormatError: the predictor is of a package that is not installed.
     """
     names = {name.rpartition(".")[0] for name in arrays_under(arrays, ADDED)}
     added = {name: arrays_under(arrays, f"{ADDED}{name}.") for name in sorted(names)}
     stored = {name: arrays for name in PREDICTORS.built_in if arrays.keys() & predictor_class(name).ARRAYS} | added
     if len(stored) > 1:
         raise ValueError(f"the predictors {' and '.join(stored)}, required one of them")
-    for name, own in stored.items():
-        if name not in PREDICTORS.names:
-            raise ValueError(f"no predictor {name!r}; there are: {', '.join(PREDICTORS.names)}; install its package")
-        chosen = predictor_class(name)
-        if name in added:
-            refuse_undeclared(own, chosen.ARRAYS)
-        return chosen.from_arrays(own, dimensions)
-    return None
+    if not stored:
+        return None
+    ((name, own),) = stored.items()
+    if name not in PREDICTORS.names:
+        known = ", ".join(PREDICTORS.names)
+        raise ModelFormatError(f"no predictor {name!r}; there are: {known}; install the package that adds it")
+    chosen = predictor_class(name)
+    if name in added:
+        refuse_undeclared(own, chosen.ARRAYS)
+    return chosen.from_arrays(own, dimensions)
