@@ -37,9 +37,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     for add_arguments in (add_recogniser_argument, add_speaker_argument, add_style_arguments):
         add_arguments(parser)
     parser.add_argument("--undo", type=int, default=0, metavar="N", help="take back the last N edits first")
-    parser.add_argument(
-        "--list", action="store_true", help="print the edits, and the phones with their numbers"
-    )
+    parser.add_argument("--list", action="store_true", help="print the edits, and the phones with their numbers")
     add_machine_readable(parser)
     parser.set_defaults(run=run)
 
