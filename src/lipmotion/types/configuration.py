@@ -53,9 +53,13 @@ class Rule:
 ANY = Rule()
 
 
-def option(default: Any, rule: Rule) -> Any:
-    """Return a dataclass field with a default value and a rule for its values."""
-    return field(default=default, metadata={"rule": rule})
+def option(default: Any, rule: Rule = ANY, *, later: bool = False) -> Any:
+    """Return a dataclass field with a default value and a rule for its values.
+
+    later : the option was added after models were published: a header leaves it out where it has its default value, so
+            that earlier versions can read the model
+    """
+    return field(default=default, metadata={"rule": rule, "later": later})
 
 
 @dataclass(frozen=True)
@@ -130,7 +134,8 @@ class Configuration:
 
     def as_mapping(self) -> dict[str, Any]:
         """Return the values of all options, by name, as the header of a model stores them."""
-        return asdict(self)
+        later = {each.name: each.default for each in fields(self) if each.metadata.get("later")}
+        return {name: value for name, value in asdict(self).items() if name not in later or value != later[name]}
 
 
 def check_value(option_field: Field[Any], value: Any) -> None:
