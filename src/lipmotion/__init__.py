@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from lipmotion.pipeline.generate.speak import speak
     from lipmotion.pipeline.generate.state_runs import state_runs
     from lipmotion.pipeline.generate.transfer import map_onto, with_person
+    from lipmotion.pipeline.job import Job, Outputs, Request
     from lipmotion.pipeline.model import Model, load_model, save_model
     from lipmotion.pipeline.outputs.cues import cues, write_cues
     from lipmotion.pipeline.outputs.write import write
@@ -35,12 +36,14 @@ if TYPE_CHECKING:
     from lipmotion.types import (
         Audio,
         Constraints,
+        Delivery,
         Explanation,
         Generation,
         Motion,
         Pin,
         Span,
         SpokenText,
+        Staging,
         Timeline,
         Unit,
     )
@@ -51,19 +54,24 @@ __all__ = [
     "Constraints",
     "Corpus",
     "CueSheet",
+    "Delivery",
     "Explanation",
     "FilmOptions",
     "FilmedFace",
     "Generation",
+    "Job",
     "Lexicon",
     "Model",
     "Motion",
+    "Outputs",
     "Pin",
+    "Request",
     "Run",
     "Selection",
     "Span",
     "SpeechRequest",
     "SpokenText",
+    "Staging",
     "Timeline",
     "Unit",
     "adapt",
@@ -94,6 +102,9 @@ _HOMES = {
     "Selection": "lipmotion.corpora.store",
     "Corpus": "lipmotion.corpora.store",
     "CueSheet": "lipmotion.export.cues.sheet",
+    "Job": "lipmotion.pipeline.job",
+    "Outputs": "lipmotion.pipeline.job",
+    "Request": "lipmotion.pipeline.job",
     "Lexicon": "lipmotion.units",
     "Model": "lipmotion.pipeline.model",
     "adapt": "lipmotion.pipeline.training.adapt",

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.cli.arguments.texts import text_or_file_content
 from lipmotion.errors import InputError
+from lipmotion.pipeline.understand.read_request import text_or_file_content
 from lipmotion.types import TimedTranscript
 
 

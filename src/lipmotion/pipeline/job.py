@@ -1,0 +1,278 @@
+"""A job: a recording, what is made of it, and how; the same value from the command line, a file and Python.
+
+Every option of ``animate`` is a field here, or in a part of the job, and nowhere else: with its default, its check and
+what the help says of it (``types.configuration.option``). Nothing is read or imported before the job runs.
+"""
+# ruff: noqa: RUF009 (``option`` returns the field of a dataclass)
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, TypeVar, get_args
+
+from lipmotion.errors import InputError
+from lipmotion.types.configuration import Configuration, Rule, option
+from lipmotion.types.delivery import Delivery
+from lipmotion.types.staging import Staging
+
+if TYPE_CHECKING:
+    from lipmotion.types import Generation
+
+PartT = TypeVar("PartT", bound=Configuration)
+Pauses = Literal["rest", "natural"]
+Jaw = Literal["motion", "energy", "none"]
+Overlay = Literal["inset", "mouth"]
+Mark = Literal["metadata", "visible", "none"]
+
+
+def _shipped() -> Path:
+    from lipmotion.pipeline.model import shipped_path
+
+    return shipped_path()
+
+
+@dataclass(frozen=True)
+class Request(Configuration):
+    """What is animated: a recording, files of what is known of it, and whose motion it gets.
+
+    Paths that are not absolute begin at the working directory. What the fields mean is said by their help, and by
+    ``SpeechRequest``, which holds what the files hold (``pipeline.understand.read_request``).
+
+    >>> Request("welcome.flac", recogniser="fast").recording.name
+    'welcome.flac'
+    """
+
+    recording: Path | None = option(
+        None, kind=Path, flags=("speech",), reads="recording", help="audio or video file, -: standard input"
+    )
+    transcript: str | None = option(
+        None,
+        kind=str,
+        reads="transcript",
+        replaceable=True,
+        metavar="TEXT|FILE",
+        help="the words that are spoken, if known: also subtitles, and what recognisers write",
+    )
+    lexicon: Path | None = option(
+        None,
+        kind=Path,
+        reads="lexicon",
+        replaceable=True,
+        metavar="FILE",
+        help="pronunciations, one per line: WORD PHONE PHONE ...",
+    )
+    units: Path | None = option(
+        None,
+        kind=Path,
+        reads="units file",
+        replaceable=True,
+        metavar="FILE",
+        help="phones in time from an earlier .json, .npz or .TextGrid, edited or not, or from Audacity labels",
+    )
+    recogniser: str = option(
+        "auto",
+        metavar="KIND",
+        help="auto, words (English), fast (phones alone), own (phone models of the model), general (of many voices), "
+        "or words by an installed recogniser: whisper, vosk (default: auto)",
+    )
+    speaker: str = option(
+        "",
+        metavar="NAME",
+        help="whose motion, of the people that the model was trained on (default: the mean person; see lipmotion info)",
+    )
+    pauses: Pauses = option(
+        "rest",
+        Rule(choices=get_args(Pauses)),
+        help="rest: lips close softly in pauses (default); natural: as people do, who breathe and hold a sound",
+    )
+    asymmetry: float = option(
+        0.0,
+        Rule(0, most=1),
+        metavar="X",
+        help="0: both sides of the mouth move alike; 1: as on the speaker's own face (default: 0)",
+    )
+    model: Path | None = option(
+        None,
+        kind=Path,
+        reads="model",
+        replaceable=True,
+        default_path=_shipped,
+        help="trained model (default: the one that ships with the package)",
+    )
+    onto: Path | None = option(
+        None,
+        kind=Path,
+        reads="footage of the other person",
+        metavar="VIDEO|CORPUS|MODEL",
+        help="another person, onto whose face the motion is mapped: a video of them, a prepared corpus or a model",
+    )
+    onto_speaker: str = option(
+        "", metavar="NAME", help="which person, if the corpus or the model of --onto has several"
+    )
+
+
+@dataclass(frozen=True)
+class Outputs(Configuration):
+    """What is written: files, their rates and channels, the face of videos and the character of curves.
+
+    >>> Outputs(("a.json", "a.mp4"), fps=30).motion_hz
+    30
+    """
+
+    files: tuple[str, ...] = option((), flags=("-o", "--output"), writes=True, help="files of motion and videos")
+    rate_hz: float | None = option(
+        None,
+        kind=float,
+        flags=("--rate",),
+        metavar="HZ",
+        help="frames per second of motion files (default: --fps, or 100)",
+    )
+    channels: tuple[str, ...] = option(
+        (), metavar="NAME,NAME", help="write only these to motion files: opening,width,..."
+    )
+    fps: float | None = option(
+        None, kind=float, help="frames per second of videos (default: 25; of filmed faces, those of the footage)"
+    )
+    articulation: bool = option(
+        False, help="add tongue, lip_tuck, protrusion, spread, lip_press, teeth to motion files"
+    )
+    face: str = option(
+        "portrait",
+        reads="face",
+        metavar="NAME|FILE.svg|FILE.face",
+        help="face that videos show: woman, man, head, cartoon, a drawing, or a filmed face (default: portrait, the "
+        "woman)",
+    )
+    background: str | None = option(
+        None,
+        kind=str,
+        reads="background",
+        metavar="VIDEO|COLOUR",
+        help="footage of the same person (default: that in its file); of a drawn face: transparent, or as #40a0ff",
+    )
+    jaw: Jaw = option(
+        "motion",
+        Rule(choices=get_args(Jaw)),
+        help="what the jaw of a filmed face follows: motion, energy or none (default: motion)",
+    )
+    overlay: Overlay | None = option(
+        None,
+        Rule(choices=get_args(Overlay)),
+        kind=str,
+        help="show the video of the speech with a large mouth of the filmed face, in a corner or over the speaker's "
+        "own",
+    )
+    mark: Mark = option(
+        "metadata",
+        Rule(choices=get_args(Mark)),
+        help="how a video of a filmed face says that it is synthetic (default: metadata; docs/consent.md)",
+    )
+    character: Path | None = option(
+        None,
+        kind=Path,
+        reads="character",
+        metavar="FILE",
+        help="your own character in videos: FILE.glb .gltf .vrm .obj, or a folder of .obj; motion files get its "
+        "weights",
+    )
+    lip_points: Path | None = option(
+        None,
+        kind=Path,
+        reads="table of lip points",
+        metavar="FILE.csv",
+        help="the vertices of lip points: point,vertex (default: found by the blendshape that opens the mouth)",
+    )
+    binding: Path | None = option(
+        None,
+        kind=Path,
+        reads="binding",
+        metavar="FILE",
+        help="weights of control points: stored (.binding) or painted (.csv)",
+    )
+    control_points: bool = option(False, help="move it by control points, though it has blendshapes")
+    curves: str = option(
+        "",
+        metavar="SET",
+        help="what motion files hold: arkit, face, visemes, fap, or the controls of a rig (FILE.csv; docs/meshes.md)",
+    )
+    posteriors: Path | None = option(
+        None, kind=Path, writes=True, metavar="FILE.png", help="draw the posteriors of units over time (coupled)"
+    )
+    kinds: tuple[str, ...] = option(
+        ("json",),
+        flags=("--to",),
+        metavar="KIND,KIND",
+        help="what is written into an output folder, as json,mp4 (default: json)",
+    )
+
+    @property
+    def motion_hz(self) -> float | None:
+        """Frame rate of motion files: that of videos, where no other is given; None: the model's."""
+        return self.fps if self.rate_hz is None else self.rate_hz
+
+
+@dataclass(frozen=True)
+class Job(Configuration):
+    """A recording, what is made of it, and how (docs/api.md); of a batch, of every one of its recordings.
+
+    >>> import lipmotion, tempfile
+    >>> request = lipmotion.Request("examples/welcome.flac", recogniser="fast")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     lipmotion.Job(request, lipmotion.Outputs((f"{folder}/a.csv",))).run().motion.rate_hz
+    100.0
+    """
+
+    request: Request = option(Request())
+    outputs: Outputs = option(Outputs())
+    delivery: Delivery = option(Delivery())
+    staging: Staging = option(Staging())
+
+    @classmethod
+    def from_file(cls, path: str | Path) -> Job:
+        """Return the job of a TOML file: a table for each part, with the names of its fields (docs/api.md).
+
+        Raises InputError: no such file, no TOML, an unknown name, or a value that is not allowed.
+        Raises MissingDependencyError: Python 3.10 without the package tomli.
+        """
+        from lipmotion.storage.toml_text import read_toml
+
+        content = read_toml(Path(path), "job")
+        try:
+            return cls.parsed(content)
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from error
+
+    def of(self, recording: Path, files: tuple[str, ...] | None = None) -> Job:
+        """Return the same job for another recording; with other output files, if some are given."""
+        outputs = self.outputs if files is None else replace(self.outputs, files=files)
+        return replace(self, request=replace(self.request, recording=recording), outputs=outputs)
+
+    def at_any_place(self) -> Job:
+        """Return the same job with absolute paths of the files that are read, for workers in other folders."""
+        return replace(self, request=_absolute(self.request), outputs=_absolute(self.outputs))
+
+    def run(self, *, workers: int = 1) -> Generation:
+        """Animate the recording and write the files, as ``lipmotion animate``; return the motion.
+
+        workers : as of ``animate``
+        Raises InputError, ExportError and more: as ``animate`` and ``write``, or there is no recording.
+        """
+        from lipmotion.pipeline.opened_job import opened
+
+        return opened(self).run(workers=workers)
+
+
+def _absolute(part: PartT) -> PartT:
+    names = [each.name for each in fields(part) if "reads" in each.metadata or each.name == "curves"]
+    found = {name: getattr(part, name) for name in names}
+    return replace(part, **{name: _located(value) for name, value in found.items()})
+
+
+def _located(value: str | Path | None) -> str | Path | None:
+    """Return the absolute path of what is there; another value as it is."""
+    from lipmotion.storage.sources import is_file, is_folder
+
+    path = Path(value or "")
+    there = is_file(path) or (isinstance(value, Path) and is_folder(path))
+    return type(value)(path.absolute()) if value and there else value
