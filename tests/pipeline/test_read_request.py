@@ -9,6 +9,12 @@ from lipmotion.pipeline.understand.read_request import text_or_file_content
 from lipmotion.types import TimedTranscript
 
 
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
 @pytest.mark.usefixtures("here")
 def test_a_text_is_itself() -> None:
     texts = ["hello there", "see p. 3", "", "α" * 3000, "a/b/c", "the file words.txt", "..", "\n"]

@@ -25,6 +25,9 @@ Jaw = Literal["motion", "energy", "none"]
 Overlay = Literal["inset", "mouth"]
 Mark = Literal["metadata", "visible", "none"]
 
+RATE = Rule(1, most=1000, unit=" a second")
+"""Frame rates of a file; a mistyped rate must not fill the memory."""
+
 
 def _shipped() -> Path:
     from lipmotion.pipeline.model import shipped_path
@@ -123,7 +126,9 @@ class Outputs(Configuration):
     files: tuple[str, ...] = option((), flags=("-o", "--output"), writes=True, help="files of motion and videos")
     rate_hz: float | None = option(
         None,
+        RATE,
         kind=float,
+        what="frame rate",
         flags=("--rate",),
         metavar="HZ",
         help="frames per second of motion files (default: --fps, or 100)",
@@ -132,7 +137,11 @@ class Outputs(Configuration):
         (), metavar="NAME,NAME", help="write only these to motion files: opening,width,..."
     )
     fps: float | None = option(
-        None, kind=float, help="frames per second of videos (default: 25; of filmed faces, those of the footage)"
+        None,
+        RATE,
+        kind=float,
+        what="frame rate",
+        help="frames per second of videos (default: 25; of filmed faces, those of the footage)",
     )
     articulation: bool = option(
         False, help="add tongue, lip_tuck, protrusion, spread, lip_press, teeth to motion files"

@@ -71,7 +71,7 @@ def part_of(options: argparse.Namespace, start: PartT, **given: Any) -> PartT:
         name, value = _name(each), getattr(start, each.name)
         if isinstance(value, Configuration):
             values[each.name] = part_of(options, value) if each.name not in given else None
-        elif hasattr(options, name):
+        elif "help" in each.metadata and hasattr(options, name):
             found = getattr(options, name)
             values[each.name] = _moves(each, found) if "still" in each.metadata else found
     return replace(start, **(values | given))
@@ -155,7 +155,7 @@ def _given(part: Configuration) -> Iterator[tuple[str, Any]]:
         value = getattr(part, each.name)
         if isinstance(value, Configuration):
             yield from _given(value)
-        elif "still" not in each.metadata and value != each.default:
+        elif {"help", "still"} & {*each.metadata} == {"help"} and value != each.default:
             yield _name(each), value
     if isinstance(part, Staging):
         still = [each.name for each in fields(part) if "still" in each.metadata and not getattr(part, each.name)]
