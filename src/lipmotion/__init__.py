@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from lipmotion.export.cues.sheet import CueSheet
     from lipmotion.faces.filmed.face import FilmedFace, load_face, save_face
     from lipmotion.pipeline.corpus.prepare import prepare
+    from lipmotion.pipeline.edits import Edits
     from lipmotion.pipeline.evaluation.evaluate import evaluate
     from lipmotion.pipeline.film.build import build_face
     from lipmotion.pipeline.film.video import FilmOptions
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from lipmotion.pipeline.model import Model, load_model, save_model
     from lipmotion.pipeline.outputs.cues import cues, write_cues
     from lipmotion.pipeline.outputs.write import write
+    from lipmotion.pipeline.session import Session
     from lipmotion.pipeline.training.adapt import adapt
     from lipmotion.pipeline.training.train import Run, train
     from lipmotion.pipeline.understand.request import SpeechRequest
@@ -38,6 +40,7 @@ if TYPE_CHECKING:
         Constraints,
         Delivery,
         Explanation,
+        Gain,
         Generation,
         Motion,
         Pin,
@@ -55,9 +58,11 @@ __all__ = [
     "Corpus",
     "CueSheet",
     "Delivery",
+    "Edits",
     "Explanation",
     "FilmOptions",
     "FilmedFace",
+    "Gain",
     "Generation",
     "Job",
     "Lexicon",
@@ -68,6 +73,7 @@ __all__ = [
     "Request",
     "Run",
     "Selection",
+    "Session",
     "Span",
     "SpeechRequest",
     "SpokenText",
@@ -97,7 +103,9 @@ __all__ = [
 ]
 
 _HOMES = {
+    "Edits": "lipmotion.pipeline.edits",
     "Run": "lipmotion.pipeline.training.train",
+    "Session": "lipmotion.pipeline.session",
     "SpeechRequest": "lipmotion.pipeline.understand.request",
     "Selection": "lipmotion.corpora.store",
     "Corpus": "lipmotion.corpora.store",

@@ -7,11 +7,14 @@ what the help says of it (``types.configuration.option``). Nothing is read or im
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, TypeVar, get_args
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args
 
 from lipmotion.errors import InputError
+from lipmotion.storage.files import read_text_file
+from lipmotion.storage.sources import is_file
 from lipmotion.types.configuration import Configuration, Rule, option
 from lipmotion.types.delivery import Delivery
 from lipmotion.types.staging import Staging
@@ -27,6 +30,11 @@ Mark = Literal["metadata", "visible", "none"]
 
 RATE = Rule(1, most=1000, unit=" a second")
 """Frame rates of a file; a mistyped rate must not fill the memory."""
+
+
+def _file(reads: str, metavar: str, says: str, **told: Any) -> Any:
+    """Return the option of a file that is read, None where there is none; ``reads``: what it is, in messages."""
+    return option(None, kind=Path, reads=reads, help=says, **({"metavar": metavar} if metavar else {}), **told)
 
 
 def _shipped() -> Path:
@@ -46,9 +54,7 @@ class Request(Configuration):
     'welcome.flac'
     """
 
-    recording: Path | None = option(
-        None, kind=Path, flags=("speech",), reads="recording", help="audio or video file, -: standard input"
-    )
+    recording: Path | None = _file("recording", "", "audio or video file, -: standard input", flags=("speech",))
     transcript: str | None = option(
         None,
         kind=str,
@@ -57,21 +63,14 @@ class Request(Configuration):
         metavar="TEXT|FILE",
         help="the words that are spoken, if known: also subtitles, and what recognisers write",
     )
-    lexicon: Path | None = option(
-        None,
-        kind=Path,
-        reads="lexicon",
-        replaceable=True,
-        metavar="FILE",
-        help="pronunciations, one per line: WORD PHONE PHONE ...",
+    lexicon: Path | None = _file(
+        "lexicon", "FILE", "pronunciations, one per line: WORD PHONE PHONE ...", replaceable=True
     )
-    units: Path | None = option(
-        None,
-        kind=Path,
-        reads="units file",
+    units: Path | None = _file(
+        "units file",
+        "FILE",
+        "phones in time from an earlier .json, .npz or .TextGrid, edited or not, or from Audacity labels",
         replaceable=True,
-        metavar="FILE",
-        help="phones in time from an earlier .json, .npz or .TextGrid, edited or not, or from Audacity labels",
     )
     recogniser: str = option(
         "auto",
@@ -95,20 +94,17 @@ class Request(Configuration):
         metavar="X",
         help="0: both sides of the mouth move alike; 1: as on the speaker's own face (default: 0)",
     )
-    model: Path | None = option(
-        None,
-        kind=Path,
-        reads="model",
+    model: Path | None = _file(
+        "model",
+        "",
+        "trained model (default: the one that ships with the package)",
         replaceable=True,
         default_path=_shipped,
-        help="trained model (default: the one that ships with the package)",
     )
-    onto: Path | None = option(
-        None,
-        kind=Path,
-        reads="footage of the other person",
-        metavar="VIDEO|CORPUS|MODEL",
-        help="another person, onto whose face the motion is mapped: a video of them, a prepared corpus or a model",
+    onto: Path | None = _file(
+        "footage of the other person",
+        "VIDEO|CORPUS|MODEL",
+        "another person, onto whose face the motion is mapped: a video of them, a prepared corpus or a model",
     )
     onto_speaker: str = option(
         "", metavar="NAME", help="which person, if the corpus or the model of --onto has several"
@@ -177,28 +173,17 @@ class Outputs(Configuration):
         Rule(choices=get_args(Mark)),
         help="how a video of a filmed face says that it is synthetic (default: metadata; docs/consent.md)",
     )
-    character: Path | None = option(
-        None,
-        kind=Path,
-        reads="character",
-        metavar="FILE",
-        help="your own character in videos: FILE.glb .gltf .vrm .obj, or a folder of .obj; motion files get its "
-        "weights",
+    character: Path | None = _file(
+        "character",
+        "FILE",
+        "your own character in videos: FILE.glb .gltf .vrm .obj, or a folder of .obj; motion files get its weights",
     )
-    lip_points: Path | None = option(
-        None,
-        kind=Path,
-        reads="table of lip points",
-        metavar="FILE.csv",
-        help="the vertices of lip points: point,vertex (default: found by the blendshape that opens the mouth)",
+    lip_points: Path | None = _file(
+        "table of lip points",
+        "FILE.csv",
+        "the vertices of lip points: point,vertex (default: found by the blendshape that opens the mouth)",
     )
-    binding: Path | None = option(
-        None,
-        kind=Path,
-        reads="binding",
-        metavar="FILE",
-        help="weights of control points: stored (.binding) or painted (.csv)",
-    )
+    binding: Path | None = _file("binding", "FILE", "weights of control points: stored (.binding) or painted (.csv)")
     control_points: bool = option(False, help="move it by control points, though it has blendshapes")
     curves: str = option(
         "",
@@ -241,15 +226,17 @@ class Job(Configuration):
     def from_file(cls, path: str | Path) -> Job:
         """Return the job of a TOML file: a table for each part, with the names of its fields (docs/api.md).
 
-        Raises InputError: no such file, no TOML, an unknown name, or a value that is not allowed.
-        Raises MissingDependencyError: Python 3.10 without the package tomli.
+        Paths begin at the folder of the file.
+        Raises InputError: no such file, no TOML, an unknown name, a value that is not allowed, or Python 3.10.
         """
-        from lipmotion.storage.toml_text import read_toml
+        if sys.version_info < (3, 11):
+            raise InputError(f"{path}: job files are read by Python 3.11 or newer; give the options themselves")
+        import tomllib
 
-        content = read_toml(Path(path), "job")
+        text = read_text_file(Path(path), "job")
         try:
-            return cls.parsed(content)
-        except InputError as error:
+            return cls.parsed(tomllib.loads(text)).at(Path(path).parent)
+        except (ValueError, RecursionError) as error:
             raise InputError(f"{path}: {error}") from error
 
     def of(self, recording: Path, files: tuple[str, ...] | None = None) -> Job:
@@ -257,9 +244,11 @@ class Job(Configuration):
         outputs = self.outputs if files is None else replace(self.outputs, files=files)
         return replace(self, request=replace(self.request, recording=recording), outputs=outputs)
 
-    def at_any_place(self) -> Job:
-        """Return the same job with absolute paths of the files that are read, for workers in other folders."""
-        return replace(self, request=_absolute(self.request), outputs=_absolute(self.outputs))
+    def at(self, folder: Path) -> Job:
+        """Return the same job with paths that begin at a folder."""
+        files = [file if file == "-" else f"{folder / file}{'/' * file.endswith('/')}" for file in self.outputs.files]
+        outputs = replace(_located(self.outputs, folder), files=tuple(files))
+        return replace(self, request=_located(self.request, folder), outputs=outputs)
 
     def run(self, *, workers: int = 1) -> Generation:
         """Animate the recording and write the files, as ``lipmotion animate``; return the motion.
@@ -272,16 +261,13 @@ class Job(Configuration):
         return opened(self).run(workers=workers)
 
 
-def _absolute(part: PartT) -> PartT:
-    names = [each.name for each in fields(part) if "reads" in each.metadata or each.name == "curves"]
-    found = {name: getattr(part, name) for name in names}
-    return replace(part, **{name: _located(value) for name, value in found.items()})
-
-
-def _located(value: str | Path | None) -> str | Path | None:
-    """Return the absolute path of what is there; another value as it is."""
-    from lipmotion.storage.sources import is_file, is_folder
-
-    path = Path(value or "")
-    there = is_file(path) or (isinstance(value, Path) and is_folder(path))
-    return type(value)(path.absolute()) if value and there else value
+def _located(part: PartT, folder: Path) -> PartT:
+    """Return a part with paths that begin at a folder; a text that is no file there is left as it is."""
+    found: dict[str, Any] = {}
+    for each in fields(part):
+        value = getattr(part, each.name)
+        if isinstance(value, Path) and str(value) != "-":
+            found[each.name] = folder / value
+        elif isinstance(value, str) and ("reads" in each.metadata or each.name == "curves") and is_file(folder / value):
+            found[each.name] = str(folder / value)
+    return replace(part, **found)

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from lipmotion.types.generation import (
         Constraints,
         Example,
+        Gain,
         Generation,
         HeardSpectrum,
         Outlook,
@@ -61,6 +62,7 @@ __all__ = [
     "Example",
     "Explanation",
     "Features",
+    "Gain",
     "Generation",
     "HeardSpectrum",
     "Item",

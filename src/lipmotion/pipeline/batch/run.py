@@ -82,7 +82,7 @@ def batch(
     ...     batch("examples", folder, lipmotion.Job(outputs=lipmotion.Outputs(kinds=("csv",))), jobs=1).text
     '1 lines: 1 done, 0 kept, 0 failed'
     """
-    job = (job or Job()).at_any_place()
+    job = (job or Job()).at(Path.cwd())
     check_job(job)
     if jobs is not None and jobs < 1:
         raise InputError(f"{jobs} processes, required 1 or more; leave the number out for one a core")
