@@ -34,7 +34,8 @@ RATE = Rule(1, most=1000, unit=" a second")
 
 def _file(reads: str, metavar: str, says: str, **told: Any) -> Any:
     """Return the option of a file that is read, None where there is none; ``reads``: what it is, in messages."""
-    return option(None, kind=Path, reads=reads, help=says, **({"metavar": metavar} if metavar else {}), **told)
+    told |= {"metavar": metavar} if metavar else {}
+    return option(None, kind=Path, reads=reads, help=says, **told)
 
 
 def _shipped() -> Path:
