@@ -98,7 +98,7 @@ def test_each_option_is_declared_once() -> None:
     found = set()
     for path in (Path(command_line.__file__).parent).rglob("*.py"):
         calls = [node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, ast.Call)]
-        words = {word.value for node in calls for word in node.args if isinstance(word, ast.Constant)}
+        words = {str(word.value) for node in calls for word in node.args if isinstance(word, ast.Constant)}
         found |= {f"{path.stem} {flag}" for flag in words & {*flags} - {"-o", "--output", "speech"}}
     assert found == OTHERS
 
@@ -148,14 +148,14 @@ def test_a_batch_takes_a_job(run: RunCommand, here: Path, toy_speech: Path, toy_
 @needs_toml
 def test_what_is_wrong_with_a_file(run: RunCommand, here: Path) -> None:
     (here / "half.toml").write_text("[request]\nrecording = 'a.wav'\n")
-    (here / "wrong.toml").write_text("[outputs]\nface_seed = 3\n")
+    (here / "wrong.toml").write_text("[staging]\nface-seed = 3\n")
     done = run("animate", "--job", "half.toml")
     assert (done.code, done.err[-1]) == (
         2,
         "lipmotion animate: error: the following arguments are required: -o/--output",
     )
     for words, message in (
-        ("wrong.toml", "wrong.toml: in [outputs]: no option 'face_seed'; there are: files, rate_hz"),
+        ("wrong.toml", "wrong.toml: in [staging]: no option 'face-seed'; here it is called 'seed'"),
         ("missing.toml", "missing.toml: no such job file"),
     ):
         done = run("animate", "--job", words)

@@ -145,6 +145,9 @@ class Configuration:
         """Return the message that there is no option of this name."""
         if name in cls.hints:
             return f"no option {name!r}; {cls.hints[name]}"
+        for option_field in fields(cls):
+            if f"--{name.replace('_', '-')}" in option_field.metadata.get("flags", ()):
+                return f"no option {name!r}; here it is called {option_field.name!r}"
         return f"no option {name!r}; there are: {', '.join(option_field.name for option_field in fields(cls))}"
 
     def as_mapping(self) -> dict[str, Any]:

@@ -28,6 +28,9 @@ class Staging(Configuration):
     blinks, gaze, brows, head : whether these move on their own
     seed       : of the movements that depend on chance
     Raises InputError: a value out of its range, or no such background.
+
+    >>> Staging(size=480, head=False, background="#40a0ff").colour
+    (64, 160, 255)
     """
 
     size: int = option(0, Rule(least=0), metavar="PIXELS", help="height of the face's picture")

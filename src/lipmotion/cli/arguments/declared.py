@@ -66,15 +66,16 @@ def part_of(options: argparse.Namespace, start: PartT, **given: Any) -> PartT:
     given : values of fields, ahead of the options
     Raises InputError: a value that is not allowed.
     """
-    values: dict[str, Any] = {}
     for each in fields(start):
-        name, value = _name(each), getattr(start, each.name)
+        value = getattr(start, each.name)
+        if each.name in given:
+            continue
         if isinstance(value, Configuration):
-            values[each.name] = part_of(options, value) if each.name not in given else None
-        elif "help" in each.metadata and hasattr(options, name):
-            found = getattr(options, name)
-            values[each.name] = _moves(each, found) if "still" in each.metadata else found
-    return replace(start, **(values | given))
+            given[each.name] = part_of(options, value)
+        elif "help" in each.metadata and hasattr(options, _name(each)):
+            found = getattr(options, _name(each))
+            given[each.name] = _moves(each, found) if "still" in each.metadata else found
+    return replace(start, **given)
 
 
 def _moves(each: Field[Any], still: str) -> bool:
