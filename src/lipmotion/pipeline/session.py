@@ -1,7 +1,7 @@
 """Sessions: one recording whose motion is edited; what an edit does not change is not computed again.
 
-A recording is understood (words, phones in time), moved (motion from phones), and delivered (intensity, offsets). Each
-stage is kept by the edits that it depends on.
+A recording is understood (words, phones in time), moved (motion from phones), delivered (intensity, offsets), drawn.
+Each stage is kept by the edits that it depends on.
 """
 
 from __future__ import annotations
@@ -11,16 +11,19 @@ from collections.abc import Callable, Hashable, Iterable
 from dataclasses import replace
 from pathlib import Path
 from threading import RLock
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from lipmotion.articulation.curve_edits import with_edited_curves, with_gain, with_locked
 from lipmotion.articulation.pauses import with_pauses
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
 from lipmotion.articulation.symmetry import symmetrical
 from lipmotion.errors import AlignmentError, InputError, shortened
+from lipmotion.faces.base import DrawnMotion, DrawsSingly, Face, Picture
+from lipmotion.faces.registry import staged_face
+from lipmotion.kernels.choice import expect_more
 from lipmotion.kernels.threads import one_thread
 from lipmotion.meshes.fitting.facial_animation import PARAMETERS
-from lipmotion.meshes.fitting.visemes import VISEME_PHONES
+from lipmotion.meshes.fitting.visemes import VISEME_CHANNELS
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS
 from lipmotion.motion.speakers import SpeakerMap
 from lipmotion.pipeline.edits import CurveStep, Edits, Lock, PhoneStep, PinStep, Step, WordIs, with_span
@@ -29,7 +32,9 @@ from lipmotion.pipeline.generate.outlook import outlook_of
 from lipmotion.pipeline.generate.prior import with_prior
 from lipmotion.pipeline.generate.transfer import person_of
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.outputs.delivered import delivered, with_motion
+from lipmotion.pipeline.outputs.delivered import delivered, shown, with_motion
+from lipmotion.pipeline.outputs.drawn_video import DRAWN_HZ, read_sound
+from lipmotion.pipeline.outputs.prosody import moved_prosody, prosody_of_speech
 from lipmotion.pipeline.understand.request import SpeechInput, SpeechRequest, request_of
 from lipmotion.pipeline.understand.understood_speech import (
     UnderstoodSpeech,
@@ -52,6 +57,7 @@ from lipmotion.types import (
     Speech,
     Timeline,
     Unit,
+    frame_of,
     silent_monitor,
 )
 from lipmotion.units import words_in_time
@@ -62,10 +68,12 @@ UNDERSTANDING = 0.9
 """The share of the work that is recognition, in reports; the rest is the generation of motion."""
 MODELLED = ("opening", "width", "outer")
 """Channels, beside weights, that models generate as they are, so that motion runs smoothly through their pins."""
-KNOWN_CURVES = (*ARKIT_MOUTH, *ARKIT_OTHERS, *VISEME_PHONES, *(row[1] for row in PARAMETERS))
+KNOWN_CURVES = (*ARKIT_MOUTH, *ARKIT_OTHERS, *VISEME_CHANNELS, *(row[1] for row in PARAMETERS))
 """Curves that outputs may have, whatever the motion has: ARKit's blendshapes, visemes, MPEG-4's parameters."""
 KEPT = 4
 """Results that each stage keeps: the last ones that were asked for."""
+INTERACTIVE = 3
+"""A session that generates motion for the third time will do so often: kernels are loaded that pay then."""
 NO_EDITS = Edits()
 
 
@@ -127,6 +135,9 @@ class Session:
         self._moved: _Kept[Generation] = _Kept()
         self._generated: _Kept[Generation] = _Kept()
         self._delivered: _Kept[Generation] = _Kept()
+        self._faces: _Kept[DrawsSingly] = _Kept()
+        self._drawn: _Kept[DrawnMotion[Any]] = _Kept()
+        self._motions = 0
         self._one_at_a_time = RLock()
 
     def units(self, edits: Edits = NO_EDITS) -> Timeline[Unit]:
@@ -152,6 +163,35 @@ class Session:
         """Return the motion as files hold it: with its intensity, anticipation and offset (docs/controls.md)."""
         with self._one_at_a_time, one_thread():
             return self._delivered.once(edits.steps, lambda: delivered(self.generated(edits), edits.delivery()))
+
+    def picture(
+        self, time_s: float, edits: Edits = NO_EDITS, *, face: str | Face = "portrait", fps: float = DRAWN_HZ
+    ) -> Picture:
+        """Return the picture of a drawn face that is shown at a time in a video [shape as of ``Face.render``].
+
+        fps : frames a second of the video
+        What of the face does not move is painted once.
+        Raises InputError: as ``generated``; a time outside the recording, or a face that cannot draw single pictures.
+        """
+        with self._one_at_a_time, one_thread():
+            staging, delivery = edits.staging(), edits.delivery()
+
+            def staged() -> DrawsSingly:
+                prosody = prosody_of_speech(read_sound(self.request.recording))
+                found = staged_face(face, staging, moved_prosody(prosody, delivery))
+                if not isinstance(found, DrawsSingly):
+                    raise InputError(f"the face {face!r} draws no single pictures; write a video")
+                return found
+
+            def drawn() -> DrawnMotion[Any]:
+                seen = shown(self.generated(edits), delivery, fps)
+                return self._faces.once((face, staging, delivery), staged).drawn(seen.motion, seen.units, fps=fps)
+
+            pictures = self._drawn.once((edits.steps, face, fps), drawn)
+            frame = frame_of(time_s, len(pictures), fps)
+            if frame is None:
+                raise InputError(f"{time_s} s lies outside the video (0 to {(len(pictures) - 1) / fps:.2f} s)")
+            return pictures.picture(frame)
 
     def understood(self, edits: Edits = NO_EDITS) -> UnderstoodSpeech:
         """Return the speech as input of the engine, with the phones of ``units``."""
@@ -275,6 +315,9 @@ class Session:
 
     def _generation(self, phone_steps: tuple[Step, ...], pins: tuple[Pin, ...]) -> Generation:
         understood = self._edited_speech(phone_steps)
+        self._motions += 1
+        if self._motions == INTERACTIVE:
+            expect_more()
         self._monitor(Progress("moving the mouth", 0, 1, UNDERSTANDING))
         generation = generation_of(self.request, self._speaker(), self.model, understood, Constraints(pins))
         self._monitor(Progress("moving the mouth", 1, 1, 1.0))
