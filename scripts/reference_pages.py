@@ -22,6 +22,7 @@ SEE = {
     "batch": "batch",
     "speak": "speak",
     "render": "controls",
+    "edit": "edit",
     "explain": "explain",
     "cues": "cues",
     "words": "start",

@@ -77,6 +77,13 @@ def begun(request: SpeechRequest, recording: Path, model: Path | None, lexicon: 
     return EditFile(Edits(), recording, session.units(), session.generated().outlook, model, lexicon, options)
 
 
+def edit_file(edits: EditFile | Edits | str | Path | None) -> EditFile:
+    """Return edits as the content of a file: of its path, or of a value; None: there are none. Raises InputError."""
+    if isinstance(edits, EditFile):
+        return edits
+    return EditFile(edits or Edits()) if isinstance(edits, Edits | None) else read_edits(edits)
+
+
 def is_edit_file(path: Path) -> bool:
     """Return whether a file is one of edits, by its suffix and how it begins."""
     if path.suffix.lower() not in SUFFIXES or not path.is_file():

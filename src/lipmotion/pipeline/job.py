@@ -73,6 +73,9 @@ class Request(Configuration):
         "phones in time from an earlier .json, .npz or .TextGrid, edited or not, or from Audacity labels",
         replaceable=True,
     )
+    edits: Path | None = _file(
+        "edits", "FILE", "what is changed of the motion: of lipmotion edit (docs/edit.md)", replaceable=True
+    )
     recogniser: str = option(
         "auto",
         metavar="KIND",

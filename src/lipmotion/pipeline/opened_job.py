@@ -1,4 +1,4 @@
-"""Jobs at work: here, and nowhere else, ``animate`` is called for a recording and ``write`` for its outputs."""
+"""Jobs at work: here, and nowhere else, a job's motion is made and its outputs are written."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from pathlib import Path
 from lipmotion.errors import InputError
 from lipmotion.faces.mesh import MeshFace
 from lipmotion.meshes.fitting import driven
+from lipmotion.pipeline.edit_files import EditFile, edit_file
 from lipmotion.pipeline.film.video import FilmOptions
-from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.generate.posteriors import animate_with_posteriors, check_picture, write_posteriors
 from lipmotion.pipeline.job import Job, Outputs
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.outputs.curve_sets import check_curve_set
+from lipmotion.pipeline.outputs.curve_sets import check_curve_set, curve_names
 from lipmotion.pipeline.outputs.drawn_video import VideoOutput
 from lipmotion.pipeline.outputs.motion_files import with_articulation
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, checked_outputs
@@ -29,15 +29,17 @@ RECOGNITION = 0.3
 
 @dataclass(frozen=True, eq=False)
 class OpenedJob:
-    """A job with its face, which several recordings share.
+    """A job with its face, which several recordings share; delivery and staging are those of the edits, too.
 
     face   : as outputs show it
     curves : what motion files hold instead of the motion: a set, or the character, if it has blendshapes; None: nothing
+    edits  : what is changed of the motion
     """
 
     job: Job
     face: ShownFace
     curves: str | driven.DrivenCharacter | None
+    edits: EditFile
 
     def of(self, recording: Path, files: tuple[str, ...] | None = None) -> OpenedJob:
         """Return the same for another recording, and other output files, as of ``Job.of``."""
@@ -122,16 +124,18 @@ class OpenedJob:
         if request.onto is None:
             request = replace(request, onto=self.face.other_person(model, named.speaker))
         if picture:
-            generation, posteriors = animate_with_posteriors(request, model=model)
+            generation, posteriors = animate_with_posteriors(request, model=model, edits=self.edits)
             write_posteriors(picture, generation, posteriors)
         else:
-            generation = animate(
+            session = self.edits.session(
                 request,
                 model=model,
                 workers=workers,
                 monitor=sub_monitor(monitor, 0.0, RECOGNITION if draws else 1.0),
                 meanwhile=self.face.load if draws else None,
+                curves=curve_names(self.curves) if self.curves else (),
             )
+            generation = session.generated(self.edits.edits)
         of_writing = sub_monitor(monitor, RECOGNITION, 1.0)
         self.write(generation, named.recording, model, temporary=temporary, monitor=of_writing)
         return generation
@@ -142,16 +146,17 @@ def opened(job: Job) -> OpenedJob:
 
     Raises InputError: no such face, character or set of curves. Raises ModelFormatError: as ``shown_face``.
     """
-    outputs = job.outputs
+    outputs, edits = job.outputs, edit_file(job.request.edits)
+    job = replace(job, delivery=edits.edits.delivery(job.delivery), staging=edits.edits.staging(job.staging))
     if outputs.curves:
         check_curve_set(outputs.curves)
     if outputs.character is None:
         if outputs.lip_points or outputs.binding or outputs.control_points:
             raise InputError("lip points and bindings belong to a character; name it: --character FILE")
-        return OpenedJob(job, shown_face(outputs.face), outputs.curves or None)
+        return OpenedJob(job, shown_face(outputs.face), outputs.curves or None, edits)
     character = character_of(outputs)
     weighed = character if character.shapes is not None else None
-    return OpenedJob(job, shown_face(MeshFace(character)), outputs.curves or weighed)
+    return OpenedJob(job, shown_face(MeshFace(character)), outputs.curves or weighed, edits)
 
 
 def character_of(outputs: Outputs) -> driven.DrivenCharacter:

@@ -55,7 +55,8 @@ def _one_by_one(job: Job, recordings: Sequence[Path]) -> list[OpenedJob]:
     from lipmotion.pipeline.understand.recordings import planned_outputs
     from lipmotion.storage.files import made_folders
 
-    alone = {"transcript": job.request.transcript, "units": job.request.units, "posteriors": job.outputs.posteriors}
+    alone = {name: getattr(job.request, name) for name in ("transcript", "units", "edits")}
+    alone["posteriors"] = job.outputs.posteriors
     for name, value in alone.items():
         if value is not None and len(recordings) > 1:
             raise InputError(f"--{name} belongs to one recording, and there are {len(recordings)}; animate each alone")

@@ -41,6 +41,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.animate``, ``lipmotion.cues`` and ``lipmotion.write_cues``; print the cues or their paths."""
+    from lipmotion.pipeline.edit_files import edit_file
     from lipmotion.pipeline.generate.animate import animate
     from lipmotion.pipeline.model import load_model
     from lipmotion.pipeline.outputs.cues import check_cue_options, check_cue_outputs, cue_text, cues, write_cues
@@ -55,7 +56,9 @@ def run(options: argparse.Namespace) -> None:
         set_progress(0.0)
         request, model = read_request(asked), load_model(asked.model)
         set_progress(0.1)
-        result = animate(request, model=model)
+        edits = edit_file(asked.edits)
+        result = animate(request, model=model, edits=edits)
+        delivery = edits.edits.delivery(delivery)
         set_progress(0.9)
         sheet = cues(result, fps=options.fps, hold_frames=options.hold, shapes=options.shapes, delivery=delivery)
         heard_in = "" if piped else speech

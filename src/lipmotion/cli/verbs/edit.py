@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lipmotion.cli.arguments.declared import add_options, part_of
 from lipmotion.cli.arguments.options import add_machine_readable
-from lipmotion.cli.arguments.paths import add_input
+from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.pipeline.job import Request
 from lipmotion.printable import printable
 
@@ -20,9 +19,9 @@ if TYPE_CHECKING:
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
     parser = verbs.add_parser("edit", help="change words, phones, curves of a recording's motion, in a file of edits")
-    parser.add_argument("file", type=Path, metavar="FILE", help="file of edits, .json or .toml")
+    add_output(parser, "file", metavar="FILE", help="file of edits, .json or .toml")
     sentence = "'phone 12 ends 1.24', 'word 3 is blue', 'pin jawOpen 0.1 at 1.2', ... (docs/edit.md)"
-    parser.add_argument("edits", nargs="*", metavar="EDIT", help=sentence)
+    parser.add_argument("sentences", nargs="*", metavar="EDIT", help=sentence)
     add_input(parser, "--of", what="recording", metavar="RECORDING", help="begin a file of edits of this recording")
     known = ("transcript", "lexicon", "model", "recogniser", "speaker", "pauses", "asymmetry")
     add_options(parser, Request, *known)
@@ -48,7 +47,7 @@ def run(options: argparse.Namespace) -> None:
         before = file.edits.steps
         if not 0 <= options.undo <= len(before):
             raise InputError(f"--undo {options.undo}, required 0 to {len(before)}: there are no more edits")
-        edits = Edits(before[: len(before) - options.undo]).then(*options.edits)
+        edits = Edits(before[: len(before) - options.undo]).then(*options.sentences)
         session = file.session()
         units = session.generated(edits).units if edits.steps else session.units()
         if options.of is not None or edits.steps != before:

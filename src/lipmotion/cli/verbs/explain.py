@@ -18,7 +18,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add_input(
         parser, "former_model", what="model", nargs="?", help=argparse.SUPPRESS
     )  # explain MODEL SPEECH, before 0.2
-    add_options(parser, Request)
+    add_options(parser, Request, but=("edits",))
     times = "time of a frame (repeatable; default: list the states of the whole recording)"
     parser.add_argument("--at", type=float, action="append", metavar="SECONDS", help=times)
     most = f"without --at: print at most N lines (default: {RUNS})"

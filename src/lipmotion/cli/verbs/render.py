@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
     parser = verbs.add_parser("render", help="draw edited or imported motion, or write it in another form")
-    motion = "motion file: .json .csv .npz, or another that can be read; of channels 'opening' or blendshapes"
+    motion = "motion file: .json .csv .npz, or another that can be read; or edits (docs/edit.md)"
     add_input(parser, "motion", what="motion file", replaceable=True, help=motion)
     sound = "the sound of videos (default: none; the video is silent)"
     add_input(parser, "--sound", what="recording", metavar="FILE", help=sound)
@@ -49,11 +50,15 @@ def run(options: argparse.Namespace) -> None:
 def _render(job: OpenedJob, motion: Path, monitor: Monitor) -> None:
     import numpy as np
 
+    from lipmotion.pipeline.edit_files import is_edit_file
     from lipmotion.pipeline.outputs.drawn_video import VideoOutput
     from lipmotion.pipeline.outputs.motion_input import as_long_as, read_generation
     from lipmotion.speech.sound.audio_files import read_audio
     from lipmotion.types import Audio
 
+    if is_edit_file(motion):
+        _replay(job, motion, monitor)
+        return
     sound: Path | Audio | None = job.job.request.recording
     planned = job.checked(sound)
     generation = read_generation(motion, job.job.request.units)
@@ -63,6 +68,21 @@ def _render(job: OpenedJob, motion: Path, monitor: Monitor) -> None:
         samples = round(float(generation.motion.time_s[-1]) * SILENT_HZ)
         sound = Audio(np.zeros(samples, np.float32), SILENT_HZ)
     job.write(generation, sound, monitor=monitor)
+
+
+def _replay(job: OpenedJob, path: Path, monitor: Monitor) -> None:
+    """Make the motion of the recording that a file of edits names, and write the outputs as ``animate`` does."""
+    from lipmotion.errors import InputError
+    from lipmotion.pipeline.edit_files import read_edits
+    from lipmotion.pipeline.opened_job import opened
+
+    asked, edits = job.job.request, read_edits(path)
+    if asked.recording or asked.units:
+        raise InputError(f"{path}: names its recording and holds its phones; leave --sound and --units out")
+    if edits.recording is None:
+        raise InputError(f"{path}: names no recording; give it: lipmotion animate RECORDING --edits {path}")
+    request = replace(asked, recording=edits.recording, edits=path, model=edits.model, lexicon=edits.lexicon)
+    opened(replace(job.job, request=replace(request, **edits.options))).run(monitor=monitor)
 
 
 SILENT_HZ = 16_000

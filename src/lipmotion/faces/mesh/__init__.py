@@ -14,7 +14,7 @@ from lipmotion.errors import InputError
 from lipmotion.faces.base import SMALLEST, TRANSPARENT, DrawnMotion, Face, Picture, Staging, alive
 from lipmotion.faces.mesh.stage import MeshStage
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
-from lipmotion.meshes.fitting.driven import CharacterPose, DrivenCharacter
+from lipmotion.meshes.fitting.driven import DrivenCharacter, DrivenPose
 from lipmotion.meshes.fitting.eyes_and_brows import eye_and_brow_weights
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 
@@ -28,7 +28,7 @@ AHEAD = 2
 class MeshPose(NamedTuple):
     """A character in one frame: of ``DrivenCharacter.poses``, angles of the head, and of the eyes, in radians."""
 
-    row: CharacterPose
+    row: DrivenPose
     turn: tuple[float, float, float]
     look: tuple[float, float]
 

@@ -33,7 +33,7 @@ METRIC = (".glb", ".gltf", ".vrm")
 EYES_AND_BROWS = tuple(name for name in ARKIT_OTHERS if name.startswith(("eyeBlink", "eyeLook", "brow")))
 
 
-class CharacterPose(NamedTuple):
+class DrivenPose(NamedTuple):
     """What moves a character in one frame.
 
     mouth  : weights of its blendshapes of the mouth [shape=(S,)], or displacements of points [shape=(52, 3)]
@@ -77,7 +77,7 @@ class DrivenCharacter:
         units: Timeline[Unit],
         time_s: Array,
         others: Mapping[str, Array] | None = None,
-    ) -> list[CharacterPose]:
+    ) -> list[DrivenPose]:
         """Return the pose at some times in seconds, evenly spaced, for ``posed``.
 
         others : weights of ARKit's blendshapes of eyes and brows, 0 to 1 [each shape=(T,)]; those that the mesh does
@@ -91,7 +91,7 @@ class DrivenCharacter:
         if self.shapes is not None:
             moved = shape_weights(motion, units, self.shapes).values.astype(np.float64)
         rows = in_pictures(moved, contact, motion.rate_hz, time_s)
-        return list(map(CharacterPose, rows, beside))
+        return list(map(DrivenPose, rows, beside))
 
     def vertices(
         self, motion: Motion, units: Timeline[Unit], time_s: Array, others: Mapping[str, Array] | None = None
@@ -99,7 +99,7 @@ class DrivenCharacter:
         """Yield the vertices at some times [each shape=(V, 3)], as of ``poses``."""
         return map(self.posed, self.poses(motion, units, time_s, others))
 
-    def posed(self, pose: CharacterPose) -> Array:
+    def posed(self, pose: DrivenPose) -> Array:
         """Return the vertices in a pose [shape=(V, 3)]."""
         if self.shapes is not None:
             return self._shaped(pose.mouth @ self._displacements, pose.others)

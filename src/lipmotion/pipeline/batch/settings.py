@@ -35,7 +35,7 @@ def check_job(job: Job) -> None:
     Raises InputError: the job names what belongs to one recording.
     """
     check_kinds(job.outputs.kinds)
-    alone = {name: getattr(job.request, name) for name in ("recording", "transcript", "units")}
+    alone = {name: getattr(job.request, name) for name in ("recording", "transcript", "units", "edits")}
     alone |= {name: getattr(job.outputs, name) for name in ("files", "overlay", "posteriors")}
     found = next((name for name, value in alone.items() if value), None)
     if found:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from lipmotion.errors import InputError
-from lipmotion.pipeline.edit_files import EditFile, read_edits
+from lipmotion.pipeline.edit_files import EditFile, edit_file
 from lipmotion.pipeline.edits import Edits
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.understand.request import SpeechInput, request_of
@@ -19,7 +19,7 @@ def animate(  # noqa: PLR0913
     model: Model | str | Path | None = None,
     transcript: str | Path | TimedTranscript | None = None,
     constraints: Constraints | None = None,
-    edits: Edits | str | Path | None = None,
+    edits: EditFile | Edits | str | Path | None = None,
     workers: int = 1,
     monitor: Monitor = silent_monitor,
     meanwhile: Callable[[], None] | None = None,
@@ -52,7 +52,7 @@ def animate(  # noqa: PLR0913
     if not isinstance(constraints, Constraints | None):
         raise InputError(f"the constraints are a {type(constraints).__name__}, required Constraints((Pin(...),))")
     request = request_of(speech, transcript)
-    file = EditFile(edits or Edits()) if isinstance(edits, Edits | None) else read_edits(edits)
+    file = edit_file(edits)
     model = model if isinstance(model, Model) else load_model(model)
     session = file.session(request, model=model, workers=workers, monitor=monitor, meanwhile=meanwhile)
     pins = Edits.of_pins(constraints.pins if constraints else ())

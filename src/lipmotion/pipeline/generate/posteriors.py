@@ -7,9 +7,9 @@ from pathlib import Path
 from lipmotion.engines import ENGINES, Engine
 from lipmotion.errors import ExportError, InputError
 from lipmotion.kernels.threads import one_thread
+from lipmotion.pipeline.edit_files import EditFile, edit_file
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.session import Session
-from lipmotion.pipeline.understand.request import SpeechInput
+from lipmotion.pipeline.understand.request import SpeechInput, request_of
 from lipmotion.storage.files import check_target, whole_file
 from lipmotion.types import ChainPosteriors, Generation
 
@@ -17,8 +17,12 @@ SUFFIX = ".png"
 
 
 @one_thread()
-def animate_with_posteriors(speech: SpeechInput, *, model: Model) -> tuple[Generation, tuple[ChainPosteriors, ...]]:
+def animate_with_posteriors(
+    speech: SpeechInput, *, model: Model, edits: EditFile | None = None
+) -> tuple[Generation, tuple[ChainPosteriors, ...]]:
     """Return generated motion as ``animate`` does, and the posterior probabilities of every chain of the model.
+
+    edits : what is changed of the motion; None: nothing
 
     Raises InputError: as ``animate``, or the model's engine has no chains of states.
     """
@@ -29,8 +33,9 @@ def animate_with_posteriors(speech: SpeechInput, *, model: Model) -> tuple[Gener
             f"the engine {engine.name!r} has no chains of states whose posteriors could be shown; give a model that "
             f"was trained with --engine {' or '.join(having)}"
         )
-    session = Session(speech, model=model)
-    return session.generated(), engine.posteriors(learned, session.understood().speech)
+    file = edit_file(edits)
+    session = file.session(request_of(speech), model=model)
+    return session.generated(file.edits), engine.posteriors(learned, session.understood(file.edits).speech)
 
 
 def check_picture(path: Path, speech: Path | None = None) -> None:

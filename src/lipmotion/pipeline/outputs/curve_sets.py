@@ -38,6 +38,14 @@ def check_curve_set(curves: str | Path) -> None:
         raise InputError(f"no set of curves {str(curves)!r}, required one of {', '.join(SHAPE_SETS)}, or a FILE.csv")
 
 
+def curve_names(curves: str | Path | DrivenCharacter) -> tuple[str, ...]:
+    """Return the names that a character or a rig has for its curves; none, for the sets of ``SHAPE_SETS``."""
+    if isinstance(curves, DrivenCharacter):
+        names = curves.mesh.shape_names
+        return (*names, *(arkit_name(name) or name for name in names))
+    return () if curves in SHAPE_SETS else tuple(row.control for row in read_rig_table(Path(curves)))
+
+
 def curves_of(
     motion: Motion,
     units: Timeline[Unit],
