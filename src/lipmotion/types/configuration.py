@@ -62,16 +62,18 @@ class Rule:
 ANY = Rule()
 
 
-def option(default: Any, rule: Rule = ANY, **told: Any) -> Any:
+def option(default: Any, rule: Rule = ANY, *, later: bool = False, **told: Any) -> Any:
     """Return a dataclass field with a default value and a rule for its values.
 
-    told : ``kind``: the type of the values, where it is not that of the default: None, which then is allowed;
-           ``what``: what messages call it. What the command line shows, of options that are there
-           (``cli.arguments.declared``): ``help``, ``metavar``, ``flags`` (the names, where they are others than the
-           field's), ``still`` (the option that lists what of several is switched off). Of files: ``reads`` (what it
-           is), ``replaceable``, ``default_path``, ``writes``, all as of ``cli.arguments.paths``
+    later : the option was added after models were published: a header leaves it out where it has its default value, so
+            that earlier versions can read the model
+    told  : ``kind``: the type of the values, where it is not that of the default: None, which then is allowed;
+            ``what``: what messages call it. What the command line shows, of options that are there
+            (``cli.arguments.declared``): ``help``, ``metavar``, ``flags`` (the names, where they are others than the
+            field's), ``still`` (the option that lists what of several is switched off). Of files: ``reads`` (what it
+            is), ``replaceable``, ``default_path``, ``writes``, all as of ``cli.arguments.paths``
     """
-    return field(default=default, metadata={"rule": rule, **told})
+    return field(default=default, metadata={"rule": rule, "later": later, **told})
 
 
 @dataclass(frozen=True)
@@ -152,7 +154,8 @@ class Configuration:
 
     def as_mapping(self) -> dict[str, Any]:
         """Return the values of all options, by name, as the header of a model stores them."""
-        return asdict(self)
+        later = {each.name: each.default for each in fields(self) if each.metadata.get("later")}
+        return {name: value for name, value in asdict(self).items() if name not in later or value != later[name]}
 
 
 def check_value(option_field: Field[Any], value: Any) -> None:
