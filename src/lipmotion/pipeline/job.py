@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args
 
 from lipmotion.errors import InputError
-from lipmotion.storage.files import read_text_file
 from lipmotion.storage.sources import is_file
 from lipmotion.types.configuration import Configuration, Rule, option
 from lipmotion.types.delivery import Delivery
@@ -236,6 +235,8 @@ class Job(Configuration):
         if sys.version_info < (3, 11):
             raise InputError(f"{path}: job files are read by Python 3.11 or newer; give the options themselves")
         import tomllib
+
+        from lipmotion.storage.files import read_text_file
 
         text = read_text_file(Path(path), "job")
         try:

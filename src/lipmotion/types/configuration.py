@@ -62,18 +62,18 @@ class Rule:
 ANY = Rule()
 
 
-def option(default: Any, rule: Rule = ANY, **told: Any) -> Any:
+def option(default: Any, rule: Rule = ANY, *, later: bool = False, **told: Any) -> Any:
     """Return a dataclass field with a default value and a rule for its values.
 
-    told : ``kind``: the type of the values, where it is not that of the default: None, which then is allowed;
-           ``what``: what messages call it. What the command line shows, of options that are there
-           (``cli.arguments.declared``): ``help``, ``metavar``, ``flags`` (the names, where they are others than the
-           field's), ``still`` (the option that lists what of several is switched off). Of files: ``reads`` (what it
-           is), ``replaceable``, ``default_path``, ``writes``, all as of ``cli.arguments.paths``. ``later``: the option
-           was added after models were published: a header leaves it out where it has its default value, so that earlier
-           versions can read the model
+    later : the option was added after models were published: a header leaves it out where it has its default value, so
+            that earlier versions can read the model
+    told  : ``kind``: the type of the values, where it is not that of the default: None, which then is allowed;
+            ``what``: what messages call it. What the command line shows, of options that are there
+            (``cli.arguments.declared``): ``help``, ``metavar``, ``flags`` (the names, where they are others than the
+            field's), ``still`` (the option that lists what of several is switched off). Of files: ``reads`` (what it
+            is), ``replaceable``, ``default_path``, ``writes``, all as of ``cli.arguments.paths``
     """
-    return field(default=default, metadata={"rule": rule, **told})
+    return field(default=default, metadata={"rule": rule, "later": later, **told})
 
 
 @dataclass(frozen=True)

@@ -54,7 +54,7 @@ def add_outputs(parser: argparse.ArgumentParser, files: str, *, required: bool =
 
 def add_job_file(parser: argparse.ArgumentParser) -> None:
     """Add ``--job``: options from a file. What the command line says is ahead of it."""
-    told = "options from a TOML file, behind those that are given here (docs/api.md)"
+    told = "options from a TOML file; those that are given here are ahead of it (docs/api.md)"
     add_input(parser, "--job", what="job file", action=_JobFile, metavar="FILE.toml", help=told)
     parser.set_defaults(start=Job())
 

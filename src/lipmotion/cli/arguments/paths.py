@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from lipmotion.storage.files import work_folder
 from lipmotion.storage.sources import Source, check_apart, is_folder
 
 
@@ -78,6 +77,8 @@ def add_output(
 
 def check_paths(options: argparse.Namespace) -> None:
     """Raise ExportError if an output of a command is one of its inputs."""
+    from lipmotion.storage.files import work_folder
+
     declared: tuple[OutputArgument, ...] = getattr(options, "writes", ())
     written = [(output, path) for output in declared for path in _paths(getattr(options, output.name))]
     if written:
