@@ -165,8 +165,7 @@ def _still_differences(pictures: Pictures) -> NDArray[np.float32]:
     moved = np.abs(steps).mean(axis=(1, 2, 3))
     moved = np.maximum(moved[1:], moved[:-1])
     still = np.argsort(moved, kind="stable")[: max(1, round(STILL_SHARE * len(moved)))]
-    differences: NDArray[np.float32] = steps[still + 1] - steps[still]
-    return differences
+    return steps[still + 1] - steps[still]
 
 
 def _neighbours(values: NDArray[np.float32], axis: int) -> Array:

@@ -110,8 +110,7 @@ def feather(mask: NDArray[np.bool_], width_px: float) -> Floats:
         raise InputError(f"feather of {width_px} px, required at least 1")
     distance = distance_transform_edt(np.pad(mask, 1))[1:-1, 1:-1]
     share = np.clip(distance / width_px, 0, 1)
-    weight: Floats = (share * share * (3 - 2 * share)).astype(np.float32)
-    return weight
+    return (share * share * (3 - 2 * share)).astype(np.float32)
 
 
 def place(frame: NDArray[np.uint8], patch: Pictures, weight: Floats, to_frame: Array, kind: Kind = "cubic") -> None:

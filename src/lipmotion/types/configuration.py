@@ -156,5 +156,4 @@ def _from_text(option_field: Field[Any], text: str) -> Any:
 
 def _kind(option_field: Field[Any]) -> type[Any]:
     """Return the type of an option: that of its default value."""
-    kind: type[Any] = type(option_field.default)
-    return kind
+    return type(option_field.default)

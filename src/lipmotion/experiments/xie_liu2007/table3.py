@@ -158,8 +158,7 @@ def table3(
     about |= {"workers": settings.workers, "order": "given" if order is not None else "shuffled"}
     about |= {"mixtures": list(mixtures), "visual": options.visual}
     about |= {"channels": list(recordings.channels), "closed_under": recordings.closed_under}
-    figures: dict[str, Any] = nan_as_null(about | {"rows": rows, "noise": noise_rows})
-    return figures
+    return nan_as_null(about | {"rows": rows, "noise": noise_rows})
 
 
 @dataclass(frozen=True, eq=False)
