@@ -53,6 +53,18 @@ class Camera:
         """The place of the camera [shape=(3,)]."""
         return np.array([*self.centre, self.distance])
 
+    def box(self, screen: Real) -> tuple[int, int, int, int] | None:
+        """Return first column and row, and the column and row behind the last ones, around what ``on_screen`` returned.
+
+        None: it is outside the picture.
+        """
+        size = self.width, self.height
+        left, top = (max(0, int(edge - 2)) for edge in screen[:, :2].min(axis=0))
+        right, bottom = (
+            min(most, int(np.ceil(edge + 2))) for edge, most in zip(screen[:, :2].max(axis=0), size, strict=True)
+        )
+        return (left, top, right, bottom) if left < right and top < bottom else None
+
 
 class Canvas:
     """A picture on which triangles are drawn, four samples a pixel.
@@ -87,12 +99,8 @@ class Canvas:
         """
         screen = self.camera.on_screen(places)
         picture = (self.empty if onto is None else onto).copy()
-        columns, rows = screen[moving, 0], screen[moving, 1]
-        left, top = (max(0, int(edges.min() - 2)) for edges in (columns, rows))
-        right = min(self.camera.width, int(np.ceil(columns.max() + 2)))
-        bottom = min(self.camera.height, int(np.ceil(rows.max() + 2)))
-        if left < right and top < bottom:
-            area = (left, top, right, bottom)
+        area = self.camera.box(screen[moving])
+        if area is not None:
             draw(screen, colours, triangles, area, self.background, self._tone, picture)
         return picture
 
