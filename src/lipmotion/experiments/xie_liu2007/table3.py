@@ -266,17 +266,13 @@ def _statistics(recordings: HeldOutRecordings, made: Sequence[ComparedClip]) -> 
     statistics = {}
     for part, columns in parts.items():
         if columns.any():
-            generated, original = ([side[:, columns] for side in sides] for sides in _sides(made))
+            generated = [clip.generated[:, columns] for clip in made]
+            original = [clip.original[:, columns] for clip in made]
             statistics[f"{part}amse"] = distance_statistic(generated, original)
             statistics[f"{part}acc"] = correlation_statistic(generated, original)
     if OPENING in recordings.channels:
         statistics["opening_acc"] = correlation_statistic(*opening_curves(recordings, made))
     return statistics
-
-
-def _sides(made: Sequence[ComparedClip]) -> tuple[list[Array], list[Array]]:
-    """Return the generated and the original curves."""
-    return [clip.generated for clip in made], [clip.original for clip in made]
 
 
 def _noise_rows(trained: _TrainedSystems, noise: NoiseConditions, seed: int, monitor: Monitor) -> list[dict[str, Any]]:
