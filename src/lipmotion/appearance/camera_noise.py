@@ -45,11 +45,6 @@ class CameraNoise:
     covariance: Array
     spread_px: Array
 
-    @property
-    def deviation(self) -> Array:
-        """Standard deviation of red, green and blue [shape=(3,)], grey levels."""
-        return np.sqrt(np.diag(self.covariance))
-
 
 def estimate_noise(clips: Iterable[Pictures]) -> CameraNoise:
     """Return the noise of recorded mouth pictures.
