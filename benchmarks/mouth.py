@@ -45,10 +45,11 @@ from lipmotion.faces.head.performance import head_poses
 from lipmotion.faces.head.pose import CharacterPose
 from lipmotion.faces.head.shapes import head_mesh
 from lipmotion.faces.head.stage import figure
-from lipmotion.meshes.files.gltf_writer import write_glb
+from lipmotion.meshes.files.gltf_writer import write_gltf_scene
 from lipmotion.meshes.fitting.driven import driven_character
 from lipmotion.meshes.fitting.lip_placement import LipPlacement, placed_by_shape
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
+from lipmotion.meshes.model.scene import Scene
 from lipmotion.meshes.model.surface import mesh_surface
 from lipmotion.motion.predictors import Predictor
 from lipmotion.motion.reliability import phone_reliability
@@ -285,7 +286,7 @@ def millimetres(options: argparse.Namespace, model: Model) -> None:
     show_lips("3D head", 1000 * METRES * gaps, units, time_s, at_rest_mm=1000 * METRES * apart(mesh.vertices, lips))
     with tempfile.TemporaryDirectory() as folder:
         three = Path(folder) / "A E O.glb"
-        write_glb(three, three_shapes(mesh))
+        write_gltf_scene(three, Scene(three_shapes(mesh)))
         for path in (three, *characters(options.characters)):
             lips_of_character(path, result, time_s)
 

@@ -62,8 +62,7 @@ class Registry(Generic[ExtensionT]):
         """
         if name in self.built_in:
             module, _, attribute = self.built_in[name].partition(":")
-            extension: ExtensionT = getattr(import_module(module), attribute)
-            return extension
+            return getattr(import_module(module), attribute)
         if name not in self._installed:
             raise InputError(f"no {self.kind} {name!r}; there are: {', '.join(self.names)}")
         entry = self._installed[name]

@@ -53,7 +53,7 @@ def test_its_parts(appearance: Appearance, footage: FootagePictures) -> None:
     assert len(appearance.jaws) == JAW_CANDIDATES
     assert appearance.from_motion.names == ("opening", "width", "outer")
     assert (appearance.mouth.explained > 0.98).all()
-    assert appearance.noise.deviation == pytest.approx([NOISE] * 3, rel=0.05)
+    assert np.sqrt(np.diag(appearance.noise.covariance)) == pytest.approx([NOISE] * 3, rel=0.05)
     light = np.median(cheek_light(np.concatenate(footage.clips)[MOUTH]), axis=0)
     assert appearance.light == pytest.approx(light)
 

@@ -12,8 +12,7 @@ import pytest
 from cli.conftest import RunCommand, is_one_error
 from lipmotion.export.base import read_motion
 from lipmotion.meshes.files.character_files import read_character
-from lipmotion.meshes.files.gltf_writer import write_glb
-from meshes.heads import head, lip_points
+from meshes.heads import head, lip_points, write_glb
 from meshes.obj_writing import write_obj
 
 

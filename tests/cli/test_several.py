@@ -16,10 +16,9 @@ import pytest
 from cli.conftest import RunCommand, is_one_error
 from lipmotion.cli.main import main
 from lipmotion.export.base import read_motion
-from lipmotion.meshes.files.gltf_writer import write_glb
 from lipmotion.meshes.fitting.driven import DrivenCharacter, driven_character
 from lipmotion.testing.toy import ToySentence
-from meshes.heads import head
+from meshes.heads import head, write_glb
 
 
 @pytest.fixture

@@ -10,11 +10,10 @@ import pytest
 from lipmotion.errors import InputError
 from lipmotion.faces.base import Staging
 from lipmotion.faces.mesh import MeshFace, MeshStage
-from lipmotion.meshes.files.gltf_writer import write_glb
 from lipmotion.meshes.fitting.driven import DrivenCharacter, driven_character
 from lipmotion.meshes.model.bones import HEAD, NECK, Bone
 from lipmotion.meshes.model.mesh import Material, Mesh, MeshPart
-from meshes.heads import head
+from meshes.heads import head, write_glb
 from meshes.speech import motion, units
 
 STILL = Staging(blinks=False, gaze=False, brows=False, head=False)

@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Mapping
+from pathlib import Path
 
-from lipmotion.meshes.model.mesh import Blendshape, Mesh, joined
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.meshes.files.gltf_writer import write_gltf_scene
+from lipmotion.meshes.model.mesh import Blendshape, Mesh, MeshPart
+from lipmotion.meshes.model.scene import Scene
+from lipmotion.types import Motion
 
 SEAM, HALF = -0.86, 0.3
 """Height of the mouth and half its width, in eye distances."""
@@ -99,3 +106,50 @@ def _under(mesh: Mesh):
     under = mesh.vertices[:, 1] < SEAM - 1e-9
     under[sheet:] = True
     return under
+
+
+def joined(meshes: Mapping[str, Mesh]) -> Mesh:
+    """Return one mesh of several ones; each gives one part of its name, of the material of its first part.
+
+    Blendshapes of one name become one. Texture coordinates remain where one has some, and are 0 in the others; colours
+    remain where all have some.
+    """
+    offsets = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes.values())])
+    triangles = [mesh.triangles + offset for mesh, offset in zip(meshes.values(), offsets, strict=False)]
+    stops = np.cumsum([0, *(len(rows) for rows in triangles)])
+    parts = [
+        MeshPart(name, int(first), int(stop), mesh.parts[0].material)
+        for (name, mesh), first, stop in zip(meshes.items(), stops, stops[1:], strict=False)
+    ]
+    shapes: dict[str, list[tuple[NDArray[np.int64], NDArray[np.float64]]]] = {}
+    for mesh, offset in zip(meshes.values(), offsets, strict=False):
+        for shape in mesh.shapes:
+            shapes.setdefault(shape.name, []).append((shape.rows + offset, shape.displacements))
+    uv = [np.zeros((*mesh.triangles.shape, 2)) if mesh.uv is None else mesh.uv for mesh in meshes.values()]
+    mapped = any(mesh.uv is not None for mesh in meshes.values())
+    colours = [mesh.colours for mesh in meshes.values() if mesh.colours is not None]
+    return Mesh(
+        np.concatenate([mesh.vertices for mesh in meshes.values()]),
+        np.concatenate(triangles).astype(np.int32),
+        tuple(parts),
+        tuple(
+            Blendshape(name, np.concatenate([rows for rows, _ in moved]), np.concatenate([way for _, way in moved]))
+            for name, moved in shapes.items()
+        ),
+        np.concatenate(uv) if mapped else None,
+        np.concatenate(colours) if len(colours) == len(meshes) else None,
+    )
+
+
+def shaped(mesh: Mesh, weights: dict[str, float]) -> NDArray[np.float64]:
+    """The vertices under weights of blendshapes; the others have weight 0."""
+    assert weights.keys() <= set(mesh.shape_names)
+    vertices = mesh.vertices.copy()
+    for shape in mesh.shapes:
+        vertices[shape.rows] += weights.get(shape.name, 0.0) * shape.displacements
+    return vertices
+
+
+def write_glb(path: Path, mesh: Mesh, weights: Motion | None = None) -> None:
+    """A mesh with its blendshapes, and their weights over time, as a file."""
+    write_gltf_scene(path, Scene(mesh, weights))

@@ -71,7 +71,7 @@ def test_the_face_beyond_the_mouth_stands_still(binding, mesh):
 
 def test_teeth_follow_the_jaw(binding, mesh):
     template = mouth_template()
-    teeth = mesh.part("teeth")
+    teeth = next(part for part in mesh.parts if part.name == "teeth")
     rows = np.unique(mesh.triangles[teeth.first : teeth.stop])
     moved = _moved(binding, mesh, template.jaw, [0, -0.5, 0])
     np.testing.assert_allclose(moved[rows], np.tile([0, -0.5, 0], (3, 1)), atol=1e-9)

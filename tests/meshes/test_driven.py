@@ -7,9 +7,8 @@ import pytest
 
 from lipmotion.errors import InputError
 from lipmotion.meshes.files.binding_files import save_binding, write_weights
-from lipmotion.meshes.files.gltf_writer import write_glb
 from lipmotion.meshes.fitting.driven import driven_character
-from meshes.heads import head, lip_points
+from meshes.heads import head, lip_points, write_glb
 from meshes.obj_writing import write_obj
 from meshes.speech import motion, units
 

@@ -12,6 +12,7 @@ import pytest
 from lipmotion.errors import InputError
 from lipmotion.meshes.files.gltf_scene import read_gltf
 from meshes.gltf import INDICES, OPEN, POSITIONS, WIDE, data_uri, document, glb, packed_attributes
+from meshes.heads import shaped
 
 
 def _read(tmp_path, content, binary=None, name="head.glb"):
@@ -26,7 +27,7 @@ def test_a_mesh_with_morph_targets(tmp_path):
     assert mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3]]
     assert mesh.shape_names == ("jawOpen", "mouthWide")
     assert mesh.parts[0].name == "head"
-    np.testing.assert_allclose(mesh.shaped({"jawOpen": 0.5, "mouthWide": 1}), POSITIONS + OPEN / 2 + WIDE, atol=1e-7)
+    np.testing.assert_allclose(shaped(mesh, {"jawOpen": 0.5, "mouthWide": 1}), POSITIONS + OPEN / 2 + WIDE, atol=1e-7)
 
 
 @pytest.mark.parametrize("place", ["data", "file"])
@@ -47,7 +48,7 @@ def test_nodes_turn_scale_and_shift(tmp_path):
     mesh = _read(tmp_path, content, binary)
     turned = np.stack([-2 * POSITIONS[:, 1], 2 * POSITIONS[:, 0] + 10, POSITIONS[:, 2]], axis=1)
     np.testing.assert_allclose(mesh.vertices, turned, atol=1e-6)
-    np.testing.assert_allclose(mesh.shaped({"jawOpen": 1})[2] - mesh.vertices[2], [-1, 0, 0], atol=1e-6)
+    np.testing.assert_allclose(shaped(mesh, {"jawOpen": 1})[2] - mesh.vertices[2], [-1, 0, 0], atol=1e-6)
 
 
 def test_quantised_positions(tmp_path):
@@ -72,7 +73,7 @@ def test_sparse_targets(tmp_path):
     sparse = {"count": 2, "indices": {"bufferView": 4, "componentType": 5123}, "values": {"bufferView": 5}}
     content["accessors"][1] = {"componentType": 5126, "count": 4, "type": "VEC3", "sparse": sparse}
     mesh = _read(tmp_path, content, binary + rows.tobytes() + moved.tobytes())
-    np.testing.assert_allclose(mesh.shaped({"jawOpen": 1}), POSITIONS + OPEN, atol=1e-7)
+    np.testing.assert_allclose(shaped(mesh, {"jawOpen": 1}), POSITIONS + OPEN, atol=1e-7)
 
 
 def test_compressed_attributes(tmp_path):
@@ -110,7 +111,7 @@ def test_skins_at_rest(tmp_path):
     content["meshes"][0]["primitives"][0]["attributes"] |= {"JOINTS_0": 4, "WEIGHTS_0": 5}
     mesh = _read(tmp_path, content, binary + joints.tobytes() + weights.tobytes())
     np.testing.assert_allclose(mesh.vertices, [[0, 1, 0], [1, 1, 0], [2, 2, 0], [0, 2, 0]], atol=1e-6)
-    np.testing.assert_allclose(mesh.shaped({"jawOpen": 1})[2], [2, 3, 0], atol=1e-6)
+    np.testing.assert_allclose(shaped(mesh, {"jawOpen": 1})[2], [2, 3, 0], atol=1e-6)
 
 
 def test_expressions_of_vrm(tmp_path):
@@ -119,7 +120,7 @@ def test_expressions_of_vrm(tmp_path):
     content["extensions"] = {"VRMC_vrm": {"expressions": {"preset": {"aa": {"morphTargetBinds": [bind]}}}}}
     mesh = _read(tmp_path, content, binary, "head.vrm")
     assert mesh.shape_names == ("jawOpen", "mouthWide", "aa")
-    np.testing.assert_allclose(mesh.shaped({"aa": 1}), POSITIONS + OPEN / 2, atol=1e-7)
+    np.testing.assert_allclose(shaped(mesh, {"aa": 1}), POSITIONS + OPEN / 2, atol=1e-7)
 
 
 def test_characters_of_vrm_0_are_turned_to_the_front(tmp_path):
@@ -128,7 +129,7 @@ def test_characters_of_vrm_0_are_turned_to_the_front(tmp_path):
     content["extensions"] = {"VRM": {"blendShapeMaster": {"blendShapeGroups": [group]}}}
     mesh = _read(tmp_path, content, binary, "head.vrm")
     np.testing.assert_allclose(mesh.vertices, POSITIONS * [-1, 1, -1], atol=1e-7)
-    np.testing.assert_allclose(mesh.shaped({"aa": 1}), (POSITIONS + WIDE) * [-1, 1, -1], atol=1e-7)
+    np.testing.assert_allclose(shaped(mesh, {"aa": 1}), (POSITIONS + WIDE) * [-1, 1, -1], atol=1e-7)
 
 
 def _changed(change):

@@ -9,9 +9,8 @@ from lipmotion.errors import ExportError
 from lipmotion.meshes.files.character_files import read_character
 from lipmotion.meshes.files.gltf_accessors import GltfArrays
 from lipmotion.meshes.files.gltf_container import read_gltf_document
-from lipmotion.meshes.files.gltf_writer import write_glb
 from lipmotion.types import WEIGHT, Channel, Motion
-from meshes.heads import head
+from meshes.heads import head, shaped, write_glb
 
 
 @pytest.fixture
@@ -26,7 +25,7 @@ def test_a_mesh_comes_back(tmp_path):
     read = read_character(tmp_path / "head.glb")
     assert read.shape_names == mesh.shape_names
     for name in ("jawOpen", "mouthSmileLeft", "eyeBlinkLeft"):
-        written, again = mesh.shaped({name: 1.0})[mesh.triangles], read.shaped({name: 1.0})[read.triangles]
+        written, again = shaped(mesh, {name: 1.0})[mesh.triangles], shaped(read, {name: 1.0})[read.triangles]
         np.testing.assert_allclose(again, written, atol=1e-5)
 
 

@@ -8,7 +8,7 @@ from lipmotion.meshes.fitting.driven import driven_character
 from lipmotion.meshes.model.bones import HEAD, JAW, LEFT_EYE, NECK, RIGHT_EYE, Bone, bone_kind, merged_bones
 from lipmotion.meshes.model.jaw_bone import JAW_OPEN, with_jaw
 from meshes.gltf import POSITIONS, document, glb
-from meshes.heads import SEAM, head
+from meshes.heads import SEAM, head, shaped, write_glb
 from meshes.speech import motion, units
 
 
@@ -29,7 +29,7 @@ def test_bones_are_known_by_their_names():
 def test_a_jaw_bone_opens_the_mouth():
     mesh = with_jaw(with_bone(head(shapes=False)))
     assert mesh.shape_names == (JAW_OPEN,)
-    moved = mesh.shaped({JAW_OPEN: 1}) - mesh.vertices
+    moved = shaped(mesh, {JAW_OPEN: 1}) - mesh.vertices
     chin = int(np.abs(mesh.vertices - [0, -16, 0]).sum(axis=1).argmin())
     assert moved[chin, 1] < -1
     assert np.abs(moved[mesh.vertices[:, 1] > 10 * SEAM + 1]).max() == pytest.approx(0)
@@ -43,7 +43,6 @@ def test_a_mesh_that_opens_its_mouth_already_keeps_its_shapes():
 
 def test_a_character_with_a_jaw_bone_alone_follows_the_motion(tmp_path):
     """The square of two triangles is no head; the made head has no skin. So the bone is put on the read mesh."""
-    from lipmotion.meshes.files.gltf_writer import write_glb
     from lipmotion.meshes.fitting import driven
 
     path = tmp_path / "head.glb"

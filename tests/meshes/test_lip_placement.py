@@ -11,7 +11,7 @@ from lipmotion.meshes.fitting import lip_placement
 from lipmotion.meshes.fitting.lip_placement import placed_by_points, placed_by_shape, surface_of_named
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
 from lipmotion.meshes.model.surface import mesh_surface
-from meshes.heads import COLUMNS, HALF, SEAM, SIZE, head, lip_points
+from meshes.heads import COLUMNS, HALF, SEAM, SIZE, head, lip_points, shaped
 
 GRID = 0.05 * SIZE
 """The distance between vertices."""
@@ -45,7 +45,7 @@ def test_upper_points_are_on_the_upper_lip(named):
     mesh = head()
     surface = mesh_surface(mesh)
     placement = _named(mesh) if named else placed_by_shape(mesh, surface)
-    drop = (mesh.shaped({"jawOpen": 1.0}) - mesh.vertices)[placement.vertices, 1]
+    drop = (shaped(mesh, {"jawOpen": 1.0}) - mesh.vertices)[placement.vertices, 1]
     template = mouth_template()
     middle = np.abs(template.places[:, 0]) < 0.2
     assert np.abs(drop[template.upper]).max() < 1e-9

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.meshes.model.mesh import Blendshape, Material, Mesh, MeshPart, joined
+from lipmotion.meshes.model.mesh import Blendshape, Mesh, MeshPart
 
 CORNERS = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
 SQUARE = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
@@ -16,11 +16,6 @@ def _mesh(**changes) -> Mesh:
     up = Blendshape("up", np.array([2, 3]), np.array([[0.0, 1, 0], [0, 2, 0]]))
     out = Blendshape("out", np.array([3]), np.array([[0.0, 0, 4]]))
     return Mesh(**({"vertices": CORNERS, "triangles": SQUARE, "shapes": (up, out)} | changes))
-
-
-def test_weights_add_displacements():
-    moved = _mesh().shaped({"up": 0.5, "out": 0.25})
-    np.testing.assert_allclose(moved - CORNERS, [[0, 0, 0], [0, 0, 0], [0, 0.5, 0], [0, 1, 1]], atol=1e-12)
 
 
 def test_displacements_of_some_vertices():
@@ -33,11 +28,6 @@ def test_a_blendshape_keeps_only_what_moves():
     shape[1] += [0, 0, 1e-9]
     shape[2] += [0, 0, 0.5]
     assert Blendshape.between("a", CORNERS, shape, least=1e-6).rows.tolist() == [2]
-
-
-def test_an_unknown_weight_is_named():
-    with pytest.raises(InputError, match="'jawOpen', required one of up, out"):
-        _mesh().shaped({"jawOpen": 1.0})
 
 
 WRONG = [
@@ -60,11 +50,3 @@ def test_what_does_not_fit_is_refused():
     for changes, message in WRONG:
         with pytest.raises(InputError, match=message):
             _mesh(**changes)
-
-
-def test_joined_meshes_keep_parts_and_shapes():
-    red = (MeshPart("", 0, 2, Material("red", (1, 0, 0))),)
-    both = joined({"a": _mesh(), "b": _mesh(parts=red)})
-    assert [(part.name, part.first, part.stop) for part in both.parts] == [("a", 0, 2), ("b", 2, 4)]
-    assert both.part("b").material.name == "red"
-    np.testing.assert_allclose(both.shaped({"up": 1.0})[4:], _mesh().shaped({"up": 1.0}), atol=1e-12)

@@ -8,7 +8,7 @@ import pytest
 from lipmotion.errors import InputError
 from lipmotion.meshes.files.character_files import read_character
 from lipmotion.meshes.files.obj_files import read_obj
-from meshes.heads import head
+from meshes.heads import head, shaped
 from meshes.obj_writing import write_obj
 
 QUAD = (
@@ -47,11 +47,11 @@ def test_a_folder_has_a_neutral_mesh_and_shapes(tmp_path):
     mesh = head()
     write_obj(tmp_path / "my_neutral.obj", mesh)
     for name in ("jawOpen", "mouthPucker"):
-        write_obj(tmp_path / f"{name}.obj", mesh, mesh.shaped({name: 1.0}))
+        write_obj(tmp_path / f"{name}.obj", mesh, shaped(mesh, {name: 1.0}))
     write_obj(tmp_path / "older_person.obj", mesh)
     read = read_character(tmp_path)
     assert read.shape_names == ("jawOpen", "mouthPucker")
-    np.testing.assert_allclose(read.shaped({"jawOpen": 1}), mesh.shaped({"jawOpen": 1}), atol=1e-3)
+    np.testing.assert_allclose(shaped(read, {"jawOpen": 1}), shaped(mesh, {"jawOpen": 1}), atol=1e-3)
 
 
 def test_what_is_written_is_read(tmp_path):

@@ -3,7 +3,8 @@ import pytest
 
 from lipmotion.errors import InputError
 from lipmotion.meshes.model.mesh import Material, Mesh, MeshPart
-from lipmotion.meshes.rendering.rasteriser import Camera, Canvas, flat, gradient, normals_of, picture_of
+from lipmotion.meshes.rendering.lighting import Finish, Lighting, linear
+from lipmotion.meshes.rendering.rasteriser import Camera, Canvas, flat, gradient, normals_of
 
 CAMERA = Camera(120, 100, (0.5, -0.25), across=2.0, distance=8.0)
 
@@ -16,6 +17,19 @@ def ball(rows: int = 24, columns: int = 36, radius: float = 0.5) -> Mesh:
     triangles = np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3).astype(np.int32)
     part = MeshPart("ball", 0, len(triangles), Material("", (0.9, 0.2, 0.1), 0.3))
     return Mesh(radius * places.reshape(-1, 3), triangles, (part,))
+
+
+def picture_of(mesh: Mesh, camera: Camera) -> np.ndarray:
+    """A picture of a mesh, each part in the colour and gloss of its material."""
+    vertices = mesh.vertices
+    colours, kinds = np.zeros_like(vertices), np.zeros(len(vertices), np.intp)
+    for number, part in enumerate(mesh.parts):
+        rows = np.unique(mesh.triangles[part.first : part.stop])
+        colours[rows], kinds[rows] = linear(part.material.colour), number
+    glosses = [part.material.gloss for part in mesh.parts]
+    lighting = Lighting([Finish((0.3, 0.2, 0.15), gloss=0.5 * gloss, focus=4 + round(2 * gloss)) for gloss in glosses])
+    light = lighting.light(vertices, normals_of(vertices, mesh.triangles), colours, kinds, camera.place)
+    return Canvas(camera).picture(vertices, light, mesh.triangles)
 
 
 def test_the_centre_is_in_the_middle_of_the_picture():

@@ -8,7 +8,7 @@ import pytest
 from lipmotion.errors import ExportError, InputError
 from lipmotion.meshes.model.scene import HeadTurn, Scene, shading_normals
 from lipmotion.types import WEIGHT, Channel, Motion
-from meshes.heads import head
+from meshes.heads import head, shaped
 
 
 def weights(name: str = "jawOpen") -> Motion:
@@ -41,7 +41,7 @@ def test_normals_are_of_length_one_and_turn_with_the_shape() -> None:
     assert np.linalg.norm(normals.rest, axis=1) == pytest.approx(np.ones(len(mesh.vertices)))
     number = mesh.shape_names.index("jawOpen")
     rows, change = normals.turned[number]
-    moved = type(mesh)(mesh.shaped({"jawOpen": 1.0}), mesh.triangles, mesh.parts)
+    moved = type(mesh)(shaped(mesh, {"jawOpen": 1.0}), mesh.triangles, mesh.parts)
     after = shading_normals(moved, split=False).rest
     assert len(rows) > 10
     inner = np.isin(rows, mesh.shapes[number].rows)

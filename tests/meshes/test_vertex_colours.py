@@ -9,11 +9,11 @@ from lipmotion.errors import InputError
 from lipmotion.faces.head.shapes import head_mesh
 from lipmotion.faces.head.stage import figure
 from lipmotion.meshes.files.gltf_scene import read_gltf
-from lipmotion.meshes.files.gltf_writer import write_glb
 from lipmotion.meshes.files.obj_files import read_obj, read_obj_folder
 from lipmotion.meshes.model.mesh import BLEND, MASK, OPAQUE
 from lipmotion.meshes.rendering.lighting import linear
 from meshes.gltf import document, glb, textured_document, with_colours
+from meshes.heads import write_glb
 from meshes.test_textures import encoded, picture_of
 
 LIGHT = np.array([[1.0, 0.0, 0.5], [0.2, 1.0, 0.0], [0.0, 0.25, 1.0], [0.75, 0.5, 0.0]])

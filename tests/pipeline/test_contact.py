@@ -20,7 +20,6 @@ from lipmotion.faces.head.shape_fit import lip_gap
 from lipmotion.faces.head.shapes import head_mesh
 from lipmotion.faces.head.stage import figure
 from lipmotion.faces.portrait.frames import face_poses
-from lipmotion.meshes.files.gltf_writer import write_glb
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter, driven_character
 from lipmotion.meshes.fitting.facial_animation import FAP
@@ -31,7 +30,7 @@ from lipmotion.pipeline.outputs.delivered import delivered
 from lipmotion.pipeline.outputs.motion_files import in_format, resampled_curves
 from lipmotion.pipeline.outputs.scenes import character_scene, head_scene
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
-from meshes.heads import head, lip_points
+from meshes.heads import head, lip_points, write_glb
 from meshes.obj_writing import write_obj
 from meshes.speech import motion, units
 

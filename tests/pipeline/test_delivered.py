@@ -13,7 +13,6 @@ from lipmotion.articulation.contact import closures
 from lipmotion.articulation.delivery import Delivery
 from lipmotion.export.base import read_motion
 from lipmotion.faces import Face, Staging
-from lipmotion.meshes.files.gltf_writer import write_glb
 from lipmotion.meshes.fitting.driven import driven_character
 from lipmotion.pipeline.outputs.curve_sets import with_curves
 from lipmotion.pipeline.outputs.delivered import held_mouth, shown
@@ -23,7 +22,7 @@ from lipmotion.pipeline.outputs.scenes import delivered_scene
 from lipmotion.pipeline.outputs.shown_faces import shown_face
 from lipmotion.pipeline.outputs.write import write
 from lipmotion.types import Generation, Prosody, StateTrace
-from meshes.heads import head
+from meshes.heads import head, write_glb
 from meshes.speech import motion, units
 
 

@@ -15,14 +15,13 @@ from lipmotion.faces.head.shapes import head_mesh
 from lipmotion.faces.head.stage import figure
 from lipmotion.meshes.files.gltf_accessors import GltfArrays
 from lipmotion.meshes.files.gltf_container import read_gltf_document
-from lipmotion.meshes.files.gltf_writer import write_glb
 from lipmotion.meshes.fitting.driven import driven_character
 from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.output import OutputSettings
 from lipmotion.pipeline.outputs.scenes import SceneOutput, character_scene, head_scene, sound_reference, write_scene
 from lipmotion.pipeline.outputs.shown_faces import shown_face
 from lipmotion.types import Channel, Generation, Motion, StateTrace
-from meshes.heads import head
+from meshes.heads import head, write_glb
 from meshes.speech import motion, units
 from programs import gltf_report, gltf_validator, python_with, run_with
 

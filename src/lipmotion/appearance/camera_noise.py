@@ -45,11 +45,6 @@ class CameraNoise:
     covariance: Array
     spread_px: Array
 
-    @property
-    def deviation(self) -> Array:
-        """Standard deviation of red, green and blue [shape=(3,)], grey levels."""
-        return np.sqrt(np.diag(self.covariance))
-
 
 def estimate_noise(clips: Iterable[Pictures]) -> CameraNoise:
     """Return the noise of recorded mouth pictures.
@@ -165,8 +160,7 @@ def _still_differences(pictures: Pictures) -> NDArray[np.float32]:
     moved = np.abs(steps).mean(axis=(1, 2, 3))
     moved = np.maximum(moved[1:], moved[:-1])
     still = np.argsort(moved, kind="stable")[: max(1, round(STILL_SHARE * len(moved)))]
-    differences: NDArray[np.float32] = steps[still + 1] - steps[still]
-    return differences
+    return steps[still + 1] - steps[still]
 
 
 def _neighbours(values: NDArray[np.float32], axis: int) -> Array:

@@ -173,8 +173,7 @@ def squared_distances(some: Values, others: Values) -> Values:
     """Return the squared distances between rows of two tables [shape=(M, D) and (N, D)]: float32 [shape=(M, N)]."""
     products = some @ others.T
     lengths = np.einsum("nd,nd->n", some, some)[:, None] + np.einsum("nd,nd->n", others, others)
-    distances: Values = np.maximum(lengths - 2 * products, 0)
-    return distances
+    return np.maximum(lengths - 2 * products, 0)
 
 
 LARGEST_COEFFICIENT = 1e6

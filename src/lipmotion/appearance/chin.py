@@ -41,8 +41,7 @@ def moved_part(scale: int) -> Mask:
     x, y = (columns + 0.5) / scale + CORNER[0], (rows + 0.5) / scale + CORNER[1]
     top, bottom = CORNER[1] + 14.0, CORNER[1] + HEIGHT - 2.0
     middle = (top + bottom) / 2
-    inside: Mask = (np.abs(x) / SIDE_PX[1]) ** 4 + (np.abs(y - middle) / (bottom - middle)) ** 4 <= 1
-    return inside
+    return (np.abs(x) / SIDE_PX[1]) ** 4 + (np.abs(y - middle) / (bottom - middle)) ** 4 <= 1
 
 
 def with_chin_moved(pictures: Pictures, chin_px: Array, drops_px: Array) -> Pictures:
@@ -87,12 +86,10 @@ def _moved(picture: Pictures, chin_px: float, drops: Array, scale: int) -> Pictu
 def _rise(values: Array, start: Array | float, stop: Array | float) -> Array:
     """Return 0 up to ``start``, 1 from ``stop`` on, and a smooth rise between (3t² − 2t³)."""
     share = np.clip((values - start) / (np.asarray(stop) - start), 0, 1)
-    rise: Array = share * share * (3 - 2 * share)
-    return rise
+    return share * share * (3 - 2 * share)
 
 
 def _weight(distance: NDArray[np.float32]) -> NDArray[np.float32]:
     near = ((A + 2) * distance - (A + 3)) * distance**2 + 1
     far = A * (((distance - 5) * distance + 8) * distance - 4)
-    weights: NDArray[np.float32] = np.where(distance <= 1, near, np.where(distance < 2, far, 0)).astype(np.float32)
-    return weights
+    return np.where(distance <= 1, near, np.where(distance < 2, far, 0)).astype(np.float32)

@@ -63,8 +63,7 @@ class FrameDescriptors:
         rows = self.standardised(scenes)
         rows = rows - rows.mean(axis=0)
         power = np.square(rows).sum(axis=1)
-        squares: Array = np.sqrt(np.maximum(power[:, None] + power - 2 * rows @ rows.T, 0))
-        return squares
+        return np.sqrt(np.maximum(power[:, None] + power - 2 * rows @ rows.T, 0))
 
 
 def describe_frames(frames: Iterable[NDArray[np.uint8]], face_to_image: Array) -> FrameDescriptors:
@@ -113,8 +112,7 @@ def _cells(grey: Array, cell: int) -> Array:
     height, width = (side // cell for side in grey.shape)
     if not height or not width:
         return grey.mean(keepdims=True)
-    means: Array = grey[: height * cell, : width * cell].reshape(height, cell, width, cell).mean(axis=(1, 3))
-    return means
+    return grey[: height * cell, : width * cell].reshape(height, cell, width, cell).mean(axis=(1, 3))
 
 
 def _sampled(grey: Array, to_image: Array, box: tuple[float, float, float, float], step: float) -> Array:
@@ -139,8 +137,7 @@ def _between(image: Array, rows: Array, columns: Array) -> Array:
     down, across = rows - top, columns - left
     upper = (1 - across) * image[top, left] + across * image[top, beside]
     under = (1 - across) * image[below, left] + across * image[below, beside]
-    samples: Array = (1 - down) * upper + down * under
-    return samples
+    return (1 - down) * upper + down * under
 
 
 def _inside(

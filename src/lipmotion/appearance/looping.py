@@ -240,8 +240,7 @@ def _busy(eyes: Array, rate_hz: float, scenes: Sequence[tuple[int, int]]) -> NDA
         change[start : stop - 1] = steps
         change[start + 1 : stop] = np.maximum(change[start + 1 : stop], steps)
     ordinary = np.median(change[change > 0]) if (change > 0).any() else np.inf
-    busy: NDArray[np.bool_] = binary_dilation(change > BUSY * ordinary, iterations=max(1, round(BUSY_S * rate_hz)))
-    return busy
+    return binary_dilation(change > BUSY * ordinary, iterations=max(1, round(BUSY_S * rate_hz)))
 
 
 def _restlessness(rows: Array, scenes: Sequence[tuple[int, int]]) -> Array:

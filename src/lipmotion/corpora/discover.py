@@ -36,15 +36,11 @@ def discover(directory: Path) -> RecordingFolder:
     if not directory.is_dir():
         raise InputError(f"{directory}: no such folder; give a folder of recordings")
     check_listable(directory)
-    found = next(filter(None, (READERS.load(name)(directory) for name in _order())))
+    readers = sorted(READERS.names, key=lambda name: name == "folder")  # the one that reads any folder is the last
+    found = next(filter(None, (READERS.load(name)(directory) for name in readers)))
     if not found.recordings and not found.problems:
         raise CorpusError(
             f"{directory}: no videos in it, and no sounds with motion beside them; required: files ending in one of "
             f"{' '.join(sorted(VIDEO_SUFFIXES))}, or a sound and a file of the same name in {' '.join(MOTION_SUFFIXES)}"
         )
     return found
-
-
-def _order() -> list[str]:
-    """Return the names of all readers; the one that reads any folder is the last."""
-    return [name for name in READERS.names if name != "folder"] + ["folder"]

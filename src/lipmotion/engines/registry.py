@@ -74,8 +74,7 @@ def _class_of(name: str) -> type[Engine[Any]]:
 
 def _create(chosen: type[Engine[Any]], config: Any) -> Engine[Any]:
     constructor: Any = chosen  # every engine is a dataclass with one field
-    engine: Engine[Any] = constructor(config)
-    return engine
+    return constructor(config)
 
 
 def _preset(chosen: type[Engine[Any]], name: str, preset: str) -> Mapping[str, Any]:

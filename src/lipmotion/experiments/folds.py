@@ -58,8 +58,7 @@ def folds(corpus: Corpus, *, count: int = FOLDS, settings: ExperimentSettings = 
     about |= {"closed_under": results[0].recordings.closed_under}
     shared = [name for name in results[0].clips if all(name in result.clips for result in results)]
     conditions = {name: _row(results, name, settings.seed) for name in shared}
-    figures: dict[str, Any] = nan_as_null(about | {"conditions": conditions})
-    return figures
+    return nan_as_null(about | {"conditions": conditions})
 
 
 def _row(results: list[HeldOutResult], condition: str, seed: int) -> dict[str, Any]:

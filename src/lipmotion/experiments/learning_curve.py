@@ -65,8 +65,7 @@ def learning_curve(
         rows.append({"names": count} | _row(corpus, result, settings.seed))
     about = {"split": split or "all", "clips": len(held_out), "seed": settings.seed, "workers": settings.workers}
     about |= {"order": "given" if order is not None else "shuffled", "closed_under": result.recordings.closed_under}
-    figures: dict[str, Any] = nan_as_null(about | {"rows": rows})
-    return figures
+    return nan_as_null(about | {"rows": rows})
 
 
 def training_sizes(sizes: Sequence[int] | None, listed: int) -> list[int]:

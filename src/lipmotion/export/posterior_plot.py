@@ -64,7 +64,8 @@ def draw_posteriors(generation: Generation, posteriors: Sequence[ChainPosteriors
     axis = TimeAxis(frames, rate_hz, int(np.clip(2 * frames, NARROWEST, WIDEST)))
     leader = posteriors[0].name if posteriors else ""
     panels = [panel for number, chain in enumerate(posteriors) for panel in _panels(axis, chain, leader, number)]
-    curve = _curve_name(generation)
+    channels = generation.motion.names
+    curve = "opening" if "opening" in channels else channels[0]
     height = TITLE + sum(TITLE + ROW * len(names) + GAP for _, names, _ in panels) + TITLE + CURVE + 2 * TITLE
     picture = Image.new("RGB", (LEFT + axis.columns + RIGHT, height), WHITE)
     pen = PlotPainter(ImageDraw.Draw(picture), axis)
@@ -105,11 +106,6 @@ def _panels(
 def _shaded(axis: TimeAxis, probability: NDArray[Any], colour: tuple[int, int, int]) -> NDArray[np.uint8]:
     share = np.clip(axis.averaged(probability), 0, 1)[:, :, None]
     return np.round(255 + share * (np.array(colour, float) - 255)).astype(np.uint8)
-
-
-def _curve_name(generation: Generation) -> str:
-    names = generation.motion.names
-    return "opening" if "opening" in names else names[0]
 
 
 @dataclass(frozen=True)

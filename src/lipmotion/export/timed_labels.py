@@ -19,11 +19,6 @@ LABEL_SUFFIXES = tuple(_WRITERS)
 """Suffixes of label files, as programs write them; capitals do not matter."""
 
 
-def holds_labels(path: Path) -> bool:
-    """Return whether a file of that name holds labels in time."""
-    return path.suffix.lower() in map(str.lower, LABEL_SUFFIXES)
-
-
 def write_labels(path: Path, units: Timeline[Unit]) -> None:
     """Write phones and words in time in the format of the suffix.
 

@@ -177,10 +177,9 @@ def between_steps(steps: Array, frames: int) -> Array:
     position, u = np.divmod(np.arange(frames), STEP)
     u = (u / STEP)[:, None]
     before, here, after, last = (padded[np.minimum(position + k, len(padded) - 1)] for k in range(4))
-    result: Array = here + u / 2 * (
+    return here + u / 2 * (
         after - before + u * (2 * before - 5 * here + 4 * after - last + u * (3 * (here - after) + last - before))
     )
-    return result
 
 
 def _network_arrays(network: ConvolutionalNetwork) -> dict[str, NDArray[Any]]:

@@ -26,8 +26,7 @@ def away_from_speech(time_s: Array, speech_s: Sequence[tuple[float, float]], mar
     starts_s = np.array([-np.inf, *(start_s for start_s, _ in speech_s), np.inf])
     ends_s = np.array([-np.inf, *(end_s for _, end_s in speech_s), np.inf])
     last = np.searchsorted(starts_s, time_s, side="right") - 1  # the last interval that begins at or before a time
-    away: NDArray[np.bool_] = (time_s > ends_s[last] + margin_s) & (time_s < starts_s[last + 1] - margin_s)
-    return away
+    return (time_s > ends_s[last] + margin_s) & (time_s < starts_s[last + 1] - margin_s)
 
 
 def runs(mask: NDArray[np.bool_]) -> NDArray[np.intp]:

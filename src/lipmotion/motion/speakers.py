@@ -144,8 +144,7 @@ def restfulness(units: Timeline[Unit], frames: int) -> Array:
     following = np.searchsorted(speech_s[:, 0], time_s, side="right")  # the first interval that begins after a time
     distance_s = np.maximum(np.minimum(starts_s[following] - time_s, time_s - ends_s[following]), 0)
     share = np.clip((distance_s - NEAR_SPEECH_S) / (FAR_FROM_SPEECH_S - NEAR_SPEECH_S), 0, 1)
-    smooth: Array = share * share * (3 - 2 * share)
-    return smooth
+    return share * share * (3 - 2 * share)
 
 
 def viseme_weights(units: Timeline[Unit], frames: int) -> Array:
@@ -164,8 +163,7 @@ def viseme_weights(units: Timeline[Unit], frames: int) -> Array:
     if frames:
         window = np.hanning(FADE_FRAMES + 2)[1:-1]
         weights = convolve1d(weights, window / window.sum(), axis=0, mode="nearest")
-    faded: Array = weights * (1 - restfulness(units, frames))[:, None]
-    return faded
+    return weights * (1 - restfulness(units, frames))[:, None]
 
 
 def with_habits(
@@ -350,8 +348,7 @@ def person_gains(
     trust = speech_s / (speech_s + RANGE_PRIOR_S)
     shrunk = np.exp(np.log(ratio) * trust[:, None])
     shrunk /= np.exp(np.log(shrunk).mean(axis=0))  # the geometric mean of all gains is 1
-    gains: Array = np.clip(shrunk, 1 / most_gain, most_gain)
-    return gains
+    return np.clip(shrunk, 1 / most_gain, most_gain)
 
 
 SPEAKERS = {

@@ -141,8 +141,7 @@ def point_distances(differences: Array, groups: NDArray[np.intp]) -> Array:
     """
     order = np.argsort(groups, kind="stable")
     starts = np.searchsorted(groups[order], np.arange(groups.max() + 1))
-    distances: Array = np.sqrt(np.add.reduceat(np.square(differences[:, order]), starts, axis=1))
-    return distances
+    return np.sqrt(np.add.reduceat(np.square(differences[:, order]), starts, axis=1))
 
 
 def motion_store_arrays(store: MotionStore) -> dict[str, NDArray[Any]]:

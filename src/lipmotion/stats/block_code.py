@@ -49,8 +49,7 @@ class BlockLayout:
         lengths = self.kept[:, 1] - self.kept[:, 0]
         if self.is_plain:
             return lengths
-        counts: Indices = np.floor((lengths - 1) / self.spacing).astype(np.intp) + 4
-        return counts
+        return np.floor((lengths - 1) / self.spacing).astype(np.intp) + 4
 
     @property
     def is_plain(self) -> bool:
@@ -91,8 +90,7 @@ class BlockLayout:
         """
         if self.is_plain:
             return np.ones(self.length)
-        gains: Array = (2 + np.cos(np.pi * np.arange(self.length) / self.length)) / 3
-        return gains
+        return (2 + np.cos(np.pi * np.arange(self.length) / self.length)) / 3
 
     def places(self, frames: Indices) -> tuple[Indices, Array]:
         """Return which stored values, counted over all blocks, each frame is a weighted sum of, and the weights.
@@ -178,8 +176,7 @@ class BlockCode:
             return values[columns[:, 0]]
         starts = np.arange(len(frames) + 1) * weights.shape[1]
         mixing = csr_array((weights.ravel(), columns.ravel(), starts), shape=(len(frames), len(values)))
-        mixed: Array = mixing @ values
-        return mixed
+        return mixing @ values
 
     def _blocks(self, blocks: Indices) -> Array:
         """Return the stored values of some blocks [shape=(B', L, K)]."""
@@ -193,8 +190,7 @@ class BlockCode:
         flat[:, place[: len(self.low)]] = self.low[:, blocks].T
         flat[:, place[len(self.low) :]] = self.high[:, blocks].T
         coefficients *= (self.step / self.layout.gains)[:, None]
-        values: Array = idct(coefficients, axis=1, norm="ortho", overwrite_x=True)
-        return values
+        return idct(coefficients, axis=1, norm="ortho", overwrite_x=True)
 
 
 def quantise_blocks(layout: BlockLayout, coefficients: NDArray[np.float32], step: float) -> BlockCode:
@@ -342,5 +338,4 @@ def _spline(curves: NDArray[np.floating[Any]], spacing: float, count: int) -> Ar
     banded = np.zeros((4, count))
     for n in range(4):
         banded[n, : count - n] = products.diagonal(-n)
-    fitted: Array = solveh_banded(banded, spline.T @ curves.astype(np.float64), lower=True)
-    return fitted
+    return solveh_banded(banded, spline.T @ curves.astype(np.float64), lower=True)

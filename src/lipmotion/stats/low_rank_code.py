@@ -50,12 +50,6 @@ class LowRankCode:
         return self.basis * self.steps[:, None] * self.scale
 
     @property
-    def kept_frames(self) -> NDArray[np.intp]:
-        """The numbers of all frames that are stored."""
-        ranges = [np.arange(first, stop) for first, stop in self.code.layout.kept]
-        return np.concatenate(ranges) if ranges else np.zeros(0, np.intp)
-
-    @property
     def nbytes(self) -> int:
         """The bytes that its arrays take in memory."""
         return sum(array.nbytes for array in low_rank_arrays(self).values())

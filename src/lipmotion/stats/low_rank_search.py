@@ -191,8 +191,7 @@ class _Table:
             return scale
         weights = np.maximum(errors / errors.max(), 0.05) ** EQUAL_POWER
         changed = scale / weights[self.groups]
-        scaled: Array = changed * np.exp(np.log(self.tolerance / changed).mean())
-        return scaled
+        return changed * np.exp(np.log(self.tolerance / changed).mean())
 
 
 @dataclass(frozen=True, eq=False)

@@ -118,8 +118,7 @@ def gaussian_log_likelihood(statistics: Array, least_variance: float = LEAST_VAR
     sums, squares = np.split(statistics[:, 1:] / count, 2, axis=1)
     spread = np.maximum(squares - sums * sums, 0.0)
     variance = np.maximum(spread, least_variance)
-    likelihood: Array = -0.5 * count[:, 0] * (np.log(2 * np.pi * variance) + spread / variance).sum(axis=1)
-    return likelihood
+    return -0.5 * count[:, 0] * (np.log(2 * np.pi * variance) + spread / variance).sum(axis=1)
 
 
 def multispace_log_likelihood(statistics: Array, least_variance: float = LEAST_VARIANCE) -> Array:

@@ -96,8 +96,7 @@ def array_in(content: bytes) -> NDArray[Any]:
     if dtype.kind == "U" and size and np.frombuffer(content[-size:], dtype.byteorder + "u4").max() > LAST_LETTER:
         raise ValueError("texts with characters that do not exist")
     stream.seek(0)
-    array: NDArray[Any] = npy.read_array(stream, allow_pickle=False)
-    return array
+    return npy.read_array(stream, allow_pickle=False)
 
 
 def _member(name: str, method: int) -> zipfile.ZipInfo:

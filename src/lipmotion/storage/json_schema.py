@@ -76,8 +76,7 @@ def one_of(values: Collection[int | str]) -> Schema:
     def checked(value: Any) -> int | str:
         if type(value) not in (int, str) or (type(value), value) not in known:
             raise SchemaError(_spelled(value), f"one of {', '.join(map(str, values))}")
-        chosen: int | str = value
-        return chosen
+        return value
 
     return checked
 

@@ -255,8 +255,7 @@ def _with_formants(segments: Sequence[TargetSegment]) -> list[TargetSegment]:
 
 
 def _smooth(frames: Array, deviation_s: float) -> Array:
-    smooth: Array = gaussian_filter1d(frames, deviation_s * CONTROL_HZ, axis=0, mode="nearest")
-    return smooth
+    return gaussian_filter1d(frames, deviation_s * CONTROL_HZ, axis=0, mode="nearest")
 
 
 def _speech(tracks: _Tracks, noise: Array, pitch_hz: float, rate_hz: int) -> Array:
@@ -276,8 +275,7 @@ def _pulses(count: int, pitch_hz: float, rate_hz: int) -> Array:
     """Return the derivative of the glottal flow, peak −1 [shape=(count,)]."""
     pitch = pitch_hz * np.linspace(1 + _DECLINATION, 1 - _DECLINATION, count)
     opened = np.cumsum(pitch / rate_hz) % 1.0 / _OPEN_SHARE
-    pulses: Array = lfilter([1 - _TILT], [1.0, -_TILT], np.where(opened < 1, opened * (2 - 3 * opened), 0.0))
-    return pulses
+    return lfilter([1 - _TILT], [1.0, -_TILT], np.where(opened < 1, opened * (2 - 3 * opened), 0.0))
 
 
 def _formant_sections(tracks: _Tracks, rate_hz: int) -> Array:

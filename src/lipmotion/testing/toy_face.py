@@ -75,8 +75,7 @@ def toy_lower_faces(motion: Motion, scale: int = 1, *, noise: float = NOISE, see
 
 def toy_chin_px(motion: Motion) -> Array:
     """Return how far the tip of the toy's chin is below its eyes, px of the face [shape=(T,)]."""
-    chin: Array = CHIN_PX + CHIN_DROP_PX * np.asarray(motion["opening"], np.float64)
-    return chin
+    return CHIN_PX + CHIN_DROP_PX * np.asarray(motion["opening"], np.float64)
 
 
 def toy_footage_pictures(sentences: int = 4, scale: int = 1) -> FootagePictures:
@@ -94,8 +93,7 @@ def toy_places(frames: int, rate_hz: float = CAMERA_HZ) -> Array:
     angle = TILT * np.sin(phase + 1)
     turn = SCALE * np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     middle = np.array(MIDDLE_PX)[:, None] + SWAY_PX * np.array([np.sin(phase), 0.5 * np.cos(phase)])
-    places: Array = np.concatenate([turn, middle[:, None]], axis=1).transpose(2, 0, 1)
-    return places
+    return np.concatenate([turn, middle[:, None]], axis=1).transpose(2, 0, 1)
 
 
 def toy_frames(motion: Motion, places: Array, *, noise: float = NOISE, seed: int = 0) -> Iterator[Pictures]:
@@ -190,12 +188,10 @@ def _picture(x: Values, y: Values, shape: Array, pixel_px: float, noise: float, 
 
 
 def _over(picture: Values, colour: tuple[float, ...] | Values, share: Values) -> Values:
-    result: Values = (picture + share[..., None] * (np.asarray(colour, np.float32) - picture)).astype(np.float32)
-    return result
+    return (picture + share[..., None] * (np.asarray(colour, np.float32) - picture)).astype(np.float32)
 
 
 def _inside(x: Values, y: Values, across: float, down: float | Values, pixel_px: float, power: int = 2) -> Values:
     """Return the share of each pixel inside a centred superellipse of two half axes [shape of x]."""
     radius = (np.abs(x / across) ** power + np.abs(y / down) ** power) ** (1 / power)
-    share: Values = np.clip(0.5 + (1 - radius) * np.minimum(across, down) / pixel_px, 0, 1)
-    return share
+    return np.clip(0.5 + (1 - radius) * np.minimum(across, down) / pixel_px, 0, 1)

@@ -86,8 +86,7 @@ class Motion:
 
     def __getitem__(self, name: str) -> NDArray[np.floating[Any]]:
         """Return the curve of one channel [shape=(T,)]. Raises InputError: no such channel."""
-        curve: NDArray[np.floating[Any]] = self.values[:, self.column(name)]
-        return curve
+        return self.values[:, self.column(name)]
 
     def column(self, name: str) -> int:
         """Return the column of a channel in ``values``. Raises InputError: no such channel."""
@@ -123,8 +122,7 @@ def between_frames(rows: NDArray[np.floating[Any]], rate_hz: float, time_s: NDAr
     low = np.minimum(position.astype(int), max(len(rows) - 2, 0))
     high = np.minimum(low + 1, len(rows) - 1)
     fraction = (position - low)[:, None]
-    values: NDArray[np.float64] = (1 - fraction) * rows[low] + fraction * rows[high]
-    return values
+    return (1 - fraction) * rows[low] + fraction * rows[high]
 
 
 def check_curves(motion: Motion) -> None:

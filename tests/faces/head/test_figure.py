@@ -7,6 +7,7 @@ from lipmotion.faces.head.shapes import POSES, SIDED_POSES, head_mesh
 from lipmotion.faces.head.skin import REST
 from lipmotion.faces.head.stage import camera_for, figure
 from lipmotion.faces.turning import turned
+from meshes.heads import shaped
 
 VIEWER = camera_for(640, 360).place
 OPEN = CharacterPose(gap=0.25, upper_rise=0.04, jaw=0.18)
@@ -107,22 +108,22 @@ def test_the_mesh_has_the_shapes_that_are_promised(mesh):
 
 
 def test_a_shape_at_full_weight_is_its_pose(mesh):
-    assert mesh.shaped({"jawOpen": 1.0}) == pytest.approx(figure().placed(POSES["jawOpen"])[0], abs=1e-4)
-    both = mesh.shaped({"eyeBlinkLeft": 1.0, "eyeBlinkRight": 1.0})
+    assert shaped(mesh, {"jawOpen": 1.0}) == pytest.approx(figure().placed(POSES["jawOpen"])[0], abs=1e-4)
+    both = shaped(mesh, {"eyeBlinkLeft": 1.0, "eyeBlinkRight": 1.0})
     assert both == pytest.approx(figure().placed(CharacterPose(shut=1))[0], abs=1e-4)
 
 
 def test_mouth_close_brings_the_lips_of_an_open_jaw_together(mesh):
     lips = figure().skin.lip_rows()[9]
     apart, together = (
-        mesh.shaped(weights)[lips] for weights in ({"jawOpen": 1.0}, {"jawOpen": 1.0, "mouthClose": 1.0})
+        shaped(mesh, weights)[lips] for weights in ({"jawOpen": 1.0}, {"jawOpen": 1.0, "mouthClose": 1.0})
     )
     assert apart[20, 1] - apart[60, 1] > 0.25
     assert together[20, 1] - together[60, 1] < 0.03
 
 
 def test_sided_shapes_leave_the_other_side_alone(mesh):
-    moved = mesh.shaped({"mouthSmileLeft": 1.0}) - mesh.vertices
+    moved = shaped(mesh, {"mouthSmileLeft": 1.0}) - mesh.vertices
     assert np.abs(moved[mesh.vertices[:, 0] < -0.15]).max() < 1e-9
     assert np.abs(moved[mesh.vertices[:, 0] > 0.15]).max() > 0.03
 

@@ -17,12 +17,11 @@ from fuzz.readers.plausible import require
 from lipmotion.faces.mesh import MeshStage
 from lipmotion.meshes.files.binding_files import save_binding, write_weights
 from lipmotion.meshes.files.character_files import read_character
-from lipmotion.meshes.files.gltf_writer import write_glb
 from lipmotion.meshes.fitting.driven import driven_character
 from lipmotion.meshes.rendering.drawn_surface import drawn_surface
 from lipmotion.pipeline.outputs.curve_sets import curves_of
 from meshes.gltf import data_uri, document, glb, packed_attributes, textured_document, with_colours
-from meshes.heads import head, lip_points
+from meshes.heads import head, lip_points, write_glb
 from meshes.obj_writing import write_obj
 from meshes.speech import motion, units
 

@@ -39,8 +39,6 @@ from lipmotion.types import (
     Unit,
 )
 
-Array = NDArray[np.float64]
-
 
 @final
 @dataclass(frozen=True)

@@ -174,7 +174,8 @@ class JointEngine(Engine[JointModel]):
         utterances = [self._training_utterance(example, x, units) for example, x in zip(examples, values, strict=True)]
         if all(set(utterance.units) <= set(units.silence) for utterance in utterances):
             raise CorpusError(f"no speech in {len(examples)} examples; train on speech")
-        inventory = Inventory(units.units, units.silence[:1] + _further_silence(units), self.config.states)
+        silence = units.silence[:1] + tuple(unit for unit in units.silence[1:] if units.silent(unit))  # only silence
+        inventory = Inventory(units.units, silence, self.config.states)
         hmm = train_joint(utterances, inventory, units.classes(), self.config.hmm, monitor)
         closure = fit_closure(space.direct_names, values, examples)
         figures = {f"leaves_{name}": float(stream.forest.size) for name, stream in hmm.models.items()}
@@ -254,11 +255,6 @@ class JointEngine(Engine[JointModel]):
             return units, recogniser.sampled_paths(observations, self.config.paths, self.config.seed)
         bounds = np.array([*(segment.first for segment in segments), observations.frames])
         return units, [align(model.hmm, observations, [segment.unit for segment in segments], bounds)]
-
-
-def _further_silence(units: UnitSet) -> tuple[str, ...]:
-    """Return all units of a unit set that are silence only, but the first."""
-    return tuple(unit for unit in units.silence[1:] if units.silent(unit))
 
 
 def _aligned(model: JointModel, observations: StreamObservations, units: Timeline[Unit]) -> StatePath:

@@ -114,8 +114,7 @@ def shown_units(target: Target, pieces: Sequence[Piece], frames: int) -> UnitNum
     lowest = np.array([piece.first - (piece.join == BEFORE) for piece in pieces])[leading]
     highest = np.array([piece.stop - 1 + more for piece, more in zip(pieces, followed, strict=True)])[leading]
     shift = np.array([piece.unit - piece.first for piece in pieces])[leading]
-    shown: UnitNumbers = np.clip(numbers, lowest, highest) + shift
-    return shown
+    return np.clip(numbers, lowest, highest) + shift
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,8 +147,7 @@ class TimeMap:
         if len(self.target_s) < 2:
             return self.recorded_s[0] + time_s - self.target_s[0]
         inside = np.clip(time_s, self.target_s[0], self.target_s[-1])
-        mapped: Array = PchipInterpolator(self.target_s, self.recorded_s)(inside) + (time_s - inside)
-        return mapped
+        return PchipInterpolator(self.target_s, self.recorded_s)(inside) + (time_s - inside)
 
 
 def _knots(inventory: RecordedUnits, target: Target, number: int, shift: int) -> Iterator[tuple[float, float]]:

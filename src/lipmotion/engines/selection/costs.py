@@ -183,8 +183,7 @@ class Costs:
 
     def _succeed(self, left: UnitNumbers, right: UnitNumbers) -> NDArray[np.bool_]:
         """Return which pairs were recorded in succession [shape=(len(left), len(right))]."""
-        result: NDArray[np.bool_] = (left[:, None] + 1 == right) & self.inventory.windows.continues[left][:, None]
-        return result
+        return (left[:, None] + 1 == right) & self.inventory.windows.continues[left][:, None]
 
     def _distances(self, left: UnitNumbers, at_left: float, right: UnitNumbers, at_right: float) -> Array:
         """Return the squared deviations between units at fractions of their durations, weighted."""
@@ -239,5 +238,4 @@ class Costs:
 
 def _differ(one: NDArray[np.int8], other: NDArray[np.int8]) -> NDArray[np.bool_]:
     """Return where two stresses are known and differ; the shapes are broadcast."""
-    result: NDArray[np.bool_] = (one != other) & (one >= 0) & (other >= 0)
-    return result
+    return (one != other) & (one >= 0) & (other >= 0)

@@ -182,8 +182,7 @@ def _resting(features: NDArray[np.floating], units: Timeline[Unit], *, always: b
     width = round(SETTLED_S * FRAME_RATE_HZ)
     window = np.hanning(2 * width + 1)
     padded = np.pad(resting, width, mode="edge")
-    weights: Array = np.convolve(padded, window / window.sum(), "valid")
-    return weights
+    return np.convolve(padded, window / window.sum(), "valid")
 
 
 def _given(costs: Costs, target: Target, units: Timeline[Unit]) -> dict[int, int]:

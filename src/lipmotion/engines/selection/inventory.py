@@ -77,8 +77,7 @@ class RecordedUnits:
         before = np.minimum(position.astype(np.intp), np.maximum(last - 1, first))
         after = np.minimum(before + 1, last)
         share = (position - before)[:, None]
-        result: Array = self.values[before] * (1 - share) + self.values[after] * share
-        return result
+        return self.values[before] * (1 - share) + self.values[after] * share
 
 
 @dataclass(frozen=True, eq=False)

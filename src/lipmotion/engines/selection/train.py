@@ -121,8 +121,7 @@ def comparison_scale(recorded: Array, space: MotionSpace) -> Array:
     deviations[direct:] = deviations[direct:].max(initial=1e-9)
     weights = np.ones(len(deviations))
     weights[:direct] = [CHANNEL_WEIGHTS.get(name, 1.0) for name in space.direct_names]
-    scale: Array = np.sqrt(weights) / deviations
-    return scale
+    return np.sqrt(weights) / deviations
 
 
 def _stored(
@@ -154,8 +153,7 @@ def _rest_pose(examples: Sequence[Example], values: Sequence[Array], space: Moti
         if OPENING in space.direct_names:
             opening = poses[:, space.direct_names.index(OPENING)]
             poses = poses[opening <= np.percentile(opening, 10)]
-    rest: Array = poses.mean(axis=0)
-    return rest
+    return poses.mean(axis=0)
 
 
 def _error_variances(

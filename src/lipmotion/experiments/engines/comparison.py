@@ -99,8 +99,7 @@ def engines(
     about |= {"closed_under": recordings.closed_under, "reference": REFERENCE_ENGINE}
     about |= {"models": {name: _about(each) for name, each in trained.items()}}
     conditions = {name: _condition(recordings, clips, settings.seed) for name, clips in made.items()}
-    figures: dict[str, Any] = nan_as_null(about | {"conditions": conditions})
-    return figures
+    return nan_as_null(about | {"conditions": conditions})
 
 
 def compared_systems(trained: Mapping[str, EngineModel]) -> dict[str, ComparedEngine]:

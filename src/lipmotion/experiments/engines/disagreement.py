@@ -70,8 +70,7 @@ class OpeningOfClip:
         second = np.floor(self.time_s + ROUNDING_S).astype(np.intp)
         frames = np.bincount(second)
         means = np.bincount(second, values) / np.maximum(frames, 1)
-        result: Array = np.where(frames >= LEAST_FRAMES, np.sqrt(means) if root else means, np.nan)
-        return result
+        return np.where(frames >= LEAST_FRAMES, np.sqrt(means) if root else means, np.nan)
 
 
 def openings_of_clips(clips: Mapping[str, Sequence[ComparedClip]], column: int) -> tuple[list[OpeningOfClip], float]:
@@ -109,8 +108,7 @@ def confidence_of(disagreement: Array) -> Array:
     the list ``val`` of the speaker GRID s1 the error was two to three times the disagreement where the mouth moves
     (docs/results/engines.md): the confidence is about 1 minus the error that is to be expected.
     """
-    result: Array = np.clip(1 - ERROR_SHARE * disagreement, 0, 1)
-    return result
+    return np.clip(1 - ERROR_SHARE * disagreement, 0, 1)
 
 
 def rank_correlation(some: Sequence[Array], others: Sequence[Array]) -> float:

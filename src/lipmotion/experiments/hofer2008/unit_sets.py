@@ -88,8 +88,7 @@ def unit_sets(
         blocks[name] = _block(recordings, examples, options | {"closures": closures}, settings.seed, part)
     about = {"split": split or "all", "clips": len(recordings.utterances), "trained_on": len(examples)}
     about |= {"closed_under": recordings.closed_under, "closures": closures}
-    figures: dict[str, Any] = nan_as_null(about | {"systems": blocks})
-    return figures
+    return nan_as_null(about | {"systems": blocks})
 
 
 def _block(

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.errors import InputError
@@ -57,7 +56,6 @@ from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import Audio, Monitor, sub_monitor, with_progress
 from lipmotion.units import Lexicon
 
-Array = NDArray[np.float64]
 STATES = 5
 """Per unit, in the paper."""
 BABBLE = "babble"
@@ -158,8 +156,7 @@ def table3(
     about |= {"workers": settings.workers, "order": "given" if order is not None else "shuffled"}
     about |= {"mixtures": list(mixtures), "visual": options.visual}
     about |= {"channels": list(recordings.channels), "closed_under": recordings.closed_under}
-    figures: dict[str, Any] = nan_as_null(about | {"rows": rows, "noise": noise_rows})
-    return figures
+    return nan_as_null(about | {"rows": rows, "noise": noise_rows})
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,17 +264,13 @@ def _statistics(recordings: HeldOutRecordings, made: Sequence[ComparedClip]) -> 
     statistics = {}
     for part, columns in parts.items():
         if columns.any():
-            generated, original = ([side[:, columns] for side in sides] for sides in _sides(made))
+            generated = [clip.generated[:, columns] for clip in made]
+            original = [clip.original[:, columns] for clip in made]
             statistics[f"{part}amse"] = distance_statistic(generated, original)
             statistics[f"{part}acc"] = correlation_statistic(generated, original)
     if OPENING in recordings.channels:
         statistics["opening_acc"] = correlation_statistic(*opening_curves(recordings, made))
     return statistics
-
-
-def _sides(made: Sequence[ComparedClip]) -> tuple[list[Array], list[Array]]:
-    """Return the generated and the original curves."""
-    return [clip.generated for clip in made], [clip.original for clip in made]
 
 
 def _noise_rows(trained: _TrainedSystems, noise: NoiseConditions, seed: int, monitor: Monitor) -> list[dict[str, Any]]:

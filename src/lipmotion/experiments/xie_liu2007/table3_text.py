@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from lipmotion.experiments.comparison import significance_mark
@@ -24,10 +24,12 @@ def table(figures: Mapping[str, Any]) -> str:
     order = {"given": "the list given", "shuffled": f"the training list shuffled with seed {figures['seed']}"}
     chosen = " or ".join(map(str, figures["mixtures"])) + (", the best on val" if len(figures["mixtures"]) > 1 else "")
     closed = f"; closed under {figures['closed_under']:.4f}" if figures["closed_under"] is not None else ""
+    names = figures["channels"]
+    compared = ", ".join(names) if len(names) <= FEW else f"{len(names)} channels"
     lines = [
         f"the first N clips of {order[figures['order']]}; split {figures['split']}: {figures['clips']} clips",
         f"paper's systems: {figures['states']} states a unit, Gaussians a state (K): {chosen}; "
-        f"AMSE, ACC of {_compared(figures['channels'])}{closed}",
+        f"AMSE, ACC of {compared}{closed}",
     ]
     for size in figures["rows"]:
         for condition, rows in size["conditions"].items():
@@ -41,11 +43,6 @@ def table(figures: Mapping[str, Any]) -> str:
         f"* differs from {REFERENCE_SYSTEM}: the 95 % interval of the difference on the same clips leaves out 0",
     ]
     return "\n".join(map(printable, lines))
-
-
-def _compared(channels: Sequence[str]) -> str:
-    """Return the names of the channels, or their number where there are many."""
-    return ", ".join(channels) if len(channels) <= FEW else f"{len(channels)} channels"
 
 
 def _line(name: str, row: Mapping[str, Any], training: Mapping[str, Any]) -> str:

@@ -95,8 +95,7 @@ def _means(motion: Motion, channel: str, edges_s: Array) -> Array:
 def _integrals(time_s: Array, sums: Array, edges_s: Array) -> Array:
     """Return means between edges [shape=(len(edges_s) − 1, columns)] from integrals up to the times ``time_s``."""
     at_edges = np.stack([np.interp(edges_s, time_s, column) for column in sums.T], axis=1)
-    means: Array = np.diff(at_edges, axis=0) / np.diff(edges_s)[:, None]
-    return means
+    return np.diff(at_edges, axis=0) / np.diff(edges_s)[:, None]
 
 
 def _relative_opening(opening: Array, nominal: Array, voiced: Array) -> Array:

@@ -83,10 +83,6 @@ class Layer:
         """Make the inside of an outline transparent."""
         self.pixels *= 1 - _mask(self.window, outline)[..., None]
 
-    def over(self, below: Pixels) -> Pixels:
-        """Return the pixels [shape=(h, w, 3)] with this layer over them."""
-        return below * (1 - self.pixels[..., 3:]) + self.pixels[..., :3]
-
 
 def _strength(window: Window, shade: Glow | Rim, outline: Points) -> Pixels:
     """Return the weight of a shade in every pixel, 0..1 [shape=(h, w)]."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from lipmotion.faces.portrait.design import Design
 from lipmotion.faces.portrait.layer import Glow, Layer, Rim
 from lipmotion.faces.portrait.outlines import (
-    Points,
     both_sides,
     closed_curve,
     lowered,
@@ -102,14 +101,11 @@ def _neck_and_shoulders(layer: Layer, design: Design) -> None:
     if not design.flat:
         shadow = lowered(design.shoulders, -0.02)
         layer.fill(shadow, colours.skin_deep, opacity=0.3, blur=0.03, within=design.neck)
-    for part, colour, dark in ((design.shoulders, colours.cloth, colours.cloth_dark), *_collars(design)):
+    collars = ((part, colours.collar, colours.collar_dark) for part in design.collar)
+    for part, colour, dark in ((design.shoulders, colours.cloth, colours.cloth_dark), *collars):
         light = Glow(-0.9, 1.92, 0.35, 0.12, colours.cloth_light, 0.7)
         layer.fill(part, colour, *(() if design.flat else (Rim(0.1, dark, 0.8), light)))
         layer.contour(part, design.line, colours.line)
-
-
-def _collars(design: Design) -> list[tuple[Points, tuple[int, int, int], tuple[int, int, int]]]:
-    return [(part, design.palette.collar, design.palette.collar_dark) for part in design.collar]
 
 
 def _cap(layer: Layer, design: Design) -> None:

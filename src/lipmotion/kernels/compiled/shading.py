@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.kernels.compiled.compiler import compiled
+from lipmotion.kernels.pixels.shading import AWAY
 
 Real = NDArray[np.float64]
-AWAY = -0.35
-"""Vertices that face further away than this (the cosine) are not seen, and stay dark."""
 
 
 @compiled

@@ -9,20 +9,16 @@ from numpy.typing import NDArray
 
 from lipmotion.kernels.compiled.compiler import compiled
 from lipmotion.kernels.compiled.raster import BAND, FAR, _bias, _by_band
+from lipmotion.kernels.pixels.textured import CLEAR, CUT, EMPTY, HIDES, SCALE, SEEN
 
 Real = NDArray[np.float64]
 Light = NDArray[np.float32]
 Whole = NDArray[np.int32]
-CUT, CLEAR = 1, 2
-HIDES = 0.95
-SEEN = 1 / 512
-EMPTY = -1
 WIDE = 8
 """In triangles wider than this, in samples, the columns of a row are worked out before they are tried."""
 PLANES = 27
 """Numbers of a triangle that are linear on the screen: three of each of light, highlights, depth, and place in the
 texture times depth."""
-SCALE = 1 / 65535
 
 
 @compiled

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.kernels.choice import compiled_pays
-from lipmotion.kernels.pixels.raster import GRID, TRIANGLE_S
+from lipmotion.kernels.pixels.raster import GRID, TRIANGLE_S, _bias
 
 Real = NDArray[np.float64]
 Light = NDArray[np.float32]
@@ -243,8 +243,3 @@ def _texel(ids: Whole, places: Real, planes: Real, surface: TexturedTriangles) -
         result[:, channel] = (upper + low_share * (lower - upper)) * SCALE
     result[row < 0] = 1.0
     return result
-
-
-def _bias(xa: float, ya: float, xb: float, yb: float) -> float:
-    """Return the least edge function of samples inside, as ``kernels.pixels.raster`` has it."""
-    return 0.0 if ya > yb or (ya == yb and xa < xb) else 1e-6

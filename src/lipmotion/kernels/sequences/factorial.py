@@ -231,7 +231,7 @@ def _posteriors_in_logs(audio: Loop, visual: Loop, logs: FactorialLogLikelihoods
         """Return the log forward probabilities of a stretch."""
         found: list[Array] = []
         for t in range(start, min(start + stretch, frames)):
-            before = initial + steps.log_density(0) if before is None else steps.forward(before, t)
+            before = initial + logs.joint(0) if before is None else steps.forward(before, t)
             found.append(before)
         return found
 
@@ -244,7 +244,7 @@ def _posteriors_in_logs(audio: Loop, visual: Loop, logs: FactorialLogLikelihoods
     if not math.isfinite(last.overlap):
         return None
     totals.store(frames - 1, last, -math.inf)
-    backward = final + steps.log_density(frames - 1)
+    backward = final + logs.joint(frames - 1)
     for start, before in zip(reversed(starts), reversed(befores[:-1]), strict=True):
         forward = forward_of(start, before)
         for t in range(start + len(forward) - 1, start - 1, -1):

@@ -76,15 +76,9 @@ class LogForwardBackward(NamedTuple):
         """Return the steps of a recording in two loops."""
         return cls(LogTransitions.of(audio), LogTransitions.of(visual), logs)
 
-    def log_density(self, t: int) -> Array:
-        """Return the log densities of all joint states in a frame [shape=(Na, Nv)]."""
-        joint = np.add.outer(self.logs.audio[t], self.logs.visual[t], dtype=np.float64)
-        joint[tuple(self.logs.pairs.T)] = self.logs.pair[t]
-        return joint
-
     def forward(self, before: Array, t: int) -> Array:
         """Return the log forward probabilities of frame ``t`` from those of the frame before [shape=(Na, Nv)]."""
-        return self.visual.forward(self.audio.forward(before).T).T + self.log_density(t)
+        return self.visual.forward(self.audio.forward(before).T).T + self.logs.joint(t)
 
     def frame(self, forward: Array, backward: Array) -> FramePosteriors:
         """Return the posteriors of a frame; its overlap is a logarithm."""
@@ -109,4 +103,4 @@ class LogForwardBackward(NamedTuple):
         entered = (
             np.exp(np.minimum(logs - frame.overlap, LARGEST_EXPONENT)) for logs in (audio_entered, visual_entered)
         )
-        return LogStep(frame, beta + self.log_density(t), *entered)
+        return LogStep(frame, beta + self.logs.joint(t), *entered)

@@ -31,7 +31,7 @@ def factorial_best_path(
             np.add.outer(*(np.log(getattr(loop, name).ravel()) for loop in (audio, visual)))
             for name in ("initial", "final")
         )
-    score = initial + search.log_density(0)
+    score = initial + logs.joint(0)
     befores = []
     for start in range(1, frames, stretch):
         befores.append((start, score))
@@ -90,20 +90,13 @@ class _FactorialSearch(NamedTuple):
     visual: _ViterbiTransitions
     logs: FactorialLogLikelihoods
 
-    def log_density(self, t: int) -> Array:
-        """Return the log densities of all joint states in a frame [shape=(Na, Nv)]."""
-        logs = self.logs
-        joint = np.add.outer(logs.audio[t], logs.visual[t], dtype=np.float64)
-        joint[tuple(logs.pairs.T)] = logs.pair[t]
-        return joint
-
     def through(self, start: int, stop: int, score: Array) -> tuple[Array, list[_Decisions]]:
         """Return the scores after the frames of a stretch, and the decisions of each frame."""
         decisions = []
         for t in range(start, stop):
             score, by_audio = self.audio.best_forward(score)
             turned, by_visual = self.visual.best_forward(np.ascontiguousarray(score.T))
-            score = turned.T + self.log_density(t)
+            score = turned.T + self.logs.joint(t)
             decisions.append((by_audio, by_visual))
         return score, decisions
 

@@ -65,6 +65,12 @@ class FactorialLogLikelihoods(NamedTuple):
         """Return the log densities of loops without pairs."""
         return cls(audio, visual, np.empty((len(audio), 0), audio.dtype), np.empty((0, 2), np.intp))
 
+    def joint(self, t: int) -> Array:
+        """Return the log densities of all joint states in a frame [shape=(Na, Nv)]."""
+        joint = np.add.outer(self.audio[t], self.visual[t], dtype=np.float64)
+        joint[tuple(self.pairs.T)] = self.pair[t]
+        return joint
+
     def densities(self, start: int, stop: int) -> list[FrameDensity]:
         """Return the densities of the frames from ``start`` up to ``stop``."""
         logs = self.audio[start:stop], self.visual[start:stop], self.pair[start:stop]

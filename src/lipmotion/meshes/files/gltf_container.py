@@ -51,8 +51,7 @@ class GltfDocument:
 
     def items(self, name: str) -> list[dict[str, Any]]:
         """Return a list of objects of the document; none if it is missing."""
-        found: list[dict[str, Any]] = self.parts.get(name, [])
-        return found
+        return self.parts.get(name, [])
 
     def linked(self, uri: str, kind: str) -> bytes:
         """Return what an address in the document stands for: bytes inside of it, or a file in the same folder.

@@ -8,11 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import ExportError
 from lipmotion.meshes.files.gltf_container import write_container
-from lipmotion.meshes.model.mesh import Blendshape, Mesh, MeshPart
+from lipmotion.meshes.model.mesh import Blendshape, MeshPart
 from lipmotion.meshes.model.scene import HeadTurn, Scene, ShadingNormals, shading_normals
-from lipmotion.types import Motion
 
 FLOAT, UNSIGNED, UNSIGNED_BYTE = 5126, 5125, 5121
 VERTICES, INDICES = 34962, 34963
@@ -75,19 +73,6 @@ class _Buffer:
             del self.accessors[numbers:]
         self.accessors.append(accessor)
         return len(self.accessors) - 1
-
-
-def write_glb(path: Path, mesh: Mesh, weights: Motion | None = None) -> None:
-    """Write a mesh with its blendshapes, and their weights over time, as ``write_gltf_scene`` does.
-
-    weights : channels by the names of the blendshapes; None: no animation
-    Raises ExportError: a channel that is no blendshape, or the file cannot be written.
-    """
-    try:
-        scene = Scene(mesh, weights)
-    except ExportError as error:
-        raise ExportError(f"{path}: {error}") from error
-    write_gltf_scene(path, scene)
 
 
 def write_gltf_scene(path: Path, scene: Scene) -> None:

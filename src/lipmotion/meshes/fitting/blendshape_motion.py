@@ -140,5 +140,4 @@ def given_weights(motion: Motion, shapes: FaceShapes) -> Motion | None:
 def _apart(places: Array, one: int, other: int) -> Array:
     """Return the distance of two points in the picture [shape=(T,)]."""
     template = mouth_template()
-    away: Array = np.linalg.norm(places[:, template.row(one), :2] - places[:, template.row(other), :2], axis=1)
-    return away
+    return np.linalg.norm(places[:, template.row(one), :2] - places[:, template.row(other), :2], axis=1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -155,23 +155,6 @@ class Mesh:
         """The names of the blendshapes, in order."""
         return tuple(shape.name for shape in self.shapes)
 
-    def shaped(self, weights: Mapping[str, float]) -> NDArray[np.float64]:
-        """Return the vertices under weights of blendshapes [shape=(V, 3)]; shapes that are not named have weight 0.
-
-        Raises InputError: there is no blendshape of such a name.
-        """
-        unknown = sorted(set(weights) - set(self.shape_names))
-        if unknown:
-            raise InputError(
-                f"there is no blendshape {shortened(unknown[0])!r}, required one of "
-                f"{shortened(', '.join(self.shape_names)) or 'none: the mesh has no blendshapes'}"
-            )
-        vertices = self.vertices.copy()
-        for shape in self.shapes:
-            if weights.get(shape.name):
-                vertices[shape.rows] += weights[shape.name] * shape.displacements
-        return vertices
-
     def displacements(self, rows: NDArray[np.int64], names: Sequence[str] | None = None) -> NDArray[np.float64]:
         """Return how far blendshapes move the vertices ``rows`` [shape=(N,)] at weight 1 [shape=(S, N, 3)].
 
@@ -187,51 +170,10 @@ class Mesh:
             dense[shape.rows] = 0.0
         return moved
 
-    def part(self, name: str) -> MeshPart:
-        """Return a part by its name. Raises InputError: there is none of this name."""
-        found = next((part for part in self.parts if part.name == name), None)
-        if found is None:
-            names = ", ".join(part.name for part in self.parts)
-            raise InputError(f"there is no part {shortened(name)!r} in the mesh, required one of {shortened(names)}")
-        return found
-
     def _check_parts(self) -> None:
         edges = [0, *(part.stop for part in self.parts)]
         if [part.first for part in self.parts] != edges[:-1] or edges[-1] != len(self.triangles):
             raise InputError(f"the parts of the mesh end at {edges[1:]}, required ranges of {len(self.triangles)}")
-
-
-def joined(meshes: Mapping[str, Mesh]) -> Mesh:
-    """Return one mesh of several ones; each gives one part of its name, of the material of its first part.
-
-    Blendshapes of one name become one. Texture coordinates remain where one has some, and are 0 in the others; colours
-    remain where all have some.
-    """
-    offsets = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes.values())])
-    triangles = [mesh.triangles + offset for mesh, offset in zip(meshes.values(), offsets, strict=False)]
-    stops = np.cumsum([0, *(len(rows) for rows in triangles)])
-    parts = [
-        MeshPart(name, int(first), int(stop), mesh.parts[0].material)
-        for (name, mesh), first, stop in zip(meshes.items(), stops, stops[1:], strict=False)
-    ]
-    shapes: dict[str, list[tuple[NDArray[np.int64], NDArray[np.float64]]]] = {}
-    for mesh, offset in zip(meshes.values(), offsets, strict=False):
-        for shape in mesh.shapes:
-            shapes.setdefault(shape.name, []).append((shape.rows + offset, shape.displacements))
-    uv = [np.zeros((*mesh.triangles.shape, 2)) if mesh.uv is None else mesh.uv for mesh in meshes.values()]
-    mapped = any(mesh.uv is not None for mesh in meshes.values())
-    colours = [mesh.colours for mesh in meshes.values() if mesh.colours is not None]
-    return Mesh(
-        np.concatenate([mesh.vertices for mesh in meshes.values()]),
-        np.concatenate(triangles).astype(np.int32),
-        tuple(parts),
-        tuple(
-            Blendshape(name, np.concatenate([rows for rows, _ in moved]), np.concatenate([way for _, way in moved]))
-            for name, moved in shapes.items()
-        ),
-        np.concatenate(uv) if mapped else None,
-        np.concatenate(colours) if len(colours) == len(meshes) else None,
-    )
 
 
 def _check_places(what: str, values: NDArray[np.float64]) -> None:

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.kernels.pixels.raster import draw
 from lipmotion.kernels.pixels.shading import normal_sums
-from lipmotion.meshes.model.mesh import Mesh
-from lipmotion.meshes.rendering.lighting import LEVELS, WHITE, Finish, Lighting, linear, tone_table
+from lipmotion.meshes.rendering.lighting import LEVELS, WHITE, linear, tone_table
 
 Real = NDArray[np.float64]
 Colours = NDArray[np.float32]
@@ -54,6 +53,18 @@ class Camera:
         """The place of the camera [shape=(3,)]."""
         return np.array([*self.centre, self.distance])
 
+    def box(self, screen: Real) -> tuple[int, int, int, int] | None:
+        """Return first column and row, and the column and row behind the last ones, around what ``on_screen`` returned.
+
+        None: it is outside the picture.
+        """
+        size = self.width, self.height
+        left, top = (max(0, int(edge - 2)) for edge in screen[:, :2].min(axis=0))
+        right, bottom = (
+            min(most, int(np.ceil(edge + 2))) for edge, most in zip(screen[:, :2].max(axis=0), size, strict=True)
+        )
+        return (left, top, right, bottom) if left < right and top < bottom else None
+
 
 class Canvas:
     """A picture on which triangles are drawn, four samples a pixel.
@@ -88,12 +99,8 @@ class Canvas:
         """
         screen = self.camera.on_screen(places)
         picture = (self.empty if onto is None else onto).copy()
-        columns, rows = screen[moving, 0], screen[moving, 1]
-        left, top = (max(0, int(edges.min() - 2)) for edges in (columns, rows))
-        right = min(self.camera.width, int(np.ceil(columns.max() + 2)))
-        bottom = min(self.camera.height, int(np.ceil(rows.max() + 2)))
-        if left < right and top < bottom:
-            area = (left, top, right, bottom)
+        area = self.camera.box(screen[moving])
+        if area is not None:
             draw(screen, colours, triangles, area, self.background, self._tone, picture)
         return picture
 
@@ -157,19 +164,3 @@ def normals_of(places: Real, triangles: NDArray[np.int32]) -> Real:
     total = normal_sums(places, triangles)
     length = np.linalg.norm(total, axis=1, keepdims=True)
     return np.where(length > 0, total / np.where(length > 0, length, 1), [0.0, 0.0, 1.0])
-
-
-def picture_of(mesh: Mesh, camera: Camera, places: Real | None = None) -> NDArray[np.uint8]:
-    """Return a picture of any mesh, each part in the colour and gloss of its material [shape=(H, W, 3)].
-
-    places : of the vertices, in the mesh's unit [shape=(V, 3)]; None: the mesh without blendshapes
-    """
-    vertices = mesh.vertices if places is None else places
-    colours, kinds = np.zeros_like(vertices), np.zeros(len(vertices), np.intp)
-    for number, part in enumerate(mesh.parts):
-        rows = np.unique(mesh.triangles[part.first : part.stop])
-        colours[rows], kinds[rows] = linear(part.material.colour), number
-    glosses = [part.material.gloss for part in mesh.parts]
-    lighting = Lighting([Finish((0.3, 0.2, 0.15), gloss=0.5 * gloss, focus=4 + round(2 * gloss)) for gloss in glosses])
-    light = lighting.light(vertices, normals_of(vertices, mesh.triangles), colours, kinds, camera.place)
-    return Canvas(camera).picture(vertices, light, mesh.triangles)

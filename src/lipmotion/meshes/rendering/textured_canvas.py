@@ -38,9 +38,9 @@ class TexturedCanvas:
         """
         picture = (self.empty if onto is None else onto).copy()
         opacity = np.empty(picture.shape[:2], np.uint8)
-        area = self.box(places if moving is None else moving)
+        points = self.camera.on_screen(places)
+        area = self.camera.box(points if moving is None else self.camera.on_screen(moving))
         if area is not None:
-            points = self.camera.on_screen(places)
             draw_textured(points, light, shine, self.surface, area, self._background, self._tone, picture, opacity)
         return picture
 
@@ -48,26 +48,11 @@ class TexturedCanvas:
         """Return the surface without background: red, green, blue and straight alpha [shape=(H, W, 4)]."""
         picture = np.zeros((self.camera.height, self.camera.width, 3), np.uint8)
         opacity = np.zeros(picture.shape[:2], np.uint8)
-        area = self.box(places)
+        points = self.camera.on_screen(places)
+        area = self.camera.box(points)
         if area is not None:
-            points = self.camera.on_screen(places)
             draw_textured(points, light, shine, self.surface, area, self._black, self._tone, picture, opacity)
         partly = (opacity > 0) & (opacity < 255)
         level = np.searchsorted(self._tone, picture[partly]) / (opacity[partly, None] / 255)
         picture[partly] = self._tone[np.minimum(level, LEVELS - 1).astype(int)]
         return np.concatenate([picture, opacity[..., None]], axis=2)
-
-    def box(self, places: Real) -> tuple[int, int, int, int] | None:
-        """Return first column and row, and the column and row behind the last ones, around places in space.
-
-        None: they are outside the picture.
-        """
-        screen = self.camera.on_screen(places)[:, :2]
-        low, high = screen.min(axis=0) - 2, screen.max(axis=0) + 2
-        left, top = (int(np.clip(edge, 0, most)) for edge, most in zip(low, self._size, strict=True))
-        right, bottom = (int(np.clip(np.ceil(edge), 0, most)) for edge, most in zip(high, self._size, strict=True))
-        return (left, top, right, bottom) if left < right and top < bottom else None
-
-    @property
-    def _size(self) -> tuple[int, int]:
-        return self.camera.width, self.camera.height

@@ -142,7 +142,8 @@ def held_out_recordings(  # noqa: PLR0913
     reference = [_reference(utterance, phones, lexicon) for utterance in aligned]
     threshold = None
     if OPENING in compared:
-        threshold = closed_threshold([_openings(u) for u in _training_list(corpus, selection.speakers) or utterances])
+        training = [corpus.utterance(name) for name in corpus.names("train", selection.speakers)]
+        threshold = closed_threshold([_openings(utterance) for utterance in training or utterances])
     recognised = with_progress(utterances, "phones: recognition", sub_monitor(monitor, 0.4, 0.9))
     found = [phones.recognition(utterance.audio, utterance.features) for utterance in recognised]
     conditions = {AUDIO_ONLY: [each.units for each in found]}
@@ -173,10 +174,6 @@ def compared_channels(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...],
         raise CorpusError(f"none of {len(names)} motion channels moves in these {len(utterances)} utterances")
     moving = tuple(name for name, moved in zip(names, moves, strict=True) if moved)
     return moving, tuple(name for name in names if name not in moving)
-
-
-def _training_list(corpus: Corpus, speakers: Sequence[str]) -> list[Utterance]:
-    return [corpus.utterance(name) for name in corpus.names("train", speakers)]
 
 
 def _openings(utterance: Utterance) -> NDArray[np.float64]:

@@ -98,8 +98,7 @@ def evaluate(
         figures["seen_in_training"] = True
     if model.speakers is not None:
         figures["strangers"] = list(recordings.strangers)
-    plain: dict[str, Any] = nan_as_null(figures)
-    return plain
+    return nan_as_null(figures)
 
 
 def _was_trained_on(model: Model, utterances: Sequence[Utterance], folder: str) -> bool:

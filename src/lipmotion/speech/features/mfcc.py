@@ -184,8 +184,7 @@ def _frames(samples: NDArray[np.float32]) -> NDArray[np.float32]:
 def _log_power(power: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the natural logarithm of powers, floored 80 dB under the largest; it overwrites them."""
     floor = np.float32(max(DYNAMIC_RANGE * float(power.max()), 1e-30))
-    log_power: NDArray[np.float32] = np.log(np.maximum(power, floor, out=power), out=power)
-    return log_power
+    return np.log(np.maximum(power, floor, out=power), out=power)
 
 
 @cache

@@ -110,8 +110,7 @@ def _reverberation(samples: Samples, share: float, rng: np.random.Generator) -> 
     response = rng.standard_normal(int(duration_s * SPEECH_RATE_HZ))
     response *= 10 ** (-3 * np.arange(len(response)) / len(response))
     response *= np.sqrt(share / np.square(response).sum())
-    result: Samples = fftconvolve(samples, response)[: len(samples)]
-    return result
+    return fftconvolve(samples, response)[: len(samples)]
 
 
 def _babble(voices: Sequence[Audio], count: int, rng: np.random.Generator) -> Samples:

@@ -83,15 +83,12 @@ def _system_data(program: str | None) -> Path | None:
         return None
 
 
-def _variants(data: Path) -> tuple[str, ...]:
-    return tuple(name for name in VARIANTS if (data / "voices" / "!v" / name).is_file())
-
-
 def _voices() -> tuple[SyntheticVoice, ...]:
     data = _data()
     if data is None:
         return ()
-    return tuple(SyntheticVoice(f"{LANGUAGE}+{name}", "espeak-ng", f"espeak-{name}") for name in _variants(data))
+    variants = [name for name in VARIANTS if (data / "voices" / "!v" / name).is_file()]
+    return tuple(SyntheticVoice(f"{LANGUAGE}+{name}", "espeak-ng", f"espeak-{name}") for name in variants)
 
 
 def _others() -> tuple[SyntheticVoice, ...]:

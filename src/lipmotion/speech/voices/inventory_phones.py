@@ -51,7 +51,7 @@ def inventory_timeline(
         named = iter(with_words([phone for phone, _, _ in spoken], words, lexicon or Lexicon()))
     last = len(phones) - 1
     spans = [
-        Span(start, end, Unit(_silence(0 < place < last, end - start)))
+        Span(start, end, Unit(PAUSE if 0 < place < last and end - start < SHORT_PAUSE_S else SILENCE))
         if is_silent(phone)
         else Span(start, end, next(named))
         for place, (phone, start, end) in enumerate(phones)
@@ -168,7 +168,3 @@ def _joined(phones: Phones) -> list[tuple[str, float, float]]:
         part = list(run)
         joined += [(SILENCE, part[0][1], part[-1][2])] if silent else part
     return joined
-
-
-def _silence(inside: bool, duration_s: float) -> str:
-    return PAUSE if inside and duration_s < SHORT_PAUSE_S else SILENCE

@@ -68,11 +68,6 @@ class Product:
     initial: NDArray[np.float64]
 
     @cached_property
-    def arc_start(self) -> Index:
-        """The position of the first arc to each joint state [shape=(S,)]."""
-        return np.searchsorted(self.arc_to, np.arange(len(self.joint_states)))
-
-    @cached_property
     def chain_states(self) -> Index:
         """The state of every chain in each joint state [shape=(C, S)]."""
         chains = range(len(self.structure.chains))

@@ -197,8 +197,7 @@ def _rest_pose(examples: Sequence[Example], values: Sequence[Array], valid: Sequ
     poses = np.concatenate(silent_poses)
     if not len(poses):
         poses = np.concatenate([x[mask] for x, mask in zip(values, valid, strict=True)])
-    rest_pose: Array = np.median(poses, axis=0)
-    return rest_pose
+    return np.median(poses, axis=0)
 
 
 def _fitted_regression(
@@ -257,8 +256,7 @@ def _fitted_scaling(model: CoupledModel, data: Sequence[AlignedUtterance], value
     def generated_deviation(utterance: AlignedUtterance) -> Array:
         speech = without_visual_streams(utterance.observations)
         motion, _ = generate(*model.motion_statistics(chains.infer(speech, chains.full_lattice)))
-        deviation: Array = motion[utterance.observations.observed[1]].std(axis=0)
-        return deviation
+        return motion[utterance.observations.observed[1]].std(axis=0)
 
     generated = list(_threaded(generated_deviation, data))
     original = [x[utterance.observations.observed[1]].std(axis=0) for utterance, x in zip(data, values, strict=True)]
