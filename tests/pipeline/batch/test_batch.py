@@ -26,6 +26,7 @@ from lipmotion.pipeline.batch import run as run_module
 from lipmotion.pipeline.batch.ledger import Place
 from lipmotion.pipeline.batch.one_line import LineWork, finished_line
 from lipmotion.pipeline.batch.pool import WorkerDied
+from lipmotion.pipeline.edit_files import EditFile
 from lipmotion.pipeline.job import Job, Outputs, Request
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.opened_job import OpenedJob
@@ -92,7 +93,7 @@ def test_the_face_of_another_person_is_mapped_onto_once(
     monkeypatch.setattr(one_line, "map_onto", lambda *_, speaker: mapped.append(speaker) or "a map")
     other = replace(toy_model, about=toy_model.about | {"corpus": ["another"]})
     lines = [BatchLine(name, f"/{name}.wav", "hello") for name in "ab"]
-    shown = OpenedJob(Job(), shown_face(filmed_face), None)
+    shown = OpenedJob(Job(), shown_face(filmed_face), None, EditFile())
     assert [one_line._request(line, shown, other).onto for line in lines] == ["a map", "a map"]
     assert mapped == [""]
     assert one_line._request(lines[0], shown, toy_model).onto is None

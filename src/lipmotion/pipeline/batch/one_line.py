@@ -6,10 +6,10 @@ import errno
 import logging
 import shutil
 import tempfile
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -47,8 +47,6 @@ from lipmotion.types import Audio, Generation, Span, Timeline, Unit
 from lipmotion.units import Lexicon
 
 LOG = logging.getLogger("lipmotion")
-ONE_AT_A_TIME = threading.Lock()
-"""A worker of a cluster may have several threads: warnings and the threads of matrix products belong to a process."""
 MOST_WARNINGS = 10
 SILENCE_S = 0.5
 """Seconds of silence with which the settings are tried out."""
@@ -77,20 +75,19 @@ def finished_line(work: LineWork) -> Record:
     A line whose receipt is there, because another worker died after it had finished it, is not done again.
     Raises ExportError: the disk is full, or a later run has begun in the same folder.
     """
-    with ONE_AT_A_TIME:
-        receipt = read_receipt(work.place.receipt(work.line.name))
-        if receipt is not None and receipt["run"] == work.place.run and are_in_place(Path(work.place.out), receipt):
-            return receipt
-        folder = work.place.work(work.line.name)
+    receipt = read_receipt(work.place.receipt(work.line.name))
+    if receipt is not None and receipt["run"] == work.place.run and are_in_place(Path(work.place.out), receipt):
+        return receipt
+    folder = work.place.work(work.line.name)
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    try:
+        return _finished(work)
+    finally:
+        for kind in work.job.outputs.kinds:
+            with suppress(OSError):  # there is none, or its folder is none
+                work.place.staged(work.line.name, kind).unlink()
         shutil.rmtree(folder, ignore_errors=True)
-        folder.mkdir(parents=True)
-        try:
-            return _finished(work)
-        finally:
-            for kind in work.job.outputs.kinds:
-                with suppress(OSError):  # there is none, or its folder is none
-                    work.place.staged(work.line.name, kind).unlink()
-            shutil.rmtree(folder, ignore_errors=True)
 
 
 def _finished(work: LineWork) -> Record:
@@ -200,23 +197,33 @@ def _findings(generation: Generation) -> Record:
     return found
 
 
+_KEPT: ContextVar[list[str] | None] = ContextVar("warnings of the line that this thread works on", default=None)
+
+
 @contextmanager
 def _kept_warnings() -> Iterator[list[str]]:
-    """Give a list that receives the package's warnings inside the block, instead of the terminal; each once."""
+    """Give a list that receives this thread's warnings of the package inside the block, instead of the terminal.
+
+    Each is kept once. What other threads log goes where it went before.
+    """
     kept: list[str] = []
-
-    class Keeper(logging.Handler):
-        def emit(self, record: logging.LogRecord) -> None:
-            text = record.getMessage()
-            if text not in kept:
-                kept.append(text)
-
-    handler, others, goes_up = Keeper(logging.WARNING), LOG.handlers[:], LOG.propagate
-    LOG.handlers[:], LOG.propagate = [handler], False
+    LOG.addFilter(_keep)  # which a logger has once, however often it is added
+    before = _KEPT.set(kept)
     try:
         yield kept
     finally:
-        LOG.handlers[:], LOG.propagate = others, goes_up
+        _KEPT.reset(before)
+
+
+def _keep(record: logging.LogRecord) -> bool:
+    """Keep a warning of a thread that works on a line; return whether a record goes on to the handlers."""
+    kept = _KEPT.get()
+    if kept is None:
+        return True
+    text = record.getMessage()
+    if record.levelno >= logging.WARNING and text not in kept:
+        kept.append(text)
+    return False
 
 
 def _stamp(*paths: str | Path | None) -> tuple[int, ...]:
