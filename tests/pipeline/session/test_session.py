@@ -10,11 +10,11 @@ from threading import Barrier
 import numpy as np
 import pytest
 
-import lipmotion
 from lipmotion.articulation.curve_edits import GAIN_EDGE_S, LOCK_EDGE_S
 from lipmotion.articulation.delivery import Delivery
 from lipmotion.errors import InputError
 from lipmotion.faces.registry import staged_face
+from lipmotion.pipeline import session as session_module
 from lipmotion.pipeline.edits import Edits
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import Model
@@ -68,13 +68,13 @@ def test_a_session_gives_what_one_pass_gives(session: Session, request_: SpeechR
 def test_only_what_changed_is_computed_again(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[str] = []
     for name in ("understood_speech", "generate_for"):
-        plain = getattr(lipmotion.pipeline.session, name)
+        plain = getattr(session_module, name)
 
         def counted(*given: object, name: str = name, plain: object = plain, **more: object) -> object:
             calls.append(name)
             return plain(*given, **more)  # type: ignore[operator]
 
-        monkeypatch.setattr(lipmotion.pipeline.session, name, counted)
+        monkeypatch.setattr(session_module, name, counted)
     first = session.generated()
     session.generated(edited("phone 3 is p"))
     session.generated(edited("phone 3 is p", "pin jawOpen 0.2 at 1.0"))  # a curve: no new motion
