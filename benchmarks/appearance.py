@@ -30,7 +30,7 @@ from lipmotion.types import Channel, Motion
 from lipmotion.vision.footage import Footage, footage_frames, track_footage
 from lipmotion.vision.frames import WHOLE
 from lipmotion.vision.landmarks import EYE_CORNERS, TRACKED_POINTS
-from lipmotion.vision.mouth import eyes_to_image
+from lipmotion.vision.mouth_pictures import eyes_to_image
 from lipmotion.vision.tracked_frames import tracked_frames
 
 Pictures = NDArray[np.uint8]

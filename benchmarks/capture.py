@@ -44,7 +44,7 @@ TAKEN = {
     "mouthStretchRight": ["mouth_lipStretch_r"],
 }
 """ARKit's curves, each the mean of FACEGOOD's that are nearest to it; FACEGOOD's others are left out."""
-LOST, JITTER_S = 0.01, 0.003
+LOST_SHARE, JITTER_S = 0.01, 0.003
 """Share of the rows that the app loses, and how uneven their times are."""
 
 
@@ -60,7 +60,7 @@ def write_takes(corpus: Path, folder: Path) -> dict[str, Motion]:
         with wave.open(str(sound)) as file:
             rows = int(file.getnframes() / file.getframerate() * 60)
         times_s = np.arange(rows) / 60 + chance.uniform(-JITTER_S, JITTER_S, rows)
-        kept = chance.random(rows) >= LOST
+        kept = chance.random(rows) >= LOST_SHARE
         kept[[0, -1]] = True
         write_take(folder / f"{sound.stem}.csv", motion, np.maximum(times_s, 0)[kept])
         (folder / sound.name).write_bytes(sound.read_bytes())

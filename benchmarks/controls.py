@@ -21,7 +21,7 @@ from lipmotion.types import Generation
 
 RATE_HZ = 24.0
 VOICES = ("espeak-ng:en-us+f2", "espeak-ng:en-us+m1", "espeak-ng:en-us+m7", "espeak-ng:en-gb")
-CLOSED = 0.012
+CLOSED_OPENING = 0.012
 """Lips that touch have openings up to this (``meshes.fitting.point_motion``)."""
 
 
@@ -50,8 +50,8 @@ def held_poses(spoken: list[Generation]) -> None:
         sampled_errors.append(sampled - curve.motion["opening"])
         at = [min(round(time_s * RATE_HZ), len(steps) - 1) for time_s in closed_s]
         count += len(at)
-        shown += int((steps[at] <= CLOSED).sum())
-        sampled_shown += int((sampled[at] <= CLOSED).sum())
+        shown += int((steps[at] <= CLOSED_OPENING).sum())
+        sampled_shown += int((sampled[at] <= CLOSED_OPENING).sum())
     figures = {"poses of at least frames": frames, "rate": RATE_HZ, "p b m": count}
     for way, found, closed in (("held", errors, shown), ("sampled", sampled_errors, sampled_shown)):
         rms = float(np.sqrt(np.mean(np.concatenate(found) ** 2)))

@@ -44,8 +44,8 @@ def main() -> None:
     for name, sounds in (("recorded", [u.audio for u in utterances]), ("joined", [sound for sound, _ in said])):
         errors = {"package": 0, "words of the corpus": 0}
         for text, sound in zip(texts, sounds, strict=True):
-            heard = recognise_words(SpeechRequest(sound)).words
-            errors["package"] += distance(text.split(), [span.label.text for span in heard])
+            recognised = recognise_words(SpeechRequest(sound)).words
+            errors["package"] += distance(text.split(), [span.label.text for span in recognised])
             errors["words of the corpus"] += distance(text.split(), loop_words(sound, vocabulary))
         count = sum(len(text.split()) for text in texts)
         right = {key: round(1 - value / count, 3) for key, value in errors.items()}

@@ -44,8 +44,8 @@ from lipmotion.types import Audio, Generation
 HERE = Path(__file__).parents[1]
 FACES = ("woman", "man", "cartoon")
 RECOGNISERS = ("fast", "auto")
-EVERY = 7
-CHECKED = 400
+CHECKED_STEP = 7
+CHECKED_FRAMES = 400
 """Frames whose encoding is timed; they are held in memory."""
 Bytes = NDArray[np.uint8]
 
@@ -118,7 +118,7 @@ def frame_times(options: argparse.Namespace, generation: Generation) -> dict[str
     kept, count, start_s = list[Bytes](), 0, time.process_time()
     for frame in planes:
         count += 1
-        if len(kept) < CHECKED:
+        if len(kept) < CHECKED_FRAMES:
             kept.append(frame)
     drawn_s = (time.process_time() - start_s) / count
     with tempfile.TemporaryDirectory() as folder:
@@ -144,7 +144,7 @@ def likeness(name: str, speech: Path, generation: Generation) -> dict[str, float
     assert planes is not None
     luma, colours, largest = [], [], 0
     for number, (picture, frame) in enumerate(zip(pictures, planes, strict=True)):
-        if number % EVERY == 0:
+        if number % CHECKED_STEP == 0:
             given = av.VideoFrame.from_ndarray(picture).reformat(format="yuv420p", dst_colorspace="itu601").to_ndarray()
             difference = given.astype(np.int16) - frame
             luma.append(_decibel(difference[: len(picture)]))

@@ -28,7 +28,7 @@ from lipmotion.types import Audio, Motion, Track
 from lipmotion.vision.track import track
 
 SHARES = (0.0, 0.2, 0.35, 0.5, 0.75, 1.0)
-HEARD = ("quiet", "babble 10 dB", "white 10 dB", "room")
+CONDITIONS = ("quiet", "babble 10 dB", "white 10 dB", "room")
 
 
 def main() -> None:
@@ -60,11 +60,11 @@ def own_voice(options: argparse.Namespace, figures: dict[float, dict[str, Any]])
     model, corpus = load_model(options.model), Corpus.open(options.corpus)
     threshold = closed_threshold([corpus.utterance(name).track.motion["opening"] for name in corpus.names("train")])
     utterances = [corpus.utterance(name) for name in corpus.names(options.split)]
-    heard = conditions(options.corpora)
-    for name in HEARD:
+    condition_of = conditions(options.corpora)
+    for name in CONDITIONS:
         pairs: dict[float, list[Any]] = {share: [] for share in SHARES}
         for seed, utterance in enumerate(utterances):
-            for share, motion in generated(model, heard[name](utterance.audio, seed)):
+            for share, motion in generated(model, condition_of[name](utterance.audio, seed)):
                 pairs[share].append([side[:, 0] for side in compared(motion, utterance.track)])
         for share, sides in pairs.items():
             made, recorded = zip(*sides, strict=True)

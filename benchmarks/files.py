@@ -23,10 +23,10 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import lipmotion
 from lipmotion.addons.blender.curves import at_frames
 from lipmotion.export.addon import write_addon
-from lipmotion.faces.head.lips import COLUMNS, VISIBLE
+from lipmotion.faces.head.head_blendshapes import head_mesh
+from lipmotion.faces.head.lips import COLUMNS, VISIBLE_RINGS
 from lipmotion.faces.head.performance import head_poses
 from lipmotion.faces.head.shape_fit import mouth_weights
-from lipmotion.faces.head.shapes import head_mesh
 from lipmotion.faces.head.stage import figure
 from lipmotion.meshes.fitting.driven import driven_character
 from lipmotion.meshes.model.scene import Scene
@@ -37,7 +37,7 @@ from lipmotion.types import Generation
 from programs import gltf_report, gltf_validator, python_with, run_with
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
-TIMES = 40
+REPETITIONS = 40
 
 
 def main() -> None:
@@ -50,11 +50,11 @@ def main() -> None:
         sound = folder / "welcome.flac"
         sound.write_bytes((EXAMPLES / sound.name).read_bytes())
         result = lipmotion.animate(sound, transcript=EXAMPLES / "welcome.txt")
-        heard = prosody_of_speech(sound)
+        prosody = prosody_of_speech(sound)
         print(json.dumps(fit(result)), flush=True)
-        makers = {"head": lambda: head_scene(result, prosody=heard)}
+        makers = {"head": lambda: head_scene(result, prosody=prosody)}
         for path in options.characters:
-            makers[path.stem] = lambda path=path: character_scene(result, driven_character(path), prosody=heard)
+            makers[path.stem] = lambda path=path: character_scene(result, driven_character(path), prosody=prosody)
         for name, make in makers.items():
             started = time.process_time()
             scene = make()
@@ -75,8 +75,8 @@ def fit(result: Generation) -> dict[str, object]:
     mesh = head_mesh(character)
     poses = head_poses(result.motion, result.units, 100.0)
     curves = mouth_weights(character, mesh, poses)
-    lips = character.skin.lip_rows()[:VISIBLE]
-    rows, ring = lips.ravel(), slice((VISIBLE - 1) * COLUMNS, VISIBLE * COLUMNS)
+    lips = character.skin.lip_rows()[:VISIBLE_RINGS]
+    rows, ring = lips.ravel(), slice((VISIBLE_RINGS - 1) * COLUMNS, VISIBLE_RINGS * COLUMNS)
     moved = mesh.displacements(rows)
     apart, gaps, closed = [], [], []
     for number, pose in enumerate(poses):
@@ -107,7 +107,7 @@ def size(scene: Scene) -> dict[str, int]:
 def asked(path: Path, scene: Scene) -> dict[str, object]:
     """Return what the programs say of a scene's file."""
     assert scene.weights is not None
-    times_s = np.linspace(0, scene.weights.time_s[-1], TIMES)
+    times_s = np.linspace(0, scene.weights.time_s[-1], REPETITIONS)
     found: dict[str, object] = {}
     if path.suffix == ".glb" and gltf_validator():
         report = gltf_report(path)

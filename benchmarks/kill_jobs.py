@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-CLIPS, TRAINED, MANY = 3, 6, 96
+CLIPS, TRAINING_CLIPS, BATCH_LINES = 3, 6, 96
 """Recordings to track; utterances to train on; utterances for which two processes share the training."""
 
 
@@ -42,13 +42,13 @@ def make_inputs(folder: Path, command: Sequence[str]) -> Path:
     from lipmotion.testing.toy import toy_utterances, write_toy_recordings
 
     write_toy_recordings(folder / "recordings", sentences=CLIPS)
-    utterances = toy_utterances(MANY)
-    for name, count in (("corpus", TRAINED), ("large", MANY)):
+    utterances = toy_utterances(BATCH_LINES)
+    for name, count in (("corpus", TRAINING_CLIPS), ("large", BATCH_LINES)):
         corpus = Corpus.create(folder / name)
         for utterance in utterances[:count]:
             corpus.add(utterance)
     (folder / "sounds").mkdir()
-    for utterance in utterances[:TRAINED]:
+    for utterance in utterances[:TRAINING_CLIPS]:
         _write_sound(folder / "sounds" / f"{utterance.name}.wav", utterance)
     train = ["train", folder / "corpus", "-o", folder / "model.lipmotion", "--workers", "1"]
     subprocess.run([*command, *map(str, train)], check=True, capture_output=True)

@@ -8,7 +8,7 @@ import signal
 from kill_jobs import Job
 
 LINE = "lipmotion: stopped; run the same command again to go on"
-EARLY = 0.5
+EARLY_SHARE = 0.5
 """Before this share of its usual duration, Python may still be starting, without the program's signal handlers."""
 
 
@@ -19,7 +19,7 @@ def verdict(number: int, code: int, out: str, err: str, share: float, job: Job) 
     out, err     : standard output and standard error
     share        : time of the signal relative to the usual duration
     """
-    early = not out and share < EARLY
+    early = not out and share < EARLY_SHARE
     if number == signal.SIGKILL:
         return "killed at once", "" if code == -number else f"exit code {code}: {err}"
     if "runpy" in err or (code == -number and early):

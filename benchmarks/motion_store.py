@@ -25,13 +25,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus
+from lipmotion.motion.motion_store import compress, lip_tolerance, motion_store_arrays, point_distances
 from lipmotion.motion.resample import to_model_frames
-from lipmotion.motion.store import compress, lip_tolerance, motion_store_arrays, point_distances
 from lipmotion.storage.archive import write_archive
 from lipmotion.types import Channel
-from lipmotion.vision.mesh import quiet_stderr
+from lipmotion.vision.face_mesh import quiet_stderr
+from lipmotion.vision.head_pose import without_head_motion
 from lipmotion.vision.packages import import_face_mesh
-from lipmotion.vision.pose import without_head_motion
 
 Array = NDArray[Any]
 POINTS, VERTICES, VIDEO_HZ, PAPER_HZ = 468, 2000, 25.0, 30.0

@@ -9,7 +9,7 @@ within 120 ms at which both fit best. Phones in time are those recognised, for p
 
 strength    : 98th percentile over speech of the opening and of ARKit's curves, of what is generated and of the person's
               tracked motion, beside a capture's
-vowels      : share of the frames inside vowels with an opening under ``SHUT``, under several doubts of the phones: of
+vowels      : share of the frames inside vowels opening less than ``SHUT_OPENING``, under several doubts of phones: of
               whole recordings and, of those longer than ten seconds, of pieces of five, where it is worst
 pauses      : median opening in inner pauses of ``PAUSE_S``, without ``EDGE_S`` at both ends, over that in vowels; the
               same of what each face draws (``READINGS``)
@@ -41,9 +41,9 @@ from lipmotion.articulation.lip_points import CHIN, LOWER_MIDDLE, UPPER_MIDDLE
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.articulation.pauses import PAUSE_STYLES, with_pauses
 from lipmotion.articulation.symmetry import symmetrical
+from lipmotion.faces.head.head_blendshapes import head_mesh
 from lipmotion.faces.head.performance import head_poses
 from lipmotion.faces.head.pose import CharacterPose
-from lipmotion.faces.head.shapes import head_mesh
 from lipmotion.faces.head.stage import figure
 from lipmotion.meshes.files.gltf_writer import write_gltf_scene
 from lipmotion.meshes.fitting.driven import driven_character
@@ -69,10 +69,10 @@ Inside = NDArray[np.bool_]
 Units = Timeline[Unit]
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "welcome.flac"
-SHUT = 0.015
+SHUT_OPENING = 0.015
 PAUSE_S, EDGE_S = (0.2, 1.2), 0.12
 LAG_S = 0.12
-STRONG = 98
+STRONG_PERCENTILE = 98
 """The percentile that is a mouth's strength: wider openings are rare, and often a tracker's."""
 CAPTURED = {
     "jawOpen": 0.33, "mouthLowerDownLeft": 0.43, "mouthLowerDownRight": 0.43, "mouthFunnel": 0.39, "mouthPucker": 0.44,
@@ -356,12 +356,12 @@ def accuracy(options: argparse.Namespace, model: Model) -> None:
 
 def strong(curve: NDArray[np.floating[Any]]) -> float:
     """Return the strength of a curve."""
-    return float(np.nanpercentile(curve, STRONG))
+    return float(np.nanpercentile(curve, STRONG_PERCENTILE))
 
 
 def shut_share(opening: NDArray[np.floating[Any]]) -> float:
     """Return the share of openings at which the mouth is shut."""
-    return float(np.mean(opening[np.isfinite(opening)] < SHUT))
+    return float(np.mean(opening[np.isfinite(opening)] < SHUT_OPENING))
 
 
 def rounded(row: Mapping[str, object], digits: int = 3) -> dict[str, object]:

@@ -20,7 +20,7 @@ import lipmotion
 from lipmotion.corpora.store import Corpus
 
 CHANNELS = ("opening", "width", "outer")
-ENLARGED = 2
+ENLARGEMENT = 2
 
 
 def pictures_of(corpus: Corpus, clips: int) -> dict[str, list[tuple[NDArray[np.float64], NDArray[np.uint8]]]]:
@@ -62,7 +62,7 @@ def main() -> None:
             *(f"{name} {value:.3f}" for name, value in zip(CHANNELS, median, strict=True)),
         )
     picture = Image.fromarray(np.hstack(columns))
-    picture = picture.resize((picture.width * ENLARGED, picture.height * ENLARGED), Image.Resampling.LANCZOS)
+    picture = picture.resize((picture.width * ENLARGEMENT, picture.height * ENLARGEMENT), Image.Resampling.LANCZOS)
     whole = Image.new("RGB", (picture.width, picture.height + 22), "white")
     whole.paste(picture, (0, 22))
     step = picture.width // len(found)

@@ -28,7 +28,7 @@ from lipmotion.appearance.poisson import cloning_system
 from lipmotion.kernels.pixels.affine import resample
 from lipmotion.vision.face_follower import FaceFollower
 from lipmotion.vision.frames import open_video
-from lipmotion.vision.mouth import face_to_image, region_to_image
+from lipmotion.vision.mouth_pictures import face_to_image, region_to_image
 
 Picture = NDArray[np.uint8]
 FEATHER_PX = 6.0

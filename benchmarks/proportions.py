@@ -6,7 +6,7 @@ CORPUS : prepared videos of one person, with transcripts (``lipmotion corpus pre
 
 The transcripts are aligned with the model of the package. At the middle of every sound of at least 40 ms:
 
-*Photographs*: the tracked points of the lips. The hole is as wide as the inner lips are more than ``SEEN`` apart.
+*Photographs*: the tracked points of the lips. The hole is as wide as the inner lips are more than ``SEEN_GAP`` apart.
 *Drawings*: the outlines that a face draws for the tracked motion and the phones of the same utterances, before they are
 painted. *Tracked*: the drawing of the middle pose of each sound,
 written as .mp4 and tracked as the photographs were.
@@ -32,8 +32,8 @@ from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.export.video import write_mp4
 from lipmotion.faces import face_named
 from lipmotion.faces.portrait.geometry import lip_outlines
+from lipmotion.faces.portrait.portrait_rasteriser import FacePose, Rasteriser
 from lipmotion.faces.portrait.pose import MouthPose, mouth_poses
-from lipmotion.faces.portrait.rasteriser import FacePose, Rasteriser
 from lipmotion.types import Audio, Motion, Timeline, Unit, Utterance
 
 SOUNDS = {
@@ -43,7 +43,7 @@ SOUNDS = {
 }  # fmt: skip
 INNER = ((191, 95), (80, 88), (81, 178), (82, 87), (13, 14), (312, 317), (311, 402), (310, 318), (415, 324))
 """Points of the inner lips above one another, between the inner corners 78 and 308."""
-LEAST_S, SEEN, SIZE, HELD, FPS = 0.04, 0.015, 640, 6, 25.0
+LEAST_S, SEEN_GAP, SIZE, HELD_FRAMES, FPS = 0.04, 0.015, 640, 6, 25.0
 COLUMNS = ("width", "hole width", "hole height", "lips height")
 Row = NDArray[np.float64]
 
@@ -66,7 +66,7 @@ def photographed(motion: Motion, at_s: float) -> Row:
     apart = np.array([0.0, *(upper[1] - lower[1] for upper, lower in pairs), 0.0])
     order = np.argsort(x)
     across = np.linspace(x.min(), x.max(), 400)
-    hole = float(np.ptp(x)) * float((np.interp(across, x[order], apart[order]) > SEEN).mean())
+    hole = float(np.ptp(x)) * float((np.interp(across, x[order], apart[order]) > SEEN_GAP).mean())
     return np.array([motion["width"][frame], hole, motion["opening"][frame], motion["outer"][frame]])
 
 
@@ -76,7 +76,7 @@ def outlined(face: str, pose: MouthPose) -> Row:
     lips = face_named(face).design.lips  # type: ignore[attr-defined]
     shape = lip_outlines(lips, pose, x)
     apart = shape.lower_inner - shape.upper_inner
-    hole = float((apart > SEEN).mean() * 1.2) if pose.gap > 0 else 0.0
+    hole = float((apart > SEEN_GAP).mean() * 1.2) if pose.gap > 0 else 0.0
     return np.array([2 * shape.half_width, hole, apart.max(), (shape.lower_outer - shape.upper_outer)[600]])
 
 
@@ -89,13 +89,15 @@ def tracked(face: str, poses: dict[str, MouthPose]) -> dict[str, Row]:
     from lipmotion.vision.track import track
 
     drawing = Rasteriser(face_named(face).design, SIZE)  # type: ignore[attr-defined]
-    frames = [drawing.picture(FacePose(pose, 0.07), drawing.canvas()) for pose in poses.values() for _ in range(HELD)]
+    frames = [
+        drawing.picture(FacePose(pose, 0.07), drawing.canvas()) for pose in poses.values() for _ in range(HELD_FRAMES)
+    ]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "held.mp4"
         sound = Audio(np.zeros(int(16_000 * len(frames) / FPS), np.float32), 16_000)
         write_mp4(path, iter(frames), fps=FPS, audio=sound)
         motion = track(path, crops=False).motion
-    return {name: photographed(motion, (n * HELD + HELD - 2) / FPS) for n, name in enumerate(poses)}
+    return {name: photographed(motion, (n * HELD_FRAMES + HELD_FRAMES - 2) / FPS) for n, name in enumerate(poses)}
 
 
 def measured(corpus: lipmotion.Corpus, every: int, faces: list[str]) -> dict[str, Any]:

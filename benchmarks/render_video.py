@@ -47,7 +47,7 @@ from lipmotion.vision.frames import open_video
 COMMAND = [sys.executable, "-m", "lipmotion.cli.main"]
 Pictures = NDArray[np.uint8]
 RATE_HZ = 25
-STITCHED = 9
+STITCHED_FRAMES = 9
 """Rounds of stitching."""
 BATCH = 25
 """Frames that are stitched at once."""
@@ -152,7 +152,7 @@ def stitch(size: str, path: Path) -> None:
     shape = mask.shape
     system, weight = cloning_system(mask), feather(mask, 6.0 * scale)
     ours, opencv, cloned = [], [], []
-    for _ in range(STITCHED):
+    for _ in range(STITCHED_FRAMES):
         starts = range(0, len(frames), BATCH)
         parts = [stitched(frames[n : n + BATCH], to_frame[n : n + BATCH], system, weight) for n in starts]
         cut, clone, placed, theirs = 1e3 * np.sum(parts, axis=0) / len(frames)
@@ -226,10 +226,10 @@ def resized(clip: Path, path: Path, width: int, height: int) -> Path:
             container.mux(stream.encode(av.VideoFrame.from_ndarray(shown, format="rgb24")))
         container.mux(stream.encode(None))
         samples = np.ascontiguousarray(audio.samples[None], np.float32)
-        heard = av.AudioFrame.from_ndarray(samples, format="fltp", layout="mono")
-        heard.rate, heard.pts, heard.time_base = 16_000, 0, Fraction(1, 16_000)
+        sound_frame = av.AudioFrame.from_ndarray(samples, format="fltp", layout="mono")
+        sound_frame.rate, sound_frame.pts, sound_frame.time_base = 16_000, 0, Fraction(1, 16_000)
         fifo = av.AudioFifo()
-        fifo.write(heard)
+        fifo.write(sound_frame)
         while (block := fifo.read(1024, partial=True)) is not None:
             container.mux(sound.encode(block))
         container.mux(sound.encode(None))

@@ -50,13 +50,13 @@ def again(first: Motion, second: Motion) -> str:
 
 def print_generated_again(folder: Path, speech: Path, transcript: Path) -> None:
     """Print, for several kinds of speech, what the phones of three files give when they are given back unedited."""
-    heard = read_audio(speech)
-    repeated = Audio(np.resize(heard.samples, round(LONG_S * heard.rate_hz)), heard.rate_hz)
+    audio = read_audio(speech)
+    repeated = Audio(np.resize(audio.samples, round(LONG_S * audio.rate_hz)), audio.rate_hz)
     requests = {
-        "transcript": lipmotion.SpeechRequest(heard, transcript=transcript),
-        "recognised (auto)": lipmotion.SpeechRequest(heard),
-        "recognised (fast)": lipmotion.SpeechRequest(heard, recogniser="fast"),
-        "white noise of 15 dB": lipmotion.SpeechRequest(noisy_audio(heard, "white", 15.0)),
+        "transcript": lipmotion.SpeechRequest(audio, transcript=transcript),
+        "recognised (auto)": lipmotion.SpeechRequest(audio),
+        "recognised (fast)": lipmotion.SpeechRequest(audio, recogniser="fast"),
+        "white noise of 15 dB": lipmotion.SpeechRequest(noisy_audio(audio, "white", 15.0)),
         f"{LONG_S:.0f} s, recognised (fast)": lipmotion.SpeechRequest(repeated, recogniser="fast"),
     }
     kinds = {name: (request.recording, lipmotion.animate(request)) for name, request in requests.items()}

@@ -2,9 +2,9 @@
 
     python benchmarks/sound_offset.py GRID [TRIALS]
 
-GRID : the folder of one speaker, with ``clips``. Three clips in a row are the scene; a camera hears it in a room (as
+GRID : the folder of one speaker, with ``clips``. Three clips in a row are the scene; a camera records it in a room (as
 much energy in echoes as straight, noise), a recorder at the mouth, from another time on. In the rows "mark alone", the
-recorder hears silence after the mark.
+recorder has silence after the mark.
 """
 
 from __future__ import annotations

@@ -26,8 +26,8 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.types import Track
+from lipmotion.vision.face_mesh import FaceMesh
 from lipmotion.vision.landmarks import EYE_CORNERS, JAW_POINTS, LIP_POINTS, TRACKED_POINTS
-from lipmotion.vision.mesh import FaceMesh
 from lipmotion.vision.track import track
 
 Image = NDArray[np.uint8]

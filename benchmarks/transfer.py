@@ -27,8 +27,8 @@ from numpy.typing import NDArray
 from lipmotion import Corpus, Generation, Model, SpeechRequest, load_model
 from lipmotion.motion.closure import closable_ranges
 from lipmotion.motion.rest import away_from_speech, speech_intervals
-from lipmotion.motion.speakers import FAR_FROM_SPEECH_S, NEAR_SPEECH_S, SpeakerMap
-from lipmotion.motion.transfer import transfer_map
+from lipmotion.motion.speaker_maps import FAR_FROM_SPEECH_S, NEAR_SPEECH_S, SpeakerMap
+from lipmotion.motion.transfer_map import transfer_map
 from lipmotion.pipeline.generate import transfer
 from lipmotion.pipeline.generate.generation_for import generate_for
 from lipmotion.pipeline.understand.understood_speech import understand

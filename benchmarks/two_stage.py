@@ -30,14 +30,14 @@ from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.pipeline.corpus.prompts import prompts
 from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.training.train import examples_without_motion, model_motion
-from lipmotion.pipeline.training.voices import (
+from lipmotion.pipeline.training.other_speakers import (
     VoiceExample,
     is_held_out_speaker,
     recorded_sentences,
     synthetic_sentences,
     voice_examples,
 )
+from lipmotion.pipeline.training.train import examples_without_motion, model_motion
 from lipmotion.speech.features.mfcc import mfcc
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.voices.installed import installed_voices

@@ -81,7 +81,7 @@ Array = NDArray[np.float64]
 Span = tuple[float, float]
 LIPS = (slice(None), slice(16, 40), slice(16, 56))
 """The part of the mouth region in which lips and teeth are."""
-UNTOUCHED = 30
+UNTOUCHED_FRAMES = 30
 """Rows of pixels from the top that no way changes."""
 DISTANCES = ("opening", "width", "outer")
 INTERVALS = ("psnr_db", "ssim", "sharpness", "flicker", "seam_ratio", "acc_opening", "driver_opening", "landmarks")
@@ -236,7 +236,7 @@ def judged_way(clip: RecordedClip, way: Way, driver: Motion | None, true: Pictur
         landmarks = np.linalg.norm(moved, axis=2).mean(axis=1)
     if way.motion_only:
         return Judged({}, curves, landmarks, seen, clip.eyes_px, Sheets({}, {}))
-    if not job.setting.mp4 and (frames[:, :UNTOUCHED] != clip.frames[:, :UNTOUCHED]).any():
+    if not job.setting.mp4 and (frames[:, :UNTOUCHED_FRAMES] != clip.frames[:, :UNTOUCHED_FRAMES]).any():
         raise InputError(f"{clip.name}, {way.name}: other frames behind the face than those of the clip, in its order")
     made = lower_face(clip, frames)
     inner = (slice(None), *MOUTH)

@@ -21,16 +21,16 @@ from lipmotion.errors import InputError
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.faces.filmed.renderer import STITCHING
 from lipmotion.faces.registry import face_named
-from lipmotion.pipeline.film import video
+from lipmotion.pipeline.film import filmed_video
 from lipmotion.pipeline.film.background import open_background, placed_maps
-from lipmotion.pipeline.film.video import FILM, FilmOptions, film_of
+from lipmotion.pipeline.film.filmed_video import FILM, FilmOptions, film_of
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.training.channels import PICTURES
 from lipmotion.stats.pca import evenly_spaced
 from lipmotion.types import Motion, Timeline, Utterance
 from lipmotion.vision.footage import footage_frames, track_footage
 from lipmotion.vision.landmarks import LIP_POINTS
-from lipmotion.vision.mouth import region_to_image
+from lipmotion.vision.mouth_pictures import region_to_image
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -285,7 +285,7 @@ def filmed_ways(face: FilmedFace, mouths: RecordedMouths, engines: Sequence[str]
 
     engines : what else than the clip's own track drives them; all options are tried with the track and the first
     """
-    video.open_background = lru_cache(maxsize=1)(open_background)  # every clip is tracked once, not once a way
+    filmed_video.open_background = lru_cache(maxsize=1)(open_background)  # every clip is tracked once, not once a way
 
     def way(name: str, source: str, options: FilmOptions, eigenlips: Eigenlips | None = None) -> Way:
         def render(clip: RecordedClip, motion: Motion | None) -> Iterator[Pictures]:

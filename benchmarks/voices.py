@@ -20,14 +20,19 @@ import numpy as np
 import lipmotion
 from lipmotion.errors import AlignmentError
 from lipmotion.pipeline.corpus.prompts import prompts
-from lipmotion.pipeline.training.voices import SpokenSentence, is_held_out_speaker, synthetic_sentences, voice_examples
+from lipmotion.pipeline.training.other_speakers import (
+    SpokenSentence,
+    is_held_out_speaker,
+    synthetic_sentences,
+    voice_examples,
+)
 from lipmotion.speech.features.mfcc import mfcc
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.voices.installed import installed_voices
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import is_silent
 
-FEWEST, BIASED_MS = 20, 12
+FEWEST_PHONES, BIASED_MS = 20, 12
 
 
 def main() -> None:
@@ -77,7 +82,9 @@ def start_differences(sentences: Sequence[SpokenSentence], general: Recogniser) 
         for stated, found in zip(without_silence(sentence.phones), without_silence(placed), strict=True):
             late_ms[stated.label.phone].append(1000 * (stated.start_s - found.start_s))
     errors = np.concatenate(list(late_ms.values()))
-    medians = {phone: round(float(np.median(values))) for phone, values in late_ms.items() if len(values) >= FEWEST}
+    medians = {
+        phone: round(float(np.median(values))) for phone, values in late_ms.items() if len(values) >= FEWEST_PHONES
+    }
     return {
         "phones": len(errors),
         "misfits": misfits,

@@ -138,9 +138,9 @@ def cue_formats() -> str:
 
 def character_limits() -> str:
     """Return what the files of a character may hold."""
-    from lipmotion.meshes.model.limits import MOST
+    from lipmotion.meshes.model.file_limits import ALLOWANCE
 
-    return "At most " + ", ".join(f"{most:,} {what}" for what, most in MOST.items()) + "."
+    return "At most " + ", ".join(f"{most:,} {what}" for what, most in ALLOWANCE.items()) + "."
 
 
 def bad_input() -> str:

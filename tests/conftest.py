@@ -29,7 +29,7 @@ from lipmotion.testing.toy_face import toy_face
 SENTENCES = 12
 FIXED, EXPLORE = "fixed", "explore"
 """Profiles of Hypothesis: the same examples every time; and ``--hypothesis-profile=explore``: others, and more."""
-MORE = 10
+MORE_SENTENCES = 10
 """How many times the examples of a test are tried by ``explore``."""
 # How long an example takes depends on what else the machine does; a fixture that examples share is never changed here.
 ANYWHERE = settings(
@@ -39,7 +39,7 @@ ANYWHERE = settings(
     print_blob=True,
 )
 settings.register_profile(FIXED, ANYWHERE, derandomize=True)
-settings.register_profile(EXPLORE, ANYWHERE, derandomize=False, max_examples=100 * MORE)
+settings.register_profile(EXPLORE, ANYWHERE, derandomize=False, max_examples=100 * MORE_SENTENCES)
 settings.load_profile(FIXED)
 
 
@@ -52,7 +52,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         for test in {getattr(item, "obj", None) for item in items}:
             own = getattr(test, "_hypothesis_internal_use_settings", None)
             if own is not None and own.max_examples < settings().max_examples:
-                test._hypothesis_internal_use_settings = settings(own, max_examples=MORE * own.max_examples)
+                test._hypothesis_internal_use_settings = settings(own, max_examples=MORE_SENTENCES * own.max_examples)
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from lipmotion.pipeline.edits import Edits
     from lipmotion.pipeline.evaluation.evaluate import evaluate
     from lipmotion.pipeline.film.build import build_face
-    from lipmotion.pipeline.film.video import FilmOptions
+    from lipmotion.pipeline.film.filmed_video import FilmOptions
     from lipmotion.pipeline.generate.animate import animate
     from lipmotion.pipeline.generate.explain import explain
     from lipmotion.pipeline.generate.speak import speak
@@ -116,7 +116,7 @@ _HOMES = {
     "Lexicon": "lipmotion.units",
     "Model": "lipmotion.pipeline.model",
     "adapt": "lipmotion.pipeline.training.adapt",
-    "FilmOptions": "lipmotion.pipeline.film.video",
+    "FilmOptions": "lipmotion.pipeline.film.filmed_video",
     "FilmedFace": "lipmotion.faces.filmed.face",
     "animate": "lipmotion.pipeline.generate.animate",
     "build_face": "lipmotion.pipeline.film.build",

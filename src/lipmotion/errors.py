@@ -6,13 +6,13 @@ for each class; exit code 2 means a wrong command line, exit code 1 a bug.
 
 from __future__ import annotations
 
-SHOWN = 80
+SHOWN_CHARACTERS = 80
 """Largest number of characters of a text from a user that a message repeats."""
 
 
 def shortened(text: str) -> str:
-    """Return a text, or its first ``SHOWN`` characters and ``...``, for a message."""
-    return text if len(text) <= SHOWN else text[:SHOWN] + "..."
+    """Return a text, or its first ``SHOWN_CHARACTERS`` characters and ``...``, for a message."""
+    return text if len(text) <= SHOWN_CHARACTERS else text[:SHOWN_CHARACTERS] + "..."
 
 
 class LipMotionError(Exception):

@@ -21,9 +21,9 @@ class Strips(list[Any]):
 
 
 @pytest.mark.parametrize(
-    ("sound_s", "start", "heard_from"), [(0.0, 10, 10), (0.5, 22, 22), (-0.5, -2, 10)]
+    ("sound_s", "start", "played_from"), [(0.0, 10, 10), (0.5, 22, 22), (-0.5, -2, 10)]
 )  # fmt: skip
-def test_the_sound_is_where_the_motion_is(sound_s: float, start: int, heard_from: int, tmp_path: Path) -> None:
+def test_the_sound_is_where_the_motion_is(sound_s: float, start: int, played_from: int, tmp_path: Path) -> None:
     path = tmp_path / "a.wav"
     path.write_bytes(b"")
     strips = Strips()
@@ -32,7 +32,7 @@ def test_the_sound_is_where_the_motion_is(sound_s: float, start: int, heard_from
     for _ in range(2):
         assert add_sound(scene, str(path), 10.0, sound_s)
     (strip,) = strips
-    assert (strip.start, strip.frame_final_start) == (start, heard_from)
+    assert (strip.start, strip.frame_final_start) == (start, played_from)
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ import pytest
 
 from appearance.test_eigenlips import pictures
 from lipmotion.appearance.candidates import (
-    DRAWN,
+    MIXTURE_SHARE,
     choose_candidates,
     drawn_to_recorded,
     make_candidates,
@@ -132,9 +132,11 @@ def test_a_mouth_between_recorded_ones_stays_and_one_far_away_comes_nearer() -> 
     wanted = np.array([[3.4, 2.7], [3.5, 20.0]], np.float32)
     drawn = drawn_to_recorded(wanted, grid)
     assert drawn[0] == pytest.approx(wanted[0], abs=0.1)
-    assert drawn[1] == pytest.approx([3.5, (1 - DRAWN) * 20 + DRAWN * 7], abs=0.5)  # 7 is the end of what was recorded
+    assert drawn[1] == pytest.approx(
+        [3.5, (1 - MIXTURE_SHARE) * 20 + MIXTURE_SHARE * 7], abs=0.5
+    )  # 7 is the end of what was recorded
     one = grid[:1]
-    assert drawn_to_recorded(one + 4, one) == pytest.approx(one + 4 * (1 - DRAWN), abs=1e-3)
+    assert drawn_to_recorded(one + 4, one) == pytest.approx(one + 4 * (1 - MIXTURE_SHARE), abs=1e-3)
 
 
 def test_mouths_are_drawn_smoothly_over_time() -> None:

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.appearance.identity import SAME_PERSON, face_signature, likeness
+from lipmotion.appearance.identity import SAME_PERSON_LIKENESS, face_signature, likeness
 
 
 def face(seed: int) -> np.ndarray:
@@ -21,7 +21,7 @@ def test_other_faces_and_neck_and_background() -> None:
     other = face(1)
     other[112:] = 0
     other[:, :18] = 255
-    assert likeness(face_signature(face(1)), face_signature(face(2))) < SAME_PERSON
+    assert likeness(face_signature(face(1)), face_signature(face(2))) < SAME_PERSON_LIKENESS
     assert likeness(face_signature(face(1)), face_signature(other)) == pytest.approx(1)
 
 

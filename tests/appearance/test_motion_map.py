@@ -9,7 +9,7 @@ from lipmotion.appearance.motion_map import (
     COMPONENTS,
     FRAMES_PER_CENTRE,
     MOTION_MAP,
-    OUTERMOST,
+    OUTER_PERCENTAGE,
     MotionMap,
     channel_values,
     fit_motion_map,
@@ -100,7 +100,7 @@ def test_limits_leave_out_the_outermost_poses() -> None:
     components = (values[:, [0, 1, 3]] - found.mean) / found.scale @ found.basis
     outside = (components < found.limits[0]) | (components > found.limits[1])
     assert outside[17].any()
-    assert outside.mean(axis=0) == pytest.approx([2 * OUTERMOST / 100] * 3, abs=1e-3)
+    assert outside.mean(axis=0) == pytest.approx([2 * OUTER_PERCENTAGE / 100] * 3, abs=1e-3)
 
 
 def test_short_footage_is_trusted_less(fitted: MotionMap) -> None:

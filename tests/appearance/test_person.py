@@ -133,7 +133,7 @@ def test_all_pictures_are_in_one_light(footage: FootagePictures) -> None:
 @pytest.mark.long
 def test_damaged_pictures_are_no_candidates(footage: FootagePictures, monkeypatch: pytest.MonkeyPatch) -> None:
     """A blue square, as errors of video leave it, in a picture from which no component is learned."""
-    monkeypatch.setattr(person, "LEARNED_FROM", 120)
+    monkeypatch.setattr(person, "TRAINING_PICTURES", 120)
     learned = set(evenly_spaced(120, len(footage.motion)))
     damaged = next(n for n in range(20, 60) if n not in learned)
     clip = footage.clips[0].copy()

@@ -28,7 +28,7 @@ FORBIDDEN = [
     (DOWN, "pipeline/training/train.py", "from lipmotion.testing import toy"),
     (ENGINES, "engines/trajectory/model.py", "from lipmotion.engines.joint import engine"),
     (ENGINES, "engines/base.py", "from lipmotion.engines import registry"),
-    (FACES, "faces/portrait/mouth.py", "from lipmotion.faces import registry"),
+    (FACES, "faces/portrait/mouth_painting.py", "from lipmotion.faces import registry"),
     ("Exporters never import one another", "export/cues/sheet.py", "from lipmotion.export.motion import rounded"),
     (
         "Formats of one kind never import one another",

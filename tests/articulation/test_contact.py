@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from lipmotion.articulation.contact import (
-    CLOSED_BELOW,
+    CLOSED_OPENING,
     CONTACT_S,
+    EDITED_GAP,
     GAP,
+    LARGEST_GAP,
     LEAST_GAP,
-    MEANT,
-    UNSEEN,
-    WIDEST,
+    TRACKER_DEFICIT,
     closed_lips,
     closures,
     gap_in,
@@ -40,13 +40,13 @@ def runs(mask: np.ndarray) -> list[tuple[int, int]]:
 
 
 def test_the_gap_is_0_where_trackers_see_closed_lips_and_grows_with_the_opening():
-    assert not gap_of(np.array([-0.01, 0, 0.005, CLOSED_BELOW])).any()
+    assert not gap_of(np.array([-0.01, 0, 0.005, CLOSED_OPENING])).any()
     gap = gap_of(np.linspace(0, 1, 1001))
     assert (np.diff(gap) >= 0).all()
     assert np.diff(gap).max() < 0.004
-    assert gap[-1] <= WIDEST
+    assert gap[-1] <= LARGEST_GAP
     people = np.array([0.05, 0.1, 0.25])
-    assert gap_of(people) == pytest.approx(people + UNSEEN, abs=1e-3)
+    assert gap_of(people) == pytest.approx(people + TRACKER_DEFICIT, abs=1e-3)
 
 
 def test_an_opening_has_the_gap_that_it_was_made_of():
@@ -83,7 +83,7 @@ def test_a_contact_that_the_motion_has_is_neither_longer_nor_shorter():
 
 
 def test_lips_that_are_wide_open_in_all_of_a_p_are_meant_so():
-    opening = np.full(101, MEANT + 0.05)
+    opening = np.full(101, EDITED_GAP + 0.05)
     assert not (closed_lips(gap_of(opening), motion(opening), said((0.3, 0.5, "p"))) == 0).any()
 
 

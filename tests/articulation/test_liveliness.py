@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from lipmotion.articulation.liveliness import FOLLOWING, LARGEST_GLANCE, lid_closure, liveliness, phrases
+from lipmotion.articulation.liveliness import GAZE_COUNTER_SHARE, LARGEST_GLANCE, lid_closure, liveliness, phrases
 from lipmotion.types import Channel, Motion, Prosody, Span, Timeline, Unit
 
 MINUTE = Motion(np.full((6001, 1), 0.05), 100.0, (Channel("opening"),))
@@ -79,7 +79,7 @@ def test_each_part_can_be_off_and_leaves_the_others(part, curve):
 
 def test_without_glances_the_eyes_hold_their_target_while_the_head_turns():
     moved = liveliness(frames(25), MINUTE, SAID, None, gaze=False)
-    assert moved.gaze == pytest.approx(-FOLLOWING * moved.turn[:, :2])
+    assert moved.gaze == pytest.approx(-GAZE_COUNTER_SHARE * moved.turn[:, :2])
     assert np.ptp(moved.gaze) > 0.01
 
 

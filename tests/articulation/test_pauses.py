@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.articulation.contact import CLOSED_BELOW
+from lipmotion.articulation.contact import CLOSED_OPENING
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.articulation.pauses import (
-    BREATH,
+    BREATH_GAP,
     NATURAL,
     OPENING_S,
     REST,
@@ -51,8 +51,8 @@ def test_nothing_moves_earlier_than_the_opening_time_before_a_phrase():
     for start_s in (0.4, 1.5):
         before = opening[round((start_s - 0.2) * 100) : round((start_s - OPENING_S) * 100)]
         assert np.ptp(before) < 1e-9
-        assert before.max() <= CLOSED_BELOW
-        assert opening[round(start_s * 100) - 4] >= BREATH - 1e-9
+        assert before.max() <= CLOSED_OPENING
+        assert opening[round(start_s * 100) - 4] >= BREATH_GAP - 1e-9
     assert opening[60] == pytest.approx(0.1)
     mouth = spoken_mouth(moved.motion, LINE)
     assert mouth.contact[[0, 20, 125, 135, 300]].all()
@@ -75,12 +75,12 @@ def test_natural_pauses_and_motion_without_pauses_stay_as_they_are():
 def test_a_pin_in_a_pause_holds():
     moved = with_pauses(generation(LINE), REST, [1.25])
     assert moved.motion["opening"][125] == pytest.approx(0.1)
-    assert moved.motion["opening"][20] <= CLOSED_BELOW
+    assert moved.motion["opening"][20] <= CLOSED_OPENING
 
 
 def test_all_silence_is_rest():
     moved = with_pauses(generation(said((0, 3, "sil"))), REST)
-    assert moved.motion["opening"].max() <= CLOSED_BELOW
+    assert moved.motion["opening"].max() <= CLOSED_OPENING
 
 
 def test_short_pauses_are_shared_by_the_phones_beside_them():

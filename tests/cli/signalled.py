@@ -15,7 +15,7 @@ from types import FrameType
 
 from lipmotion.cli.main import main
 
-RETURNED, CLEARED = -1, -2
+RETURN_MARK, CLEARANCE_MARK = -1, -2
 
 
 class Steps:
@@ -48,11 +48,11 @@ class Last:
 
 if __name__ == "__main__":
     number, step, sys.argv = int(sys.argv[1]), int(sys.argv[2]), ["lipmotion", *sys.argv[3:]]
-    steps, last = Steps(step, number), Last(number) if step == CLEARED else None
+    steps, last = Steps(step, number), Last(number) if step == CLEARANCE_MARK else None
     sys.setprofile(steps.watch)
     code = main()
     sys.setprofile(None)
-    if step == RETURNED:
+    if step == RETURN_MARK:
         os.kill(os.getpid(), number)
     if step == 0:
         Path("steps").write_text(str(steps.taken))

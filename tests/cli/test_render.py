@@ -93,13 +93,13 @@ def test_motion_of_more_than_a_day_is_refused(here: Path, monkeypatch: pytest.Mo
 
 
 def test_files_without_sound_get_no_silence(run: RunCommand, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    heard = []
-    monkeypatch.setattr("lipmotion.pipeline.opened_job.OpenedJob.write", lambda *given, **_: heard.append(given[2]))
+    sounds = []
+    monkeypatch.setattr("lipmotion.pipeline.opened_job.OpenedJob.write", lambda *given, **_: sounds.append(given[2]))
     (here / "rig.csv").write_text("time_s,opening\n0,0\n0.1,0.1\n")
     for name in ("a.json", "a.mp4"):
         assert run("render", "rig.csv", "-o", name).code == 0
-    assert heard[0] is None
-    assert len(heard[1].samples) == 1600
+    assert sounds[0] is None
+    assert len(sounds[1].samples) == 1600
 
 
 def test_a_single_pose_is_written(run: RunCommand, here: Path) -> None:

@@ -189,7 +189,7 @@ def test_whenever_the_signal_comes(name: str, lines: dict[str, tuple[list[object
     steps = int((here / "steps").read_text())
     (here / "steps").unlink()
     early = [1, 20, steps // 2]
-    late = [steps - 12, steps - 1, signalled.RETURNED, signalled.CLEARED]
+    late = [steps - 12, steps - 1, signalled.RETURN_MARK, signalled.CLEARANCE_MARK]
     codes = set()
     for turn, step in enumerate([*early, *late]):
         number = (signal.SIGINT, signal.SIGTERM)[turn % 2]
@@ -219,7 +219,7 @@ def test_a_film_that_is_stopped(toy_speech: Path, toy_model_file: Path, filmed_f
 
 
 def test_a_late_signal_does_not_change_what_is_done(toy_model_file: Path, here: Path) -> None:
-    for number, step in ((signal.SIGINT, signalled.RETURNED), (signal.SIGTERM, signalled.CLEARED)):
+    for number, step in ((signal.SIGINT, signalled.RETURN_MARK), (signal.SIGTERM, signalled.CLEARANCE_MARK)):
         done = signalled_at(step, number, ["info", toy_model_file])
         assert (done.returncode, done.stderr) == (0, "")
         assert done.stdout.startswith("file ")

@@ -12,8 +12,8 @@ from cli.conftest import RunCommand, is_one_error
 from lipmotion.corpora.store import Corpus
 from lipmotion.export.base import read_motion
 from lipmotion.pipeline.model import Model, load_model
+from lipmotion.pipeline.training.other_speakers import SpokenSentence, VoiceExample
 from lipmotion.pipeline.training.train import TrainReport
-from lipmotion.pipeline.training.voices import SpokenSentence, VoiceExample
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.units import unit_set
@@ -121,8 +121,8 @@ def test_other_voices_are_learned_from_but_those_for_judging(
         return toy_model, TrainReport((), {}, {})
 
     both = tuple(SyntheticVoice(name, "flite", name) for name in ("slt", "rms"))
-    monkeypatch.setattr("lipmotion.pipeline.training.voices.installed_voices", lambda: both)
-    monkeypatch.setattr("lipmotion.pipeline.training.voices.synthetic_sentences", say)
+    monkeypatch.setattr("lipmotion.pipeline.training.other_speakers.installed_voices", lambda: both)
+    monkeypatch.setattr("lipmotion.pipeline.training.other_speakers.synthetic_sentences", say)
     monkeypatch.setattr("lipmotion.pipeline.training.train.train", learn)
     (here / "open" / "friend").mkdir(parents=True)
     shutil.copy(toy_speech, here / "open" / "friend" / "one.wav")
@@ -137,7 +137,7 @@ def test_an_engine_without_a_use_for_voices(
 ) -> None:
     sentence = toy_sentences(3)[0]
     one = SpokenSentence("one", "rms", sentence.audio, sentence.units)
-    monkeypatch.setattr("lipmotion.pipeline.training.voices.synthetic_sentences", lambda **_: iter([one]))
+    monkeypatch.setattr("lipmotion.pipeline.training.other_speakers.synthetic_sentences", lambda **_: iter([one]))
     refused = run("train", toy_corpus.path, "-o", "other", "--voices")
     assert is_one_error(refused, 3)
     assert "the engine 'trajectory' does not learn from other voices without motion" in refused.err[0]

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording
-from lipmotion.corpora.splits import LARGEST_LIST, MOST_MISSING, assign_splits, read_names
+from lipmotion.corpora.splits import LARGEST_LIST_BYTES, MOST_MISSING_NAMES, assign_splits, read_names
 from lipmotion.errors import CorpusError
 
 
@@ -30,15 +30,15 @@ def test_long_lists_of_many_recordings(tmp_path: Path) -> None:
 
 
 def test_a_list_of_another_folder_is_refused_in_one_line(tmp_path: Path) -> None:
-    (tmp_path / "val.txt").write_text("".join(f"other{i}\n" for i in range(MOST_MISSING + 1)))
+    (tmp_path / "val.txt").write_text("".join(f"other{i}\n" for i in range(MOST_MISSING_NAMES + 1)))
     with pytest.raises(
-        CorpusError, match=f"name {MOST_MISSING + 1} recordings that are not in it, at most {MOST_MISSING}"
+        CorpusError, match=f"name {MOST_MISSING_NAMES + 1} recordings that are not in it, at most {MOST_MISSING_NAMES}"
     ):
         assign_splits(recordings(2), tmp_path)
 
 
 def test_a_list_is_small(tmp_path: Path) -> None:
-    (tmp_path / "train.txt").write_bytes(b"\n" * (LARGEST_LIST + 1))
+    (tmp_path / "train.txt").write_bytes(b"\n" * (LARGEST_LIST_BYTES + 1))
     with pytest.raises(CorpusError, match="required at most 16777216: is it a list"):
         read_names(tmp_path / "train.txt")
 

@@ -20,7 +20,6 @@ from lipmotion.engines.selection.engine import SelectionEngine
 from lipmotion.engines.trajectory.engine import TrajectoryConfig, TrajectoryEngine
 from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.experiments.engines import disagreement
-from lipmotion.experiments.engines.comparison import HYBRID, MEAN, engines, mean_of_clips
 from lipmotion.experiments.engines.disagreement import (
     OpeningOfClip,
     confidence_of,
@@ -29,14 +28,15 @@ from lipmotion.experiments.engines.disagreement import (
     partial_rank_correlation,
     rank_correlation,
 )
+from lipmotion.experiments.engines.engine_comparison import HYBRID, MEAN, engines, mean_of_clips
 from lipmotion.experiments.engines.hybrid import Hybrid, HybridModel
 from lipmotion.experiments.engines.models import ENGINES_COMPARED
 from lipmotion.experiments.engines.text import table
 from lipmotion.experiments.runner import ExperimentSettings
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.bootstrap import bootstrap_interval
-from lipmotion.pipeline.evaluation.conditions import ComparedClip
 from lipmotion.pipeline.evaluation.evaluate import evaluate
+from lipmotion.pipeline.evaluation.held_out import ComparedClip
 from lipmotion.pipeline.model import load_model
 from lipmotion.testing.examples import examples, speech, timeline
 from lipmotion.types import Constraints, Pin, Progress, silent_monitor

@@ -18,8 +18,8 @@ from lipmotion.experiments.folds import folds, table
 from lipmotion.experiments.runner import ExperimentSettings
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.closures import closings
-from lipmotion.pipeline.evaluation.conditions import ComparedClip, compared_clips, held_out_recordings
 from lipmotion.pipeline.evaluation.figures import BILABIAL
+from lipmotion.pipeline.evaluation.held_out import ComparedClip, compared_clips, held_out_recordings
 from lipmotion.pipeline.training.train import train
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 

@@ -8,7 +8,7 @@ import pytest
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.errors import InputError
 from lipmotion.experiments.noise import LONGEST_S, read_talkers, recordings_in_noise
-from lipmotion.pipeline.evaluation.conditions import HeldOutRecordings, held_out_recordings
+from lipmotion.pipeline.evaluation.held_out import HeldOutRecordings, held_out_recordings
 from lipmotion.pipeline.model import Model
 from lipmotion.speech.features.mfcc import mfcc
 from lipmotion.speech.recognition.recogniser import Recogniser

@@ -7,7 +7,16 @@ from dataclasses import replace
 import numpy as np
 from PIL import Image
 
-from lipmotion.export.posterior_plot import COLOURS, LEFT, NARROWEST, RIGHT, ROW, TITLE, WIDEST, draw_posteriors
+from lipmotion.export.posterior_plot import (
+    COLOURS,
+    LEAST_COLUMNS,
+    LEFT_PX,
+    MOST_COLUMNS,
+    RIGHT_PX,
+    ROW_PX,
+    TITLE_PX,
+    draw_posteriors,
+)
 from lipmotion.types import ChainPosteriors, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 
 FRAMES = 400
@@ -41,8 +50,8 @@ def pixels(picture: Image.Image) -> np.ndarray:
 
 def test_units_have_a_row_each_in_the_order_of_their_time() -> None:
     shown = pixels(draw_posteriors(generated(), [posteriors("phone", halves())]))
-    rows = [2 * TITLE + ROW * number + ROW // 2 for number in range(3)]
-    early, late = LEFT + 100, LEFT + 2 * FRAMES - 100
+    rows = [2 * TITLE_PX + ROW_PX * number + ROW_PX // 2 for number in range(3)]
+    early, late = LEFT_PX + 100, LEFT_PX + 2 * FRAMES - 100
     full, white = list(COLOURS[0]), [255, 255, 255]
     assert shown[rows[0], early].tolist() == full
     assert shown[rows[0], late].tolist() == white
@@ -56,7 +65,7 @@ def test_units_that_are_never_likely_have_no_row() -> None:
     three, four = halves(), halves()
     four[9, 3] = 0.06
     heights = [draw_posteriors(generated(), [posteriors("phone", probability)]).height for probability in (three, four)]
-    assert heights[1] - heights[0] == ROW
+    assert heights[1] - heights[0] == ROW_PX
 
 
 def test_where_nothing_is_likely_there_is_a_picture_all_the_same() -> None:
@@ -69,23 +78,23 @@ def test_the_asynchrony_is_a_panel_of_its_own() -> None:
     lead = np.tile([0.1, 0.3, 0.6], (FRAMES, 1))
     alone = draw_posteriors(generated(), [posteriors("phone", halves())])
     both = draw_posteriors(generated(), [posteriors("phone", halves()), posteriors("viseme", halves(), lead)])
-    assert both.height > alone.height + 6 * ROW
+    assert both.height > alone.height + 6 * ROW_PX
     shown = pixels(both)
-    column = shown[:, LEFT + 300].sum(axis=1)
-    assert column[-(5 * TITLE + 120) - 3 * ROW :].min() < 700  # something is drawn above the opening
+    column = shown[:, LEFT_PX + 300].sum(axis=1)
+    assert column[-(5 * TITLE_PX + 120) - 3 * ROW_PX :].min() < 700  # something is drawn above the opening
 
 
 def test_recordings_of_any_length() -> None:
-    for frames, columns in {1: NARROWEST, 400: 800, 5_345: WIDEST}.items():
+    for frames, columns in {1: LEAST_COLUMNS, 400: 800, 5_345: MOST_COLUMNS}.items():
         picture = draw_posteriors(generated(frames), [posteriors("phone", halves(frames))])
-        assert picture.width == LEFT + columns + RIGHT
+        assert picture.width == LEFT_PX + columns + RIGHT_PX
 
 
 def test_a_column_of_a_long_recording_is_the_mean_of_its_frames() -> None:
-    probability = np.zeros((8 * WIDEST, 1))
+    probability = np.zeros((8 * MOST_COLUMNS, 1))
     probability[::4] = 1
-    shown = pixels(draw_posteriors(generated(8 * WIDEST), [posteriors("phone", probability)]))
-    row = shown[2 * TITLE + ROW // 2, LEFT + 10 : LEFT + WIDEST // 2 - 10]
+    shown = pixels(draw_posteriors(generated(8 * MOST_COLUMNS), [posteriors("phone", probability)]))
+    row = shown[2 * TITLE_PX + ROW_PX // 2, LEFT_PX + 10 : LEFT_PX + MOST_COLUMNS // 2 - 10]
     assert (row == [round(255 + 0.25 * (part - 255)) for part in COLOURS[0]]).all()
 
 
@@ -94,6 +103,6 @@ def test_phones_are_written_where_there_is_room() -> None:
     strips = []
     for units in (Timeline(()), dense, generated().units):
         picture = draw_posteriors(replace(generated(), units=units), [posteriors("phone", halves())])
-        strips.append(pixels(picture.crop((LEFT, 0, picture.width, TITLE - 4))).min())
+        strips.append(pixels(picture.crop((LEFT_PX, 0, picture.width, TITLE_PX - 4))).min())
     assert strips[:2] == [255, 255]
     assert strips[2] < 200

@@ -32,7 +32,7 @@ def test_samples_survive(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("rate_hz", [16_000, 22_050, 44_100])
-def test_sixteen_bits_come_back_as_they_were_and_are_heard_so(tmp_path: Path, rate_hz: int) -> None:
+def test_sixteen_bits_come_back_as_they_were_and_are_read_so(tmp_path: Path, rate_hz: int) -> None:
     values = np.resize(np.array([-32_768, -32_767, -1, 0, 1, 20_000, 32_766, 32_767], np.int16), 70_000)
     sound = Audio(from_sixteen_bits(values), rate_hz)
     for name in ("a.wav", "a.flac"):
@@ -50,8 +50,8 @@ def test_a_compressed_sound_is_as_long_and_as_loud(tmp_path: Path) -> None:
 
 def test_too_loud_is_clipped(tmp_path: Path) -> None:
     write_sound(tmp_path / "a.wav", tone(level=2.0))
-    heard = read_audio(tmp_path / "a.wav", RATE_HZ).samples
-    np.testing.assert_allclose(heard, np.clip(tone(level=2.0).samples, -1, 1), atol=1e-4)
+    clipped = read_audio(tmp_path / "a.wav", RATE_HZ).samples
+    np.testing.assert_allclose(clipped, np.clip(tone(level=2.0).samples, -1, 1), atol=1e-4)
 
 
 def test_errors_leave_nothing(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 from lipmotion.errors import ExportError
 from lipmotion.export import write_mp4
 from lipmotion.export.video import TAGS, frame_rate
-from lipmotion.export.xmp import LARGEST_PACKET
+from lipmotion.export.xmp import LARGEST_PACKET_BYTES
 from lipmotion.types import Audio
 
 RATES = [24, 29.97, 60]
@@ -47,11 +47,11 @@ def test_a_click_and_a_flash_stay_together(tmp_path, fps):
     write_mp4(tmp_path / "a.mp4", frames, fps=fps, audio=audio)
 
     time_s, brightness = pictures(tmp_path / "a.mp4")
-    start_s, samples, heard_hz = sound(tmp_path / "a.mp4")
+    start_s, samples, played_hz = sound(tmp_path / "a.mp4")
     seen_s = time_s[brightness.argmax()]
-    heard_s = start_s + np.abs(samples).argmax() / heard_hz
+    played_s = start_s + np.abs(samples).argmax() / played_hz
     assert seen_s == pytest.approx(flash / fps, abs=2e-4)
-    assert heard_s == pytest.approx(seen_s, abs=1e-3)
+    assert played_s == pytest.approx(seen_s, abs=1e-3)
 
 
 @pytest.mark.parametrize(("fps", "duration_s"), [(24, 1.617), (29.97, 1.0), (60, 1.617)])
@@ -72,7 +72,7 @@ def test_streams_start_at_zero_and_keep_their_lengths(tmp_path, fps, duration_s)
     assert np.diff(time_s) == pytest.approx(np.full(count - 1, 1 / fps), abs=2e-4)
 
 
-def test_the_end_of_the_sound_is_heard(tmp_path):
+def test_the_end_of_the_sound_is_played(tmp_path):
     audio = silence(1.0)
     audio.samples[-80:] = 0.5
     write_mp4(tmp_path / "a.mp4", black(5), fps=25, audio=audio)
@@ -82,7 +82,7 @@ def test_the_end_of_the_sound_is_heard(tmp_path):
 
 
 def test_sound_lies_beside_its_frames(tmp_path):
-    """A player that streams must not wait for the end of the file to hear the beginning."""
+    """A player that streams must not wait for the end of the file to play the beginning."""
     write_mp4(tmp_path / "a.mp4", black(300), fps=10, audio=silence(30.0))
     with av.open(str(tmp_path / "a.mp4")) as container:
         packets = [(p.pos, p.stream.type, float(p.dts * p.time_base)) for p in container.demux() if p.dts is not None]
@@ -145,7 +145,7 @@ def test_other_unusable_input_is_refused(tmp_path):
     with pytest.raises(ExportError, match="sound has no samples"):
         write_mp4(tmp_path / "a.mp4", black(1), fps=25, audio=silence(0))
     with pytest.raises(ExportError, match="XMP metadata"):
-        write_mp4(tmp_path / "a.mp4", black(1), fps=25, audio=silence(0.1), xmp="x" * (LARGEST_PACKET + 1))
+        write_mp4(tmp_path / "a.mp4", black(1), fps=25, audio=silence(0.1), xmp="x" * (LARGEST_PACKET_BYTES + 1))
     for fps in (0, -1, float("nan"), float("inf")):
         with pytest.raises(ExportError, match="frame rate"):
             write_mp4(tmp_path / "a.mp4", black(1), fps=fps, audio=silence(0.1))

@@ -6,7 +6,7 @@ import pytest
 
 from lipmotion.errors import ExportError
 from lipmotion.export import write_mp4
-from lipmotion.export.xmp import LARGEST_PACKET, XMP_UUID, append_xmp
+from lipmotion.export.xmp import LARGEST_PACKET_BYTES, XMP_UUID, append_xmp
 from lipmotion.types import Audio
 
 
@@ -66,4 +66,4 @@ def test_what_does_not_end_with_a_whole_box_is_left_alone(tmp_path):
 
 def test_packets_that_cannot_be_are_refused(video):
     with pytest.raises(ExportError, match="at most"):
-        append_xmp(video, "x" * (LARGEST_PACKET + 1))
+        append_xmp(video, "x" * (LARGEST_PACKET_BYTES + 1))

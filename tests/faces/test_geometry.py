@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.articulation.contact import WIDEST
+from lipmotion.articulation.contact import LARGEST_GAP
 from lipmotion.articulation.mouth import TUCKED_GAP, jaw_drop
 from lipmotion.faces.portrait.cartoon import CARTOON
 from lipmotion.faces.portrait.geometry import TEETH_EDGE, lip_outlines, mouth_interior
@@ -22,7 +22,7 @@ def pose(gap: float, width: float = 1.0, fullness: float = 1.0, **gestures: floa
 
 poses = st.builds(
     pose,
-    gap=st.floats(0, WIDEST),
+    gap=st.floats(0, LARGEST_GAP),
     width=st.floats(0.5, 1.35),
     fullness=st.floats(0.75, 1.25),
     tuck=st.floats(0, 1),

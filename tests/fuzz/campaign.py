@@ -18,7 +18,7 @@ from fuzz.mutators import mutated
 from fuzz.mutators.documents import systematic
 from fuzz.worker import Worker
 
-ACCEPTED, RECENT = 0.7, 0.5
+ACCEPTED_SHARE, RECENT_SHARE = 0.7, 0.5
 """Probability that an input that was read is changed, not one that was refused; that one of the last few is."""
 STOP_AFTER = 200
 """Hangs and crashes after which a reader is abandoned: each of them costs a new process."""
@@ -103,5 +103,5 @@ def _in_turn(inputs: list[Iterator[Files]]) -> Iterator[tuple[Files, ...]]:
 
 
 def _chosen(chance: Random, accepted: list[Files], refused: list[Files]) -> Files:
-    pool = accepted if not refused or (accepted and chance.random() < ACCEPTED) else refused
-    return chance.choice(pool[-10:] if chance.random() < RECENT else pool)
+    pool = accepted if not refused or (accepted and chance.random() < ACCEPTED_SHARE) else refused
+    return chance.choice(pool[-10:] if chance.random() < RECENT_SHARE else pool)

@@ -10,7 +10,7 @@ from typing import Any
 import lipmotion
 
 ROOT = str(Path(lipmotion.__file__).parent)
-OFTEN, SELDOM = 500, 50
+FREQUENT_HITS, RARE_HITS = 500, 50
 """After so many calls without a new line, a function is traced only once in so many calls."""
 
 
@@ -59,7 +59,7 @@ class LineCoverage:
             if not missing:
                 return None
             calls = self._calls[code] = self._calls.get(code, 0) + 1
-            return self._run if calls < OFTEN or calls % SELDOM == 0 else None
+            return self._run if calls < FREQUENT_HITS or calls % RARE_HITS == 0 else None
 
         def _run(self, frame: FrameType, *_: object) -> Any:
             missing = self._missing[frame.f_code]

@@ -18,7 +18,7 @@ from meshes.gltf import document, glb
 from robustness.case import npy
 from robustness.motion_cases import GOOD
 
-COUNT, MANY = 200, 40
+COUNT, ROUNDS = 200, 40
 DOCUMENT = json.dumps(GOOD).encode()
 ARRAY = npy(np.arange(12.0).reshape(4, 3))
 ZIP = zips.zipped([("header.json", DOCUMENT), ("a.npy", ARRAY)], zipfile.ZIP_DEFLATED)
@@ -38,12 +38,12 @@ SAMPLES = {
 def test_changes_are_many_and_the_same_again(name: str) -> None:
     def made(seed: int) -> list[tuple[int, bytes]]:
         chance, sample = Random(seed), {name: SAMPLES[name]}
-        changed = (mutated(chance, sample, sample) for _ in range(MANY))
+        changed = (mutated(chance, sample, sample) for _ in range(ROUNDS))
         return [(len(files[name]), digest(files)) for files in changed]
 
     found = made(1)
-    assert len(set(found)) > MANY / 4
-    assert max(size for size, _ in found) <= raw.LARGEST
+    assert len(set(found)) > ROUNDS / 4
+    assert max(size for size, _ in found) <= raw.LARGEST_BYTES
     assert found == made(1) != made(2)
 
 
@@ -68,7 +68,7 @@ def test_every_hostile_value_comes_to_every_place() -> None:
     for name in ("a.json", "a.gltf"):
         made = [files[name] for files in documents.systematic({name: small}, Random(0))]
         assert wanted <= set(made)
-        assert len(made) == len(places) * (len(documents.HOSTILE) + documents.OTHERS)
+        assert len(made) == len(places) * (len(documents.HOSTILE) + documents.OTHER_PARTS)
 
 
 def test_documents_inside_of_other_files_are_changed_in_their_place() -> None:

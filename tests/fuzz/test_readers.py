@@ -16,7 +16,7 @@ from fuzz.worker import Worker
 
 FOUND = Path(__file__).parent / "found"
 FOLDERS = sorted(path for path in FOUND.glob("*/*") if path.is_dir())
-MANY = 12
+ROUNDS = 12
 INPUTS = {"model": 4, "face": 4, "video": 6, "transcript": 8, "lexicon": 8, "character": 4}
 """Numbers of changed inputs of slower readers."""
 
@@ -30,7 +30,7 @@ def test_good_input_is_read_and_changed_input_read_or_refused(name: str, worker:
     assert results[0].kind == READ, results[0]
     assert sum(result.kind == READ for result in results) > len(results) / 2
     chance = Random(f"1 {name}")
-    for _ in range(INPUTS.get(name, MANY)):
+    for _ in range(INPUTS.get(name, ROUNDS)):
         _check(worker, name, mutated(chance, chance.choice(seeds), chance.choice(seeds)))
 
 

@@ -56,7 +56,7 @@ def test_a_crash(planted: Worker) -> None:
 def test_lines_are_new_once() -> None:
     with Worker(NOWHERE, readers=readers) as process:
         first, second = (process.read_input("planted", _input("now")).lines for _ in range(2))
-    assert any(line.startswith("units/transcript.py") for line in first)
+    assert any(line.startswith("units/text_normalisation.py") for line in first)
     assert second == frozenset()
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.hmm.states import plain_states
-from lipmotion.hmm.train import TranscribedUtterance, UnitInventory
+from lipmotion.hmm.unit_training import TranscribedUtterance, UnitInventory
 from lipmotion.stats.bigram import Bigram, estimate_bigram
 from lipmotion.stats.mixture import Mixtures
 

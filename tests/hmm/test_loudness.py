@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from hmm.synthetic import PAUSE, SILENCE, known_hmm, speaker
 from lipmotion.hmm.align import align_units, choose_pronunciations
 from lipmotion.hmm.log_likelihoods import log_likelihoods_of, penalise_silence, penalise_speech
-from lipmotion.hmm.loudness import QUIET, QUIET_REACH, loud_frames, quiet_frames
+from lipmotion.hmm.loudness import QUIET_DISTANCE, QUIET_REACH_FRAMES, loud_frames, quiet_frames
 
 
 def energy(seed: int = 0) -> np.ndarray:
@@ -73,13 +73,13 @@ def test_loud_frames_are_not_chosen_as_pauses():
 
 
 def test_quiet_frames_are_far_under_the_loud_ones_and_away_from_them():
-    level = np.full(200, -QUIET - 1)
+    level = np.full(200, -QUIET_DISTANCE - 1)
     level[50:120] = 0
-    level[70:76] = -QUIET - 9  # the closure of a stop
+    level[70:76] = -QUIET_DISTANCE - 9  # the closure of a stop
     quiet = quiet_frames(level.astype(np.float32))
-    assert quiet[: 50 - QUIET_REACH].all()
-    assert quiet[120 + QUIET_REACH :].all()
-    assert not quiet[50 - QUIET_REACH : 120 + QUIET_REACH].any()
+    assert quiet[: 50 - QUIET_REACH_FRAMES].all()
+    assert quiet[120 + QUIET_REACH_FRAMES :].all()
+    assert not quiet[50 - QUIET_REACH_FRAMES : 120 + QUIET_REACH_FRAMES].any()
 
 
 def test_quiet_frames_are_silence_whatever_they_sound_like():

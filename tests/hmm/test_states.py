@@ -25,7 +25,7 @@ def test_seen_contexts_have_densities_of_their_own():
 
 
 def test_unseen_contexts_resolve_to_the_plain_state():
-    for state, neighbour in ((0, "sil"), (2, "ih"), (1, "ih"), (0, None), (0, "never heard of")):
+    for state, neighbour in ((0, "sil"), (2, "ih"), (1, "ih"), (0, None), (0, "unknown")):
         assert TABLE.names[TABLE.density("b", state, neighbour)] == f"b.{state}"
 
 

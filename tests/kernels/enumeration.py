@@ -105,7 +105,7 @@ def of_chains(draw, spread, extreme):
     right = True
     for u, case in enumerate(alone):
         wanted, wanted_kept, wanted_log_likelihood = chains.chain_posteriors(*case)
-        found = log_likelihood[u] if log_likelihood[u] > forward_backward.IMPOSSIBLE / 2 else -np.inf
+        found = log_likelihood[u] if log_likelihood[u] > forward_backward.LOG_ZERO / 2 else -np.inf
         right &= near(found, wanted_log_likelihood, spread)
         right &= near(posterior[: frames[u], u, : states[u]], wanted, spread)
         right &= near(kept[u, : states[u]], wanted_kept, spread, times=int(frames[u]))

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.kernels.sequences import forward_backward
-from lipmotion.kernels.sequences.forward_backward import IMPOSSIBLE, chain_posteriors, log_forward_backward
+from lipmotion.kernels.sequences.forward_backward import LOG_ZERO, chain_posteriors, log_forward_backward
 from oracles import chains, networks
 
 
@@ -62,7 +62,7 @@ def test_chains_are_those_of_the_definition(seed, loudness):
         wanted_posterior, wanted_stay, wanted_log_likelihood = by_definition(emission * loudness, *moves)
         assert posterior[:frames, u, :states] == pytest.approx(wanted_posterior, abs=1e-8)
         assert stay[u, :states] == pytest.approx(wanted_stay, abs=1e-8)
-        found = log_likelihood[u] if log_likelihood[u] > IMPOSSIBLE / 2 else -np.inf
+        found = log_likelihood[u] if log_likelihood[u] > LOG_ZERO / 2 else -np.inf
         assert found == pytest.approx(wanted_log_likelihood, rel=1e-12)
 
 
@@ -82,7 +82,7 @@ def test_agrees_with_the_enumeration_of_all_paths(seed, sizes, padding):
         assert stay[u, :states] == pytest.approx(wanted_stay, abs=1e-10)
         assert not stay[u, states:].any()
         if frames < states:
-            assert log_likelihood[u] <= IMPOSSIBLE / 2
+            assert log_likelihood[u] <= LOG_ZERO / 2
         else:
             assert log_likelihood[u] == pytest.approx(wanted_log_likelihood, abs=1e-9)
 
@@ -103,7 +103,7 @@ def test_too_short_an_utterance_has_no_path_and_harms_no_other():
     batch, _ = padded(3, [(6, 3), (2, 3)])
     alone, _ = padded(3, [(6, 3)])
     posterior, stay, log_likelihood = chain_posteriors(*batch)
-    assert log_likelihood[1] <= IMPOSSIBLE / 2
+    assert log_likelihood[1] <= LOG_ZERO / 2
     assert not posterior[:, 1].any()
     assert not stay[1].any()
     for together, apart in zip((posterior, stay, log_likelihood), chain_posteriors(*alone), strict=True):

@@ -158,7 +158,7 @@ def test_arc_by_arc_gives_the_same_bits_as_run_by_run(monkeypatch):
     log_emission = random_emission(3, 120, len(arrays["emission"]))
     found = []
     for least in (0.0, np.inf):
-        monkeypatch.setattr(viterbi, "LEAST_RUN", least)
+        monkeypatch.setattr(viterbi, "LEAST_RUN_ARCS", least)
         found.append(viterbi.best_path(*asked(log_emission), NetworkArrays(**arrays), 6.0))
     assert np.array_equal(found[0][0], found[1][0])
     assert np.float64(found[0][1]).tobytes() == np.float64(found[1][1]).tobytes()

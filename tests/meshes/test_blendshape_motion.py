@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.articulation.contact import CLOSED_BELOW, gap_of
+from lipmotion.articulation.contact import CLOSED_OPENING, gap_of
 from lipmotion.meshes.fitting.blendshape_motion import arkit_weights, given_weights, is_of_blendshapes, with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.lip_placement import placed_by_shape
@@ -33,7 +33,7 @@ def test_other_motion_stays_as_it_is() -> None:
 def test_the_jaw_opens_and_mouth_close_closes() -> None:
     moved = with_mouth(weights(jawOpen=[0.0, 0.5, 1.0, 0.5], mouthClose=[0.0, 0.0, 0.0, 0.5]))
     opening = moved["opening"]
-    assert opening[[0, 3]].max() < CLOSED_BELOW
+    assert opening[[0, 3]].max() < CLOSED_OPENING
     assert moved["lip_gap"] == pytest.approx(gap_of(opening), abs=1e-3)
     assert np.diff(opening[:3]).min() > 0.1
     assert moved["y_152"][1] < moved["y_152"][0]

@@ -15,7 +15,7 @@ from fuzz.inputs import lay_out
 from lipmotion.errors import InputError
 from lipmotion.meshes.files.character_files import read_character
 from lipmotion.meshes.files.gltf_animator import write_animated_gltf
-from lipmotion.meshes.model.limits import MOST, Budget
+from lipmotion.meshes.model.file_limits import ALLOWANCE, Budget
 from lipmotion.types import WEIGHT, Channel, Motion
 from meshes.gltf import document, glb
 
@@ -50,10 +50,12 @@ def test_what_is_not_in_the_scene_costs_nothing(tmp_path: Path) -> None:
 
 def test_a_budget_is_that_of_all_files_together(tmp_path: Path) -> None:
     budget = Budget()
-    budget.spend("vertices", MOST["vertices"])
-    with pytest.raises(InputError, match=f"{MOST['vertices'] + 1} vertices, required at most {MOST['vertices']}"):
+    budget.spend("vertices", ALLOWANCE["vertices"])
+    with pytest.raises(
+        InputError, match=f"{ALLOWANCE['vertices'] + 1} vertices, required at most {ALLOWANCE['vertices']}"
+    ):
         budget.spend("vertices", 1)
-    budget.spend("bytes of files", MOST["bytes of files"] - 3)
+    budget.spend("bytes of files", ALLOWANCE["bytes of files"] - 3)
     (tmp_path / "head.bin").write_bytes(b"four")
     with pytest.raises(InputError, match="bytes of files"):
         budget.file_bytes(tmp_path / "head.bin", "buffer")
@@ -74,7 +76,7 @@ def test_buffers_lead_to_no_pipe_folder_or_other_folder(tmp_path: Path) -> None:
 def test_lines_of_obj_are_counted_before_they_are_read(tmp_path: Path) -> None:
     path = tmp_path / "head.obj"
     wrong = {
-        "lines, required at most": b"\n" * (MOST["lines"] + 1),
+        "lines, required at most": b"\n" * (ALLOWANCE["lines"] + 1),
         "is no vertex of 3 numbers in line 2": b"#\nv\nv\n",
         "a line of 80001 bytes": b"f" + b" 1" * 40_000,
         "a polygon of 1001 corners": b"v 0 0 0\nf" + b" 1" * 1001,

@@ -1,4 +1,4 @@
-"""Acoustic networks: interpolation, training on heard conditions, serialisation."""
+"""Acoustic networks: interpolation, training on acoustic conditions, serialisation."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from lipmotion.motion.acoustic_network import STEP, AcousticNetwork, between_ste
 from lipmotion.motion.predictors import PredictorTraining
 from lipmotion.storage.checkpoint import Checkpoint
 from lipmotion.testing.examples import example
-from lipmotion.types import SPECTRUM_BANDS, Example, HeardSpectrum
+from lipmotion.types import SPECTRUM_BANDS, ConditionSpectrum, Example
 
 
-def heard_example(seed: int, tempos: tuple[float, ...] = (1.0,)) -> tuple[Example, np.ndarray]:
+def example_in_conditions(seed: int, tempos: tuple[float, ...] = (1.0,)) -> tuple[Example, np.ndarray]:
     """An example whose motion is a smooth function of two bands; its other versions are as much distorted as fast."""
     one = example(("aa", "t", "iy", "s"), seed)
     frames = len(one.valid)
@@ -28,9 +28,9 @@ def heard_example(seed: int, tempos: tuple[float, ...] = (1.0,)) -> tuple[Exampl
     versions = []
     for tempo in tempos:
         positions = np.minimum(np.round(np.arange(int(frames / tempo)) * tempo).astype(int), frames - 1)
-        versions.append(HeardSpectrum(spectrum[positions].astype(np.float16), tempo, float(tempo != 1)))
+        versions.append(ConditionSpectrum(spectrum[positions].astype(np.float16), tempo, float(tempo != 1)))
     speech = replace(one.speech, spectrum=spectrum.astype(np.float32))
-    return replace(one, speech=speech, heard=tuple(versions)), slow * [0.1, 0.02] + [0.3, 0.6]
+    return replace(one, speech=speech, condition_spectra=tuple(versions)), slow * [0.1, 0.02] + [0.3, 0.6]
 
 
 @pytest.fixture(scope="module")
@@ -39,15 +39,15 @@ def trained() -> AcousticNetwork:
     patch = pytest.MonkeyPatch()
     patch.setattr(acoustic_network, "LEAST_STEPS", 60)
     patch.setattr(acoustic_network, "BATCH_SIZE", 4)
-    examples, values = zip(*(heard_example(seed, (1.0, 0.8, 1.25)) for seed in range(6)), strict=True)
+    examples, values = zip(*(example_in_conditions(seed, (1.0, 0.8, 1.25)) for seed in range(6)), strict=True)
     result = AcousticNetwork.fit(PredictorTraining(examples, values, 2)).predictor
     patch.undo()
     assert isinstance(result, AcousticNetwork)
     return result
 
 
-def test_it_predicts_motion_of_speech_that_it_did_not_hear(trained: AcousticNetwork) -> None:
-    one, values = heard_example(99)
+def test_it_predicts_motion_of_held_out_speech(trained: AcousticNetwork) -> None:
+    one, values = example_in_conditions(99)
     motion, distortion = trained.predict(one.speech)
     assert motion.shape == values.shape
     assert distortion.shape == (len(values),)
@@ -69,7 +69,7 @@ def test_a_straight_line_stays_straight_inside() -> None:
 
 def test_it_is_the_same_after_serialisation_but_for_half_precision(trained: AcousticNetwork) -> None:
     again = AcousticNetwork.from_arrays(trained.arrays(), 2)
-    speech = heard_example(5)[0].speech
+    speech = example_in_conditions(5)[0].speech
     np.testing.assert_allclose(again.predict(speech)[0], trained.predict(speech)[0], atol=3e-3)
 
 
@@ -93,7 +93,7 @@ def test_a_stopped_training_goes_on_from_its_checkpoint(
 ) -> None:
     checkpoint = Checkpoint(tmp_path_factory.mktemp("work"), "job")
     monkeypatch.setattr(acoustic_network, "LEAST_STEPS", 2)
-    examples, values = zip(*(heard_example(seed) for seed in range(2)), strict=True)
+    examples, values = zip(*(example_in_conditions(seed) for seed in range(2)), strict=True)
     training = PredictorTraining(examples, values, 2, checkpoint=checkpoint)
     first = AcousticNetwork.fit(training).predictor.arrays()
 
@@ -106,6 +106,6 @@ def test_a_stopped_training_goes_on_from_its_checkpoint(
 
 
 def test_examples_without_conditions_are_refused() -> None:
-    one, values = heard_example(0)
+    one, values = example_in_conditions(0)
     with pytest.raises(CorpusError, match="120 s of measured motion"):
-        AcousticNetwork.fit(PredictorTraining([replace(one, heard=())], [values], 2))
+        AcousticNetwork.fit(PredictorTraining([replace(one, condition_spectra=())], [values], 2))

@@ -30,7 +30,7 @@ from lipmotion.motion.predictors import (
 )
 from lipmotion.motion.prior_regression import PriorRegression
 from lipmotion.testing.examples import example, examples, speech, timeline
-from lipmotion.types import HeardSpectrum, PriorOutput, silent_monitor
+from lipmotion.types import ConditionSpectrum, PriorOutput, silent_monitor
 
 PAGE = Path(__file__).parents[2] / "docs" / "extend" / "predictor.md"
 SMALL = {
@@ -113,8 +113,8 @@ def test_the_recordings_choose_where_no_name_is_given() -> None:
     steps = -(-len(one.valid) // 4)
     prior = PriorOutput(np.zeros((steps, 1)), np.zeros((steps, 0), np.float32), np.zeros(steps))
     standing = replace(one, speech=replace(one.speech, prior=prior))
-    heard = replace(one, heard=(HeardSpectrum(np.zeros((len(one.valid), 40), np.float16), 1.0, 0.0),))
-    much = replace(standing, valid=np.ones(48_000, bool), heard=heard.heard)
+    heard = replace(one, condition_spectra=(ConditionSpectrum(np.zeros((len(one.valid), 40), np.float16), 1.0, 0.0),))
+    much = replace(standing, valid=np.ones(48_000, bool), condition_spectra=heard.condition_spectra)
     assert suitable_predictor(AUTOMATIC, [one]) is None
     assert suitable_predictor(AUTOMATIC, [standing]) is PriorRegression
     assert suitable_predictor(AUTOMATIC, [heard]) is AcousticNetwork

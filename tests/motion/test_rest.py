@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lipmotion.motion.rest import away_from_speech, speech_intervals, unheard_frames
+from lipmotion.motion.rest import away_from_speech, digital_silence, speech_intervals
 from lipmotion.testing.examples import timeline
 from lipmotion.types import ENERGY_FEATURE
 
@@ -30,10 +30,10 @@ def test_intervals_are_those_of_phones() -> None:
     assert away_from_speech(np.arange(3.0), [], 1.0).all()
 
 
-def test_the_mouth_rests_where_nothing_at_all_is_heard_for_a_while() -> None:
+def test_the_mouth_rests_in_digital_silence_of_some_length() -> None:
     features = np.full((200, ENERGY_FEATURE + 1), 3.0)
     for first, stop in ((5, 10), (20, 24), (50, 62), (75, 90)):  # 50 ms, 40 ms, beside speech, in speech
         features[first:stop, ENERGY_FEATURE] = -9.0
     features[30:40, ENERGY_FEATURE] = -8.9  # a breath
-    unheard = unheard_frames(features, timeline(("t", "aa", "t")))
-    assert np.flatnonzero(unheard).tolist() == [*range(5, 10), *range(50, 55)]
+    silent = digital_silence(features, timeline(("t", "aa", "t")))
+    assert np.flatnonzero(silent).tolist() == [*range(5, 10), *range(50, 55)]

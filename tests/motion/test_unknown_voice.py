@@ -21,7 +21,7 @@ from lipmotion.types import Constraints, Generation, Motion, Pin, Speech
 from lipmotion.units import VOWELS
 
 WELCOME = Path(__file__).parent.parent.parent / "examples" / "welcome.flac"
-SHUT = 0.015
+SHUT_OPENING = 0.015
 """Eye distances; people do not say a vowel through lips that are so close."""
 CONFIDENCES = (0.0, 0.25, 0.5, 0.75, 1.0)
 
@@ -48,7 +48,7 @@ def shut_share(generation: Generation) -> float:
     """The share of the frames of vowels in which the lips are shut."""
     opening = generation.motion["opening"]
     vowels = [opening[int(s.start_s * 100) : int(s.end_s * 100)] for s in generation.units if s.label.phone in VOWELS]
-    return float((np.concatenate(vowels) < SHUT).mean())
+    return float((np.concatenate(vowels) < SHUT_OPENING).mean())
 
 
 @pytest.mark.parametrize("confidence", CONFIDENCES)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lipmotion.stats.affine import AffineStatistics
+from lipmotion.stats.constrained_mllr import AffineStatistics
 from lipmotion.stats.mixture import Mixtures
 
 

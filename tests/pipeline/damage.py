@@ -17,7 +17,7 @@ from lipmotion.types import Generation, Speech
 
 Array = NDArray[Any]
 Damage = Callable[[Array], Array]
-FAR = 30.0
+LARGEST_DIFFERENCE = 30.0
 """Spans of what the whole model generates, beyond which motion is absurd."""
 
 

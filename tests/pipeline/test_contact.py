@@ -15,11 +15,11 @@ from lipmotion.articulation.delivery import Delivery
 from lipmotion.articulation.lip_points import FACING
 from lipmotion.articulation.mouth import frame_times, spoken_mouth
 from lipmotion.faces.base import Staging
+from lipmotion.faces.head.head_blendshapes import head_mesh
 from lipmotion.faces.head.performance import head_poses
 from lipmotion.faces.head.shape_fit import lip_gap
-from lipmotion.faces.head.shapes import head_mesh
 from lipmotion.faces.head.stage import figure
-from lipmotion.faces.portrait.frames import face_poses
+from lipmotion.faces.portrait.drawn_frames import face_poses
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter, driven_character
 from lipmotion.meshes.fitting.facial_animation import FAP
@@ -37,7 +37,7 @@ from meshes.speech import motion, units
 Mask = NDArray[np.bool_]
 Reader = Callable[[Generation, float], Mask]
 RATES = (24.0, 25.0, 30.0, 60.0, 100.0)
-TOUCHING = LEAST_GAP / 2
+TOUCHING_GAP = LEAST_GAP / 2
 
 
 def _generation(moved: Motion, said: Timeline[Unit]) -> Generation:
@@ -130,7 +130,7 @@ def _of_character(character: DrivenCharacter) -> Reader:
         moved = generation.motion
         time_s = frame_times(len(moved.values), moved.rate_hz, fps)
         gaps = [_mesh_gap(character, each) for each in character.vertices(moved, generation.units, time_s)]
-        return np.array(gaps) < TOUCHING
+        return np.array(gaps) < TOUCHING_GAP
 
     return read
 
@@ -155,7 +155,7 @@ def _of_scene(character: DrivenCharacter) -> Reader:
         weights = character_scene(generation, character, fps).weights
         assert weights is not None
         apart = sum(gap[name] * weights[name] for name in weights.names if name in gap)
-        return np.asarray(apart < TOUCHING)
+        return np.asarray(apart < TOUCHING_GAP)
 
     return read
 
@@ -168,7 +168,7 @@ def _of_head_scene(generation: Generation, fps: float) -> Mask:
     mesh = head_mesh(character)
     moved = mesh.displacements(np.arange(len(character.skin.rest)))
     parting = {name: lip_gap(character, moved[number]) for number, name in enumerate(mesh.shape_names)}
-    return np.asarray(sum(parting[name] * weights[name] for name in weights.names) < TOUCHING)
+    return np.asarray(sum(parting[name] * weights[name] for name in weights.names) < TOUCHING_GAP)
 
 
 def _sampled(generation: Generation, curves: Motion, fps: float) -> Motion:
@@ -186,18 +186,18 @@ def _closed(curves: Motion) -> Mask:
     mouth = arkit_mouth()
     return np.asarray(
         sum(gap * curves[name] for name, gap in zip(mouth.names, mouth.gap, strict=True) if name in curves.names)
-        < TOUCHING
+        < TOUCHING_GAP
     )
 
 
 def _drawn(generation: Generation, fps: float) -> Mask:
     poses = face_poses(with_mouth(generation.motion), generation.units, fps, Staging())
-    return np.array([pose.mouth.gap < TOUCHING for pose in poses])
+    return np.array([pose.mouth.gap < TOUCHING_GAP for pose in poses])
 
 
 def _of_head(generation: Generation, fps: float) -> Mask:
     poses = head_poses(with_mouth(generation.motion), generation.units, fps)
-    return np.array([pose.gap < TOUCHING for pose in poses])
+    return np.array([pose.gap < TOUCHING_GAP for pose in poses])
 
 
 def _readers(characters: dict[str, DrivenCharacter]) -> dict[str, Reader]:

@@ -57,7 +57,7 @@ def test_sound_and_motion_are_in_step(toy_corpus: Corpus, selection_model: Model
     assert generation.units[0].end_s <= REST_S + 1e-6
 
 
-def test_sources_are_the_recordings_that_are_heard(toy_corpus: Corpus, selection_model: Model) -> None:
+def test_sources_are_the_recordings_whose_sound_is_joined(toy_corpus: Corpus, selection_model: Model) -> None:
     sound, generation = speak_from_corpus("baby blue", toy_corpus, selection_model)
     for span in generation.units:
         recording, times = span.label.unit.split(" ")[:2]

@@ -16,7 +16,7 @@ from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.understood_speech import understand
 from lipmotion.speech.recognition.adaptation import adaptation_arrays, identity_adaptation
 from lipmotion.testing.toy import ToySentence
-from pipeline.damage import DAMAGES, FAR, QUICK, UNREADABLE, animated, damaged, distance, refused
+from pipeline.damage import DAMAGES, LARGEST_DIFFERENCE, QUICK, UNREADABLE, animated, damaged, distance, refused
 
 ENGINES = ("toy_model", "joint_model", "coupled_model", "pictured_model")
 
@@ -41,7 +41,7 @@ def absurd(model: Model, sentence: ToySentence, damages: tuple[str, ...]) -> tup
         number = arrays[name].dtype.kind in "fiu" and arrays[name].size > 1
         if motion is None:
             refusals += 1
-        elif distance(motion, whole) > FAR or (number and what in UNREADABLE):
+        elif distance(motion, whole) > LARGEST_DIFFERENCE or (number and what in UNREADABLE):
             found.append(f"{name}: {what}")
         else:
             harmless += 1

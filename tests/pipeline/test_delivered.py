@@ -64,11 +64,11 @@ def test_weights_beside_an_opening_are_enlarged_for_the_mesh_that_has_them(
 def test_brows_and_head_of_pictures_come_later_with_the_mouth(
     generation: Generation, toy_speech: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    heard = []
+    levels = []
 
     def staged(face: Face, _: Staging, prosody: Prosody | None = None) -> Face:
         if prosody is not None:
-            heard.append(prosody.level_db)
+            levels.append(prosody.level_db)
         return face
 
     monkeypatch.setattr("lipmotion.pipeline.outputs.drawn_video.staged_face", staged)
@@ -76,7 +76,7 @@ def test_brows_and_head_of_pictures_come_later_with_the_mouth(
     for offset_ms in (0, 500):
         path = tmp_path / "a%d.png"
         write(generation, path, speech=toy_speech, fps=1, face="woman", delivery=Delivery(offset_ms=offset_ms))
-    assert heard[-1][50:] == pytest.approx(heard[0])
+    assert levels[-1][50:] == pytest.approx(levels[0])
 
 
 @pytest.mark.parametrize("offset_ms", [30.0, -30.0, 0.0])

@@ -15,7 +15,7 @@ from lipmotion.articulation.delivery import Delivery
 from lipmotion.articulation.liveliness import Liveliness
 from lipmotion.errors import ExportError
 from lipmotion.faces import Staging
-from lipmotion.meshes.fitting.eyes_and_brows import FULL_LOOK, eye_and_brow_weights
+from lipmotion.meshes.fitting.eyes_and_brows import FULL_LOOK_RAD, eye_and_brow_weights
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH
 from lipmotion.pipeline.outputs.curve_sets import curves_of
 from lipmotion.pipeline.outputs.living_curves import HEAD, living_curves
@@ -93,7 +93,7 @@ def test_what_moves_on_its_own_can_be_switched_off(generation: Generation) -> No
 
 
 def test_eyes_look_to_one_side_together(generation: Generation) -> None:
-    gaze = np.array([[0.5 * FULL_LOOK, 0.25 * FULL_LOOK]])
+    gaze = np.array([[0.5 * FULL_LOOK_RAD, 0.25 * FULL_LOOK_RAD]])
     to_its_left = eye_and_brow_weights(Liveliness(np.zeros(1), np.zeros(1), gaze, np.zeros((1, 3))))
     for name, weight in (("OutLeft", 0.5), ("InRight", 0.5), ("InLeft", 0), ("OutRight", 0), ("UpLeft", 0.25)):
         assert to_its_left[f"eyeLook{name}"] == pytest.approx(weight)

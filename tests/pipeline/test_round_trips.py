@@ -41,8 +41,8 @@ def test_spoken_text_and_its_phones_give_the_motion_of_speak(
     stand_in_voice.install(monkeypatch)
     sound, said = speak("Papa, see Bob. Mama!", model=toy_model)
     write(said, [tmp_path / name for name in ("a.wav", "a.flac", *PHONE_FILES)], speech=sound)
-    for heard, phones in (("a.wav", "a.TextGrid"), ("a.flac", "a.json"), ("a.wav", "a.npz")):
-        request = SpeechRequest(tmp_path / heard, units=read_units(tmp_path / phones))
+    for recording, phones in (("a.wav", "a.TextGrid"), ("a.flac", "a.json"), ("a.wav", "a.npz")):
+        request = SpeechRequest(tmp_path / recording, units=read_units(tmp_path / phones))
         again = animate(request, model=toy_model)
         assert np.array_equal(again.motion.values, said.motion.values)
         assert again.units == said.units

@@ -10,8 +10,8 @@ import pytest
 
 from lipmotion.errors import InputError
 from lipmotion.faces import Staging
-from lipmotion.faces.head.lips import VISIBLE
-from lipmotion.faces.head.shapes import head_mesh
+from lipmotion.faces.head.head_blendshapes import head_mesh
+from lipmotion.faces.head.lips import VISIBLE_RINGS
 from lipmotion.faces.head.stage import figure
 from lipmotion.meshes.files.gltf_accessors import GltfArrays
 from lipmotion.meshes.files.gltf_container import read_gltf_document
@@ -62,7 +62,7 @@ def test_scenes_are_known_by_their_suffix(name: str, is_one: bool) -> None:
 def test_the_head_closes_its_lips_in_m_and_p_and_opens_them_in_aa(own_head: Scene) -> None:
     assert own_head.weights is not None
     table, mesh = own_head.table(), own_head.mesh
-    ring = figure().skin.lip_rows()[VISIBLE - 1]
+    ring = figure().skin.lip_rows()[VISIBLE_RINGS - 1]
     upper, lower = ring[20], ring[60]
     places = mesh.vertices[[upper, lower], 1]
     gaps = places + np.einsum("ts,sv->tv", table, mesh.displacements(np.array([upper, lower]))[:, :, 1])

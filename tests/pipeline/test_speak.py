@@ -80,10 +80,10 @@ def test_sentences_go_to_the_synthesiser_a_few_at_a_time(
         return real(texts, voice, lexicon)
 
     monkeypatch.setattr(module, "voiced_sentences", count)
-    monkeypatch.setattr(module, "AT_ONCE", 2)
+    monkeypatch.setattr(module, "SENTENCES_PER_RUN", 2)
     together = speak("See Bob. Mama. Papa. See. Bob.", model=toy_model)
     assert asked == [2, 2, 1]
-    monkeypatch.setattr(module, "AT_ONCE", 20)
+    monkeypatch.setattr(module, "SENTENCES_PER_RUN", 20)
     again = speak("See Bob. Mama. Papa. See. Bob.", model=toy_model)
     assert np.array_equal(together.sound.samples, again.sound.samples)
     assert np.array_equal(together.generation.motion.values, again.generation.motion.values)

@@ -15,7 +15,7 @@ from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion.closure import closable_ranges
-from lipmotion.motion.speakers import speaker_arrays
+from lipmotion.motion.speaker_maps import speaker_arrays
 from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.generate.explain import explain

@@ -156,7 +156,7 @@ def test_words_of_an_installed_recogniser_are_aligned(
     words = tuple(span.label.word for span in found.units if span.label.word)
     assert tuple(word for word, _ in groupby(words)) == toy_sentence.words
     assert found.units_known
-    nothing = understand(toy_model, request)  # nothing heard: phones are recognised
+    nothing = understand(toy_model, request)  # no words: phones are recognised
     assert not nothing.units_known
     known = understand(toy_model, replace(request, transcript=" ".join(toy_sentence.words)))
     assert known.units == found.units

@@ -11,14 +11,14 @@ from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.understood_speech import understand, understood_speech
 from lipmotion.pipeline.understand.words import recognise_words, words_as_text, write_words
-from lipmotion.speech.recognition.recognised_speech import HeardWord, Recognition
+from lipmotion.speech.recognition.recognised_speech import RecognisedWord, Recognition
 from lipmotion.types import Span, Timeline, Unit
 
 WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
 
 
-def words(*timed: tuple[float, float, str]) -> Timeline[HeardWord]:
-    return Timeline(tuple(Span(start_s, end_s, HeardWord(text, 0.5)) for start_s, end_s, text in timed))
+def words(*timed: tuple[float, float, str]) -> Timeline[RecognisedWord]:
+    return Timeline(tuple(Span(start_s, end_s, RecognisedWord(text, 0.5)) for start_s, end_s, text in timed))
 
 
 def labels(units: Timeline[Unit]) -> list[tuple[str, str]]:

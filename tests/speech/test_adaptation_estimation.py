@@ -10,7 +10,7 @@ from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.mfcc import mfcc
 from lipmotion.speech.recognition.adaptation_estimation import EstimatedAdaptation, estimate_adaptation
 from lipmotion.speech.recognition.recogniser import Recogniser
-from lipmotion.stats.affine import log_determinant
+from lipmotion.stats.constrained_mllr import log_determinant
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Audio
 

@@ -67,7 +67,7 @@ def whisper(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> type[WhisperMode
 @pytest.fixture
 def vosk(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[bytes]:
     """Install a stand-in for vosk, whose model is in ``tmp_path``; return the sound that it is given."""
-    heard: list[bytes] = []
+    given: list[bytes] = []
     results = [
         {"text": ""},
         {"result": [{"conf": 1, "word": w.strip(" ,"), "start": a, "end": b} for w, a, b in WORDS], "text": ""},
@@ -81,8 +81,8 @@ def vosk(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[bytes]:
             assert wanted
 
         def AcceptWaveform(self, sound: bytes) -> bool:  # noqa: N802
-            heard.append(sound)
-            return len(heard) == 2
+            given.append(sound)
+            return len(given) == 2
 
         def Result(self) -> str:  # noqa: N802
             return json.dumps(results[0])
@@ -101,7 +101,7 @@ def vosk(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[bytes]:
     monkeypatch.setenv("LIPMOTION_VOSK_MODEL", str(tmp_path))
     (tmp_path / "am").mkdir()
     (tmp_path / "am" / "final.mdl").touch()
-    return heard
+    return given
 
 
 def check_words(transcript: TimedTranscript | None) -> None:
@@ -132,7 +132,7 @@ def test_another_language_is_not_taken_for_words(
 ) -> None:
     monkeypatch.setattr(whisper, "language", "fr")
     assert recognise_words(AUDIO, "whisper") is None
-    assert "hears the language 'fr', not English; its words are not used" in caplog.text
+    assert "recognises the language 'fr', not English; its words are not used" in caplog.text
 
 
 def test_vosk(vosk: list[bytes]) -> None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.speech.features import mfcc as module
-from lipmotion.speech.features.mfcc import ROUNDING, mfcc, normalised, regression_delta
+from lipmotion.speech.features.mfcc import ROUNDING_SHARE, mfcc, normalised, regression_delta
 from lipmotion.types import Audio
 from speech.mfcc_oracle import features as slow_features
 
@@ -48,12 +48,12 @@ def test_the_number_of_frames(count: int) -> None:
 
 
 def test_frame_n_is_centred_at_n_times_10_ms() -> None:
-    """25 ms around a click: the frame itself and one on either side hear it, and no other."""
+    """25 ms around a click: the frame itself and one on either side have it, and no other."""
     for frame in (0, 1, 2, 50, 98, 99, 100):
         samples = np.zeros(RATE_HZ, np.float32)
         samples[min(frame * 160, RATE_HZ - 1)] = 1
-        heard = np.flatnonzero(features(samples)[:, LOG_ENERGY] > 0)
-        assert heard.tolist() == [n for n in (frame - 1, frame, frame + 1) if 0 <= n <= 100]
+        loud = np.flatnonzero(features(samples)[:, LOG_ENERGY] > 0)
+        assert loud.tolist() == [n for n in (frame - 1, frame, frame + 1) if 0 <= n <= 100]
 
 
 def test_columns_are_normalised_over_the_recording() -> None:
@@ -103,7 +103,7 @@ def test_silence_inside_a_recording_has_a_finite_logarithm() -> None:
 def test_a_constant_column_becomes_0() -> None:
     for value in (0.1, -69.07755, 1e4):
         for count in (1, 2, 12_345):
-            assert not normalised(np.full((count, 2), value, np.float32), ROUNDING * abs(value)).any()
+            assert not normalised(np.full((count, 2), value, np.float32), ROUNDING_SHARE * abs(value)).any()
 
 
 @settings(max_examples=50)

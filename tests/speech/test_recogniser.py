@@ -125,7 +125,7 @@ def test_a_long_pause_between_words_is_silence(hmm: UnitHmm, known: bool) -> Non
     assert found.spans[5].duration_s == pytest.approx(0.5, abs=0.12)
 
 
-def test_a_phone_never_heard_borrows_a_relative_s_sound(hmm: UnitHmm, sentences: list[ToySentence]) -> None:
+def test_a_phone_without_data_takes_the_models_of_a_similar_one(hmm: UnitHmm, sentences: list[ToySentence]) -> None:
     sentence = sentences[0]
     assert not {"z", "g"} & set(hmm.table.units)
     found = align(hmm, sentence.audio, sentence.words, Lexicon({"see": (("z", "ih"),)}))
@@ -214,7 +214,7 @@ def test_noises_are_silence_and_silences_are_one(hmm: UnitHmm, monkeypatch: pyte
 
 
 @pytest.mark.recordings
-def test_speakers_and_words_that_no_model_of_ours_has_heard(recordings: Path) -> None:
+def test_speakers_and_words_beyond_all_training(recordings: Path) -> None:
     """The general models find about twice as many phones as those of one GRID speaker."""
     share = {}
     for kind in ("own", "auto"):

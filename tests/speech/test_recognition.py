@@ -5,8 +5,8 @@ import pytest
 
 from lipmotion.speech.recognition.recognised_speech import (
     SLIVER_FRAMES,
-    HeardWord,
     LabelledFrames,
+    RecognisedWord,
     labels_of_words,
     recognition_of,
     spliced,
@@ -99,12 +99,12 @@ def test_what_was_recognised() -> None:
     ]
     spans = ((0.0, 0.1, "sil", ""), (0.1, 0.2, "b", "bee"), (0.2, 0.4, "iy", "bee"), (0.4, 0.5, "z", ""))
     units = Timeline(tuple(Span(start, end, Unit(phone, word=word)) for start, end, phone, word in spans))
-    found = recognition_of(units, labels, [HeardWord("bee", 0.8)], -7.0)
+    found = recognition_of(units, labels, [RecognisedWord("bee", 0.8)], -7.0)
     assert [(s.start_s, s.end_s, s.label.text) for s in found.words] == [
         (pytest.approx(0.1), pytest.approx(0.4), "bee")
     ]
     assert (found.word_s, found.phone_s) == pytest.approx((0.3, 0.1))
     assert found.confidence == pytest.approx(0.8)
     assert found.reliability == pytest.approx(1)
-    doubtful = recognition_of(units, labels, [HeardWord("bee", 0.3)], -7.0)
+    doubtful = recognition_of(units, labels, [RecognisedWord("bee", 0.3)], -7.0)
     assert doubtful.reliability == pytest.approx(0)

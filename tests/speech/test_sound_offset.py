@@ -36,7 +36,7 @@ def test_the_offset_is_found():
 
 
 def test_a_mark_alone_is_enough():
-    """The recorder heard the mark and then another speaker."""
+    """The recorder has the mark and then another speaker."""
     for mark, most_ms in ((CLAP, 0.2), (BEEP, 2.0)):
         chance = np.random.default_rng(7)
         both = scene(chance, mark)

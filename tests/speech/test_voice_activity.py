@@ -13,14 +13,14 @@ from lipmotion.speech.sound.voice_activity import (
     stretches_of_sound,
 )
 
-QUIET, LOUD = -8.0, 2.0
+QUIET_ENERGY, LOUD_ENERGY = -8.0, 2.0
 
 
 def energy(frames: int, *sounds: tuple[int, int]) -> np.ndarray:
     """Return a quiet recording with loud frames."""
-    values = np.full(frames, QUIET, np.float32)
+    values = np.full(frames, QUIET_ENERGY, np.float32)
     for first, end in sounds:
-        values[first:end] = LOUD
+        values[first:end] = LOUD_ENERGY
     return values
 
 
@@ -70,7 +70,7 @@ def test_stretches_are_in_order_bounded_and_hold_all_sound() -> None:
         inside = np.zeros(frames, bool)
         for stretch in found:
             inside[slice(*stretch)] = True
-        loud = values > (QUIET + LOUD) / 2
+        loud = values > (QUIET_ENERGY + LOUD_ENERGY) / 2
         middle = np.convolve(loud, np.ones(41), "same") > 40  # all around it is loud
-        if np.quantile(values, 0.1) < QUIET + 1 and loud.mean() > 0.1:
+        if np.quantile(values, 0.1) < QUIET_ENERGY + 1 and loud.mean() > 0.1:
             assert inside[middle].all()

@@ -72,12 +72,12 @@ def test_confidences_grow_with_fit_and_posterior() -> None:
     assert 0.7 < confidence_of(0, 1) <= 1
 
 
-def heard(monkeypatch: pytest.MonkeyPatch, *words: str) -> None:
+def recognise_as(monkeypatch: pytest.MonkeyPatch, *words: str) -> None:
     monkeypatch.setattr(word_search, "words_in", lambda _: tuple(FoundWord(word, 0.5) for word in words))
 
 
 def test_words_that_do_not_fit_are_not_believed(welcome: Audio, monkeypatch: pytest.MonkeyPatch) -> None:
-    heard(monkeypatch, *("thick", "zoo", "choosy", "oath", "judges", "azure", "shush"))
+    recognise_as(monkeypatch, *("thick", "zoo", "choosy", "oath", "judges", "azure", "shush"))
     found = recognition(welcome)
     assert found.word_s < found.phone_s
     assert texts(recognition(welcome, "words")) == ["thick", "zoo", "choosy", "oath", "judges", "azure", "shush"]
@@ -85,19 +85,19 @@ def test_words_that_do_not_fit_are_not_believed(welcome: Audio, monkeypatch: pyt
 
 def test_the_words_that_fit_are_believed_among_others(welcome: Audio, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(word_search, "STRETCH_FIT", 0.0)
-    heard(monkeypatch, *SAID[:9], "oxygen", *SAID[10:])
+    recognise_as(monkeypatch, *SAID[:9], "oxygen", *SAID[10:])
     found = recognition(welcome)
     assert "oxygen" not in texts(found)
     assert {"lips", "float", "by"} <= set(texts(found))
 
 
 def test_too_many_words_are_not_believed(welcome: Audio, monkeypatch: pytest.MonkeyPatch) -> None:
-    heard(monkeypatch, *["constitutional"] * 100)
+    recognise_as(monkeypatch, *["constitutional"] * 100)
     assert recognition(welcome).units == of_welcome("fast").units
 
 
 def test_no_words_leave_the_phones_as_they_are(welcome: Audio, monkeypatch: pytest.MonkeyPatch) -> None:
-    heard(monkeypatch)
+    recognise_as(monkeypatch)
     assert recognition(welcome).units == of_welcome("fast").units
     assert {span.label.phone for span in recognition(welcome, "words").units} == {"sil"}
 

@@ -66,7 +66,7 @@ def test_components_are_those_of_the_svd(count, dimensions, seed):
 def test_a_large_table_is_searched_for_its_first_components(count, dimensions, kind, monkeypatch):
     values = spectrum(3, count, dimensions)
     values = (255 * (values - values.min()) / np.ptp(values)).astype(kind)
-    monkeypatch.setattr(module, "EXACT", 10)
+    monkeypatch.setattr(module, "EXACT_ROWS", 10)
     monkeypatch.setattr(module, "ROWS", 16)
     pca = fit_pca(values, 5)
     _, basis = components(values.astype(float), 5)

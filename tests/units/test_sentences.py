@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
 from lipmotion.units.sentences import LONGEST_SENTENCE, LONGEST_WORD, MOST_CHARACTERS, clean_text, sentences_of
-from lipmotion.units.transcript import words_in
+from lipmotion.units.text_normalisation import words_in
 
 
 def test_sentences() -> None:

@@ -40,7 +40,7 @@ def points(face: Face) -> NDArray[np.float64]:
     return found
 
 
-SMALL = 40
+SMALL_FACE_PX = 40
 """A face with a smaller distance between the eyes is found by the detector alone."""
 
 
@@ -59,7 +59,7 @@ class Mesh:
         pass
 
     def faces(self, image: NDArray[np.uint8]) -> list[NDArray[np.float64]]:  # noqa: ARG002
-        return [points(face) for face in Mesh.shown if face[0].islower() and face[3] >= SMALL][: self.most]
+        return [points(face) for face in Mesh.shown if face[0].islower() and face[3] >= SMALL_FACE_PX][: self.most]
 
 
 class Finder:

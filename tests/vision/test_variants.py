@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.types import Track
+from lipmotion.vision.face_mesh import FaceMesh
 from lipmotion.vision.landmarks import EYE_CORNERS, TRACKED_POINTS
-from lipmotion.vision.mesh import FaceMesh
 from lipmotion.vision.track import track
 from vision.variants import Image, covered, frames_of, half_size, in_a_room, side_by_side, write_frames, zoomed
 

@@ -20,9 +20,9 @@ STILL_SHARE = 0.1
 """Share of the frames of a clip, those in which least moves, from which noise is estimated."""
 DIFFERENCE_GAIN = 6.0
 """Variance of the second difference 1, −2, 1 of independent values of variance 1."""
-ROUNDING = 1 / 12
+ROUNDING_VARIANCE = 1 / 12
 """Variance of rounding to whole grey levels."""
-FIELD = 2
+FIELD_SCALE = 2
 """Height and width of the field of noise, in heights and widths of a picture."""
 WHITE = 255
 """The largest level of a colour."""
@@ -70,7 +70,7 @@ def estimate_noise(clips: Iterable[Pictures]) -> CameraNoise:
         pixels += still[..., 0].size
     if not pixels:
         raise InputError("no clip of at least three pictures; required at least one, to estimate the noise of a camera")
-    covariance = products / (DIFFERENCE_GAIN * pixels) - ROUNDING * np.eye(3)
+    covariance = products / (DIFFERENCE_GAIN * pixels) - ROUNDING_VARIANCE * np.eye(3)
     values, vectors = np.linalg.eigh(covariance)
     return CameraNoise((vectors * np.maximum(values, 0)) @ vectors.T, np.array([_spread(down), _spread(across)]))
 
@@ -107,7 +107,7 @@ class NoiseSource:
         result = np.empty_like(pictures)
         for number, picture in enumerate(pictures):
             draw = np.random.default_rng([self.seed, first_frame + number])
-            top, left = draw.integers(FIELD * height), draw.integers(FIELD * width)
+            top, left = draw.integers(FIELD_SCALE * height), draw.integers(FIELD_SCALE * width)
             levels = self._field[top : top + height, left : left + width] + picture
             result[number] = np.clip(np.rint(levels, out=levels), 0, WHITE, out=levels)
         return result
@@ -120,7 +120,9 @@ class NoiseSource:
         values, vectors = np.linalg.eigh(self.noise.covariance)
         mixing = (vectors * np.sqrt(np.maximum(values, 0))).T.astype(np.float32)
         height, width = self.size
-        field = np.random.default_rng(self.seed).standard_normal((FIELD * height, FIELD * width, 3), np.float32)
+        field = np.random.default_rng(self.seed).standard_normal(
+            (FIELD_SCALE * height, FIELD_SCALE * width, 3), np.float32
+        )
         for axis, spread in enumerate(self.noise.spread_px):
             if spread > 0:
                 field = convolve1d(field, _window(float(spread)), axis=axis, mode="wrap")
@@ -138,14 +140,14 @@ def camera_noise_from_arrays(arrays: Arrays) -> CameraNoise:
         refuse_undeclared(arrays, NOISE_ARRAYS)
         stored = checked_arrays(arrays, NOISE_ARRAYS)
         covariance = stored["noise_covariance"]
-        if not np.allclose(covariance, covariance.T) or np.linalg.eigvalsh(covariance)[0] < -SLACK:
+        if not np.allclose(covariance, covariance.T) or np.linalg.eigvalsh(covariance)[0] < -EIGENVALUE_TOLERANCE:
             raise ValueError(
                 "noise_covariance is no covariance matrix, required a symmetric one without negative eigenvalues"
             )
         return CameraNoise(covariance, stored["noise_spread_px"])
 
 
-SLACK = 1e-6
+EIGENVALUE_TOLERANCE = 1e-6
 """An eigenvalue may be so far below 0 by rounding, grey²."""
 NOISE_ARRAYS = {
     "noise_covariance": ArraySpec(np.float64, "3 3", -(255.0**2), 255.0**2),

@@ -20,13 +20,13 @@ CANDIDATES = 500
 """Number of candidate mouths. Source: Xie & Liu 2007, §6.1."""
 ROUNDS = 8
 """Rounds in which the centres of the groups are moved: more did not lower the error on GRID."""
-MIXED, DRAWN = 20, 0.75
+MIXED_CANDIDATES, MIXTURE_SHARE = 20, 0.75
 """Recorded mouths of which a predicted one is mixed, and the share of the mixture."""
 PICTURES_AT_ONCE = 16
 """Pictures that are restored at a time."""
 BLOCK = 2048
 """Pictures whose distances to all candidates are in memory at a time."""
-DEEPEST = 100
+LARGEST_DETAIL = 100
 """The largest detail of an undamaged picture, in grey levels. Of 499 candidates of GRID s1, one has more (139): an
 error of the video left a blue square in it. The others have at most 70."""
 NO_DISTANCE = 1e-6
@@ -107,17 +107,18 @@ def make_candidates(eigenlips: Eigenlips, pictures: Pictures, coefficients: Valu
     eigenlips    : of the same person
     pictures     : those chosen [shape=(N, H, W, 3)], uint8
     coefficients : of the same pictures [shape=(N, 3·K)], for eigenlips that are ``enlarged``; None: their projections
-    A picture that differs from what its eigenlips restore by more than ``DEEPEST`` grey levels somewhere is left out.
+    A picture that differs from what its eigenlips restore by over ``LARGEST_DETAIL`` grey levels somewhere is left out.
     Raises InputError: no pictures, none that is whole, or of another size than those of the eigenlips.
     """
     if coefficients is None:
         coefficients = eigenlips.project(pictures)
     details, deepest = recorded_details(eigenlips, pictures, coefficients)
-    whole = deepest <= DEEPEST
+    whole = deepest <= LARGEST_DETAIL
     if not whole.any():
         raise InputError(
-            f"{len(pictures)} pictures, all of which differ from their eigenlips by more than {DEEPEST} grey levels; "
-            "required at least one that does not: are they pictures of the person whom the eigenlips were trained on?"
+            f"{len(pictures)} pictures, all of which differ from their eigenlips by more than {LARGEST_DETAIL} grey "
+            "levels; required at least one that does not: are they pictures of the person whom the eigenlips were "
+            "trained on?"
         )
     return Candidates(coefficients[whole], details[whole])
 
@@ -129,14 +130,14 @@ def recorded_details(
 
     pictures     : [shape=(N, H, W, 3)], uint8
     coefficients : their eigenlips [shape=(N, 3·K)]
-    Returns whole grey levels, cut off at ``DEEPEST`` [shape=(N, H, W, 3)], and [shape=(N,)].
+    Returns whole grey levels, cut off at ``LARGEST_DETAIL`` [shape=(N, H, W, 3)], and [shape=(N,)].
     """
     details, deepest = np.empty(pictures.shape, np.int8), np.empty(len(pictures), np.float32)
     for start in range(0, len(pictures), PICTURES_AT_ONCE):
         part = slice(start, start + PICTURES_AT_ONCE)
         exact = pictures[part] - eigenlips.expand(coefficients[part])
         deepest[part] = np.abs(np.rint(exact, out=exact)).max(axis=(1, 2, 3))
-        details[part] = np.clip(exact, -DEEPEST, DEEPEST, out=exact)
+        details[part] = np.clip(exact, -LARGEST_DETAIL, LARGEST_DETAIL, out=exact)
     return details, deepest
 
 
@@ -145,13 +146,14 @@ def drawn_to_recorded(wanted: Values, recorded: Values) -> Values:
 
     wanted   : coefficients that a regression predicts [shape=(T, D)]
     recorded : of recorded mouths [shape=(N, D)]
-    Each is replaced by ``DRAWN`` of the nearest mixture of its ``MIXED`` nearest recorded ones, and the rest of itself.
+    Each is replaced by ``MIXTURE_SHARE`` of the nearest mixture of its ``MIXED_CANDIDATES`` nearest recorded
+    ones, and the rest of itself.
     Mixtures have weights ≥ 0 whose sum is 1, and prefer what is near, so they change smoothly over time.
     Source: Wang et al. 2010, "Locality-constrained linear coding", Eq. 7 (here with squared distances as penalty);
     what it gains: docs/results/video.md.
     Cost: O(T·N·D) for distances, O(T·MIXED³).
     """
-    count = min(MIXED, len(recorded))
+    count = min(MIXED_CANDIDATES, len(recorded))
     result = np.empty(wanted.shape, np.float32)
     for start in range(0, len(wanted), BLOCK):
         some = wanted[start : start + BLOCK]
@@ -165,7 +167,7 @@ def drawn_to_recorded(wanted: Values, recorded: Values) -> Values:
         weights = np.maximum(np.linalg.solve(products, np.ones((len(some), count, 1)))[:, :, 0], 0)
         weights /= weights.sum(axis=1, keepdims=True)
         mixtures = np.einsum("tn,tnd->td", weights.astype(np.float32), recorded[near])
-        result[start : start + BLOCK] = DRAWN * mixtures + (1 - DRAWN) * some
+        result[start : start + BLOCK] = MIXTURE_SHARE * mixtures + (1 - MIXTURE_SHARE) * some
     return result
 
 

@@ -27,7 +27,7 @@ SIDE_PX = 46.0, 60.0
 """Between these distances from the middle the movement ends: beyond is what is behind the head."""
 LARGEST_PX = 14.0
 """The chin is not moved further: more would fold the neck."""
-LARGEST_UP, LARGEST_DOWN = 0.6, 1.2
+LARGEST_RISE_SHARE, LARGEST_DROP_SHARE = 0.6, 1.2
 """Nor further than these shares of its distance to what is not moved: more would fold or tear a short chin."""
 LEAST_PX = 0.05
 """A smaller movement is none."""
@@ -55,7 +55,9 @@ def with_chin_moved(pictures: Pictures, chin_px: Array, drops_px: Array) -> Pict
     scale = pictures.shape[1] // HEIGHT
     result = pictures.copy()
     room = np.maximum(chin_px - ABOVE_PX - STILL_PX, 0)
-    drops = np.clip(drops_px, -np.minimum(LARGEST_PX, LARGEST_UP * room), np.minimum(LARGEST_PX, LARGEST_DOWN * room))
+    drops = np.clip(
+        drops_px, -np.minimum(LARGEST_PX, LARGEST_RISE_SHARE * room), np.minimum(LARGEST_PX, LARGEST_DROP_SHARE * room)
+    )
     across = (np.arange(WIDTH * scale) + 0.5) / scale + CORNER[0]
     share = np.maximum(1 - (across / HINGE_PX) ** 2, 0) * (1 - _rise(np.abs(across), *SIDE_PX))
     columns = np.flatnonzero(share > 0)

@@ -13,7 +13,7 @@ from lipmotion.errors import InputError
 Array = NDArray[np.float64]
 Scenes = Sequence[tuple[int, int]]
 
-WHOLE_CELLS = 32
+FRAME_CELLS = 32
 """Cells of the thumbnail of the whole frame along its longer side."""
 UPPER_FACE = (-54.0, -45.0, 54.0, 42.0)
 EYES = (-50.0, -14.0, 50.0, 14.0)
@@ -84,7 +84,7 @@ def describe_frames(frames: Iterable[NDArray[np.uint8]], face_to_image: Array) -
                 f"frame {n} of shape {frame.shape} with {len(face_to_image)} maps; required as many frames, of one size"
             )
         if not size:
-            size, cell = frame.shape, max(1, round(max(frame.shape[:2]) / WHOLE_CELLS))
+            size, cell = frame.shape, max(1, round(max(frame.shape[:2]) / FRAME_CELLS))
         grey = frame[:, :, 1].astype(np.float64)  # green, of which a camera has most pixels
         thumbnail = _cells(grey, cell)
         hidden = _inside(face_to_image[n], LOWER_FACE, thumbnail.shape, cell)

@@ -11,7 +11,7 @@ from lipmotion.appearance.lower_face import HEIGHT, WIDTH
 
 Floats = NDArray[np.float32]
 
-SAME_PERSON = 0.78
+SAME_PERSON_LIKENESS = 0.78
 """Least likeness of two recordings of one person. Between clips of one person it was 0.83 to 0.99 (four people),
 between those of different people up to 0.76, and 0.83 twice in 228 pairs: GRID, and three open talkers."""
 _ROWS, _COLUMNS, _STEP = 110, slice(20, 108), 3
@@ -30,5 +30,5 @@ def face_signature(pictures: NDArray[Any]) -> Floats:
 
 
 def likeness(one: Floats, other: Floats) -> float:
-    """Return the correlation of two signatures, -1 to 1; below ``SAME_PERSON`` they are probably two people's."""
+    """Return the correlation of two signatures, -1 to 1; below ``SAME_PERSON_LIKENESS`` probably of two people."""
     return float(one @ other)

@@ -23,17 +23,17 @@ LEAST_RUN_S = 0.8
 """Frames are shown one after the other for at least so long between two joins, where the background is long enough."""
 USUAL_RUN_S = 2.0
 """A run of this length costs as much as a join at which everything moves as usual; longer ones cost less."""
-CHOICE = 0.5
+CHOICE_COST_RANGE = 0.5
 """Joins whose cost exceeds the least one by less than this are chosen by chance, so that no rhythm is seen."""
 FADE_FRAMES = 4
 """Frames over which a jump is cross-faded."""
-FADE_FROM = 0.8
+LEAST_FADE_COST = 0.8
 """A jump that costs less is made without a cross-fade, which would blur a frame."""
-BUSY, BUSY_S = 2.5, 0.12
+BUSY_CHANGE_RATIO, BUSY_S = 2.5, 0.12
 """Eyes that change by more than this many times the median change blink or look elsewhere: no join so near, s."""
 BUSY_COST = 10.0
 """What a join there costs: more than any other."""
-MOST_COMPARED = 1500
+MOST_COMPARED_FRAMES = 1500
 """In longer backgrounds no jumps are searched, as every pair of frames would be compared."""
 TRIES = 8
 """Orders that are drawn; the one with the least cost of its worst join and of its last frame is returned."""
@@ -99,7 +99,7 @@ def loop_order(
     frames that look and move alike, cross-faded if need be. No join is made in a blink while there is another one.
     Raises InputError: no frames are wanted, or none may be shown.
     Source: Schödl et al. 2000, "Video textures" (cost of jumps); turns and runs are ours.
-    Cost: O(T²) for T frames up to ``MOST_COMPARED``, else O(T).
+    Cost: O(T²) for T frames up to ``MOST_COMPARED_FRAMES``, else O(T).
     """
     allowed = np.ones(len(descriptors), bool) if usable is None else np.asarray(usable, bool)
     if count < 1 or allowed.shape != (len(descriptors),) or not allowed.any():
@@ -146,7 +146,7 @@ class _Plan:
         joins: list[Join] = []
         while shown < count:
             ends, costs, nexts = self._joins_from(at, way)
-            near = np.flatnonzero(costs <= costs.min() + CHOICE)
+            near = np.flatnonzero(costs <= costs.min() + CHOICE_COST_RANGE)
             chosen = int(draws.choice(near))
             end, after = int(ends[chosen]), int(nexts[chosen])
             runs.append((at, way, abs(end - at) + 1))
@@ -190,7 +190,7 @@ class _Plan:
     def _best_jumps(self, descriptors: FrameDescriptors) -> dict[int, tuple[Numbers, Array]]:
         """Return the frame to which each frame is best followed by a jump, -1 for none, and the cost, both ways."""
         count = len(descriptors)
-        if count > MOST_COMPARED:
+        if count > MOST_COMPARED_FRAMES:
             return {way: (np.full(count, -1), np.full(count, np.inf)) for way in (1, -1)}
         distance = descriptors.distances(self.scenes)
         return {way: self._best_jumps_on(distance, way) for way in (1, -1)}
@@ -240,7 +240,7 @@ def _busy(eyes: Array, rate_hz: float, scenes: Sequence[tuple[int, int]]) -> NDA
         change[start : stop - 1] = steps
         change[start + 1 : stop] = np.maximum(change[start + 1 : stop], steps)
     ordinary = np.median(change[change > 0]) if (change > 0).any() else np.inf
-    return binary_dilation(change > BUSY * ordinary, iterations=max(1, round(BUSY_S * rate_hz)))
+    return binary_dilation(change > BUSY_CHANGE_RATIO * ordinary, iterations=max(1, round(BUSY_S * rate_hz)))
 
 
 def _restlessness(rows: Array, scenes: Sequence[tuple[int, int]]) -> Array:
@@ -261,7 +261,7 @@ def _as_order(runs: Sequence[tuple[int, int, int]], joins: tuple[Join, ...], cou
     first = np.concatenate([at + way * np.arange(length) for at, way, length in runs])[:count]
     second, weight = first.copy(), np.zeros(count)
     for join, (before, after) in zip(joins, pairwise(runs), strict=False):
-        if join.kind == "jump" and join.cost > FADE_FROM:
+        if join.kind == "jump" and join.cost > LEAST_FADE_COST:
             way = before[1]
             for step in range(-FADE_FRAMES // 2, FADE_FRAMES // 2):
                 at, share = join.at + step, (step + FADE_FRAMES / 2 + 0.5) / FADE_FRAMES

@@ -68,7 +68,8 @@ def face_shape(jaw_half_width: float, chin_px: Array) -> FaceShape:
 def region_map(face_to_frame: Array, scale: int) -> Array:
     """Return the affine maps from a pixel of a lower-face picture to its position in the frame.
 
-    face_to_frame : maps from px of the face to px of the frame [shape=(..., 2, 3)], of ``vision.mouth.face_to_image``
+    face_to_frame : maps from px of the face to those of the frame [shape=(..., 2, 3)], of
+                    ``vision.mouth_pictures.face_to_image``
     scale         : samples a pixel
     Pixel (0, 0) is a centre. Returns an array of the same shape.
     """

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.appearance.candidates import choose_candidates, squared_distances
 from lipmotion.errors import InputError
-from lipmotion.stats.regression import ridge, zero_statistics
+from lipmotion.stats.tree_regression import ridge, zero_statistics
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
 from lipmotion.types import Channel, Motion
 
@@ -31,7 +31,7 @@ WEIGHT = 10.0
 """Weight of the likenesses beside the components, against which the ridge is."""
 RIDGE, RIDGE_FRAMES = 1.0, 1000
 """The ridge parameter of T frames is RIDGE + (RIDGE_FRAMES / T)²: short footage is trusted less."""
-OUTERMOST = 0.2
+OUTER_PERCENTAGE = 0.2
 """Percentage of the frames at each end of a component beyond which it is cut off: no map holds far from all footage."""
 LEAST_DEVIATION = 1e-4
 """A channel that moves less, in its unit, is left out."""
@@ -107,7 +107,7 @@ def fit_motion_map(values: Array, channels: tuple[Channel, ...], targets: NDArra
     kept = variances[::-1][:COMPONENTS] > LEAST_DEVIATION
     basis = vectors[:, ::-1][:, :COMPONENTS][:, kept] / np.sqrt(variances[::-1][:COMPONENTS][kept])
     components = standardised @ basis
-    limits = np.percentile(components, [OUTERMOST, 100 - OUTERMOST], axis=0)
+    limits = np.percentile(components, [OUTER_PERCENTAGE, 100 - OUTER_PERCENTAGE], axis=0)
     near = np.clip(components, *limits)[:, :LIKENESS_COMPONENTS].astype(np.float32)
     centres = near[choose_candidates(near, min(CENTRES, len(near) // FRAMES_PER_CENTRE))]
     unfitted = MotionMap(names, mean, scale, basis, limits, centres, np.zeros((0, 0), np.float32))

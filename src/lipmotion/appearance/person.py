@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from lipmotion.appearance.camera_noise import CameraNoise, estimate_noise
 from lipmotion.appearance.candidates import (
     CANDIDATES,
-    DEEPEST,
+    LARGEST_DETAIL,
     Candidates,
     choose_candidates,
     drawn_to_recorded,
@@ -42,14 +42,14 @@ Floats = NDArray[np.float32]
 Index = NDArray[np.intp]
 Pictures = NDArray[np.uint8]
 
-LEARNED_FROM = 980
+TRAINING_PICTURES = 980
 """Pictures of which the principal components are computed. Source: Xie & Liu 2007, §5."""
 JAW_COMPONENTS = 12
 """Principal components of the jaw, of each colour."""
 JAW_CANDIDATES = 120
 """Recorded lower faces whose detail the jaw has."""
 JAW_OPTIONS = RefinementOptions(steadiness=0.3)
-AT_ONCE = 256
+PICTURES_PER_BLOCK = 256
 """Pictures that are projected at a time."""
 EDGE_PX = 3
 """The jaw's pictures are its own so far beyond the part that is replaced: cloning reads its edge."""
@@ -185,15 +185,15 @@ def learn_appearance(footage: FootagePictures) -> Appearance:
     """
     pictures, light, reference = _in_one_light(footage)
     mouths = pictures[(slice(None), *mouth_part(1))]
-    mouth = fit_eigenlips(mouths[evenly_spaced(LEARNED_FROM, len(mouths))], COMPONENTS)
+    mouth = fit_eigenlips(mouths[evenly_spaced(TRAINING_PICTURES, len(mouths))], COMPONENTS)
     codes = mouth.project(mouths)
-    around = pictures[evenly_spaced(LEARNED_FROM, len(pictures))].mean(axis=0, dtype=np.float32)
-    faces = _jaw_alone(pictures[evenly_spaced(LEARNED_FROM, len(pictures))], around, footage.shape)
+    around = pictures[evenly_spaced(TRAINING_PICTURES, len(pictures))].mean(axis=0, dtype=np.float32)
+    faces = _jaw_alone(pictures[evenly_spaced(TRAINING_PICTURES, len(pictures))], around, footage.shape)
     jaw = fit_eigenlips(faces, JAW_COMPONENTS)
     jaw_codes = np.concatenate(
         [
-            jaw.project(_jaw_alone(pictures[start : start + AT_ONCE], around, footage.shape))
-            for start in range(0, len(pictures), AT_ONCE)
+            jaw.project(_jaw_alone(pictures[start : start + PICTURES_PER_BLOCK], around, footage.shape))
+            for start in range(0, len(pictures), PICTURES_PER_BLOCK)
         ]
     )
     chosen = _undamaged(mouth, mouths, codes, choose_candidates(codes, CANDIDATES))
@@ -257,7 +257,7 @@ def _jaw_alone(pictures: Pictures, mean: Floats, shape: FaceShape) -> Pictures:
 
 def _undamaged(space: Eigenlips, pictures: Pictures, codes: Floats, chosen: Index) -> Index:
     """Return those of the chosen pictures that are like what their components restore: damaged video is not."""
-    whole = recorded_details(space, pictures[chosen], codes[chosen])[1] <= DEEPEST
+    whole = recorded_details(space, pictures[chosen], codes[chosen])[1] <= LARGEST_DETAIL
     return chosen[whole] if whole.any() else chosen
 
 

@@ -17,11 +17,11 @@ from lipmotion.units import LIP_CLOSING
 Curve = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-CLOSED_BELOW: Final = 0.012
+CLOSED_OPENING: Final = 0.012
 """Trackers measure openings up to this on lips that touch, in eye distances."""
-UNSEEN, SEEN_FROM = 0.006, 0.03
+TRACKER_DEFICIT, FULL_DEFICIT_GAP = 0.006, 0.03
 """Trackers measure this much less than the distance of parted lips; from the second length on, all of it is added."""
-BEND, WIDEST = 0.3, 0.48
+MEASURED_GAP, LARGEST_GAP = 0.3, 0.48
 """Up to the first gap, lips are as far apart as measured; further ones approach the second, in eye distances."""
 LEAST_GAP: Final = 0.006
 """Lips that do not touch are at least this far apart, in eye distances (0.5 mm on a face)."""
@@ -31,7 +31,7 @@ than a picture at 24 a second), and for no longer than the second one."""
 CONTACT_SHARE: Final = 0.6
 FADE_S: Final = 0.04
 """Lips that are made to touch come together, and part, within this time."""
-MEANT: Final = 0.15
+EDITED_GAP: Final = 0.15
 """Lips that are further apart than this in all of a p, b or m are left so: somebody edited or pinned them."""
 GAP: Final = "lip_gap"
 """The channel of the distance between the inner lips itself, of motion that comes from a rig, in eye distances."""
@@ -42,16 +42,18 @@ def gap_of(opening: Curve) -> Curve:
 
     Both in eye distances. It never falls where the opening rises.
     """
-    share = np.clip((opening - CLOSED_BELOW) / (SEEN_FROM - CLOSED_BELOW), 0, 1)
-    gap = (opening + UNSEEN) * share
-    over = (WIDEST - BEND) * np.tanh(np.maximum(gap - BEND, 0) / (WIDEST - BEND))
-    return np.minimum(gap, BEND) + over
+    share = np.clip((opening - CLOSED_OPENING) / (FULL_DEFICIT_GAP - CLOSED_OPENING), 0, 1)
+    gap = (opening + TRACKER_DEFICIT) * share
+    over = (LARGEST_GAP - MEASURED_GAP) * np.tanh(np.maximum(gap - MEASURED_GAP, 0) / (LARGEST_GAP - MEASURED_GAP))
+    return np.minimum(gap, MEASURED_GAP) + over
 
 
 def opening_of(gap: Curve) -> Curve:
     """Return the opening that trackers measure for a distance between the inner lips [shape=(T,)]: of ``gap_of``."""
-    openings = np.concatenate([np.linspace(CLOSED_BELOW, SEEN_FROM, 24), np.linspace(SEEN_FROM, 1.0, 200)[1:]])
-    return np.where(gap > 0, np.interp(gap, gap_of(openings), openings), CLOSED_BELOW - 0.002)
+    openings = np.concatenate(
+        [np.linspace(CLOSED_OPENING, FULL_DEFICIT_GAP, 24), np.linspace(FULL_DEFICIT_GAP, 1.0, 200)[1:]]
+    )
+    return np.where(gap > 0, np.interp(gap, gap_of(openings), openings), CLOSED_OPENING - 0.002)
 
 
 def gap_in(motion: Motion) -> Curve:
@@ -102,7 +104,7 @@ def closed_lips(gap: Curve, motion: Motion, units: Timeline[Unit]) -> Curve:
         length_s = float(np.clip(CONTACT_SHARE * (end_s - begin_s), *CONTACT_S))
         after = int(np.searchsorted(parted, frame))  # the first frame in which the lips are apart, from this one on
         touching_s = float(parted[after] - parted[after - 1]) / motion.rate_hz if parted[after] > frame else 0.0
-        if gap[frame] > MEANT or touching_s >= length_s - 1e-9:
+        if gap[frame] > EDITED_GAP or touching_s >= length_s - 1e-9:
             continue
         # as near to the middle of the phone as the least open frame lets it be
         at_s = float(np.clip((begin_s + end_s) / 2, time_s[frame] - length_s / 2, time_s[frame] + length_s / 2))

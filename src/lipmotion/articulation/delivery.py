@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.contact import CLOSED_BELOW, closures
+from lipmotion.articulation.contact import CLOSED_OPENING, closures
 from lipmotion.articulation.rest import rest_frames
 from lipmotion.errors import InputError
 from lipmotion.kernels.sequences.holds import best_holds
@@ -22,7 +22,7 @@ from lipmotion.units import is_silent
 
 Curve = NDArray[np.float64]
 
-FREE = 0.03
+UNSCALED_GAP = 0.03
 """Lips that have just parted by less than this, in eye distances, move less than in proportion to the intensity."""
 GROWING = ("protrusion", "spread")
 """The articulatory channels that grow with the intensity; the others say what touches what."""
@@ -111,7 +111,7 @@ def intensified(generation: Generation, intensity: float, opening: Curve | None 
     factor = np.full(len(motion.values), float(intensity))
     if opening is not None:
         closed = float(np.median(opening[rest]))
-        factor = _factors(opening - closed, max(CLOSED_BELOW - closed, 0.0), intensity)
+        factor = _factors(opening - closed, max(CLOSED_OPENING - closed, 0.0), intensity)
     values = motion.values.astype(np.float64)
     still = np.median(values[rest], axis=0)
     larger = still + factor[:, None] * (values - still)
@@ -185,7 +185,7 @@ def _factors(further: Curve, touching: float, intensity: float) -> Curve:
     wanted = np.maximum(intensity * further, 0)
     beyond = np.maximum(wanted - most, 0)
     limited = np.where(beyond > 0, most + most * np.tanh(beyond / most), wanted)
-    share = np.clip((further - touching) / FREE, 0, 1)
+    share = np.clip((further - touching) / UNSCALED_GAP, 0, 1)
     weight = share * share * (3 - 2 * share)
     factor = np.divide(limited, further, out=np.ones_like(further), where=further > 0)
     return 1 + weight * (factor - 1)

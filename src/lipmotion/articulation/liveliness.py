@@ -34,11 +34,11 @@ LARGEST_GLANCE = (0.2, 0.08)
 """The furthest that the eyes turn to the side, and up or down, in radians."""
 BROW_RAISE = 0.03
 """For a strong accent, in eye distances."""
-FOLLOWING = 0.85
+GAZE_COUNTER_SHARE = 0.85
 """The eyes turn against the head by this part of its way, and so hold their target."""
 SWAY = (0.034, 0.016, 0.018)
 """Deviations of the slow turning of the head in speech: to the side, up and down, to a shoulder, in radians."""
-NOD, FALL = 0.045, 0.03
+NOD_RAD, PHRASE_FALL_RAD = 0.045, 0.03
 """How far the head nods with a strong accent, and how much lower a phrase ends than it begins, in radians."""
 STILL_SHARE = 0.35
 """Share of the turning of the head that is left in silence."""
@@ -90,7 +90,7 @@ def liveliness(  # noqa: PLR0913
     lids = lid_closure(time_s, blink_times(end_s, spoken, _generator(seed, 2))) if blinks else still
     aim = _gaze(time_s, end_s, spoken, _generator(seed, 3)) if gaze else np.zeros((len(time_s), 2))
     raised = _brows(time_s, accent, spoken, _generator(seed, 4)) if brows else still
-    return Liveliness(lids, raised, aim - FOLLOWING * turn[:, :2], turn)
+    return Liveliness(lids, raised, aim - GAZE_COUNTER_SHARE * turn[:, :2], turn)
 
 
 def phrases(units: Timeline[Unit]) -> list[tuple[float, float]]:
@@ -201,7 +201,7 @@ def _turn(
         roll[first:last] += 0.9 * SWAY[2] * side * rise
         yaw[first:last] += 0.9 * SWAY[0] * about * rise
         tilt[first:last] += rise * (np.clip((near - begin) / max(end - begin, 0.1), 0, 1) - 0.5)
-    return np.stack([lively * yaw, lively * pitch - NOD * nod - FALL * tilt, lively * roll], axis=1)
+    return np.stack([lively * yaw, lively * pitch - NOD_RAD * nod - PHRASE_FALL_RAD * tilt, lively * roll], axis=1)
 
 
 def _brows(time_s: Curve, accent: Curve, spoken: list[tuple[float, float]], rng: np.random.Generator) -> Curve:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import GAP, closed_lips, gap_in, in_pictures
 from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER
-from lipmotion.articulation.phone_targets import GESTURES, OVAL, PURSED, TIP_OUT, TIP_UP, gesture_curves
+from lipmotion.articulation.phone_targets import GESTURES, OVAL, PURSED_PRESS, TIP_OUT, TIP_UP, gesture_curves
 from lipmotion.articulation.rest import against_rest, rest_frames
 from lipmotion.errors import InputError
 from lipmotion.types import Motion, Timeline, Unit
@@ -37,13 +37,13 @@ WIDTH_REACH = 0.3
 """Changes of width approach this."""
 LIP_SPEED = 3.0
 """The gap changes no faster than this beside f and v, in eye distances a second (27 cm/s on a face)."""
-TUCKED_CHIN = 0.6
+TUCKED_CHIN_SHARE = 0.6
 """Share of its drop by which the chin rises while the lower lip is on the teeth."""
-UPPER_MOST, UPPER_RATE = 0.058, 5.2
+LARGEST_UPPER_RISE, UPPER_RATE = 0.058, 5.2
 """The upper lip rises by at most the first length (5 mm), for small gaps by the product of both times the gap."""
 JAW_SHARE = 0.85
 """Share of the lower lip's way that the chin goes: the lip also turns outwards."""
-LEAST_JAW = 0.75
+LEAST_CHIN_DROP_SHARE = 0.75
 """Least drop of the chin, as a share of the usual one: trackers of small jaws, and models of them, show less."""
 CORNERS = (f"x_{RIGHT_CORNER}", f"x_{LEFT_CORNER}")
 """Where the lip corners are across, in motion that has points."""
@@ -135,7 +135,7 @@ def spoken_mouth(motion: Motion, units: Timeline[Unit], fps: float | None = None
     said = gesture_curves(units, time_s, [name for name in (*GESTURES, OVAL) if name not in motion.names])
     said |= {name: np.clip(motion[name].astype(np.float64), 0, 1) for name in {*GESTURES} & {*motion.names}}
     # w has half the press of p, with protruded lips: a hole that is almost closed
-    said["pursed"] = np.clip(said["lip_press"] / (0.8 * PURSED), 0, 1) * said["protrusion"]
+    said["pursed"] = np.clip(said["lip_press"] / (0.8 * PURSED_PRESS), 0, 1) * said["protrusion"]
     said["pursed"] *= np.clip((0.75 - said["lip_press"]) / 0.15, 0, 1)
     gap = gap_in(motion)
     if GAP not in motion.names:
@@ -147,7 +147,7 @@ def spoken_mouth(motion: Motion, units: Timeline[Unit], fps: float | None = None
         gap,
         _width(motion, rest, said, oval),
         _fullness(motion, rest),
-        _jaw(motion, rest, gap) * (1 - TUCKED_CHIN * said["lip_tuck"]),
+        _jaw(motion, rest, gap) * (1 - TUCKED_CHIN_SHARE * said["lip_tuck"]),
         said["tongue"],
         said["lip_tuck"],
         said["protrusion"],
@@ -181,7 +181,7 @@ def check_spoken(motion: Motion, fps: float) -> None:
 
 def upper_share(gap: Any) -> Any:
     """Return how far the upper lip rises for a gap; the rest of the gap is the lower lip's. Source: GRID speaker 1."""
-    return UPPER_MOST * (1 - np.exp(-UPPER_RATE * np.asarray(gap)))
+    return LARGEST_UPPER_RISE * (1 - np.exp(-UPPER_RATE * np.asarray(gap)))
 
 
 def jaw_drop(gap: Any) -> Any:
@@ -242,4 +242,4 @@ def _jaw(motion: Motion, rest: NDArray[np.bool_], gap: Curve) -> Curve:
     if "y_152" not in motion.names:
         return np.asarray(usual)
     chin = motion["y_152"].astype(np.float64)
-    return np.clip(np.median(chin[rest]) - chin, LEAST_JAW * usual, 1.15 * usual + 0.01)
+    return np.clip(np.median(chin[rest]) - chin, LEAST_CHIN_DROP_SHARE * usual, 1.15 * usual + 0.01)

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.contact import CLOSED_BELOW
+from lipmotion.articulation.contact import CLOSED_OPENING
 from lipmotion.articulation.rest import rest_frames
 from lipmotion.types import EYE_DISTANCE, Generation, Motion, Span, Timeline, Unit
 from lipmotion.units import LIP_CLOSING, is_silent
@@ -22,7 +22,7 @@ LEAST_PAUSE_S: Final = 0.25
 """In shorter pauses the mouth goes on; silence at both ends of a line counts at any length."""
 CLOSING_S, OPENING_S = 0.2, 0.12
 """Lips take so long to close after a phrase, and begin to part so long before the next one; less in short pauses."""
-BREATH, BREATH_S = 0.03, 0.04
+BREATH_GAP, BREATH_S = 0.03, 0.04
 """The lips are parted by this, in eye distances, for a breath, so long before a phrase that begins with open lips."""
 LEAST_BREATH_S: Final = 0.4
 """Pauses in which a breath is taken last at least so long."""
@@ -100,7 +100,7 @@ def with_pauses(generation: Generation, style: str, pinned_s: Sequence[float] = 
     values, resting = motion.values.copy(), np.flatnonzero(weight)
     pose = np.median(values[rest_frames(motion, units)].astype(np.float64), axis=0)
     if "opening" in motion.names:
-        pose[motion.column("opening")] = min(pose[motion.column("opening")], 0.5 * CLOSED_BELOW)
+        pose[motion.column("opening")] = min(pose[motion.column("opening")], 0.5 * CLOSED_OPENING)
     values[resting] += weight[resting, None] * (pose - values[resting])
     if "opening" in motion.names and motion.channels[motion.column("opening")].unit == EYE_DISTANCE:
         column = motion.column("opening")
@@ -123,7 +123,7 @@ def _breaths(units: Timeline[Unit], time_s: Curve) -> Curve:
         ):
             near = slice(*np.searchsorted(time_s, (end_s - OPENING_S, end_s + OPENING_S)))
             share = np.clip(1 - np.abs(time_s[near] - end_s + BREATH_S) / (OPENING_S - BREATH_S), 0, 1)
-            least[near] = np.maximum(least[near], BREATH * share * share * (3 - 2 * share))
+            least[near] = np.maximum(least[near], BREATH_GAP * share * share * (3 - 2 * share))
     return least
 
 

@@ -30,7 +30,7 @@ OVAL = "oval"
 """How far the opening is tall and narrow instead of wide: for aa. It is drawn, but is no channel of motion files."""
 TIP_UP, TIP_OUT = 0.6, 1.0
 """Values of ``tongue``: the tip is at the ridge behind the upper teeth; the tip is between the teeth."""
-PURSED = 0.5
+PURSED_PRESS = 0.5
 """Value of ``lip_press`` of w: with protruded lips, a hole that is almost closed. The round hole of uw has 0."""
 REACH = 4.0
 """Dominance is 0 further than so many widths from a phone."""
@@ -102,7 +102,7 @@ _TARGETS: dict[str, tuple[GestureTarget, Targets]] = {
     ),
     "lip_press": (
         GestureTarget(0, 0, 1.0, 0.02),
-        _steady({_CLOSED: 1.0}, 3.0, 0.02) | {"w": GestureTarget(PURSED, 0.8 * PURSED, 3.0, 0.02)},
+        _steady({_CLOSED: 1.0}, 3.0, 0.02) | {"w": GestureTarget(PURSED_PRESS, 0.8 * PURSED_PRESS, 3.0, 0.02)},
     ),
     "oval": (
         GestureTarget(0, 0, 0.4, 0.03),

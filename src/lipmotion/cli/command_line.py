@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 from lipmotion.cli.arguments.paths import check_paths
 from lipmotion.cli.terminal.events import Events
 from lipmotion.cli.terminal.outcome import one_line
-from lipmotion.cli.terminal.output import flush_output, print_line, print_usage, with_program_name
+from lipmotion.cli.terminal.printing import flush_output, print_line, print_usage, with_program_name
 from lipmotion.cli.terminal.stop import Stopper
 from lipmotion.cli.verbs import (
     adapt,

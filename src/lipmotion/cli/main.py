@@ -46,7 +46,7 @@ def _run(arguments: Sequence[str] | None, stopper: Stopper, events: Events) -> i
 
         command_line.run(arguments, stopper, events)
     except BrokenPipeError:  # the reader of standard output has gone
-        from lipmotion.cli.terminal.output import discard_pending_output
+        from lipmotion.cli.terminal.printing import discard_pending_output
 
         stopper.settle()
         discard_pending_output()
@@ -78,7 +78,7 @@ def _run(arguments: Sequence[str] | None, stopper: Stopper, events: Events) -> i
 
 def _report_failure(events: Events, code: int, text: str) -> int:
     """Report an error as an event and as a line; return the exit code."""
-    from lipmotion.cli.terminal.output import print_error
+    from lipmotion.cli.terminal.printing import print_error
 
     events.fail(text.removeprefix("error: "), code)
     if not events.replaces_errors:

@@ -24,7 +24,7 @@ from lipmotion.types import WEIGHT, Channel, Motion
 KIND = "FACEGOOD blendshape weights"
 NAMES, VALUES = "*_bs_name.npy", "bs_value_"
 RATE_HZ = 30.0
-LICENCE_START = 10_000
+LICENCE_CHARACTERS = 10_000
 """Characters of a licence file that are read for its name and its owner."""
 
 
@@ -106,7 +106,7 @@ def _rights(directory: Path) -> dict[str, str]:
     if not path.is_file():
         return {}
     with path.open(encoding="utf-8", errors="replace") as file:
-        text = file.read(LICENCE_START)
+        text = file.read(LICENCE_CHARACTERS)
     lines = [line.strip() for line in text.splitlines() if line.strip()]
     owners = [line for line in lines if line.lower().startswith("copyright")]
     return {"licence": lines[0]} | ({"attribution": owners[0]} if owners else {}) if lines else {}

@@ -18,7 +18,7 @@ RIGHTS = {
 SILENCES = frozenset({"sil", "sp"})
 """Labels of a word-time file that are not words."""
 WORD = re.compile(r"[^\W\d_]+(?:['-][^\W\d_]+)*")
-LARGEST_ALIGN = 1 << 16
+LARGEST_ALIGNMENT_BYTES = 1 << 16
 """Most bytes of a word-time file; GRID's have a hundred."""
 
 COMMANDS = {"b": "bin", "l": "lay", "p": "place", "s": "set"}
@@ -80,8 +80,10 @@ def read_aligned_words(path: Path) -> tuple[str, ...]:
     Raises InputError: not such a file, or without a word.
     """
     size = path.stat().st_size
-    if size > LARGEST_ALIGN:
-        raise InputError(f"{path}: {size} bytes, required at most {LARGEST_ALIGN}: are they the words of one sentence?")
+    if size > LARGEST_ALIGNMENT_BYTES:
+        raise InputError(
+            f"{path}: {size} bytes, required at most {LARGEST_ALIGNMENT_BYTES}: are they the words of one sentence?"
+        )
     rows = [line.split() for line in path.read_text(encoding="utf-8", errors="replace").splitlines() if line.strip()]
     for number, row in enumerate(rows, 1):
         if len(row) != 3 or not (row[0].isdecimal() and row[1].isdecimal()):

@@ -16,7 +16,7 @@ RECORDER = ".recorder"
 """``take.recorder.wav`` is the sound that a recorder of its own made of ``take.mp4``, or of ``take.wav``."""
 OFFSETS = "offsets.csv"
 COLUMNS = ["name", "offset_ms"]
-LARGEST_TABLE = 1 << 22
+LARGEST_TABLE_BYTES = 1 << 22
 LARGEST_OFFSET_S = 6 * 3600.0
 
 
@@ -67,7 +67,7 @@ def read_offsets(path: Path) -> dict[str, float]:
     Raises CorpusError: other columns, a row that is damaged, or a name twice.
     """
     try:
-        rows = list(csv.reader(io.StringIO(read_text_file(path, "table of offsets", LARGEST_TABLE))))
+        rows = list(csv.reader(io.StringIO(read_text_file(path, "table of offsets", LARGEST_TABLE_BYTES))))
         if not rows or [field.strip() for field in rows[0]] != COLUMNS:
             raise InputError(
                 f"{path}: the columns are {shortened(','.join(rows[0] if rows else []))!r}, required name,offset_ms"

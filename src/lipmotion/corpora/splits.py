@@ -12,9 +12,9 @@ from lipmotion.storage.files import read_text_file
 
 SPLITS = ("train", "val", "test")
 LISTS = tuple(f"{split}.txt" for split in SPLITS)
-LARGEST_LIST = 1 << 24
+LARGEST_LIST_BYTES = 1 << 24
 """Most bytes of a list of names."""
-MOST_MISSING = 20_000
+MOST_MISSING_NAMES = 20_000
 """Names without a recording that are reported one by one; more of them mean a list of another folder."""
 
 
@@ -24,7 +24,7 @@ def assign_splits(folder: RecordingFolder, directory: Path) -> RecordingFolder:
     Without lists all are ``train``. With a train.txt, recordings that are in no list become problems, because they are
     not meant for training; so do names without a recording.
     A list may name files (``take08.mkv``): where no recording has that name, the suffix is left out.
-    Raises CorpusError: a name is in two lists, or more than ``MOST_MISSING`` names have no recording.
+    Raises CorpusError: a name is in two lists, or more than ``MOST_MISSING_NAMES`` names have no recording.
     """
     known = {recording.name for recording in folder.recordings} | folder.problems.keys()
     split_of = _read_lists(directory, known)
@@ -34,10 +34,10 @@ def assign_splits(folder: RecordingFolder, directory: Path) -> RecordingFolder:
         for name, split in split_of.items()
         if name not in known
     }
-    if len(problems) > MOST_MISSING:
+    if len(problems) > MOST_MISSING_NAMES:
         raise CorpusError(
-            f"{directory}: its lists name {len(problems)} recordings that are not in it, at most {MOST_MISSING} may "
-            "be missing; are they those of another folder?"
+            f"{directory}: its lists name {len(problems)} recordings that are not in it, at most {MOST_MISSING_NAMES} "
+            "may be missing; are they those of another folder?"
         )
     recordings = []
     for recording in folder.recordings:
@@ -72,7 +72,7 @@ def read_names(path: Path) -> list[str]:
     Raises CorpusError: no such file, or not UTF-8 text.
     """
     try:
-        lines = read_text_file(path, "list", LARGEST_LIST).splitlines()
+        lines = read_text_file(path, "list", LARGEST_LIST_BYTES).splitlines()
     except InputError as error:
         raise CorpusError(f"{error}; required: one name a line") from error
     return [line.strip().replace("/", "-") for line in lines if line.strip()]

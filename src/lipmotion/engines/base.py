@@ -47,7 +47,7 @@ class Inputs:
     """What an engine takes besides acoustic features, phones in time and motion.
 
     f0           : F0, ``Speech.log_f0``
-    conditions   : acoustic conditions in which training takes each example (``Example.heard``), and with them spectra
+    conditions   : acoustic conditions in which training takes each example (``Example.condition_spectra``), and with them spectra
                    (``Speech.spectrum``); 0: neither
     prior        : what another model makes of the speech, ``Speech.prior``: its models can stand on other ones
     speech_alone : examples without any valid frame: of other speakers, for instance
@@ -184,7 +184,8 @@ class SelectsRecordings(Protocol):
         """Return the pieces of recordings that say some phones best, and the phones with the sources of their units.
 
         units    : phones in time, from 0 s
-        features : acoustic features of every recording, by its name [each shape=(T, D)]; pieces join where these agree
+        features : acoustic features of every recording, by its name [each shape=(T, D)]; pieces
+            join where these agree
         Raises InputError: an unknown phone, or features of other recordings.
         """
 

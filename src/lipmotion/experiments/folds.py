@@ -21,9 +21,9 @@ from lipmotion.experiments.runner import (
     train_and_generate,
 )
 from lipmotion.kernels.threads import one_thread
-from lipmotion.measures.report import figure_text
-from lipmotion.pipeline.evaluation.conditions import OPENING
+from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.pipeline.evaluation.figures import figures_of
+from lipmotion.pipeline.evaluation.held_out import OPENING
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import sub_monitor
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from lipmotion.errors import InputError
-from lipmotion.pipeline.evaluation.conditions import AUDIO_ONLY, HeldOutRecordings
+from lipmotion.pipeline.evaluation.held_out import AUDIO_ONLY, HeldOutRecordings
 from lipmotion.speech.features.mfcc import mfcc
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ, read_audio
 from lipmotion.speech.sound.noise import noisy_audio

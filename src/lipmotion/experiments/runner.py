@@ -12,7 +12,7 @@ import numpy as np
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.pipeline.evaluation.conditions import (
+from lipmotion.pipeline.evaluation.held_out import (
     OPENING,
     ComparedClip,
     HeldOutRecordings,

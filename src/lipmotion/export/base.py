@@ -14,10 +14,10 @@ from lipmotion.storage.files import check_regular, whole_file
 from lipmotion.types import Generation, Motion, Timeline, Unit
 
 About = Mapping[str, str]
-LARGEST_MOTION = 1 << 31
+LARGEST_MOTION_BYTES = 1 << 31
 """Most bytes of a motion file: four hours of a hundred channels."""
 
-LARGEST_UNITS = 1 << 28
+LARGEST_UNITS_BYTES = 1 << 28
 """Most bytes of a file of units alone: phones of a day."""
 
 
@@ -149,8 +149,8 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
     check_regular(path, "motion file")
     try:
         size = path.stat().st_size
-        if size > LARGEST_MOTION:
-            raise InputError(f"{size} bytes, required at most {LARGEST_MOTION}: is it a motion file?")
+        if size > LARGEST_MOTION_BYTES:
+            raise InputError(f"{size} bytes, required at most {LARGEST_MOTION_BYTES}: is it a motion file?")
         motion, units = read(path)
         if not np.isfinite(motion.values).all():
             raise InputError("there are values that are not finite; interpolate them first")
@@ -167,7 +167,7 @@ def read_units(path: Path) -> Timeline[Unit]:
     Raises InputError: as ``read_motion``.
     """
     read = _format_of(path).units if motion_suffix(path) else None
-    if read is not None and path.is_file() and path.stat().st_size <= LARGEST_UNITS:
+    if read is not None and path.is_file() and path.stat().st_size <= LARGEST_UNITS_BYTES:
         try:
             units = read(path)
         except OSError as error:

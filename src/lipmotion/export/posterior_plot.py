@@ -13,11 +13,11 @@ from PIL import Image, ImageChops, ImageDraw, ImageFont
 from lipmotion.types import ChainPosteriors, Generation
 from lipmotion.units import is_silent
 
-WIDEST = 2000
+MOST_COLUMNS = 2000
 """Most columns of a plot; in a longer recording, each column is the mean of several frames."""
-NARROWEST = 600
-ROW, GAP, LEFT, RIGHT, TITLE = 16, 14, 120, 16, 20
-CURVE = 90
+LEAST_COLUMNS = 600
+ROW_PX, GAP_PX, LEFT_PX, RIGHT_PX, TITLE_PX = 16, 14, 120, 16, 20
+CURVE_PX = 90
 """Height of the plot of the opening."""
 LEAST_PROBABILITY = 0.05
 """Units whose posterior probability never reaches this have no row."""
@@ -46,7 +46,7 @@ class TimeAxis:
 
     def x(self, time_s: float) -> float:
         """Return the horizontal position of a time, in pixels."""
-        return LEFT + float(np.clip(time_s * self.rate_hz / self.frames, 0, 1)) * self.columns
+        return LEFT_PX + float(np.clip(time_s * self.rate_hz / self.frames, 0, 1)) * self.columns
 
     def averaged(self, values: NDArray[Any]) -> NDArray[np.float64]:
         """Return values of frames [shape=(T, K)] averaged over each column [shape=(columns, K)]."""
@@ -61,27 +61,33 @@ class TimeAxis:
 def draw_posteriors(generation: Generation, posteriors: Sequence[ChainPosteriors]) -> Image.Image:
     """Return a picture of posteriors; from top to bottom: phones, units of each chain, asynchrony, opening, time."""
     frames, rate_hz = len(generation.motion.values), generation.motion.rate_hz
-    axis = TimeAxis(frames, rate_hz, int(np.clip(2 * frames, NARROWEST, WIDEST)))
+    axis = TimeAxis(frames, rate_hz, int(np.clip(2 * frames, LEAST_COLUMNS, MOST_COLUMNS)))
     leader = posteriors[0].name if posteriors else ""
     panels = [panel for number, chain in enumerate(posteriors) for panel in _panels(axis, chain, leader, number)]
     channels = generation.motion.names
     curve = "opening" if "opening" in channels else channels[0]
-    height = TITLE + sum(TITLE + ROW * len(names) + GAP for _, names, _ in panels) + TITLE + CURVE + 2 * TITLE
-    picture = Image.new("RGB", (LEFT + axis.columns + RIGHT, height), WHITE)
+    height = (
+        TITLE_PX
+        + sum(TITLE_PX + ROW_PX * len(names) + GAP_PX for _, names, _ in panels)
+        + TITLE_PX
+        + CURVE_PX
+        + 2 * TITLE_PX
+    )
+    picture = Image.new("RGB", (LEFT_PX + axis.columns + RIGHT_PX, height), WHITE)
     pen = PlotPainter(ImageDraw.Draw(picture), axis)
-    pen.phones(generation, height - 2 * TITLE)
-    y = TITLE
+    pen.phones(generation, height - 2 * TITLE_PX)
+    y = TITLE_PX
     for title, names, colours in panels:
-        pen.text(LEFT, y + 2, title, INK)
-        y += TITLE
+        pen.text(LEFT_PX, y + 2, title, INK)
+        y += TITLE_PX
         pen.rows(y, names)
-        area = (LEFT, y, LEFT + axis.columns, y + ROW * len(names))
-        band = Image.fromarray(colours.transpose(1, 0, 2)).resize((axis.columns, ROW * len(names)), 0)
+        area = (LEFT_PX, y, LEFT_PX + axis.columns, y + ROW_PX * len(names))
+        band = Image.fromarray(colours.transpose(1, 0, 2)).resize((axis.columns, ROW_PX * len(names)), 0)
         picture.paste(ImageChops.darker(band, picture.crop(area)), area)
-        y += ROW * len(names) + GAP
-    pen.text(LEFT, y + 2, f"{curve} (generated)", INK)
-    pen.curve(y + TITLE, generation.motion[curve])
-    pen.times(y + TITLE + CURVE)
+        y += ROW_PX * len(names) + GAP_PX
+    pen.text(LEFT_PX, y + 2, f"{curve} (generated)", INK)
+    pen.curve(y + TITLE_PX, generation.motion[curve])
+    pen.times(y + TITLE_PX + CURVE_PX)
     return picture
 
 
@@ -121,22 +127,22 @@ class PlotPainter:
 
     def rows(self, y: float, names: Sequence[str]) -> None:
         """Write the names of rows, and draw lines between them."""
-        right = LEFT + self.axis.columns
+        right = LEFT_PX + self.axis.columns
         for number, name in enumerate(names):
-            self.on.line([(LEFT, y + ROW * number), (right, y + ROW * number)], fill=PALE)
-            self.text(LEFT - 6, y + ROW * (number + 0.5), name, INK, "rm")
-        self.on.rectangle([LEFT, y, right, y + ROW * len(names)], outline=GREY)
+            self.on.line([(LEFT_PX, y + ROW_PX * number), (right, y + ROW_PX * number)], fill=PALE)
+            self.text(LEFT_PX - 6, y + ROW_PX * (number + 0.5), name, INK, "rm")
+        self.on.rectangle([LEFT_PX, y, right, y + ROW_PX * len(names)], outline=GREY)
 
     def curve(self, y: float, values: NDArray[Any]) -> None:
         """Draw a curve [shape=(T,)] with its least and largest value."""
         shown = values if len(values) < self.axis.columns else self.axis.averaged(values[:, None])[:, 0]
         low, high = float(min(shown.min(), 0)), float(shown.max())
-        heights = y + CURVE - (shown - low) / max(high - low, 1e-9) * (CURVE - 8)
-        positions = LEFT + (np.arange(len(shown)) + 0.5) / len(shown) * self.axis.columns
-        self.on.rectangle([LEFT, y, LEFT + self.axis.columns, y + CURVE], outline=GREY)
+        heights = y + CURVE_PX - (shown - low) / max(high - low, 1e-9) * (CURVE_PX - 8)
+        positions = LEFT_PX + (np.arange(len(shown)) + 0.5) / len(shown) * self.axis.columns
+        self.on.rectangle([LEFT_PX, y, LEFT_PX + self.axis.columns, y + CURVE_PX], outline=GREY)
         self.on.line(list(zip(positions.tolist(), heights.tolist(), strict=True)), fill=INK, width=2)
-        self.text(LEFT - 6, y + 8, f"{high:.2f}", INK, "rm")
-        self.text(LEFT - 6, y + CURVE, f"{low:.2f}", INK, "rm")
+        self.text(LEFT_PX - 6, y + 8, f"{high:.2f}", INK, "rm")
+        self.text(LEFT_PX - 6, y + CURVE_PX, f"{low:.2f}", INK, "rm")
 
     def phones(self, generation: Generation, bottom: float) -> None:
         """Write the phones at the top, and draw lines where they begin, if there is room for them."""
@@ -145,7 +151,7 @@ class PlotPainter:
         free = 0.0
         for span in generation.units:
             left, right = self.axis.x(span.start_s), self.axis.x(span.end_s)
-            self.on.line([(left, TITLE - 4), (left, bottom)], fill=PALE)
+            self.on.line([(left, TITLE_PX - 4), (left, bottom)], fill=PALE)
             width = self.on.textlength(span.label.phone, font=ImageFont.load_default(12))
             start = (left + right - width) / 2
             if start > free:

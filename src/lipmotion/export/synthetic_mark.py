@@ -29,11 +29,11 @@ STATEMENT = (
 )
 """What the metadata says. It begins with the word to search for."""
 LABEL = "synthetic"
-LETTER_SHARE, SMALLEST_LETTERS = 0.035, 9
+LETTER_SHARE, SMALLEST_LETTERS_PX = 0.035, 9
 """Height of the label's letters, as a share of the frame's shorter side, and the least that can be read, px."""
-SPACE = 0.8
+EDGE_DISTANCE = 0.8
 """Distance of the label from the edges of the frame, relative to the height of its letters."""
-DARKNESS, BRIGHTNESS = 0.45, 0.9
+GROUND_OPACITY, LETTER_OPACITY = 0.45, 0.9
 """Opacity of the label's black ground, and of its white letters."""
 
 
@@ -66,7 +66,7 @@ def mark_frames(frames: Iterable[Frame], face: Box | None = None, label: str = L
     frames : uint8 RGB [shape=(H, W, 3)], all of one size; taken one at a time
     face   : the part of the frames in which the face is at any time, which the label leaves free. Of the corners that
              are free, the first in this order is taken: lower right, lower left, upper right, upper left.
-    Raises ExportError: the face leaves no corner for letters of ``SMALLEST_LETTERS`` px.
+    Raises ExportError: the face leaves no corner for letters of ``SMALLEST_LETTERS_PX`` px.
     Raises InputError: the face is no such box.
     """
     if face is not None and not (face[0] <= face[2] and face[1] <= face[3]):
@@ -95,11 +95,11 @@ class _DrawnLabel:
 
 def _placed(height: int, width: int, face: Box | None, label: str) -> _DrawnLabel:
     """Return the label in the first free corner, as large as possible. Raises ExportError: no corner is free."""
-    largest = max(SMALLEST_LETTERS, round(LETTER_SHARE * min(height, width)))
-    for size in range(largest, SMALLEST_LETTERS - 1, -1):
+    largest = max(SMALLEST_LETTERS_PX, round(LETTER_SHARE * min(height, width)))
+    for size in range(largest, SMALLEST_LETTERS_PX - 1, -1):
         ground, letters = _drawn(label, size)
         rows, columns = ground.shape
-        space = round(SPACE * size)
+        space = round(EDGE_DISTANCE * size)
         for top in (height - space - rows, space):
             for left in (width - space - columns, space):
                 inside = 0 <= top <= height - rows and 0 <= left <= width - columns
@@ -128,8 +128,8 @@ def _drawn(label: str, size: int) -> tuple[NDArray[np.float32], NDArray[np.float
     shape = np.asarray(finer.resize(room, Image.Resampling.BOX), np.float32) / 255
     text = Image.new("L", room)
     ImageDraw.Draw(text).text((across - left, down - top), label, fill=255, font=font)
-    letters = (BRIGHTNESS / 255) * np.asarray(text, np.float32)
-    ground = letters + (1 - letters) * DARKNESS * shape
+    letters = (LETTER_OPACITY / 255) * np.asarray(text, np.float32)
+    ground = letters + (1 - letters) * GROUND_OPACITY * shape
     return ground.astype(np.float32), (255 * letters).astype(np.float32)
 
 

@@ -22,7 +22,7 @@ from lipmotion.types import Audio
 Frame = NDArray[np.uint8]
 
 SOUND_HZ = 48_000
-_BT709, _LIMITED = 1, 1
+_BT709, _LIMITED_RANGE = 1, 1
 
 
 class _Codecs(NamedTuple):
@@ -104,7 +104,7 @@ def _encode(temporary: Path, path: Path, frames: Iterator[Frame], rate: Fraction
             context = video.codec_context
             context.time_base, context.thread_count = 1 / rate, os.cpu_count() or 1
             context.colorspace = context.color_primaries = context.color_trc = _BT709
-            context.color_range = _LIMITED
+            context.color_range = _LIMITED_RANGE
             sound = container.add_stream(codecs.sound, rate=SOUND_HZ, layout="mono")
             pictures = ((n / rate, video, _picture(f, n, rate, pixels)) for n, f in enumerate(chain([first], frames)))
             sounds = ((part.pts * part.time_base, sound, part) for part in _sound_parts(audio, codecs.sound_format))

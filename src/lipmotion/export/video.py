@@ -28,7 +28,7 @@ TAGS = frozenset(
     "episode_id network keywords".split()
 )
 """Tags that an mp4 file can hold; FFmpeg would leave out all others without a word."""
-_BT601, _BT709, _LIMITED = 6, 1, 1
+_BT601, _BT709, _LIMITED_RANGE = 6, 1, 1
 _ENCODER = {
     "preset": "superfast",
     "crf": "18",
@@ -135,7 +135,7 @@ def _video_stream(container: Any, first: Frame, rate: Fraction) -> Any:
     stream.pix_fmt = "yuv420p"
     context = stream.codec_context
     context.time_base = 1 / rate
-    context.colorspace, context.color_range = _BT601, _LIMITED
+    context.colorspace, context.color_range = _BT601, _LIMITED_RANGE
     context.color_primaries = context.color_trc = _BT709
     return stream
 
@@ -145,7 +145,7 @@ def _picture(frame: Frame, n: int, rate: Fraction, converter: Any) -> Any:
 
     if frame.ndim == 2:
         picture = VideoFrame.from_numpy_buffer(np.ascontiguousarray(frame), format="yuv420p")
-        picture.colorspace, picture.color_range = _BT601, _LIMITED
+        picture.colorspace, picture.color_range = _BT601, _LIMITED_RANGE
     else:
         picture = VideoFrame.from_ndarray(np.ascontiguousarray(frame), format="rgb24")
         picture = converter.reformat(picture, format="yuv420p", dst_colorspace="itu601")

@@ -12,7 +12,7 @@ from lipmotion.errors import ExportError
 
 XMP_UUID = bytes.fromhex("be7acfcb97a942e89c71999491e3afac")
 """What says that a box of type ``uuid`` holds XMP (Adobe, XMP Specification Part 3)."""
-LARGEST_PACKET = 1 << 24
+LARGEST_PACKET_BYTES = 1 << 24
 """Most bytes of a packet, which programs read into the memory as a whole."""
 
 
@@ -22,8 +22,8 @@ def append_xmp(path: Path, packet: str) -> None:
     Raises ExportError: the file does not consist of whole boxes, or the packet is too large.
     """
     content = packet.encode()
-    if len(content) > LARGEST_PACKET:
-        raise ExportError(f"{path}: XMP metadata of {len(content)} bytes, at most {LARGEST_PACKET} are possible")
+    if len(content) > LARGEST_PACKET_BYTES:
+        raise ExportError(f"{path}: XMP metadata of {len(content)} bytes, at most {LARGEST_PACKET_BYTES} are possible")
     with path.open("r+b") as file:
         ends = list(_ends(file))
         if not ends or ends[-1] != file.seek(0, os.SEEK_END):

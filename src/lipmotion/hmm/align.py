@@ -17,7 +17,7 @@ from lipmotion.kernels.sequences.windowed_viterbi import Windows
 
 FIT_BLOCK = 2048
 """Frames whose log densities are in memory at a time."""
-FEW_ARCS, ARCS_A_FRAME = 1_000_000, 10
+MOST_BASE_ARCS, ARCS_A_FRAME = 1_000_000, 10
 """The largest number of arcs of a network, and how many more for each frame; sentences need about one a frame."""
 
 
@@ -228,7 +228,7 @@ def _check_room(hmm: UnitHmm, log_likelihoods: LogLikelihoods, words: Sequence[S
         )
     ends = [1, *(len(variants) + 1 for variants in words)]  # of the word before, and of the pause
     arcs = sum(2 * sum(states[id(v)]) + len(v) * before for v, before in zip(words, ends, strict=False))
-    most = FEW_ARCS + ARCS_A_FRAME * log_likelihoods.frames
+    most = MOST_BASE_ARCS + ARCS_A_FRAME * log_likelihoods.frames
     if arcs > most:
         raise AlignmentError(
             f"{len(words)} words in all their pronunciations make {arcs} arcs, required at most {most} for "

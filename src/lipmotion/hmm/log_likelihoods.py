@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from lipmotion.hmm.model import UnitHmm
 
-LOUD_SILENCE = 8.0
+LOUD_SILENCE_PENALTY = 8.0
 """Penalty of silence in a loud frame, subtracted from its log density."""
-QUIET_SPEECH = 1000.0
+QUIET_SPEECH_PENALTY = 1000.0
 """Penalty of everything but silence in a quiet frame."""
 
 DensitySelection = NDArray[np.intp] | None
@@ -56,12 +56,12 @@ def penalise_silence(hmm: UnitHmm, log_likelihoods: LogLikelihoods, loud: NDArra
 
     For a voice unlike those of the training, the densities hardly tell speech from silence; the energy does.
     """
-    return _penalised(log_likelihoods, loud, _silent_densities(hmm), LOUD_SILENCE)
+    return _penalised(log_likelihoods, loud, _silent_densities(hmm), LOUD_SILENCE_PENALTY)
 
 
 def penalise_speech(hmm: UnitHmm, log_likelihoods: LogLikelihoods, quiet: NDArray[np.bool_]) -> LogLikelihoods:
     """Return log likelihoods that makes all but silence improbable in quiet frames [shape=(T,)]."""
-    return _penalised(log_likelihoods, quiet, ~_silent_densities(hmm), QUIET_SPEECH)
+    return _penalised(log_likelihoods, quiet, ~_silent_densities(hmm), QUIET_SPEECH_PENALTY)
 
 
 def _silent_densities(hmm: UnitHmm) -> NDArray[np.bool_]:

@@ -27,9 +27,9 @@ def loud_frames(log_energy: NDArray[np.float32], smoothing: int, share: float = 
     return (rise > LEAST_RISE) & (smooth > quiet + share * rise)
 
 
-QUIET = 35 * np.log(10) / 10
+QUIET_DISTANCE = 35 * np.log(10) / 10
 """Frames this far below the 95th percentile of log energy contain no speech: 35 dB, as natural logarithm of energy."""
-QUIET_REACH = 10
+QUIET_REACH_FRAMES = 10
 """A frame is quiet only if all frames within so many are: the closure of a stop is part of speech."""
 
 
@@ -38,6 +38,6 @@ def quiet_frames(log_energy: NDArray[np.float32]) -> NDArray[np.bool_]:
 
     log_energy : [shape=(T,)], natural logarithm
     """
-    padded = np.pad(log_energy, QUIET_REACH, "edge")
-    loudest = sliding_window_view(padded, 2 * QUIET_REACH + 1).max(axis=1)
-    return loudest < np.quantile(log_energy, 0.95) - QUIET
+    padded = np.pad(log_energy, QUIET_REACH_FRAMES, "edge")
+    loudest = sliding_window_view(padded, 2 * QUIET_REACH_FRAMES + 1).max(axis=1)
+    return loudest < np.quantile(log_energy, 0.95) - QUIET_DISTANCE

@@ -21,14 +21,14 @@ from lipmotion.stats.convolution import (
     initial_network,
 )
 from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
-from lipmotion.storage.schema import POSITIVE, STANDARD, Arrays, ArraySpec, checked_arrays
-from lipmotion.types import SPECTRUM_BANDS, Example, HeardSpectrum, Progress, Speech
+from lipmotion.storage.schema import LARGEST_MEAN, POSITIVE, Arrays, ArraySpec, checked_arrays
+from lipmotion.types import SPECTRUM_BANDS, ConditionSpectrum, Example, Progress, Speech
 
 Array = NDArray[np.float64]
 STEP = 4
 """Frames of a time step of the network, 40 ms: about a picture of a video."""
-HIDDEN, DILATIONS = 192, (1, 2, 4, 8, 1, 2, 4, 8)
-"""Units of a hidden layer, and time steps between its taps: it hears 1.2 s before and after a frame."""
+HIDDEN_UNITS, DILATIONS = 192, (1, 2, 4, 8, 1, 2, 4, 8)
+"""Units of a hidden layer, and time steps between its taps: its input is 1.2 s before and after a frame."""
 BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED = 16, 2e-3, 0.3, 0
 LEAST_STEPS = 600
 """Least number of optimiser steps: with few recordings, each is used more often."""
@@ -41,10 +41,14 @@ CHECKPOINT = "network"
 
 
 WEIGHTS = {
-    "network_first": ArraySpec(np.float32, f"{TAPS * STEP * SPECTRUM_BANDS} {HIDDEN}", -STANDARD, STANDARD),
-    "network_layers": ArraySpec(np.float32, f"{len(DILATIONS) - 1} {TAPS * HIDDEN} {HIDDEN}", -STANDARD, STANDARD),
-    "network_biases": ArraySpec(np.float32, f"{len(DILATIONS)} {HIDDEN}", -STANDARD, STANDARD),
-    "network_output": ArraySpec(np.float32, f"{HIDDEN + 1} O", -STANDARD, STANDARD),
+    "network_first": ArraySpec(
+        np.float32, f"{TAPS * STEP * SPECTRUM_BANDS} {HIDDEN_UNITS}", -LARGEST_MEAN, LARGEST_MEAN
+    ),
+    "network_layers": ArraySpec(
+        np.float32, f"{len(DILATIONS) - 1} {TAPS * HIDDEN_UNITS} {HIDDEN_UNITS}", -LARGEST_MEAN, LARGEST_MEAN
+    ),
+    "network_biases": ArraySpec(np.float32, f"{len(DILATIONS)} {HIDDEN_UNITS}", -LARGEST_MEAN, LARGEST_MEAN),
+    "network_output": ArraySpec(np.float32, f"{HIDDEN_UNITS + 1} O", -LARGEST_MEAN, LARGEST_MEAN),
 }
 TARGETS = {
     "network_targets": ArraySpec(np.float64, "2 Q", -1e6, 1e6),
@@ -72,13 +76,13 @@ class AcousticNetwork(Predictor):
 
     @classmethod
     def fit(cls, training: PredictorTraining) -> PredictorFit:
-        """Return a network that is trained on all conditions in which each example is heard.
+        """Return a network that is trained on all acoustic conditions of each example.
 
         Each example is used in one of its conditions, drawn at random, at a time.
         Raises CorpusError: an example without acoustic conditions.
         """
         examples, values = training.examples, training.values
-        if not all(example.heard for example in examples):
+        if not all(example.condition_spectra for example in examples):
             raise CorpusError(
                 f"examples without acoustic conditions; a network is trained on {cls.least_motion_s:g} s of measured "
                 "motion or more, with the option conditions from 1"
@@ -141,7 +145,7 @@ def _trained(training: PredictorTraining, mean: Array, scale: Array) -> Convolut
     if stored is not None:
         return _network_from_arrays(stored, len(mean))
     pieces = [
-        [_sequence(version, (x - mean) / scale, example.valid) for version in example.heard]
+        [_sequence(version, (x - mean) / scale, example.valid) for version in example.condition_spectra]
         for example, x in zip(training.examples, training.values, strict=True)
     ]
     steps = max(training.epochs * -(-len(pieces) // BATCH_SIZE), LEAST_STEPS)
@@ -157,7 +161,7 @@ def _trained(training: PredictorTraining, mean: Array, scale: Array) -> Convolut
             training.monitor(Progress("training the network", step, steps, error))
 
     network = fit_network(
-        initial_network(STEP * SPECTRUM_BANDS, HIDDEN, len(mean) + 1, DILATIONS, SEED),
+        initial_network(STEP * SPECTRUM_BANDS, HIDDEN_UNITS, len(mean) + 1, DILATIONS, SEED),
         draw,
         len(pieces),
         weights,
@@ -206,11 +210,11 @@ def _steps(spectrum: NDArray[np.floating]) -> NDArray[np.float32]:
     return spectrum[frames].reshape(len(centres), -1).astype(np.float32)
 
 
-def _sequence(heard: HeardSpectrum, targets: Array, valid: NDArray[np.bool_]) -> TrainingSequence:
+def _sequence(version: ConditionSpectrum, targets: Array, valid: NDArray[np.bool_]) -> TrainingSequence:
     """Return inputs and targets of a whole recording in time steps; inputs at half precision."""
-    inputs = _steps(heard.values).astype(np.float16)
-    frames = np.minimum(np.round(np.arange(len(inputs)) * STEP * heard.tempo).astype(int), len(targets) - 1)
-    distortion = np.full((len(inputs), 1), heard.distortion)
+    inputs = _steps(version.values).astype(np.float16)
+    frames = np.minimum(np.round(np.arange(len(inputs)) * STEP * version.tempo).astype(int), len(targets) - 1)
+    distortion = np.full((len(inputs), 1), version.distortion)
     outputs = np.concatenate([targets[frames], distortion], axis=1).astype(np.float32)
     return TrainingSequence(inputs, outputs, valid[frames])
 
@@ -230,7 +234,7 @@ def _error_variances(acoustic: AcousticNetwork, examples: Sequence[Example], val
     squares, count = np.zeros((3, len(acoustic.mean))), 0
     for example, x in zip(examples, values, strict=True):
         frames = dynamics_known(example.valid)
-        predicted, _ = acoustic._predict(example.heard[0].values)
+        predicted, _ = acoustic._predict(example.condition_spectra[0].values)
         squares += np.square(with_dynamics(x - predicted)[frames]).sum(axis=0)
         count += int(frames.sum())
     floor = 1e-4 * np.square(acoustic.scale) + 1e-12

@@ -50,7 +50,7 @@ POWER = 3
 """The weight of the table grows with this power of the reliability, for phones that are wrong make contexts unknown,
 and of how unknown a context is: the table has a third of the weight where training saw the context once, an eighth
 where twice."""
-HALF_FAMILIAR = 1.0
+HALF_FAMILIAR_COUNT = 1.0
 """Occurrences in training after which a context counts as half familiar."""
 
 
@@ -86,7 +86,7 @@ class ArticulationPrior:
             if span.label.phone and not at_end:
                 count = self.contexts.get((_merged(left), _merged(span.label.phone), _merged(right)), 0)
                 first, stop = frames_of(span, frames)
-                steps[first:stop] = count / (count + HALF_FAMILIAR)
+                steps[first:stop] = count / (count + HALF_FAMILIAR_COUNT)
         steps[away_from_speech(np.arange(frames) / FRAME_RATE_HZ, speech_intervals(units), REST_S)] = 1
         return smoothed(steps)[:, 0]
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.stats.pca import principal_axes
-from lipmotion.storage.schema import STANDARD, ArraySpec, CheckedArrays
+from lipmotion.storage.schema import LARGEST_MEAN, ArraySpec, CheckedArrays
 
 OFFSETS = (-24, -18, -12, -8, -4, 0, 4, 8, 12, 18, 24)
 """Frames whose features are used, relative to the frame whose motion is predicted: up to 240 ms before and after it,
@@ -22,8 +22,8 @@ LEAST_DEVIATION = 1e-3
 FEATURES = 39
 INPUTS = FEATURES * len(OFFSETS)
 WINDOW = {
-    "window": ArraySpec(np.float32, f"2 {INPUTS}", -STANDARD, STANDARD),
-    "window_basis": ArraySpec(np.float32, f"{INPUTS} A", -STANDARD, STANDARD),
+    "window": ArraySpec(np.float32, f"2 {INPUTS}", -LARGEST_MEAN, LARGEST_MEAN),
+    "window_basis": ArraySpec(np.float32, f"{INPUTS} A", -LARGEST_MEAN, LARGEST_MEAN),
 }
 """Arrays of an acoustic context: ``window`` holds the means in its first row and the scales in its second."""
 

@@ -22,11 +22,11 @@ LARGEST_SPREAD = 1000.0
 """Largest median, over dimensions, of the span of the poses in standard deviations; our models have about 10."""
 LARGEST_OFFSET = 1000.0
 """Largest magnitude of the mean of the points, in units of the largest span of a dimension."""
-WIDE_OPEN = 5.0
+PLAUSIBLE_OPENING = 5.0
 """Eye distances; a larger opening is implausible unless the range of all poses is as large."""
 NEGATIVE_SHARE = 0.05
-"""Share of the span of the opening that may be negative where the opening is larger than ``WIDE_OPEN``."""
-FAR_REST = 3.0
+"""Share of the span of the opening that may be negative where the opening is larger than ``PLAUSIBLE_OPENING``."""
+LARGEST_REST_DISTANCE = 3.0
 """Largest distance of the rest pose from the range of the poses, in spans of that range."""
 LEAST_SPAN = 1e-3
 """Smallest span of a dimension, as a share of its largest magnitude or of 1."""
@@ -85,7 +85,7 @@ def check_poses(limits: MotionLimits, space: MotionSpace, closure: Closure | Non
         check_magnitude(space.channels[channel], float(limits.low[column]), float(limits.high[column]))
     if space.points is not None:
         largest, span = float(np.abs(space.points.mean).max()), float(limits.span[count:].max(initial=0.0))
-        if largest > max(WIDE_OPEN, LARGEST_OFFSET * span):
+        if largest > max(PLAUSIBLE_OPENING, LARGEST_OFFSET * span):
             raise ValueError(f"points_mean as large as {largest:g} of points that move by {span:g}")
     if closure is not None:
         _check_opening(float(limits.low[closure.column]), float(limits.high[closure.column]), closure.closed)
@@ -95,7 +95,7 @@ def check_rest(rest: Array, limits: MotionLimits) -> None:
     """Raise ValueError if the rest pose [shape=(Q,)] is far from all other poses."""
     distance = np.maximum(limits.low - rest, rest - limits.high) / _span(limits.low, limits.high)
     column = int(distance.argmax())
-    if distance[column] > FAR_REST:
+    if distance[column] > LARGEST_REST_DISTANCE:
         raise ValueError(
             f"rest pose of {rest[column]:g} in dimension {column}, whose poses are {limits.low[column]:g} to "
             f"{limits.high[column]:g}"
@@ -110,9 +110,9 @@ def _span(low: Array, high: Array) -> Array:
 def _check_opening(low: float, high: float, closed: float) -> None:
     """Raise ValueError if the opening cannot be from ``low`` to ``high``, with lips closed at ``closed``."""
     span = high - low
-    if max(-low, high) > WIDE_OPEN and (low < -NEGATIVE_SHARE * span or low > LARGEST_EXCESS * span):
+    if max(-low, high) > PLAUSIBLE_OPENING and (low < -NEGATIVE_SHARE * span or low > LARGEST_EXCESS * span):
         raise ValueError(f"poses whose {OPENING} is {low:g} to {high:g}")
-    if closed > max(high + LARGEST_EXCESS * span, WIDE_OPEN):
+    if closed > max(high + LARGEST_EXCESS * span, PLAUSIBLE_OPENING):
         raise ValueError(f"lips that are closed at {closed:g}, with poses whose {OPENING} is {low:g} to {high:g}")
 
 

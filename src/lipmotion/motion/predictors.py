@@ -68,7 +68,7 @@ class Predictor(ABC):
 
     name              : under which it is registered, and its arrays are stored
     ARRAYS            : the stored arrays, where Q is the number of dimensions of motion
-    least_motion_s    : seconds of measured motion from which on training gets acoustic conditions (``Example.heard``)
+    least_motion_s    : seconds of measured motion from which on training gets acoustic conditions (``Example.condition_spectra``)
     uses_prior        : whether it predicts from ``Speech.prior``: then the model stands on another model
     uses_articulation : whether the table of articulation is among its inputs: then engines do not lean on it once more
     variances         : of the error of static value, Δ and Δ² [shape=(3, Q)]
@@ -156,7 +156,7 @@ def suitable_predictor(name: str, examples: Sequence[Example]) -> type[Predictor
     measured_s = sum(int(example.valid.sum()) for example in examples) / FRAME_RATE_HZ
     if measured_s < LEAST_OWN_S and all(example.speech.prior is not None for example in examples):
         return predictor_class("prior")
-    return predictor_class("network") if all(example.heard for example in examples) else None
+    return predictor_class("network") if all(example.condition_spectra for example in examples) else None
 
 
 def needs_conditions(name: str, motion_s: float) -> bool:

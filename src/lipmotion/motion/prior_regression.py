@@ -21,7 +21,7 @@ WINDOW = 4
 """Time steps of 40 ms before and after a frame whose spectrum is used: 160 ms."""
 RIDGES = tuple(10.0**power for power in range(0, 6))
 """Ridge parameters that cross-validation chooses from, one for each kind of regressors."""
-START = 1000.0
+INITIAL_RIDGE = 1000.0
 """Ridge parameter of all kinds before the choice."""
 ROUNDS = 2
 LEAST_DEVIATION = 1e-3
@@ -175,7 +175,7 @@ def _chosen_ridges(data: Sequence[_Fold], sizes: Sequence[int], weights: Array) 
     weights : of the squared errors of these dimensions [shape=(D,)]
     """
     data = [_Fold(each.regressors, each.motion[:, : len(weights)]) for each in data]
-    ridges = np.full(len(sizes), START)
+    ridges = np.full(len(sizes), INITIAL_RIDGE)
 
     def error(candidate: Array) -> float:
         total = 0.0

@@ -43,8 +43,8 @@ def speech_intervals(units: Timeline[Unit]) -> list[tuple[float, float]]:
     return [(span.start_s, span.end_s) for span in units if not is_silent(span.label.phone)]
 
 
-def unheard_frames(features: NDArray[np.floating], units: Timeline[Unit]) -> NDArray[np.bool_]:
-    """Return the frames of digital silence, in which the mouth rests: not even a breath is heard [shape=(T,)].
+def digital_silence(features: NDArray[np.floating], units: Timeline[Unit]) -> NDArray[np.bool_]:
+    """Return the frames of digital silence, in which the mouth rests: without even a breath [shape=(T,)].
 
     features : acoustic features [shape=(T, D)]
     The log energy stays at its floor for ``LEAST_SILENCE_S``, and speech is further away than ``BEFORE_SPEECH_S``.

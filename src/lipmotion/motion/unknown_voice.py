@@ -21,7 +21,7 @@ from lipmotion.types import EYE_DISTANCE, Timeline, Unit
 from lipmotion.units import VOWELS
 
 Array = NDArray[np.float64]
-LEAST_OPEN = 0.4
+LEAST_OPENING_SHARE = 0.4
 """Share of the opening that the table of articulation gives a vowel, which a voice that training does not know has at
 least: what the model makes of its vowels is shut where it takes them for something else."""
 INSET_S = 0.03
@@ -57,7 +57,7 @@ def with_open_vowels(
     for span in units:
         if span.label.phone in VOWELS:
             vowels[slice(*frames_of(span, frames))] = 1
-    least = LEAST_OPEN * _strangeness(voice) * vowels * np.maximum(opening, 0)
+    least = LEAST_OPENING_SHARE * _strangeness(voice) * vowels * np.maximum(opening, 0)
 
     def opened(chosen: slice) -> Statistics:
         means, precisions = statistics(chosen)

@@ -15,7 +15,7 @@ from lipmotion.appearance.eigenlips import Eigenlips, eigenlips_arrays, eigenlip
 from lipmotion.engines import ENGINES, Engine, engine_named
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.hmm.model import HmmConfig, UnitHmm, hmm_arrays, hmm_from_arrays
-from lipmotion.motion.speakers import SpeakerMaps, speaker_arrays, speakers_from_arrays
+from lipmotion.motion.speaker_maps import SpeakerMaps, speaker_arrays, speakers_from_arrays
 from lipmotion.pipeline.training.channels import EIGENLIPS, GEOMETRY
 from lipmotion.speech.features.mfcc import FEATURES
 from lipmotion.speech.recognition.adaptation import Adaptation, adaptation_arrays, adaptation_from_arrays

@@ -10,7 +10,7 @@ from lipmotion.errors import InputError
 from lipmotion.faces.mesh import MeshFace
 from lipmotion.meshes.fitting import driven
 from lipmotion.pipeline.edit_files import EditFile, edit_file
-from lipmotion.pipeline.film.video import FilmOptions
+from lipmotion.pipeline.film.filmed_video import FilmOptions
 from lipmotion.pipeline.generate.posteriors import animate_with_posteriors, check_picture, write_posteriors
 from lipmotion.pipeline.job import Job, Outputs
 from lipmotion.pipeline.model import Model, load_model

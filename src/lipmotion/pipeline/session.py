@@ -23,9 +23,9 @@ from lipmotion.faces.registry import staged_face
 from lipmotion.kernels.choice import expect_more
 from lipmotion.kernels.threads import one_thread
 from lipmotion.meshes.fitting.facial_animation import PARAMETERS
-from lipmotion.meshes.fitting.visemes import VISEME_CHANNELS
+from lipmotion.meshes.fitting.oculus_visemes import VISEME_CHANNELS
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS
-from lipmotion.motion.speakers import SpeakerMap
+from lipmotion.motion.speaker_maps import SpeakerMap
 from lipmotion.pipeline.edits import CurveStep, Edits, LockStep, PhoneStep, PinStep, Step, WordIs, with_span
 from lipmotion.pipeline.generate.generation_for import generate_for
 from lipmotion.pipeline.generate.outlook import outlook_of

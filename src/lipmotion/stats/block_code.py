@@ -21,7 +21,7 @@ LARGEST_LEVEL = 2**31 - 1
 """No quantised coefficient is larger."""
 MOST_FRAMES = 10**9
 """No store has more frames."""
-LONGEST, WIDEST = 256, 100.0
+LONGEST_BLOCK, WIDEST_KNOT_SPACING = 256, 100.0
 """No block is longer, and no knots are further apart, so that a damaged file cannot fill the memory."""
 FLATNESS = 3e-4
 """Weight of the second differences of spline coefficients beside the fit: they decide only where no frame does; as
@@ -294,8 +294,8 @@ def block_code_from_arrays(arrays: Arrays, count: int) -> BlockCode:
 BLOCK_CODE = {
     "frames": ArraySpec(np.intp, "", 0, MOST_FRAMES),
     "kept": ArraySpec(np.intp, "r 2", 0, MOST_FRAMES),
-    "spacing": ArraySpec(np.float64, "", 1, WIDEST),
-    "length": ArraySpec(np.intp, "", 1, LONGEST),
+    "spacing": ArraySpec(np.float64, "", 1, WIDEST_KNOT_SPACING),
+    "length": ArraySpec(np.intp, "", 1, LONGEST_BLOCK),
     "step": ArraySpec(np.float64, "", POSITIVE),
     "used": ArraySpec(np.intp, "c 2", 0, MOST_FRAMES),
     "low": ArraySpec(np.int8, "l b", -127, 127),

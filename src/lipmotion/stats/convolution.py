@@ -20,7 +20,7 @@ BLOCK = 4096
 DECAY_MEAN, DECAY_SQUARE, WEIGHT_DECAY = 0.9, 0.98, 0.01
 LARGEST_GRADIENT = 1.0
 """Gradients of a larger norm are shortened to it."""
-WARM_UP = 0.15
+WARM_UP_SHARE = 0.15
 """Share of the training in which the learning rate rises; then it falls along a cosine to 0."""
 SHARDS = 2
 """Parts of a batch, computed in one thread each. Their number is fixed: the sum does not depend on the processors."""
@@ -162,9 +162,9 @@ def _rebuilt(network: ConvolutionalNetwork, parameters: Sequence[Array]) -> Conv
 def _rate(plan: TrainingPlan, step: int) -> float:
     """Return the learning rate of a step, from 0: one cycle (Smith & Topin 2019)."""
     share = (step + 1) / plan.steps
-    if share < WARM_UP:
-        return plan.rate * share / WARM_UP
-    return plan.rate * (1 + float(np.cos(np.pi * (share - WARM_UP) / (1 - WARM_UP)))) / 2
+    if share < WARM_UP_SHARE:
+        return plan.rate * share / WARM_UP_SHARE
+    return plan.rate * (1 + float(np.cos(np.pi * (share - WARM_UP_SHARE) / (1 - WARM_UP_SHARE)))) / 2
 
 
 class _AdamW:

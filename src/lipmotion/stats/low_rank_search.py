@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.stats.block_code import BlockLayout, quantise_blocks
 from lipmotion.stats.low_rank_code import LowRankCode, packed_size
-from lipmotion.stats.pca import EXACT, evenly_spaced, fit_pca
+from lipmotion.stats.pca import EXACT_ROWS, evenly_spaced, fit_pca
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -28,24 +28,24 @@ PERCENTILE = 99
 FIRST_COMPONENTS = 64
 """Components of a large table at first; twice as many where they do not suffice."""
 MOST_ROWS = 20_000
-"""Frames that the components are computed of; of tables with more than ``EXACT`` columns, ``EXACT``."""
-SAMPLE, MOST_SAMPLED = 2048, 1 << 25
+"""Frames that the components are computed of; of tables with more than ``EXACT_ROWS`` columns, ``EXACT_ROWS``."""
+SAMPLE_FRAMES, MOST_SAMPLED_NUMBERS = 2048, 1 << 25
 """Frames by which a step is chosen, at last as many as hold the second count of numbers; all are verified."""
-PART, PIECE = 8192, 512
+PART_FRAMES, PIECE_FRAMES = 8192, 512
 """Layout and weights are chosen on pieces of at most so many frames, as many together as the first number says."""
 FIRST_STEP = 2.0
 ROUNDS, MOST_ROUNDS = 8, 24
 """Steps that are tried on the sample; more where none of the first will do."""
 LEAST_STEP = 1e-3
 """No smaller step is tried, in units of the tolerance: where it will not do, the errors come from elsewhere."""
-NEAR, NEARLY = 0.975, 0.99
+LEAST_ERROR_SHARE, AIMED_ERROR_SHARE = 0.975, 0.99
 """A step is good enough where the error is at least the first part of what is allowed; it aims at the second."""
-SMALLER, MOST_STEPS = 0.97, 100
+STEP_FACTOR, MOST_STEPS = 0.97, 100
 """Factor of the step where the promise is not kept on all frames, and how often it is tried."""
 BASIS_SHARE = 1.0
 """Rounding of an entry of the basis changes all values together by so many times as much as rounding of a coefficient:
 with 1, a bit more in either of them helps as much."""
-FINEST = 1e-9
+FINEST_STEP = 1e-9
 """Smallest step of the basis, so that its levels are 32-bit numbers."""
 EQUAL_ROUNDS, EQUAL_POWER = 4, 0.7
 """How often, and by which power of its error, the weight of each group is changed until all have the same error."""
@@ -144,15 +144,19 @@ class _Table:
 
     def part(self) -> _Table:
         """Return the same table with evenly spaced pieces of the frames only."""
-        pieces = [(start, min(start + PIECE, stop)) for first, stop in self.kept for start in range(first, stop, PIECE)]
+        pieces = [
+            (start, min(start + PIECE_FRAMES, stop))
+            for first, stop in self.kept
+            for start in range(first, stop, PIECE_FRAMES)
+        ]
         usual = sum(stop - first for first, stop in pieces) / len(pieces)
-        chosen = evenly_spaced(int(PART / usual) + 1, len(pieces))
+        chosen = evenly_spaced(int(PART_FRAMES / usual) + 1, len(pieces))
         return replace(self, kept=np.array(pieces, np.intp)[chosen])
 
     def projected(self, scale: Array, count: int) -> _Projection:
         """Return the curves of the first components of the values divided by ``scale``."""
         width = self.values.shape[1]
-        some = self.frames[evenly_spaced(EXACT if width > EXACT else MOST_ROWS, len(self.frames))]
+        some = self.frames[evenly_spaced(EXACT_ROWS if width > EXACT_ROWS else MOST_ROWS, len(self.frames))]
         space = fit_pca(self.values[some] / scale, count)
         curves = np.zeros((len(self.values), len(space.basis)), np.float32)
         for first, stop in self.kept:
@@ -174,7 +178,7 @@ class _Table:
         Raises InputError: there is none.
         """
         projection = self.projected(scale, count)
-        code = projection.searched(layout, max(SAMPLE, MOST_SAMPLED // self.values.shape[1]))
+        code = projection.searched(layout, max(SAMPLE_FRAMES, MOST_SAMPLED_NUMBERS // self.values.shape[1]))
         coefficients = layout.forward(projection.curves)
         for _ in range(MOST_STEPS):
             if code is None:
@@ -182,7 +186,7 @@ class _Table:
             errors = self.errors(code, self.frames)
             if errors.max() <= 1:
                 return CodedTable(code, float(errors.max())), self.reweighted(scale, errors)
-            code = _coded(layout, coefficients, SMALLER * code.code.step, projection.space)
+            code = _coded(layout, coefficients, STEP_FACTOR * code.code.step, projection.space)
         raise _refusal(self)
 
     def reweighted(self, scale: Array, errors: Array) -> Array:
@@ -202,7 +206,7 @@ class _Projection:
     space: _Space
     curves: NDArray[np.float32]
 
-    def searched(self, layout: BlockLayout, most: int = SAMPLE) -> LowRankCode | None:
+    def searched(self, layout: BlockLayout, most: int = SAMPLE_FRAMES) -> LowRankCode | None:
         """Return the code of one layout with about the largest step that a sample of frames allows, or None."""
         coefficients = layout.forward(self.curves)
         some = self.table.frames[evenly_spaced(most, len(self.table.frames))]
@@ -218,13 +222,13 @@ class _Projection:
             error = float(self.table.errors(code, some).max())
             if error <= 1:
                 best, small = code, step
-            elif error > NEAR * last and step < large / 2:  # what is left is not from quantisation
+            elif error > LEAST_ERROR_SHARE * last and step < large / 2:  # what is left is not from quantisation
                 break
             else:
                 large, last = step, error
-            if NEAR <= error <= 1 or (error <= 1 and not len(code.code.used)):
+            if LEAST_ERROR_SHARE <= error <= 1 or (error <= 1 and not len(code.code.used)):
                 break
-            step *= float(np.clip(NEARLY / max(error, 1e-9), 0.1, 4))
+            step *= float(np.clip(AIMED_ERROR_SHARE / max(error, 1e-9), 0.1, 4))
             if not small < step < large:
                 step = float(np.sqrt(small * large)) if small > 0 else large / 2
         return best
@@ -233,7 +237,7 @@ class _Projection:
 def _equalised(table: _Table, length: int) -> tuple[Array, int]:
     """Return scales of the columns with which all groups have about the same error, and the number of components."""
     width = table.values.shape[1]
-    scale, count = table.tolerance.copy(), width if width <= EXACT else FIRST_COMPONENTS
+    scale, count = table.tolerance.copy(), width if width <= EXACT_ROWS else FIRST_COMPONENTS
     layout = BlockLayout(len(table.values), table.kept, 1.0, length)
     for _ in range(EQUAL_ROUNDS):
         code = None
@@ -262,7 +266,7 @@ def _coded(layout: BlockLayout, coefficients: NDArray[np.float32], step: float, 
     code = quantise_blocks(layout, coefficients, step)
     used, numbers = np.unique(code.used[:, 1], return_inverse=True)
     code = replace(code, count=len(used), used=np.stack([code.used[:, 0], numbers.ravel()], axis=1))
-    steps = np.clip(BASIS_SHARE * step / np.maximum(space.norms[used], LEAST_STEP), FINEST, 0.5)
+    steps = np.clip(BASIS_SHARE * step / np.maximum(space.norms[used], LEAST_STEP), FINEST_STEP, 0.5)
     levels = np.rint(space.basis[used] / steps[:, None]).astype(np.int32)
     return LowRankCode(space.mean, space.scale, levels, steps, code)
 
@@ -277,7 +281,7 @@ def _no_space(scale: Array) -> _Space:
 
 
 def _refusal(table: _Table) -> InputError:
-    some = table.values[table.frames[evenly_spaced(SAMPLE, len(table.frames))]]
+    some = table.values[table.frames[evenly_spaced(SAMPLE_FRAMES, len(table.frames))]]
     return InputError(
         f"errors of at most {float(table.tolerance.min()):g} cannot be promised for values from {float(some.min()):g} "
         f"to {float(some.max()):g}; allow larger ones"

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.storage.schema import LARGEST_VARIANCE, POSITIVE, STANDARD, ArraySpec, CheckedArrays
+from lipmotion.storage.schema import LARGEST_MEAN, LARGEST_VARIANCE, POSITIVE, ArraySpec, CheckedArrays
 
 SPLIT_STEP = 0.2
 """The halves of a split component move by so many standard deviations, in opposite directions."""
@@ -19,7 +19,7 @@ LEAST_LOG_SHARE = np.float32(-50)
 LOG_2PI = float(np.log(2 * np.pi))
 MIXTURES = {
     "log_weights": ArraySpec(np.float32, "G M", -np.inf, 0.1),
-    "means": ArraySpec(np.float32, "G M D", -STANDARD, STANDARD),
+    "means": ArraySpec(np.float32, "G M D", -LARGEST_MEAN, LARGEST_MEAN),
     "variances": ArraySpec(np.float32, "G M D", POSITIVE, LARGEST_VARIANCE),
 }
 """How mixtures of standardised values are stored; weights may be rounded to half precision."""

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-EXACT = 1500
+EXACT_ROWS = 1500
 """Up to so many rows or columns all components are computed; of larger tables only the first ones."""
 ROWS = 256
 """Rows of a large table that are centred at a time."""
-SPARE = 16
+SPARE_DIRECTIONS = 16
 """Additional directions of the iteration, which speed up its convergence."""
 TOLERANCE, MOST_PASSES = 1e-4, 12
 """The iteration ends when a pass raises the explained variance by less than this share, or after so many passes."""
-ORTHONORMAL = 0.01
+ORTHONORMAL_TOLERANCE = 0.01
 """Largest error of the products of a stored basis' rows."""
 RANK_TOLERANCE = 1e-10
 """Components with less variance, as a share of the largest, are rounding errors."""
@@ -48,13 +48,13 @@ def fit_pca(values: NDArray[Any], components: int) -> Pca:
     """Return the first principal components of values [shape=(N, D)]; at most as many as the values span.
 
     The entry of each component that is furthest from 0 is positive, so equal values have equal components.
-    Cost: O(N·D·min(N, D)) and min(N, D)³ up to ``EXACT`` rows or columns; of larger tables O(N·D·components) a pass,
-    with ``ROWS`` rows of memory, in single precision and up to ``TOLERANCE`` of the variance.
+    Cost: O(N·D·min(N, D)) and min(N, D)³ up to ``EXACT_ROWS`` rows or columns; of larger tables O(N·D·components) a
+    pass, with ``ROWS`` rows of memory, in single precision and up to ``TOLERANCE`` of the variance.
     """
     mean = values.mean(axis=0, dtype=np.float64)
     largest = max(float(values.max()), -float(values.min()))  # no copy of a large table
     least = values.size * (largest * CONSTANT) ** 2
-    if min(values.shape) > EXACT:
+    if min(values.shape) > EXACT_ROWS:
         basis = _leading(values, mean, components)
     elif values.shape[0] < values.shape[1]:
         basis = _of_rows(values - mean, components, least)
@@ -83,7 +83,7 @@ def _with_signs(basis: NDArray[np.float64]) -> NDArray[np.float64]:
 def check_orthonormal(name: str, basis: NDArray[Any]) -> None:
     """Raise ValueError unless the rows of a basis [shape=(K, D)] are orthonormal."""
     worst = float(np.abs(basis @ basis.T - np.eye(len(basis))).max())
-    if not worst <= ORTHONORMAL:
+    if not worst <= ORTHONORMAL_TOLERANCE:
         raise ValueError(f"{name} of rows that are not orthonormal (products {worst:g} off)")
 
 
@@ -108,7 +108,7 @@ def _leading(values: NDArray[Any], mean: NDArray[np.float64], components: int) -
 
     Source: Halko, Martinsson & Tropp 2011, §4.5 (subspace iteration) and §5.1; Rayleigh-Ritz at its end.
     """
-    size = min(components + SPARE, *values.shape)
+    size = min(components + SPARE_DIRECTIONS, *values.shape)
     start = values[evenly_spaced(size, len(values))] - mean
     directions = np.linalg.qr(start.T.astype(np.float32))[0]
     variance = 0.0

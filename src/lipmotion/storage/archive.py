@@ -21,7 +21,7 @@ from lipmotion.storage.json_text import as_json, from_json
 HEADER, ARRAY = "header.json", ".npy"
 OLDEST_DATE = (1980, 1, 1, 0, 0, 0)
 """The date of all members of an archive."""
-LARGE = 1 << 30
+ZIP64_BYTES = 1 << 30
 """Arrays from so many bytes on are written with the zip64 extension."""
 UNREADABLE = (
     *(OSError, EOFError, KeyError, ValueError, TypeError, RuntimeError),
@@ -30,7 +30,7 @@ UNREADABLE = (
 """The errors that reading a damaged zip, or one of other content, may raise."""
 LAST_LETTER = 0x10FFFF
 """The last code point of Unicode."""
-SMALL_ARCHIVE, LARGEST_RATIO = 1 << 26, 20
+SMALL_ARCHIVE_BYTES, LARGEST_RATIO = 1 << 26, 20
 """An archive may have so many bytes uncompressed, or so many times its own size: our arrays are compressed to half
 their size, zip bombs to a thousandth."""
 
@@ -43,7 +43,7 @@ def write_archive(
     with whole_file(path) as unfinished, zipfile.ZipFile(unfinished, "w") as file:
         file.writestr(_member(HEADER, method), as_json(header, indent=1, ensure_ascii=False).encode())
         for name, array in sorted(arrays.items()):
-            with file.open(_member(f"{name}{ARRAY}", method), "w", force_zip64=array.nbytes >= LARGE) as member:
+            with file.open(_member(f"{name}{ARRAY}", method), "w", force_zip64=array.nbytes >= ZIP64_BYTES) as member:
                 np.lib.format.write_array(member, np.asarray(array, order="C"), allow_pickle=False)
 
 
@@ -71,7 +71,7 @@ def check_archive(file: zipfile.ZipFile) -> None:
     if len(set(names)) < len(names):
         raise ValueError(f"the part {next(name for name in names if names.count(name) > 1)!r} is in it twice")
     size = sum(member.file_size for member in members)
-    largest = max(SMALL_ARCHIVE, LARGEST_RATIO * Path(str(file.filename)).stat().st_size)
+    largest = max(SMALL_ARCHIVE_BYTES, LARGEST_RATIO * Path(str(file.filename)).stat().st_size)
     if size > largest:
         raise ValueError(f"its parts would grow to {size} bytes, required at most {largest}")
     if any(member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED) for member in members):

@@ -33,7 +33,7 @@ MOST_FRAMES = 100_000
 """Most frames of a stored video: an hour."""
 MOST_PICTURE_BYTES = 1 << 29
 """Most bytes of a stack of decoded pictures."""
-_BT601, _LIMITED = 5, 1
+_BT601, _LIMITED_RANGE = 5, 1
 _DELIMITER, _PARAMETERS = 9, 7
 """Types of the unit that begins every frame, and of the one that begins every group."""
 
@@ -198,7 +198,7 @@ def _encode(frames: Iterable[Pictures], crf: float, group: int, pixel_format: st
         if frame.shape != shape or frame.dtype != np.uint8:
             raise InputError(f"frame {n} is {frame.dtype} {frame.shape}, required uint8 {shape} as the first")
         picture = av.VideoFrame.from_ndarray(_padded(frame, context.height, context.width), format="rgb24")
-        picture = picture.reformat(format=pixel_format, dst_colorspace=_BT601, dst_color_range=_LIMITED)
+        picture = picture.reformat(format=pixel_format, dst_colorspace=_BT601, dst_color_range=_LIMITED_RANGE)
         picture.pts = n
         yield from map(bytes, context.encode(picture))
     yield from map(bytes, context.encode(None))
@@ -219,7 +219,7 @@ def _encoder(shape: tuple[int, ...], crf: float, group: int, pixel_format: str) 
     context.height, context.width = (-(-side // step) * step for side in shape[:2])
     context.pix_fmt = pixel_format
     context.time_base = Fraction(1, 25)
-    context.colorspace, context.color_range = _BT601, _LIMITED
+    context.colorspace, context.color_range = _BT601, _LIMITED_RANGE
     context.options = {
         "crf": f"{crf:g}",
         "preset": "medium",
@@ -286,6 +286,6 @@ def _as_rgb(picture: Any, size: tuple[int, int] | None) -> Pictures:
     height, width = size or (picture.height, picture.width)
     if picture.is_corrupt or not (0 <= picture.height - height <= 1 and 0 <= picture.width - width <= 1):
         raise ValueError(f"a picture of {picture.width} × {picture.height} pixels, required {width} × {height}")
-    picture = picture.reformat(format="rgb24", src_colorspace=_BT601, src_color_range=_LIMITED)
+    picture = picture.reformat(format="rgb24", src_colorspace=_BT601, src_color_range=_LIMITED_RANGE)
     rgb: Pictures = picture.to_ndarray()
     return rgb[:height, :width]

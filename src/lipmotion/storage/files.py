@@ -33,7 +33,7 @@ UNFINISHED = ".unfinished"
 """Suffix of a folder of unfinished work, after the name of the file that the work is for."""
 
 
-LARGEST_TEXT = 1 << 26
+LARGEST_TEXT_BYTES = 1 << 26
 """Most bytes of a text file: more than the words that a person speaks in a year."""
 
 
@@ -72,7 +72,7 @@ def check_listable(folder: Path) -> None:
         raise InputError(f"{folder}: cannot be read: {error.strerror or error}; ask its owner, or copy it") from error
 
 
-def read_text_file(path: Path, kind: str, largest: int = LARGEST_TEXT) -> str:
+def read_text_file(path: Path, kind: str, largest: int = LARGEST_TEXT_BYTES) -> str:
     """Return the text of a UTF-8 file, without a byte order mark.
 
     kind : what it should be, for messages

@@ -20,7 +20,7 @@ MEDIA_FORMATS = (
 """FFmpeg's names of the container formats whose content is in the file itself. All others are refused before they
 open anything: playlists (hls, concat, dash, imf), indexes (vobsub), numbered pictures (image2), addresses (sdp, rtsp),
 devices."""
-LARGEST_BLOCK = 1 << 28
+LARGEST_BLOCK_BYTES = 1 << 28
 """Most bytes that FFmpeg may allocate at a time: three pictures of ``MOST_PIXELS`` with four channels of 16 bits."""
 DURATION = re.compile(r"(\d{1,6}):(\d\d):(\d\d(?:\.\d{1,9})?)")
 MOST_PIXELS = 4096 * 2304
@@ -66,11 +66,11 @@ def open_media(path: Path) -> Any:
 
 @cache
 def bound_allocations() -> None:
-    """Limit FFmpeg's allocations to ``LARGEST_BLOCK``, in the whole process: it trusts the sizes in file headers."""
+    """Limit FFmpeg's allocations to ``LARGEST_BLOCK_BYTES``, in the whole process: it trusts the sizes in headers."""
     import av._core
 
     with suppress(OSError, AttributeError):  # on systems where the module does not export the libraries' functions
-        ctypes.CDLL(av._core.__file__).av_max_alloc(ctypes.c_size_t(LARGEST_BLOCK))
+        ctypes.CDLL(av._core.__file__).av_max_alloc(ctypes.c_size_t(LARGEST_BLOCK_BYTES))
 
 
 def video_streams(container: Any) -> list[Any]:

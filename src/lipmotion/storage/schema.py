@@ -16,9 +16,9 @@ from lipmotion.errors import ModelFormatError
 Arrays = Mapping[str, NDArray[Any]]
 POSITIVE, NEGATIVE, BELOW_ONE = 5e-324, -5e-324, math.nextafter(1, 0)
 """The least number over 0, the largest under 0, the largest under 1: limits of ranges that exclude 0 or 1."""
-LARGEST = 1e30
+LARGEST_NUMBER = 1e30
 """No number of a model is larger, whatever its unit."""
-STANDARD = 500.0
+LARGEST_MEAN = 500.0
 """No mean of standardised values is larger: none of N numbers is more than √N deviations from the mean of all."""
 LARGEST_VARIANCE = 1e6
 """No variance of standardised values is larger; a component that is switched off has 1."""
@@ -39,8 +39,8 @@ class ArraySpec:
 
     dtype: type[Any]
     shape: str
-    least: float = -LARGEST
-    most: float = LARGEST
+    least: float = -LARGEST_NUMBER
+    most: float = LARGEST_NUMBER
     optional: bool = False
     whole: bool = False
 

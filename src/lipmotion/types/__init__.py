@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     )
     from lipmotion.types.features import ENERGY_FEATURE, FRAME_RATE_HZ, SPECTRUM_BANDS, Features, frame_of
     from lipmotion.types.generation import (
+        ConditionSpectrum,
         Constraints,
         Example,
         Gain,
         Generation,
-        HeardSpectrum,
         Outlook,
         Pin,
         PriorOutput,
@@ -55,6 +55,7 @@ __all__ = [
     "ChainStates",
     "Channel",
     "ChannelValue",
+    "ConditionSpectrum",
     "Configuration",
     "Constraints",
     "Delivery",
@@ -64,7 +65,6 @@ __all__ = [
     "Features",
     "Gain",
     "Generation",
-    "HeardSpectrum",
     "Item",
     "Monitor",
     "Motion",

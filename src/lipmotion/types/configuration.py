@@ -10,7 +10,7 @@ from typing import Any, ClassVar, TypeVar
 from lipmotion.errors import InputError, shortened
 
 ConfigurationT = TypeVar("ConfigurationT", bound="Configuration")
-LARGEST = 1e6
+LARGEST_NUMBER = 1e6
 """Largest absolute value of a number in a configuration."""
 _WORDS = {bool: "true or false", int: "a whole number", float: "a number", str: "text"}
 _WORDS |= {Path: "a path", tuple: "a list of texts"}
@@ -170,8 +170,8 @@ def check_value(option_field: Field[Any], value: Any) -> None:
     if fits and rule.most is not None and not rule.allows(value):
         what = option_field.metadata.get("what", option_field.name)
         raise InputError(f"the {what} is {value:g}{rule.unit}, required {rule.words}")
-    if fits and kind in (int, float) and not -LARGEST <= value <= LARGEST:
-        raise InputError(f"{option_field.name} is {value}, required at most {LARGEST:g} in size")
+    if fits and kind in (int, float) and not -LARGEST_NUMBER <= value <= LARGEST_NUMBER:
+        raise InputError(f"{option_field.name} is {value}, required at most {LARGEST_NUMBER:g} in size")
     if not fits or not rule.allows(value):
         is_complete = rule.odd or rule.power_of_two or bool(rule.choices) or rule.most is not None
         words = _WORDS.get(kind, "a table of options")

@@ -79,11 +79,11 @@ class Speech:
 
 
 @dataclass(frozen=True, eq=False)
-class HeardSpectrum:
-    """The spectrum of a recording as it would be heard in another acoustic condition, for training.
+class ConditionSpectrum:
+    """The spectrum of a recording in another acoustic condition, for training.
 
     values   : float16 array [shape=(T', 40)], the normalised log mel spectrum
-    tempo    : frames of the recording in one of these frames: frame n is heard at frame ``tempo`` · n
+    tempo    : frames of the recording in one of these frames: frame n is that at ``tempo`` · n
     distortion : 0 (as recorded) to 1: by how much noise and room cover the speech
     """
 
@@ -99,14 +99,14 @@ class Example:
     name   : of the utterance
     motion : at 100 Hz, on the frames of ``speech.features``
     valid  : bool array [shape=(T,)], False in frames whose motion was not measured
-    heard  : the recording as it was made, and as heard in other conditions; empty: the engine does not use it
+    condition_spectra : the spectrum as recorded, and in other conditions; empty: the engine does not use them
     """
 
     name: str
     speech: Speech
     motion: Motion
     valid: NDArray[np.bool_]
-    heard: Sequence[HeardSpectrum] = ()
+    condition_spectra: Sequence[ConditionSpectrum] = ()
 
 
 @dataclass(frozen=True)
@@ -214,7 +214,7 @@ class ReducedVariance:
     mixing: NDArray[np.floating[Any]]
 
 
-ALL_FITS = 0.995
+FULL_FIT_SHARE = 0.995
 """A transcript that fits as large a share of the speech fits all of it, rounded."""
 
 
@@ -248,7 +248,7 @@ class Outlook:
         parts = [f"{self.words} recognised, confidence {self.confidence:.2f}" if recognised else f"words: {self.words}"]
         if self.words == "no speech":
             parts = ["no speech found"]
-        elif self.words == "transcript" and self.confidence < ALL_FITS:
+        elif self.words == "transcript" and self.confidence < FULL_FIT_SHARE:
             parts[0] += f", which fits {self.confidence:.0%} of the speech"
         if self.voice is not None:
             parts.append(f"voice {self.voice:.2f}")

@@ -18,7 +18,7 @@ WEIGHT = "weight"
 """The unit of blendshapes: 0 is no effect, 1 the full effect; never negative."""
 GREY = "grey"
 """The unit of eigenlips: coefficients of an orthonormal basis of mouth pictures in grey levels, 0 to 255."""
-LARGEST = {EYE_DISTANCE: 1e4, WEIGHT: 255.0, GREY: 1e5}
+LARGEST_MAGNITUDE = {EYE_DISTANCE: 1e4, WEIGHT: 255.0, GREY: 1e5}
 """Largest plausible magnitude of motion of a face, by unit; values in pixels, in files without units, are allowed."""
 LARGEST_OTHER = 1e6
 """The same for all other units."""
@@ -135,7 +135,7 @@ def check_curves(motion: Motion) -> None:
 
 def check_magnitude(channel: Channel, low: float, high: float) -> None:
     """Raise InputError if values of a channel from ``low`` to ``high`` are larger than plausible motion of a face."""
-    largest = LARGEST.get(channel.unit, LARGEST_OTHER)
+    largest = LARGEST_MAGNITUDE.get(channel.unit, LARGEST_OTHER)
     if not -largest <= low <= high <= largest:
         raise InputError(
             f"{channel.name!r} goes from {low:g} to {high:g} {channel.unit}, required within ±{largest:g}; "

@@ -67,13 +67,13 @@ def sub_monitor(monitor: Monitor, start: float, stop: float, prefix: str = "") -
 def with_reports(items: Iterable[ItemT], count: int, stage: str, monitor: Monitor) -> Iterator[ItemT]:
     """Yield the items one by one, about ``count`` of them, and report now and then how many are done."""
     for number, item in enumerate(items):
-        if number % REPORTED == 0:
+        if number % REPORT_INTERVAL == 0:
             monitor(Progress(stage, number, count, min(number / max(count, 1), 1.0)))
         yield item
     monitor(Progress(stage, count, count, 1.0))
 
 
-REPORTED = 10
+REPORT_INTERVAL = 10
 """Every so many items are reported."""
 
 

@@ -16,7 +16,7 @@ from lipmotion.units.phones import (
     unknown_phone_message,
 )
 from lipmotion.units.recognised import RECOGNISED, RecognisedPhone, recognised_phones, with_confidences
-from lipmotion.units.transcript import words_in, words_of
+from lipmotion.units.text_normalisation import words_in, words_of
 from lipmotion.units.unit_set import UnitSet
 from lipmotion.units.unit_sets import UNIT_SETS, unit_set
 from lipmotion.units.visemes import VISEME_OF, VISEMES, VOWELS

@@ -10,7 +10,7 @@ CHARACTERS_PER_S = 200
 """Most characters a second: three times the fastest speech on record (655 words a minute), blanks and punctuation."""
 ALWAYS_ALLOWED_CHARACTERS = 10_000
 """Characters that a text may always have, as notes and blank lines beside the words of a short recording."""
-LARGEST_TRANSCRIPT = 1 << 22
+LARGEST_TRANSCRIPT_BYTES = 1 << 22
 """Most bytes of a transcript file: three days of speech."""
 PHONES_PER_S = 100
 """Most phones a second: with more, a phone has less than one frame of 10 ms on average."""

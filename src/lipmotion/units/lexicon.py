@@ -13,7 +13,7 @@ from lipmotion.errors import InputError, MissingDependencyError, shortened
 from lipmotion.storage.files import read_text_file
 from lipmotion.units.phones import PHONES, is_silent
 from lipmotion.units.spelling import guess_pronunciation, without_accents
-from lipmotion.units.transcript import normalised_text
+from lipmotion.units.text_normalisation import normalised_text
 
 Pronunciation = tuple[str, ...]
 
@@ -22,7 +22,7 @@ REDUCED_VOWELS = {"ah": "ax", "er": "axr", "ih": "ix"}
 FULL_VOWELS = frozenset("aa ae ao aw ay eh ey iy ow oy uh uw".split())
 WEAK_WORDS = frozenset("a an the of and from was but than that's her were your for if in is it its".split())
 """Monosyllables that are unstressed in running speech."""
-LARGEST_LEXICON, MOST_LINES = 1 << 25, 1 << 20
+LARGEST_LEXICON_BYTES, MOST_LINES = 1 << 25, 1 << 20
 """Most bytes and lines of a user's file; the dictionary of 134,000 words has 3.3 million bytes."""
 LONGEST_LINE = 2000
 """Most characters of a line: a word, its phones and a comment."""
@@ -60,7 +60,7 @@ class Lexicon:
         """Return the lexicon of a file: a pronunciation ``word PHONE PHONE ...`` a line; ``#`` starts a comment.
 
         Phones are ARPAbet in either case, with or without stress digits, or names of the inventory.
-        Raises InputError: no such file, not UTF-8, more than a lexicon holds (``LARGEST_LEXICON``, ``MOST_LINES``,
+        Raises InputError: no such file, not UTF-8, larger than allowed (``LARGEST_LEXICON_BYTES``, ``MOST_LINES``,
         ``LONGEST_LINE``, ``MOST_VARIANTS``), no phones after a word, or an unknown phone (with its line).
         """
         user: dict[str, list[Pronunciation]] = {}
@@ -106,7 +106,7 @@ def _add_line(user: dict[str, list[Pronunciation]], line: str) -> None:
 
 def _lines(path: Path) -> Iterator[str]:
     """Yield the lines of a lexicon file. Raises InputError: not a text, or more than a lexicon holds."""
-    text = read_text_file(path, "lexicon", LARGEST_LEXICON)
+    text = read_text_file(path, "lexicon", LARGEST_LEXICON_BYTES)
     count = text.count("\n") + 1
     if count > MOST_LINES:
         raise InputError(f"{path}: {count} lines, required at most {MOST_LINES}; keep the words that are said")

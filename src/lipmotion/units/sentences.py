@@ -7,7 +7,7 @@ import unicodedata
 from collections.abc import Iterator
 
 from lipmotion.errors import InputError, shortened
-from lipmotion.units.transcript import words_in
+from lipmotion.units.text_normalisation import words_in
 
 MOST_CHARACTERS = 50_000
 """Most characters of a text: about an hour of speech."""

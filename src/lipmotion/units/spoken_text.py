@@ -9,19 +9,19 @@ from collections.abc import Iterable
 
 from lipmotion.errors import InputError
 from lipmotion.types import TimedWord, TranscriptLine
-from lipmotion.units.transcript import words_in
+from lipmotion.units.text_normalisation import words_in
 
 TAG = re.compile(r"</?[a-zA-Z!][^<>]{0,200}>|<[\d:.]{1,20}>|\{[^{}]{0,200}\}")
 """Tags of SubRip and WebVTT (``<i>``, ``<v Anna>``, ``<00:01.500>``), of SubStation (``{\\an8}``), and ``<unk>``."""
 SOUND = re.compile(r"\[[^\[\]]{0,200}\]|\([^()]{0,200}\)|（[^（）]{0,200}）")
-"""Descriptions of what is heard, as subtitles for the deaf and recognisers write them: ``[music]``, ``(laughs)``."""
+"""Descriptions of sounds, as subtitles for the deaf and recognisers write them: ``[music]``, ``(laughs)``."""
 SPEAKER = re.compile(
     r"^[ \t>\-–—]{0,8}(?:[A-Z][A-Z0-9.'_#& -]{0,30}|[Ss]peaker[ _]?\w{1,3})[ \t]*:(?=\s|$)", re.MULTILINE
 )
 """A name in capitals, or ``Speaker 1``, before a colon at the start of a line."""
 NAME = re.compile(r"^[ \t>\-–—]{0,8}([A-Z][\w.'-]{0,30}(?: [A-Z][\w.'-]{0,30}){0,3})[ \t]*:(?=\s)", re.MULTILINE)
 """What may be the name of a speaker, as programs for meetings write it."""
-REPEATED = 3
+SPEAKER_NAME_LINES = 3
 """A name that begins so many lines is that of a speaker."""
 LONGEST_PAUSE_S = 0.5
 """Words in time that are further apart are not of one line."""
@@ -41,7 +41,7 @@ def spoken_text(text: str, names: frozenset[str] = frozenset()) -> str:
 def speaker_names(texts: Iterable[str]) -> frozenset[str]:
     """Return the names that stand before a colon at the start of several lines."""
     counts = Counter(found[1] for text in texts for found in NAME.finditer(text))
-    return frozenset(name for name, count in counts.items() if count >= REPEATED)
+    return frozenset(name for name, count in counts.items() if count >= SPEAKER_NAME_LINES)
 
 
 def line_words(text: str, where: str) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from lipmotion.types import Unit
 from lipmotion.units.classes import phone_classes
 from lipmotion.units.phones import PHONES, SILENCE, is_silent, unknown_phone_message
 
-LARGEST_TABLE = 1 << 18
+LARGEST_TABLE_BYTES = 1 << 18
 """The most bytes of a table file; one of 47 phones has a few hundred."""
 CLOSED_UNIT = "closed"
 """Name of the only unit that may hold silence and speech."""
@@ -135,7 +135,7 @@ def read_unit_table(path: Path) -> UnitSet:
     unit_line: dict[str, int] = {}
     phone_line: dict[str, int] = {}
     unit_of_phone: dict[str, str] = {}
-    for number, line in enumerate(read_text_file(path, "unit table", LARGEST_TABLE).splitlines(), start=1):
+    for number, line in enumerate(read_text_file(path, "unit table", LARGEST_TABLE_BYTES).splitlines(), start=1):
         unit, *phones = line.split("#")[0].split() or [""]
         if not unit:
             continue

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.vision.mesh import quiet_stderr
+from lipmotion.vision.face_mesh import quiet_stderr
 from lipmotion.vision.packages import import_face_detection, import_opencv
 from lipmotion.vision.trackers import FaceBox
 
 Image = NDArray[np.uint8]
 
-FULL_RANGE = 1
+FULL_RANGE_MODEL = 1
 """MediaPipe's number of the model for faces within five metres; the face mesh's own detector reaches two."""
 LEAST_SCORE = 0.5
 """Detections with a lower score are not returned. Small faces of GRID, VidTIMIT and open speech are at 0.64 or more."""
@@ -73,7 +73,9 @@ class FaceFinder:
                 return self._detector.process(image)
             module = import_face_detection()
             with quiet_stderr():  # the graph logs while it starts, up to its first result
-                self._detector = module.FaceDetection(min_detection_confidence=LEAST_SCORE, model_selection=FULL_RANGE)
+                self._detector = module.FaceDetection(
+                    min_detection_confidence=LEAST_SCORE, model_selection=FULL_RANGE_MODEL
+                )
                 return self._detector.process(image)
 
 

@@ -22,7 +22,7 @@ JUMP, GROWTH = 0.6, 1.25
 """Most eye distances that a face moves in a frame (GRID: up to 0.03), and the largest ratio of its sizes (1.06)."""
 LOST_FRAMES = 10
 """A face that was missing in more frames must be recognised again."""
-SAME_PERSON = 0.9
+SAME_PERSON_CORRELATION = 0.9
 """Correlation of the upper faces above which two faces are one person's. GRID: 0.90 to 1 within a clip; two people, 0.2
 to 0.87 in 14 pairs of 15, and 0.94 in one."""
 LARGE_PX = 1280
@@ -32,7 +32,7 @@ THOROUGH_STEP = 5
 """Where no face is found, the parts of every such frame are searched too, not only the whole picture."""
 THUMBNAIL_STEP, MOST_THUMBNAILS = 5, 20
 """Every how many frames of a scene a thumbnail of the face is kept for comparison, and how many at first."""
-NEW_LOOK, MOST_LOOKS = 0.95, 60
+NEW_LOOK_CORRELATION, MOST_LOOKS = 0.95, 60
 """Later thumbnails are kept when they correlate less than this with all that are kept, and how many at most in all."""
 
 _EYES = [TRACKED_POINTS.index(index) for index in EYE_CORNERS]
@@ -123,7 +123,7 @@ class FaceFollower:
             more = {
                 index
                 for index, scene in enumerate(self._scenes)
-                if _best_correlation(scene.thumbnails, known) > SAME_PERSON
+                if _best_correlation(scene.thumbnails, known) > SAME_PERSON_CORRELATION
             } - kept
             if not more:
                 return kept
@@ -169,7 +169,7 @@ class _Scene:
 
     def _keep_thumbnail(self, thumbnail: Array) -> None:
         is_early = len(self.thumbnails) < MOST_THUMBNAILS
-        if is_early or _best_correlation([thumbnail], self.thumbnails) < NEW_LOOK:
+        if is_early or _best_correlation([thumbnail], self.thumbnails) < NEW_LOOK_CORRELATION:
             self.thumbnails.append(thumbnail)
 
     def is_near(self, before: _Scene) -> bool:
@@ -235,7 +235,7 @@ class _Scene:
 
     def _priority(self, image: Image, face: Array) -> tuple[bool, float]:
         """Return whether a face was followed before, and its size, which counts half at the edge of the picture."""
-        is_known = _best_correlation([face_thumbnail(image, face[_EYES, :2])], self._known) > SAME_PERSON
+        is_known = _best_correlation([face_thumbnail(image, face[_EYES, :2])], self._known) > SAME_PERSON_CORRELATION
         return is_known, _size(face) * (1 - abs(float(_middle(face)[0]) / image.shape[1] - 0.5))
 
 

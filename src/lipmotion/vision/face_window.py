@@ -17,7 +17,7 @@ REACH = 2.5
 """Side of a window, in sides of the face in it: the mesh's detector finds faces of a third of a picture best."""
 SIZE_PX = 384
 """Every window is scaled to this side: the mesh then always sees faces of about one size."""
-STEADY = 1.25
+STEADY_RATIO = 1.25
 """The window keeps its side until that of the face has changed by this ratio."""
 
 
@@ -84,6 +84,6 @@ class WindowedMesh:
     def _following(self, face: Array) -> FaceWindow:
         low, high = face[:, :2].min(axis=0), face[:, :2].max(axis=0)
         side = REACH * float((high - low).max())
-        is_steady = 1 / STEADY < side / self._window.side < STEADY
+        is_steady = 1 / STEADY_RATIO < side / self._window.side < STEADY_RATIO
         x, y = (low + high) / 2
         return FaceWindow.around(float(x), float(y), self._window.side if is_steady else side)

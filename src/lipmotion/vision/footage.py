@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.storage.frame_groups import MOST_DECODED, FrameGroups
+from lipmotion.storage.frame_groups import MOST_DECODED_BYTES, FrameGroups
 from lipmotion.types import Track
 from lipmotion.vision.frames import WHOLE, VideoSpan, open_video
-from lipmotion.vision.mouth import face_to_image
+from lipmotion.vision.mouth_pictures import face_to_image
 from lipmotion.vision.timing import nearest_indices, resample_to_constant_rate
 from lipmotion.vision.track import track_of
 from lipmotion.vision.tracked_frames import TrackedFrames, tracked_frames
@@ -35,7 +35,7 @@ class Footage:
     path          : the video
     span          : the part of the video that was tracked
     track         : motion of the lips and jaw, T frames, and which of them are seen; as ``vision.track.track`` finds it
-    face_to_image : the affine maps of ``vision.mouth.face_to_image``, from px of the face that looks straight ahead to
+    face_to_image : affine maps of ``vision.mouth_pictures.face_to_image``, from px of the face that looks ahead to
                     px of the frame [shape=(T, 2, 3)]; in frames that are not seen, interpolated within their scene
     pictures_s    : time of the picture that frame n shows, the one nearest to its time, s since the start of ``span``
                     [shape=(T,)]; equal times in a row are a picture shown again
@@ -96,7 +96,7 @@ def footage_frames(footage: Footage, start: int = 0, stop: int | None = None) ->
     return _frames_between(footage, start, stop)
 
 
-def footage_groups(footage: Footage, most_bytes: int = MOST_DECODED) -> FrameGroups:
+def footage_groups(footage: Footage, most_bytes: int = MOST_DECODED_BYTES) -> FrameGroups:
     """Return access to the frames of a tracked video in any order, also backwards, in bounded memory.
 
     most_bytes : decoded frames that are kept

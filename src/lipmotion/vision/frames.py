@@ -61,7 +61,7 @@ ROUNDING_S = 1e-4
 """A picture belongs to a span that begins this much later: times of the container are whole ticks."""
 SHORT_S = 0.5
 """Pictures that end more than this before the stated duration are reported."""
-LEAST_SIDE, LONGEST_SIDE = 16, 8192
+LEAST_SIDE_PX, LONGEST_SIDE_PX = 16, 8192
 """Bounds of a picture's width and height, px: a smaller one shows no face, a larger one fills the memory."""
 
 
@@ -191,9 +191,10 @@ def _check_size(path: Path, width: int, height: int, pixel_shape: float) -> None
     if not width or not height:  # FFmpeg gives no size for pictures that it refuses
         raise InputError(f"{path}: pictures of no size, or of more than {MOST_PIXELS} pixels; scale the video")
     shown = round(width * pixel_shape)
-    if not (LEAST_SIDE <= shown <= LONGEST_SIDE and LEAST_SIDE <= height <= LONGEST_SIDE):
+    if not (LEAST_SIDE_PX <= shown <= LONGEST_SIDE_PX and LEAST_SIDE_PX <= height <= LONGEST_SIDE_PX):
         raise InputError(
-            f"{path}: pictures of {shown} × {height} pixels, required {LEAST_SIDE} to {LONGEST_SIDE}; scale the video"
+            f"{path}: pictures of {shown} × {height} pixels, required {LEAST_SIDE_PX} to {LONGEST_SIDE_PX}; scale "
+            "the video"
         )
     if shown * height > MOST_PIXELS:
         raise InputError(

@@ -6,7 +6,7 @@ from importlib import metadata
 from typing import final
 
 from lipmotion.vision.face_finder import FaceFinder
-from lipmotion.vision.mesh import FaceMesh
+from lipmotion.vision.face_mesh import FaceMesh
 from lipmotion.vision.packages import import_opencv, missing
 from lipmotion.vision.trackers import MEDIAPIPE, LandmarkTracker
 

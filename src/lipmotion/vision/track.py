@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from lipmotion.types import Channel, Motion, Track
 from lipmotion.vision.frames import WHOLE, VideoSpan, open_video
+from lipmotion.vision.head_pose import without_head_motion
 from lipmotion.vision.landmarks import DISTANCES, EYE_CORNERS, JAW_POINTS, LIP_POINTS, TRACKED_POINTS
-from lipmotion.vision.mouth import face_to_image, mouth_crop
-from lipmotion.vision.pose import without_head_motion
+from lipmotion.vision.mouth_pictures import face_to_image, mouth_crop
 from lipmotion.vision.timing import nearest_indices, resample_to_constant_rate
 from lipmotion.vision.tracked_frames import TrackedFrames, distance_px, tracked_frames
 from lipmotion.vision.trackers import MEDIAPIPE

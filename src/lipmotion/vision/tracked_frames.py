@@ -14,7 +14,7 @@ from lipmotion.vision.face_follower import FaceFollower
 from lipmotion.vision.frames import OpenVideo, VideoSpan, damage_notes, open_video
 from lipmotion.vision.image_similarity import mouth_thumbnail, occluded_mouths
 from lipmotion.vision.landmarks import EYE_CORNERS, TRACKED_POINTS
-from lipmotion.vision.mouth import eyes_to_image, mouth_crop
+from lipmotion.vision.mouth_pictures import eyes_to_image, mouth_crop
 from lipmotion.vision.timing import check_rate, frame_count, nominal_rate_hz
 from lipmotion.vision.trackers import MEDIAPIPE
 
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 UNSEEN_LIMIT = 0.2
 """A clip is refused when more than this share of its frames shows no face."""
-USABLE = 0.5
+USABLE_SHARE = 0.5
 """A clip is refused when its pictures cover less than this share of the duration that it states."""
 SMALL_EYES_PX = 35.0
 """A smaller median distance between the eyes is reported. GRID clips made small and tracked have a correlation of the
@@ -150,7 +150,7 @@ def _check(
     check_rate(rate_hz, path)
     count = frame_count(times_s, rate_hz)
     noted = f" ({'; '.join(notes)})" if notes else ""
-    if count < USABLE * video.stated_s * rate_hz:
+    if count < USABLE_SHARE * video.stated_s * rate_hz:
         raise InputError(
             f"{path}: pictures for {count / rate_hz:.1f} of {video.stated_s:.1f} s; required at least half{noted}; "
             "export the video again"

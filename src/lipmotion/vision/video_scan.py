@@ -19,7 +19,7 @@ LOOK_PX = 640
 """Pictures are reduced to this while they are converted."""
 FACE_STEP_S = 2.0
 """How often faces are looked for."""
-ALONE = 0.9
+ALONE_SHARE = 0.9
 """Somebody whose face is in this share of the pictures with a face is taken to be the only person."""
 REPORT_STEP = 250
 
@@ -77,4 +77,4 @@ def scan_video(path: Path, reached: Callable[[float], None] = lambda _: None, tr
 
 def _person(follower: FaceFollower) -> list[NDArray[np.float64]]:
     """Return thumbnails of the person, if other people have a tenth of the faces or more; else none."""
-    return [] if follower.share_of_person() >= ALONE else follower.thumbnails()
+    return [] if follower.share_of_person() >= ALONE_SHARE else follower.thumbnails()

@@ -12,7 +12,7 @@ from lipmotion.corpora.labels.label_files import LARGEST_LABELS
 from lipmotion.corpora.labels.tier import MOST_LABELS
 from lipmotion.errors import InputError
 from lipmotion.units import PHONES, phone_named
-from lipmotion.units.length_limits import LARGEST_TRANSCRIPT
+from lipmotion.units.length_limits import LARGEST_TRANSCRIPT_BYTES
 
 SPOKEN = [phone for phone in PHONES if phone not in ("sil", "sp")]
 
@@ -202,7 +202,7 @@ def test_real_ones(recordings: Path):
         (f"0 sil\n1000000 p\n{'9' * 5000} aa\n", "line 3 has the time 9"),
         (f"0.0\t{'9' * 400}.0\tp\n", "line 1 has the time 9"),
         ("0 1000000 p\n" * (MOST_LABELS + 1), "more than 250000 labels; give those of one recording"),
-        ("a" * (LARGEST_TRANSCRIPT + 1), "4194305 characters, required at most 4194304: is it a transcript"),
+        ("a" * (LARGEST_TRANSCRIPT_BYTES + 1), "4194305 characters, required at most 4194304: is it a transcript"),
         (" " * (LARGEST_LABELS + 1), "16777217 bytes, required at most 16777216"),
     ],
 )

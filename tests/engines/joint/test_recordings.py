@@ -10,12 +10,12 @@ import pytest
 
 from lipmotion.hmm.multistream.align import align
 from lipmotion.hmm.multistream.generate import densities_of_path, generate
-from lipmotion.hmm.multistream.inventory import Inventory
-from lipmotion.hmm.multistream.labels import units_in_frames
 from lipmotion.hmm.multistream.model import JointConfig
+from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, train_joint
 from lipmotion.hmm.multistream.recognise import JointRecogniser
 from lipmotion.hmm.multistream.streams import stream_observations
-from lipmotion.hmm.multistream.train import TrainingUtterance, train_joint
+from lipmotion.hmm.multistream.unit_frames import units_in_frames
+from lipmotion.hmm.multistream.unit_states import Inventory
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import LOG_ENERGY, mfcc
 from lipmotion.speech.sound.audio_files import read_audio

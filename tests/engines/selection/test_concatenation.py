@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from engines.selection.conftest import SETTINGS
 from lipmotion.engines.selection.concatenation import TimeMap, concatenated, pieces_of, shown_units
-from lipmotion.engines.selection.costs import HARD
+from lipmotion.engines.selection.costs import ABUTTING_JOIN
 from lipmotion.engines.selection.engine import SelectionEngine
 from lipmotion.engines.selection.lip_reading import OVERLAPS, TABLE_1, lip_reading_class, parsed_invisible
 from lipmotion.engines.selection.model import SelectionModel
@@ -70,7 +70,7 @@ def test_no_join_is_a_jump(model: SelectionModel, engine: SelectionEngine, phone
     motion = concatenated(model.inventory, target, pieces, frames)
     largest = np.abs(np.diff(model.inventory.values, axis=0)).max(axis=0)
     bend = np.ptp(model.inventory.values, axis=0) * np.pi / 4  # within two frames, where pieces abut
-    hard = any(piece.join == HARD for piece in pieces[1:])
+    hard = any(piece.join == ABUTTING_JOIN for piece in pieces[1:])
     assert (np.abs(np.diff(motion, axis=0)).max(axis=0) < 3 * largest + hard * bend).all()
 
 

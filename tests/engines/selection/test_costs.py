@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from lipmotion.engines.selection.concatenation import concatenated, pieces_of, shown_units
 from lipmotion.engines.selection.config import SelectionConfig
-from lipmotion.engines.selection.costs import AFTER, BEFORE, FRACTIONS, HARD, Costs, Target
+from lipmotion.engines.selection.costs import ABUTTING_JOIN, FRACTIONS, JOIN_AFTER, JOIN_BEFORE, Costs, Target
 from lipmotion.engines.selection.inventory import RecordedUnits
 from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.windows import phone_windows
-from lipmotion.motion.store import MotionStore, compress
+from lipmotion.motion.motion_store import MotionStore, compress
 from lipmotion.types import Span, Timeline, Unit
 
 FREE = SelectionConfig(
@@ -171,20 +171,20 @@ def test_units_merge_in_an_identical_phone_only_and_another_stress_has_its_cost(
         in_the_phone_after = costs.join_costs(target, 1, array(0, 6), array(4))[:, 0]  # before aa, before ae
         assert in_the_phone_before == pytest.approx([wanted, 1])
         assert in_the_phone_after == pytest.approx([wanted, 1])
-        assert [costs.join_kind(target, 2, 1, unit) for unit in (5, 11)] == [BEFORE, HARD]
-        assert [costs.join_kind(target, 1, unit, 4) for unit in (0, 6)] == [AFTER, HARD]
+        assert [costs.join_kind(target, 2, 1, unit) for unit in (5, 11)] == [JOIN_BEFORE, ABUTTING_JOIN]
+        assert [costs.join_kind(target, 1, unit, 4) for unit in (0, 6)] == [JOIN_AFTER, ABUTTING_JOIN]
 
 
 def overlapping(before: str, after: str, kind: int) -> tuple[Costs, Target, list[int]]:
     """Return units of two recordings, at 0 and at 1, that overlap in aa between two phones."""
     costs = costs_of(inventory(f"{before} aa f", f"f aa {after}", levels=(0, 1)), hard=1.0)
-    return costs, target_of(costs, f"{before} aa {after}"), [0, 1, 5] if kind == BEFORE else [0, 4, 5]
+    return costs, target_of(costs, f"{before} aa {after}"), [0, 1, 5] if kind == JOIN_BEFORE else [0, 4, 5]
 
 
 def test_units_overlap_where_table_1_says() -> None:
     for before, row in TABLE_1.items():
         for after, share in row.items():
-            for kind in (BEFORE, AFTER):
+            for kind in (JOIN_BEFORE, JOIN_AFTER):
                 costs, target, units = overlapping(NAMED[before], NAMED[after], kind)
                 pieces = pieces_of(costs, target, np.array(units))
                 assert [piece.join for piece in pieces[1:]] == [kind]
@@ -204,7 +204,7 @@ def test_units_overlap_where_table_1_says() -> None:
 def test_units_that_overlap_cost_what_they_differ_by_where_they_overlap() -> None:
     for before, row in TABLE_1.items():
         for after, share in row.items():
-            costs, target, _ = overlapping(NAMED[before], NAMED[after], BEFORE)
+            costs, target, _ = overlapping(NAMED[before], NAMED[after], JOIN_BEFORE)
             units = costs.inventory
             drawn = units.values.copy()
             drawn[:61, 0] = np.clip(np.arange(61) / 20 - 1, 0, 1)  # rises from 0 to 1 within aa
@@ -260,5 +260,5 @@ def test_by_default_units_merge_in_a_vowel_rather_than_abut_behind_a_plosive() -
     costs = costs_of(units, SelectionConfig())
     target = target_of(costs, "s p uw n")
     pieces = pieces_of(costs, target, select(costs, target).units)
-    assert HARD not in [piece.join for piece in pieces[1:]]
-    assert (pieces[0].unit, pieces[0].stop + (pieces[1].join == AFTER)) == (4, 3)
+    assert ABUTTING_JOIN not in [piece.join for piece in pieces[1:]]
+    assert (pieces[0].unit, pieces[0].stop + (pieces[1].join == JOIN_AFTER)) == (4, 3)

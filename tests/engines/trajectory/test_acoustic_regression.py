@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from lipmotion.engines.trajectory.engine import TrajectoryConfig
-from lipmotion.engines.trajectory.train import fit_trajectory
+from lipmotion.engines.trajectory.trajectory_training import fit_trajectory
 from lipmotion.motion.context_window import OFFSETS, SCALE, fit_acoustic_context
 from lipmotion.motion.frame_labels import full_context_states
-from lipmotion.stats.regression import fit_tree_regressions, regression_node, ridge, zero_statistics
+from lipmotion.stats.tree_regression import fit_tree_regressions, regression_node, ridge, zero_statistics
 from lipmotion.stats.trees import Question, Tree
 from lipmotion.testing.examples import examples
 from lipmotion.types.progress import silent_monitor

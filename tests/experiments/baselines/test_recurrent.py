@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from lipmotion.experiments.baselines import recurrent as network
+from lipmotion.experiments.baselines.frame_regression import FrameRegressionModel
 from lipmotion.experiments.baselines.recurrent import BlstmBaseline
-from lipmotion.experiments.baselines.regression import FrameRegressionModel
 from lipmotion.testing.examples import CHANNELS
 from lipmotion.testing.examples import examples as sentences
 from lipmotion.types import Example, Progress

@@ -18,8 +18,8 @@ from lipmotion.experiments.hofer2008.unit_sets import ENGINE_SETTINGS, PAPER_SCO
 from lipmotion.experiments.runner import ExperimentSettings
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.closures import closings
-from lipmotion.pipeline.evaluation.conditions import compared_clips, held_out_recordings
 from lipmotion.pipeline.evaluation.evaluate import evaluate
+from lipmotion.pipeline.evaluation.held_out import compared_clips, held_out_recordings
 from lipmotion.pipeline.training.train import train
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.units import unit_set

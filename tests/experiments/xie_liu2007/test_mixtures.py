@@ -15,7 +15,7 @@ from lipmotion.errors import InputError
 from lipmotion.experiments.xie_liu2007 import mixtures
 from lipmotion.experiments.xie_liu2007.mixtures import select_mixtures
 from lipmotion.measures import curves
-from lipmotion.pipeline.evaluation.conditions import HeldOutRecordings, compared_clips, held_out_recordings
+from lipmotion.pipeline.evaluation.held_out import HeldOutRecordings, compared_clips, held_out_recordings
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.training.train import model_motion
 from lipmotion.speech.recognition.recogniser import Recogniser

@@ -26,8 +26,8 @@ from lipmotion.experiments.xie_liu2007.table3 import ComparisonOptions, NoiseCon
 from lipmotion.experiments.xie_liu2007.table3_text import table
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures import curves
-from lipmotion.pipeline.evaluation.conditions import compared_clips, held_out_recordings
 from lipmotion.pipeline.evaluation.evaluate import evaluate
+from lipmotion.pipeline.evaluation.held_out import compared_clips, held_out_recordings
 from lipmotion.pipeline.training.train import train
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 

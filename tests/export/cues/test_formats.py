@@ -15,7 +15,7 @@ from export.cues.conftest import result, spoken
 from lipmotion.errors import ExportError
 from lipmotion.export.cues.base import CUE_FORMATS, format_of, write_cue_file
 from lipmotion.export.cues.choose import choose_cues
-from lipmotion.export.cues.shapes import SHAPES
+from lipmotion.export.cues.cue_shapes import SHAPES
 from lipmotion.export.cues.sheet import CueSheet
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Channel, Motion, Timeline

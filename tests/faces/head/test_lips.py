@@ -10,7 +10,7 @@ from lipmotion.faces.head.lips import (
     SIDE,
     TEETH_EDGE,
     TEETH_Z,
-    VISIBLE,
+    VISIBLE_RINGS,
     lip_surface,
     section_points,
 )
@@ -152,10 +152,10 @@ def test_a_round_hole_is_an_ellipse_that_nothing_behind_it_narrows():
     for gap in (0.028, 0.04, 0.06, 0.1):
         pose = CharacterPose(gap=gap, upper_rise=0.48 * gap, width=0.75, roundness=1, protrusion=0.08)
         surface = lip_surface(section_points(pose, figure().skin.base_z))
-        rim = surface[VISIBLE - 1]
+        rim = surface[VISIBLE_RINGS - 1]
         line = np.interp(np.abs(rim[:, 0]), rim[20:41, 0], 0.5 * (rim[20:41, 1] + rim[60 - np.arange(21), 1]))
         half_width, half_height = rim[:, 0].max(), 0.5 * (rim[20, 1] - rim[60, 1])
         away = np.hypot(rim[:, 0] / half_width, (rim[:, 1] - line) / half_height)
         assert np.abs(away - 1).max() < 0.06
-        behind = surface[VISIBLE : VISIBLE + 4]
+        behind = surface[VISIBLE_RINGS : VISIBLE_RINGS + 4]
         assert behind[:, :, 0].max(axis=1).min() >= half_width - 1e-9

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.faces.head.lips import VISIBLE
+from lipmotion.faces.head.head_blendshapes import POSES, head_mesh
+from lipmotion.faces.head.lips import VISIBLE_RINGS
 from lipmotion.faces.head.pose import CharacterPose
 from lipmotion.faces.head.shape_fit import mouth_weights
-from lipmotion.faces.head.shapes import POSES, head_mesh
 from lipmotion.faces.head.skin import REST
 from lipmotion.faces.head.stage import figure
 from lipmotion.meshes.model.mesh import Mesh
@@ -48,7 +48,7 @@ def places(mesh: Mesh) -> dict[str, tuple[np.ndarray, np.ndarray]]:
 
 def test_the_lips_are_where_they_are_drawn(places: dict[str, tuple[np.ndarray, np.ndarray]]) -> None:
     rings = figure().skin.lip_rows()
-    lips, ring = rings[:10].ravel(), rings[VISIBLE - 1]
+    lips, ring = rings[:10].ravel(), rings[VISIBLE_RINGS - 1]
     for name, (summed, drawn) in places.items():
         assert np.abs(summed - drawn)[lips].max() < 0.07, name
         assert np.abs(summed - drawn)[lips].mean() < 0.018, name
@@ -59,7 +59,7 @@ def test_the_lips_are_where_they_are_drawn(places: dict[str, tuple[np.ndarray, n
 def test_closed_lips_are_those_of_the_rest_pose(mesh: Mesh) -> None:
     closed = [CharacterPose(gap=0.0, jaw=jaw, width=width) for jaw in (0.0, 0.06, 0.1) for width in (0.9, 1.0, 1.05)]
     curves = mouth_weights(figure(), mesh, closed)
-    ring = figure().skin.lip_rows()[VISIBLE - 1]
+    ring = figure().skin.lip_rows()[VISIBLE_RINGS - 1]
     moved = mesh.displacements(ring[[20, 60]])[:, :, 1]
     table = np.stack(list(curves.values()), axis=1)
     change = table @ np.stack([moved[mesh.shape_names.index(name)] for name in curves])

@@ -56,6 +56,6 @@ def _changed(chance: Random, name: str, content: bytes, other: bytes) -> bytes:
         return raw.spliced(chance, content, other)
     ways = (*FORMS.get(PurePosixPath(name).suffix, ()), raw.change)
     try:
-        return chance.choice(ways)(chance, content)[: raw.LARGEST]
+        return chance.choice(ways)(chance, content)[: raw.LARGEST_BYTES]
     except Exception:  # the content does not allow this change
         return raw.change(chance, content)

@@ -13,16 +13,22 @@ from fuzz.mutators import json_text, raw, zips
 
 Document = tuple[bytes, Callable[[bytes], bytes]]
 """The JSON text in a file, and a function that returns the file with another one."""
-DEEP = 300
+NESTING = 300
 HOSTILE = (
     *("null", "true", "false", "0", "-1", "1", "0.5", "255", "1e308", "-1e308", "1e999", "NaN", "-Infinity", "1e-320"),
     *("1" + "0" * 30, "-1" + "0" * 30, "1" + "0" * 400, "9" * 5000, "4294967296", "9007199254740993", "1e9"),
     *('""', '"0"', '"' + "x" * 3000 + '"', '"\\ud800"', '"../../x"', '"\\u0000"', '"data:;base64,AAAA"', '"head.glb"'),
     *("[]", "[0]", "[-1]", "[null]", "[[0]]", "{}", '{"": null}', '{"a": 1, "a": 2}', "[" + "0," * 1000 + "0]"),
-    *("[" * DEEP + "]" * DEEP, '{"a":' * DEEP + "0" + "}" * DEEP, "[" * 100_000, "[{}]", "[[[0, 0], 1e308]]"),
+    *(
+        "[" * NESTING + "]" * NESTING,
+        '{"a":' * NESTING + "0" + "}" * NESTING,
+        "[" * 100_000,
+        "[{}]",
+        "[[[0, 0], 1e308]]",
+    ),
 )
 """Values as JSON spells them, and some that it does not."""
-OTHERS = 3
+OTHER_PARTS = 3
 """Values of the same document that are put in each place."""
 MARK = "a place in a document"
 _JSON, _ARCHIVES = {".json", ".gltf"}, {".npz", ".lipmotion", ".face", ".binding"}
@@ -59,7 +65,7 @@ def systematic(files: Files, chance: Random) -> Iterator[Files]:
             count = 0 if found is None else sum(1 for _ in json_text.places(json.loads(found[0]), 2000))
         except (ValueError, RecursionError):
             continue
-        orders += [(name, place, value) for place in range(count) for value in range(len(HOSTILE) + OTHERS)]
+        orders += [(name, place, value) for place in range(count) for value in range(len(HOSTILE) + OTHER_PARTS)]
     chance.shuffle(orders)
     for name, place, value in orders:
         found = document_in(name, files[name])

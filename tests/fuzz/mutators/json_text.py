@@ -29,7 +29,7 @@ NUMBERS = (
     -1e-9,
 )
 VALUES: tuple[Any, ...] = (*NUMBERS, *NUMBERS, None, True, False, "", "0", "é\ud800", [], {}, [[]], [None], {"": None})
-DEEP = 100_000
+NESTING = 100_000
 """Nested brackets; Python's own limit is far lower."""
 
 
@@ -93,6 +93,6 @@ def _written(chance: Random, tree: Any) -> bytes:
 
 
 def _root(chance: Random, content: bytes) -> bytes:
-    deep = b"[" * DEEP if chance.random() < 0.5 else b'{"a":' * DEEP
+    deep = b"[" * NESTING if chance.random() < 0.5 else b'{"a":' * NESTING
     value = json.dumps(chance.choice(VALUES)).encode("utf-8", "surrogatepass")
     return chance.choice((deep, value, content + content, b"[" + content + b"]"))

@@ -78,7 +78,7 @@ def _flood(chance: Random, words: str) -> str:
     """Insert many repetitions of something."""
     token = chance.choice(words[:100_000].split() or ["a"])
     one = chance.choice((token[:1000], "a", "9", "0.1", '"', "p")) + chance.choice(("", " ", "\n", ","))
-    many = one * min(10 ** chance.choice(POWERS), raw.LARGEST // 2 // len(one))
+    many = one * min(10 ** chance.choice(POWERS), raw.LARGEST_BYTES // 2 // len(one))
     at = chance.choice((0, len(words), chance.randrange(len(words) + 1)))
     return words[:at] + many + words[at:]
 

@@ -93,7 +93,7 @@ def _put(text: str, span: tuple[int, int], new: str) -> str:
 
 def _prologue(chance: Random, text: str) -> str:
     many = 10 ** chance.choice((0, 0, 0, 0, 2, 4))
-    return (chance.choice(PROLOGUES) * many)[: raw.LARGEST // 2] + text
+    return (chance.choice(PROLOGUES) * many)[: raw.LARGEST_BYTES // 2] + text
 
 
 def _element(chance: Random, text: str) -> str:
@@ -129,7 +129,7 @@ def _flood(chance: Random, text: str) -> str:
     one = chance.choice(
         (text[start:end], "a", "(", ")", "9", ".", " ", ",", "-", "M", "z", "h1", "a1 1 0 0 1 1 1", ";")
     )
-    many = min(10 ** chance.choice(POWERS), raw.LARGEST // 2 // max(len(one), 1))
+    many = min(10 ** chance.choice(POWERS), raw.LARGEST_BYTES // 2 // max(len(one), 1))
     at = chance.choice((start, end))
     return text[:at] + one * many + text[at:]
 

@@ -17,7 +17,7 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.outputs.write import write
 from lipmotion.types import Audio, Generation, Motion
-from lipmotion.types.motion import LARGEST
+from lipmotion.types.motion import LARGEST_MAGNITUDE
 
 GENERATED = {"eye_distance": 10.0, "weight": 100.0, "grey": 1e6}
 """Largest plausible value of generated motion, by unit: a whole head is two eye distances high."""
@@ -46,7 +46,7 @@ def good_model(good: Good) -> Model:
     return load_model(good.models[0])
 
 
-def check_motion(motion: Motion, largest_of: Mapping[str, float] = LARGEST) -> None:
+def check_motion(motion: Motion, largest_of: Mapping[str, float] = LARGEST_MAGNITUDE) -> None:
     """Raise ImplausibleError unless all values are finite and plausible in their units."""
     require(bool(np.isfinite(motion.values).all()), "values that are not finite")
     for channel, curve in zip(motion.channels, motion.values.T, strict=True):

@@ -6,8 +6,8 @@ import numpy as np
 
 from lipmotion.hmm.multistream.densities import GaussianStatistics, StreamScale, TiedDensities
 from lipmotion.hmm.multistream.forest import TreeCosts, context_questions, grow_forest
-from lipmotion.hmm.multistream.inventory import Inventory
 from lipmotion.hmm.multistream.model import JointConfig, JointHmm, StreamModel
+from lipmotion.hmm.multistream.multistream_training import TrainingUtterance
 from lipmotion.hmm.multistream.streams import (
     F0_STREAMS,
     MOTION,
@@ -17,7 +17,7 @@ from lipmotion.hmm.multistream.streams import (
     StreamObservations,
     stream_observations,
 )
-from lipmotion.hmm.multistream.train import TrainingUtterance
+from lipmotion.hmm.multistream.unit_states import Inventory
 from lipmotion.stats.bigram import Bigram
 from lipmotion.stats.mixture import Mixtures
 

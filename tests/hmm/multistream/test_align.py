@@ -4,9 +4,9 @@ import pytest
 from hmm.multistream.synthetic import CLASSES, config, inventory, observed, random_joint, utterances
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.multistream.align import align, measured_durations
-from lipmotion.hmm.multistream.inventory import triphone_states
+from lipmotion.hmm.multistream.multistream_training import train_joint
 from lipmotion.hmm.multistream.streams import StreamWeights
-from lipmotion.hmm.multistream.train import train_joint
+from lipmotion.hmm.multistream.unit_states import triphone_states
 from oracles import joint as slow
 from oracles.sequences import segmentations
 

@@ -7,8 +7,8 @@ from hmm.multistream.synthetic import CLASSES, NAMES, inventory, random_joint
 from lipmotion.errors import InputError
 from lipmotion.hmm.multistream.densities import GaussianStatistics
 from lipmotion.hmm.multistream.forest import TreeCosts, context_questions, grow_forest, positions_asked, unit_forest
-from lipmotion.hmm.multistream.inventory import Inventory, triphone_states
 from lipmotion.hmm.multistream.streams import ACOUSTIC_STREAMS
+from lipmotion.hmm.multistream.unit_states import Inventory, triphone_states
 
 KNOWN = inventory()
 SIDES = [name for name in NAMES if name != "sp"]

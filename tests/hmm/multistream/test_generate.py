@@ -16,8 +16,8 @@ from lipmotion.hmm.multistream.generate import (
     generate,
 )
 from lipmotion.hmm.multistream.model import ACOUSTIC_ONLY
+from lipmotion.hmm.multistream.multistream_training import train_joint
 from lipmotion.hmm.multistream.streams import MOTION, SPEECH
-from lipmotion.hmm.multistream.train import train_joint
 from lipmotion.stats.delta_windows import with_dynamics
 from oracles import trajectories
 

@@ -13,7 +13,7 @@ import pytest
 from lipmotion.errors import ExportError
 from lipmotion.pipeline.batch.ledger import RECEIPTS, RUN, WORK, Place, opened_ledger, read_receipt, write_receipt
 from lipmotion.pipeline.batch.lines import OWN_FILES, OWN_FOLDER, BatchLine
-from lipmotion.pipeline.batch.record import DONE, LARGEST_RECORD, Record
+from lipmotion.pipeline.batch.record import DONE, LARGEST_RECORD_BYTES, Record
 from lipmotion.pipeline.batch.report import write_reports
 from lipmotion.pipeline.batch.settings import (
     check_kinds,
@@ -126,7 +126,7 @@ def damaged(record: Record) -> dict[str, bytes]:
         "its second half": row[len(row) // 2 :],
         "two in one": row + row,
         "a key twice": row.replace(b'"run"', b'"name"'),
-        "too long": row + b" " * LARGEST_RECORD,
+        "too long": row + b" " * LARGEST_RECORD_BYTES,
         "half an escape": row.replace(b'"old"', b'"\\ud8"'),
     }
 

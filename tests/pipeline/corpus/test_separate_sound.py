@@ -33,7 +33,7 @@ def write_ramp(path: Path, seconds: float) -> None:
 
 @pytest.fixture
 def studio(tmp_path: Path) -> Path:
-    """A take of a camera with motion, and the same take as a recorder heard it, from earlier on."""
+    """A take of a camera with motion, and the same take as a recorder has it, from earlier on."""
     chance = np.random.default_rng(5)
     scene = np.concatenate([np.zeros(2 * RATE_HZ), speech_like(chance, 4.0)])
     made = clap(chance)

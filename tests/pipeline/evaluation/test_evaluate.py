@@ -14,11 +14,11 @@ import pytest
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import Engine
 from lipmotion.errors import AlignmentError, CorpusError
-from lipmotion.measures.report import figures_table
-from lipmotion.pipeline.evaluation.conditions import ComparedClip
+from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.pipeline.evaluation.evaluate import _was_trained_on
 from lipmotion.pipeline.evaluation.evaluate import evaluate as evaluated
 from lipmotion.pipeline.evaluation.figures import figures_of
+from lipmotion.pipeline.evaluation.held_out import ComparedClip
 from lipmotion.pipeline.model import Model
 from lipmotion.testing.toy import toy_motion, toy_sentences
 from lipmotion.types import Channel, Generation, Motion, Speech, StateTrace, Timeline, Unit, Utterance

@@ -9,7 +9,7 @@ import pytest
 
 from cli.conftest import RunCommand, here, run
 from lipmotion.faces.filmed.face import load_face
-from lipmotion.pipeline.film.video import film_of, write_film
+from lipmotion.pipeline.film.filmed_video import film_of, write_film
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.speech.sound.audio_files import read_audio

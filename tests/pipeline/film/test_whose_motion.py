@@ -10,7 +10,7 @@ import pytest
 
 from lipmotion.errors import InputError
 from lipmotion.faces.filmed.face import FilmedFace
-from lipmotion.pipeline.film.video import is_person_of, person_shown
+from lipmotion.pipeline.film.filmed_video import is_person_of, person_shown
 from lipmotion.pipeline.outputs.shown_faces import shown_face
 
 

@@ -15,9 +15,9 @@ from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError, ModelFormatError
 from lipmotion.export.base import read_motion
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.measures.report import figures_table
-from lipmotion.pipeline.evaluation.conditions import compared_clips, held_out_recordings
+from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.pipeline.evaluation.evaluate import evaluate
+from lipmotion.pipeline.evaluation.held_out import compared_clips, held_out_recordings
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import Model, load_model, save_model
 from lipmotion.pipeline.outputs.write import write

@@ -13,8 +13,8 @@ from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.model import Model, save_model
 from lipmotion.pipeline.training import train as module
+from lipmotion.pipeline.training.other_speakers import VoiceExample
 from lipmotion.pipeline.training.train import Run, about_training, model_motion, phones_of, train
-from lipmotion.pipeline.training.voices import VoiceExample
 from lipmotion.speech.features.mfcc import mfcc
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.testing.toy import toy_sentences

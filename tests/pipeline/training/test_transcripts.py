@@ -12,7 +12,7 @@ from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.training import transcripts as module
 from lipmotion.pipeline.training.train import train
 from lipmotion.pipeline.training.transcripts import (
-    MOST_NAMED,
+    MOST_NAMED_RECORDINGS,
     warn_of_doubtful_transcripts,
     warn_of_missing_transcripts,
 )
@@ -86,7 +86,9 @@ def test_without_general_models_nothing_is_measured(
 
 def test_only_some_are_named(labelled: Labelled, caplog: pytest.LogCaptureFixture) -> None:
     named = labelled[0][0]
-    many = [replace(named, name=f"take{number:02d}", words=None, phones=None) for number in range(MOST_NAMED + 4)]
+    many = [
+        replace(named, name=f"take{number:02d}", words=None, phones=None) for number in range(MOST_NAMED_RECORDINGS + 4)
+    ]
     warn_of_missing_transcripts([named, *many])
     (text,) = messages(caplog)
     assert "14 of 15 recordings" in text

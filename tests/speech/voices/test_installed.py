@@ -98,7 +98,7 @@ def test_a_sentence_that_festival_leaves_out_is_missed(faked: Path) -> None:
     assert list(faked.iterdir()) == []
 
 
-def test_temporary_files_go_even_if_not_all_is_heard(faked: Path) -> None:
+def test_temporary_files_go_even_if_not_all_is_read(faked: Path) -> None:
     said = speak_sentences(["hello", "hello"], FAKED[0])
     next(said)
     assert len(list(faked.iterdir())) == 1
@@ -216,12 +216,12 @@ def test_real_voices_say_what_the_dictionary_says(real: SyntheticVoice) -> None:
 
 
 @pytest.mark.long
-def test_the_times_of_real_voices_are_those_that_the_aligner_hears(real: SyntheticVoice, toy_model: Model) -> None:
+def test_the_times_of_real_voices_are_those_of_the_aligner(real: SyntheticVoice, toy_model: Model) -> None:
     recogniser, late_s = Recogniser(toy_model.phones, "general"), []
     for audio, units in speak_sentences(TEXTS, real):
         room = noisy_audio(audio, "white", 50)
         placed = recogniser.align_phones(room, mfcc(room), units)
-        said, heard = ([span for span in part if not is_silent(span.label.phone)] for part in (units, placed))
-        late_s += [a.start_s - b.start_s for a, b in zip(said, heard, strict=True)]
+        said, aligned = ([span for span in part if not is_silent(span.label.phone)] for part in (units, placed))
+        late_s += [a.start_s - b.start_s for a, b in zip(said, aligned, strict=True)]
     assert np.median(np.abs(late_s)) < 0.02  # two frames; flite 0.013, festival with kal 0.015
     assert abs(np.median(late_s)) < 0.02

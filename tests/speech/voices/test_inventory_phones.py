@@ -28,7 +28,7 @@ def cost_of(found: Sequence[str], wanted: Sequence[str]) -> float:
     matched = matches(found, wanted)
     pairs = [(f, wanted[m]) for f, m in zip(found, matched, strict=True) if m >= 0]
     gaps = len(found) + len(wanted) - 2 * len(pairs)
-    return sum(module._cost(*pair) for pair in pairs) + module.GAP * gaps
+    return sum(module._cost(*pair) for pair in pairs) + module.GAP_COST * gaps
 
 
 @settings(max_examples=40)
@@ -36,7 +36,7 @@ def cost_of(found: Sequence[str], wanted: Sequence[str]) -> float:
 def test_matches_are_the_cheapest(found: list[str], wanted: list[str]) -> None:
     matched = [match for match in matches(found, wanted) if match >= 0]
     assert matched == sorted(set(matched))
-    assert cost_of(found, wanted) == pytest.approx(least_cost(found, wanted, module._cost, module.GAP))
+    assert cost_of(found, wanted) == pytest.approx(least_cost(found, wanted, module._cost, module.GAP_COST))
 
 
 def test_unstressed_vowels_are_reduced_and_words_known() -> None:

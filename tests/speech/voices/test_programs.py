@@ -18,7 +18,12 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="the programs are scr
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
     """Small bounds."""
-    for name, value in {"LARGEST_PRINTED": 1000, "LARGEST_SOUND": 1000, "STILL_S": 0.15, "POLL_S": 0.01}.items():
+    for name, value in {
+        "LARGEST_OUTPUT_BYTES": 1000,
+        "LARGEST_SOUND_BYTES": 1000,
+        "STILL_S": 0.15,
+        "POLL_S": 0.01,
+    }.items():
         monkeypatch.setattr(programs, name, value)
 
 

@@ -11,12 +11,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
-from lipmotion.cli.terminal.output import write_bytes
+from lipmotion.cli.terminal.printing import write_bytes
 
 PIPE = "-"
 OPENED = ("/dev/fd/", "/dev/stdin", "/proc/self/fd/")
 """Where pipes are that the shell has opened for this process."""
-LARGEST = 1 << 32
+LARGEST_RECORDING_BYTES = 1 << 32
 """Most bytes of a recording from a pipe."""
 BLOCK = 1 << 20
 FORMATS = ("json", "csv")
@@ -46,7 +46,7 @@ def is_pipe(path: Path | str) -> bool:
 def read_pipe(path: Path) -> Iterator[Path]:
     """Yield the path of a recording; what comes through a pipe is kept in a temporary file meanwhile.
 
-    Raises InputError: nothing comes, or more than ``LARGEST`` bytes.
+    Raises InputError: nothing comes, or more than ``LARGEST_RECORDING_BYTES`` bytes.
     """
     if not is_pipe(path):
         yield path
@@ -92,8 +92,10 @@ def _copy(source: IO[bytes], target: IO[bytes]) -> None:
     size = 0
     while block := source.read(BLOCK):
         size += len(block)
-        if size > LARGEST:
-            raise InputError(f"more than {LARGEST} bytes come through the pipe; save the recording as a file first")
+        if size > LARGEST_RECORDING_BYTES:
+            raise InputError(
+                f"more than {LARGEST_RECORDING_BYTES} bytes come through the pipe; save the recording as a file first"
+            )
         target.write(block)
     if not size:
         raise InputError("nothing comes through the pipe; required: a recording, as of 'ffmpeg ... -f wav -'")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from lipmotion.cli.arguments.options import worker_count
 from lipmotion.cli.arguments.pipes import is_pipe
 from lipmotion.cli.terminal.outcome import outcome
-from lipmotion.cli.terminal.output import print_lines
+from lipmotion.cli.terminal.printing import print_lines
 from lipmotion.printable import printable
 
 if TYPE_CHECKING:

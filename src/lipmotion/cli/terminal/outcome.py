@@ -10,7 +10,7 @@ from lipmotion.extensions import failed_extension
 from lipmotion.printable import printable
 
 GONE = "the current folder has been deleted; go to one that exists"
-BEGIN, END = 700, 300
+HEAD_CHARACTERS, TAIL_CHARACTERS = 700, 300
 """Characters of a long line that are shown from its beginning and from its end."""
 
 
@@ -35,4 +35,8 @@ def one_line(message: object) -> str:
     """Return a message as a printable line of limited length; the middle of a longer one is left out, for its end says
     what to do."""
     line = printable(message)
-    return line if len(line) <= BEGIN + END else f"{line[:BEGIN]} ... {line[-END:]}"
+    return (
+        line
+        if len(line) <= HEAD_CHARACTERS + TAIL_CHARACTERS
+        else f"{line[:HEAD_CHARACTERS]} ... {line[-TAIL_CHARACTERS:]}"
+    )

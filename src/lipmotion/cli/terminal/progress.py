@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from typing import Any, Protocol
 
 from lipmotion.cli.terminal.events import JsonLines
-from lipmotion.cli.terminal.output import print_error, print_lines, with_program_name
+from lipmotion.cli.terminal.printing import print_error, print_lines, with_program_name
 from lipmotion.cli.terminal.stop import Stopper
 from lipmotion.printable import printable
 from lipmotion.types.progress import Item, Progress

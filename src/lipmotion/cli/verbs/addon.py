@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from lipmotion.cli.arguments.paths import add_output
-from lipmotion.cli.terminal.output import print_line
+from lipmotion.cli.terminal.printing import print_line
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

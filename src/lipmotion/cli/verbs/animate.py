@@ -8,7 +8,7 @@ from lipmotion.cli.arguments.declared import OF_ANIMATE, add_job_file, add_optio
 from lipmotion.cli.arguments.options import add_execution, worker_count
 from lipmotion.cli.arguments.pipes import add_pipe_format, is_pipe, read_pipe, written_pipe
 from lipmotion.cli.arguments.several import animated_one_by_one
-from lipmotion.cli.terminal.output import print_note
+from lipmotion.cli.terminal.printing import print_note
 from lipmotion.pipeline.job import Outputs, Request
 from lipmotion.printable import printable
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from lipmotion.cli.terminal.output import print_lines
+from lipmotion.cli.terminal.printing import print_lines
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

@@ -6,7 +6,7 @@ import argparse
 
 from lipmotion.cli.arguments.declared import add_options
 from lipmotion.cli.arguments.paths import add_input
-from lipmotion.cli.terminal.output import print_error, print_line
+from lipmotion.cli.terminal.printing import print_error, print_line
 from lipmotion.pipeline.job import Request
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from lipmotion.cli.arguments.paths import add_input
-from lipmotion.cli.terminal.output import print_line
+from lipmotion.cli.terminal.printing import print_line
 
 
 def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 from lipmotion.cli.arguments.declared import add_options, part_of
 from lipmotion.cli.arguments.paths import add_output
 from lipmotion.cli.arguments.pipes import is_pipe, read_pipe
-from lipmotion.cli.terminal.output import flush_output, print_line, print_lines
+from lipmotion.cli.terminal.printing import flush_output, print_line, print_lines
 from lipmotion.cli.terminal.status import status_lines
 from lipmotion.pipeline.job import Request
 from lipmotion.types.delivery import Delivery
@@ -61,11 +61,11 @@ def run(options: argparse.Namespace) -> None:
         delivery = edits.edits.delivery(delivery)
         set_progress(0.9)
         sheet = cues(result, fps=options.fps, hold_frames=options.hold, shapes=options.shapes, delivery=delivery)
-        heard_in = "" if piped else speech
-        write_cues(sheet, options.output, speech=heard_in, form=options.format)
+        speech_path = "" if piped else speech
+        write_cues(sheet, options.output, speech=speech_path, form=options.format)
         set_progress(1.0)
         for path in options.output:
             print_line(path)
         if not options.output:
-            print_lines(cue_text(sheet, speech=heard_in, form=options.format or "tsv").removesuffix("\n"))
+            print_lines(cue_text(sheet, speech=speech_path, form=options.format or "tsv").removesuffix("\n"))
         flush_output()

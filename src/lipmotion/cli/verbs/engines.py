@@ -28,7 +28,7 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Call ``experiment.engines`` and print its table."""
-    from lipmotion.experiments.engines.comparison import engines
+    from lipmotion.experiments.engines.engine_comparison import engines
     from lipmotion.experiments.engines.text import table
 
     def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:

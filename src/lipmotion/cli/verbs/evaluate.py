@@ -27,7 +27,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.evaluate`` and print its figures."""
     from lipmotion.corpora.store import Corpus, Selection
-    from lipmotion.measures.report import figures_table
+    from lipmotion.measures.evaluation_table import figures_table
     from lipmotion.pipeline.evaluation.evaluate import evaluate
     from lipmotion.pipeline.model import load_model
     from lipmotion.types import Monitor

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from lipmotion.cli.arguments.paths import add_input
-from lipmotion.cli.terminal.output import print_line, print_lines
+from lipmotion.cli.terminal.printing import print_line, print_lines
 
 OF_PRIOR = ("engine", "corpus", "split", "utterances", "minutes", "licence", "attribution")
 """What is printed of the model on which a model stands and which is part of its file."""

@@ -42,8 +42,8 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.corpora.store import Corpus, Selection
     from lipmotion.engines import engine_from_settings
     from lipmotion.pipeline.model import save_model
+    from lipmotion.pipeline.training.other_speakers import other_voices
     from lipmotion.pipeline.training.train import Run, train
-    from lipmotion.pipeline.training.voices import other_voices
     from lipmotion.storage.files import unfinished_work
     from lipmotion.units import Lexicon
 

@@ -30,7 +30,7 @@ from lipmotion.errors import InputError
 from lipmotion.storage.files import check_regular
 from lipmotion.types import TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
 from lipmotion.units import phone_named, words_of
-from lipmotion.units.length_limits import LARGEST_TRANSCRIPT
+from lipmotion.units.length_limits import LARGEST_TRANSCRIPT_BYTES
 
 LOG = logging.getLogger("lipmotion")
 RECOGNISED = (".srt", ".vtt", ".ass", ".ssa", ".json", ".ctm", ".tsv")
@@ -223,8 +223,10 @@ def _spoken(transcript: TimedTranscript) -> RecordingLabels:
 
 def check_size(path: Path, text: str) -> None:
     """Raise InputError for more plain text than a transcript has."""
-    if len(text) > LARGEST_TRANSCRIPT:
-        raise InputError(f"{path}: {len(text)} characters, required at most {LARGEST_TRANSCRIPT}: is it a transcript?")
+    if len(text) > LARGEST_TRANSCRIPT_BYTES:
+        raise InputError(
+            f"{path}: {len(text)} characters, required at most {LARGEST_TRANSCRIPT_BYTES}: is it a transcript?"
+        )
 
 
 def _chosen(tiers: list[LabelTier], where: str) -> RecordingLabels:

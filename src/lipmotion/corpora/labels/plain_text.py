@@ -16,7 +16,7 @@ MASTER = "#!MLF!#"
 """The start of HTK's master label files, which hold the labels of many recordings."""
 MARKUP = re.compile(r'\{\\rtf|<[!?a-zA-Z]|\{\s*"|\[\s*[\[{]')
 """The start of RTF, HTML, XML and JSON."""
-LINES_JUDGED = 1000
+JUDGED_LINES = 1000
 """Lines of a text that are judged for whether they hold times."""
 NUMBERED = re.compile(r"[-+.]?\d|nan\b|[-+]?inf\b")
 TIME = re.compile(r"(?<![\w.])(?:\d*\.\d+|\d{5,})(?![\w.])")
@@ -60,7 +60,7 @@ def check_no_labels(text: str, where: str) -> None:
 def _seems_timed(text: str) -> bool:
     """Return whether most of the first lines begin with a number and some with a time, or half hold two times."""
     lines = numbered = timed = with_two = 0
-    for line in islice(_body(text), LINES_JUDGED):
+    for line in islice(_body(text), JUDGED_LINES):
         lines += 1
         numbered += NUMBERED.match(line) is not None
         times = sum(1 for _, _ in zip(TIME.finditer(line), "12", strict=False))

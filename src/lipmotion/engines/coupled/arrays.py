@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.coupled.chains.densities import StreamGroup
-from lipmotion.engines.coupled.chains.factorial import FactorialProduct, FactorialTransitions
+from lipmotion.engines.coupled.chains.factorial_lattice import FactorialProduct, FactorialTransitions
 from lipmotion.engines.coupled.chains.model import Chains
 from lipmotion.engines.coupled.chains.product import Grammar, reachable
 from lipmotion.engines.coupled.chains.structures import FACTORIAL, Structure
 from lipmotion.engines.coupled.chains.transitions import Transitions
 from lipmotion.engines.coupled.chains.visual_streams import VisualStream
 from lipmotion.engines.coupled.config import CoupledConfig
-from lipmotion.engines.coupled.conversion.regression import OFFSETS, RegressionInputs, VisualRegression
+from lipmotion.engines.coupled.conversion.mean_regression import OFFSETS, RegressionInputs, VisualRegression
 from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.motion.arrays import MOTION_ARRAYS, PHONE_SET, motion_arrays, motion_from_arrays
@@ -26,9 +26,9 @@ from lipmotion.stats.bigram import check_sums_to_one
 from lipmotion.stats.mixture import MIXTURES, mixtures_from_arrays
 from lipmotion.storage.schema import (
     BELOW_ONE,
+    LARGEST_MEAN,
     LARGEST_VARIANCE,
     POSITIVE,
-    STANDARD,
     Arrays,
     ArraySpec,
     arrays_under,
@@ -148,7 +148,7 @@ GROUP = {
 REGRESSION_INPUTS = {
     **WINDOW,
     "belief": ArraySpec(np.float32, "N B", -1.01, 1.01),
-    "mean": ArraySpec(np.float32, "I", -STANDARD, STANDARD),
+    "mean": ArraySpec(np.float32, "I", -LARGEST_MEAN, LARGEST_MEAN),
     "basis": ArraySpec(np.float32, "I F", -1.01, 1.01),
 }
 VISUAL_REGRESSION = {

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from lipmotion.engines.coupled.chains.structures import STRUCTURES, SYSTEMS, structure_of
-from lipmotion.engines.coupled.conversion.em import EXACT, SOFT, STARTS, UPDATES, ConversionSettings
+from lipmotion.engines.coupled.conversion.em_conversion import EXACT, SOFT, STARTS, UPDATES, ConversionSettings
 from lipmotion.types import Configuration, Rule, option
 
 TRAJECTORY, FRAMES, PATH = "trajectory", "em", "viterbi"
@@ -33,7 +33,7 @@ class CoupledConfig(Configuration):
                  and of eigenlips
     conversion : ``trajectory``: parameter generation from expected precisions and means of static values, Δ and Δ²;
                  ``em``: the paper's, frame by frame;  ``viterbi``: means along the best path
-    start, update, steps : of the EM of conversion (``conversion.em.ConversionSettings``); ``trajectory`` takes no
+    start, update, steps : of EM conversion (``conversion.em_conversion.ConversionSettings``); ``trajectory`` takes no
                  steps after its soft start unless asked to
     acoustic_regression : regress visual means on the acoustic features and state posteriors around the frame
                  (``trajectory`` only)

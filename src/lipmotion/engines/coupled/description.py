@@ -7,7 +7,7 @@ from textwrap import wrap
 
 from lipmotion.engines.coupled.chains.product import Product
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM
-from lipmotion.engines.coupled.conversion.em import group_index
+from lipmotion.engines.coupled.conversion.em_conversion import group_index
 from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.printable import printable
 

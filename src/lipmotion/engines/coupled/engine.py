@@ -16,12 +16,12 @@ from lipmotion.engines.coupled.chains.densities import Single
 from lipmotion.engines.coupled.chains.lattice import Lattice
 from lipmotion.engines.coupled.chains.model import Inference
 from lipmotion.engines.coupled.config import PATH, TRAJECTORY, CoupledConfig
-from lipmotion.engines.coupled.conversion.em import convert, path_means
+from lipmotion.engines.coupled.conversion.em_conversion import convert, path_means
 from lipmotion.engines.coupled.description import describe
 from lipmotion.engines.coupled.explanation import concatenated, explain_frames, unit_posteriors
 from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.engines.coupled.training.alignment import allowed_units
-from lipmotion.engines.coupled.training.fit import fit_coupled
+from lipmotion.engines.coupled.training.coupled_training import fit_coupled
 from lipmotion.kernels.sequences.banded import generate
 from lipmotion.motion.generation import Statistics, generation_blocks
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint

@@ -14,8 +14,8 @@ from lipmotion.engines.coupled.chains.model import Chains, Inference
 from lipmotion.engines.coupled.chains.product import Product
 from lipmotion.engines.coupled.chains.structures import Structure
 from lipmotion.engines.coupled.chains.visual_streams import VisualStream
-from lipmotion.engines.coupled.conversion.em import group_index
-from lipmotion.engines.coupled.conversion.regression import regression_weights
+from lipmotion.engines.coupled.conversion.em_conversion import group_index
+from lipmotion.engines.coupled.conversion.mean_regression import regression_weights
 from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.types import (
     ChainPosteriors,

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, Single
 from lipmotion.engines.coupled.chains.model import Chains, Inference
 from lipmotion.engines.coupled.chains.visual_streams import VisualStream, speech_observations
-from lipmotion.engines.coupled.conversion.em import precision_statistics
-from lipmotion.engines.coupled.conversion.regression import RegressionInputs, VisualRegression
+from lipmotion.engines.coupled.conversion.em_conversion import precision_statistics
+from lipmotion.engines.coupled.conversion.mean_regression import RegressionInputs, VisualRegression
 from lipmotion.motion.articulation import ArticulationPrior
 from lipmotion.motion.closure import Closure
 from lipmotion.motion.generation import LearnedMotion
@@ -25,7 +25,7 @@ from lipmotion.types import FRAME_RATE_HZ
 Array = NDArray[np.float64]
 AWAY_FROM_SPEECH_S = 0.45
 """In silence this far from speech the mouth is in the rest pose; nearer, it is still closing or gets ready."""
-MOST_SPEECH = 0.05
+LARGEST_SPEECH_POSTERIOR = 0.05
 """Greatest posterior of speech in a frame that counts as silent."""
 REST_PRECISION_FACTOR = 100.0
 """How many times more precise the rest pose is than the means that it replaces."""
@@ -141,7 +141,7 @@ class CoupledModel:
         """
         structure = self.chains.structure
         silent = np.repeat([structure.chains[0].silent(unit) for unit in structure.units[0]], structure.states)
-        speech = posterior @ (~silent).astype(np.float32) > MOST_SPEECH
+        speech = posterior @ (~silent).astype(np.float32) > LARGEST_SPEECH_POSTERIOR
         reach = round(AWAY_FROM_SPEECH_S * FRAME_RATE_HZ)
         speech_before = np.cumsum(np.pad(speech.astype(np.intp), (reach + 1, reach)))
         return np.asarray(speech_before[2 * reach + 1 :] == speech_before[: -2 * reach - 1])

@@ -16,12 +16,12 @@ from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.multistream.align import StatePath, align
 from lipmotion.hmm.multistream.arrays import joint_arrays, joint_from_arrays
 from lipmotion.hmm.multistream.generate import densities_of_path, densities_of_paths, single_gaussians
-from lipmotion.hmm.multistream.inventory import Inventory
-from lipmotion.hmm.multistream.labels import units_in_frames, units_in_time
 from lipmotion.hmm.multistream.model import JointConfig, JointHmm
+from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, train_joint
 from lipmotion.hmm.multistream.recognise import joint_recogniser
 from lipmotion.hmm.multistream.streams import MOTION, StreamObservations, StreamWeights, stream_observations
-from lipmotion.hmm.multistream.train import TrainingUtterance, train_joint
+from lipmotion.hmm.multistream.unit_frames import units_in_frames, units_in_time
+from lipmotion.hmm.multistream.unit_states import Inventory
 from lipmotion.motion.arrays import MOTION_ARRAYS, motion_arrays, motion_from_arrays
 from lipmotion.motion.articulation import ArticulationPrior, fit_articulation_prior
 from lipmotion.motion.closure import Closure, fit_closure

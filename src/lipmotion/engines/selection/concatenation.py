@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-from lipmotion.engines.selection.costs import AFTER, BEFORE, HARD, NONE, Costs, Target
+from lipmotion.engines.selection.costs import ABUTTING_JOIN, JOIN_AFTER, JOIN_BEFORE, NO_JOIN, Costs, Target
 from lipmotion.engines.selection.inventory import RecordedUnits, UnitNumbers
 from lipmotion.engines.selection.lip_reading import PROTECTED_PHONES
 from lipmotion.types import FRAME_RATE_HZ
 from lipmotion.units import PHONES, is_silent
 
 Array = NDArray[np.float64]
-HARD_SMOOTHING = 0.05
+SMOOTHED_SHARE = 0.05
 """Share of two abutting pieces, at the end of the first and at the start of the second, that is smoothed (§4)."""
 LEAST_OVERLAP_S, MOST_OVERLAP_S = 0.02, 0.15
 """Pieces overlap from at least so much, two frames, to at most so much before and after a soft join."""
@@ -36,7 +36,7 @@ class Piece:
 
     first, stop : the phones of the target
     unit        : the unit of the first phone; the others follow it in the inventory
-    join        : kind of the join with the piece before: ``HARD``, ``BEFORE`` or ``AFTER``
+    join        : kind of the join with the piece before: ``ABUTTING_JOIN``, ``JOIN_BEFORE`` or ``JOIN_AFTER``
     start_s     : time of that join in the target; the piece counts for half there
     overlap_s   : the pieces overlap from so much before this time to so much after it; 0 for a hard join
     """
@@ -55,19 +55,19 @@ def pieces_of(costs: Costs, target: Target, units: UnitNumbers) -> list[Piece]:
     units : one for each phone of the target
     In one phone there is one overlap at most: where the search has two, the second join is of the next best kind.
     """
-    kinds = [HARD]
+    kinds = [ABUTTING_JOIN]
     for number in range(1, len(units)):
         pair = int(units[number - 1]), int(units[number])
-        is_cut = kinds[-1] == AFTER  # the phone before is one in which two pieces overlap already
+        is_cut = kinds[-1] == JOIN_AFTER  # the phone before is one in which two pieces overlap already
         kinds.append(costs.join_kind(target, number, *pair, may_be_before=not is_cut))
-    firsts = [number for number, kind in enumerate(kinds) if number == 0 or kind != NONE]
+    firsts = [number for number, kind in enumerate(kinds) if number == 0 or kind != NO_JOIN]
     times_s = target.windows.times_s
     pieces = []
     latest_s = -np.inf
     for first, stop in zip(firsts, [*firsts[1:], len(units)], strict=True):
         start_s, overlap_s = float(times_s[first, 0]), 0.0
-        if first and kinds[first] in (BEFORE, AFTER):
-            shared = first - 1 if kinds[first] == BEFORE else first
+        if first and kinds[first] in (JOIN_BEFORE, JOIN_AFTER):
+            shared = first - 1 if kinds[first] == JOIN_BEFORE else first
             share, (begin_s, end_s) = costs.forward_share(target, shared), times_s[shared].tolist()
             start_s = begin_s + share * (end_s - begin_s)
             overlap_s = float(np.clip(min(share, 1 - share) * (end_s - begin_s), LEAST_OVERLAP_S, MOST_OVERLAP_S))
@@ -100,7 +100,7 @@ def concatenated(inventory: RecordedUnits, target: Target, pieces: list[Piece], 
         total[used] += weight[:, None]
     result /= np.maximum(total, LEAST_WEIGHT)
     for sides in pairwise(zip(pieces, clocks, strict=True)):
-        if sides[1][0].join == HARD:
+        if sides[1][0].join == ABUTTING_JOIN:
             _smooth(inventory, target, sides, time_s, result)
     return result
 
@@ -110,8 +110,8 @@ def shown_units(target: Target, pieces: Sequence[Piece], frames: int) -> UnitNum
     time_s = np.arange(frames) / FRAME_RATE_HZ + ROUNDING_S
     leading = np.maximum(np.searchsorted([piece.start_s for piece in pieces], time_s, side="right") - 1, 0)
     numbers = np.maximum(np.searchsorted(target.windows.times_s[:, 0], time_s, side="right") - 1, 0)
-    followed = [piece.join == AFTER for piece in pieces[1:]] + [False]
-    lowest = np.array([piece.first - (piece.join == BEFORE) for piece in pieces])[leading]
+    followed = [piece.join == JOIN_AFTER for piece in pieces[1:]] + [False]
+    lowest = np.array([piece.first - (piece.join == JOIN_BEFORE) for piece in pieces])[leading]
     highest = np.array([piece.stop - 1 + more for piece, more in zip(pieces, followed, strict=True)])[leading]
     shift = np.array([piece.unit - piece.first for piece in pieces])[leading]
     return np.clip(numbers, lowest, highest) + shift
@@ -135,8 +135,8 @@ class TimeMap:
 
         following : the piece after it (None: it is the last)
         """
-        first = piece.first - (piece.join == BEFORE)
-        stop = piece.stop + (following is not None and following.join == AFTER)
+        first = piece.first - (piece.join == JOIN_BEFORE)
+        stop = piece.stop + (following is not None and following.join == JOIN_AFTER)
         shift = piece.unit - piece.first
         times = np.array([pair for number in range(first, stop) for pair in _knots(inventory, target, number, shift)])
         kept = np.append(np.diff(times[:, 0]) > SHORTEST_S, True)
@@ -189,8 +189,8 @@ def _smooth(
     kept = [is_protected(target, number) for number in (after.first - 1, after.first)]
     shares = (0.0, 1.0) if kept[0] and not kept[1] else (1.0, 0.0) if kept[1] and not kept[0] else (0.5, 0.5)
     spans_s = (
-        HARD_SMOOTHING * (join_s - times_s[before.first, 0]),
-        HARD_SMOOTHING * (times_s[after.stop - 1, 1] - join_s),
+        SMOOTHED_SHARE * (join_s - times_s[before.first, 0]),
+        SMOOTHED_SHARE * (times_s[after.stop - 1, 1] - join_s),
     )
     for side, (share, span_s) in enumerate(zip(shares, spans_s, strict=True)):
         width_s = float(np.clip(span_s, LEAST_OVERLAP_S, MOST_OVERLAP_S))

@@ -29,7 +29,7 @@ FRACTIONS = (np.arange(POINTS) + 0.5) / POINTS
 PER_S = 10.0
 """Costs of the guide are given for a tenth of a second."""
 LEAST_S = 0.01
-HARD, BEFORE, AFTER, NONE = 0, 1, 2, 3
+ABUTTING_JOIN, JOIN_BEFORE, JOIN_AFTER, NO_JOIN = 0, 1, 2, 3
 """Kinds of a join: units abut; they overlap in the phone before it; in the phone after it; they were recorded in
 succession, so that nothing is joined."""
 _CONSONANTS = frozenset(PHONES) - frozenset(CLASSES["vowel"]) - frozenset(CLASSES["silence"])
@@ -42,14 +42,14 @@ class Target:
     windows  : the phones, each present in the inventory or replaced by one that is [U phones]
     contexts : the symbols of their windows [shape=(U, N)]
     guided   : the motion that the guide predicts, as wide as recorded motion, times ``scale`` [shape=(U, POINTS, Q)]
-    heard    : what it predicts, as it is, times ``scale`` [shape=(U, POINTS, Q)]; both None: there is no guide
+    predicted : what it predicts, as it is, times ``scale`` [shape=(U, POINTS, Q)]; both None: there is no guide
     by_sound : whether the phones are not known, so that the guide alone chooses
     """
 
     windows: PhoneWindows
     contexts: NDArray[np.intp]
     guided: Array | None
-    heard: Array | None
+    predicted: Array | None
     by_sound: bool = False
 
     def __len__(self) -> int:
@@ -82,18 +82,18 @@ class Costs:
         return standing_in(self.inventory.windows, self.inventory.usable)
 
     def target(
-        self, windows: PhoneWindows, guided: Array | None, heard: Array | None, *, by_sound: bool = False
+        self, windows: PhoneWindows, guided: Array | None, predicted: Array | None, *, by_sound: bool = False
     ) -> Target:
         """Return phones in a form that can be compared with units.
 
         by_sound : as of ``Target``
-        guided, heard : predicted motion at ``POINTS`` of each phone [each shape=(U, POINTS, Q)]
+        guided, predicted : predicted motion at ``POINTS`` of each phone [each shape=(U, POINTS, Q)]
         """
         known = replaced(windows, self.stand_ins)
         contexts = known.contexts(self.config.invisible_phones, self.config.window // 2)
-        if guided is None or heard is None:
+        if guided is None or predicted is None:
             return Target(known, contexts, None, None)
-        return Target(known, contexts, guided * self.scale, heard * self.scale, by_sound)
+        return Target(known, contexts, guided * self.scale, predicted * self.scale, by_sound)
 
     def target_costs(self, target: Target, number: int, units: UnitNumbers) -> Array:
         """Return the cost of each of some units for one phone [shape=(N,)]."""
@@ -102,10 +102,10 @@ class Costs:
         duration_s = max(float(target.windows.durations_s[number]), LEAST_S)
         costs += config.duration * np.abs(np.log(np.maximum(windows.durations_s[units], LEAST_S) / duration_s))
         is_shown = target.by_sound or target.symbol(number) != INVISIBLE_SYMBOL
-        if is_shown and target.guided is not None and target.heard is not None and self._recorded is not None:
+        if is_shown and target.guided is not None and target.predicted is not None and self._recorded is not None:
             distance = np.square(self._recorded[units] - target.guided[number]).mean(axis=1).sum(axis=1)
             if self._predicted is not None and config.trust:
-                unlike = np.square(self._predicted[units] - target.heard[number]).mean(axis=1).sum(axis=1)
+                unlike = np.square(self._predicted[units] - target.predicted[number]).mean(axis=1).sum(axis=1)
                 distance *= np.minimum(unlike / config.trust**2, 1)
             costs += config.guide * PER_S * duration_s * distance
         return costs
@@ -137,10 +137,10 @@ class Costs:
         """
         pair = np.array([left]), np.array([right])
         if self._succeed(*pair)[0, 0]:
-            return NONE
+            return NO_JOIN
         costs = [cost[0, 0] for cost in self._joins(target, number, *pair)]
         if not may_be_before:
-            costs[BEFORE] = np.inf
+            costs[JOIN_BEFORE] = np.inf
         return int(np.argmin(costs))
 
     def forward_share(self, target: Target, shared: int) -> float:
@@ -151,7 +151,7 @@ class Costs:
         return OVERLAPS[self.config.overlap][before, after]
 
     def _joins(self, target: Target, number: int, left: UnitNumbers, right: UnitNumbers) -> tuple[Array, Array, Array]:
-        """Return the costs of the joins of kind ``HARD``, ``BEFORE`` and ``AFTER``; infinite where there is none."""
+        """Return the costs of joins: ``ABUTTING_JOIN``, ``JOIN_BEFORE``, ``JOIN_AFTER``; infinite where none is."""
         config, continues, symbols = self.config, self.inventory.windows.continues, self.index.contexts
         middle = symbols.shape[1] // 2
         before, after = (PHONES[target.windows.phones[n]] for n in (number - 1, number))

@@ -15,16 +15,16 @@ from lipmotion.engines.base import Arrays, Engine, Fit, Inputs, SourcePiece
 from lipmotion.engines.selection.concatenation import concatenated, pieces_of, shown_units
 from lipmotion.engines.selection.config import SelectionConfig
 from lipmotion.engines.selection.costs import Costs, Target
+from lipmotion.engines.selection.inventory_text import inventory_text, is_source, source_of, units_by_source
 from lipmotion.engines.selection.model import SelectionModel, model_arrays, model_from_arrays
-from lipmotion.engines.selection.report import inventory_text, is_source, source_of, units_by_source
 from lipmotion.engines.selection.search import select
-from lipmotion.engines.selection.sources import source_pieces, typical_duration_s, with_sources
+from lipmotion.engines.selection.selection_training import fit_selection
+from lipmotion.engines.selection.source_recordings import source_pieces, typical_duration_s, with_sources
 from lipmotion.engines.selection.targets import target_of
-from lipmotion.engines.selection.train import fit_selection
 from lipmotion.errors import InputError
 from lipmotion.motion.generation import Statistics
 from lipmotion.motion.predictors import needs_conditions
-from lipmotion.motion.rest import away_from_speech, runs, speech_intervals, unheard_frames
+from lipmotion.motion.rest import away_from_speech, digital_silence, runs, speech_intervals
 from lipmotion.printable import printable
 from lipmotion.stats.delta_windows import with_dynamics
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
@@ -44,7 +44,7 @@ from lipmotion.units import SILENCE, is_silent
 
 Array = NDArray[np.float64]
 LOG = logging.getLogger("lipmotion")
-SHOWN = 3
+NAMED_UNITS = 3
 """Units that one warning names."""
 SETTLED_S = 0.06
 """Half of the rest pose is left so long before the first phone, and reached so long after the last one."""
@@ -136,8 +136,8 @@ class SelectionEngine(Engine[SelectionModel]):
         )
         sources = [source_of(model.inventory, unit) for unit in units.tolist()]
         starts_s = target.windows.times_s[:, 0]
-        heard, places = np.unique(shown_units(target, pieces, frames), return_inverse=True)
-        trace = StateTrace(tuple(source_of(model.inventory, unit) for unit in heard.tolist()), places.astype(np.intp))
+        shown, places = np.unique(shown_units(target, pieces, frames), return_inverse=True)
+        trace = StateTrace(tuple(source_of(model.inventory, unit) for unit in shown.tolist()), places.astype(np.intp))
         return Generation(motion, variance, with_sources(speech.units, starts_s, sources), trace)
 
     def recordings(self, model: SelectionModel) -> tuple[str, ...]:  # noqa: D102
@@ -172,13 +172,13 @@ def _resting(features: NDArray[np.floating], units: Timeline[Unit], *, always: b
     features : acoustic features [shape=(T, D)]
     always   : whether it is 1 in every silence, for no silence was recorded
     """
-    unheard = np.ones(len(features), bool) if always else unheard_frames(features, units)
-    if not unheard.any():
+    silent = np.ones(len(features), bool) if always else digital_silence(features, units)
+    if not silent.any():
         return np.zeros(len(features))
     away = away_from_speech(np.arange(len(features)) / FRAME_RATE_HZ, speech_intervals(units), SETTLED_S)
     resting = np.zeros(len(features))
     for first, stop in runs(away):
-        resting[first:stop] = float(unheard[first:stop].any())
+        resting[first:stop] = float(silent[first:stop].any())
     width = round(SETTLED_S * FRAME_RATE_HZ)
     window = np.hanning(2 * width + 1)
     padded = np.pad(resting, width, mode="edge")
@@ -204,10 +204,10 @@ def _given(costs: Costs, target: Target, units: Timeline[Unit]) -> dict[int, int
         else:
             useless.append(f"{span.label.phone} at {span.start_s:.2f} s: {span.label.unit!r}")
     if useless:
-        more = f" and {len(useless) - SHOWN} more" if len(useless) > SHOWN else ""
+        more = f" and {len(useless) - NAMED_UNITS} more" if len(useless) > NAMED_UNITS else ""
         LOG.warning(
             "%d of %d units name no recorded unit of their phone in this model (%s%s); these phones are selected again",
-            *(len(useless), len(units), printable("; ".join(useless[:SHOWN])), more),
+            *(len(useless), len(units), printable("; ".join(useless[:NAMED_UNITS])), more),
         )
     return given
 

@@ -15,7 +15,7 @@ from lipmotion.types.motion import between_frames
 
 Array = NDArray[np.float64]
 LEAST_EXPANSION, MOST_EXPANSION = 1.0, 1.6
-UNHEARD_EXPANSION = 1.05
+NEW_SPEECH_EXPANSION = 1.05
 """Predictions for new recordings are so much narrower again than those for recordings of the training."""
 
 
@@ -48,7 +48,7 @@ def fit_guide(predictor: Predictor, examples: Sequence[Example], values: Sequenc
     """
     recorded = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
     predicted = np.concatenate([predictor.predict(e.speech)[0][e.valid] for e in examples])
-    ratio = UNHEARD_EXPANSION * recorded.std(axis=0) / np.maximum(predicted.std(axis=0), 1e-9)
+    ratio = NEW_SPEECH_EXPANSION * recorded.std(axis=0) / np.maximum(predicted.std(axis=0), 1e-9)
     return Guide(predictor, recorded.mean(axis=0), np.clip(ratio, LEAST_EXPANSION, MOST_EXPANSION))
 
 

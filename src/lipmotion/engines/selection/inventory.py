@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.selection.windows import PHONE_NUMBER, SYMBOLS, PhoneWindows
-from lipmotion.motion.store import MotionStore
+from lipmotion.motion.motion_store import MotionStore
 from lipmotion.types import FRAME_RATE_HZ
 from lipmotion.units import PHONES, most_similar_lips
 

@@ -22,8 +22,8 @@ from lipmotion.hmm.multistream.phone_recogniser import (
 )
 from lipmotion.motion.arrays import LEARNED_MOTION_ARRAYS, learned_motion_arrays, learned_motion_from_arrays
 from lipmotion.motion.generation import LearnedMotion
+from lipmotion.motion.motion_store import motion_store_arrays, motion_store_from_arrays
 from lipmotion.motion.predictors import names_of_predictors, predictor_arrays, predictor_from_arrays
-from lipmotion.motion.store import motion_store_arrays, motion_store_from_arrays
 from lipmotion.storage.schema import (
     POSITIVE,
     Arrays,
@@ -37,7 +37,7 @@ from lipmotion.types import FRAME_RATE_HZ
 from lipmotion.units import PHONES
 
 Array = NDArray[np.float64]
-MOST_SILENCE = 100
+LONGEST_SILENCE_FRAMES = 100
 """At least one of so many frames is stored."""
 LATE_S = 1.0
 """Units end at most so long after the motion of their recording."""
@@ -180,8 +180,10 @@ def _check(inventory: RecordedUnits, dimensions: int) -> None:
     if (windows.durations_s < 0).any() or not inventory.usable.any():
         raise ValueError("units of negative duration, or none that is usable")
     stored = int(np.diff(motion.kept, axis=1).sum())
-    if len(motion) > MOST_SILENCE * stored:
-        raise ValueError(f"{stored} of {len(motion)} frames of motion are stored, required 1 of {MOST_SILENCE}")
+    if len(motion) > LONGEST_SILENCE_FRAMES * stored:
+        raise ValueError(
+            f"{stored} of {len(motion)} frames of motion are stored, required 1 of {LONGEST_SILENCE_FRAMES}"
+        )
     ends_s = np.diff(first)[windows.recording] / FRAME_RATE_HZ + LATE_S
     if (windows.times_s[:, 1] > ends_s).any():
         raise ValueError("units beyond the end of their recording")

@@ -27,7 +27,7 @@ def target_of(
     """Return the phones of speech, with the motion that the guide predicts from its sound.
 
     guiding : motion in the motion space, as wide as recorded motion, that guides instead of the prediction
-              [shape=(T, Q)]; what is ``heard`` is still the model's own prediction. None: the prediction guides
+              [shape=(T, Q)]; what is ``predicted`` is still the model's own prediction. None: the prediction guides
     Where noise makes the recognised phones of a recording unreliable on the whole, the target is segments of equal
     duration, for which the sound alone chooses.
     Raises InputError: an unknown phone.

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lipmotion.engines.trajectory.emission import AcousticRegression, Emission, add_acoustic_regression
 from lipmotion.engines.trajectory.training_data import TrainingClip, TrainingOptions, density_rows
 from lipmotion.motion.context_window import AcousticContext, fit_acoustic_context
-from lipmotion.stats.regression import (
+from lipmotion.stats.tree_regression import (
     RegressionStatistics,
     fit_tree_regressions,
     regression_node,

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs
 from lipmotion.engines.trajectory.experts import Experts
 from lipmotion.engines.trajectory.model import TrajectoryModel, model_arrays, model_from_arrays
-from lipmotion.engines.trajectory.train import fit_trajectory
 from lipmotion.engines.trajectory.training_data import TrainingOptions
+from lipmotion.engines.trajectory.trajectory_training import fit_trajectory
 from lipmotion.motion.frame_labels import StateLayout, full_context_states, with_unit_names
 from lipmotion.motion.predictors import AUTOMATIC, check_predictor, needs_conditions
-from lipmotion.motion.rest import unheard_frames
+from lipmotion.motion.rest import digital_silence
 from lipmotion.printable import printable
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import (
@@ -57,7 +57,7 @@ class TrajectoryConfig(Configuration):
     closures   : make the lips meet in every p, b and m, whatever their units are
     joint_recogniser : train the joint model as well, where there is enough speech: it recognises the phones of
                  speakers that it was trained on
-    conditions : acoustic conditions in which each recording is heard in the training of the acoustic network; 0: no
+    conditions : acoustic conditions in which each recording is used in the training of the acoustic network; 0: no
                  network
     epochs     : how often the training of the network uses each recording
     predictor  : name of the predictor beside the states (docs/extend/predictor.md); ``auto``: an acoustic network, or,
@@ -157,7 +157,7 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
         path = np.array([distinct[state] for state in states], np.intp)
         rows = np.array([model.emission.row(state, layout) for state in distinct], np.intp)
         densities = rows[path]
-        densities[unheard_frames(np.asarray(speech.features.values), speech.units)] = len(model.emission.means) - 1
+        densities[digital_silence(np.asarray(speech.features.values), speech.units)] = len(model.emission.means) - 1
         experts = Experts(model.emission, densities, speech, model.network, model.prior, model.network_share)
 
         learned = model.motion if self.config.variance_scaling else replace(model.motion, scaling=None)

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import MissingDependencyError
-from lipmotion.experiments.baselines.regression import Array, Baseline, Float32Array
+from lipmotion.experiments.baselines.frame_regression import Array, Baseline, Float32Array
 from lipmotion.types import Monitor, with_progress
 
 UNITS, LAYERS = 192, 2
-STACKED = 4
+STACKED_FRAMES = 4
 """Frames of features in one time step of the network: its steps are as far apart as the pictures of a video."""
 EPOCHS, BATCH_SIZE, LEARNING_RATE = 40, 8, 4e-3
 DROPOUT = 0.3
@@ -82,7 +82,7 @@ class BlstmBaseline(Baseline):
         torch = import_torch()
         with torch.no_grad():
             steps = learned.network(torch.from_numpy(_stacked(features))[None])[0].numpy().astype(float)
-        positions = np.arange(len(features)) / STACKED
+        positions = np.arange(len(features)) / STACKED_FRAMES
         curves = [np.interp(positions, np.arange(len(steps)), step) for step in steps.T]
         return np.stack(curves, axis=1) * learned.deviation + learned.mean
 
@@ -135,10 +135,10 @@ def _step(
 
 def _stacked(features: Float32Array) -> Float32Array:
     """Return each fourth frame with its neighbours, side by side [shape=(ceil(T / 4), 4·39)]."""
-    centres = np.arange(0, len(features), STACKED)
-    frames = np.clip(centres[:, None] + np.arange(STACKED) - STACKED // 2, 0, len(features) - 1)
+    centres = np.arange(0, len(features), STACKED_FRAMES)
+    frames = np.clip(centres[:, None] + np.arange(STACKED_FRAMES) - STACKED_FRAMES // 2, 0, len(features) - 1)
     return np.ascontiguousarray(features[frames].reshape(len(centres), -1), np.float32)
 
 
 def _every_fourth(values: NDArray[Any]) -> NDArray[Any]:
-    return np.ascontiguousarray(values[::STACKED])
+    return np.ascontiguousarray(values[::STACKED_FRAMES])

@@ -15,7 +15,7 @@ from scipy.stats import rankdata
 
 from lipmotion.measures.bootstrap import bootstrap_interval
 from lipmotion.measures.curves import correlation
-from lipmotion.pipeline.evaluation.conditions import ComparedClip
+from lipmotion.pipeline.evaluation.held_out import ComparedClip
 
 Array = NDArray[np.float64]
 LEAST_FRAMES = 5

@@ -7,7 +7,7 @@ from typing import Any
 
 from lipmotion.experiments.comparison import significance_mark
 from lipmotion.experiments.engines.models import ENGINES_COMPARED
-from lipmotion.measures.report import figure_text
+from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.printable import printable
 
 NAME_WIDTH = 19

@@ -17,14 +17,14 @@ from lipmotion.experiments.runner import DEFAULT_SETTINGS, ExperimentSettings, c
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.kernels.threads import one_thread
 from lipmotion.measures import curves
-from lipmotion.measures.report import figure_text
-from lipmotion.pipeline.evaluation.conditions import (
+from lipmotion.measures.evaluation_table import figure_text
+from lipmotion.pipeline.evaluation.figures import figures_of
+from lipmotion.pipeline.evaluation.held_out import (
     ComparedClip,
     HeldOutRecordings,
     compared_clips,
     held_out_recordings,
 )
-from lipmotion.pipeline.evaluation.figures import figures_of
 from lipmotion.pipeline.training.train import UTTERANCES_PER_WORKER, phones_and_examples
 from lipmotion.pipeline.workers import worker_pool
 from lipmotion.speech.recognition.recogniser import cached_recogniser

@@ -10,10 +10,10 @@ from lipmotion.engines import Fit
 from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledModel
-from lipmotion.engines.coupled.training.fit import growing_models
+from lipmotion.engines.coupled.training.coupled_training import growing_models
 from lipmotion.errors import InputError
 from lipmotion.experiments.comparison import correlation_statistic
-from lipmotion.pipeline.evaluation.conditions import AUDIO_ONLY, HeldOutRecordings, compared_clips
+from lipmotion.pipeline.evaluation.held_out import AUDIO_ONLY, HeldOutRecordings, compared_clips
 from lipmotion.types import Example, Monitor, silent_monitor
 
 MIXTURE_COUNTS = (1, 2, 4, 8)

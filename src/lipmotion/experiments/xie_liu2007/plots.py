@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from lipmotion.engines.coupled.conversion.em import convert
+from lipmotion.engines.coupled.conversion.em_conversion import convert
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.errors import ExportError, MissingDependencyError
 from lipmotion.experiments.xie_liu2007.systems import TrainedSystem
-from lipmotion.pipeline.evaluation.conditions import AUDIO_ONLY, ComparedClip, HeldOutRecordings, compared_clips
+from lipmotion.pipeline.evaluation.held_out import AUDIO_ONLY, ComparedClip, HeldOutRecordings, compared_clips
 from lipmotion.storage.files import whole_file
 from lipmotion.types import GREY
 

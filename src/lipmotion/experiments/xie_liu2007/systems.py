@@ -12,10 +12,10 @@ from lipmotion.engines.coupled.chains.structures import SYSTEMS
 from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.errors import InputError
+from lipmotion.experiments.baselines.frame_regression import ContextRidge, LoudnessRegression, MeanPose
 from lipmotion.experiments.baselines.recurrent import BlstmBaseline, import_torch, torch_is_installed
-from lipmotion.experiments.baselines.regression import ContextRidge, LoudnessRegression, MeanPose
 from lipmotion.experiments.xie_liu2007.mixtures import select_mixtures
-from lipmotion.pipeline.evaluation.conditions import HeldOutRecordings
+from lipmotion.pipeline.evaluation.held_out import HeldOutRecordings
 from lipmotion.types import Example, Monitor, sub_monitor
 
 REFERENCE_SYSTEM = "ph-vi-CHMM"

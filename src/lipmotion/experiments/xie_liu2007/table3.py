@@ -29,7 +29,8 @@ from lipmotion.experiments.xie_liu2007.systems import REFERENCE_SYSTEM, TrainedS
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.kernels.threads import one_thread
 from lipmotion.measures import curves
-from lipmotion.pipeline.evaluation.conditions import (
+from lipmotion.pipeline.evaluation.figures import figures_of
+from lipmotion.pipeline.evaluation.held_out import (
     AUDIO_ONLY,
     OPENING,
     ComparedClip,
@@ -37,7 +38,6 @@ from lipmotion.pipeline.evaluation.conditions import (
     compared_clips,
     held_out_recordings,
 )
-from lipmotion.pipeline.evaluation.figures import figures_of
 from lipmotion.pipeline.training.channels import (
     EIGENLIPS,
     GEOMETRY,

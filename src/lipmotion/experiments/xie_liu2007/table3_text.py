@@ -7,11 +7,11 @@ from typing import Any
 
 from lipmotion.experiments.comparison import significance_mark
 from lipmotion.experiments.xie_liu2007.systems import PAPER_FIGURES, REFERENCE_SYSTEM
-from lipmotion.measures.report import figure_text
+from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.printable import printable
 
 WIDTH = 27
-FEW = 8
+NAMED_CHANNELS = 8
 """Most channels that are named one by one."""
 HEAD = (
     f"  {'system':{WIDTH}}{'paper':>13}  {'AMSE (95 %)':25}  {'ACC (95 %)':22}  {'opening (95 %)':22}  "
@@ -25,7 +25,7 @@ def table(figures: Mapping[str, Any]) -> str:
     chosen = " or ".join(map(str, figures["mixtures"])) + (", the best on val" if len(figures["mixtures"]) > 1 else "")
     closed = f"; closed under {figures['closed_under']:.4f}" if figures["closed_under"] is not None else ""
     names = figures["channels"]
-    compared = ", ".join(names) if len(names) <= FEW else f"{len(names)} channels"
+    compared = ", ".join(names) if len(names) <= NAMED_CHANNELS else f"{len(names)} channels"
     lines = [
         f"the first N clips of {order[figures['order']]}; split {figures['split']}: {figures['clips']} clips",
         f"paper's systems: {figures['states']} states a unit, Gaussians a state (K): {chosen}; "

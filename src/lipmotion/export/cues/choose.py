@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.export.cues.costs import frame_costs
-from lipmotion.export.cues.shapes import OPTIONAL, SHAPES, drawn_shape
+from lipmotion.export.cues.cue_shapes import OPTIONAL, SHAPES, drawn_shape
+from lipmotion.export.cues.shape_costs import frame_costs
 from lipmotion.export.cues.sheet import CueSheet, cue_frame_count, cue_sheet, drawn_shapes
 from lipmotion.kernels.sequences.segments import best_segments
 from lipmotion.types import Generation, Timeline
 from lipmotion.units import words_in_time
 
-CHANGE = 0.35
+CHANGE_COST = 0.35
 """Cost of a change of shape, in the unit of ``costs``."""
 HOLD_S = 2 / 24
 
@@ -46,7 +46,7 @@ def choose_cues(
     cost = np.empty((0, len(drawn)))
     if frames:
         cost = _costs_of_drawn_shapes(frame_costs(generation, frames, fps, intensity), drawn)
-    segments = best_segments(cost, hold_frames or default_hold_frames(fps), CHANGE)
+    segments = best_segments(cost, hold_frames or default_hold_frames(fps), CHANGE_COST)
     sheet = cue_sheet([(frame, drawn[label]) for frame, label in segments], duration_s, fps, drawn)
     return replace(sheet, words=Timeline(tuple(span for span in words_in_time(generation.units) if span.label)))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lipmotion.export.cues.shapes import SHAPES
+from lipmotion.export.cues.cue_shapes import SHAPES
 from lipmotion.export.cues.sheet import CueSheet
 
 

@@ -11,11 +11,11 @@ from bisect import bisect_left
 from dataclasses import replace
 from itertools import islice, takewhile
 
-from lipmotion.export.cues.shapes import REST, SHAPES
+from lipmotion.export.cues.cue_shapes import REST, SHAPES
 from lipmotion.export.cues.sheet import CueSheet
 from lipmotion.printable import is_line, printable
 
-NEARLY_WHOLE = 0.01
+WHOLE_RATE_TOLERANCE = 0.01
 """A rate that is so little over a whole one counts as that."""
 UNKNOWN = "speech"
 """The text of speech without known words."""
@@ -29,7 +29,7 @@ def text(sheet: CueSheet, sound_file: str) -> str:
     Papagayo knows whole frame rates alone: of another one, frames are those of the next larger whole rate (30 for
     29.97) at the same times, so that they do not drift from the sound.
     """
-    sheet = replace(sheet, fps=float(math.ceil(sheet.fps - NEARLY_WHOLE)))
+    sheet = replace(sheet, fps=float(math.ceil(sheet.fps - WHOLE_RATE_TOLERANCE)))
     shown = shown_shapes(sheet)
     phrases = [words_of_run(sheet, first, last) for first, last in _runs(shown)]
     said = [" ".join(word for *_, word in phrase) for phrase in phrases]

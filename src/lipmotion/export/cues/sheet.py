@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from lipmotion.export.cues.shapes import REST, SHAPES, drawn_shape
+from lipmotion.export.cues.cue_shapes import REST, SHAPES, drawn_shape
 from lipmotion.types import Span, Timeline
 
 

@@ -23,14 +23,14 @@ Values = list[str] | NDArray[np.floating[Any]] | NDArray[np.integer[Any]]
 
 BLOCK = 512
 MARK = 0x50
-INTEL = 84
+INTEL_PROCESSOR = 84
 """The processor type of files with the lowest byte first; others were written by old workstations."""
 MOST_FRAMES = 65_535
 """Most frames that the header can number."""
-LARGEST = 1 << 28
+LARGEST_FILE_BYTES = 1 << 28
 """Most bytes of a file that is read."""
-MOST_POINTS, MOST_ANALOG = 2_000, 5_000
-LONGEST_LABEL = 64
+MOST_POINTS, MOST_ANALOG_CHANNELS = 2_000, 5_000
+LONGEST_LABEL_CHARACTERS = 64
 _KINDS = {1: "u1", 2: "<u2", 4: "<f4"}
 
 
@@ -63,8 +63,8 @@ def read_c3d(path: Path) -> C3dFile:
     Raises InputError: not a C3D file, cut short, too large, of a processor that is not known, or sizes that disagree.
     """
     size = path.stat().st_size
-    if size > LARGEST:
-        raise InputError(f"{size} bytes, required at most {LARGEST}: divide the capture into takes")
+    if size > LARGEST_FILE_BYTES:
+        raise InputError(f"{size} bytes, required at most {LARGEST_FILE_BYTES}: divide the capture into takes")
     try:
         return _parsed(path.read_bytes())
     except (struct.error, IndexError, UnicodeDecodeError, OverflowError) as error:
@@ -76,8 +76,10 @@ def _parsed(content: bytes) -> C3dFile:
         raise InputError("not a C3D file: its first bytes are not those of the format; export the capture again")
     start = (content[0] - 1) * BLOCK
     processor = content[start + 3]
-    if processor != INTEL:
-        raise InputError(f"its processor type is {processor}, required {INTEL} (Intel); export the capture so")
+    if processor != INTEL_PROCESSOR:
+        raise InputError(
+            f"its processor type is {processor}, required {INTEL_PROCESSOR} (Intel); export the capture so"
+        )
     found = _parameters(content, start + 4)
     points, analog, first, last, _, scale, block, samples, rate_hz = struct.unpack("<5HfHHf", content[2:24])
     rate_hz = _number(found, "POINT.RATE", rate_hz)
@@ -85,7 +87,7 @@ def _parsed(content: bytes) -> C3dFile:
     frames = last - first + 1
     if last == MOST_FRAMES:
         frames = int(max(frames, _number(found, "POINT.LONG_FRAMES", 0), _number(found, "POINT.FRAMES", 0) % (1 << 31)))
-    if not (0 <= points <= MOST_POINTS and 0 <= analog <= MOST_ANALOG and points + analog > 0 and frames > 0):
+    if not (0 <= points <= MOST_POINTS and 0 <= analog <= MOST_ANALOG_CHANNELS and points + analog > 0 and frames > 0):
         raise InputError(
             f"{points} points and {analog} analog values in {frames} frames, required at least one of each"
         )
@@ -166,7 +168,7 @@ def _values(content: bytes, at: int) -> Values:
     if kind == -1:
         width = sizes[0] if sizes else 1
         texts = [data[start : start + width] for start in range(0, len(data), max(width, 1))]
-        return [text.decode("latin-1").rstrip("\0 ")[:LONGEST_LABEL] for text in texts]
+        return [text.decode("latin-1").rstrip("\0 ")[:LONGEST_LABEL_CHARACTERS] for text in texts]
     if kind not in _KINDS or len(data) < count * kind:
         raise InputError(f"a parameter of type {kind} and sizes {sizes} does not fit; export the capture again")
     return np.frombuffer(data, _KINDS[kind], count).astype(np.float64)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lipmotion.export.motion.c3d_file import BLOCK, INTEL, MARK, C3dFile, Values
+from lipmotion.export.motion.c3d_file import BLOCK, INTEL_PROCESSOR, MARK, C3dFile, Values
 
 
 def write_c3d(path: Path, content: C3dFile) -> None:
@@ -39,7 +39,7 @@ def write_c3d(path: Path, content: C3dFile) -> None:
     }
     blocks = -(-(4 + len(_section(groups))) // BLOCK)
     groups["POINT"]["DATA_START"] = 2 + blocks
-    section = bytes([1, MARK, blocks, INTEL]) + _section(groups)
+    section = bytes([1, MARK, blocks, INTEL_PROCESSOR]) + _section(groups)
     header = struct.pack("<BB5HfHHf", 2, MARK, points, curves, 1, frames, 10, -1.0, 2 + blocks, 1, content.rate_hz)
     seen = np.isfinite(content.points).all(axis=2)
     data = np.zeros((frames, points * 4 + curves), "<f4")

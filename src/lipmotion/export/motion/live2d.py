@@ -24,16 +24,16 @@ Array = NDArray[np.float64]
 
 OPEN, FORM = "ParamMouthOpenY", "ParamMouthForm"
 """Live2D's standard parameters: 0 closed to 1 open; −1 puckered to 1 wide, as in a smile."""
-WHOLLY_OPEN = 0.20
+FULL_GAP = 0.20
 """The gap between the lips that is drawn as wholly open, eye distances."""
-WIDEST, NARROWEST = 0.08, 0.12
+LARGEST_WIDENING, LARGEST_NARROWING = 0.08, 0.12
 """By how much the mouth is wider and narrower than at rest where the form is 1 and −1, eye distances."""
 FPS = 30.0
 """The frame rate that the file states; its keys are at any time."""
 TOLERANCE = 0.005
 """Largest error of a curve through the keys that are kept."""
 DECIMALS = 3
-LINEAR, STEPPED = 0, 2
+LINEAR_SEGMENT, STEPPED_SEGMENT = 0, 2
 """Types of segments: straight to the next key, or held until it."""
 SHOWING = frozenset(("opening", "jawOpen"))
 """Channels that say how far the mouth is open."""
@@ -55,7 +55,7 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
         keys = [(round(float(motion.time_s[frame]), 6), float(rounded[frame])) for frame in kept]
         segments: list[float] = [*keys[0]]
         for time_s, value in keys[1:]:
-            segments += [STEPPED if steps else LINEAR, time_s, value]
+            segments += [STEPPED_SEGMENT if steps else LINEAR_SEGMENT, time_s, value]
         curves.append({"Target": "Parameter", "Id": name, "Segments": segments, "Points": len(keys)})
     points = [int(curve.pop("Points")) for curve in curves]  # type: ignore[call-overload]
     meta = {
@@ -79,7 +79,7 @@ def mouth_open(generation: Generation) -> Array:
         gap = spoken_mouth(motion, generation.units).gap
     else:
         gap = _by_weights(motion, arkit_mouth().gap)
-    return np.clip(gap / WHOLLY_OPEN, 0.0, 1.0)
+    return np.clip(gap / FULL_GAP, 0.0, 1.0)
 
 
 def mouth_form(generation: Generation) -> Array:
@@ -91,7 +91,7 @@ def mouth_form(generation: Generation) -> Array:
         template = mouth_template()
         corners = arkit_mouth().moved[:, [template.row(LEFT_CORNER), template.row(RIGHT_CORNER)], 0]
         wider = _by_weights(motion, corners[:, 0] - corners[:, 1])
-    return np.clip(wider / np.where(wider > 0, WIDEST, NARROWEST), -1.0, 1.0)
+    return np.clip(wider / np.where(wider > 0, LARGEST_WIDENING, LARGEST_NARROWING), -1.0, 1.0)
 
 
 def _by_weights(motion: Motion, effects: Array) -> Array:

@@ -21,8 +21,8 @@ LEFT_EYE = frozenset(("eyel", "leye", "lefteye", "eyeleft", "exl", "lex", "leyeo
 RIGHT_EYE = frozenset(("eyer", "reye", "righteye", "eyeright", "exr", "rex", "reyeouter", "eyerouter", "righteyeouter"))
 RIGID = ("forehead", "head", "nasion", "nosebridge", "glabella", "temple", "ear", "mastoid", "fhd", "lfhd", "rfhd")
 """Beginnings of names, after a side, of other markers that do not move against the skull."""
-LEAST_RIGID = 3
-LARGEST_PLACE = 1e6
+LEAST_RIGID_MARKERS = 3
+LARGEST_COORDINATE = 1e6
 LEAST_DISTANCE = 1e-3
 """Least distance of the eye corners in any frame, as a share of the median."""
 
@@ -39,8 +39,8 @@ def in_head_frame(markers: Mapping[str, Array], unit: str) -> dict[str, Array]:
     millimetres = UNITS.get(unit.strip().lower().removesuffix("s"))
     if millimetres is None:
         raise InputError(f"its unit of length is {unit[:20]!r}, required one of {', '.join(UNITS)}")
-    if max(float(np.abs(places).max()) for places in markers.values()) > LARGEST_PLACE:
-        raise InputError(f"a marker is further than {LARGEST_PLACE:g} {unit} away; export the capture again")
+    if max(float(np.abs(places).max()) for places in markers.values()) > LARGEST_COORDINATE:
+        raise InputError(f"a marker is further than {LARGEST_COORDINATE:g} {unit} away; export the capture again")
     left, right = (next((name for name in markers if _plain(name) in names), "") for names in (LEFT_EYE, RIGHT_EYE))
     if not (left and right):
         return {name: places * millimetres / MILLIMETRES for name, places in markers.items()}
@@ -49,7 +49,7 @@ def in_head_frame(markers: Mapping[str, Array], unit: str) -> dict[str, Array]:
     if not moving:
         raise InputError(f"all markers are those of the head ({', '.join(rigid[:6])}), required markers of the mouth")
     places = np.stack([markers[name] for name in (*rigid, *moving)], axis=1)
-    if len(rigid) >= LEAST_RIGID:
+    if len(rigid) >= LEAST_RIGID_MARKERS:
         places = _steadied(places, len(rigid))
     centre = places[:, :2].mean(axis=1, keepdims=True)
     across = places[:, 0] - places[:, 1]
@@ -57,7 +57,7 @@ def in_head_frame(markers: Mapping[str, Array], unit: str) -> dict[str, Array]:
     distance = float(np.median(distances))
     if not distances.min() > LEAST_DISTANCE * max(distance, LEAST_DISTANCE):
         raise InputError("the two eye corners are in one place, required the outer corners of both eyes")
-    if len(rigid) >= LEAST_RIGID:
+    if len(rigid) >= LEAST_RIGID_MARKERS:
         across = np.broadcast_to(across.mean(axis=0), across.shape)
     turned = _rotated(places - centre, _least_rotations(across)) / distance
     turned = turned @ _quarter_turn(turned[:, len(rigid) :].mean(axis=(0, 1))).T

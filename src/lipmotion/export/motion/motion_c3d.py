@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from lipmotion.articulation.lip_points import CHIN, mouth_template
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import MotionFormat
-from lipmotion.export.motion.c3d_file import LONGEST_LABEL, MOST_FRAMES, C3dFile, read_c3d
+from lipmotion.export.motion.c3d_file import LONGEST_LABEL_CHARACTERS, MOST_FRAMES, C3dFile, read_c3d
 from lipmotion.export.motion.c3d_writing import write_c3d
 from lipmotion.export.motion.marker_frame import MILLIMETRES, in_head_frame
 from lipmotion.types import EYE_DISTANCE, Channel, Generation, Motion, Timeline, Unit
@@ -27,7 +27,7 @@ SOFTWARE = "lipmotion"
 EYES = (("EYE_L", 0.5), ("EYE_R", -0.5))
 DISTANCES = {"opening": (13, 14), "width": (61, 291), "outer": (0, 17)}
 """Channels that are the distance of two points, where the file does not hold them."""
-LEAST_SEEN = 0.5
+LEAST_SEEN_SHARE = 0.5
 """Markers that are seen in a smaller share of the frames are left out; shorter gaps are bridged by straight lines."""
 MOST_CURVES = 255
 _MARKER = re.compile(r"(?:lip|jaw|p|point)[ _]?(\d{1,3})$", re.IGNORECASE)
@@ -44,7 +44,9 @@ def check(motion: Motion) -> None:
     if "" in motion.names:
         raise ExportError("a channel has no name, required one in .c3d; write .json or .npz")
     for text in [text for channel in motion.channels for text in (channel.name, channel.unit)]:
-        if not (text.isascii() and text.isprintable() and text == text.strip() and len(text) <= LONGEST_LABEL):
+        if not (
+            text.isascii() and text.isprintable() and text == text.strip() and len(text) <= LONGEST_LABEL_CHARACTERS
+        ):
             raise ExportError(
                 f"the name or unit {text[:60]!r} of a channel does not fit into .c3d, required up to 64 ASCII "
                 "characters, without blanks at its ends"
@@ -111,7 +113,7 @@ def _label(point: int) -> str:
 def _bridged(places: Array) -> Array | None:
     """Return the places of a marker [shape=(T, 3)] without gaps, or None where it is hardly ever seen."""
     seen = np.isfinite(places).all(axis=1)
-    if seen.mean() < LEAST_SEEN or not seen.any():
+    if seen.mean() < LEAST_SEEN_SHARE or not seen.any():
         return None
     frames = np.arange(len(places))
     return np.stack([np.interp(frames, frames[seen], axis[seen]) for axis in places.T], axis=1)

@@ -22,7 +22,7 @@ from lipmotion.meshes.files.steady_rate import exact_rate, steady_rows
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Generation, Motion, Timeline, Unit
 
-LONGEST_HEAD = 1 << 20
+LONGEST_LINE_CHARACTERS = 1 << 20
 """Most characters of a line."""
 LONGEST_S = 1e6
 """Largest time that is accepted: more than eleven days."""
@@ -40,8 +40,10 @@ def check(motion: Motion) -> None:
     for name in motion.names:
         if set(name) & set(',;"') or not name.isprintable():
             raise ExportError(f"the channel name {shortened(name)!r} does not fit in a table; write .json or .npz")
-    if len(",".join(["time_s", *motion.names])) >= LONGEST_HEAD:
-        raise ExportError(f"the channel names do not fit in a line of {LONGEST_HEAD} letters; write .json or .npz")
+    if len(",".join(["time_s", *motion.names])) >= LONGEST_LINE_CHARACTERS:
+        raise ExportError(
+            f"the channel names do not fit in a line of {LONGEST_LINE_CHARACTERS} letters; write .json or .npz"
+        )
 
 
 def write(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
@@ -63,7 +65,7 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
     """
     try:
         with path.open(encoding="utf-8-sig") as file:
-            head = file.readline(LONGEST_HEAD).rstrip("\n")
+            head = file.readline(LONGEST_LINE_CHARACTERS).rstrip("\n")
             if is_live_link(head):
                 return read_live_link(path)
             first, *names = head.split(",")
@@ -100,7 +102,7 @@ def _channel(name: str) -> Channel:
 def _numbers(file: TextIO, columns: int) -> NDArray[np.float64]:
     """Return the rows of a table [shape=(T, columns)]. Raises ValueError: a field is no number, or rows are uneven."""
     numbers = array("d")
-    for number, line in enumerate(iter(partial(file.readline, LONGEST_HEAD), ""), 2):
+    for number, line in enumerate(iter(partial(file.readline, LONGEST_LINE_CHARACTERS), ""), 2):
         row = line.rstrip("\n")
         if row and row.count(",") + 1 != columns:
             raise ValueError(f"line {number} has {row.count(',') + 1} fields, required {columns} numbers in each")

@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 FORMAT, VERSION = "lipmotion.face", 1
 SUFFIX = ".face"
-SAMPLE = 32767
+FULL_SCALE = 32767
 """Full scale of the stored sound."""
 
 
@@ -116,7 +116,7 @@ def save_face(face: FilmedFace, path: str | Path) -> None:
     arrays |= {"background/face_to_frame": background.face_to_frame, "background/chin_px": background.chin_px}
     for number, take in enumerate(takes):
         arrays |= {
-            f"take{number}/sound": np.rint(np.clip(take.sound.samples, -1, 1) * SAMPLE).astype(np.int16),
+            f"take{number}/sound": np.rint(np.clip(take.sound.samples, -1, 1) * FULL_SCALE).astype(np.int16),
             f"take{number}/sound_rate_hz": np.array(take.sound.rate_hz),
             f"take{number}/motion": np.asarray(take.motion.values, np.float32),
             f"take{number}/rate_hz": np.array(take.motion.rate_hz),
@@ -186,7 +186,7 @@ BACKGROUND = {
 }
 """The arrays of a background, beside those of its video."""
 TAKE = {
-    "sound": ArraySpec(np.int16, "S", -SAMPLE - 1, SAMPLE),
+    "sound": ArraySpec(np.int16, "S", -FULL_SCALE - 1, FULL_SCALE),
     "sound_rate_hz": ArraySpec(np.intp, "", 8000, 48_000),
     "motion": ArraySpec(np.float32, "T C"),
     "rate_hz": ArraySpec(np.float64, "", POSITIVE, 1000),
@@ -200,19 +200,19 @@ def _background(arrays: Arrays) -> StoredBackground:
     video = stored_video_from_arrays({name: array for name, array in arrays.items() if name not in BACKGROUND})
     stored = checked_arrays(arrays, BACKGROUND, T=len(video))
     maps = stored["face_to_frame"]
-    if (np.abs(np.linalg.det(maps[:, :, :2])) < FLAT).any() or any(length % 2 for length in video.size):
+    if (np.abs(np.linalg.det(maps[:, :, :2])) < LEAST_DETERMINANT).any() or any(length % 2 for length in video.size):
         raise ValueError("flat places of the face, or frames of odd sizes")
     return StoredBackground(video, maps, stored["chin_px"])
 
 
-FLAT = 1e-6
+LEAST_DETERMINANT = 1e-6
 """A map with a smaller determinant has no inverse."""
 
 
 def _take(arrays: Arrays, channels: tuple[Channel, ...]) -> SpokenTake:
     refuse_undeclared(arrays, TAKE)
     stored = checked_arrays(arrays, TAKE, C=len(channels))
-    sound = Audio(stored["sound"].astype(np.float32) / np.float32(SAMPLE), int(stored["sound_rate_hz"]))
+    sound = Audio(stored["sound"].astype(np.float32) / np.float32(FULL_SCALE), int(stored["sound_rate_hz"]))
     motion = Motion(stored["motion"].astype(np.float64), float(stored["rate_hz"]), channels)
     return SpokenTake(sound, motion, stored["seen"])
 

@@ -23,7 +23,7 @@ __all__ = ["Head", "render"]
 
 OWN_SIZE = 720
 """Height of pictures whose size is not given."""
-AHEAD = 2
+FRAMES_AHEAD = 2
 """Pictures that are drawn before they are asked for."""
 
 
@@ -46,7 +46,7 @@ class Head(Face):
 
     def drawn(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> DrawnMotion[CharacterPose]:  # noqa: D102
         poses = head_poses(motion, units, fps, self.staging, self.prosody)
-        return DrawnMotion(poses, lambda: self._painter, AHEAD)
+        return DrawnMotion(poses, lambda: self._painter, FRAMES_AHEAD)
 
     @cached_property
     def _painter(self) -> Callable[[CharacterPose], Picture]:
@@ -82,7 +82,7 @@ def render(
     chosen = staging or Staging()
     poses = head_poses(motion, units, fps, chosen, prosody)
     camera_for(width, height)  # refuses sizes before the first picture is asked for
-    return iter(DrawnMotion(poses, lambda: _painter(width, height, chosen), AHEAD))
+    return iter(DrawnMotion(poses, lambda: _painter(width, height, chosen), FRAMES_AHEAD))
 
 
 def _painter(width: int, height: int, staging: Staging) -> Callable[[CharacterPose], Picture]:

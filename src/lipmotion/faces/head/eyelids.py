@@ -7,22 +7,22 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import map_coordinates, spline_filter
 
-from lipmotion.faces.head.forms import EYE, EYEBALL, head, seen_from_front
+from lipmotion.faces.head.forms import EYE, EYEBALL_RADIUS, head, seen_from_front
 from lipmotion.faces.head.pose import CharacterPose
 
 Real = NDArray[np.float64]
 
-_UPPER = 33
-LID_COLUMNS = 2 * _UPPER - 2
+_UPPER_COLUMNS = 33
+LID_COLUMNS = 2 * _UPPER_COLUMNS - 2
 LID_RINGS = 11
 """Rings from the edge of the lids (after the first ring, which touches the eyeball) to the skin of the face."""
 HALF_WIDTH = 0.187
 _EDGE_X = 0.268
 _EDGE_UP, _EDGE_DOWN = 0.25, 0.215
-_ACROSS = np.sin(np.linspace(-np.pi / 2, np.pi / 2, _UPPER))
+_ACROSS = np.sin(np.linspace(-np.pi / 2, np.pi / 2, _UPPER_COLUMNS))
 LID_ACROSS: Real = np.concatenate([_ACROSS, _ACROSS[-2:0:-1]])
 """Place of every column between the inner corner (-1) and the outer one (1)."""
-LID_SIDE: Real = np.concatenate([np.ones(_UPPER), -np.ones(_UPPER - 2)])
+LID_SIDE: Real = np.concatenate([np.ones(_UPPER_COLUMNS), -np.ones(_UPPER_COLUMNS - 2)])
 """1 on the upper lid, -1 on the lower lid."""
 
 
@@ -37,7 +37,7 @@ UPPER_LID = _curve(
 LOWER_LID = _curve(
     [(-1, -0.022), (-0.75, -0.053), (-0.3, -0.072), (0.15, -0.074), (0.6, -0.053), (0.85, -0.018), (1, 0.018)]
 )
-MEETING = 0.028
+LOWER_LID_RISE = 0.028
 """How far the middle of the lower lid rises to meet the upper one."""
 
 
@@ -62,7 +62,7 @@ class Eyelids:
         gaze = 0.10 * pose.gaze[1]
         squint = 0.6 * max(pose.smile, 0.0)
         upper = UPPER_LID + gaze * (1 - LID_ACROSS**2) + 0.15 * pose.brows * (1 - LID_ACROSS**2)
-        lower = LOWER_LID + (0.5 * gaze * (1 - pose.shut) + squint + MEETING * pose.shut) * (1 - LID_ACROSS**2)
+        lower = LOWER_LID + (0.5 * gaze * (1 - pose.shut) + squint + LOWER_LID_RISE * pose.shut) * (1 - LID_ACROSS**2)
         upper = np.maximum(upper + min(1.12 * pose.shut, 1.0) * (lower - upper), lower)
         return EYE[0] + HALF_WIDTH * LID_ACROSS, np.where(LID_SIDE > 0, upper, lower)
 
@@ -76,7 +76,7 @@ class Eyelids:
         fold = np.exp(-(((share - 0.2) / 0.05) ** 2)) * np.where(LID_SIDE > 0, 1 - LID_ACROSS**2, 0) * (1 - pose.shut)
         rings[..., 2] -= 0.018 * fold
         away = rings[0] - EYE
-        inner = EYE + away / np.linalg.norm(away, axis=1, keepdims=True) * (EYEBALL - 0.004)
+        inner = EYE + away / np.linalg.norm(away, axis=1, keepdims=True) * (EYEBALL_RADIUS - 0.004)
         inner[:, 1] = rings[0][:, 1] + 0.1 * (inner[:, 1] - rings[0][:, 1])
         return np.concatenate([inner[None], rings])
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.faces.head import palette
-from lipmotion.faces.head.forms import EYE, EYEBALL, head, seen_from_front
+from lipmotion.faces.head.forms import EYE, EYEBALL_RADIUS, head, seen_from_front
 from lipmotion.faces.head.part import Part, grid_triangles, joined_parts, part, tube
 
 Real = NDArray[np.float64]
@@ -42,10 +42,10 @@ def eyeball() -> Part:
             0.215,
         ]
     )
-    angle = np.arcsin(np.clip(radii / EYEBALL, 0, 0.999))
+    angle = np.arcsin(np.clip(radii / EYEBALL_RADIUS, 0, 0.999))
     angle = np.concatenate([angle, np.linspace(angle[-1] + 0.15, 2.0, 5)])
     around = 2 * np.pi * np.arange(_SIDES) / _SIDES
-    dome = EYEBALL + 0.007 * np.maximum(1 - (np.concatenate([radii, np.full(5, 1.0)]) / 0.125) ** 2, 0)
+    dome = EYEBALL_RADIUS + 0.007 * np.maximum(1 - (np.concatenate([radii, np.full(5, 1.0)]) / 0.125) ** 2, 0)
     ring = np.stack(
         [
             np.sin(angle)[:, None] * np.cos(around),
@@ -83,7 +83,7 @@ def catchlights() -> Part:
     for (x, y), radius, white in (((-0.045, 0.05), 0.026, 1.0), ((0.038, -0.045), 0.012, 0.8)):
         around = 2 * np.pi * np.arange(16) / 16
         flat = np.concatenate([[[x, y]], np.stack([x + radius * np.cos(around), y + radius * np.sin(around)], axis=1)])
-        away = EYEBALL + 0.010
+        away = EYEBALL_RADIUS + 0.010
         z = np.sqrt(away**2 - (flat**2).sum(axis=1))
         fan = np.stack([np.zeros(16, int), 1 + np.arange(16), 1 + (np.arange(16) + 1) % 16], axis=1).astype(np.int32)
         discs.append(part("light", np.column_stack([flat, z]), fan, (white, white, white), palette.GLOWING))

@@ -14,7 +14,7 @@ from lipmotion.faces.head.eyes import LASHES, brow, catchlights, eyeball, lash_t
 from lipmotion.faces.head.forms import EYE
 from lipmotion.faces.head.hair import hair
 from lipmotion.faces.head.inside import lower_drop, lower_teeth, tongue, tongue_triangles, upper_teeth
-from lipmotion.faces.head.lips import RINGS, VISIBLE, closed_share
+from lipmotion.faces.head.lips import RINGS, VISIBLE_RINGS, closed_share
 from lipmotion.faces.head.part import part
 from lipmotion.faces.head.pose import CharacterPose
 from lipmotion.faces.head.skin import AT_CORNER, REST, Skin, jaw_moved
@@ -39,7 +39,7 @@ LIP_SHADOW, SHADOW_DEPTH = 0.24, 0.09
 CORNER_SHADE = 0.6
 """How far the corners of any mouth are shaded as a seam."""
 _EYES = ((1.0, ""), (-1.0, "right "))
-_MIDDLE, _LAST = 20, 60
+_UPPER_COLUMN, _LOWER_COLUMN = 20, 60
 """Columns of the lips in the middle of the upper and of the lower lip."""
 
 
@@ -93,9 +93,9 @@ class Figure:
         kinds = [np.full(len(each.places), palette.FINISHES.index(each.finish)) for each in parts]
         self._kinds = np.concatenate(kinds).astype(np.intp)
         lips = self.skin.lip_rows()
-        self._kinds[lips[1 : VISIBLE + 2].ravel()] = palette.FINISHES.index(palette.LIP_FINISH)
-        self._wall = lips[VISIBLE + 1 : RINGS].ravel()
-        self._kinds[lips[VISIBLE + 2 :].ravel()] = palette.FINISHES.index(palette.MOUTH_FINISH)
+        self._kinds[lips[1 : VISIBLE_RINGS + 2].ravel()] = palette.FINISHES.index(palette.LIP_FINISH)
+        self._wall = lips[VISIBLE_RINGS + 1 : RINGS].ravel()
+        self._kinds[lips[VISIBLE_RINGS + 2 :].ravel()] = palette.FINISHES.index(palette.MOUTH_FINISH)
         self._lighting = Lighting(palette.FINISHES)
         self._reaches = self._baked()
         self._held = np.zeros((stops[-1], 1))
@@ -141,7 +141,7 @@ class Figure:
             name: np.arange(*self.rows[name].indices(len(self._places))) for name in ("tongue", "teeth", "upper teeth")
         }
         lips = self.skin.lip_rows()
-        return {"lips": lips[1 : VISIBLE + 1].ravel(), "wall": self._wall, **rows}
+        return {"lips": lips[1 : VISIBLE_RINGS + 1].ravel(), "wall": self._wall, **rows}
 
     def _look(self, pose: CharacterPose, places: Real, normals: Real) -> None:
         """Place eyeballs, reflections and lashes."""
@@ -172,11 +172,11 @@ class Figure:
             1.0, TONGUE_LIGHT * (1 - 0.35 * pose.tongue_up) * arrives[self.rows["tongue"]]
         )
         lips, closed = self.skin.lip_rows(), closed_share(pose)
-        for ring, part_of in enumerate(SEAM_LIGHT, VISIBLE - len(SEAM_LIGHT)):
+        for ring, part_of in enumerate(SEAM_LIGHT, VISIBLE_RINGS - len(SEAM_LIGHT)):
             arrives[lips[ring]] *= 1 - (1 - part_of) * np.maximum(
                 closed, CORNER_SHADE * (1 - pose.roundness**2) * AT_CORNER
             )
-        for ring, part_of in enumerate(RIM_LIGHT, VISIBLE - 3):
+        for ring, part_of in enumerate(RIM_LIGHT, VISIBLE_RINGS - 3):
             arrives[lips[ring]] *= 1 - (1 - part_of) * pose.roundness
         arrives[self.rows["upper teeth"]] *= UPPER_TEETH_LIGHT
         arrives[self.rows["teeth"]] *= LOWER_TEETH_LIGHT
@@ -184,8 +184,12 @@ class Figure:
 
     def _lit_inside(self, pose: CharacterPose, skin: Real) -> Callable[[Real], Real]:
         """Return the function from places in the mouth to the part of the light that arrives there."""
-        ring = skin[self.skin.lip_rows()[VISIBLE - 1]]
-        top, low, front = ring[_MIDDLE, 1], ring[_LAST, 1], 0.5 * (ring[_MIDDLE, 2] + ring[_LAST, 2])
+        ring = skin[self.skin.lip_rows()[VISIBLE_RINGS - 1]]
+        top, low, front = (
+            ring[_UPPER_COLUMN, 1],
+            ring[_LOWER_COLUMN, 1],
+            0.5 * (ring[_UPPER_COLUMN, 2] + ring[_LOWER_COLUMN, 2]),
+        )
         span, half = max(top - low, 0.0), max(0.26 * pose.width, 0.1)
         shadow = LIP_SHADOW + 0.4 * pose.tuck  # teeth on the lip are seen
         shade, open_ = 1 - 0.92 * pose.roundness**1.1, min(span / 0.25, 1.0)

@@ -16,7 +16,7 @@ Form = Callable[[Real], Real]
 
 EYE = np.array([0.315, 0.0, -0.215])
 """Centre of the left eyeball; the right one is its mirror image."""
-EYEBALL, LID = 0.225, 0.243
+EYEBALL_RADIUS, LID_RADIUS = 0.225, 0.243
 """Radii of the eyeball and of the skin upon it."""
 MOUTH_Y = -0.70
 """Height of the line between the lips."""
@@ -61,7 +61,7 @@ def head(p: Real) -> Real:
     d = union(d, ellipsoid(q, (0, -0.98, -0.185), (0.19, 0.14, 0.16)), 0.22)
     d = union(d, ellipsoid(q, (0, -0.71, -0.17), (0.36, 0.27, 0.22)), 0.25)
     d = cut(d, ellipsoid(q, (0.335, 0.0, 0.115), (0.27, 0.2, 0.14)), 0.2)
-    d = union(d, np.linalg.norm(q - EYE, axis=1) - LID, 0.05)
+    d = union(d, np.linalg.norm(q - EYE, axis=1) - LID_RADIUS, 0.05)
     d = union(d, cone(q, (0, 0.10, -0.07), (0, -0.35, 0.10), 0.052, 0.078), 0.14)
     d = union(d, ellipsoid(q, (0, -0.40, 0.135), (0.092, 0.082, 0.095)), 0.1)
     d = union(d, ellipsoid(q, (0.094, -0.43, 0.045), (0.06, 0.055, 0.075)), 0.06)

@@ -17,8 +17,8 @@ from lipmotion.faces.head.pose import CharacterPose
 
 Real = NDArray[np.float64]
 
-_UPPER = 41
-COLUMNS = 2 * _UPPER - 2
+_UPPER_COLUMNS = 41
+COLUMNS = 2 * _UPPER_COLUMNS - 2
 REST_HALF_WIDTH = 0.268
 TEETH_Z = -0.055
 """Front of the incisors."""
@@ -41,7 +41,7 @@ ROUND_DROP = 0.025
 """How far the line between round lips sinks: the upper lip hides the teeth."""
 REST_SMILE, SMILE_GAP = 0.027, 0.05
 """How far the corners rise at rest; parted, pressed, round and tucked lips do not smile, from this gap on."""
-ON_TEETH = TEETH_EDGE + 0.028
+BITTEN_EDGE_Y = TEETH_EDGE + 0.028
 """Height of the edge of the lower lip on the upper teeth."""
 _KNOTS = np.array([0, 0.22, 0.5, 0.72, 0.88, 0.98, 1.12, 1.4])
 _AT = np.array([0.0, 0.09, 0.2, 0.31, 0.41, 0.5, 0.58, 0.66, 0.74, 0.81, 0.88, 0.94, 1.0, 1.12, 1.4])
@@ -49,13 +49,15 @@ _SECTION: Real = np.asarray(CubicSpline(_KNOTS, np.eye(len(_KNOTS)))(_AT))
 _WALL = ((0.10, -0.16), (0.26, -0.30), (0.7, -0.40), (1.0, -0.42))
 """Rings behind the lips: how far towards the middle of the throat, and how far back."""
 RINGS = len(_AT) + len(_WALL)
-VISIBLE = 11
+VISIBLE_RINGS = 11
 """Rings up to this one can be seen as lips; those behind are the wall of the mouth."""
 
 
 def _columns() -> tuple[Real, Real]:
-    across = np.sin(np.linspace(-np.pi / 2, np.pi / 2, _UPPER))
-    return np.concatenate([across, across[-2:0:-1]]), np.concatenate([np.ones(_UPPER), -np.ones(_UPPER - 2)])
+    across = np.sin(np.linspace(-np.pi / 2, np.pi / 2, _UPPER_COLUMNS))
+    return np.concatenate([across, across[-2:0:-1]]), np.concatenate(
+        [np.ones(_UPPER_COLUMNS), -np.ones(_UPPER_COLUMNS - 2)]
+    )
 
 
 ACROSS, SIDE = _columns()
@@ -69,10 +71,10 @@ def _smooth(knots: list[tuple[float, float]]) -> Real:
 
 
 _BOW = _smooth([(0, 0.80), (0.2, 0.97), (0.36, 0.92), (0.62, 0.66), (0.85, 0.39), (1, 0)])
-_BELOW = _smooth([(0, 1.0), (0.25, 0.97), (0.5, 0.83), (0.72, 0.59), (0.89, 0.35), (1, 0)])
+_LOWER_BOW = _smooth([(0, 1.0), (0.25, 0.97), (0.5, 0.83), (0.72, 0.59), (0.89, 0.35), (1, 0)])
 _LINE = _smooth([(0, -0.006), (0.15, -0.005), (0.4, -0.002), (0.7, 0.005), (0.88, 0.010), (1, 0.014)])
 _ENVELOPE = np.sqrt(np.maximum(1 - ACROSS**2, 0))
-_FULL = np.where(SIDE > 0, _BOW, _BELOW)
+_FULL = np.where(SIDE > 0, _BOW, _LOWER_BOW)
 
 
 def section_points(pose: CharacterPose, base_z: Real) -> Real:
@@ -111,7 +113,7 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
     contact_z = meet - 0.002 + 0.02 * belly * pose.roundness
     contact_z = contact_z + SEAM_FORWARD * (1 - 0.45 * pose.press) * belly * closed_share(pose)
     contact_z = contact_z + tuck * (teeth + 0.02 - contact_z)
-    below_upper = np.minimum(ON_TEETH - middle, rise - LEAST_GAP)  # the teeth part the lips
+    below_upper = np.minimum(BITTEN_EDGE_Y - middle, rise - LEAST_GAP)  # the teeth part the lips
     on_teeth = np.minimum(middle + below_upper * hole, inner_y + 0.08)
     inner_y = np.where(upper, inner_y, np.maximum(inner_y, inner_y + tuck * (on_teeth - inner_y)))
     crest = _meeting(pose, base_z, 1 - 0.5 * squeeze) - lower_back + bulge * (1 - 0.25 * tuck) - 0.03 * tuck
@@ -139,7 +141,7 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
 def _meeting(pose: CharacterPose, base_z: Real, inwards: float) -> Real:
     """Return how far forward the lips meet, at places that much nearer to the middle [shape=(COLUMNS,)]."""
     across = inwards * ACROSS
-    between = np.interp(across, ACROSS[:_UPPER], 0.5 * (base_z[:_UPPER] + _opposite(base_z)))
+    between = np.interp(across, ACROSS[:_UPPER_COLUMNS], 0.5 * (base_z[:_UPPER_COLUMNS] + _opposite(base_z)))
     curved = ARCH * REST_HALF_WIDTH**2 * (pose.width**2 - 1)
     return np.asarray(between + pose.protrusion - (0.45 * pose.protrusion + curved) * across**2)
 
@@ -162,7 +164,7 @@ def _between(pose: CharacterPose) -> Real:
 
 def _opposite(base_z: Real) -> Real:
     """Return the values of the lower lip at the columns of the upper one [shape=(41,)]."""
-    return np.concatenate([base_z[:1], base_z[: _UPPER - 1 : -1], base_z[_UPPER - 1 : _UPPER]])
+    return np.concatenate([base_z[:1], base_z[: _UPPER_COLUMNS - 1 : -1], base_z[_UPPER_COLUMNS - 1 : _UPPER_COLUMNS]])
 
 
 def _opening(pose: CharacterPose) -> tuple[Real, Real]:

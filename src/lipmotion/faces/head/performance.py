@@ -20,9 +20,9 @@ BITTEN_GAP = (0.12, 0.2)
 """Teeth stay together up to the first gap, and part until the second one."""
 BITTEN = (0.8, 0.95)
 """Teeth are apart up to the first value of ``teeth``, and together from the second on."""
-ROUND = 0.8
+OO_ROUNDNESS = 0.8
 """How round the lips of oo are; those of w are a ring."""
-NARROW, WIDE = 0.16, 0.12
+FULL_NARROWING, FULL_WIDENING = 0.16, 0.12
 """Changes of width at which lips are round, and spread, whatever the phones ask for."""
 
 
@@ -47,8 +47,8 @@ def posed(mouth: SpokenMouth, moved: Liveliness) -> list[CharacterPose]:
     """Return the poses that show a mouth, and eyes, brows and head, one a frame."""
     gap, change = mouth.gap, mouth.width - 1
     spread = mouth.spread * (1 - mouth.protrusion)
-    roundness = np.maximum(mouth.protrusion, 0.4 * np.clip(-change / NARROW, 0, 1) * (1 - spread))
-    wide = np.clip(np.maximum(spread, np.clip(change / WIDE, 0, 1)) - roundness, 0, 1)
+    roundness = np.maximum(mouth.protrusion, 0.4 * np.clip(-change / FULL_NARROWING, 0, 1) * (1 - spread))
+    wide = np.clip(np.maximum(spread, np.clip(change / FULL_WIDENING, 0, 1)) - roundness, 0, 1)
     together = np.clip((BITTEN_GAP[1] - gap) / np.ptp(BITTEN_GAP), 0, 1)
     teeth = np.clip((mouth.teeth - BITTEN[0]) / (BITTEN[1] - BITTEN[0]), 0, 1)
     bite = np.maximum(teeth, 0.5 * spread) * together
@@ -60,7 +60,7 @@ def posed(mouth: SpokenMouth, moved: Liveliness) -> list[CharacterPose]:
         "bite": np.maximum(bite, closing),
         "width": mouth.width,
         "fullness": mouth.fullness * (1 + 0.08 * roundness),
-        "roundness": roundness * (ROUND + (1 - ROUND) * mouth.pursed),
+        "roundness": roundness * (OO_ROUNDNESS + (1 - OO_ROUNDNESS) * mouth.pursed),
         "spread": wide,
         "oval": mouth.oval,
         "protrusion": 0.06 * roundness + 0.02 * mouth.pursed,

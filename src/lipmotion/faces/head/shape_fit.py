@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.faces.head.figure import Figure
-from lipmotion.faces.head.lips import COLUMNS, VISIBLE
+from lipmotion.faces.head.lips import COLUMNS, VISIBLE_RINGS
 from lipmotion.faces.head.pose import CharacterPose
 from lipmotion.faces.head.skin import REST
 from lipmotion.meshes.fitting.bounded_curves import CurveCosts, bounded_curves
@@ -23,7 +23,7 @@ FROM_POSE = {"tongueOut": "tongue_out", "tongueUp": "tongue_up", "mouthPressLeft
 _NOT_OF_LIPS = ("eye", "brow", *FROM_POSE)
 PARTING = ("jawOpen", "mouthClose", "mouthLowerDown", "mouthUpperUp")
 """Shapes that are changed first so that the lips are apart as in the pose; the others where that is not enough."""
-APART = 12.0
+GAP_WEIGHT = 12.0
 """How much the distance between the lips counts against the places of their vertices."""
 COSTS = CurveCosts(ridge=1e-3, smooth=2e-3)
 
@@ -60,7 +60,7 @@ def mouth_weights(figure: Figure, mesh: Mesh, poses: Sequence[CharacterPose]) ->
 
 def lip_gap(figure: Figure, moved: Real) -> float:
     """Return by how much displacements of the vertices part the middle of the lips, in eye distances."""
-    edge = figure.skin.lip_rows()[VISIBLE - 1]
+    edge = figure.skin.lip_rows()[VISIBLE_RINGS - 1]
     half = COLUMNS // 2
     upper, lower = edge[1:half], edge[:half:-1]
     middle = len(upper) // 2
@@ -71,9 +71,9 @@ def _rows(figure: Figure, moved: Real) -> Real:
     """Return displacements of the skin as rows of a least squares problem: places around the mouth, and gaps."""
     lips = figure.skin.lip_rows()
     around = np.flatnonzero(figure.skin.lip_weight > 0)[::3]
-    edge = moved[lips[VISIBLE - 1]]
+    edge = moved[lips[VISIBLE_RINGS - 1]]
     half = COLUMNS // 2
     upper, lower = edge[1:half], edge[:half:-1]
-    gaps = APART * (upper - lower)[:, 1]
-    visible = moved[lips[:VISIBLE]].reshape(-1, 3)
+    gaps = GAP_WEIGHT * (upper - lower)[:, 1]
+    visible = moved[lips[:VISIBLE_RINGS]].reshape(-1, 3)
     return np.concatenate([visible.ravel(), 0.5 * moved[around].ravel(), gaps])

@@ -14,7 +14,7 @@ from lipmotion.faces.head.lips import (
     COLUMNS,
     RINGS,
     SIDE,
-    VISIBLE,
+    VISIBLE_RINGS,
     closed_share,
     lip_surface,
     section_points,
@@ -36,12 +36,12 @@ CHEEKS_SPREAD, CHEEKS_ROUND = 0.035, 0.025
 _LEFT_CORNER = 40
 _OPPOSITE = -np.arange(COLUMNS) % COLUMNS
 """For every column of the lips the one of the other lip that it meets."""
-_JOINED = {VISIBLE - 1: 0.3}
+_JOINED = {VISIBLE_RINGS - 1: 0.3}
 """By rings of the lips: how far the light on both sides of the seam is the same."""
 AT_CORNER = (np.clip((np.abs(ACROSS) - 0.72) / 0.28, 0, 1) ** 2)[:, None]
 """How near each column of the lips is to a corner, 0 to 1 [shape=(COLUMNS, 1)]."""
 _NEAR_CORNER = np.clip((np.abs(ACROSS) - 0.5) / 0.5, 0, 1)[:, None]
-CORNER_JOINED, CORNER_FLAT = 0.6, 0.75
+CORNER_LIGHT_SHARE, CORNER_SKIN_SHARE = 0.6, 0.75
 """How far the light at the corners is the same on both lips, and that of the skin before them."""
 CALM_RADIUS = 0.035
 """Round the corners of the lips, where the surface folds, the shading changes less than the surface."""
@@ -71,7 +71,7 @@ class Skin:
             rows = self.lid_rows(eye)
             grids.append(_closed_grid(rows[::-1]) if eye == 0 else _closed_grid(rows))
         self.triangles = np.concatenate([triangles, *grids]).astype(np.int32)
-        front = 2 * VISIBLE * COLUMNS
+        front = 2 * VISIBLE_RINGS * COLUMNS
         self.pieces = {
             "skin": len(triangles),
             "lips": front,
@@ -121,14 +121,16 @@ class Skin:
         What meets there has no edge of light between its two sides then.
         """
         rows, closed = self.lip_rows(), closed_share(pose)
-        normals[rows[VISIBLE - 1]] += closed * (normals[rows[VISIBLE - 2]] - normals[rows[VISIBLE - 1]])
-        beside = AT_CORNER * (CORNER_JOINED + (1 - CORNER_JOINED) * pose.roundness)
-        for ring in range(1, VISIBLE):
+        normals[rows[VISIBLE_RINGS - 1]] += closed * (
+            normals[rows[VISIBLE_RINGS - 2]] - normals[rows[VISIBLE_RINGS - 1]]
+        )
+        beside = AT_CORNER * (CORNER_LIGHT_SHARE + (1 - CORNER_LIGHT_SHARE) * pose.roundness)
+        for ring in range(1, VISIBLE_RINGS):
             own = normals[rows[ring]]
             share = np.maximum(closed * _JOINED.get(ring, 0.0), beside)
             normals[rows[ring]] += 0.5 * share * (own[_OPPOSITE] - own)
-        outer = rows[1:VISIBLE]
-        normals[outer] += CORNER_FLAT * (1 - pose.roundness) * _NEAR_CORNER * (self._before_lips - normals[outer])
+        outer = rows[1:VISIBLE_RINGS]
+        normals[outer] += CORNER_SKIN_SHARE * (1 - pose.roundness) * _NEAR_CORNER * (self._before_lips - normals[outer])
 
     def _bind(self, contour: Real) -> None:
         """Bind every vertex of the face to two columns of the lips, and to the jaw."""

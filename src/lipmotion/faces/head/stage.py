@@ -12,7 +12,7 @@ from lipmotion.faces.head.pose import CharacterPose
 from lipmotion.meshes.rendering.rasteriser import Camera, Canvas, flat
 
 CENTRE = (0.0, -0.03)
-ACROSS = 3.35
+PICTURE_HEIGHT = 3.35
 """Height of the picture, in eye distances."""
 
 
@@ -24,7 +24,7 @@ def figure() -> Figure:
 
 def camera_for(width: int, height: int) -> Camera:
     """Return the camera for a size of pictures. Raises InputError: a size that is odd or under 64."""
-    return Camera(width, height, CENTRE, ACROSS)
+    return Camera(width, height, CENTRE, PICTURE_HEIGHT)
 
 
 class Stage:

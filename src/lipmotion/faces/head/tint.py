@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from lipmotion.faces.head import palette
 from lipmotion.faces.head.eyelids import LID_SIDE
-from lipmotion.faces.head.lips import ACROSS, VISIBLE
+from lipmotion.faces.head.lips import ACROSS, VISIBLE_RINGS
 from lipmotion.faces.head.skin import Skin
 from lipmotion.meshes.rendering.lighting import linear
 
 Real = NDArray[np.float64]
-FADED = 0.4
+CORNER_FADE_SHARE = 0.4
 """How far the colour of the lips fades to that of the skin towards the corners."""
 
 
@@ -47,10 +47,10 @@ def _lips(skin: Skin, colour: Real) -> None:
     lips = skin.lip_rows()
     bare = colour[lips[0]]
     colour[lips[1]] = 0.45 * colour[lips[1]] + 0.55 * np.array(palette.LIP)
-    colour[lips[2 : VISIBLE - 1].ravel()] = palette.LIP
-    for ring in range(VISIBLE - 2, VISIBLE + 1):
-        share = 0.3 * (ring - VISIBLE + 3)
+    colour[lips[2 : VISIBLE_RINGS - 1].ravel()] = palette.LIP
+    for ring in range(VISIBLE_RINGS - 2, VISIBLE_RINGS + 1):
+        share = 0.3 * (ring - VISIBLE_RINGS + 3)
         colour[lips[ring]] = (1 - share) * np.array(palette.LIP) + share * np.array(palette.LIP_DEEP)
-    faded = (FADED * np.clip((np.abs(ACROSS) - 0.8) / 0.2, 0, 1) ** 2)[:, None]
-    colour[lips[1:VISIBLE]] += faded * (bare - colour[lips[1:VISIBLE]])
-    colour[lips[VISIBLE + 1 :].ravel()] = palette.MOUTH
+    faded = (CORNER_FADE_SHARE * np.clip((np.abs(ACROSS) - 0.8) / 0.2, 0, 1) ** 2)[:, None]
+    colour[lips[1:VISIBLE_RINGS]] += faded * (bare - colour[lips[1:VISIBLE_RINGS]])
+    colour[lips[VISIBLE_RINGS + 1 :].ravel()] = palette.MOUTH

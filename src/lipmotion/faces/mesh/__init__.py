@@ -21,7 +21,7 @@ from lipmotion.types import Motion, Prosody, Timeline, Unit
 __all__ = ["MeshFace", "MeshStage"]
 
 WIDTH, HEIGHT = 1280, 720
-AHEAD = 2
+FRAMES_AHEAD = 2
 """Pictures that are drawn before they are asked for."""
 
 
@@ -81,7 +81,7 @@ class MeshFace(Face):
             MeshPose(row, (yaw, pitch, roll), (across, up))
             for row, (yaw, pitch, roll), (across, up) in zip(rows, turns, looks, strict=True)
         ]
-        return DrawnMotion(poses, lambda: self._painter, AHEAD)
+        return DrawnMotion(poses, lambda: self._painter, FRAMES_AHEAD)
 
     @cached_property
     def _painter(self) -> Callable[[MeshPose], Picture]:

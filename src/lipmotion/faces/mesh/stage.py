@@ -20,13 +20,13 @@ Rows = NDArray[np.int64]
 Picture = NDArray[np.uint8]
 Turn = tuple[float, float, float]
 
-BELOW = 0.55
+SHARE_BELOW_MOUTH = 0.55
 """The picture shows as much below the mouth as this share of what is above it, up to the top of the head."""
 KEPT_SHARE = 0.92
 """The picture has this share of the height that follows from it: hair may leave it at the top."""
 DISTANCE = 2.8
 """The camera is this many heights of the picture away."""
-NEARBY = 1.7
+DRAWN_HEIGHTS = 1.7
 """Everything within this many heights of the picture around the mouth is drawn: of a body, head and shoulders."""
 PIVOT = np.array([0.0, 0.12, -1.05])
 """The head turns about this place where no bone says another one: the top of the neck, in eye distances from the middle
@@ -56,9 +56,9 @@ class MeshStage:
         self._rest = self._placed(mesh.vertices)
         face = surface.pieces == surface.pieces[placement.vertices[0]]
         top = float(self._rest[face, 1].max())
-        across = KEPT_SHARE * (1 + BELOW) * top
-        camera = Camera(width, height, (0.0, (1 - BELOW) / 2 * top), across, DISTANCE * across)
-        near = np.linalg.norm(self._rest, axis=1) < NEARBY * across
+        across = KEPT_SHARE * (1 + SHARE_BELOW_MOUTH) * top
+        camera = Camera(width, height, (0.0, (1 - SHARE_BELOW_MOUTH) / 2 * top), across, DISTANCE * across)
+        near = np.linalg.norm(self._rest, axis=1) < DRAWN_HEIGHTS * across
         shown = np.asarray(near[mesh.triangles].any(axis=1))
         self._drawn = drawn_surface(mesh, shown, height / across / placement.scale)
         self._canvas = TexturedCanvas(camera, self._drawn.triangles, None if colour is None else flat(camera, colour))

@@ -22,7 +22,7 @@ from lipmotion.faces.portrait.design import Design
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 
 if TYPE_CHECKING:
-    from lipmotion.faces.portrait.rasteriser import FacePose
+    from lipmotion.faces.portrait.portrait_rasteriser import FacePose
 
 __all__ = ["Cartoon", "DrawnFace", "Man", "Portrait", "Woman"]
 
@@ -56,15 +56,15 @@ class DrawnFace(Face):
         return iter(self.drawn(motion, units, fps=fps))
 
     def drawn(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> DrawnMotion[FacePose]:  # noqa: D102
-        from lipmotion.faces.portrait.frames import face_poses
+        from lipmotion.faces.portrait.drawn_frames import face_poses
 
         poses = face_poses(motion, units, fps, self.staging, self.prosody)
         return DrawnMotion(poses, lambda: self._painter)
 
     @cached_property
     def _painter(self) -> Callable[[FacePose], NDArray[np.uint8]]:
-        from lipmotion.faces.portrait.frames import painter
-        from lipmotion.faces.portrait.rasteriser import Rasteriser
+        from lipmotion.faces.portrait.drawn_frames import painter
+        from lipmotion.faces.portrait.portrait_rasteriser import Rasteriser
 
         chosen = self.staging
         background = None if chosen.background == TRANSPARENT else chosen.colour or chosen.background
@@ -73,7 +73,7 @@ class DrawnFace(Face):
     def render_planes(  # noqa: D102
         self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0
     ) -> Iterator[NDArray[np.uint8]] | None:
-        from lipmotion.faces.portrait.frames import face_poses, painter
+        from lipmotion.faces.portrait.drawn_frames import face_poses, painter
         from lipmotion.faces.portrait.planar import PlanarRasteriser
 
         chosen = self.staging

@@ -22,7 +22,7 @@ TEETH_EDGE = 0.024
 """The upper incisors end this far below the line of the closed lips; they belong to the skull."""
 SPREAD_RISE = (0.5, 0.06)
 """The upper lip of spread lips rises by this part of the gap, at most so far: more of the upper teeth shows."""
-DRAWN_IN, RING = 0.9, 0.8
+LARGEST_RING_SHARE, LIP_RING_SHARE = 0.9, 0.8
 """Protruded lips are a ring round a hole, this part of both lips thick; they are at most so much of their own width."""
 ROUND_HOLE = (0.012, 0.85)
 """Half the width of the hole of protruded lips: a length, and so much of the gap."""
@@ -137,7 +137,7 @@ def mouth_interior(lips: LipDesign, pose: MouthPose, x: Heights, outlines: LipOu
 def drawn_half_width(lips: LipDesign, pose: MouthPose) -> float:
     """Return half the width of the drawn lips: protruded lips draw their corners in, closed ones less."""
     flat = lips.half_width * pose.width
-    ring = min(DRAWN_IN * flat, _round_hole(pose) + RING * (lips.upper + lips.lower))
+    ring = min(LARGEST_RING_SHARE * flat, _round_hole(pose) + LIP_RING_SHARE * (lips.upper + lips.lower))
     return flat + pose.protrusion * (0.3 + 0.7 * min(pose.gap / 0.03, 1)) * (ring - flat)
 
 

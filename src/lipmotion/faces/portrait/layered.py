@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.faces.base import SCENE, TRANSPARENT, DrawnMotion, Face, Staging
-from lipmotion.faces.portrait.frames import face_poses
+from lipmotion.faces.portrait.drawn_frames import face_poses
 from lipmotion.faces.portrait.movement import PIVOT_Y, HeadPlacement
+from lipmotion.faces.portrait.portrait_rasteriser import FacePose
 from lipmotion.faces.portrait.pose import MouthPose
-from lipmotion.faces.portrait.rasteriser import FacePose
 from lipmotion.faces.portrait.svg_document import Drawing, Shape, read_drawing
 from lipmotion.faces.portrait.svg_painting import Pixels, over, painted
 from lipmotion.kernels.pixels.painting import warp_bytes

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from lipmotion.faces.portrait.design import Design
 from lipmotion.faces.portrait.eyes import GAZE_STEPS, LID_POSITIONS, EyePainter
-from lipmotion.faces.portrait.mouth import MouthPainter
+from lipmotion.faces.portrait.mouth_painting import MouthPainter
+from lipmotion.faces.portrait.mouth_textures import MouthTextures, mouth_textures
 from lipmotion.faces.portrait.movement import BrowField, HeadField, SkinField
 from lipmotion.faces.portrait.palette import Colour
-from lipmotion.faces.portrait.rasteriser import BROW_STEPS, SCENE, FacePose, moving_parts, still_layers
-from lipmotion.faces.portrait.textures import MouthTextures, mouth_textures
+from lipmotion.faces.portrait.portrait_rasteriser import BROW_STEPS, SCENE, FacePose, moving_parts, still_layers
 from lipmotion.faces.portrait.view import View, Window
 from lipmotion.kernels.pixels.planes import (
     Box,

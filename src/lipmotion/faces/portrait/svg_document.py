@@ -3,7 +3,7 @@
 Read are groups, paths, rectangles, circles, ellipses, polygons, polylines and lines with plain colours, strokes,
 opacity and transforms. What could reach outside the file (references, scripts, pictures, styles, entities) is refused,
 and so is what would be drawn wrongly without notice, as gradients and text. The text is UTF-8, whatever it declares.
-It is read in one pass, which ends at the first thing that is refused: ``LARGEST_FILE`` and the other limits.
+It is read in one pass, which ends at the first thing that is refused: ``LARGEST_FILE_BYTES`` and the other limits.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.faces.portrait.svg_paths import (
-    LARGEST,
+    LARGEST_NUMBER,
     MOST_POINTS,
     bounded,
     check_points,
@@ -34,13 +34,13 @@ from lipmotion.faces.portrait.svg_paths import (
 from lipmotion.storage.files import check_regular
 
 Points = NDArray[np.float64]
-WIDEST = 4.0
+LARGEST_SIDE_RATIO = 4.0
 """Largest ratio of the sides of a picture."""
-LARGEST_FILE, MOST_ELEMENTS, DEEPEST = 8 << 20, 20_000, 60
+LARGEST_FILE_BYTES, MOST_ELEMENTS, DEEPEST_NESTING = 8 << 20, 20_000, 60
 """Most bytes of a drawing, elements in it, and elements in one another."""
-MOST_COVERED, LINES_ACROSS = 200.0, 100.0
+MOST_COVERED_PICTURES, LINES_PER_PICTURE = 200.0, 100.0
 """Most that shapes cover, in pictures; lines across the picture that take as long to paint as one picture."""
-LONGEST_VALUE = 100
+LONGEST_VALUE_CHARACTERS = 100
 """Most letters of a number, a colour or another value of a style."""
 _SHAPES = {"path", "rect", "circle", "ellipse", "polygon", "polyline", "line"}
 _PASSED_OVER = {"title", "desc", "metadata", "namedview", "defs", "guide", "grid", "page", "RDF"}
@@ -91,7 +91,7 @@ def read_drawing(path: Path) -> Drawing:
     try:
         check_regular(path, "drawing")
         with path.open("rb") as file:
-            data = file.read(LARGEST_FILE + 1)
+            data = file.read(LARGEST_FILE_BYTES + 1)
     except (OSError, ValueError) as error:
         if isinstance(error, InputError):
             raise
@@ -104,8 +104,8 @@ def read_drawing(path: Path) -> Drawing:
 
 def drawing_of(data: bytes) -> Drawing:
     """Return the drawing in the bytes of an ``.svg`` file. Raises InputError: as ``read_drawing``."""
-    if len(data) > LARGEST_FILE:
-        raise InputError(f"more than {LARGEST_FILE} bytes; is it a drawing?")
+    if len(data) > LARGEST_FILE_BYTES:
+        raise InputError(f"more than {LARGEST_FILE_BYTES} bytes; is it a drawing?")
     if data[:2] == b"\x1f\x8b":
         raise InputError("it is compressed (.svgz); save it as plain SVG")
     try:
@@ -164,8 +164,8 @@ class _DrawingReader:
         self.elements, self.depth = self.elements + 1, self.depth + 1
         if self.elements > MOST_ELEMENTS:
             raise InputError(f"more than {MOST_ELEMENTS} elements")
-        if self.depth > DEEPEST:
-            raise InputError(f"groups in groups, more than {DEEPEST} deep")
+        if self.depth > DEEPEST_NESTING:
+            raise InputError(f"groups in groups, more than {DEEPEST_NESTING} deep")
         if self.passed:
             return
         tag = _local(name)
@@ -199,8 +199,8 @@ class _DrawingReader:
         check_points(MOST_POINTS - self.points)
         shape = _shape(group, lines, filled=tag != "line")
         self.covered += _covered(shape, self.box or (0, 0, 1, 1))
-        if self.covered > MOST_COVERED:
-            raise InputError(f"its shapes cover more than {MOST_COVERED:g} times the picture; leave some out")
+        if self.covered > MOST_COVERED_PICTURES:
+            raise InputError(f"its shapes cover more than {MOST_COVERED_PICTURES:g} times the picture; leave some out")
         self.shapes.append((self.groups[-1].layers, shape))
 
 
@@ -230,9 +230,10 @@ def _box(root: Mapping[str, str]) -> tuple[float, float, float, float]:
         numbers = [0, 0, *(_number(root.get(name, "0"), name) for name in ("width", "height"))]
     if len(numbers) != 4 or not (1e-3 <= numbers[2] < 1e6 and 1e-3 <= numbers[3] < 1e6):
         raise InputError(f"the view box is {shortened(text)!r}, required four numbers, the last two 0.001 or more")
-    if not 1 / WIDEST <= numbers[2] / numbers[3] <= WIDEST:
+    if not 1 / LARGEST_SIDE_RATIO <= numbers[2] / numbers[3] <= LARGEST_SIDE_RATIO:
         raise InputError(
-            f"the picture is {numbers[2]:g} by {numbers[3]:g}, required at most {WIDEST:g} times as long as wide"
+            f"the picture is {numbers[2]:g} by {numbers[3]:g}, required at most {LARGEST_SIDE_RATIO:g} times as "
+            "long as wide"
         )
     return numbers[0], numbers[1], numbers[2], numbers[3]
 
@@ -276,7 +277,7 @@ def _style(attributes: Mapping[str, str]) -> dict[str, str]:
         if name.strip() in names:
             style[name.strip()] = value.strip()
     for name, value in style.items():
-        if len(value) > LONGEST_VALUE:
+        if len(value) > LONGEST_VALUE_CHARACTERS:
             raise InputError(f"{name} is {shortened(value)!r}, required a number or a plain colour")
     return style
 
@@ -285,8 +286,8 @@ def _shape(group: _Group, lines: list[tuple[Points, bool]], *, filled: bool) -> 
     style, matrix = group.style, group.matrix
     alphas = [group.opacity * _number(style.get(f"{kind}-opacity", "1"), "opacity") for kind in ("fill", "stroke")]
     placed = tuple(Line(points @ matrix[:2, :2].T + matrix[:2, 2], closed) for points, closed in lines)
-    if not all(np.abs(line.points).max(initial=0) <= 1e3 * LARGEST for line in placed):
-        raise InputError(f"a shape is {1e3 * LARGEST:g} units away; check the transforms")
+    if not all(np.abs(line.points).max(initial=0) <= 1e3 * LARGEST_NUMBER for line in placed):
+        raise InputError(f"a shape is {1e3 * LARGEST_NUMBER:g} units away; check the transforms")
     fill = _colour(style.get("fill", "black"), "fill")
     return Shape(
         placed,
@@ -306,7 +307,7 @@ def _covered(shape: Shape, box: tuple[float, float, float, float]) -> float:
     for points, _ in shape.lines:
         inside = np.clip((points - first) / size, 0, 1)
         steps = np.abs(np.diff(inside, axis=0, append=inside[:1]))
-        covered += float(np.prod(np.ptp(inside, axis=0))) + float(steps[:, 1].sum()) / LINES_ACROSS
+        covered += float(np.prod(np.ptp(inside, axis=0))) + float(steps[:, 1].sum()) / LINES_PER_PICTURE
         if stroked:
             width = min(shape.width / float(size.min()), 1.0)
             covered += float(np.minimum(width * (width + steps.sum(axis=1)), 1.0).sum())

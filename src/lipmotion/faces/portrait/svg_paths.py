@@ -18,7 +18,7 @@ MOST_POINTS = 400_000
 """Most points of all lines of a drawing; a curve has ``STEPS``, an arc four times as many."""
 MOST_TRANSFORMS = 20
 """Most transforms one after another in one attribute."""
-LARGEST = 1e6
+LARGEST_NUMBER = 1e6
 """Largest magnitude of a number in a drawing."""
 _NUMBER = re.compile(r"[\s,]*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)")
 _FLAG = re.compile(r"[\s,]*([01])")
@@ -164,9 +164,9 @@ def _arc(at: Points, end: Points, rx: float, ry: float, turned: float, large: fl
 
 
 def within(number: float, text: str) -> float:
-    """Return the number. Raises InputError, with ``text``: it is larger than ``LARGEST``, or not finite."""
-    if not abs(number) <= LARGEST:
-        raise InputError(f"{number:g} in {shortened(text)!r}, required numbers up to {LARGEST:g}")
+    """Return the number. Raises InputError, with ``text``: it is larger than ``LARGEST_NUMBER``, or not finite."""
+    if not abs(number) <= LARGEST_NUMBER:
+        raise InputError(f"{number:g} in {shortened(text)!r}, required numbers up to {LARGEST_NUMBER:g}")
     return number
 
 
@@ -215,7 +215,7 @@ def rectangle(x: float, y: float, width: float, height: float, radius: float) ->
 
 def transform_of(text: str) -> Points:
     """Return the matrix of a ``transform`` [shape=(3, 3)]. Raises InputError: not a transform, or what enlarges more
-    than ``LARGEST`` times."""
+    than ``LARGEST_NUMBER`` times."""
     matrix = np.eye(3)
     *calls, rest = text.split(")", MOST_TRANSFORMS)
     if rest.strip():
@@ -231,9 +231,9 @@ def transform_of(text: str) -> Points:
 
 
 def bounded(matrix: Points) -> Points:
-    """Return a matrix of transforms. Raises InputError: it enlarges or moves beyond ``LARGEST``."""
-    if not np.abs(matrix).max() <= LARGEST:
-        raise InputError(f"transforms in one another enlarge beyond {LARGEST:g} times")
+    """Return a matrix of transforms. Raises InputError: it enlarges or moves beyond ``LARGEST_NUMBER``."""
+    if not np.abs(matrix).max() <= LARGEST_NUMBER:
+        raise InputError(f"transforms in one another enlarge beyond {LARGEST_NUMBER:g} times")
     return matrix
 
 

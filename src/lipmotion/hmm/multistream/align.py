@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.log_likelihoods import LogLikelihoods
-from lipmotion.hmm.multistream.inventory import TriphoneStates, triphone_states
 from lipmotion.hmm.multistream.model import JointHmm
 from lipmotion.hmm.multistream.streams import StreamObservations, StreamWeights
+from lipmotion.hmm.multistream.unit_states import TriphoneStates, triphone_states
 from lipmotion.hmm.network import NetworkBuilder
 
 LEAST_SPREAD = 1.0

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from lipmotion.hmm.multistream.densities import LEAST_SCALE, StreamScale, TiedDensities
 from lipmotion.hmm.multistream.forest import Forest
-from lipmotion.hmm.multistream.inventory import Inventory
 from lipmotion.hmm.multistream.model import JointConfig, JointHmm, StreamModel
 from lipmotion.hmm.multistream.streams import F0_STREAMS, MOTION, SPEECH, STREAMS
+from lipmotion.hmm.multistream.unit_states import Inventory
 from lipmotion.stats.bigram import BIGRAM, bigram_from_array
 from lipmotion.stats.mixture import MIXTURES, mixtures_from_arrays
 from lipmotion.stats.trees import TREES, tree_arrays, trees_from_arrays

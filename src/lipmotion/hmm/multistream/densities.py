@@ -15,7 +15,7 @@ LEAST_FRAMES = 2.0
 """A Gaussian with less data, in frames, is not re-estimated."""
 SPLIT_FRAMES = 40.0
 """A Gaussian with less data, in frames, is not split."""
-LEAST_VOICED = 1e-3
+LEAST_VOICED_PROBABILITY = 1e-3
 """Least probability of a frame being voiced, and of its being unvoiced."""
 LEAST_POSTERIOR = np.float32(1e-10)
 """Smaller posteriors are set to 0; so none is denormal, which would be slow."""
@@ -177,7 +177,9 @@ class TiedDensities:
         if self.voiced is None:
             return replace(self, mixtures=mixtures)
         frames = statistics.frames
-        voiced = np.clip(total[:, 0] / np.maximum(frames, 1e-30), LEAST_VOICED, 1 - LEAST_VOICED)
+        voiced = np.clip(
+            total[:, 0] / np.maximum(frames, 1e-30), LEAST_VOICED_PROBABILITY, 1 - LEAST_VOICED_PROBABILITY
+        )
         return TiedDensities(mixtures, np.where(frames >= LEAST_FRAMES, voiced, self.voiced))
 
     def can_split(self, statistics: GaussianStatistics) -> bool:
@@ -209,7 +211,7 @@ def standard_normal_densities(densities: int, dimensions: int, has_spaces: bool,
     """
     shape = (densities, 1, dimensions)
     mixtures = Mixtures(np.zeros((densities, 1), np.float32), np.zeros(shape, np.float32), np.ones(shape, np.float32))
-    share = float(np.clip(voiced, LEAST_VOICED, 1 - LEAST_VOICED))
+    share = float(np.clip(voiced, LEAST_VOICED_PROBABILITY, 1 - LEAST_VOICED_PROBABILITY))
     return TiedDensities(mixtures, np.full(densities, share) if has_spaces else None)
 
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.hmm.multistream.densities import GaussianStatistics
-from lipmotion.hmm.multistream.inventory import Inventory, TriphoneState
 from lipmotion.hmm.multistream.streams import MOTION
+from lipmotion.hmm.multistream.unit_states import Inventory, TriphoneState
 from lipmotion.printable import printable
 from lipmotion.stats.trees import (
     Context,

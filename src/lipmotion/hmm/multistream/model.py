@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.hmm.multistream.densities import StreamScale, TiedDensities
 from lipmotion.hmm.multistream.forest import Forest
-from lipmotion.hmm.multistream.inventory import Inventory, TriphoneState
 from lipmotion.hmm.multistream.streams import StreamObservations, StreamWeights
+from lipmotion.hmm.multistream.unit_states import Inventory, TriphoneState
 from lipmotion.printable import printable
 from lipmotion.stats.bigram import Bigram
 

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError
 from lipmotion.hmm.multistream.arrays import joint_arrays, joint_from_arrays
-from lipmotion.hmm.multistream.inventory import Inventory
-from lipmotion.hmm.multistream.labels import units_in_frames, units_in_time
 from lipmotion.hmm.multistream.model import JointConfig, JointHmm
+from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, train_joint
 from lipmotion.hmm.multistream.recognise import joint_recogniser
 from lipmotion.hmm.multistream.streams import SPEECH, StreamObservations, stream_observations
-from lipmotion.hmm.multistream.train import TrainingUtterance, train_joint
+from lipmotion.hmm.multistream.unit_frames import units_in_frames, units_in_time
+from lipmotion.hmm.multistream.unit_states import Inventory
 from lipmotion.storage.checkpoint import Checkpoint
 from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, checked_arrays
 from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Speech, Timeline, Unit

@@ -14,9 +14,9 @@ from lipmotion.hmm.decode import UnitLoop, decode_units, unit_loop
 from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.hmm.multistream.align import StatePath
-from lipmotion.hmm.multistream.inventory import TriphoneState, triphone_states
 from lipmotion.hmm.multistream.model import JointHmm
 from lipmotion.hmm.multistream.streams import ACOUSTIC_STREAMS, MOTION, SPEECH, StreamObservations, StreamWeights
+from lipmotion.hmm.multistream.unit_states import TriphoneState, triphone_states
 from lipmotion.hmm.states import StateTable, plain_states
 from lipmotion.kernels.sequences.sampling import sample_paths
 from lipmotion.stats.bigram import Bigram

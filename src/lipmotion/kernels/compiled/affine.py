@@ -17,7 +17,7 @@ Floats = NDArray[np.float32]
 Picture = NDArray[Any]
 Index = NDArray[np.int32]
 Number = np.float32
-HALF, ONE, MORE, TWO, MOST = Number(0.5), Number(1), Number(1.5), Number(2), Number(2.5)
+HALF, ONE, ONE_AND_HALF, TWO, TWO_AND_HALF = Number(0.5), Number(1), Number(1.5), Number(2), Number(2.5)
 BLACK, WHITE = Number(0), Number(255)
 COLOURS = 3
 NEXT = np.uint64(COLOURS)  # indices that may be negative are not vectorised
@@ -87,8 +87,8 @@ def _weigh(fractions: Floats, taps: Floats) -> None:
         for c in range(fractions.shape[1]):
             t = fractions[side, c]
             taps[4 * side, c] = ((ONE - HALF * t) * t - HALF) * t
-            taps[4 * side + 1, c] = (MORE * t - MOST) * t * t + ONE
-            taps[4 * side + 2, c] = ((TWO - MORE * t) * t + HALF) * t
+            taps[4 * side + 1, c] = (ONE_AND_HALF * t - TWO_AND_HALF) * t * t + ONE
+            taps[4 * side + 2, c] = ((TWO - ONE_AND_HALF * t) * t + HALF) * t
             taps[4 * side + 3, c] = (HALF * t - HALF) * t * t
 
 

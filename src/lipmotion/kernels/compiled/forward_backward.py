@@ -14,7 +14,7 @@ from lipmotion.kernels.compiled.compiler import compiled
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
-IMPOSSIBLE = -1e30
+LOG_ZERO = -1e30
 LOG_2 = math.log(2)
 
 
@@ -23,7 +23,7 @@ def chains(
     log_emission: Array, log_stay: Array, log_move: Array, frames: Index, states: Index
 ) -> tuple[Array, Array, Array]:
     """Return log posteriors of states and of staying in them, and log likelihoods (as NumPy's form, ``_chains``)."""
-    posterior, kept = np.full(log_emission.shape, IMPOSSIBLE), np.full(log_emission.shape, IMPOSSIBLE)
+    posterior, kept = np.full(log_emission.shape, LOG_ZERO), np.full(log_emission.shape, LOG_ZERO)
     log_likelihood = np.empty(len(frames))
     for u in range(len(frames)):
         T, S = frames[u], states[u]
@@ -40,10 +40,10 @@ def _forward(log_emission: Array, log_stay: Array, log_move: Array, alpha: Array
     """Fill in the forward scores [shape=(T, S)]."""
     alpha[0, 0] = log_emission[0, 0]
     for t in range(1, len(alpha)):
-        alpha[t, 0] = max(alpha[t - 1, 0] + log_stay[0] + log_emission[t, 0], IMPOSSIBLE)
+        alpha[t, 0] = max(alpha[t - 1, 0] + log_stay[0] + log_emission[t, 0], LOG_ZERO)
         for s in range(1, alpha.shape[1]):
             arrive = _log_sum(alpha[t - 1, s] + log_stay[s], alpha[t - 1, s - 1] + log_move[s - 1])
-            alpha[t, s] = max(arrive + log_emission[t, s], IMPOSSIBLE)
+            alpha[t, s] = max(arrive + log_emission[t, s], LOG_ZERO)
 
 
 @compiled
@@ -52,7 +52,7 @@ def _backward(
 ) -> None:
     """Replace the forward scores ``alpha`` by log posteriors, and fill in those of staying in a state."""
     T, S = alpha.shape
-    beta = np.full(S, IMPOSSIBLE)
+    beta = np.full(S, LOG_ZERO)
     beta[S - 1] = log_move[S - 1]
     onward = np.empty(S)
     for t in range(T - 1, -1, -1):
@@ -63,7 +63,7 @@ def _backward(
                 keep = log_stay[s] + onward[s]
                 kept[t, s] = alpha[t, s] + keep - log_likelihood
                 reach = _log_sum(keep, log_move[s] + onward[s + 1]) if s + 1 < S else keep
-                beta[s] = max(reach, IMPOSSIBLE)
+                beta[s] = max(reach, LOG_ZERO)
         for s in range(S):
             alpha[t, s] = alpha[t, s] + beta[s] - log_likelihood
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.kernels.compiled.compiler import compiled
-from lipmotion.kernels.pixels.shading import AWAY
+from lipmotion.kernels.pixels.shading import LEAST_FACING_COSINE
 
 Real = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ def shade(
         nx, ny, nz = normals[v]
         ex, ey, ez = _towards(viewer, places[v])
         faces = nx * ex + ny * ey + nz * ez
-        if faces < AWAY:
+        if faces < LEAST_FACING_COSINE:
             light[v] = 0.0
             continue
         grazing = min(max(1.0 - faces, 0.0), 1.0)

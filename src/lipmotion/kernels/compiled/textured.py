@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from lipmotion.kernels.compiled.compiler import compiled
 from lipmotion.kernels.compiled.raster import BAND, FAR, _bias, _by_band
-from lipmotion.kernels.pixels.textured import CLEAR, CUT, EMPTY, HIDES, SCALE, SEEN
+from lipmotion.kernels.pixels.textured import CLEAR, CUT, HIDING_OPACITY, NO_TRIANGLE, SCALE, SEEN_OPACITY
 
 Real = NDArray[np.float64]
 Light = NDArray[np.float32]
 Whole = NDArray[np.int32]
-WIDE = 8
+WIDE_SAMPLES = 8
 """In triangles wider than this, in samples, the columns of a row are worked out before they are tried."""
 PLANES = 27
 """Numbers of a triangle that are linear on the screen: three of each of light, highlights, depth, and place in the
@@ -39,13 +39,13 @@ def draw(
     for band in range(bands):
         first = top + band * BAND
         last = min(first + BAND, bottom)
-        depth[:], near[:], shown[:], before[:] = FAR, FAR, EMPTY, EMPTY
+        depth[:], near[:], shown[:], before[:] = FAR, FAR, NO_TRIANGLE, NO_TRIANGLE
         layered = False
         for n in range(starts[band], starts[band + 1]):
             t = faces[n]
             a, c, b = triangles[t]
             layered = layered or looks[t, 1] == CLEAR
-            least = alphas[t, 0] if looks[t, 1] == CUT else HIDES
+            least = alphas[t, 0] if looks[t, 1] == CUT else HIDING_OPACITY
             _mark(
                 t, x[a], y[a], z[a], x[b], y[b], z[b], x[c], y[c], z[c], 2 * left, 2 * right, 2 * first, 2 * last,
                 looks[t, 1] != 0, least / max(alphas[t, 1], 1e-9), planes, looks[t, 0], texels, levels, depth, shown,
@@ -59,7 +59,7 @@ def draw(
                     _mark(
                         t, x[a], y[a], z[a], x[b], y[b], z[b], x[c], y[c], z[c],
                         2 * left, 2 * right, 2 * first, 2 * last,
-                        True, SEEN / max(alphas[t, 1], 1e-9), planes, looks[t, 0], texels, levels, near, before,
+                        True, SEEN_OPACITY / max(alphas[t, 1], 1e-9), planes, looks[t, 0], texels, levels, near, before,
                         depth,
                     )  # fmt: skip
         _resolve(
@@ -120,7 +120,7 @@ def _mark(
         within = False
         i = row - top
         start, stop = x0, x1
-        if x1 - x0 > WIDE:
+        if x1 - x0 > WIDE_SAMPLES:
             start, stop = _narrowed(start, stop, px, of_a - bias_a, step_a)
             start, stop = _narrowed(start, stop, px, of_b - bias_b, step_b)
             start, stop = _narrowed(start, stop, px, of_c - bias_c, step_c)
@@ -232,9 +232,9 @@ def _resolve(
             t = shown[i, j]
             whole = t == shown[i, j + 1] and t == shown[i + 1, j] and t == shown[i + 1, j + 1]
             if whole and layered:
-                whole = before[i, j] == EMPTY and before[i, j + 1] == EMPTY
-                whole = whole and before[i + 1, j] == EMPTY and before[i + 1, j + 1] == EMPTY
-            if whole and t == EMPTY:
+                whole = before[i, j] == NO_TRIANGLE and before[i, j + 1] == NO_TRIANGLE
+                whole = whole and before[i + 1, j] == NO_TRIANGLE and before[i + 1, j + 1] == NO_TRIANGLE
+            if whole and t == NO_TRIANGLE:
                 for channel in range(3):
                     picture[row, column, channel] = tone[_level(np.float64(background[row, column, channel]), most)]
                 opacity[row, column] = 0
@@ -273,7 +273,7 @@ def _mix(
             ids[k] = marks[i + k // 2, j + k % 2]
         for k in range(4):
             t = ids[k]
-            if t == EMPTY or _earlier(ids, k) != k:
+            if t == NO_TRIANGLE or _earlier(ids, k) != k:
                 continue
             px, py = _middle(ids, k, row, column)
             red, green, blue, alpha = _shaded(t, px, py, planes, looks[t, 0], texels, levels)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from lipmotion.kernels.choice import compiled_pays
 
 Real = NDArray[np.float64]
-AWAY = -0.35
+LEAST_FACING_COSINE = -0.35
 """Vertices that face further away than this (the cosine) are not seen, and stay dark."""
 VERTEX_S = 1.2e-6
 """Time that NumPy takes for a vertex."""
@@ -106,7 +106,7 @@ def _shade(
             diffuse[c] = diffuse[c] + 0.9 * rim * lamps[n, 3 + c]
             shine[c] = shine[c] + 0.12 * rim * lamps[n, 3 + c]
     light = np.stack([colours[:, c] * diffuse[c] + shine[c] for c in range(3)], axis=1)
-    light[faces < AWAY] = 0
+    light[faces < LEAST_FACING_COSINE] = 0
     return light.astype(np.float32)
 
 

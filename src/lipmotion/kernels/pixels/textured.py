@@ -17,11 +17,11 @@ Triple = tuple[Real, Real, Real]
 
 SOLID, CUT, CLEAR = 0, 1, 2
 """Kinds of triangles: without holes; with holes where the texture is clear; blended with what is behind."""
-HIDES = 0.95
+HIDING_OPACITY = 0.95
 """From this opacity on, a blended surface hides what is behind it."""
-SEEN = 1 / 512
+SEEN_OPACITY = 1 / 512
 """Below this opacity, it is not seen."""
-EMPTY = -1
+NO_TRIANGLE = -1
 SCALE = 1 / 65535
 
 
@@ -93,7 +93,7 @@ def _draw(
     left, top, right, bottom = area
     samples = (2 * left, 2 * top, 2 * right, 2 * bottom)
     size = samples[3] - samples[1], samples[2] - samples[0]
-    shown, before = np.full(size, EMPTY, np.int32), np.full(size, EMPTY, np.int32)
+    shown, before = np.full(size, NO_TRIANGLE, np.int32), np.full(size, NO_TRIANGLE, np.int32)
     depth, near = np.full(size, np.inf, np.float32), np.full(size, np.inf, np.float32)
     planes = _planes(points, light, shine, surface)
     for number in range(len(surface.triangles)):
@@ -107,7 +107,7 @@ def _draw(
         colour = background[top:bottom, left:right].astype(np.float64)
         hidden = np.zeros(colour.shape[:2])
         for marks, solid in ((ids, True), (layers, False)):
-            seen = marks[k] != EMPTY
+            seen = marks[k] != NO_TRIANGLE
             place = _middle(marks, k, left, top)
             look = _shaded(marks[k][seen], place[seen], planes, surface)
             alpha = np.ones(len(look)) if solid else look[:, 3]
@@ -166,7 +166,7 @@ def _mark(
     kind = surface.looks[number, 1]
     if kind != SOLID and seen.any():
         cut, factor = surface.alphas[number]
-        least = SEEN if blended else cut if kind == CUT else HIDES
+        least = SEEN_OPACITY if blended else cut if kind == CUT else HIDING_OPACITY
         rows, columns = np.nonzero(seen)
         places = np.stack([px[0, columns], py[rows, 0]], axis=1)
         alpha = _texel(np.full(len(places), number), places, planes, surface)[:, 3]

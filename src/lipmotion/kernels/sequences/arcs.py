@@ -17,7 +17,7 @@ Index = NDArray[np.intp]
 
 LEAST_BLOCK = 8
 """Least number of sources, and of targets, of a block."""
-PADDED = 16
+PADDING_ROWS = 16
 """Rows of a block are padded to a multiple of this."""
 
 
@@ -144,7 +144,7 @@ def _runs(source: Index, target: Index) -> tuple[Index, Index]:
 def _blocks(groups: _Groups, arc_from: Index, place: Index) -> tuple[Index, Index, Index]:
     """Return ``blocks``, ``block_sources`` and ``block_arcs`` of ``ArcLayout``."""
     total = sum(len(arcs) for _, arcs in groups)
-    widest = max((-(-len(targets) // PADDED) * PADDED for targets, _ in groups), default=PADDED)
+    widest = max((-(-len(targets) // PADDING_ROWS) * PADDING_ROWS for targets, _ in groups), default=PADDING_ROWS)
     blocks, sources, matrix = (
         np.empty((len(groups), 4), np.intp),
         np.empty(total, np.intp),

@@ -11,7 +11,7 @@ from lipmotion.kernels.sequences import factorial_steps
 from lipmotion.kernels.sequences.factorial_steps import WHOLE, BackwardStep, FramePosteriors, Joint
 from lipmotion.kernels.sequences.loops import FrameDensity, LoopTransitions
 
-LEAST = {np.dtype(np.float32): 1e-37, np.dtype(np.float64): 1e-300}
+LEAST_PRODUCT = {np.dtype(np.float32): 1e-37, np.dtype(np.float64): 1e-300}
 """By precision: smaller products of probabilities and densities are set to 0."""
 LEAST_TOTAL = {np.dtype(np.float32): 1e-20, np.dtype(np.float64): 1e-150}
 """By precision: least sum of these products, as a share of the whole. With such a sum, what was set to 0 or underflowed
@@ -28,7 +28,7 @@ def forward_step(
     total = factorial.forward(
         before, audio.stay, audio.onward, entering, visual.stay, visual.onward, moved @ visual.leaving,
         density.audio, density.visual, density.pair_audio, density.pair_visual, density.pair,
-        LEAST[before.dtype], WHOLE[before.dtype], after,
+        LEAST_PRODUCT[before.dtype], WHOLE[before.dtype], after,
     )  # fmt: skip
     if total > LEAST_TOTAL[before.dtype]:
         return after, moved, math.log(total) + density.best
@@ -55,7 +55,7 @@ def backward_step(
     total = factorial.backward(
         before, moved, audio.stay, audio.onward, audio.leaving @ moved[:units],
         density.audio, density.visual, density.pair_audio, density.pair_visual, density.pair,
-        LEAST[before.dtype], WHOLE[before.dtype], after, by_audio, by_visual, by_pair,
+        LEAST_PRODUCT[before.dtype], WHOLE[before.dtype], after, by_audio, by_visual, by_pair,
     )  # fmt: skip
     enough = total > LEAST_TOTAL[before.dtype]
     if not enough and before.dtype == np.float64:

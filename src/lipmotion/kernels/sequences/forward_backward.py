@@ -13,7 +13,7 @@ from lipmotion.kernels.choice import compiled_pays
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
-IMPOSSIBLE = -1e30
+LOG_ZERO = -1e30
 """Stands for the log probability -inf: sums and differences of it are no NaN."""
 LEAST_LOG = -700.0
 """Probabilities with smaller logarithms are set to 0."""
@@ -80,7 +80,7 @@ def chain_posteriors(
         log_posterior, log_kept, log_likelihood = forward_backward.chains(*arrays)
     else:
         log_posterior, log_kept, log_likelihood = _chains(*arrays)
-    possible = log_likelihood > IMPOSSIBLE / 2
+    possible = log_likelihood > LOG_ZERO / 2
     within = frames > np.arange(len(log_emission))[:, None]
     posterior, kept = _probabilities(log_posterior), _probabilities(log_kept)
     posterior *= (within & possible)[:, :, None]
@@ -99,19 +99,19 @@ def _chains(
     likelihoods [shape=(U,)]. In the padding, posteriors have no meaning.
     """
     T, U, S = log_emission.shape
-    alpha = np.full((T, U, S), IMPOSSIBLE)
+    alpha = np.full((T, U, S), LOG_ZERO)
     alpha[0, :, 0] = log_emission[0, :, 0]
     for t in range(1, T):
         arrive = alpha[t - 1] + log_stay
         moved = (alpha[t - 1] + log_move)[:, :-1]
         arrive[:, 1:] = np.logaddexp(arrive[:, 1:], moved)
-        np.maximum(arrive + log_emission[t], IMPOSSIBLE, out=alpha[t])
+        np.maximum(arrive + log_emission[t], LOG_ZERO, out=alpha[t])
     rows = np.arange(U)
-    leave = np.full((U, S), IMPOSSIBLE)
+    leave = np.full((U, S), LOG_ZERO)
     leave[rows, states - 1] = log_move[rows, states - 1]
     log_likelihood = (alpha[frames - 1, rows] + leave).max(axis=1)
 
-    beta, log_kept = np.full((T, U, S), IMPOSSIBLE), np.full((T, U, S), IMPOSSIBLE)
+    beta, log_kept = np.full((T, U, S), LOG_ZERO), np.full((T, U, S), LOG_ZERO)
     for t in range(T - 1, -1, -1):
         last = (frames == t + 1)[:, None]
         if t + 1 < T:
@@ -119,7 +119,7 @@ def _chains(
             kept = log_stay + onward
             reach = kept.copy()
             reach[:, :-1] = np.logaddexp(kept[:, :-1], log_move[:, :-1] + onward[:, 1:])
-            np.maximum(reach, IMPOSSIBLE, out=beta[t])
-            log_kept[t] = np.where((frames > t + 1)[:, None], alpha[t] + kept - log_likelihood[:, None], IMPOSSIBLE)
+            np.maximum(reach, LOG_ZERO, out=beta[t])
+            log_kept[t] = np.where((frames > t + 1)[:, None], alpha[t] + kept - log_likelihood[:, None], LOG_ZERO)
         beta[t] = np.where(last, leave, beta[t])
     return alpha + beta - log_likelihood[:, None], log_kept, log_likelihood

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.kernels.choice import numba_works
-from lipmotion.kernels.sequences.arcs import PADDED, ArcLayout, ArcWeights, arc_layout, arc_weights
+from lipmotion.kernels.sequences.arcs import PADDING_ROWS, ArcLayout, ArcWeights, arc_layout, arc_weights
 from lipmotion.kernels.sequences.forward_backward import log_forward_backward
 
 Index = NDArray[np.intp]
@@ -262,7 +262,7 @@ def _weighted(layout: ArcLayout, arc_log: Array) -> tuple[float, ArcWeights, Arr
 
 def _transposed(layout: ArcLayout, weights: ArcWeights) -> Array:
     """Return the weights of all blocks, targets as rows, sources as columns, padded."""
-    transposed = [np.empty((0, -(-layout.blocks[:, 3].max(initial=0) // PADDED) * PADDED))]
+    transposed = [np.empty((0, -(-layout.blocks[:, 3].max(initial=0) // PADDING_ROWS) * PADDING_ROWS))]
     for _, targets, first, sources in layout.blocks:
         matrix = np.zeros((targets, transposed[0].shape[1]))
         matrix[:, :sources] = weights.blocks[first : first + sources, :targets].T

@@ -19,7 +19,7 @@ BLOCK = 2048
 """Frames whose scores are in memory at a time; earlier scores are computed again from checkpoints."""
 FRAME_S, ARC_S = 10e-6, 15e-9
 """Time that NumPy takes for a frame, and for every arc in it (docs/results/kernels.md)."""
-LEAST_RUN = 20.0
+LEAST_RUN_ARCS = 20.0
 """Networks whose runs of arcs are shorter on average are searched arc by arc: a run costs as much as 30 single arcs."""
 
 
@@ -163,6 +163,6 @@ def _plain_search(network: NetworkArrays, beam: float) -> PathSearch:
 
 
 def _compiled_search(network: NetworkArrays, beam: float, layout: ArcLayout) -> PathSearch:
-    if len(layout.run_arcs) < LEAST_RUN * len(layout.runs):
+    if len(layout.run_arcs) < LEAST_RUN_ARCS * len(layout.runs):
         return replace(_plain_search(network, beam), by_arcs=True)
     return PathSearch(network, beam, layout.order, layout.place, layout, arc_weights(layout, network.arc_log, -np.inf))

@@ -13,7 +13,7 @@ from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import InputError, ModelFormatError, shortened
 from lipmotion.meshes.fitting.lip_placement import LipPlacement
 from lipmotion.meshes.model.binding import MOST_WEIGHTS, ControlBinding
-from lipmotion.meshes.model.limits import MOST_VERTICES
+from lipmotion.meshes.model.file_limits import MOST_VERTICES
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.storage.archive import UNREADABLE, read_archive, read_archive_header, write_archive
 from lipmotion.storage.files import check_source, read_text_file, whole_file
@@ -23,7 +23,7 @@ BINDING_FORMAT, BINDING_VERSION = "lipmotion.binding", 1
 BINDING_SUFFIX = ".binding"
 WEIGHT_COLUMNS = ("vertex", "point", "weight")
 POINT_COLUMNS = ("point", "vertex")
-LARGEST_TABLE = 1 << 26
+LARGEST_TABLE_BYTES = 1 << 26
 BINDING_ARRAYS = {
     "points": ArraySpec(np.int64, "C", 0, 1000),
     "vertices": ArraySpec(np.int64, "C", 0, MOST_VERTICES),
@@ -153,7 +153,7 @@ def _whole(path: Path, line: int, text: str) -> int:
 
 def _rows(path: Path, columns: tuple[str, ...], kind: str) -> Iterator[tuple[int, list[str]]]:
     """Yield the rows of a table with their line numbers; empty lines and lines that begin with # are left out."""
-    reader = csv.reader(io.StringIO(read_text_file(path, kind, LARGEST_TABLE)))
+    reader = csv.reader(io.StringIO(read_text_file(path, kind, LARGEST_TABLE_BYTES)))
     try:
         table = [(reader.line_num, row) for row in reader]
     except csv.Error as error:

@@ -11,7 +11,7 @@ from lipmotion.errors import InputError, shortened
 from lipmotion.meshes.files.gltf_container import GltfDocument
 from lipmotion.meshes.files.gltf_schema import COMPONENTS, COMPRESSION, LARGEST_NUMBER, WIDTHS
 from lipmotion.meshes.files.meshopt import decoded_attributes, decoded_exponents, decoded_indices, decoded_triangles
-from lipmotion.meshes.model.limits import Budget
+from lipmotion.meshes.model.file_limits import Budget
 
 
 class GltfArrays:

@@ -13,7 +13,7 @@ from urllib.parse import unquote
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.meshes.files.gltf_schema import ASSET, gltf_schema
-from lipmotion.meshes.model.limits import Budget
+from lipmotion.meshes.model.file_limits import Budget
 from lipmotion.storage.files import whole_file
 from lipmotion.storage.json_schema import SchemaError
 from lipmotion.storage.json_text import as_json, from_json
@@ -21,7 +21,7 @@ from lipmotion.storage.json_text import as_json, from_json
 MAGIC, VERSION = b"glTF", 2
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 MOST_CHUNKS = 100
-LONGEST_NAME = 1000
+LONGEST_NAME_CHARACTERS = 1000
 READABLE = {
     *("KHR_mesh_quantization", "EXT_meshopt_compression", "KHR_meshopt_compression"),
     *("KHR_texture_basisu", "EXT_texture_webp", "EXT_texture_avif", "KHR_texture_transform"),
@@ -61,8 +61,8 @@ class GltfDocument:
         """
         if uri.startswith("data:"):
             return _data(uri, kind)
-        name = unquote(uri) if len(uri) <= LONGEST_NAME else uri
-        if not name or len(name) > LONGEST_NAME or Path(name).name != name or "\\" in name or "\0" in name:
+        name = unquote(uri) if len(uri) <= LONGEST_NAME_CHARACTERS else uri
+        if not name or len(name) > LONGEST_NAME_CHARACTERS or Path(name).name != name or "\\" in name or "\0" in name:
             raise InputError(f"its {kind} is {shortened(repr(name))}, required a file in the same folder")
         return self.budget.file_bytes(self.folder / name, kind)
 
@@ -95,7 +95,7 @@ def read_gltf_document(path: Path) -> GltfDocument:
 
 def plain_name(name: str) -> str:
     """Return a name, or its beginning, on one line, which UTF-8 can encode."""
-    return " ".join(name[:LONGEST_NAME].encode("utf-8", "replace").decode().split())
+    return " ".join(name[:LONGEST_NAME_CHARACTERS].encode("utf-8", "replace").decode().split())
 
 
 def write_container(path: Path, json: dict[str, Any], body: bytes) -> None:

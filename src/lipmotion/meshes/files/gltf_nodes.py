@@ -15,7 +15,7 @@ from lipmotion.meshes.files.gltf_schema import LARGEST_NUMBER
 from lipmotion.meshes.model.bones import bone_kind
 
 Matrix = NDArray[np.float64]
-DEEPEST = 256
+DEEPEST_NESTING = 256
 """Most levels of nodes."""
 
 
@@ -46,7 +46,7 @@ def placed_nodes(document: GltfDocument) -> dict[int, PlacedNode]:
     while waiting:
         number, parent, depth = waiting.pop()
         node = nodes[number]
-        if number in placed or depth > DEEPEST:
+        if number in placed or depth > DEEPEST_NESTING:
             raise InputError(f"node {number} is in the scene twice, or too deep; export it again")
         matrix = parent.matrix @ _local_matrix(node)
         if not np.abs(matrix).max() <= LARGEST_NUMBER:

@@ -25,7 +25,7 @@ from lipmotion.meshes.model.mesh import Blendshape, Material, Mesh, MeshPart, Pa
 Matrix = NDArray[np.float64]
 TRIANGLES = 4
 """The mode of primitives that are lists of triangles; strips, fans, lines and points are not read."""
-LEAST = 1e-9
+LEAST_DISPLACEMENT = 1e-9
 """Vertices that a morph target moves by no more than this, in the unit of the file, are not stored."""
 
 
@@ -198,7 +198,7 @@ class _SceneSurface:
                 found = self._arrays.count(target["POSITION"])
                 raise InputError(f"the target {shortened(name)!r} moves {found} of {count} vertices; export it again")
             moved = _mapped(linear, self._arrays.floats(target["POSITION"], 3))
-            rows = np.flatnonzero(np.abs(moved).max(axis=1, initial=0.0) > LEAST)
+            rows = np.flatnonzero(np.abs(moved).max(axis=1, initial=0.0) > LEAST_DISPLACEMENT)
             self._budget.spend("displacements", len(rows))
             kept.append((rows + self._count, moved[rows]))
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from lipmotion.meshes.model.limits import MOST
+from lipmotion.meshes.model.file_limits import ALLOWANCE
 from lipmotion.storage.json_schema import (
     Schema,
     SchemaError,
@@ -36,10 +36,10 @@ _LISTS = (
     *("accessors", "animations", "buffers", "bufferViews", "images", "materials", "meshes", "nodes", "scenes", "skins"),
     "textures",
 )
-_LARGEST = 1 << 53
+_LARGEST_INTEGER = 1 << 53
 _NAME = if_fits(text(1000))
 _WORD = text(1000)
-_SIZE = whole(0, _LARGEST)
+_SIZE = whole(0, _LARGEST_INTEGER)
 _NUMBER = number(-LARGEST_NUMBER, LARGEST_NUMBER)
 ASSET = members({"asset": members({"version": text(20)}, ["version"])}, ["asset"])
 """What a document of any version has."""
@@ -62,7 +62,7 @@ def gltf_schema(json: Mapping[str, Any]) -> Schema:
         "indices": to("accessors"),
         "material": to("materials"),
         "mode": whole(0, 6),
-        "targets": items(target, most=MOST["blendshapes"]),
+        "targets": items(target, most=ALLOWANCE["blendshapes"]),
         "extras": if_fits(members({"targetNames": items(_WORD)})),
     }
     mesh = {"name": _NAME, "primitives": items(members(primitive, ["attributes"])), "extras": primitive["extras"]}
@@ -73,9 +73,9 @@ def gltf_schema(json: Mapping[str, Any]) -> Schema:
     lists = {
         "accessors": members(_accessor(to("bufferViews")), ["componentType", "count", "type"]),
         "animations": members({}),
-        "buffers": members({"uri": text(_LARGEST), "byteLength": _SIZE}),
+        "buffers": members({"uri": text(_LARGEST_INTEGER), "byteLength": _SIZE}),
         "bufferViews": members(_view(to("buffers")), ["buffer", "byteLength"]),
-        "images": members({"uri": text(_LARGEST), "bufferView": to("bufferViews")}),
+        "images": members({"uri": text(_LARGEST_INTEGER), "bufferView": to("bufferViews")}),
         "materials": members(_material(to("textures"), vector)),
         "meshes": members(mesh, ["primitives"]),
         "nodes": members(node),
@@ -83,7 +83,9 @@ def gltf_schema(json: Mapping[str, Any]) -> Schema:
         "skins": members({"joints": items(to("nodes"), 1), "inverseBindMatrices": to("accessors")}, ["joints"]),
         "textures": members({"source": to("images"), "extensions": members(_webp(to("images")))}),
     }
-    table = {name: items(schema, most=MOST["nodes"] if name == "nodes" else None) for name, schema in lists.items()}
+    table = {
+        name: items(schema, most=ALLOWANCE["nodes"] if name == "nodes" else None) for name, schema in lists.items()
+    }
     others = {"scene": to("scenes"), "extensionsRequired": items(_WORD), "extensions": members(_vrm())}
     return members(table | others)
 
@@ -146,7 +148,7 @@ def _webp(image: Schema) -> dict[str, Schema]:
 
 def _vrm() -> dict[str, Schema]:
     """Return what is used of VRM 0.x and of VRM 1.0."""
-    any_number = whole(-_LARGEST, _LARGEST)
+    any_number = whole(-_LARGEST_INTEGER, _LARGEST_INTEGER)
     old = {"mesh": any_number, "index": any_number, "weight": _NUMBER}
     group = {"name": _NAME, "presetName": _NAME, "binds": items(if_fits(members(old, list(old))))}
     new = {"node": any_number, "index": any_number, "weight": _NUMBER}

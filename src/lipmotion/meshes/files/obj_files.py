@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
-from lipmotion.meshes.model.limits import Budget
+from lipmotion.meshes.model.file_limits import Budget
 from lipmotion.meshes.model.mesh import MASK, OPAQUE, Blendshape, Material, Mesh, MeshPart
 from lipmotion.meshes.model.textures import Texture, read_texture
 from lipmotion.storage.sources import is_file
@@ -24,11 +24,11 @@ LEAST_SHARE = 1e-5
 """Vertices that a blendshape moves by less than this share of the size of the mesh are not stored: OBJ files of one
 head are written with rounded numbers."""
 LARGEST_NUMBER = 1e9
-LARGEST_LIBRARY = 1 << 20
+LARGEST_LIBRARY_BYTES = 1 << 20
 MOST_CORNERS = 1000
 """Most corners of a polygon."""
 LONGEST_LINE = 1 << 16
-OPAQUE_FROM = 250
+LEAST_OPAQUE_LEVEL = 250
 """A texture with pixels of a lower opacity than this, of 255, has holes."""
 _NO_COLOUR = (np.nan,) * 3
 _SHININESS = 60.0
@@ -248,7 +248,7 @@ def _text(words: list[bytes]) -> str:
 def _materials(folder: Path, library: str, used: Collection[str], budget: Budget) -> dict[str, Material]:
     """Return those materials of an MTL file in a folder that are used; none if there is no such file."""
     path = _beside(folder, library)
-    if path is None or path.stat().st_size > LARGEST_LIBRARY:
+    if path is None or path.stat().st_size > LARGEST_LIBRARY_BYTES:
         return {}
     found: dict[str, Material] = {}
     pictures: dict[str, str] = {}
@@ -300,7 +300,7 @@ def _with_texture(material: Material, texture: Texture | None) -> Material:
     """Return a material with a texture; where its pixels are clear, there are holes."""
     if texture is None:
         return material
-    clear = bool((texture.pixels[..., 3] < OPAQUE_FROM).any())
+    clear = bool((texture.pixels[..., 3] < LEAST_OPAQUE_LEVEL).any())
     return replace(material, texture=texture, alpha=MASK if clear else OPAQUE)
 
 

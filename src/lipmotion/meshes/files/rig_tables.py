@@ -18,7 +18,7 @@ from lipmotion.types import Channel, Motion
 COLUMNS = ("control", "source", "gain", "offset", "low", "high")
 CONTROL = "control"
 """The unit of controls of a user's rig."""
-LARGEST_TABLE, MOST_CONTROLS = 1 << 20, 2000
+LARGEST_TABLE_BYTES, MOST_CONTROLS = 1 << 20, 2000
 LARGEST_NUMBER = 1e6
 
 
@@ -42,7 +42,7 @@ def read_rig_table(path: Path) -> tuple[RigRow, ...]:
 
     Raises InputError: no such file, other columns, no rows, or a row that is damaged.
     """
-    reader = csv.DictReader(io.StringIO(read_text_file(path, "rig table", LARGEST_TABLE)))
+    reader = csv.DictReader(io.StringIO(read_text_file(path, "rig table", LARGEST_TABLE_BYTES)))
     try:
         found = [name.strip() for name in reader.fieldnames or ()]
         reader.fieldnames = found

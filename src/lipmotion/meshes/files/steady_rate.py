@@ -17,7 +17,7 @@ NEAR_RATE = 0.15
 """Uneven rows whose median rate is this near to a usual one, as a share, are put on a grid of that rate. Times stay."""
 EVEN_SHARE = 0.1
 """Times that are this near to an even grid, as a share of a step, are even: the rows are taken as they are."""
-ROUNDING = 0.002
+ROUNDING_SHARE = 0.002
 """Rounding of times, as a share of a step: rows that are about as even at a usual rate have that rate."""
 LONGEST_GAP = 3
 """Most frames of the steady rate for each row: a table whose time is mostly gaps is refused."""
@@ -53,7 +53,7 @@ def steady_rows(time_s: Array, rows: Array) -> tuple[Array, float]:
     known_hz = [min(rates, key=lambda usual: abs(usual - mean_hz)) for rates in (USUAL_RATES_HZ, TELEVISION_RATES_HZ)]
     off, *known_off = (_unevenness(passed_s, hertz) for hertz in (mean_hz, *known_hz))
     if min(off, known_off[0]) <= EVEN_SHARE:
-        fits = (hertz for hertz, each in zip(known_hz, known_off, strict=True) if each <= 2 * off + ROUNDING)
+        fits = (hertz for hertz, each in zip(known_hz, known_off, strict=True) if each <= 2 * off + ROUNDING_SHARE)
         return rows, next(fits, round(mean_hz, 6))
     hertz = _usual(1 / float(np.median(steps)))
     frames = round(float(passed_s[-1]) * hertz) + 1

@@ -14,7 +14,7 @@ from lipmotion.meshes.model.mesh import Blendshape
 
 PRESETS = {"a": "aa", "i": "ih", "u": "ou", "e": "ee", "o": "oh", "joy": "happy", "sorrow": "sad", "fun": "relaxed"}
 """Names of presets of VRM 0.x in the words of VRM 1.0; all others are the same in both."""
-FULL = 100.0
+FULL_WEIGHT = 100.0
 """Weights of VRM 0.x are per cent."""
 
 Bind = tuple[int, int, float]
@@ -57,7 +57,7 @@ def _of_version_0(document: GltfDocument) -> dict[str, list[Bind]]:
     for group in vrm.get("blendShapeMaster", {}).get("blendShapeGroups", []):
         preset = plain_name(group.get("presetName", "")).lower()
         name = PRESETS.get(preset, preset) if preset not in {"", "unknown"} else plain_name(group.get("name", ""))
-        found[name] = [_bind(each["mesh"], each, FULL) for each in group.get("binds", [])]
+        found[name] = [_bind(each["mesh"], each, FULL_WEIGHT) for each in group.get("binds", [])]
     return found
 
 

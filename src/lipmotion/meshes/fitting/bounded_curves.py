@@ -11,7 +11,7 @@ from lipmotion.errors import InputError
 
 Array = NDArray[np.float64]
 
-STEEPEST = 16.0
+LARGEST_EIGENVALUE = 16.0
 """The largest eigenvalue of the squared second difference."""
 MOST_STEPS = 2000
 TOLERANCE = 1e-5
@@ -53,7 +53,7 @@ def bounded_curves(matrix: Array, targets: Array, costs: CurveCosts | None = Non
     wanted = targets @ matrix.T / scale
     square = square / np.outer(scale, scale)
     smooth = costs.smooth / scale**2
-    step = 1 / (np.linalg.eigvalsh(square)[-1] + STEEPEST * float(smooth.max(initial=0.0)))
+    step = 1 / (np.linalg.eigvalsh(square)[-1] + LARGEST_EIGENVALUE * float(smooth.max(initial=0.0)))
     current = ahead = np.clip(wanted, 0, scale)
     momentum = 1.0
     for _ in range(MOST_STEPS):

@@ -30,13 +30,13 @@ SLIT_REACH = 0.06
 """The lips meet where vertices closer than this share of the width of the jaw go different ways as the mouth opens."""
 SLIT_STEP = 0.2
 """How different: this share of how far the jaw goes."""
-DETOUR = 2.0
+DETOUR_RATIO = 2.0
 """They are on two lips if the way along the surface is this many times as long as the straight one, and more than the
 distance between neighbours."""
 LIP_LINE = 0.1
 """Vertices this close to the line between the corners, in widths of the mouth, are not joined with others at their
 place where no blendshape tells the lips apart."""
-FRONT = 0.04
+FRONT_SHARE = 0.04
 """Behind the foremost of such pairs by more than this share are the insides of the mouth."""
 DEPTH_WEIGHT = 0.35
 """Distances in depth count so much where a point is looked for, for lips protrude differently."""
@@ -209,7 +209,7 @@ def _slit(vertices: Places, surface: MeshSurface, drop: Places, skin: NDArray[np
     pairs = pairs[drop[pairs[:, 0]] - drop[pairs[:, 1]] > SLIT_STEP]
     pairs = pairs[_apart(vertices, surface, pairs, reach)]
     middle = (vertices[pairs[:, 0]] + vertices[pairs[:, 1]]) / 2
-    return middle[middle[:, 2] > _foremost(middle, reach / 4) - FRONT * reach / SLIT_REACH]
+    return middle[middle[:, 2] > _foremost(middle, reach / 4) - FRONT_SHARE * reach / SLIT_REACH]
 
 
 def _foremost(places: Places, reach: float) -> Places:
@@ -232,7 +232,7 @@ def _apart(vertices: Places, surface: MeshSurface, pairs: Rows, reach: float) ->
     """Return which pairs are far from one another along the surface [shape=(N,)]."""
     far = np.zeros(len(pairs), bool)
     straight = np.linalg.norm(vertices[pairs[:, 0]] - vertices[pairs[:, 1]], axis=1)
-    longest = np.maximum(DETOUR * straight, reach / 2)
+    longest = np.maximum(DETOUR_RATIO * straight, reach / 2)
     sources, number = np.unique(pairs[:, 0], return_inverse=True)
     at_once = max(1, DISTANCES_AT_ONCE // len(vertices))
     for first in range(0, len(sources), at_once):

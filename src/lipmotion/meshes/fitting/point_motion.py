@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.lip_points import CHIN, FACING, LEFT_CORNER, RIGHT_CORNER, mouth_template
-from lipmotion.articulation.mouth import LEAST_JAW, SpokenMouth, jaw_drop, spoken_mouth, upper_share
+from lipmotion.articulation.mouth import LEAST_CHIN_DROP_SHARE, SpokenMouth, jaw_drop, spoken_mouth, upper_share
 from lipmotion.articulation.rest import rest_frames
 from lipmotion.errors import InputError
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
@@ -16,7 +16,7 @@ from lipmotion.types import Motion, Timeline, Unit
 
 Array = NDArray[np.float64]
 
-FORWARD = 0.03
+LEAST_PROTRUSION = 0.03
 """Protruded lips are at least so far in front of their rest pose, in eye distances."""
 
 
@@ -72,10 +72,10 @@ def _as_spoken(displacements: Array, mouth: SpokenMouth) -> Array:
     right, left = template.row(RIGHT_CORNER), template.row(LEFT_CORNER)
     wider = (mouth.width - 1) * template.width - (moved[:, left, 0] - moved[:, right, 0])
     moved[:, lips, 0] += np.outer(wider / 2, across[lips])
-    forward = np.maximum(FORWARD * mouth.protrusion - moved[:, lips, 2].mean(axis=1), 0) * mouth.protrusion
+    forward = np.maximum(LEAST_PROTRUSION * mouth.protrusion - moved[:, lips, 2].mean(axis=1), 0) * mouth.protrusion
     moved[:, lips, 2] += forward[:, None]
     moved[:, :, 1] += _parting(moved[:, :, 1], across, mouth.gap)
-    higher = moved[:, template.row(CHIN), 1] + LEAST_JAW * jaw_drop(mouth.gap) * (1 - mouth.tuck)
+    higher = moved[:, template.row(CHIN), 1] + LEAST_CHIN_DROP_SHARE * jaw_drop(mouth.gap) * (1 - mouth.tuck)
     moved[:, template.jaw, 1] -= np.maximum(higher, 0)[:, None]
     return moved
 

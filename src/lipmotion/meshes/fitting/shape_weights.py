@@ -13,27 +13,27 @@ from lipmotion.articulation.lip_points import FACING, mouth_template
 from lipmotion.articulation.mouth import SpokenMouth
 from lipmotion.meshes.fitting.blendshape_motion import given_weights, with_mouth
 from lipmotion.meshes.fitting.bounded_curves import CurveCosts, bounded_curves
+from lipmotion.meshes.fitting.lip_rounding import rounded_weights
+from lipmotion.meshes.fitting.oculus_visemes import NEAREST_VOWEL, viseme_curves
 from lipmotion.meshes.fitting.point_motion import PointMotion, point_motion
-from lipmotion.meshes.fitting.rounding import rounded_weights
-from lipmotion.meshes.fitting.visemes import NEAREST_VOWEL, viseme_curves
 from lipmotion.meshes.model.face_shapes import NOT_FROM_POINTS, FaceShapes
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
 
 Array = NDArray[np.float64]
 
-DEPTH, JAW, CORNERS, LIPS_APART = 0.4, 0.5, 4.0, 2.0
+DEPTH_WEIGHT, JAW_WEIGHT, CORNER_WEIGHT, GAP_WEIGHT = 0.4, 0.5, 4.0, 2.0
 """Weights of distances in depth, of the jaw, of the corners across, and of the gap between the lips, beside 1 for
 lips."""
-TIE = 0.15
+PAIR_WEIGHT = 0.15
 """Weight of the difference between the left and the right of a pair."""
-PHONES_SAY = 0.2
+VISEME_WEIGHT = 0.2
 """Weight of the visemes that the phones say, beside what the points say."""
-PRESSED = 0.01
+PRESS_DEPTH = 0.01
 """In p, b and m the lips are closed this much further than to touch, in eye distances: no light between them."""
 LEAST_PARTING = 0.004
 """Shapes that part the lips by less than this, in eye distances, are not used to part or to close them."""
 BISECTIONS = 60
-PRESS, ROLL_UPPER, ROLL_LOWER, TONGUE_OUT = 0.2, 0.1, 0.55, 0.3
+PRESS_WEIGHT, UPPER_ROLL_WEIGHT, LOWER_ROLL_WEIGHT, TONGUE_WEIGHT = 0.2, 0.1, 0.55, 0.3
 """Weights of ARKit's blendshapes for what lip points do not show: lips that are pressed together (``mouthPressLeft``,
 ``mouthPressRight``, ``mouthRollUpper``), a lower lip on the teeth, a tongue between the teeth."""
 
@@ -73,7 +73,7 @@ def shape_weights(
             weights = _spoken_weights(points, units, shapes, options)
         else:
             weights = _free_weights(points, shapes, options)
-        weights = with_gap(weights, shapes, points.mouth.gap - PRESSED * points.mouth.closing)
+        weights = with_gap(weights, shapes, points.mouth.gap - PRESS_DEPTH * points.mouth.closing)
     return Motion(weights, motion.rate_hz, tuple(Channel(name, WEIGHT) for name in shapes.names))
 
 
@@ -135,7 +135,7 @@ def _free_weights(points: PointMotion, shapes: FaceShapes, options: SolverOption
     jaw, close = shapes.row("jawOpen"), shapes.row("mouthClose")
     if jaw is not None and close is not None:
         matrix[close] += matrix[jaw]  # as one: the jaw opens behind closed lips
-    ties = TIE * shapes.pairs()[:, free]
+    ties = PAIR_WEIGHT * shapes.pairs()[:, free]
     solved = bounded_curves(matrix[free], targets - fixed @ _rows(shapes), options.costs, ties)
     weights = fixed.copy()
     weights[:, free] += solved
@@ -149,18 +149,18 @@ def _free_weights(points: PointMotion, shapes: FaceShapes, options: SolverOption
 def _beside_points(mouth: SpokenMouth) -> dict[str, Array]:
     """Return the weights of ARKit's blendshapes of what lip points do not show [each shape=(T,)]."""
     return {
-        **dict.fromkeys(("mouthPressLeft", "mouthPressRight"), PRESS * mouth.closing),
-        "mouthRollUpper": ROLL_UPPER * mouth.closing,
-        "mouthRollLower": ROLL_LOWER * mouth.tuck,
-        "tongueOut": TONGUE_OUT * mouth.between_teeth,
+        **dict.fromkeys(("mouthPressLeft", "mouthPressRight"), PRESS_WEIGHT * mouth.closing),
+        "mouthRollUpper": UPPER_ROLL_WEIGHT * mouth.closing,
+        "mouthRollLower": LOWER_ROLL_WEIGHT * mouth.tuck,
+        "tongueOut": TONGUE_WEIGHT * mouth.between_teeth,
     }
 
 
 def _spoken_weights(points: PointMotion, units: Timeline[Unit], shapes: FaceShapes, options: SolverOptions) -> Array:
     """Return the weights of visemes: the phones say which, the points how much [shape=(T, S)]."""
     said = _said(units, np.arange(len(points.mouth.gap)) / points.mouth.rate_hz, shapes)
-    matrix = np.concatenate([_rows(shapes), PHONES_SAY * np.eye(len(shapes.names))], axis=1)
-    targets = np.concatenate([_targets(points), PHONES_SAY * said], axis=1)
+    matrix = np.concatenate([_rows(shapes), VISEME_WEIGHT * np.eye(len(shapes.names))], axis=1)
+    targets = np.concatenate([_targets(points), VISEME_WEIGHT * said], axis=1)
     return bounded_curves(matrix, targets, options.costs)
 
 
@@ -189,10 +189,10 @@ def _targets(points: PointMotion) -> Array:
 
 def _weighted(displacements: Array, gap: Array) -> Array:
     template = mouth_template()
-    weights = np.where(template.jaw[:, None], JAW, 1.0) * np.array([1.0, 1.0, DEPTH])
-    weights[template.corner, 0] *= CORNERS
+    weights = np.where(template.jaw[:, None], JAW_WEIGHT, 1.0) * np.array([1.0, 1.0, DEPTH_WEIGHT])
+    weights[template.corner, 0] *= CORNER_WEIGHT
     inner = np.zeros(len(template.points), bool)
     inner[[template.row(point) for pair in FACING[:3] for point in pair]] = True
     weights[inner, 1] *= 0.5  # the gap says it
     flat = (displacements * weights).reshape(len(displacements), -1)
-    return np.concatenate([flat, LIPS_APART * gap[:, None]], axis=1)
+    return np.concatenate([flat, GAP_WEIGHT * gap[:, None]], axis=1)

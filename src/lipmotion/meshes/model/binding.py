@@ -29,11 +29,11 @@ LEAST_WEIGHT = 1e-3
 VERTICES_AT_ONCE = 1 << 13
 SOFTNESS = 0.03
 """Added to all distances, in eye distances: without it every control point would stick out of its surroundings."""
-PLATEAU = 0.4
+PLATEAU_SHARE = 0.4
 """Within this share of the reach of a control point nothing of a vertex is fixed to the head."""
 JAW_FOLLOWERS = (152, 199, 200, 175)
 """What lies inside the mouth below the lips (lower teeth, tongue) follows the mean of these points."""
-_CAVITY = 0.75
+_CAVITY_REACH = 0.75
 """The mouth's inside reaches so many eye distances back from the lips, and so far down."""
 
 
@@ -100,7 +100,7 @@ def bind(mesh: Mesh, surface: MeshSurface, placement: LipPlacement) -> ControlBi
         rows = slice(first, first + VERTICES_AT_ONCE)
         far = np.minimum(distances[:, surface.places[rows]] / placement.scale, reach)
         pulls = ((reach - far) / (reach * (far + SOFTNESS))) ** 2
-        out = np.clip((np.min(far / reach, axis=0) - PLATEAU) / (1 - PLATEAU), 0.0, 1.0)
+        out = np.clip((np.min(far / reach, axis=0) - PLATEAU_SHARE) / (1 - PLATEAU_SHARE), 0.0, 1.0)
         held = (1 - out) ** 2 * (1 + 2 * out)  # from 1 to 0, with slope 0 at both ends
         weights = (pulls / np.maximum(pulls.sum(axis=0), 1e-12) * held).T
         weights[inside[rows]] = 0.0
@@ -157,9 +157,11 @@ def _inside(mesh: Mesh, surface: MeshSurface, placement: LipPlacement) -> NDArra
     centre, front = lips.mean(axis=0), float(lips[:, 2].max())
     half = float(np.ptp(lips[:, 0])) / 2
     within = (
-        (np.abs(places[:, 0] - centre[0]) < 1.2 * half) & (places[:, 2] < front) & (places[:, 2] > front - 2 * _CAVITY)
+        (np.abs(places[:, 0] - centre[0]) < 1.2 * half)
+        & (places[:, 2] < front)
+        & (places[:, 2] > front - 2 * _CAVITY_REACH)
     )
-    within &= np.abs(places[:, 1] - centre[1]) < _CAVITY
+    within &= np.abs(places[:, 1] - centre[1]) < _CAVITY_REACH
     count = int(surface.pieces.max(initial=-1)) + 1
     sizes = np.bincount(surface.pieces, minlength=count)
     heights = np.bincount(surface.pieces, places[:, 1], count) / np.maximum(sizes, 1)

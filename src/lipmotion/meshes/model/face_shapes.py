@@ -20,7 +20,7 @@ NOT_FROM_POINTS = {"tongueOut", "jawLeft", "jawRight", "mouthLeft", "mouthRight"
 NOT_FROM_POINTS |= {"mouthDimpleRight", "jawForward", "mouthFrownLeft", "mouthFrownRight", "mouthPressLeft"}
 NOT_FROM_POINTS |= {"mouthPressRight"}
 """Blendshapes of ARKit that speech hardly uses, or that points do not show; they stay 0, but for gestures."""
-LEAST_MOVED = 0.02
+LEAST_DISPLACEMENT = 0.02
 """A blendshape that moves no lip point by this many eye distances is none of the mouth."""
 MOST_SHAPES = 200
 EYES_M, HEAD_M = 0.09, (0.18, 0.3)
@@ -84,7 +84,7 @@ def face_shapes(
     Raises InputError: there is no such blendshape, or none that moves the mouth.
     """
     moved = placement.to_motion(mesh.displacements(placement.vertices))
-    strong = np.abs(moved).max(axis=(1, 2), initial=0.0) > LEAST_MOVED
+    strong = np.abs(moved).max(axis=(1, 2), initial=0.0) > LEAST_DISPLACEMENT
     arkit = [arkit_name(name) or "" for name in mesh.shape_names]
     mouths = {name: n for n, name in enumerate(arkit) if name in ARKIT_MOUTH and len(mesh.shapes[n].rows)}
     if only:

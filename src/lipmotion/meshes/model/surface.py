@@ -13,12 +13,12 @@ from lipmotion.meshes.model.mesh import Mesh
 
 Rows = NDArray[np.int64]
 
-SAME_PLACE = 1e-5
+SAME_PLACE_SHARE = 1e-5
 """Vertices closer than this share of the size of the mesh are one place: files split vertices along seams of
 textures."""
-SAME_WAY = 1e-3
+SAME_MOTION_SHARE = 1e-3
 """They must be moved alike by all blendshapes, to this share of the largest displacement: lips that touch are not."""
-SAME_SIDE = -0.2
+SAME_SIDE_COSINE = -0.2
 """Their normals must not point apart (cosine): so lips that touch remain apart in a mesh without blendshapes."""
 
 
@@ -95,7 +95,7 @@ def vertex_normals(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) 
 def _places(mesh: Mesh, normals: NDArray[np.float64]) -> Rows:
     """Return the number of each vertex's place: the same for vertices at one place that move alike and face alike."""
     size = float(np.ptp(mesh.vertices, axis=0).max(initial=0.0)) or 1.0
-    keys = [np.rint(mesh.vertices / (SAME_PLACE * size)), *_movements(mesh)]
+    keys = [np.rint(mesh.vertices / (SAME_PLACE_SHARE * size)), *_movements(mesh)]
     together = np.zeros(len(mesh.vertices), np.int64)
     for column in np.concatenate(keys, axis=1).T:  # one after another: many times faster than rows at once
         _, ranks = np.unique(column, return_inverse=True)
@@ -104,7 +104,7 @@ def _places(mesh: Mesh, normals: NDArray[np.float64]) -> Rows:
     # of the vertices of one place, those that face apart from the first one are another place
     first = np.full(int(together.max(initial=-1)) + 1, -1, np.int64)
     first[together[::-1]] = np.arange(len(together))[::-1]
-    apart = np.einsum("ij,ij->i", normals, normals[first[together]]) < SAME_SIDE
+    apart = np.einsum("ij,ij->i", normals, normals[first[together]]) < SAME_SIDE_COSINE
     _, places = np.unique(2 * together + apart, return_inverse=True)
     return places.reshape(-1).astype(np.int64)
 
@@ -119,4 +119,4 @@ def _movements(mesh: Mesh) -> list[NDArray[np.float64]]:
     for shape, weight in zip(mesh.shapes, weights, strict=True):
         sums[shape.rows] += shape.displacements @ weight
         largest = max(largest, float(np.abs(shape.displacements).max(initial=0.0)))
-    return [np.rint(sums / (SAME_WAY * (largest or 1.0)))]
+    return [np.rint(sums / (SAME_MOTION_SHARE * (largest or 1.0)))]

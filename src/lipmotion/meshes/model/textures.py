@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.meshes.model.limits import Budget
+from lipmotion.meshes.model.file_limits import Budget
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -24,9 +24,9 @@ MOST_SCANS = 100
 DIRECT = {"RGB", "L"}
 """Modes of pictures that are reduced as they are; all others get an opacity first."""
 PICTURES = ("PNG", "JPEG", "WEBP")
-WIDEST = 1024
+MOST_COLUMNS = 1024
 """Textures are reduced to this many pixels across: a head of 720 rows shows no more."""
-FULL = 65535
+FULL_SCALE = 65535
 
 
 Extremes = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -86,7 +86,7 @@ class Texture:
 
 
 def read_texture(content: bytes | memoryview, budget: Budget | None = None) -> Texture | None:
-    """Return the texture in the bytes of a picture, reduced to ``WIDEST`` pixels across.
+    """Return the texture in the bytes of a picture, reduced to ``MOST_COLUMNS`` pixels across.
 
     budget : counts its pixels before they are decoded; None: of this picture alone
     None: the picture is damaged, too large, or of another format than PNG, JPEG and WebP.
@@ -99,12 +99,12 @@ def read_texture(content: bytes | memoryview, budget: Budget | None = None) -> T
             warnings.simplefilter("ignore")
             with Image.open(io.BytesIO(content), formats=PICTURES) as picture:
                 pixels = picture.width * picture.height
-                picture.draft("RGB", (WIDEST, WIDEST))
+                picture.draft("RGB", (MOST_COLUMNS, MOST_COLUMNS))
                 if _bytes_to_decode(picture, pixels) > MOST_BYTES or _scans(picture, content) > MOST_SCANS:
                     return None
                 (budget or Budget()).spend("pixels of pictures", pixels)
                 small = picture if _is_direct(picture) else picture.convert("RGBA")
-                small.thumbnail((WIDEST, WIDEST))
+                small.thumbnail((MOST_COLUMNS, MOST_COLUMNS))
                 return Texture(np.asarray(small.convert("RGBA")))
     except InputError:
         raise
@@ -170,13 +170,13 @@ def texture_table(textures: Sequence[Texture]) -> TextureTable:
         while True:
             height, width = image.shape[:2]
             levels.append((count, width, height))
-            texels.append(np.rint(FULL * image).astype(np.uint16).reshape(-1, 4))
+            texels.append(np.rint(FULL_SCALE * image).astype(np.uint16).reshape(-1, 4))
             count += height * width
             if height == width == 1:
                 break
             image = _halved(image)
     if not levels:
-        texels, levels = [np.full((1, 4), FULL, np.uint16)], [(0, 1, 1)]
+        texels, levels = [np.full((1, 4), FULL_SCALE, np.uint16)], [(0, 1, 1)]
     return TextureTable(np.concatenate(texels), np.array(levels, np.int64), tuple(first))
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.pixels.textured import CLEAR, CUT, HIDES, SEEN, SOLID, TexturedTriangles
+from lipmotion.kernels.pixels.textured import CLEAR, CUT, HIDING_OPACITY, SEEN_OPACITY, SOLID, TexturedTriangles
 from lipmotion.meshes.model.mesh import BLEND, MASK, Material, Mesh
 from lipmotion.meshes.model.textures import Extremes, Texture, TextureTable, texture_table
 from lipmotion.meshes.rendering.lighting import Finish, Lighting, linear
@@ -20,7 +20,7 @@ LEAST_OPACITY = 0.5
 SCATTER = (0.3, 0.2, 0.15)
 """How far red, green and blue light reach round into the shade, as in skin."""
 FARTHEST_UV = 1e4
-NOTHING = 3
+EMPTY = 3
 """The kind of triangles whose texture is clear all over: they are left out."""
 
 
@@ -64,7 +64,7 @@ def drawn_surface(mesh: Mesh, shown: NDArray[np.bool_], pixels_per_unit: float) 
     uv[behind] = uv[behind][:, ::-1]
     textures = _textures(materials)
     looks = _looks(mesh, numbers, part_of[numbers], uv, texture_table(list(textures)), textures, pixels_per_unit)
-    kept = looks.looks[:, 1] != NOTHING
+    kept = looks.looks[:, 1] != EMPTY
     looks = looks._replace(uv=looks.uv[kept], looks=looks.looks[kept], alphas=looks.alphas[kept])
     numbers, corners, behind = numbers[kept], corners[kept], behind[kept]
     keys = (corners * len(materials) + part_of[numbers][:, None]) * 2 + behind[:, None]
@@ -118,8 +118,8 @@ def _looks(
             if kind != SOLID:
                 halvings = looks[mine, 0] - table.first[textures[material.texture]]
                 least, most = _opacities(material, material.texture, downwards[mine], halvings)
-                hides, seen = (material.cutoff, material.cutoff) if kind == CUT else (HIDES, SEEN)
-                looks[mine, 1] = np.where(least >= hides, SOLID, np.where(most < seen, NOTHING, kind))
+                hides, seen = (material.cutoff, material.cutoff) if kind == CUT else (HIDING_OPACITY, SEEN_OPACITY)
+                looks[mine, 1] = np.where(least >= hides, SOLID, np.where(most < seen, EMPTY, kind))
         if mesh.tints is not None and material.alpha in (MASK, BLEND):
             _thin(material, mesh.tints[mesh.triangles[numbers[mine]], 3].mean(axis=1), mine, looks, alphas)
     return TexturedTriangles(np.zeros((0, 3), np.int32), downwards, looks, alphas, table.texels, table.levels)
@@ -130,11 +130,13 @@ def _thin(material: Material, opacity: Array, mine: Rows, looks: NDArray[np.int3
 
     opacity : of the triangles of the part;  mine : which ones these are [shape=(N,), both]
     """
-    kind, hides, seen = (CUT, material.cutoff, material.cutoff) if material.alpha == MASK else (CLEAR, HIDES, SEEN)
+    kind, hides, seen = (
+        (CUT, material.cutoff, material.cutoff) if material.alpha == MASK else (CLEAR, HIDING_OPACITY, SEEN_OPACITY)
+    )
     whole = material.opacity * opacity
     kinds, bare = looks[mine, 1], looks[mine, 0] < 0
-    lowered = np.where(whole < seen, NOTHING, np.where((whole < hides) | ~bare & (opacity < 1), kind, kinds))
-    looks[mine, 1] = np.where(kinds == NOTHING, NOTHING, lowered)
+    lowered = np.where(whole < seen, EMPTY, np.where((whole < hides) | ~bare & (opacity < 1), kind, kinds))
+    looks[mine, 1] = np.where(kinds == EMPTY, EMPTY, lowered)
     alphas[mine] = np.stack([np.full(len(whole), material.cutoff), whole], axis=1)
 
 

@@ -11,7 +11,7 @@ Real = NDArray[np.float64]
 
 CELL = 0.045
 """Size of the cells in which the nearest surface is kept, in the unit of the vertices."""
-BIAS, SOFT = 0.05, 0.10
+BIAS_DISTANCE, FADE_DISTANCE = 0.05, 0.10
 """A vertex this far behind another one begins to be hidden, and is hidden this much further behind."""
 
 
@@ -90,5 +90,5 @@ def _visible(places: Real, hiding: NDArray[np.bool_], way: Real) -> Real:
         for j in range(2):
             weight = np.abs(1 - i - share[:, 0]) * np.abs(1 - j - share[:, 1])
             above = nearest[low[:, 0] + i, low[:, 1] + j] - height
-            seen += weight * np.clip(1 - (above - BIAS) / SOFT, 0, 1)
+            seen += weight * np.clip(1 - (above - BIAS_DISTANCE) / FADE_DISTANCE, 0, 1)
     return seen

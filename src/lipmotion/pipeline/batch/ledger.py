@@ -21,7 +21,7 @@ from typing import IO, Any
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.pipeline.batch.lines import OWN_FILES, OWN_FOLDER, BatchLine
-from lipmotion.pipeline.batch.record import DONE, LARGEST_RECORD, Record, read_record
+from lipmotion.pipeline.batch.record import DONE, LARGEST_RECORD_BYTES, Record, read_record
 from lipmotion.pipeline.batch.settings import InputFile, input_paths, line_fingerprint
 from lipmotion.storage.files import TEMPORARY, locked, sha256_of, whole_file
 from lipmotion.storage.json_text import as_json
@@ -104,7 +104,7 @@ def _key(name: str) -> str:
 def read_receipt(path: Path) -> Record | None:
     """Return the record in a receipt; None: there is none, or it is damaged."""
     try:
-        is_one = path.is_file() and path.stat().st_size <= LARGEST_RECORD
+        is_one = path.is_file() and path.stat().st_size <= LARGEST_RECORD_BYTES
         return read_record(path.read_bytes()) if is_one else None
     except OSError:
         return None
@@ -166,7 +166,7 @@ class Ledger:
 
     def _record_at(self, start: int) -> Record | None:
         self._file.seek(start)
-        return read_record(self._file.readline(LARGEST_RECORD))
+        return read_record(self._file.readline(LARGEST_RECORD_BYTES))
 
     def append(self, record: Record) -> None:
         """Append a record. Raises ExportError: it cannot be written."""
@@ -201,10 +201,10 @@ class Ledger:
 def _whole_rows(file: IO[bytes]) -> Iterator[tuple[int, bytes]]:
     """Yield position and content of every row that has an end; of a row that is too long, nothing as its content."""
     start = file.seek(0)
-    while row := file.readline(LARGEST_RECORD):
+    while row := file.readline(LARGEST_RECORD_BYTES):
         is_long = not row.endswith(b"\n")
         while row and not row.endswith(b"\n"):
-            row = file.readline(LARGEST_RECORD)
+            row = file.readline(LARGEST_RECORD_BYTES)
         if row:
             yield start, b"" if is_long else row
         start = file.tell()

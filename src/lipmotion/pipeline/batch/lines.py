@@ -26,11 +26,11 @@ OWN_FILES = ("batch.jsonl", "report.csv", "report.html")
 """Files that a batch writes beside the outputs of its lines."""
 OWN_FOLDER = ".batch"
 """Folder of unfinished work in the folder of the outputs."""
-LARGEST_LIST, MOST_LINES = 1 << 27, 200_000
+LARGEST_LIST_BYTES, MOST_LINES = 1 << 27, 200_000
 """Most bytes of a list, and most lines of a batch: the words of a very long game."""
-LONGEST_PART = 255
+LONGEST_PART_BYTES = 255
 """Most bytes of the name of a file or a folder, on the usual file systems."""
-MOST_NAMED = 3
+MOST_NAMED_LINES = 3
 CONTROL = re.compile(r"[\x00-\x1f]")
 
 
@@ -97,10 +97,10 @@ def check_names(lines: Iterable[BatchLine], kinds: Sequence[str]) -> None:
             folders[_key(str(folder))] = line.recording
         for kind in kinds:
             file = f"{line.name}.{kind}"
-            if any(len(os.fsencode(part)) > LONGEST_PART for part in file.split("/")):
+            if any(len(os.fsencode(part)) > LONGEST_PART_BYTES for part in file.split("/")):
                 raise ExportError(
-                    f"{line.recording}: the output {shortened(file)!r} has a part of more than {LONGEST_PART} bytes; "
-                    "give a shorter name in a column 'output' of the list"
+                    f"{line.recording}: the output {shortened(file)!r} has a part of more than {LONGEST_PART_BYTES} "
+                    "bytes; give a shorter name in a column 'output' of the list"
                 )
             other = next((each for each in longer[kind] if file.lower().endswith(each)), None)
             if other is not None:
@@ -149,7 +149,7 @@ def _is_recording(path: Path) -> bool:
 
 
 def _in_list(source: Path, kinds: Sequence[str]) -> list[BatchLine]:
-    text = read_text_file(source, "list of recordings", LARGEST_LIST)
+    text = read_text_file(source, "list of recordings", LARGEST_LIST_BYTES)
     _check_count(source, max(map(text.count, "\n\r\x0b\x0c\x1c\x1d\x1e\x85\u2028\u2029")))
     rows = _table(source, text)
     if rows is None:
@@ -210,7 +210,7 @@ def _table(source: Path, text: str) -> list[dict[str, str]] | None:
         raise InputError(f"{source}: not a readable table ({error}); export it again as CSV") from error
     unused = [name for name in header if name and name != file and name not in COLUMNS]
     if unused:
-        named = ", ".join(map(shortened, unused[:MOST_NAMED]))
+        named = ", ".join(map(shortened, unused[:MOST_NAMED_LINES]))
         LOG.warning("%s: columns that are not used: %s; used are %s", source, named, ", ".join((file, *COLUMNS)))
     return [_row(source, number, header, file, cells) for number, cells in enumerate(rows, 2) if any(cells)]
 

@@ -22,7 +22,7 @@ from lipmotion.extensions import failed_extension
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.measures.closures import CLOSED_SHARE
 from lipmotion.motion.closure import OPENING, closable_ranges
-from lipmotion.motion.speakers import SpeakerMap
+from lipmotion.motion.speaker_maps import SpeakerMap
 from lipmotion.pipeline.batch.ledger import (
     Place,
     are_in_place,

@@ -20,7 +20,7 @@ ResultT = TypeVar("ResultT")
 PARENT_CHECK_S = 0.2
 CONNECT_S = 20
 GRACE_S = 5.0
-AHEAD = 4
+ITEMS_AHEAD = 4
 """Items a worker that are sent ahead: with ``Parallel``'s own bundles of short items none waits, and memory is flat."""
 
 
@@ -148,7 +148,7 @@ def _pool(chosen: dict[str, Any]) -> Pool:
 
     def each(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
         with parallel_config(**chosen):
-            results = Parallel(return_as="generator_unordered", pre_dispatch=f"{AHEAD}*n_jobs")(
+            results = Parallel(return_as="generator_unordered", pre_dispatch=f"{ITEMS_AHEAD}*n_jobs")(
                 delayed(function)(item) for item in items
             )
             try:

@@ -11,7 +11,7 @@ from lipmotion.storage.json_text import from_json
 Record = dict[str, Any]
 """What is known of one line; its fields are listed in docs/batch.md."""
 DONE, FAILED = "done", "failed"
-LARGEST_RECORD = 1 << 20
+LARGEST_RECORD_BYTES = 1 << 20
 """Most bytes of a record; one has about a thousand."""
 LARGEST_NUMBER = 1e12
 """No duration, level or count of a recording is larger."""

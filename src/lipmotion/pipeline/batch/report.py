@@ -17,7 +17,7 @@ from lipmotion.pipeline.batch.record import FAILED, Record
 from lipmotion.printable import printable
 from lipmotion.speech.recognition.recognised_speech import NOISY_DB
 from lipmotion.storage.files import as_text, whole_file
-from lipmotion.types.generation import ALL_FITS
+from lipmotion.types.generation import FULL_FIT_SHARE
 
 CSV_REPORT, HTML_REPORT = "report.csv", "report.html"
 COLUMNS = (
@@ -29,7 +29,7 @@ ROWS, BETWEEN = "/*ROWS*/", " | "
 """Where the page has its rows; what stands between several texts in a field of the CSV file."""
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """What makes a field a formula for spreadsheets, at its beginning."""
-SURE_OF_WORDS = 0.8
+SURE_CONFIDENCE = 0.8
 """Words that were recognised with less confidence deserve an ear."""
 
 
@@ -62,16 +62,16 @@ def doubt_of(record: Record) -> float:
     """Return how much a line deserves to be looked at, 0 (nothing is known against it) to 100 (it failed)."""
     if record.get("outcome") in (FAILED, None):
         return 100.0
-    words, heard = record.get("words"), record.get("closures_heard") or 0
+    words, closures = record.get("words"), record.get("closures_heard") or 0
     doubt = 50.0 if words == "no speech" else 0.0
     doubt += 10 * len(record.get("warnings", ()))
     doubt += 5 * (record.get("range_db", NOISY_DB) < NOISY_DB)
     if words == "words":
-        doubt += 10 * max(SURE_OF_WORDS - record["confidence"], 0) / SURE_OF_WORDS
-    if words == "transcript" and record["confidence"] < ALL_FITS:
+        doubt += 10 * max(SURE_CONFIDENCE - record["confidence"], 0) / SURE_CONFIDENCE
+    if words == "transcript" and record["confidence"] < FULL_FIT_SHARE:
         doubt += 10 * (1 - record["confidence"])
-    if heard:
-        doubt += 5 * (1 - record["closures_made"] / heard)
+    if closures:
+        doubt += 5 * (1 - record["closures_made"] / closures)
     return round(min(doubt, 99.0), 1)
 
 

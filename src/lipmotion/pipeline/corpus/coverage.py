@@ -13,17 +13,17 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError
-from lipmotion.pipeline.corpus.sentences import pronounced_sentences, recorded_phones
+from lipmotion.pipeline.corpus.phone_sequences import pronounced_sentences, recorded_phones
 from lipmotion.printable import printable
 from lipmotion.units import PHONES, SILENCE, SIMILAR_PHONES, VISEME_OF, Lexicon, most_similar_lips
 from lipmotion.units.classes import CLASSES
 
 KINDS = ("phones", "diphones", "triphones")
 """Sequences of one, two and three phones; silence is a neighbour only."""
-ANOTHER_VISEME, NOT_SIMILAR = 1.0, 0.5
+OTHER_VISEME_COST, DISSIMILAR_COST = 1.0, 0.5
 """What it costs that a phone has another viseme, and that it is not among the similar phones of ``SIMILAR_PHONES``.
 Different classes of articulation cost up to 1 more."""
-MIDDLE = 2.0
+MIDDLE_WEIGHT = 2.0
 """Weight of the middle phone of a triphone; its neighbours have 1."""
 Phones = tuple[str, ...]
 
@@ -121,8 +121,8 @@ def phone_distances() -> NDArray[np.float64]:
         for j, other in enumerate(PHONES):
             if wanted != other:
                 apart = len(classes[i] ^ classes[j]) / max(len(classes[i] | classes[j]), 1)
-                viseme = ANOTHER_VISEME * (VISEME_OF[wanted] != VISEME_OF[other])
-                distances[i, j] = apart + viseme + NOT_SIMILAR * (other not in SIMILAR_PHONES[wanted])
+                viseme = OTHER_VISEME_COST * (VISEME_OF[wanted] != VISEME_OF[other])
+                distances[i, j] = apart + viseme + DISSIMILAR_COST * (other not in SIMILAR_PHONES[wanted])
     return distances
 
 
@@ -181,7 +181,7 @@ def _nearest(missing: Sequence[Phones], recorded: Counter[Phones]) -> list[Phone
     candidates = sorted(recorded, key=lambda unit: (-recorded[unit], unit))  # of equal distance, the most recorded
     columns = np.array([[number[phone] for phone in unit] for unit in candidates])
     distances = phone_distances()
-    weights = (1.0, MIDDLE, 1.0) if columns.shape[1] == len(KINDS) else (1.0, 1.0)
+    weights = (1.0, MIDDLE_WEIGHT, 1.0) if columns.shape[1] == len(KINDS) else (1.0, 1.0)
     chosen = []
     for unit in missing:
         cost = sum(

@@ -36,9 +36,9 @@ DIVIDED_KINDS = (*VIDEO_KINDS, VIDEO)
 """Kinds of recordings of which the long ones are divided; GRID's and others hold a sentence each."""
 LONG_S = 30.0
 """Videos that state a longer duration are divided; a shorter one is one utterance."""
-LEAST_TO_SPLIT = 10
+LEAST_SPLIT_UTTERANCES = 10
 """A single video with fewer utterances is all for training."""
-HELD_OUT = 0.1
+HELD_OUT_SHARE = 0.1
 """Share of the utterances, the last ones, that are ``test``; as many before them are ``val``."""
 
 
@@ -175,7 +175,7 @@ def _on_pictures(span: SpokenPart, scan: VideoScan, end_s: float) -> SpokenPart:
 
 def _splits(count: int, split: str) -> list[str]:
     """Return the splits of utterances in order of time."""
-    held_out = round(HELD_OUT * count) if count >= LEAST_TO_SPLIT else 0
+    held_out = round(HELD_OUT_SHARE * count) if count >= LEAST_SPLIT_UTTERANCES else 0
     return [split] * (count - 2 * held_out) + ["val"] * held_out + ["test"] * held_out
 
 

@@ -37,7 +37,7 @@ from lipmotion.vision.trackers import MEDIAPIPE, tracker_named
 LOG = logging.getLogger("lipmotion")
 RECIPE = "5"
 """Version of the preparation, increased when the same video gives other values; older utterances are then replaced."""
-SHOWN = 5
+NAMED_UTTERANCES = 5
 """Utterances that a warning names."""
 _STAGE = "preparing recordings"
 """Name of the stage in reports of progress."""
@@ -236,7 +236,7 @@ def _warn_of_older(corpus: Corpus, collection: str, outcomes: list[_Outcome]) ->
     good = {outcome.name for outcome in outcomes if not outcome.problem}
     older = [name for name in corpus.names() if name not in good and _is_of(corpus.folder(name), collection)]
     if older:
-        shown = ", ".join(older[:SHOWN]) + (", ..." if len(older) > SHOWN else "")
+        shown = ", ".join(older[:NAMED_UTTERANCES]) + (", ..." if len(older) > NAMED_UTTERANCES else "")
         LOG.warning(
             "%s: %d utterances are from recordings that are no longer there, or cannot be used any longer: %s; to do "
             "without them, delete their folders and prepare again",

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
-from lipmotion.pipeline.corpus.sentences import pronounced_sentences, recorded_phones
+from lipmotion.pipeline.corpus.phone_sequences import pronounced_sentences, recorded_phones
 from lipmotion.units import SILENCE, VISEME_OF, Lexicon
 
 PHONE, DIPHONE, CONTEXT = "phone", "diphone", "beside"

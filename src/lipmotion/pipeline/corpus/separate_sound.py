@@ -58,12 +58,12 @@ def separate_sound(recording: SourceRecording) -> SeparateSound | None:
 
 
 def on_own_time(sound: SeparateSound, duration_s: float) -> Audio:
-    """Return a sound as it is heard in the time of the motion; silence where it had not begun, or had ended."""
+    """Return the part of a sound in the time of the motion; silence where it had not begun, or had ended."""
     rate = sound.audio.rate_hz
     shift, count = round(sound.late_s * rate), round(duration_s * rate)
-    heard = sound.audio.samples[max(shift, 0) : max(shift + count, 0)]
+    overlapping = sound.audio.samples[max(shift, 0) : max(shift + count, 0)]
     front = min(max(-shift, 0), count)
-    return Audio(np.pad(heard, (front, max(count - front - len(heard), 0))), rate)
+    return Audio(np.pad(overlapping, (front, max(count - front - len(overlapping), 0))), rate)
 
 
 def in_step(sound: SeparateSound, track: Track) -> tuple[Audio, Track, float]:

@@ -8,7 +8,8 @@ from typing import Any, TypeVar
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import Animator
 from lipmotion.kernels.threads import one_thread
-from lipmotion.pipeline.evaluation.conditions import (
+from lipmotion.pipeline.evaluation.figures import figures_of
+from lipmotion.pipeline.evaluation.held_out import (
     TEST_LIST,
     WITH_TRANSCRIPT,
     HeldOutRecordings,
@@ -16,7 +17,6 @@ from lipmotion.pipeline.evaluation.conditions import (
     held_out_recordings,
     speech_of_condition,
 )
-from lipmotion.pipeline.evaluation.figures import figures_of
 from lipmotion.pipeline.model import Model
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.json_text import nan_as_null

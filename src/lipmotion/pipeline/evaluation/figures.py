@@ -13,7 +13,7 @@ from lipmotion.measures import curves
 from lipmotion.measures.bootstrap import bootstrap_interval
 from lipmotion.measures.closures import closure_figures, phone_closures
 from lipmotion.motion.rest import away_from_speech
-from lipmotion.pipeline.evaluation.conditions import OPENING, ComparedClip, HeldOutRecordings
+from lipmotion.pipeline.evaluation.held_out import OPENING, ComparedClip, HeldOutRecordings
 from lipmotion.units import VISEMES
 
 BILABIAL = VISEMES["bi"]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.appearance.frame_descriptors import describe_frames
-from lipmotion.appearance.identity import SAME_PERSON, face_signature, likeness
+from lipmotion.appearance.identity import SAME_PERSON_LIKENESS, face_signature, likeness
 from lipmotion.appearance.looping import LoopOrder, loop_order, scenes_of
 from lipmotion.appearance.lower_face import HEIGHT as REGION_HEIGHT
 from lipmotion.appearance.lower_face import WIDTH as REGION_WIDTH
@@ -40,13 +40,13 @@ CHIN = "y_152"
 """The tip of the chin."""
 SMOOTHING_FRAMES = 0.7
 """Standard deviation of the smoothing of its place, frames: the tracker trembles."""
-MOST_TRIED = 12
+MOST_PARTS = 12
 """Parts of the footage that are tried as backgrounds."""
 SHOWN_S = 60.0
 """How long they are shown then."""
 SHORT_S, SHORT_COST = 3.0, 2.0
 """A part that is shorter costs so much more, in proportion to what is missing: it would repeat too soon."""
-ALMOST = 0.9
+COMPARED_SHARE = 0.9
 """A part of this share of ``SHORT_S`` is still compared."""
 MOST_TRACKED_S = 120.0
 """Seconds of a video that are used as a background."""
@@ -125,13 +125,13 @@ class BackgroundSequence:
 def best_background(footages: Sequence[Footage]) -> StoredBackground:
     """Return the part of some footage that can be shown for a minute with the least visible join.
 
-    ``MOST_TRIED`` parts, spread evenly, are compared. They last at most ``MOST_BACKGROUND_S``, show the face in all
+    ``MOST_PARTS`` parts, spread evenly, are compared. They last at most ``MOST_BACKGROUND_S``, show the face in all
     frames, and have no cut. Parts much shorter than ``SHORT_S`` are compared only if there are no longer ones.
     """
     parts = [part for footage in footages for part in _parts(footage)]
-    least_s = ALMOST * min(SHORT_S, max(map(_duration_s, parts)))
+    least_s = COMPARED_SHARE * min(SHORT_S, max(map(_duration_s, parts)))
     parts = [part for part in parts if _duration_s(part) >= least_s]
-    tried = [parts[number] for number in evenly_spaced(MOST_TRIED, len(parts))]
+    tried = [parts[number] for number in evenly_spaced(MOST_PARTS, len(parts))]
     footage, start, stop = min(tried, key=_blemish)
     height, width = (length // 2 * 2 for length in footage.size)
     frames = (frame[:height, :width] for frame in footage_frames(footage, start, stop))
@@ -203,13 +203,13 @@ def _warn_of_somebody_else(footage: Footage, appearance: Appearance) -> None:
     picture = cut(shown, region_map(footage.face_to_image[frame], 1), (REGION_HEIGHT, REGION_WIDTH))
     recorded = appearance.jaw.mean.T.reshape(REGION_HEIGHT, REGION_WIDTH, 3)
     found = likeness(face_signature(picture), face_signature(recorded))
-    if found < SAME_PERSON:
+    if found < SAME_PERSON_LIKENESS:
         LOG.warning(
             "%s: seems to show somebody else than the face (likeness %.2f, of one person at least %.2f); give "
             "footage of the same person",
             footage.path,
             found,
-            SAME_PERSON,
+            SAME_PERSON_LIKENESS,
         )
 
 

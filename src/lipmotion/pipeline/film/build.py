@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.appearance.identity import SAME_PERSON, face_signature
+from lipmotion.appearance.identity import SAME_PERSON_LIKENESS, face_signature
 from lipmotion.appearance.lower_face import HEIGHT, WIDTH, best_scale, face_shape, region_map
 from lipmotion.appearance.person import FootagePictures, learn_appearance
 from lipmotion.appearance.placing import cut
@@ -147,13 +147,13 @@ def _of_one_person(filmed: Sequence[_Filmed], monitor: Monitor) -> list[_Filmed]
     """Return the takes that show the person whom most takes show; the others are reported, and left out."""
     signatures = np.stack([face_signature(take.pictures) for take in filmed])
     alike = signatures @ signatures.T
-    person = int((alike >= SAME_PERSON).sum(axis=1).argmax())
+    person = int((alike >= SAME_PERSON_LIKENESS).sum(axis=1).argmax())
     kept = []
     for take, value in zip(filmed, alike[person].tolist(), strict=True):
-        if value >= SAME_PERSON:
+        if value >= SAME_PERSON_LIKENESS:
             kept.append(take)
             continue
-        reason = f"shows another face than most recordings (likeness {value:.2f}, required {SAME_PERSON})"
+        reason = f"shows another face than most recordings (likeness {value:.2f}, required {SAME_PERSON_LIKENESS})"
         monitor(Item(take.footage.path.name, "skipped", reason))
     return kept
 

@@ -22,7 +22,7 @@ MOST_FOOTAGE_S = 240.0
 """Seconds of footage that are used, spread evenly over all recordings: of 500 candidates few are new after that."""
 LONG_S = 10.0
 """Recordings are used whole if they are no longer; of longer ones the beginning, at least so much."""
-MOST_MEASURED = 240
+MOST_MEASURED_RECORDINGS = 240
 """The durations of at most so many recordings are read."""
 RIGHTS = ("licence", "attribution")
 """What is kept of the rights of a recording."""
@@ -78,7 +78,7 @@ def _evenly_used(takes: Sequence[Take]) -> list[Take]:
 
     A take that cannot be read may be among them: where it is tracked, the reason is reported.
     """
-    durations_s = [_duration_s(takes[index]) for index in evenly_spaced(MOST_MEASURED, len(takes))]
+    durations_s = [_duration_s(takes[index]) for index in evenly_spaced(MOST_MEASURED_RECORDINGS, len(takes))]
     longest_s = _longest_s(durations_s)
     mean_s = sum(min(duration_s, longest_s) for duration_s in durations_s) / len(durations_s)
     chosen = evenly_spaced(ceil(MOST_FOOTAGE_S / max(mean_s, 0.1) - 1e-6), len(takes))

@@ -77,9 +77,11 @@ def speak_from_corpus(  # noqa: PLR0913
             f"the model has recordings of {len(people)} people ({', '.join(people)}), whose voices cannot be joined; "
             "train one on the recordings of a single person"
         )
-    heard = {name: np.asarray(utterance.features.values)[:, :FEATURES] for name, utterance in utterances.items()}
+    recorded_features = {
+        name: np.asarray(utterance.features.values)[:, :FEATURES] for name, utterance in utterances.items()
+    }
     _warn_of_stand_ins(engine.stand_ins(model.learned), target)
-    pieces, units = engine.source_pieces(model.learned, target, heard)
+    pieces, units = engine.source_pieces(model.learned, target, recorded_features)
     sounds = [np.asarray(utterances[piece.recording].audio.samples) for piece in pieces]
     rate_hz = utterances[names[0]].audio.rate_hz
     joined = overlapped(sounds, [(piece.start_s, piece.end_s) for piece in pieces], rate_hz)

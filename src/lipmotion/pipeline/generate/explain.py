@@ -31,7 +31,7 @@ from lipmotion.types import (
 
 LINE = 110
 """Width of the text of a row, without its name, in characters."""
-SHOWN = 6
+SHOWN_CHANNELS = 6
 """Largest number of channels in a text; points are left out if there are other channels."""
 
 
@@ -155,9 +155,9 @@ def _regression(regression: RegressedMean) -> str:
 
 def _values(channels: Mapping[str, ChannelValue]) -> Iterator[tuple[str, str]]:
     names = [name for name in channels if name[:2] not in ("x_", "y_", "z_")] or list(channels)
-    for start in range(0, min(len(names), SHOWN), 3):
-        shown = names[start : min(start + 3, SHOWN)]
+    for start in range(0, min(len(names), SHOWN_CHANNELS), 3):
+        shown = names[start : min(start + 3, SHOWN_CHANNELS)]
         text = "   ".join(f"{name} {channels[name].value:6.3f} ± {channels[name].deviation:.3f}" for name in shown)
         yield "", text
-    if len(channels) > min(len(names), SHOWN):
-        yield "", f"and {len(channels) - min(len(names), SHOWN)} more channels (--json has all)"
+    if len(channels) > min(len(names), SHOWN_CHANNELS):
+        yield "", f"and {len(channels) - min(len(names), SHOWN_CHANNELS)} more channels (--json has all)"

@@ -14,7 +14,7 @@ from lipmotion.engines import Animator
 from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING
 from lipmotion.motion.generation import BLOCK_FRAMES
-from lipmotion.motion.speakers import SpeakerMap, SpeakerMaps, restfulness, viseme_weights
+from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps, restfulness, viseme_weights
 from lipmotion.types import (
     FRAME_RATE_HZ,
     WEIGHT,

@@ -36,13 +36,13 @@ REST_S = 0.25
 FLOOR_DB = 50.0
 """Noise under the speech, in decibels of what lies under 8 kHz, as in training: a synthesiser's silence has no sound at
 all, which would shift features that are normalised over the recording. The sound that is returned has it, too: what
-the model hears is what a ``.wav`` of it holds, so that its motion is generated again from that file and the phones."""
-AT_ONCE = 20
+the model takes in is what a ``.wav`` of it holds, so that its motion comes again from that file and the phones."""
+SENTENCES_PER_RUN = 20
 """Sentences that one run of a synthesiser speaks; only their files are on the disk at a time."""
 BLOCK = 1 << 20
 """Samples of noise that are drawn at a time."""
 _Part = tuple[int, NDArray[np.float32]]
-LARGEST_TEXT = 4 * MOST_CHARACTERS
+LARGEST_TEXT_BYTES = 4 * MOST_CHARACTERS
 """Most bytes of a text file: a character takes up to four."""
 
 
@@ -118,7 +118,7 @@ def speak(  # noqa: PLR0913
 
 def read_text(path: Path) -> str:
     """Return the text of a UTF-8 file. Raises InputError: no such file, too large, or not UTF-8."""
-    return read_text_file(path, "text", LARGEST_TEXT)
+    return read_text_file(path, "text", LARGEST_TEXT_BYTES)
 
 
 def _said(sentences: Sequence[str], voice: SyntheticVoice, lexicon: Lexicon | None) -> tuple[Audio, Timeline[Unit]]:
@@ -126,8 +126,8 @@ def _said(sentences: Sequence[str], voice: SyntheticVoice, lexicon: Lexicon | No
     sounds: list[_Part] = []
     spans: list[Span[Unit]] = []
     rate_hz, at = SPEECH_RATE_HZ, 0
-    for start in range(0, len(sentences), AT_ONCE):
-        with closing(voiced_sentences(sentences[start : start + AT_ONCE], voice, lexicon)) as said:
+    for start in range(0, len(sentences), SENTENCES_PER_RUN):
+        with closing(voiced_sentences(sentences[start : start + SENTENCES_PER_RUN], voice, lexicon)) as said:
             for sentence in said:
                 sound = sentence.own_sound()
                 sound = sentence.audio if sound.rate_hz < SPEECH_RATE_HZ else sound

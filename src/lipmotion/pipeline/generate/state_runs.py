@@ -15,7 +15,7 @@ from lipmotion.pipeline.understand.request import SpeechInput
 from lipmotion.printable import printable
 from lipmotion.types import Generation
 
-LONGEST_STATE = 110
+LONGEST_STATE_CHARACTERS = 110
 """Most characters of a state in a line of text."""
 
 
@@ -79,7 +79,9 @@ def run_lines(runs: Sequence[StateRun], count: int) -> Iterator[str]:
     width = max([len("word"), *(len(printable(run.word)) for run in shown)])
     yield f"{'from':>8} {'to':>8}  phone  {'word':{width}}  state"
     for run in shown:
-        state = run.state if len(run.state) <= LONGEST_STATE else run.state[:LONGEST_STATE] + "..."
+        state = (
+            run.state if len(run.state) <= LONGEST_STATE_CHARACTERS else run.state[:LONGEST_STATE_CHARACTERS] + "..."
+        )
         yield f"{run.start_s:8.2f} {run.end_s:8.2f}  {run.phone:5}  {run.word:{width}}  {state}"
     if len(runs) > len(shown):
         yield f"and {len(runs) - len(shown)} more (--count N prints N, --json all)"

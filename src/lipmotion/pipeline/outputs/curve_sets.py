@@ -16,9 +16,9 @@ from lipmotion.meshes.files.rig_tables import read_rig_table, rig_motion
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.facial_animation import fap_motion
+from lipmotion.meshes.fitting.oculus_visemes import viseme_motion
 from lipmotion.meshes.fitting.reference_mouth import arkit_mouth
 from lipmotion.meshes.fitting.shape_weights import shape_weights
-from lipmotion.meshes.fitting.visemes import viseme_motion
 from lipmotion.meshes.model.shape_names import arkit_name
 from lipmotion.pipeline.outputs.living_curves import living_curves
 from lipmotion.storage.files import whole_file

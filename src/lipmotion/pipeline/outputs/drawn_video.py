@@ -14,7 +14,7 @@ from lipmotion.faces.base import SMALLEST, TRANSPARENT, DrawsPlanes, Face, Stagi
 from lipmotion.faces.registry import staged_face
 from lipmotion.kernels.choice import numba_works
 from lipmotion.meshes.fitting.blendshape_motion import is_of_blendshapes
-from lipmotion.pipeline.film.video import RENDERING
+from lipmotion.pipeline.film.filmed_video import RENDERING
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
 from lipmotion.pipeline.outputs.prosody import prosody_of_speech
 from lipmotion.speech.sound.audio_files import read_audio

@@ -17,7 +17,7 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import Registry
 from lipmotion.faces.base import Staging
 from lipmotion.meshes.fitting.driven import DrivenCharacter
-from lipmotion.pipeline.film.video import FILM, FilmOptions
+from lipmotion.pipeline.film.filmed_video import FILM, FilmOptions
 from lipmotion.pipeline.job import RATE
 from lipmotion.storage.files import check_distinct, check_target
 from lipmotion.types import Audio, Generation, Monitor, silent_monitor

@@ -79,13 +79,13 @@ def write_scene(path: Path, scene: Scene, sound: Path | None = None) -> None:
     sound : the file that is referred to, by its path from the folder of the output; None: none
     Raises ExportError: the file cannot be written.
     """
-    heard = replace(scene, sound="" if sound is None else sound_reference(sound, path))
-    if _keeps_original(path, heard):
+    with_sound = replace(scene, sound="" if sound is None else sound_reference(sound, path))
+    if _keeps_original(path, with_sound):
         return
     if path.suffix.lower() == USD:
-        write_usda(path, heard)
+        write_usda(path, with_sound)
     else:
-        write_gltf_scene(path, heard)
+        write_gltf_scene(path, with_sound)
 
 
 def _keeps_original(path: Path, scene: Scene) -> bool:
@@ -113,9 +113,9 @@ def head_scene(
     from scipy.spatial.transform import Rotation
 
     from lipmotion.faces.head.figure import PIVOT
+    from lipmotion.faces.head.head_blendshapes import head_mesh
     from lipmotion.faces.head.performance import head_poses
     from lipmotion.faces.head.shape_fit import mouth_weights
-    from lipmotion.faces.head.shapes import head_mesh
     from lipmotion.faces.head.stage import figure
     from lipmotion.faces.turning import turned
 

@@ -13,7 +13,7 @@ from lipmotion.faces.mesh import MeshFace
 from lipmotion.faces.registry import FACES, face_named, staged_face
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.scene import Scene
-from lipmotion.pipeline.film.video import check_film, film_of, person_shown, refuse_film, write_film
+from lipmotion.pipeline.film.filmed_video import check_film, film_of, person_shown, refuse_film, write_film
 from lipmotion.pipeline.outputs.delivered import shown
 from lipmotion.pipeline.outputs.drawn_video import (
     DRAWN_HZ,

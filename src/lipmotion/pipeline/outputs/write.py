@@ -8,7 +8,7 @@ from pathlib import Path
 from lipmotion.articulation.delivery import Delivery
 from lipmotion.faces.base import Staging
 from lipmotion.meshes.fitting.driven import DrivenCharacter
-from lipmotion.pipeline.film.video import FILM, FilmOptions
+from lipmotion.pipeline.film.filmed_video import FILM, FilmOptions
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, checked_outputs, perform
 from lipmotion.pipeline.outputs.shown_faces import AnyFace, ShownFace, shown_face

@@ -19,7 +19,7 @@ from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.resample import to_model_frames
-from lipmotion.motion.speakers import SpeakerMaps, mean_person_examples, with_habits
+from lipmotion.motion.speaker_maps import SpeakerMaps, mean_person_examples, with_habits
 from lipmotion.pipeline.generate.prior import with_prior
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.training.channels import (
@@ -29,11 +29,11 @@ from lipmotion.pipeline.training.channels import (
     with_common_channels,
     with_visual_channels,
 )
-from lipmotion.pipeline.training.conditions import with_conditions
+from lipmotion.pipeline.training.condition_spectra import with_conditions
 from lipmotion.pipeline.training.fingerprint import fingerprint
 from lipmotion.pipeline.training.labels import label_utterances
+from lipmotion.pipeline.training.other_speakers import VoiceExample
 from lipmotion.pipeline.training.transcripts import warn_of_doubtful_transcripts, warn_of_missing_transcripts
-from lipmotion.pipeline.training.voices import VoiceExample
 from lipmotion.pipeline.understand.transcribe import phones_in_time, warn_of_guesses
 from lipmotion.pipeline.workers import worker_pool
 from lipmotion.speech.features.f0 import log_f0
@@ -127,7 +127,7 @@ def train(  # noqa: PLR0913
     visual     : ``geometry``: tracked or supplied channels; ``eigenlips``: principal components of mouth pictures
                  (docs/eigenlips.md); ``both``
     voices     : speech of other speakers, without motion, for the second stage of training
-                 (``pipeline.training.voices``); only for engines that take ``speech_alone`` (``Inputs``)
+                 (``pipeline.training.other_speakers``); only for engines that take ``speech_alone`` (``Inputs``)
     prior      : a model on which the new one stands, ``load_model()`` for instance: what it makes of the speech is an
                  input of the engine, and part of the new model. None: the new model stands on none. It must not have
                  been trained on recordings that the new model is judged on
@@ -174,7 +174,7 @@ def train(  # noqa: PLR0913
         speaker_of = {utterance.name: utterance.speaker for utterance in utterances}
         examples, speakers = _of_the_mean_person(examples, speaker_of)
         examples = [replace(example, speech=with_prior(prior, example.speech)) for example in examples]
-        examples = _heard(engine, utterances, examples, sub_monitor(run.monitor, 0.5, 0.6), team.ordered_map)
+        examples = _in_conditions(engine, utterances, examples, sub_monitor(run.monitor, 0.5, 0.6), team.ordered_map)
     fit = engine.fit([*examples, *speech_examples], sub_monitor(run.monitor, 0.6, 1, "learning motion: "), checkpoint)
     if not fit.uses_prior:
         prior = None
@@ -271,7 +271,7 @@ def _of_the_mean_person(
     return mean_person_examples(examples, names)
 
 
-def _heard(
+def _in_conditions(
     engine: Engine[Any],
     utterances: Sequence[Utterance],
     examples: Sequence[Example],

@@ -11,7 +11,7 @@ from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, LEAST_FITTING
 from lipmotion.types import Timeline, Unit, Utterance
 
 LOG = logging.getLogger("lipmotion")
-MOST_NAMED = 10
+MOST_NAMED_RECORDINGS = 10
 """Largest number of recordings that one warning names."""
 
 
@@ -72,5 +72,5 @@ def warn_of_missing_transcripts(utterances: Sequence[Utterance]) -> None:
 
 def _listed(names: Sequence[str]) -> str:
     """Return the first names, and how many more there are."""
-    more = len(names) - MOST_NAMED
-    return printable(", ".join(names[:MOST_NAMED])) + (f" and {more} more" if more > 0 else "")
+    more = len(names) - MOST_NAMED_RECORDINGS
+    return printable(", ".join(names[:MOST_NAMED_RECORDINGS])) + (f" and {more} more" if more > 0 else "")

@@ -9,7 +9,7 @@ from lipmotion.articulation.pauses import REST
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError, shortened
 from lipmotion.faces.filmed.face import FilmedFace
-from lipmotion.motion.speakers import SpeakerMap
+from lipmotion.motion.speaker_maps import SpeakerMap
 from lipmotion.pipeline.job import Request
 from lipmotion.pipeline.model import Model
 from lipmotion.types import Audio, TimedTranscript, Timeline, Unit

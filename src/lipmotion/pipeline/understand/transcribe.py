@@ -17,7 +17,7 @@ from lipmotion.speech.recognition.recogniser import ENERGY_SMOOTHING_FRAMES, Rec
 from lipmotion.storage.files import read_text_file
 from lipmotion.types import Audio, Features, TimedTranscript, Timeline, Unit
 from lipmotion.units import Lexicon, check_words
-from lipmotion.units.length_limits import LARGEST_TRANSCRIPT
+from lipmotion.units.length_limits import LARGEST_TRANSCRIPT_BYTES
 
 __all__ = ["Transcription", "phones_in_time", "read_plain_text", "read_transcript", "transcribe", "warn_of_guesses"]
 LOG = logging.getLogger("lipmotion")
@@ -85,9 +85,9 @@ def phones_in_time(
 def read_plain_text(path: Path) -> str:
     """Return the text of a file of words alone.
 
-    Raises InputError: no such file, larger than ``LARGEST_TRANSCRIPT``, not UTF-8 text, or labels in time.
+    Raises InputError: no such file, larger than ``LARGEST_TRANSCRIPT_BYTES``, not UTF-8 text, or labels in time.
     """
-    text = read_text_file(path, "transcript", LARGEST_TRANSCRIPT)
+    text = read_text_file(path, "transcript", LARGEST_TRANSCRIPT_BYTES)
     check_plain_text(text, str(path))
     return text
 

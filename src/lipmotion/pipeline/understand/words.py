@@ -13,7 +13,7 @@ from lipmotion.pipeline.understand.request import SpeechInput, request_of
 from lipmotion.pipeline.understand.understood_speech import audio_of
 from lipmotion.pipeline.workers import map_in_processes
 from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.recognition.recognised_speech import HeardWord, Recognition
+from lipmotion.speech.recognition.recognised_speech import RecognisedWord, Recognition
 from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, USING_WORDS, cached_recogniser
 from lipmotion.storage.files import check_distinct, check_target, whole_file
 from lipmotion.storage.json_text import as_json
@@ -52,7 +52,7 @@ def recognise_words(speech: SpeechInput, *, model: Model | str | Path | None = N
     return recogniser.recognition(audio, audio.mfcc(), map_in_processes(workers))
 
 
-def words_as_text(words: Timeline[HeardWord]) -> str:
+def words_as_text(words: Timeline[RecognisedWord]) -> str:
     """Return words as a transcript, a line for what is said without a long pause."""
     lines: list[list[str]] = []
     end_s = float("-inf")
@@ -64,7 +64,7 @@ def words_as_text(words: Timeline[HeardWord]) -> str:
     return "".join(" ".join(line) + "\n" for line in lines)
 
 
-def word_record(span: Span[HeardWord]) -> dict[str, Any]:
+def word_record(span: Span[RecognisedWord]) -> dict[str, Any]:
     """Return a word for JSON: ``word``, ``start`` and ``end`` in seconds, and its confidence ``conf``, as Vosk's."""
     return {
         "word": span.label.text,
@@ -74,7 +74,9 @@ def word_record(span: Span[HeardWord]) -> dict[str, Any]:
     }
 
 
-def write_words(words: Timeline[HeardWord], outputs: Sequence[str | Path], speech: str | Path | None = None) -> None:
+def write_words(
+    words: Timeline[RecognisedWord], outputs: Sequence[str | Path], speech: str | Path | None = None
+) -> None:
     """Write words to files that can be edited and given back as transcripts: ``.txt``, or ``.json`` with their times.
 
     speech : the recording, which must not be overwritten

@@ -27,19 +27,19 @@ LOWEST_HZ, HIGHEST_HZ = 60.0, 400.0
 BLOCK = 1024
 """Frames searched at a time: memory stays bounded for any length."""
 
-UNVOICED = 0.52
+UNVOICED_COST = 0.52
 """Cost of an unvoiced frame; a voiced one costs 1 − its correlation, weighted."""
-VOICING_CHANGE = 0.25
+VOICING_CHANGE_COST = 0.25
 """Cost of a change from voiced to unvoiced, or back."""
-JUMP = 0.4
+JUMP_COST = 0.4
 """Cost of a change of F0 by a factor of e; an octave costs 0.28."""
-LONG_LAG = 0.2
+LONG_LAG_SHARE = 0.2
 """The correlation of the longest lag is reduced by this share: that of two periods is as high as that of one."""
-SILENCE = 2e-4
+SILENCE_POWER = 2e-4
 """Power that is added to every frame's, as a share of that of loud frames (−37 dB): it makes silence uncorrelated."""
 FRICATION_SHARE = 1e-3
 """Share of the power of the full signal's slope that is added too: the low frequencies of an s may seem periodic."""
-ROUNDING = 1e-10
+ROUNDING_POWER = 1e-10
 """Power that is added too, as a share of that of the highest sample: a constant's rounding error has a period."""
 CANDIDATES = 4
 """Lags considered in a frame."""
@@ -64,7 +64,7 @@ def log_f0(audio: Audio) -> Floats:
     Raises InputError: as ``speech.features.mfcc`` says.
     """
     samples = checked_samples(audio)
-    silence = SILENCE * _loudness(samples) + ROUNDING * float(max(samples.max(), -samples.min())) ** 2
+    silence = SILENCE_POWER * _loudness(samples) + ROUNDING_POWER * float(max(samples.max(), -samples.min())) ** 2
     frames = frame_count(samples)
     pitch = np.empty((CANDIDATES + 1, frames), np.float32)
     pointers = np.empty((frames, CANDIDATES + 1), np.uint8)
@@ -133,8 +133,8 @@ def _refined(correlation: Floats, peaks: NDArray[np.intp], is_peak: NDArray[np.b
 
 
 def _lag_weight(lag: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the weight of the correlation at a lag (``LONG_LAG``)."""
-    return 1 - LONG_LAG * lag * LOWEST_HZ / _RATE_HZ
+    """Return the weight of the correlation at a lag (``LONG_LAG_SHARE``)."""
+    return 1 - LONG_LAG_SHARE * lag * LOWEST_HZ / _RATE_HZ
 
 
 def _steps(before: Floats, pitch: Floats, cost: Floats) -> NDArray[np.float64]:
@@ -143,11 +143,11 @@ def _steps(before: Floats, pitch: Floats, cost: Floats) -> NDArray[np.float64]:
     before : log F0 of the frame before the first [shape=(CANDIDATES,)]
     """
     earlier = np.concatenate([before[:, None], pitch[:, :-1]], axis=1)
-    steps = np.full((CANDIDATES + 1, CANDIDATES + 1, pitch.shape[1]), VOICING_CHANGE)
-    steps[:-1, :-1] = JUMP * np.abs(pitch - earlier[:, None])
+    steps = np.full((CANDIDATES + 1, CANDIDATES + 1, pitch.shape[1]), VOICING_CHANGE_COST)
+    steps[:-1, :-1] = JUMP_COST * np.abs(pitch - earlier[:, None])
     steps[-1, -1] = 0
     steps[:, :-1] += cost
-    steps[:, -1] += UNVOICED
+    steps[:, -1] += UNVOICED_COST
     return steps
 
 

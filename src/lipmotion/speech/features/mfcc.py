@@ -27,10 +27,10 @@ LIFTER = 22
 PRE_EMPHASIS = 0.97
 DYNAMIC_RANGE = 1e-8
 """Powers are floored this far below the loudest of the recording (80 dB): digital silence has a logarithm."""
-ROUNDING = 1e-5
+ROUNDING_SHARE = 1e-5
 """Features that deviate by less than this share of the largest log power are constant but for rounding. In silence and
 in a constant they deviate by up to 4e-7 of it, on every processor by another amount; in speech by 8e-4 or more."""
-LOUDEST = 1e6
+LARGEST_SAMPLE = 1e6
 """Samples beyond are damage, whatever their full scale was; their squares would not be finite."""
 KNEE_HZ = 6500.0
 """Frequencies are warped in full up to here, or until they are as high as this."""
@@ -72,7 +72,7 @@ def _cepstra(log_powers: NDArray[np.float32]) -> tuple[NDArray[np.float32], floa
 
     log_powers : of the mel filters [shape=(T, 26)]
     """
-    rounding = ROUNDING * max(float(log_powers.max()), -float(log_powers.min()))
+    rounding = ROUNDING_SHARE * max(float(log_powers.max()), -float(log_powers.min()))
     return log_powers @ liftered_cosine(FILTERS, 1, CEPSTRA + 1), rounding
 
 
@@ -83,7 +83,7 @@ def checked_samples(audio: Audio) -> NDArray[np.float32]:
     if audio.samples.ndim != 1 or len(audio.samples) < WINDOW:
         raise InputError(f"speech features need {WINDOW} samples of one channel, found shape {audio.samples.shape}")
     peak = float(np.maximum(audio.samples.max(), -audio.samples.min()))  # no copy of an hour
-    if not peak < LOUDEST:
+    if not peak < LARGEST_SAMPLE:
         raise InputError(f"speech features need finite samples, full scale 1, found a peak of {peak:g}")
     return audio.samples.astype(np.float32, copy=False)
 

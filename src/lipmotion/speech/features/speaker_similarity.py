@@ -37,8 +37,8 @@ def speaker_similarity(hmm: UnitHmm, audio: AnalysedAudio) -> SpeakerSimilarity:
     state path, so that the warp is chosen before anything is recognised.
     """
     stretch = audio.loudest_stretch(JUDGED_FRAMES)
-    form, heard = _densities(hmm), zip(WARPS, stretch.mfcc_of_warps(WARPS), strict=True)
-    fits = {warp: float(form.log_likelihood(features.values).max(axis=1).mean()) for warp, features in heard}
+    form, warped = _densities(hmm), zip(WARPS, stretch.mfcc_of_warps(WARPS), strict=True)
+    fits = {warp: float(form.log_likelihood(features.values).max(axis=1).mean()) for warp, features in warped}
     warp = best_warp(fits)
     return SpeakerSimilarity(warp, fits[warp] - hmm.typical_fit)
 

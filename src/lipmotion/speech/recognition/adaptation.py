@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
 from lipmotion.speech.features.mfcc import FEATURES
 from lipmotion.speech.recognition.general.acoustic import STREAMS
-from lipmotion.stats.affine import identity, transformed
-from lipmotion.storage.schema import STANDARD, Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
+from lipmotion.stats.constrained_mllr import identity, transformed
+from lipmotion.storage.schema import LARGEST_MEAN, Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
 
 LARGEST_WARP = 2.0
 """Frequencies are not stretched by more, nor by less than its inverse."""
@@ -70,7 +70,7 @@ def adaptation_from_arrays(arrays: Arrays) -> Adaptation:
 
 ADAPTATION_ARRAYS = {
     "numbers": ArraySpec(np.float64, "2"),
-    "own": ArraySpec(np.float64, f"{FEATURES} {FEATURES + 1}", -STANDARD, STANDARD),
-    "general": ArraySpec(np.float64, " ".join(map(str, _GENERAL)), -STANDARD, STANDARD),
+    "own": ArraySpec(np.float64, f"{FEATURES} {FEATURES + 1}", -LARGEST_MEAN, LARGEST_MEAN),
+    "general": ArraySpec(np.float64, " ".join(map(str, _GENERAL)), -LARGEST_MEAN, LARGEST_MEAN),
 }
 """The arrays of an adaptation; ``numbers`` are the warp and the weight of the own models."""

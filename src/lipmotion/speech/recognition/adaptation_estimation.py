@@ -18,7 +18,13 @@ from lipmotion.speech.recognition.adaptation import Adaptation, identity_adaptat
 from lipmotion.speech.recognition.combined_phones import NOISES
 from lipmotion.speech.recognition.general.acoustic import STREAMS, general_model
 from lipmotion.speech.recognition.recogniser import Recogniser, own_model_weight
-from lipmotion.stats.affine import AffineStatistics, Array, improved_transform, prior_statistics, transform_statistics
+from lipmotion.stats.constrained_mllr import (
+    AffineStatistics,
+    Array,
+    improved_transform,
+    prior_statistics,
+    transform_statistics,
+)
 from lipmotion.stats.em import run_em
 from lipmotion.stats.mixture import Mixtures
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features

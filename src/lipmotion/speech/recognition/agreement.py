@@ -65,9 +65,9 @@ def transcript_fit(audio: Audio, units: Timeline[Unit]) -> TranscriptFit:
     out, it stretches phones of their neighbours (``LONG_PHONE_S``), or calls loud sound silence (``LEAST_VOICE_S``).
     Raises MissingDependencyError: pocketsphinx is not installed.
     """
-    heard = analysed(audio)
-    frames, scores = _frame_scores(heard, units)
-    loud = loud_frames(heard.log_energy, SMOOTHING_FRAMES)
+    analysis = analysed(audio)
+    frames, scores = _frame_scores(analysis, units)
+    loud = loud_frames(analysis.log_energy, SMOOTHING_FRAMES)
     missing, speech_s = [], 0.0
     for span in units:
         if is_silent(span.label.phone):

@@ -17,7 +17,7 @@ from lipmotion.types import FRAME_RATE_HZ, TimedTranscript
 LOG = logging.getLogger("lipmotion")
 LINE_TOLERANCE_S, WORD_TOLERANCE_S = 0.5, 0.25
 """By how much lines and words may be earlier or later than their times say, at first."""
-WIDER, LEAST_IMPROVEMENT = (2, 4, 8, 16), 0.2
+WIDENING_FACTORS, LEAST_IMPROVEMENT = (2, 4, 8, 16), 0.2
 """Where words press against their windows or fit badly, the tolerance becomes so many times as wide, step by step, and
 stays so if the words then fit better, in nats a frame."""
 BAD_FIT, WORST_FIT = -3.5, -6.0
@@ -132,15 +132,15 @@ def lateness_s(transcript: TimedTranscript, loud: NDArray[np.bool_]) -> float:
     return late_s if is_sure and abs(late_s) > LINE_TOLERANCE_S else 0.0
 
 
-def _correlations(heard: NDArray[np.float64], spoken: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the correlation of ``heard`` with every stretch of ``spoken`` as long [shape=(S - T + 1,)]."""
-    count = len(heard)
-    deviation = heard - heard.mean()
+def _correlations(loudness: NDArray[np.float64], spoken: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the correlation of ``loudness`` with every stretch of ``spoken`` as long [shape=(S - T + 1,)]."""
+    count = len(loudness)
+    deviation = loudness - loudness.mean()
     size = 1 << (len(spoken) + count - 1).bit_length()
     product = np.fft.irfft(np.fft.rfft(spoken, size) * np.conj(np.fft.rfft(deviation, size)), size)
     total = np.cumsum(np.append(0.0, spoken))
     mean = (total[count:] - total[:-count]) / count
-    scale = count * heard.std() * np.sqrt(np.maximum(mean - mean**2, 0.0))  # of zeros and ones
+    scale = count * loudness.std() * np.sqrt(np.maximum(mean - mean**2, 0.0))  # of zeros and ones
     product = product[: len(mean)]
     return np.divide(product, scale, out=np.zeros_like(product), where=scale > 1e-6)
 
@@ -244,7 +244,7 @@ def align_within(
     the times are not used. What fits badly in the end is logged as a warning.
     """
     placed, windows, tolerance_s = _placed(anchors, anchors.tolerance_s, least, edge, frames, search)
-    for factor in WIDER:
+    for factor in WIDENING_FACTORS:
         fits = group_fits(placed, anchors.groups, frames)
         wider_s = np.maximum(factor * anchors.tolerance_s, tolerance_s)
         doubted = fits < BAD_FIT

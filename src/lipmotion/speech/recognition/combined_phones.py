@@ -20,7 +20,7 @@ NOISES = ("+nsn+", "+spn+")
 """Units that only the general models have: noise, and noise of the mouth (a breath, a cough)."""
 ENGLISH_SHARE = 0.5
 """Weight of the English bigram; the rest is the weight of the bigram of the own corpus."""
-BIGRAM_WEIGHT, INSERTION = 3.0, -4.0
+BIGRAM_WEIGHT, INSERTION_SCORE = 3.0, -4.0
 KEPT_FRAMES = 400_000
 """The general log densities of a recording of up to so many frames, about an hour, are kept: they are asked for twice
 and take 500 bytes a frame. Those of a longer recording are computed twice."""
@@ -55,7 +55,7 @@ def combine_phones(own: UnitHmm) -> CombinedPhones:
     sources = np.array([*range(plain), *(source for *_, source in added), *range(plain, len(old.names))], np.intp)
     hmm = replace(
         own,
-        config=replace(own.config, bigram_weight=BIGRAM_WEIGHT, insertion=INSERTION),
+        config=replace(own.config, bigram_weight=BIGRAM_WEIGHT, insertion=INSERTION_SCORE),
         table=table,
         mixtures=own.mixtures.selected(sources),
         log_stay=own.log_stay[sources[: plain + len(added)]],

@@ -88,7 +88,7 @@ def _whisper_lines(module: Any, folder: Path, audio: Audio) -> list[TranscriptLi
         audio.samples, word_timestamps=True, vad_filter=True, condition_on_previous_text=False
     )
     if about.language != ENGLISH:
-        LOG.warning("whisper hears the language %r, not English; its words are not used", about.language)
+        LOG.warning("whisper recognises the language %r, not English; its words are not used", about.language)
         return None
     return [_whisper_line(segment) for segment in segments]
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from itertools import cycle
 
 from lipmotion.hmm.model import HmmConfig, UnitHmm
-from lipmotion.hmm.train import TranscribedUtterance, UnitInventory, train_hmm
+from lipmotion.hmm.unit_training import TranscribedUtterance, UnitInventory, train_hmm
 from lipmotion.speech.features.mfcc import LOG_ENERGY, mfcc
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import Audio, Monitor, ParallelMap
@@ -14,7 +14,7 @@ from lipmotion.units import PAUSE, SILENCE, Lexicon
 
 WARP_CYCLE = (1.0, 0.88, 1.0, 0.94, 1.12, 1.06)
 """Warps of the frequencies, of one recording after the other."""
-FEWEST_WARPED = 60
+FEWEST_WARPED_RECORDINGS = 60
 """Fewer recordings than this are not warped: they are too few to train models of one speaker on, let alone several."""
 
 
@@ -34,7 +34,7 @@ def train_phone_models(
     Raises CorpusError: no transcript fits into its recording.
     Source: Jaitly & Hinton 2013 (vocal tract length perturbation), without random draws or more data.
     """
-    turns = WARP_CYCLE if len(spoken) >= FEWEST_WARPED else (1.0,)
+    turns = WARP_CYCLE if len(spoken) >= FEWEST_WARPED_RECORDINGS else (1.0,)
     utterances = [
         TranscribedUtterance(mfcc(audio, warp).values, tuple(lexicon.pronunciations(word) for word in words))
         for (audio, words), warp in zip(spoken, cycle(turns), strict=False)

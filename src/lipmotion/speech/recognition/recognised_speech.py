@@ -26,7 +26,7 @@ SLIVER_FRAMES = 3
 
 
 @dataclass(frozen=True)
-class HeardWord:
+class RecognisedWord:
     """A word that was recognised, and the probability that it is right, 0 to 1, as measured on other recordings."""
 
     text: str
@@ -36,7 +36,7 @@ class HeardWord:
 class LabelledFrames(NamedTuple):
     """A phone that begins in a frame.
 
-    word : the number of its word among those that were heard; -1 where none is known
+    word : the number of its word among those that were recognised; -1 where none is known
     """
 
     first: int
@@ -60,7 +60,7 @@ class Recognition:
     """
 
     units: Timeline[Unit]
-    words: Timeline[HeardWord]
+    words: Timeline[RecognisedWord]
     word_s: float
     phone_s: float
     similarity: float | None
@@ -89,20 +89,23 @@ def level_range_db(log_energy: NDArray[np.floating[Any]]) -> float:
 
 
 def recognition_of(
-    units: Timeline[Unit], labels: Sequence[LabelledFrames], heard: Sequence[HeardWord], similarity: float | None
+    units: Timeline[Unit],
+    labels: Sequence[LabelledFrames],
+    recognised: Sequence[RecognisedWord],
+    similarity: float | None,
 ) -> Recognition:
     """Return a recognition.
 
     units  : phones in time
     labels : the phones in frames of which they were made
-    heard  : the words that ``labels`` number
+    recognised : the words that ``labels`` number
     """
     ends = [label.first for label in labels[1:]] + [round(units[-1].end_s * FRAME_RATE_HZ)] if labels else []
     words = []
     for number, group in groupby(zip(labels, ends, strict=True), key=lambda pair: pair[0].word):
         if number >= 0:
             phones = list(group)
-            words.append(Span(phones[0][0].first / FRAME_RATE_HZ, phones[-1][1] / FRAME_RATE_HZ, heard[number]))
+            words.append(Span(phones[0][0].first / FRAME_RATE_HZ, phones[-1][1] / FRAME_RATE_HZ, recognised[number]))
     spoken = [span for span in units if not is_silent(span.label.phone)]
     word_s = sum(span.duration_s for span in spoken if span.label.word)
     phone_s = sum(span.duration_s for span in spoken) - word_s
@@ -116,7 +119,7 @@ def labels_of_words(
 
     aligned    : with the stretch
     believed   : of every word [shape=(W,)]
-    first_word : the number of the first word among those that were heard
+    first_word : the number of the first word among those that were recognised
     Silence and pauses belong to a run if both words beside them do, or if all words are believed.
     """
     spoken, everything = aligned.of_word >= 0, bool(believed.all())

@@ -29,8 +29,8 @@ from lipmotion.speech.recognition.adaptation import Adaptation
 from lipmotion.speech.recognition.anchors import Anchors, align_within, least_frames
 from lipmotion.speech.recognition.combined_phones import CombinedPhones, combine_phones, combined_log_likelihoods
 from lipmotion.speech.recognition.recognised_speech import (
-    HeardWord,
     LabelledFrames,
+    RecognisedWord,
     Recognition,
     recognition_of,
     spliced,
@@ -109,16 +109,16 @@ class Recogniser:
         spoken = begun_decoding(audio, each) if with_words else None
         hmm, log_likelihoods = self._log_likelihoods(audio, similarity)
         path = self._loop.network.best_path(log_likelihoods)
-        labels, heard = self._free_labels(audio, features, path), list[HeardWord]()
+        labels, recognised = self._free_labels(audio, features, path), list[RecognisedWord]()
         if spoken is not None:
-            parts, heard = self._word_search(audio, hmm, log_likelihoods, path).words_of(spoken)
+            parts, recognised = self._word_search(audio, hmm, log_likelihoods, path).words_of(spoken)
             labels = spliced(labels if self.kind == "auto" else [LabelledFrames(0, SILENCE)], parts, len(path))
         units = _timeline(
-            [(label.phone, heard[label.word].text if label.word >= 0 else "") for label in labels],
+            [(label.phone, recognised[label.word].text if label.word >= 0 else "") for label in labels],
             np.array([*(label.first for label in labels), len(path)]),
             features.duration_s,
         )
-        return recognition_of(units, labels, heard, similarity.score if similarity is not None else None)
+        return recognition_of(units, labels, recognised, similarity.score if similarity is not None else None)
 
     def _free_labels(self, audio: AnalysedAudio, features: Features, path: NDArray[np.intp]) -> list[LabelledFrames]:
         """Return the phones of a recording as they are recognised without words, of their best path."""

@@ -51,7 +51,7 @@ def words_in(samples: bytes) -> tuple[FoundWord, ...]:
     """
     decoder = _decoder()
     with _LOCK:
-        decoder.reinit_feat()  # else its estimate of the noise depends on what it heard before
+        decoder.reinit_feat()  # else its estimate of the noise depends on what it decoded before
         decoder.start_utt()
         if samples:
             decoder.process_raw(samples, no_search=False, full_utt=True)

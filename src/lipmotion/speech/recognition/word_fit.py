@@ -1,4 +1,4 @@
-"""Words that were heard in a stretch of a recording, aligned, and how well they fit beside freely recognised phones."""
+"""Words that were recognised in a stretch of a recording, aligned, and how well they fit beside free phones."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class AlignedWords:
         return total / np.maximum(count, 1), float(gain.mean())
 
 
-def align_heard_words(
+def align_recognised_words(
     hmm: UnitHmm, log_likelihoods: LogLikelihoods, words: Sequence[str], lexicon: Lexicon
 ) -> AlignedWords:
     """Return words aligned with a stretch, as a transcript is.

@@ -1,4 +1,4 @@
-"""The search for English words in a recording: which are heard, and which of them are believed."""
+"""The search for English words in a recording: which are recognised, and which of them are used."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from lipmotion.hmm.model import UnitHmm
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
 from lipmotion.speech.recognition.combined_phones import NOISES
 from lipmotion.speech.recognition.recognised_speech import (
-    HeardWord,
     LabelledFrames,
     LabelledStretch,
+    RecognisedWord,
     labels_of_words,
     spliced,
 )
 from lipmotion.speech.recognition.word_decoder import FoundWord, stretch_samples, words_in
-from lipmotion.speech.recognition.word_fit import AlignedWords, align_heard_words, phone_bonus
+from lipmotion.speech.recognition.word_fit import AlignedWords, align_recognised_words, phone_bonus
 from lipmotion.speech.sound.voice_activity import Stretch, stretches_of_sound
 from lipmotion.types import ParallelMap
 from lipmotion.units import SILENCE, Lexicon
@@ -79,20 +79,21 @@ class WordSearch:
     loud: NDArray[np.bool_]
     believing: bool = False
 
-    def words_of(self, spoken: WordsInStretches) -> tuple[list[LabelledStretch], list[HeardWord]]:
-        """Return the stretches in which words were heard, with their phones, and these words.
+    def words_of(self, spoken: WordsInStretches) -> tuple[list[LabelledStretch], list[RecognisedWord]]:
+        """Return the stretches in which words were recognised, with their phones, and these words.
 
         spoken : of ``begun_decoding``
         Raises MissingDependencyError: as ``words_in``.
         """
-        parts, heard = list[LabelledStretch](), list[HeardWord]()
+        parts, recognised = list[LabelledStretch](), list[RecognisedWord]()
         for stretch, words in zip(spoken.stretches, spoken.words, strict=True):
-            here, fits = self._part(stretch, [word.text for word in words], len(heard))
+            here, fits = self._part(stretch, [word.text for word in words], len(recognised))
             parts += here
-            heard += [
-                HeardWord(word.text, confidence_of(fit, word.posterior)) for word, fit in zip(words, fits, strict=True)
+            recognised += [
+                RecognisedWord(word.text, confidence_of(fit, word.posterior))
+                for word, fit in zip(words, fits, strict=True)
             ]
-        return parts, heard
+        return parts, recognised
 
     def _part(
         self, stretch: Stretch, words: Sequence[str], first_word: int
@@ -103,7 +104,7 @@ class WordSearch:
         values = self.aligning.stretch(*stretch)
         likelihoods = penalise_silence(self.hmm, log_likelihoods_from(values), self.loud[slice(*stretch)])
         try:
-            aligned = align_heard_words(self.hmm, likelihoods, words, DICTIONARY)
+            aligned = align_recognised_words(self.hmm, likelihoods, words, DICTIONARY)
         except AlignmentError:  # there is not room for them all
             return [], [LEAST_FIT] * len(words)
         fits, fit = aligned.fits(values, self.path[slice(*stretch)])

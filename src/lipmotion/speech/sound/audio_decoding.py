@@ -16,7 +16,7 @@ HOLE_S = 0.04
 """A frame this much later than the end of the one before leaves a hole; time stamps are rounded to 1 ms or better."""
 LONGEST_HOLE_S = 600.0
 """A hole longer than this means that the time stamps are wrong."""
-MOST_SILENCE = 20.0
+MOST_SILENCE_RATIO = 20.0
 """All holes together may last as long as the longest one allowed, and this many times the sound: a codec that sends
 nothing in pauses still sends 20 ms of every 400. More silence than that is no recording, but would fill the memory."""
 LEAST_BYTES_PER_S = 20.0
@@ -59,8 +59,8 @@ def decode_audio(container: Any, rate_hz: int, channel: int | None = None) -> De
     Time 0 is the container's start; in a file without moving pictures, the first sample.
     The silence that fills holes is allocated at the end, when its length is known and allowed.
     Raises InputError: time stamps that jump by more than ``LONGEST_HOLE_S``, or leave more silence than
-    ``MOST_SILENCE`` allows; more sound than the bytes of the track can hold; a rate or a number of channels that no
-    recorder has.
+    ``MOST_SILENCE_RATIO`` allows; more sound than the bytes of the track can hold; a rate or a number of channels that
+    no recorder has.
     """
     return _TrackDecoder(container, rate_hz, channel).decoded()
 
@@ -169,7 +169,7 @@ class _TrackDecoder:
         return 4 * round(duration_s * self._rate_hz)
 
     def _check_silence(self) -> None:
-        most_s = LONGEST_HOLE_S + MOST_SILENCE * self._sound_s
+        most_s = LONGEST_HOLE_S + MOST_SILENCE_RATIO * self._sound_s
         if self._silence_s > most_s:
             raise InputError(
                 f"{self._name}: the time stamps of its sound leave holes of {self._silence_s:.0f} s beside "

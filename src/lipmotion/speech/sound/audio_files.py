@@ -20,13 +20,13 @@ LOG = logging.getLogger("lipmotion")
 SPEECH_RATE_HZ = 16_000
 SHORTEST_S = 0.1
 """Shorter recordings hold no sentence; the features need 25 ms around every frame."""
-CANCELLED = 0.05
+CANCELLED_SHARE = 0.05
 """The mean of the channels must have this share of the loudest channel's energy; else they cancel one another."""
-USABLE = 0.5
+USABLE_SHARE = 0.5
 """A damaged recording is refused when less than this share of its sound can be decoded."""
 LEAST_HOLES_S = 0.005
 """Holes that last less together are not mentioned: they would be rounded to 0."""
-CUT_SHORT = 0.9
+CUT_SHORT_SHARE = 0.9
 """A recording is called cut short when it holds less than this share of the duration that it states."""
 
 
@@ -46,7 +46,7 @@ def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ, *, warn: bool = True) 
     """
     check_source(path, "recording")
     sound = _decoded(path, rate_hz, None)
-    if sound.mean_energy < CANCELLED * max(sound.energies, default=0.0):
+    if sound.mean_energy < CANCELLED_SHARE * max(sound.energies, default=0.0):
         loudest = int(np.argmax(sound.energies))
         LOG.log(
             logging.WARNING if warn else logging.DEBUG,
@@ -102,12 +102,12 @@ def _check_damage(path: Path, sound: DecodedAudio, level: int) -> None:
     """Log damage at a level of ``logging``. Raises InputError: too little of the sound can be decoded."""
     held_s = len(sound.samples) / sound.rate_hz - sound.silence_s
     found = f"{sound.damaged} of {sound.packets} packets of sound cannot be decoded"
-    if sound.damaged > (1 - USABLE) * sound.packets:
+    if sound.damaged > (1 - USABLE_SHARE) * sound.packets:
         raise InputError(f"{path}: damaged: {found}; required: at least half of them; export the recording again")
     if sound.damaged or sound.silence_s >= SHORTEST_S:
         holes = f"; holes of {sound.silence_s:.2f} s became silence" if sound.silence_s >= LEAST_HOLES_S else ""
         LOG.log(level, "%s: damaged: %s%s", path, found, holes)
-    if held_s < CUT_SHORT * sound.stated_s:
+    if held_s < CUT_SHORT_SHARE * sound.stated_s:
         LOG.log(level, "%s: cut short: it states %.1f s of sound and holds %.1f s", path, sound.stated_s, held_s)
 
 

@@ -27,7 +27,7 @@ APART_S = 0.3
 MOST_MARKS = 20
 """Most marks of a kind that are kept, the strongest."""
 BEEP_FRAME_S, BEEP_STEP_S = 0.032, 0.008
-LEAST_TONE = 0.9
+LEAST_TONE_SHARE = 0.9
 """Share of the energy of a beep that is in three neighbouring bands of its spectrum (96 Hz at 16 kHz)."""
 LEAST_BEEP_S, LEAST_BEEP_HZ = 0.1, 500.0
 LEAST_BEEP_LEVEL_DB = -30.0
@@ -104,7 +104,7 @@ def _beeps(audio: Audio) -> list[SoundMark]:
         tone[frames] = bands[np.arange(len(best)), best] / (level[frames] + FLOOR)
         hertz[frames] = (best + 1) / BEEP_FRAME_S
     level = 10 * np.log10(level + FLOOR)
-    good = (tone >= LEAST_TONE) & (hertz >= LEAST_BEEP_HZ) & (level >= level.max() + LEAST_BEEP_LEVEL_DB)
+    good = (tone >= LEAST_TONE_SHARE) & (hertz >= LEAST_BEEP_HZ) & (level >= level.max() + LEAST_BEEP_LEVEL_DB)
     same = np.concatenate([[False], good[1:] & good[:-1] & (np.abs(np.diff(hertz)) <= 1.01 / BEEP_FRAME_S), [False]])
     starts = np.flatnonzero(same[1:] & ~same[:-1])
     ends = np.flatnonzero(same[:-1] & ~same[1:])

@@ -16,20 +16,20 @@ Array = NDArray[np.float64]
 ALIKE = "the sound of both"
 STEP_S = 0.01
 """Distance of the levels that are compared."""
-LEAST_OVERLAP = 0.5
+LEAST_OVERLAP_SHARE = 0.5
 """Share of the shorter recording that the other one must cover, where levels are compared."""
 SAME_S = 0.03
 """Marks whose offsets differ by less are of one offset."""
 SAME_PITCH_HZ = 40.0
 """Beeps whose pitches differ by less are the same beep."""
-LEAST_ALIKE, LEAST_MARGIN, PEAK_S = 0.5, 0.1, 0.25
+LEAST_LEVEL_CORRELATION, LEAST_MARGIN, PEAK_S = 0.5, 0.1, 0.25
 """Least correlation of levels at which the sounds alone decide, by how much it must exceed all others, and how far from
 the best an offset is another one."""
-UNLIKE = 0.15
+LEAST_MARK_CORRELATION = 0.15
 """Marks alone decide, without any likeness of the sounds, only where no other offset is possible."""
-RATHER_ALIKE = 0.3
+WAVEFORM_CORRELATION = 0.3
 """Where sounds around beeps correlate by this much, their waveforms are more exact than the beginnings of beeps."""
-FOR_MARKS = 0.3
+MARK_SCORE = 0.3
 """What each of up to two marks at one offset counts, besides the correlation."""
 FINE_S, FINE_MARK_S, FINE_BEEP_S = 0.06, 0.01, 0.003
 """How far the fine search goes around the coarse offset: of whole sounds, of claps, and of sounds around beeps."""
@@ -44,7 +44,7 @@ SMOOTH_S, PLATEAU_S = 0.004, (0.04, 0.1)
 class SoundOffset:
     """The offset of a recording from another one of the same sounds.
 
-    late_s : what is heard at t in the first is heard at t + ``late_s`` in the second
+    late_s : what sounds at t in the first sounds at t + ``late_s`` in the second
     how    : ``clap``, ``beep``, or ``the sound of both``
     alike  : correlation of the levels at this offset, −1 to 1
     """
@@ -58,7 +58,7 @@ def sound_offset(first: Audio, second: Audio) -> SoundOffset:
     """Return by how much the second recording is later than the first.
 
     first, second : the same sounds, recorded by two machines that began at different times; at the same rate
-    A clap or a beep in both is found, and checked against all that is heard; without one, the levels of both are
+    A clap or a beep in both is found, and checked against all of the sound; without one, the levels of both are
     compared at every offset. Then it is refined by the waveforms to a fraction of a millisecond.
     Raises InputError: neither tells: no clap and no beep in both, and sounds that are not alike.
     """
@@ -68,17 +68,19 @@ def sound_offset(first: Audio, second: Audio) -> SoundOffset:
     likeness = _Likeness(*levels)
     hypotheses = _marked(sound_marks(first), sound_marks(second))
     best_s, best, second_best = likeness.best()
-    candidates = [(likeness.at(late_s) + FOR_MARKS * min(len(pairs), 2), late_s, pairs) for late_s, pairs in hypotheses]
-    certain = best >= LEAST_ALIKE and best - second_best >= LEAST_MARGIN
+    candidates = [
+        (likeness.at(late_s) + MARK_SCORE * min(len(pairs), 2), late_s, pairs) for late_s, pairs in hypotheses
+    ]
+    certain = best >= LEAST_LEVEL_CORRELATION and best - second_best >= LEAST_MARGIN
     if candidates:
         score, late_s, pairs = max(candidates, key=lambda each: each[0])
         alike = likeness.at(late_s)
         alone = len(candidates) == 1 or len(pairs) > 1
-        if not (certain and best > score) and (alike >= UNLIKE or alone):
+        if not (certain and best > score) and (alike >= LEAST_MARK_CORRELATION or alone):
             kind = pairs[0][0].kind
             at_mark = _between_beeps if kind == BEEP else _between_claps
             fine_s = float(np.median([at_mark(first, second, *pair) for pair in pairs]))
-            if kind == BEEP and alike >= RATHER_ALIKE:
+            if kind == BEEP and alike >= WAVEFORM_CORRELATION:
                 fine_s = _refined(first, second, fine_s, FINE_BEEP_S)
             return SoundOffset(fine_s, kind, alike)
     if certain:
@@ -86,12 +88,12 @@ def sound_offset(first: Audio, second: Audio) -> SoundOffset:
     marks = f"{len(candidates)} offsets fit claps or beeps" if candidates else "no clap and no beep is in both"
     raise InputError(
         f"the offset of the two sounds is not clear: {marks}, and their levels correlate by {best:.2f} at most, "
-        f"required {LEAST_ALIKE}; give the offset (--offset-ms, or offsets.csv)"
+        f"required {LEAST_LEVEL_CORRELATION}; give the offset (--offset-ms, or offsets.csv)"
     )
 
 
 class _Likeness:
-    """Correlation of two rows of levels at every offset that leaves ``LEAST_OVERLAP`` of both."""
+    """Correlation of two rows of levels at every offset that leaves ``LEAST_OVERLAP_SHARE`` of both."""
 
     def __init__(self, first: Array, second: Array) -> None:
         from scipy.signal import fftconvolve
@@ -103,7 +105,7 @@ class _Likeness:
         squares = fftconvolve(ones[1], flipped**2), fftconvolve(second**2, ones_flipped)
         spread = [np.maximum(square - total**2 / count, 1e-9) for square, total in zip(squares, sums, strict=True)]
         scores = (fftconvolve(second, flipped) - sums[0] * sums[1] / count) / np.sqrt(spread[0] * spread[1])
-        long = LEAST_OVERLAP * min(len(first), len(second))
+        long = LEAST_OVERLAP_SHARE * min(len(first), len(second))
         # a short overlap is alike by chance; it counts less
         self.scores = np.where(count >= long, scores * np.sqrt(1 - long / (2 * np.maximum(count, long))), 0.0)
         self.zero = len(first) - 1
@@ -193,7 +195,7 @@ def _refined(first: Audio, second: Audio, late_s: float, reach_s: float) -> floa
 def _matched(first: Audio, second: Audio, span_s: tuple[float, float], late_s: float, reach_s: float) -> float:
     """Return the offset at which the waveforms of a span agree best, within ``reach_s`` of a coarse one.
 
-    The spectra are whitened: rooms and microphones change how loud each frequency is, not when it is heard.
+    The spectra are whitened: rooms and microphones change how loud each frequency is, not its time.
     Source: Knapp and Carter 1976, "The generalized correlation method for estimation of time delay" (PHAT).
     """
     rate = first.rate_hz

@@ -41,7 +41,7 @@ DATA = "espeak-ng-data"
 STRESS_MARKS = "',%="
 """What version 1.52 writes before the vowel of a stressed syllable; 1.51 does not."""
 NO_IPA: PhoneMap = {SILENCE: ESPEAK_PHONES[SILENCE], PART: ESPEAK_PHONES[PART]}
-LARGEST_VOICE = 1 << 16
+LARGEST_VOICE_BYTES = 1 << 16
 """Most bytes of a file that describes a voice."""
 Start = tuple[str, float, int]
 
@@ -104,7 +104,7 @@ def _languages(data: Path) -> list[str]:
     """Return the names of all languages in the data, without duplicates, in alphabetical order."""
     names = set()
     for path in (data / "lang").rglob("*"):
-        if path.is_file() and path.stat().st_size <= LARGEST_VOICE:
+        if path.is_file() and path.stat().st_size <= LARGEST_VOICE_BYTES:
             lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
             names |= {line.split()[1].lower() for line in lines if line.startswith("language ") and line.split()[1:]}
     return sorted(names)

@@ -17,10 +17,10 @@ from lipmotion.units import SILENCE, phone_classes
 
 CLOSING = phone_classes()["stop"] | phone_classes()["affricate"]
 VOWELS = phone_classes()["vowel"]
-CLOSED = 0.03
+CLOSURE_SHARE = 0.03
 """Share of the largest sample that no sample of a closure exceeds: some variants have breath in it."""
 LONGEST_CLOSURE_S = 0.06
-LATE_L_S, SHARE_OF_L = 0.045, 0.45
+LATE_L_S, L_SHARE = 0.045, 0.45
 """An l that is reported so shortly before its end is late; it then gets this share of the vowel and l together, as in
 the project's own alignments."""
 
@@ -34,14 +34,14 @@ def corrected_phone_times(starts: Starts, audio: Audio, phone_map: PhoneMap = ES
     """
     labels = [label for label, _ in starts]
     edges_s = [*(start_s for _, start_s in starts), audio.duration_s]
-    closed = np.abs(audio.samples) < CLOSED * np.abs(audio.samples).max(initial=0)
+    closed = np.abs(audio.samples) < CLOSURE_SHARE * np.abs(audio.samples).max(initial=0)
     for index in range(1, len(labels)):
         before, here = _phone(labels[index - 1], phone_map), _phone(labels[index], phone_map)
         if here in CLOSING and before != SILENCE:
             edges_s[index] = max(_closure_s(closed, edges_s[index], audio.rate_hz), edges_s[index - 1])
         elif here == "l" and before in VOWELS and edges_s[index + 1] - edges_s[index] < LATE_L_S:
             length_s = edges_s[index + 1] - edges_s[index - 1]
-            edges_s[index] = min(edges_s[index], edges_s[index + 1] - SHARE_OF_L * length_s)
+            edges_s[index] = min(edges_s[index], edges_s[index + 1] - L_SHARE * length_s)
     spans = zip(edges_s, edges_s[1:], labels, strict=False)
     return Timeline(tuple(Span(start_s, max(start_s, end_s), label) for start_s, end_s, label in spans))
 

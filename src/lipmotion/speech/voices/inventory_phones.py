@@ -14,9 +14,9 @@ from lipmotion.speech.voices.phone_maps import PhoneMap
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, VISEME_OF, Lexicon, Pronunciation, is_silent, phone_classes, words_in
 from lipmotion.units.lexicon import REDUCED_VOWELS
-from lipmotion.units.transcript import normalised_text
+from lipmotion.units.text_normalisation import normalised_text
 
-GAP, ALIKE, OTHER, UNLIKE = 0.7, 0.3, 0.8, 1.5
+GAP_COST, OWN_FORM_COST, OWN_KIND_COST, OTHER_KIND_COST = 0.7, 0.3, 0.8, 1.5
 """Costs of matching a phone with none, with a form of itself, with another of its kind (vowel or consonant), and with
 one of the other kind."""
 VOWELS = phone_classes()["vowel"]
@@ -106,19 +106,19 @@ def matches(spoken: Sequence[str], expected: Sequence[str]) -> list[int]:
 
     Source: Wagner & Fischer 1974 (edit distance).
     """
-    costs = [[GAP * column for column in range(len(expected) + 1)]]
+    costs = [[GAP_COST * column for column in range(len(expected) + 1)]]
     for row, phone in enumerate(spoken):
-        above, line = costs[-1], [GAP * (row + 1)]
+        above, line = costs[-1], [GAP_COST * (row + 1)]
         for column, other in enumerate(expected):
             same = above[column] + _cost(phone, other)
-            line.append(min(same, above[column + 1] + GAP, line[column] + GAP))
+            line.append(min(same, above[column + 1] + GAP_COST, line[column] + GAP_COST))
         costs.append(line)
     matched, row, column = [-1] * len(spoken), len(spoken), len(expected)
     while row and column:
         if costs[row][column] == costs[row - 1][column - 1] + _cost(spoken[row - 1], expected[column - 1]):
             row, column = row - 1, column - 1
             matched[row] = column
-        elif costs[row][column] == costs[row - 1][column] + GAP:
+        elif costs[row][column] == costs[row - 1][column] + GAP_COST:
             row -= 1
         else:
             column -= 1
@@ -130,8 +130,8 @@ def _cost(phone: str, other: str) -> float:
     if phone == other:
         return 0.0
     if REDUCED_VOWELS.get(phone, phone) == REDUCED_VOWELS.get(other, other) or VISEME_OF[phone] == VISEME_OF[other]:
-        return ALIKE
-    return OTHER if (phone in VOWELS) == (other in VOWELS) else UNLIKE
+        return OWN_FORM_COST
+    return OWN_KIND_COST if (phone in VOWELS) == (other in VOWELS) else OTHER_KIND_COST
 
 
 def _translated(labels: Timeline[str], phone_map: PhoneMap) -> list[tuple[str, float, float]]:

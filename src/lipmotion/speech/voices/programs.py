@@ -21,11 +21,11 @@ START_S, EACH_S = 30.0, 5.0
 STILL_S = 10.0
 """A program that prints and writes nothing for so long hangs."""
 POLL_S = 0.05
-LARGEST_PRINTED = 4 << 20
+LARGEST_OUTPUT_BYTES = 4 << 20
 """Most bytes that a program may print: many times the phones of twenty sentences."""
-LARGEST_SOUND = 32 << 20
+LARGEST_SOUND_BYTES = 32 << 20
 """Most bytes that it may write for each sentence: many times the longest one (``units.sentences``)."""
-SHOWN = 200
+SHOWN_CHARACTERS = 200
 """Characters of a program's error message that ours repeats."""
 
 
@@ -53,7 +53,10 @@ def program_output(
                 _wait(process, name, sentences, lambda: (_size(printed) + _size(errors), _written(folder)))
             if process.returncode:
                 errors.seek(0)
-                message = " ".join(errors.read(4 * SHOWN).decode(errors="replace").split())[:SHOWN] or "no message"
+                message = (
+                    " ".join(errors.read(4 * SHOWN_CHARACTERS).decode(errors="replace").split())[:SHOWN_CHARACTERS]
+                    or "no message"
+                )
                 raise InputError(f"{name} failed with {process.returncode} ({message}); try another text or voice")
             printed.seek(0)
             return printed.read().decode().replace("\r\n", "\n")
@@ -84,7 +87,7 @@ def _wait(process: subprocess.Popen[bytes], name: str, sentences: int, sizes: Ca
     sizes : returns how many bytes it has printed, and how many it has written
     Raises InputError: it does not end, or prints or writes too much.
     """
-    limit_s, largest = START_S + EACH_S * sentences, LARGEST_SOUND * sentences
+    limit_s, largest = START_S + EACH_S * sentences, LARGEST_SOUND_BYTES * sentences
     start = moved = time.monotonic()
     before = 0, 0
     running = True
@@ -94,8 +97,8 @@ def _wait(process: subprocess.Popen[bytes], name: str, sentences: int, sizes: Ca
             running = False
         now, sized = time.monotonic(), sizes()
         moved, before = (moved if sized == before else now), sized
-        if sized[0] > LARGEST_PRINTED:
-            raise InputError(f"{name} prints more than {LARGEST_PRINTED} bytes; try another text or voice")
+        if sized[0] > LARGEST_OUTPUT_BYTES:
+            raise InputError(f"{name} prints more than {LARGEST_OUTPUT_BYTES} bytes; try another text or voice")
         if sized[1] > largest:
             raise InputError(f"{name} writes more than {largest} bytes; try another text or voice")
         if running and (now - start > limit_s or now - moved > STILL_S):

@@ -10,9 +10,9 @@ from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM,
 from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance, allowed_units, uniform_path
+from lipmotion.engines.coupled.training.chain_training import CONVERGENCE_GAIN, MixtureSchedule, growing_chains
+from lipmotion.engines.coupled.training.coupled_training import fit_coupled, frames_away_from_speech
 from lipmotion.engines.coupled.training.em_steps import LatticeUtterance, e_step, m_step, variance_floors
-from lipmotion.engines.coupled.training.fit import fit_coupled, frames_away_from_speech
-from lipmotion.engines.coupled.training.train import CONVERGED, MixtureSchedule, growing_chains
 from lipmotion.errors import InputError
 from lipmotion.testing.examples import examples
 from lipmotion.types import GREY, Channel, Example, Span, Timeline, Unit
@@ -59,7 +59,7 @@ def test_the_likelihood_rises_at_every_step():
         *_, grown = growing_chains(
             of, ("speech", "seen"), sentences(), MixtureSchedule(mixtures, (1.0, 1.0), most_steps=8), steps.append
         )
-        assert grown.converged is bool(steps[-1].log_likelihood - steps[-2].log_likelihood < CONVERGED)
+        assert grown.converged is bool(steps[-1].log_likelihood - steps[-2].log_likelihood < CONVERGENCE_GAIN)
         assert {step.mixtures[0] for step in steps} == {1, 2, 4}
         for one, other in pairwise(steps):
             if one.mixtures == other.mixtures:

@@ -14,9 +14,9 @@ from lipmotion.engines.coupled.chains.densities import (
     Single,
     StreamGroup,
 )
-from lipmotion.engines.coupled.chains.factorial import FactorialTransitions, factorial_lattice
+from lipmotion.engines.coupled.chains.factorial_lattice import FactorialTransitions, factorial_lattice
 from lipmotion.engines.coupled.chains.lattice import Index, Lattice, LatticePosteriors
-from lipmotion.engines.coupled.chains.network import network_lattice
+from lipmotion.engines.coupled.chains.network_lattice import network_lattice
 from lipmotion.engines.coupled.chains.structures import Structure
 from lipmotion.engines.coupled.chains.transitions import Transitions
 

@@ -21,7 +21,7 @@ LEAST_FRAMES = 50.0
 """A joint state with fewer frames in training shares its row with all that have the same own state and asynchrony."""
 LEAST_ADVANCE = 1e-5
 """Least probability of moving on, and of staying."""
-MOST_SWEEPS, CONVERGED = 50, 1e-6
+MOST_SWEEPS, CONVERGENCE_TOLERANCE = 50, 1e-6
 """Iterative scaling ends after so many sweeps, or when no probability changes by as much."""
 
 
@@ -79,7 +79,7 @@ class Transitions:
             before = current.advance
             for chain in range(len(self.rows)):
                 current = current._rescaled(chain, counts, left * np.exp(current.arc_log))
-            if all(np.abs(a - b).max() < CONVERGED for a, b in zip(before, current.advance, strict=True)):
+            if all(np.abs(a - b).max() < CONVERGENCE_TOLERANCE for a, b in zip(before, current.advance, strict=True)):
                 break
         return current
 

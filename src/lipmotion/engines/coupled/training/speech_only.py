@@ -14,16 +14,16 @@ from dataclasses import dataclass, replace
 
 from lipmotion.engines.coupled.chains.model import Chains
 from lipmotion.engines.coupled.chains.structures import HMM
-from lipmotion.engines.coupled.conversion.em import without_visual_streams
+from lipmotion.engines.coupled.conversion.em_conversion import without_visual_streams
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance
-from lipmotion.engines.coupled.training.em_steps import lattice_utterance, variance_floors
-from lipmotion.engines.coupled.training.train import (
+from lipmotion.engines.coupled.training.chain_training import (
     Report,
     component_counts,
     no_report,
     train_to_convergence,
     with_split_components,
 )
+from lipmotion.engines.coupled.training.em_steps import lattice_utterance, variance_floors
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,252 @@
+"""Regression of visual means on acoustic features, and on posteriors of the first chain, around a frame.
+
+The visual chain of Xie & Liu 2007 has one mean for each state, which does not depend on the neighbouring phones: the
+lips of a k do not take the shape of the vowels beside it. Here the mean of a state is linear in the acoustic features
+around the frame and in the posteriors of the first chain around it. These posteriors are a soft phonetic context, for
+which no phone needs to be decided. Each state of each viseme has a regression, with a ridge towards that of the viseme,
+and this one towards that of all visemes; the posteriors of the visual chain weight the regressions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import CorpusError
+from lipmotion.motion.context_window import AcousticContext, fit_acoustic_context
+from lipmotion.stats.tree_regression import ridge, zero_statistics
+
+Array = NDArray[np.float64]
+Single = NDArray[np.float32]
+OFFSETS = (-28, -20, -14, -9, -5, -2, 0, 2, 5, 9, 14, 20, 28)
+"""Frames whose posteriors are regression inputs, relative to the predicted frame; the farther, the more smoothed."""
+REACH = 2
+"""Frames to both sides over which the posteriors of the frame itself are smoothed."""
+ACOUSTIC_AXES, POSTERIOR_AXES, INPUT_AXES = 150, 80, 400
+"""Greatest number of principal axes: of the acoustic context, of posteriors, and of both together."""
+ACOUSTIC_WEIGHT = 0.1
+"""Scale of the acoustic context beside the posteriors."""
+CONSTANT = 1.0
+"""The last regression input."""
+SHARED_RIDGE = 1e-4
+"""Strength of the ridge towards 0, a frame."""
+OWN_RIDGE = 5.0
+"""Strength of the ridges towards the regression of the viseme, and towards that of all."""
+LEAST_WEIGHT = 0.01
+"""A regression with less weight in a frame is left out there."""
+LEAST_FRAMES = 20.0
+"""The variance of all states counts as so many frames in that of each."""
+
+
+@dataclass(frozen=True, eq=False)
+class RegressionInputs:
+    """The map from acoustic features and posteriors around a frame to F regression inputs.
+
+    acoustic        : the window of acoustic features
+    posterior_basis : principal axes of the posteriors of the first chain's N states, as columns [shape=(N, R)], float32
+    mean, basis     : of both together [shapes=(F',), (F', F)], float32
+    """
+
+    acoustic: AcousticContext
+    posterior_basis: Single
+    mean: Single
+    basis: Single
+
+    def __call__(self, features: Single, posterior: Single) -> Single:
+        """Return the regression inputs of all frames, with a constant as the last [shape=(T, F + 1)].
+
+        features  : [shape=(T, 39)]
+        posterior : of the first chain's states [shape=(T, N)]
+        """
+        return self._projected(_context(self.acoustic, features, posterior @ self.posterior_basis))
+
+    def observed_frames(self, utterance: RegressionUtterance) -> Single:
+        """Return the regression inputs of the frames of an utterance whose motion was observed [shape=(T', F + 1)]."""
+        context = _context(self.acoustic, utterance.features, utterance.reduced_posteriors)
+        return self._projected(context[utterance.observed])
+
+    def _projected(self, context: Single) -> Single:
+        projected = (context - self.mean) @ self.basis
+        return np.concatenate([projected, np.full((len(projected), 1), CONSTANT, np.float32)], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class VisualRegression:
+    """The regression of the means of one visual stream, in its standardised units.
+
+    regression_of_state : which of the E regressions each state of the stream's chain uses [shape=(N_v,)]
+    coefficients        : float32 array [shape=(E, F + 1, D)]
+    variances           : of each state, around the regressed means, float32 array [shape=(N_v, D)]
+    """
+
+    regression_of_state: NDArray[np.intp]
+    coefficients: Single
+    variances: Single
+
+    def means(self, inputs: Single, posterior: Single) -> Array:
+        """Return the expected means of all frames [shape=(T, D)].
+
+        inputs    : from ``RegressionInputs`` [shape=(T, F + 1)]
+        posterior : of the states of the stream's chain [shape=(T, N_v)]
+        """
+        weights = regression_weights(posterior, self.regression_of_state, len(self.coefficients))
+        means = np.zeros((len(inputs), self.coefficients.shape[2]))
+        for weight, matrix in zip(weights.T, self.coefficients, strict=True):
+            rows = np.flatnonzero(weight > 0)
+            means[rows] += weight[rows, None] * (inputs[rows] @ matrix)
+        return means
+
+    def precisions(self, posterior: Single) -> Array:
+        """Return the expected precisions of all frames [shape=(T, D)]; ``posterior`` as in ``means``."""
+        return (posterior @ (1 / self.variances)).astype(float)
+
+
+def regression_weights(posterior: Single, regression_of_state: NDArray[np.intp], count: int) -> Single:
+    """Return the weight of each regression in each frame [shape=(T, count)]; rows sum to 1, small weights are 0.
+
+    posterior           : of the states of a chain [shape=(T, N)]
+    regression_of_state : the regression of each of these states [shape=(N,)]
+    """
+    weight = posterior @ np.eye(count, dtype=np.float32)[regression_of_state]
+    weight[weight < LEAST_WEIGHT] = 0
+    return weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-9)
+
+
+@dataclass(frozen=True, eq=False)
+class RegressionUtterance:
+    """What the regressions are learned from, for one utterance.
+
+    features           : acoustic features [shape=(T, 39)]
+    reduced_posteriors : posteriors of the first chain along their principal axes [shape=(T, R)]
+    chain_posteriors   : for each visual stream, the posteriors of the states of its chain [each shape=(T, N_v)]
+    targets            : the visual streams [each shape=(T, D)]
+    observed           : the frames in which the visual streams were observed [shape=(T,)]
+    """
+
+    features: Single
+    reduced_posteriors: Single
+    chain_posteriors: Sequence[Single]
+    targets: Sequence[Single]
+    observed: NDArray[np.bool_]
+
+
+def posterior_axes(posteriors: Iterable[Single]) -> Single:
+    """Return the principal axes of posteriors [each shape=(T, N)] as columns [shape=(N, R)].
+
+    Raises CorpusError: no posteriors.
+    """
+    total: Array | None = None
+    for posterior in posteriors:
+        products = (posterior.T @ posterior).astype(float)
+        total = products if total is None else total + products
+    if total is None:
+        raise CorpusError("no recording to learn from")
+    return _principal_axes(total, POSTERIOR_AXES)
+
+
+def fit_regression_inputs(posterior_basis: Single, utterances: Sequence[RegressionUtterance]) -> RegressionInputs:
+    """Return regression inputs along the principal axes of some utterances.
+
+    posterior_basis : from ``posterior_axes`` [shape=(N, R)]
+    """
+    acoustic = fit_acoustic_context((utterance.features for utterance in utterances), ACOUSTIC_AXES)
+    count, total, products = 0, np.zeros(0), np.zeros(0)
+    for utterance in utterances:
+        context = _context(acoustic, utterance.features, utterance.reduced_posteriors).astype(float)
+        if not count:
+            total, products = np.zeros(context.shape[1]), np.zeros((context.shape[1],) * 2)
+        count += len(context)
+        total += context.sum(axis=0)
+        products += context.T @ context
+    mean = total / count
+    basis = _principal_axes(products / count - np.outer(mean, mean), INPUT_AXES)
+    return RegressionInputs(acoustic, posterior_basis, mean.astype(np.float32), basis)
+
+
+def fit_visual_regression(
+    inputs: RegressionInputs,
+    utterances: Sequence[RegressionUtterance],
+    stream: int,
+    regression_of_state: NDArray[np.intp],
+    family: NDArray[np.intp],
+) -> VisualRegression:
+    """Return the regressions of the means of a visual stream, by ridge regression towards those of their families.
+
+    stream              : the number of the visual stream
+    regression_of_state : the regression of each state of its chain [shape=(N_v,)]
+    family              : the family of each regression [shape=(E,)]; that of a family has a ridge towards that of all
+    """
+    outputs, size, count = utterances[0].targets[stream].shape[1], inputs.basis.shape[1] + 1, len(family)
+    statistics = [zero_statistics(size, outputs) for _ in range(count)]
+    for utterance in utterances:
+        z = inputs.observed_frames(utterance)
+        weights = regression_weights(utterance.chain_posteriors[stream], regression_of_state, count)[utterance.observed]
+        target = utterance.targets[stream][utterance.observed]
+        for number, weight in enumerate(weights.T):
+            rows = np.flatnonzero(weight)
+            root = np.sqrt(weight[rows, None])
+            statistics[number].add(z[rows] * root, target[rows] * root)
+    total = sum(statistics[1:], statistics[0])
+    frames = sum(int(utterance.observed.sum()) for utterance in utterances)
+    shared = ridge(total, np.zeros_like(total.targets), SHARED_RIDGE * frames)
+    families = [
+        ridge(sum(members[1:], members[0]), shared, OWN_RIDGE)
+        for members in ([statistics[i] for i in np.flatnonzero(family == f)] for f in range(int(family.max()) + 1))
+    ]
+    pairs = zip(statistics, family.tolist(), strict=True)
+    coefficients = np.array([ridge(own, families[f], OWN_RIDGE) for own, f in pairs], np.float32)
+    unit_variances = np.ones((len(regression_of_state), outputs), np.float32)
+    regression = VisualRegression(regression_of_state, coefficients, unit_variances)
+    return VisualRegression(regression_of_state, coefficients, _variances(regression, inputs, utterances, stream))
+
+
+def _variances(
+    regression: VisualRegression, inputs: RegressionInputs, utterances: Sequence[RegressionUtterance], stream: int
+) -> Single:
+    """Return the variance of a visual stream around its regressed means, for each state [shape=(N_v, D)]."""
+    squares, counts = np.zeros(regression.variances.shape), np.zeros(len(regression.regression_of_state))
+    for utterance in utterances:
+        posterior = utterance.chain_posteriors[stream][utterance.observed]
+        means = regression.means(inputs.observed_frames(utterance), posterior)
+        error = utterance.targets[stream][utterance.observed] - means
+        squares += posterior.T @ np.square(error)
+        counts += posterior.sum(axis=0)
+    overall = squares.sum(axis=0) / counts.sum()
+    variances = (squares + LEAST_FRAMES * overall) / (counts + LEAST_FRAMES)[:, None]
+    return np.maximum(variances, 1e-6).astype(np.float32)
+
+
+def _principal_axes(covariance: Array, size: int) -> Single:
+    """Return at most ``size`` eigenvectors of the largest eigenvalues as columns; the largest number of each is > 0."""
+    _, vectors = np.linalg.eigh(covariance)
+    basis = vectors[:, ::-1][:, :size]
+    signs = np.where(basis[np.abs(basis).argmax(axis=0), np.arange(basis.shape[1])] < 0, -1.0, 1.0)
+    return (basis * signs).astype(np.float32)
+
+
+def _context(acoustic: AcousticContext, features: Single, reduced_posteriors: Single) -> Single:
+    """Return the acoustic context and the posteriors at ``OFFSETS`` of all frames, side by side [shape=(T, F')]."""
+    scale = ACOUSTIC_WEIGHT / float(np.linalg.norm(acoustic.basis[:, 0]))
+    frames = np.arange(len(reduced_posteriors))
+    windows = [
+        _smoothed(reduced_posteriors, REACH + abs(offset) // 5)[np.clip(frames + offset, 0, len(frames) - 1)]
+        for offset in OFFSETS
+    ]
+    return np.concatenate([acoustic(features, slice(None)) * np.float32(scale), *windows], axis=1)
+
+
+def _smoothed(values: Single, reach: int) -> Single:
+    """Return a moving average with a cosine window of 2·reach + 1 frames [shape as ``values``].
+
+    Before the first frame and after the last, these frames are repeated.
+    """
+    window = np.hanning(2 * reach + 3)[1:-1]
+    window = (window / window.sum()).astype(np.float32)
+    padded = np.pad(values, ((reach, reach), (0, 0)), mode="edge")
+    total = np.zeros_like(values)
+    for shift, share in enumerate(window):
+        total += share * padded[shift : shift + len(values)]
+    return total

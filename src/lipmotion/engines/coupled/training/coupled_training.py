@@ -1,0 +1,269 @@
+"""Training of a coupled model from examples: chains, regression of visual means, variance scaling, rest pose."""
+
+from __future__ import annotations
+
+import itertools
+import os
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from functools import partial
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.engines.base import Fit
+from lipmotion.engines.coupled.chains.densities import AudioVisualObservations
+from lipmotion.engines.coupled.chains.model import Chains
+from lipmotion.engines.coupled.chains.structures import HMM, Structure, structure_of
+from lipmotion.engines.coupled.chains.visual_streams import (
+    EIGENLIPS,
+    GEOMETRY,
+    VisualStream,
+    fit_visual_streams,
+    speech_observations,
+)
+from lipmotion.engines.coupled.config import CoupledConfig
+from lipmotion.engines.coupled.conversion.em_conversion import without_visual_streams
+from lipmotion.engines.coupled.conversion.mean_regression import (
+    RegressionInputs,
+    RegressionUtterance,
+    VisualRegression,
+    fit_regression_inputs,
+    fit_visual_regression,
+    posterior_axes,
+)
+from lipmotion.engines.coupled.model import AWAY_FROM_SPEECH_S, CoupledModel
+from lipmotion.engines.coupled.training.alignment import AlignedUtterance
+from lipmotion.engines.coupled.training.chain_training import MixtureSchedule, TrainingStep, growing_chains
+from lipmotion.engines.coupled.training.em_steps import ChainStatistics
+from lipmotion.engines.coupled.training.speech_only import SpeechOnlySchedule, train_on_speech
+from lipmotion.errors import CorpusError
+from lipmotion.kernels.sequences.banded import generate
+from lipmotion.motion.articulation import fit_articulation_prior
+from lipmotion.motion.closure import fit_closure
+from lipmotion.motion.rest import away_from_speech, speech_intervals
+from lipmotion.motion.space import fit_reduced_motion
+from lipmotion.motion.variance_scaling import scaling_factors
+from lipmotion.stats.delta_windows import dynamics_known
+from lipmotion.stats.em import EmResult
+from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Progress, Timeline, Unit, sub_monitor
+from lipmotion.units import VISEME_OF, is_silent
+
+Array = NDArray[np.float64]
+ResultT = TypeVar("ResultT")
+SPEECH = "speech"
+
+
+def fit_coupled(examples: Sequence[Example], config: CoupledConfig, monitor: Monitor) -> Fit[CoupledModel]:
+    """Return a coupled model trained on examples of speech with its motion, and figures of the training.
+
+    Its figures are ``frames``, ``joint_states``, and ``converged``: whether EM with the greatest number of Gaussians
+    ended for want of gain (1), not after the greatest number of steps (0).
+    Examples without observed motion are for the second stage of training, which re-estimates the densities of speech
+    from more speakers (``speech_only``). The first stage ignores them, and so does what follows the second: the
+    regression of visual means, and variance scaling, which are learned from the examples with motion.
+    Raises CorpusError: no example with observed motion, or examples of different channels.
+    Raises InputError: no such unit set, or a structure that does not fit together.
+    """
+    return deque(growing_models(examples, config, monitor), maxlen=1)[0]()
+
+
+def growing_models(
+    examples: Sequence[Example], config: CoupledConfig, monitor: Monitor
+) -> Iterator[Callable[[], Fit[CoupledModel]]]:
+    """Yield functions that return the models with 1, 2, 4, … Gaussians that ``fit_coupled`` passes through.
+
+    The last function returns what ``fit_coupled`` does. Raises as ``fit_coupled``.
+    """
+    structure = structure_of(config.structure, config.chains, config.states, config.asynchrony, config.cross_units)
+    moving = [example for example in examples if dynamics_known(example.valid).any()]
+    space, values = fit_reduced_motion(moving or examples, config.components)
+    if all(is_silent(span.label.phone) for example in moving for span in example.speech.units):
+        raise CorpusError(f"nothing is said in {len(moving)} examples with motion; learn from speech")
+    valid = [dynamics_known(example.valid) for example in moving]
+    visual = fit_visual_streams(space, values, valid, config.dynamic)
+    data = [
+        AlignedUtterance(_observations(example, x, mask, visual), example.speech.units)
+        for example, x, mask in zip(moving, values, valid, strict=True)
+    ]
+    speech_only = [
+        AlignedUtterance(speech_observations(_features(example), visual), example.speech.units)
+        for example in examples
+        if not dynamics_known(example.valid).any()
+    ]
+    rest_pose, closure = _rest_pose(moving, values, valid), fit_closure(space.direct_names, values, moving)
+    prior = fit_articulation_prior(space, values, moving) if config.articulation else None
+    first_share, second_share = (0.4, 0.7) if speech_only else (0.7, 0.7)
+
+    def finished(grown: EmResult[Chains, ChainStatistics]) -> Fit[CoupledModel]:
+        chains = grown.model
+        if speech_only:
+            second_monitor = sub_monitor(monitor, first_share, second_share)
+            chains = _second_stage(chains, data, speech_only, config, second_monitor)
+        model = CoupledModel(chains, space, visual, None, np.ones(space.dimensions), rest_pose, closure, prior)
+        if config.dynamic and config.acoustic_regression:
+            monitor(Progress("regression of visual means", 1, 1, 0.75))
+            model = replace(model, regression=_fitted_regression(model, data))
+        if config.dynamic and config.variance_scaling:
+            model = replace(model, scaling=_fitted_scaling(model, data, values))
+        monitor(Progress("regression of visual means", 1, 1, 1.0))
+        joint_states = model.chains.transitions.product.chain_states.shape[1]
+        frames = sum(int(example.valid.sum()) for example in examples)
+        return Fit(model, {"frames": frames, "joint_states": joint_states, "converged": float(grown.converged)})
+
+    names, schedule = (SPEECH, *(stream.name for stream in visual)), _schedule(structure, visual, config)
+    most_steps = schedule.most_steps * max(schedule.mixtures).bit_length()
+    report = _reporter("chains", most_steps, sub_monitor(monitor, 0, first_share))
+    for grown in growing_chains(structure, names, data, schedule, report, workers()):
+        yield partial(finished, grown)
+
+
+def workers() -> int:
+    """Return the number of threads that share the work; the result does not depend on it."""
+    return min(os.cpu_count() or 1, 8)
+
+
+def frames_away_from_speech(units: Timeline[Unit], frames: int) -> NDArray[np.bool_]:
+    """Return whether each frame is silence, further than 0.45 s from every phone [shape=(T,)]."""
+    return away_from_speech(np.arange(frames) / FRAME_RATE_HZ, speech_intervals(units), AWAY_FROM_SPEECH_S)
+
+
+def _observations(
+    example: Example, values: Array, valid: NDArray[np.bool_], visual: Sequence[VisualStream]
+) -> AudioVisualObservations:
+    """Return the speech of an example with its visual streams.
+
+    values : motion in the space [shape=(T, Q)]
+    valid  : the frames in which it was observed [shape=(T,)]
+    """
+    streams = (_features(example), *(stream.standardised(values) for stream in visual))
+    return AudioVisualObservations(streams, (None, *(valid for _ in visual)))
+
+
+def _features(example: Example) -> NDArray[np.float32]:
+    return np.asarray(example.speech.features.values)
+
+
+def _schedule(structure: Structure, visual: Sequence[VisualStream], config: CoupledConfig) -> MixtureSchedule:
+    mixtures = (config.mixtures, *(config.visual_mixtures for _ in visual))
+    weights = {GEOMETRY: config.visual_weight, EIGENLIPS: config.eigenlips_weight}
+    return MixtureSchedule(
+        mixtures[:1] if structure.kind == HMM else mixtures,
+        (config.audio_weight, *(weights[stream.name] for stream in visual)),
+    )
+
+
+def _second_stage(
+    chains: Chains,
+    data: Sequence[AlignedUtterance],
+    speech_only: Sequence[AlignedUtterance],
+    config: CoupledConfig,
+    monitor: Monitor,
+) -> Chains:
+    """Return the chains after the second stage of training, on speech without motion as well."""
+    schedule = SpeechOnlySchedule(config.speech_only_mixtures, config.speech_only_steps, config.speech_only_weight)
+    most_steps = schedule.most_steps * max(schedule.mixtures // config.mixtures, 1).bit_length()
+    report = _reporter("more speech", most_steps, monitor)
+    return train_on_speech(chains, data, speech_only, schedule, report, workers())
+
+
+def _reporter(stage: str, most_steps: int, monitor: Monitor) -> Callable[[TrainingStep], None]:
+    """Return a function that reports the steps of a stage of training to the monitor.
+
+    most_steps : how many steps there will be at most; the stage may end earlier
+    """
+    numbers = itertools.count(1)
+
+    def report(step: TrainingStep) -> None:
+        number = next(numbers)
+        monitor(Progress(stage, number, most_steps, number / most_steps, step.log_likelihood))
+
+    return report
+
+
+def _rest_pose(examples: Sequence[Example], values: Sequence[Array], valid: Sequence[NDArray[np.bool_]]) -> Array:
+    """Return the median pose of silence away from speech, or that of all frames if there is none [shape=(Q,)].
+
+    values : motion in the space [each shape=(T, Q)]
+    valid  : the frames in which it was observed [each shape=(T,)]
+    """
+    silent_poses = [
+        x[mask & frames_away_from_speech(example.speech.units, len(x))]
+        for example, x, mask in zip(examples, values, valid, strict=True)
+    ]
+    poses = np.concatenate(silent_poses)
+    if not len(poses):
+        poses = np.concatenate([x[mask] for x, mask in zip(values, valid, strict=True)])
+    return np.median(poses, axis=0)
+
+
+def _fitted_regression(
+    model: CoupledModel, data: Sequence[AlignedUtterance]
+) -> tuple[RegressionInputs, tuple[VisualRegression, ...]]:
+    """Return the regression of visual means on acoustic features and on the posteriors given speech alone."""
+    structure = model.chains.structure
+    visual_chains = [structure.chain_of(stream + 1) for stream in range(len(model.visual))]
+    posteriors = list(
+        _threaded(lambda utterance: _chain_posteriors(model.chains, utterance, (0, *visual_chains)), data)
+    )
+    axes = posterior_axes(first for first, *_ in posteriors)
+    utterances = [
+        RegressionUtterance(
+            utterance.observations.streams[0],
+            first @ axes,
+            visual,
+            utterance.observations.streams[1:],
+            np.asarray(utterance.observations.observed[1]),
+        )
+        for utterance, (first, *visual) in zip(data, posteriors, strict=True)
+    ]
+    inputs = fit_regression_inputs(axes, utterances)
+    return inputs, tuple(
+        fit_visual_regression(inputs, utterances, stream, *_state_regressions(structure, chain))
+        for stream, chain in enumerate(visual_chains)
+    )
+
+
+def _chain_posteriors(
+    chains: Chains, utterance: AlignedUtterance, numbers: Sequence[int]
+) -> tuple[NDArray[np.float32], ...]:
+    """Return the posteriors of the states of some chains given speech alone, without transcript [each shape=(T, N)]."""
+    posteriors = chains.infer(without_visual_streams(utterance.observations), chains.full_lattice).posteriors
+    return tuple(posteriors.chains[number] for number in numbers)
+
+
+def _state_regressions(structure: Structure, chain: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the regression of each state of a chain [shape=(N,)], and the viseme of each regression [shape=(E,)].
+
+    There is one regression for each viseme and each position of a state within its unit.
+    """
+    visemes = [VISEME_OF[structure.chains[chain].phones(unit)[0]] for unit in structure.units[chain]]
+    numbers = np.unique(visemes, return_inverse=True)[1]
+    family = np.repeat(np.arange(numbers.max() + 1), structure.states)
+    return (numbers[:, None] * structure.states + np.arange(structure.states)).ravel().astype(np.intp), family
+
+
+def _fitted_scaling(model: CoupledModel, data: Sequence[AlignedUtterance], values: Sequence[Array]) -> Array:
+    """Return the factors of variance scaling, from generated to recorded motion [shape=(Q,)].
+
+    values : recorded motion in the space [each shape=(T, Q)]
+    """
+    chains = model.chains
+
+    def generated_deviation(utterance: AlignedUtterance) -> Array:
+        speech = without_visual_streams(utterance.observations)
+        motion, _ = generate(*model.motion_statistics(chains.infer(speech, chains.full_lattice)))
+        return motion[utterance.observations.observed[1]].std(axis=0)
+
+    generated = list(_threaded(generated_deviation, data))
+    original = [x[utterance.observations.observed[1]].std(axis=0) for utterance, x in zip(data, values, strict=True)]
+    return scaling_factors(original, generated)
+
+
+def _threaded(function: Callable[[AlignedUtterance], ResultT], data: Sequence[AlignedUtterance]) -> Iterator[ResultT]:
+    """Yield the results in the order of the data."""
+    with ThreadPoolExecutor(workers()) as pool:
+        yield from pool.map(function, data)

@@ -1,0 +1,193 @@
+"""Training of the unit selection engine: the inventory, the guide, and the error on recordings that are left out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.engines.selection.concatenation import concatenated, pieces_of
+from lipmotion.engines.selection.config import SelectionConfig
+from lipmotion.engines.selection.costs import Costs
+from lipmotion.engines.selection.guide import Guide, at_points, fit_guide
+from lipmotion.engines.selection.inventory import RecordedUnits
+from lipmotion.engines.selection.model import SelectionModel
+from lipmotion.engines.selection.search import select
+from lipmotion.engines.selection.targets import target_of
+from lipmotion.engines.selection.windows import covering, phone_windows
+from lipmotion.errors import CorpusError
+from lipmotion.hmm.multistream.phone_recogniser import fit_phone_recogniser
+from lipmotion.motion.closure import OPENING
+from lipmotion.motion.fit import fit_motion
+from lipmotion.motion.motion_store import LIP_WIDTH_SHARE, MotionStore, compress, lip_tolerance
+from lipmotion.motion.predictors import PredictorTraining, predictor_class, suitable_predictor
+from lipmotion.motion.rest import away_from_speech, runs, speech_intervals
+from lipmotion.motion.space import MotionSpace
+from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
+from lipmotion.storage.checkpoint import Checkpoint
+from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Progress, sub_monitor
+from lipmotion.units import is_silent
+
+Array = NDArray[np.float64]
+CHANNEL_WEIGHTS = {"opening": 8.0, "width": 3.0}
+"""Weights of channels in comparisons of motion; that of any other dimension is 1."""
+LEFT_OUT_RECORDINGS = 24
+"""Recordings that are generated without their own units, to measure the error; spread evenly over all."""
+REST_AWAY_S = 0.3
+"""The rest pose is that of silence further than this from speech,"""
+LEAST_REST_FRAMES = 20
+"""or, where there are fewer frames of it, that of the frames with the smallest openings."""
+KEPT_SILENCE_S = 0.5
+"""Silence further than this from speech is not stored (§6: "to edit out this data but maintain synchronisation")."""
+_STAGE = "units"
+
+
+def fit_selection(
+    examples: Sequence[Example], config: SelectionConfig, monitor: Monitor, checkpoint: Checkpoint
+) -> tuple[SelectionModel, Array]:
+    """Return a model of the recorded units of some examples, and the standard deviation of its error [shape=(Q,)].
+
+    Raises CorpusError: no example has valid motion in speech, or the examples have different channels.
+    """
+    motion, values = fit_motion(examples, config.components)
+    if not config.articulation:
+        motion = replace(motion, prior=None)
+    recogniser = None
+    if config.joint_recogniser:
+        recogniser = fit_phone_recogniser(examples, values, sub_monitor(monitor, 0, 0.3), checkpoint)
+    guide = None
+    if config.guide:
+        kind = suitable_predictor(config.predictor, examples) or predictor_class("prior")
+        direct, of_guide = len(motion.space.direct), sub_monitor(monitor, 0.3, 0.9)
+        training = PredictorTraining(examples, values, direct, config.epochs, of_guide, checkpoint)
+        guide = fit_guide(kind.fit(training).predictor, examples, values)
+    monitor(Progress(_STAGE, 1, 3, 0.0))
+    inventory = inventory_of(examples, values, motion.space, guide)
+    monitor(Progress(_STAGE, 2, 3, 0.0))
+    recorded = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
+    scale = comparison_scale(recorded, motion.space)
+    rest, unknown = _rest_pose(examples, values, motion.space), np.ones((3, len(scale)))
+    model = SelectionModel(motion, inventory, scale, rest, unknown, guide, recogniser)
+    model = replace(model, variances=_error_variances(model, config, examples, values, recorded))
+    monitor(Progress(_STAGE, 3, 3, 0.0))
+    return model, np.sqrt(model.variances[0])
+
+
+def inventory_of(
+    examples: Sequence[Example], values: Sequence[Array], space: MotionSpace, guide: Guide | None
+) -> RecordedUnits:
+    """Return the inventory of some examples.
+
+    values : motion of each in the motion space [each shape=(T, Q)]
+    Raises CorpusError: the motion of no phone of speech was measured throughout.
+    """
+    timelines = [covering(e.speech.units, (len(e.valid) - 1) / FRAME_RATE_HZ) for e in examples]
+    windows = phone_windows(timelines)
+    first = np.concatenate([[0], np.cumsum([len(x) for x in values])]).astype(np.intp)
+    known = np.concatenate([example.valid for example in examples])
+    begin = first[windows.recording] + np.floor(windows.times_s[:, 0] * FRAME_RATE_HZ).astype(np.intp)
+    end = first[windows.recording] + np.ceil(windows.times_s[:, 1] * FRAME_RATE_HZ).astype(np.intp) + 1
+    missed = np.concatenate([[0], np.cumsum(~known)])
+    last = first[windows.recording + 1]
+    usable = (missed[np.minimum(end, last)] == missed[np.minimum(begin, last)]) & (begin < last)
+    spoken = ~np.array([is_silent(span.label.phone) for units in timelines for span in units], bool)
+    usable &= np.isin(windows.recording, windows.recording[spoken])  # of others, no motion is stored
+    if not (usable & spoken).any():
+        raise CorpusError(
+            f"no phone in {len(examples)} recordings has its motion measured throughout; record more speech"
+        )
+    predicted = None
+    if guide is not None:
+        predicted = np.concatenate(
+            [
+                at_points(guide.predict(example.speech)[0], windows.times_s[windows.recording == number])
+                for number, example in enumerate(examples)
+            ]
+        ).astype(np.float16)
+    names = tuple(example.name for example in examples)
+    return RecordedUnits(names, windows, usable, first, _stored(examples, values, first, space), predicted)
+
+
+def comparison_scale(recorded: Array, space: MotionSpace) -> Array:
+    """Return the factors of the dimensions in comparisons of motion [shape=(Q,)].
+
+    recorded : motion in the motion space [shape=(N, Q)]
+    A channel counts by its own deviation, a principal component by that of the first one.
+    """
+    deviations = np.maximum(recorded.std(axis=0), 1e-9)
+    direct = len(space.direct)
+    deviations[direct:] = deviations[direct:].max(initial=1e-9)
+    weights = np.ones(len(deviations))
+    weights[:direct] = [CHANNEL_WEIGHTS.get(name, 1.0) for name in space.direct_names]
+    return np.sqrt(weights) / deviations
+
+
+def _stored(
+    examples: Sequence[Example], values: Sequence[Array], first: NDArray[np.intp], space: MotionSpace
+) -> MotionStore:
+    """Return the motion, compressed; without the middle of long silences, and without what was not measured."""
+    ranges = []
+    for example, begin, x in zip(examples, first[:-1].tolist(), values, strict=True):
+        time_s = np.arange(len(x)) / FRAME_RATE_HZ
+        near = example.valid & ~away_from_speech(time_s, speech_intervals(example.speech.units), KEPT_SILENCE_S)
+        ranges += (runs(near) + begin).tolist()
+    everything = np.concatenate(values)
+    measured = np.concatenate([everything[start:stop] for start, stop in ranges])
+    spread = np.ptp(np.percentile(measured, [1, 99], axis=0), axis=0)
+    if "width" in space.direct_names:
+        spread[:] = lip_tolerance(measured, [space.channels[column] for column in space.direct]) / LIP_WIDTH_SHARE
+    return compress(everything, FRAME_RATE_HZ, np.maximum(LIP_WIDTH_SHARE * spread, 1e-6), kept=ranges)
+
+
+def _rest_pose(examples: Sequence[Example], values: Sequence[Array], space: MotionSpace) -> Array:
+    """Return the mean pose in silence away from speech, or that of the least open frames [shape=(Q,)]."""
+    resting = []
+    for example, x in zip(examples, values, strict=True):
+        time_s = np.arange(len(x)) / FRAME_RATE_HZ
+        resting.append(x[example.valid & away_from_speech(time_s, speech_intervals(example.speech.units), REST_AWAY_S)])
+    poses = np.concatenate(resting)
+    if len(poses) < LEAST_REST_FRAMES:
+        poses = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
+        if OPENING in space.direct_names:
+            opening = poses[:, space.direct_names.index(OPENING)]
+            poses = poses[opening <= np.percentile(opening, 10)]
+    return poses.mean(axis=0)
+
+
+def _error_variances(
+    model: SelectionModel,
+    config: SelectionConfig,
+    examples: Sequence[Example],
+    values: Sequence[Array],
+    recorded: Array,
+) -> Array:
+    """Return the variances of the error of static value, Δ and Δ², without a recording's own units [shape=(3, Q)].
+
+    recorded : all measured motion in the motion space [shape=(N, Q)]
+    """
+    costs = model.costs(config)
+    spread = with_dynamics(recorded).var(axis=0)
+    floor = 1e-4 * spread + 1e-12
+    if len(examples) < 2:
+        return np.maximum(spread, floor)
+    errors = []
+    for number in np.unique(np.linspace(0, len(examples) - 1, LEFT_OUT_RECORDINGS).astype(int)):
+        example = examples[number]
+        frames = dynamics_known(example.valid)
+        if frames.any():
+            generated = generated_motion(model, costs, example, model.inventory.windows.recording == number)
+            errors.append(with_dynamics(values[number] - generated)[frames])
+    variances: Array = np.square(np.concatenate(errors)).mean(axis=0) if errors else spread
+    return np.maximum(variances, floor)
+
+
+def generated_motion(model: SelectionModel, costs: Costs, example: Example, excluded: NDArray[np.bool_]) -> Array:
+    """Return motion of an example from other units than some [shape=(T, Q)].
+
+    excluded : the units that must not be used [shape=(U,)]
+    """
+    target = target_of(model, costs, example.speech)
+    chosen = select(costs, target, excluded)
+    return concatenated(model.inventory, target, pieces_of(costs, target, chosen.units), len(example.valid))

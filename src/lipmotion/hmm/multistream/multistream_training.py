@@ -1,0 +1,234 @@
+"""Training of all streams together: equal states, units without context, decision trees, units in context, mixtures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import CorpusError, InputError
+from lipmotion.hmm.multistream.align import measured_durations
+from lipmotion.hmm.multistream.densities import fit_scale, standard_normal_densities
+from lipmotion.hmm.multistream.forest import TreeCosts, context_questions, grow_forest, unit_forest
+from lipmotion.hmm.multistream.model import JointConfig, JointHmm, StreamModel
+from lipmotion.hmm.multistream.multistream_baum_welch import (
+    PreparedUtterances,
+    StatePosteriors,
+    StreamStatistics,
+    accumulate_statistics,
+    max_stay_probability,
+    prepare_utterances,
+    reestimated_hmm,
+    state_posteriors,
+)
+from lipmotion.hmm.multistream.streams import F0_STREAMS, MOTION, SPEECH, STREAMS, StreamObservations
+from lipmotion.hmm.multistream.unit_states import Inventory, triphone_states
+from lipmotion.stats.bigram import estimate_bigram
+from lipmotion.stats.em import run_em
+from lipmotion.stats.trees import Question
+from lipmotion.types import Monitor, Progress, silent_monitor, sub_monitor
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingUtterance:
+    """The observations of an utterance, and its units.
+
+    bounds : the first frame of each unit, and the frame count at the end [shape=(len(units) + 1,)], to start
+             from; None: a flat start, with states of equal length
+    Raises InputError: no units, or bounds that do not fit the units or the frames.
+    """
+
+    observed: StreamObservations
+    units: tuple[str, ...]
+    bounds: NDArray[np.intp] | None = None
+
+    def __post_init__(self) -> None:
+        if not self.units:
+            raise InputError("an utterance without units; give at least silence")
+        bounds, frames = self.bounds, self.observed.frames
+        if bounds is not None and (
+            len(bounds) != len(self.units) + 1 or bounds[0] != 0 or bounds[-1] != frames or (np.diff(bounds) < 0).any()
+        ):
+            raise InputError(
+                f"bounds {bounds.tolist()} of {len(self.units)} units; required one more than units, from 0 to {frames}"
+            )
+
+
+def train_joint(
+    utterances: Sequence[TrainingUtterance],
+    inventory: Inventory,
+    classes: Mapping[str, frozenset[str]],
+    config: JointConfig,
+    monitor: Monitor = silent_monitor,
+    validation: Sequence[TrainingUtterance] = (),
+) -> JointHmm:
+    """Return models of all streams, trained together.
+
+    classes    : sets of units, by name, that the trees ask about, besides single units
+    validation : mixtures of speech and motion are split as long as the likelihood of these utterances rises; without
+                 any, as often as the configuration allows
+    A stream of weight 0 in training does not affect the alignment, but its densities are learned.
+    Within each stage the likelihood never falls.
+    Raises CorpusError: no utterance, or none with as many frames as its units have states.
+    Raises InputError: an unknown unit, or no stream that is active in training.
+    Source: Hofer 2008, §4 and §6; tying by minimum description length as in ``stats.trees``.  Deviations: utterances
+    with ``bounds`` start from these, not flat; trees of acoustic streams ask about one neighbour
+    (``forest.positions_asked``).
+    """
+    if not utterances:
+        raise CorpusError("no utterances to train on; give at least one")
+    streams = [name for name in STREAMS if any(name in utterance.observed.streams for utterance in utterances)]
+    if config.states != inventory.states:
+        raise InputError(f"an inventory of {inventory.states} states a unit, the configuration says {config.states}")
+    if not set(streams) & set(config.training.active):
+        raise InputError(f"switched on are {', '.join(config.training.active)}; observed were {', '.join(streams)}")
+    hmm = _untrained(utterances, inventory, config, streams)
+    prepared = _prepared(hmm, utterances)
+    if not any(item.fits for item in prepared.items):
+        raise CorpusError(
+            f"none of {len(utterances)} utterances has room for the states of its units; "
+            "check that units and recordings belong together, or give units fewer states"
+        )
+    hmm = _initialised(hmm, prepared, [(utterance.units, utterance.bounds) for utterance in utterances])
+    splits = _doublings(config.mixtures), _doublings(config.motion_mixtures)
+    widths = [config.plain_iterations, 1, config.iterations, *(2 * config.iterations * count for count in splits), 1]
+    plain, trees, tied, *mixed, last = _part_monitors(monitor, widths)
+    hmm = _run_em(hmm, prepared, "units", config.plain_iterations, plain)
+    hmm = _tied(hmm, prepared, context_questions(inventory, classes), trees)
+    hmm = _run_em(hmm, prepared, "units in context", config.iterations, tied)
+    held_out = _prepared(hmm, validation)
+    for name, count, of_stream in zip((SPEECH, MOTION), splits, mixed, strict=True):
+        if name in hmm.models:
+            hmm = _with_mixtures(hmm, prepared, held_out, name, _part_monitors(of_stream, [1] * count))
+    hmm = replace(hmm, durations=measured_durations(hmm, [(u.observed, u.units) for u in utterances]))
+    last(Progress("lengths of states", 1, 1, 1.0))
+    return hmm
+
+
+def _doublings(most: int) -> int:
+    """Return how often 1 can be doubled before it exceeds ``most``."""
+    return most.bit_length() - 1
+
+
+def _part_monitors(monitor: Monitor, widths: Sequence[int]) -> list[Monitor]:
+    """Return a monitor for each part of the work; the widths are the relative amounts of work."""
+    edges = np.cumsum([0, *widths]) / max(sum(widths), 1)
+    return [sub_monitor(monitor, start, stop) for start, stop in pairwise(edges.tolist())]
+
+
+def _run_em(hmm: JointHmm, prepared: PreparedUtterances, stage: str, steps: int, monitor: Monitor) -> JointHmm:
+    """Return the models after some steps of embedded Baum–Welch."""
+
+    def report(step: int, _: JointHmm, statistics: StreamStatistics) -> None:
+        monitor(Progress(stage, step, steps, step / steps, statistics.mean_log_likelihood))
+
+    return run_em(hmm, lambda model: accumulate_statistics(model, prepared), reestimated_hmm, steps, report).model
+
+
+def _tied(hmm: JointHmm, prepared: PreparedUtterances, questions: tuple[Question, ...], monitor: Monitor) -> JointHmm:
+    """Return the models with their states in context tied by decision trees, one Gaussian a leaf."""
+    config, triphones = hmm.config, prepared.triphones
+    statistics = accumulate_statistics(hmm, prepared).triphones
+    costs = TreeCosts(config.tree_factor, config.least_frames, config.variance_floor)
+    models = {}
+    for step, (name, model) in enumerate(hmm.models.items(), start=1):
+        has_spaces = model.tied.voiced is not None
+        forest = grow_forest(
+            name, hmm.inventory, questions, triphones, statistics[name], has_spaces=has_spaces, costs=costs
+        )
+        of_leaves = statistics[name].pooled(forest.leaves(triphones), forest.size)
+        untrained = standard_normal_densities(forest.size, len(model.scale.mean), has_spaces)
+        models[name] = StreamModel(model.scale, forest, untrained.reestimated(of_leaves, config.variance_floor))
+        monitor(Progress("trees", step, len(hmm.models), step / len(hmm.models), float(forest.size)))
+    return replace(hmm, models=models)
+
+
+def _with_mixtures(
+    hmm: JointHmm, prepared: PreparedUtterances, held_out: PreparedUtterances, name: str, monitors: Sequence[Monitor]
+) -> JointHmm:
+    """Return the models with the Gaussians of a stream split, at most once for each monitor.
+
+    Splitting ends when the likelihood of the held-out utterances does not rise.
+    """
+    best = mean_log_likelihood(hmm, held_out)
+    for monitor in monitors:
+        model, statistics = hmm.models[name], accumulate_statistics(hmm, prepared).leaves[name]
+        if not model.tied.can_split(statistics):
+            break
+        tied = model.tied.split(statistics)
+        new = replace(hmm, models={**hmm.models, name: replace(model, tied=tied)})
+        stage = f"{tied.mixtures.size[1]} Gaussians for {name}"
+        new = _run_em(new, prepared, stage, hmm.config.iterations, monitor)
+        figure = mean_log_likelihood(new, held_out)
+        if held_out.items and not figure > best:
+            break
+        hmm, best = new, figure
+    return hmm
+
+
+def mean_log_likelihood(hmm: JointHmm, prepared: PreparedUtterances) -> float:
+    """Return the mean log likelihood per frame of utterances with as many frames as states; 0 where there are none."""
+    values = [(p.log_likelihood, prepared.items[p.utterance].frames) for p in state_posteriors(hmm, prepared)]
+    return sum(value for value, _ in values) / max(sum(frames for _, frames in values), 1)
+
+
+def _prepared(hmm: JointHmm, utterances: Sequence[TrainingUtterance]) -> PreparedUtterances:
+    return prepare_utterances(hmm, [(utterance.observed, utterance.units) for utterance in utterances])
+
+
+def _untrained(
+    utterances: Sequence[TrainingUtterance], inventory: Inventory, config: JointConfig, streams: Sequence[str]
+) -> JointHmm:
+    """Return models in which all units have equal densities."""
+    spoken = {unit for utterance in utterances for unit in utterance.units}
+    spoken_units = tuple(unit for unit in inventory.names if unit in spoken | {inventory.silence})
+    models = {}
+    for name in streams:
+        scale, known = fit_scale([u.observed.streams[name] for u in utterances if name in u.observed.streams])
+        forest = unit_forest(inventory, spoken_units)
+        tied = standard_normal_densities(forest.size, len(scale.mean), name in F0_STREAMS, known)
+        models[name] = StreamModel(scale, forest, tied)
+    sequences = [_without_pauses(utterance.units, inventory) for utterance in utterances]
+    log_stay = np.log(max_stay_probability(inventory))
+    durations = np.full((len(log_stay), 2), np.nan)
+    bigram = estimate_bigram(inventory.names, sequences)
+    return JointHmm(config, inventory, models, log_stay, durations, spoken_units, bigram)
+
+
+def _without_pauses(units: Sequence[str], inventory: Inventory) -> tuple[str, ...]:
+    return tuple(inventory.silence if unit in inventory.free else unit for unit in units)
+
+
+def _initialised(
+    hmm: JointHmm,
+    prepared: PreparedUtterances,
+    starts: Sequence[tuple[tuple[str, ...], NDArray[np.intp] | None]],
+) -> JointHmm:
+    """Return models estimated from states of equal length, inside the bounds of each unit where bounds are known."""
+
+    def posteriors() -> Iterator[StatePosteriors]:
+        for number, (item, (units, bounds)) in enumerate(zip(prepared.items, starts, strict=True)):
+            if item.fits:
+                path = _equal_path(triphone_states(hmm.inventory, units).positions, item.frames, bounds)
+                posterior = np.zeros((item.frames, len(item.monophones)))
+                posterior[np.arange(item.frames), path] = 1
+                yield StatePosteriors(number, posterior, np.maximum(posterior.sum(axis=0) - 1, 0), 0.0)
+
+    return reestimated_hmm(hmm, accumulate_statistics(hmm, prepared, posteriors()))
+
+
+def _equal_path(positions: NDArray[np.intp], frames: int, bounds: NDArray[np.intp] | None) -> NDArray[np.intp]:
+    """Return the state of every frame [shape=(T,)]: all states of a unit, or without bounds all, last equally long.
+
+    positions : [shape=(S,)], the unit that each state belongs to
+    """
+    if bounds is None:
+        return np.arange(frames) * len(positions) // frames
+    path = np.empty(frames, np.intp)
+    for position, (start, end) in enumerate(pairwise(bounds.tolist())):
+        states = np.flatnonzero(positions == position)
+        path[start:end] = states[np.arange(end - start) * len(states) // max(end - start, 1)]
+    return path

@@ -1,0 +1,72 @@
+"""What the file of a character may hold and cost: a hostile or mistaken file must not fill the memory.
+
+docs/meshes.md states the same table.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+from lipmotion.errors import InputError
+from lipmotion.storage.files import check_source
+
+ALLOWANCE = {
+    "bytes of files": 1 << 28,
+    "bytes of a document": 1 << 25,
+    "values in a document": 1_000_000,
+    "lines": 5_000_000,
+    "nodes": 10_000,
+    "joints": 100_000,
+    "parts": 2_000,
+    "vertices": 200_000,
+    "corners of textures": 1_000_000,
+    "triangles": 400_000,
+    "blendshapes": 1_000,
+    "morph targets": 20_000,
+    "displacements": 8_000_000,
+    "numbers": 80_000_000,
+    "compressed bytes": 3 << 24,
+    "bytes of pictures": 1 << 28,
+    "pixels of pictures": 1 << 27,
+}
+"""The most that one character may have, all of its files, nodes and parts together.
+
+joints        : of all skins, or their matrices
+parts         : primitives, counted again for every node that shows them
+morph targets : of all parts;  displacements : vertices that they, or expressions, move
+numbers       : of the arrays that are read;  compressed bytes : of them, what is decoded from meshopt
+"""
+MOST_VERTICES = ALLOWANCE["vertices"]
+
+
+class Budget:
+    """What the files of one character add up to so far."""
+
+    def __init__(self) -> None:
+        self._spent: Counter[str] = Counter()
+
+    def spend(self, what: str, count: int) -> None:
+        """Count something before it is made. Raises InputError: more of it than ``ALLOWANCE``."""
+        self._spent[what] += count
+        if self._spent[what] > ALLOWANCE[what]:
+            raise InputError(
+                f"{self._spent[what]} {what}, required at most {ALLOWANCE[what]}; reduce the mesh, or pictures"
+            )
+
+    def file_bytes(self, path: Path, kind: str) -> bytes:
+        """Return the content of a file, which counts.
+
+        kind : what it should be, for messages
+        Raises InputError: no such file, not a file, empty, too large, or not readable.
+        """
+        check_source(path, kind)
+        size = path.stat().st_size
+        try:
+            self.spend("bytes of files", size)
+            with path.open("rb") as file:
+                return file.read(size)
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from error
+        except OSError as error:
+            raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error

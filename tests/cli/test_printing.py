@@ -1,0 +1,206 @@
+"""Contents and names of files, and arguments, reach a terminal as printable text only."""
+
+from __future__ import annotations
+
+import json
+import logging
+import re
+import shutil
+import sys
+import warnings
+import zipfile
+from argparse import Namespace
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cli.conftest import RunCommand
+from lipmotion.cli.main import main
+from lipmotion.cli.terminal.events import Events
+from lipmotion.cli.terminal.printing import print_json, print_line, print_lines
+from lipmotion.cli.terminal.progress import reporting
+from lipmotion.cli.terminal.stop import Stopper
+from lipmotion.cli.verbs import info
+from lipmotion.corpora.store import Corpus
+from lipmotion.measures.evaluation_table import figures_table
+from lipmotion.pipeline.generate.explain import explanation_text
+from lipmotion.types import ChannelValue, Explanation, Item, Progress, Span, Unit
+
+EVIL = "q\x1b]52;c;aGk=\x07\x9b31m\r\nlipmotion: error: forged\n\x85\u202e\u2028\x7f"
+SHOWN = r"q\x1b]52;c;aGk=\x07\x9b31m\r\nlipmotion: error: forged\n\x85\u202e\u2028\x7f"
+OBEYED = re.compile(
+    "[\x00-\x09\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]|^lipmotion: error: forged", re.M
+)
+
+
+@pytest.fixture
+def poisoned(here: Path, toy_corpus: Corpus, toy_model_file: Path, toy_speech: Path) -> Path:
+    """Inputs of every kind, with control characters in contents and names, in the current folder."""
+    shutil.copy(toy_speech, here / f"{EVIL}.wav")
+    shutil.copy(toy_speech, here / "a.wav")
+    shutil.copy(toy_model_file, here / EVIL)
+    with zipfile.ZipFile(toy_model_file) as old, zipfile.ZipFile(here / "m.lipmotion", "w") as new:
+        for name in old.namelist():
+            content = old.read(name)
+            if name == "header.json":
+                told = {"name": EVIL, "corpus": [EVIL], "licence": EVIL, "adapted": {EVIL: EVIL}, EVIL: 1}
+                content = json.dumps(json.loads(content) | told).encode()
+            new.writestr(name, content)
+    with zipfile.ZipFile(here / "other.lipmotion", "w") as new:
+        new.writestr("header.json", json.dumps({"format": "lipmotion.model", "version": EVIL}))
+    shutil.copytree(toy_corpus.path, here / "c")
+    for path in (here / "c").rglob("*.json"):
+        path.write_text(json.dumps(_changed(json.loads(path.read_text()))))
+    damaged = here / "damaged"
+    damaged.mkdir()
+    (damaged / "corpus.json").write_text(json.dumps({"format": EVIL, "version": 2, "utterances": {}}))
+    (here / "words.txt").write_text(f"papa {EVIL}")
+    (here / "lexicon.txt").write_text(f"papa P {EVIL.replace(chr(10), '')}\n")
+    (here / "r").mkdir()
+    (here / "r" / f"{EVIL}.mp4").write_text("no video")
+    return here
+
+
+def _changed(document: dict[str, Any]) -> dict[str, Any]:
+    """Return a manifest, or the description of an utterance, with control characters in its values."""
+    for entry in document.get("utterances", {}).values():
+        entry["speaker"] = EVIL
+    if "channels" in document:
+        document["speaker"] = EVIL
+        document["channels"][-1]["name"] = EVIL
+        document["source"] |= {"collection": EVIL, "attribution": EVIL}
+    return document
+
+
+@contextmanager
+def logged() -> Iterator[None]:
+    """Write warnings to standard error, from where pytest would take them."""
+    root = logging.getLogger()
+    handlers, root.handlers = root.handlers, []
+    yield
+    root.handlers = handlers
+
+
+LINES = """
+info m.lipmotion
+info EVIL
+info other.lipmotion
+info EVIL.wav
+info none-EVIL
+info m.lipmotion EVIL
+EVIL
+animate EVIL.wav --model m.lipmotion --recogniser own -o EVIL.json
+animate a.wav --model EVIL-none -o a.json
+animate a.wav --model m.lipmotion -o none-EVIL/a.json
+animate EVIL.wav --model m.lipmotion -o EVIL.wav
+animate a.wav --model m.lipmotion -o a.json --channels EVIL
+animate a.wav --model m.lipmotion -o a.json --recogniser EVIL
+animate a.wav --model m.lipmotion -o a.json --transcript words.txt
+animate a.wav --model m.lipmotion -o a.json --lexicon lexicon.txt
+animate a.wav --model m.lipmotion -o a.json --units none-EVIL.json
+animate a.wav --model m.lipmotion -o a.json --rate EVIL
+animate a.wav --model m.lipmotion -o a.json --posteriors EVIL
+explain m.lipmotion EVIL.mp4 --at 0
+cues EVIL.wav --model m.lipmotion --recogniser own -f xml
+cues EVIL.wav --model m.lipmotion --recogniser own -f json
+cues a.wav --model m.lipmotion --shapes EVIL
+cues EVIL.mp4 --model m.lipmotion --machine-readable
+corpus info c
+corpus info damaged
+corpus sync c
+corpus prompts --text none-EVIL
+corpus prompts --text words.txt --lexicon lexicon.txt
+corpus prepare r -o new
+corpus prepare r -o new --machine-readable
+train c -o m --speaker EVIL-none
+train c -o m --set EVIL
+train c -o m --engine EVIL
+train c -o c/EVIL
+train c -o m --speaker EVIL-none --machine-readable
+adapt EVIL.wav -o EVIL.wav
+evaluate m.lipmotion c --split EVIL
+experiment learning-curve c --sizes EVIL
+experiment table3 c --systems EVIL
+""".strip().splitlines()
+NOT_SHOWN = {
+    "corpus sync c",
+    "cues EVIL.wav --model m.lipmotion --recogniser own -f xml",
+    "animate a.wav --model m.lipmotion -o a.json --transcript words.txt",
+}
+"""Commands that print the name in another form, or not at all."""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="names that Windows does not allow")
+@pytest.mark.usefixtures("poisoned")
+def test_what_is_obeyed_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
+    for line in LINES:
+        with logged():
+            main([word.replace("EVIL", EVIL) for word in line.split()])
+        out, err = capsys.readouterr()
+        assert OBEYED.search(out + err) is None, (line, out, err)
+        shown = (out + err).replace("\\u001b", "\\x1b").replace("\\\\", "\\")
+        assert SHOWN[:8] in shown or line in NOT_SHOWN, line
+
+
+def test_warnings(run: RunCommand, monkeypatch: pytest.MonkeyPatch) -> None:
+    def warn(_: Namespace) -> None:
+        logging.getLogger("lipmotion").warning("%s is odd", EVIL)
+        logging.getLogger("another.package").error(EVIL)
+        with warnings.catch_warnings():
+            warnings.simplefilter("always")
+            warnings.warn(EVIL, stacklevel=1)
+
+    monkeypatch.setattr(info, "run", warn)
+    head = "lipmotion: warning: "
+    with logged():
+        done = run("info")
+    assert done == (0, [], [f"{head}{SHOWN} is odd", head + SHOWN, head + SHOWN])
+
+
+@pytest.mark.parametrize("watched", [False, True])
+def test_progress(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, watched: bool) -> None:
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: watched, raising=False)
+    with reporting(Namespace(machine_readable=False, stopper=Stopper(), events=Events())) as report:
+        report.receive(Progress(EVIL, 0, 2, 0.0))
+        report.receive(Item(EVIL, "skipped", EVIL))
+        report.warn(EVIL)
+        report.receive(Progress(EVIL, 1, 2, 0.5))
+        report.finish(f"two\nlines{EVIL[:9]}")
+    out, err = capsys.readouterr()
+    assert out == "two\nlines" + SHOWN[:12] + "\n"
+    assert err.count(SHOWN) >= (5 if watched else 3)
+    assert not any(part in err for part in ("\x1b]", "\x07", "\x9b", "\u202e", "\nlipmotion: error: forged"))
+
+
+def test_tables_have_a_line_a_row() -> None:
+    """A value with an end of line in it does not begin a row of its own."""
+    row = dict.fromkeys(("acc", "acc_per_clip", "nrmse", "global_variance", "jerk"), 0.5)
+    condition = {"channels": {EVIL: row}, "acc": 0.5, "amse": 0.5, "leading": EVIL, "lag_ms": 1.0}
+    figures = {
+        "closed_under": None,
+        "still_channels": [EVIL],
+        "split": EVIL,
+        "clips": 1,
+        "conditions": {EVIL: condition},
+    }
+    assert figures_table(figures).count(SHOWN) == 5
+    assert OBEYED.search(figures_table(figures)) is None
+    span = Span(0.0, 1.0, Unit(EVIL, EVIL, EVIL))
+    explained = Explanation(0.0, 0, span, EVIL, {EVIL: ChannelValue(0.0, 1.0)})
+    assert OBEYED.search(explanation_text(explained)) is None
+
+
+def test_what_is_laid_out_stays_so(capsys: pytest.CaptureFixture[str]) -> None:
+    print_lines("one\ttwo\n\n  three é 語 👩‍👧\n")
+    print_line("tab\tand\nend")
+    print_json({"name": EVIL, "n": np.float64(1.5).item()})
+    out, _ = capsys.readouterr()
+    *lines, document = out.splitlines()
+    assert lines == ["one\ttwo", "", "  three é 語 👩‍👧", "", "tab\\tand\\nend"]
+    assert json.loads(document) == {"name": EVIL, "n": 1.5}
+    assert document.isascii()
+    assert document.isprintable()

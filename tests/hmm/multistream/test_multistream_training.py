@@ -1,0 +1,178 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hmm.multistream.synthetic import CLASSES, config, inventory, random_joint, say, utterances
+from hmm.multistream.synthetic import observed as noise
+from lipmotion.errors import CorpusError, InputError
+from lipmotion.hmm.multistream import densities
+from lipmotion.hmm.multistream.align import align
+from lipmotion.hmm.multistream.model import MOTION_ONLY
+from lipmotion.hmm.multistream.multistream_baum_welch import (
+    accumulate_statistics,
+    prepare_utterances,
+    reestimated_hmm,
+    state_posteriors,
+)
+from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, mean_log_likelihood, train_joint
+from lipmotion.hmm.multistream.recognise import JointRecogniser
+from lipmotion.hmm.multistream.streams import STREAMS, StreamObservations, StreamWeights
+from lipmotion.types import Progress
+from oracles import chains
+from oracles import joint as slow
+
+TRAIN, HELD_OUT = utterances(30), utterances(8, seed=1)
+
+
+def trained(data=TRAIN, validation=(), classes=CLASSES, known=None, **changes):
+    events: list[Progress] = []
+    hmm = train_joint(data, known or inventory(), classes, config(**changes), events.append, validation)
+    return hmm, events
+
+
+@pytest.fixture(scope="module")
+def usual():
+    return trained()
+
+
+def stages(events):
+    found: dict[str, list[float]] = {}
+    for event in events:
+        if event.stage not in ("trees", "lengths of states"):
+            found.setdefault(event.stage, []).append(event.figure)
+    return found
+
+
+@pytest.mark.parametrize(
+    "weights",
+    [StreamWeights(), MOTION_ONLY, pytest.param(StreamWeights(0.3, 0.5, 0, 0.1, 2), marks=pytest.mark.long)],
+)
+def test_the_likelihood_never_falls_within_a_stage(weights):
+    data = TRAIN[:10] if weights is MOTION_ONLY else [replace(utterance, bounds=None) for utterance in TRAIN[:10]]
+    _, events = trained(data, training=weights, mixtures=4, motion_mixtures=2, plain_iterations=8, iterations=6)
+    found = stages(events)
+    assert len(found) >= 4
+    for figures in found.values():
+        assert (np.diff(figures) > -2e-4).all(), figures
+
+
+def test_posteriors_are_those_of_all_paths():
+    for components in (1, 2):
+        hmm = random_joint(1, states=2, components=components, training=StreamWeights(0.7, 1.2, 0.4, 1, 0.9))
+        draw = np.random.default_rng(0)
+        observed = StreamObservations({name: s for name, s in noise(draw, 7).streams.items() if name != "f0_slope"})
+        units = ("a", "sp", "b")
+        prepared = prepare_utterances(hmm, [(observed, units)])
+        (found,) = state_posteriors(hmm, prepared)
+        triphones = [prepared.triphones[i] for i in prepared.items[0].triphones]
+        density = [
+            [slow.log_density(hmm, observed, state, t, hmm.config.training) for state in triphones] for t in range(7)
+        ]
+        rows = prepared.items[0].monophones
+        expected, stay, log_likelihood = chains.chain_posteriors(
+            np.array(density), hmm.log_stay[rows], hmm.log_move[rows]
+        )
+        assert found.states == pytest.approx(expected, abs=1e-4)
+        assert found.states.sum(axis=1) == pytest.approx(np.ones(7), abs=1e-9)
+        assert found.stay == pytest.approx(stay, abs=1e-4)
+        assert found.log_likelihood == pytest.approx(log_likelihood, abs=1e-3)
+
+
+def test_a_stream_without_weight_is_as_good_as_absent():
+    off = StreamWeights(motion=0, f0=0)
+    hmm, events = trained(TRAIN[:12], training=off)
+    without = [
+        replace(
+            u, observed=StreamObservations({n: s for n, s in u.observed.streams.items() if n not in ("motion", "f0")})
+        )
+        for u in TRAIN[:12]
+    ]
+    alone, same = trained(without, training=off)
+    assert [e.figure for e in events if e.stage in stages(same)] == pytest.approx(
+        [e.figure for e in same if e.stage in stages(same)], abs=1e-9
+    )
+    assert np.array_equal(hmm.models["speech"].tied.mixtures.means, alone.models["speech"].tied.mixtures.means)
+    assert "motion" in hmm.models
+    assert "motion" not in alone.models
+
+
+def test_a_step_improves_on_what_was_found():
+    hmm = random_joint(2, units=("a", "b", "c", "d"), components=1)
+    data = [(noise(np.random.default_rng(i), 40), ("sil", "a", "c", "sil")) for i in range(4)]
+    prepared, figures = prepare_utterances(hmm, data), []
+    for _ in range(4):
+        expected = accumulate_statistics(hmm, prepared)
+        figures.append(expected.mean_log_likelihood)
+        hmm = reestimated_hmm(hmm, expected)
+    assert (np.diff(figures) > 0).all()
+
+
+def test_what_was_learned_is_recognised(usual):
+    hmm, _ = usual
+    recogniser = JointRecogniser(hmm)
+    right = [tuple(s.unit for s in recogniser.recognise(u.observed)) == u.units for u in HELD_OUT]
+    assert np.mean(right) >= 0.75
+
+
+def test_a_flat_start_finds_the_units():
+    hmm, _ = trained([replace(utterance, bounds=None) for utterance in TRAIN])
+    for utterance in HELD_OUT:
+        found = align(hmm, utterance.observed, utterance.units).bounds(len(utterance.units))
+        assert np.abs(found - utterance.bounds).max() <= 4
+
+
+def test_splitting_stops_where_held_out_utterances_are_no_better(monkeypatch):
+    few, events = trained(mixtures=64)
+    assert few.models["speech"].tied.mixtures.size[1] < 64  # Gaussians without enough data are not split
+    assert len(stages(events)) < 5 + np.log2(64)
+    monkeypatch.setattr(densities, "SPLIT_FRAMES", 3.0)
+    hmm, events = trained(validation=HELD_OUT, mixtures=64)
+    free, _ = trained(mixtures=64)
+    assert hmm.models["speech"].tied.mixtures.size[1] < free.models["speech"].tied.mixtures.size[1]
+    best = mean_log_likelihood(hmm, of_model(hmm, HELD_OUT))
+    assert best > mean_log_likelihood(free, of_model(free, HELD_OUT))
+    plain, _ = trained(mixtures=1)
+    assert best >= mean_log_likelihood(plain, of_model(plain, HELD_OUT))
+    assert any("Gaussians for speech" in stage for stage in stages(events))
+
+
+def of_model(hmm, data):
+    return prepare_utterances(hmm, [(utterance.observed, utterance.units) for utterance in data])
+
+
+def test_streams_and_units_that_are_missing_here_and_there():
+    draw = np.random.default_rng(7)
+    deaf = replace(TRAIN[0], observed=StreamObservations({"speech": TRAIN[0].observed.streams["speech"]}))
+    pause = say(draw, ["a", "b"])
+    hmm, _ = trained([deaf, pause, *TRAIN[1:8]])
+    assert set(hmm.models) == set(STREAMS)
+    assert hmm.spoken == ("sil", "a", "b", "c", "d")
+    path = align(hmm, HELD_OUT[0].observed, ("sil", "x", "sil"))  # not in the training
+    assert len(path.frames) == HELD_OUT[0].observed.frames
+    assert np.isfinite(hmm.durations).all()
+
+
+def test_nothing_that_is_switched_on_was_observed():
+    deaf = [replace(u, observed=StreamObservations({"speech": u.observed.streams["speech"]})) for u in TRAIN[:3]]
+    with pytest.raises(InputError, match="switched on are motion"):
+        trained(deaf, training=MOTION_ONLY)
+    hmm, _ = trained([*TRAIN[:6], deaf[0]], training=MOTION_ONLY)  # utterances without motion change nothing
+    assert np.isfinite(hmm.durations).all()
+
+
+def test_too_short_for_its_units():
+    observed = noise(np.random.default_rng(0), 5)
+    with pytest.raises(CorpusError, match="room for the states"):
+        trained([TrainingUtterance(observed, ("sil", "a", "sil"))])
+    with pytest.raises(CorpusError, match="no utterances"):
+        trained([])
+
+
+def test_bounds_are_those_of_the_units_and_a_configuration_is_in_its_range():
+    for bounds in ([0, 3], [0, 3, 4], [1, 3, 5], [0, 4, 3, 5]):
+        with pytest.raises(InputError, match="bounds"):
+            TrainingUtterance(noise(np.random.default_rng(0), 5), ("a", "b"), np.array(bounds))
+    for changes in ({"mixtures": 0}, {"insertion": float("nan")}, {"training": StreamWeights(0, 0, 0, 0, 0)}):
+        with pytest.raises(InputError):
+            config(**changes)

@@ -1,0 +1,179 @@
+"""Single steps of training: the E-step against enumeration, and the models of the M-step."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hmm.synthetic import known_hmm, random_hmm, recordings, speaker
+from lipmotion.hmm import baum_welch as module
+from lipmotion.hmm import unit_training
+from lipmotion.hmm.align import state_sequence
+from lipmotion.hmm.baum_welch import accumulate_statistics, adapt_contexts, baum_welch
+from lipmotion.hmm.log_likelihoods import log_likelihoods_of
+from lipmotion.hmm.model import HmmConfig
+from oracles import chains
+
+
+def step(hmm, data, said):
+    """Return the models after one step of Baum–Welch, and the mean log likelihood per frame before it."""
+    result = baum_welch(hmm, data, said)
+    return result.model, result.log_likelihoods[0]
+
+
+def disturbed(seed: int, spread: float):
+    """Return a speaker's data, models with disturbed parameters, and the units of every utterance."""
+    who, draw = speaker(seed, spread), np.random.default_rng(seed)
+    transcribed, said, _ = recordings(seed, 15, who, pauses=True)
+    hmm = known_hmm(who)
+    means = hmm.mixtures.means + draw.normal(0, 1.5, hmm.mixtures.means.shape)
+    mixtures = replace(hmm.mixtures, means=means.astype(np.float32), variances=np.full(means.shape, 4.0, np.float32))
+    return replace(hmm, mixtures=mixtures), [utterance.features for utterance in transcribed], said
+
+
+def test_no_iteration_lowers_the_likelihood():
+    """The tolerance, per frame, is for single precision and for posteriors that are left out."""
+    for seed, spread in ((0, 0.4), (1, 2.0)):
+        hmm, data, said = disturbed(seed, spread)
+        for _ in range(3):  # 1, 2 and 4 Gaussians
+            figures = []
+            for _ in range(5):
+                hmm, log_likelihood = step(hmm, data, said)
+                figures.append(log_likelihood)
+            assert all(after > before - 1e-5 for before, after in pairwise(figures))
+            assert figures[-1] > figures[0] + 0.01
+            assert np.isfinite(hmm.mixtures.log_weights).all()  # none was switched off: these were true steps of EM
+            hmm = replace(hmm, mixtures=hmm.mixtures.split())
+
+
+def test_a_high_variance_floor_does_not_break_the_rise():
+    hmm, data, said = disturbed(4, 0.4)
+    hmm = replace(hmm, config=replace(hmm.config, variance_floor=0.15))
+    floor = 0.15 * np.concatenate(data).var(axis=0)
+    hmm = replace(hmm, mixtures=replace(hmm.mixtures, variances=np.maximum(hmm.mixtures.variances, floor)))
+    figures = []
+    for _ in range(8):
+        hmm, log_likelihood = step(hmm, data, said)
+        figures.append(log_likelihood)
+    assert all(after > before - 1e-5 for before, after in pairwise(figures))
+    assert (hmm.mixtures.variances[:, 0] >= floor * 0.999).all()
+    assert (hmm.mixtures.variances[:, 0] < floor * 1.001).any()
+
+
+def test_the_e_step_agrees_with_the_enumeration_of_all_paths(monkeypatch):
+    monkeypatch.setattr(module, "LEAST_POSTERIOR", 0.0)
+    monkeypatch.setattr(module, "CELLS", 100)
+    hmm, draw = random_hmm(1, contexts=6), np.random.default_rng(1)
+    said = [("a",), ("sil", "b"), ("a", "sp"), ("b", "a")]
+    data = [draw.normal(0, 1.5, (frames, 2)).astype(np.float32) for frames in (7, 8, 5, 7)]
+    occupied, stays, total = np.zeros(len(hmm.table.names)), np.zeros(len(hmm.log_stay)), 0.0
+    visits = stays.copy()
+    for x, units in zip(data, said, strict=True):
+        chain = state_sequence(hmm, units)
+        stay = hmm.log_stay[chain.plain].astype(float)
+        emission = hmm.mixtures.log_likelihood(x)[:, chain.densities].astype(float)
+        posterior, stay, log_likelihood = chains.chain_posteriors(emission, stay, np.log(-np.expm1(stay)))
+        np.add.at(occupied, chain.densities, posterior.sum(axis=0))
+        np.add.at(visits, chain.plain, posterior.sum(axis=0))
+        np.add.at(stays, chain.plain, stay)
+        total += log_likelihood
+    statistics = accumulate_statistics(hmm, data, said)
+    found = np.zeros_like(occupied)
+    for density, _, share in statistics.by_density():
+        found[density] = share.sum()
+    assert found == pytest.approx(occupied, abs=1e-4)
+    assert statistics.mean_log_likelihood == pytest.approx(total / sum(map(len, data)), abs=1e-4)
+    keep = np.exp(statistics.log_stay()[visits > 0])
+    assert keep == pytest.approx(np.clip(stays[visits > 0] / visits[visits > 0], 0.05, 11 / 12), abs=1e-4)
+
+
+def test_the_size_of_batches_and_the_order_of_utterances_change_nothing(monkeypatch):
+    hmm, data, said = disturbed(6, 1.0)
+    before = hmm.mixtures.means.copy()
+    better, log_likelihood = step(hmm, data, said)
+    assert np.array_equal(hmm.mixtures.means, before)  # the old models stay as they were
+    for cells in (1, 5_000):
+        monkeypatch.setattr(module, "CELLS", cells)
+        same, figure = step(hmm, data, said)
+        assert figure == pytest.approx(log_likelihood, abs=1e-9)
+        assert np.array_equal(same.mixtures.means, better.mixtures.means)
+    same, figure = step(hmm, data[::-1], said[::-1])
+    assert figure == pytest.approx(log_likelihood, abs=1e-9)
+    assert same.mixtures.means == pytest.approx(better.mixtures.means, abs=1e-4)
+
+
+@given(sizes=st.lists(st.tuples(st.integers(1, 300), st.integers(1, 60)), min_size=1, max_size=20))
+def test_long_utterances_do_not_fill_the_memory(sizes):
+    frames, states = zip(*sizes, strict=True)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "CELLS", 20_000)
+        batches = list(module.batches(frames, states))
+    assert sorted(i for batch in batches for i in batch) == list(range(len(sizes)))
+    for batch in batches:
+        padded = len(batch) * max(frames[i] for i in batch) * max(states[i] for i in batch)
+        assert len(batch) == 1 or padded <= 20_000
+
+
+def test_an_utterance_too_short_for_its_units_counts_for_nothing():
+    hmm, data, said = disturbed(8, 1.0)
+    floor = replace(hmm, config=replace(hmm.config, variance_floor=1e-9))  # the floor depends on all data
+    better, log_likelihood = step(floor, data, said)
+    same, figure = step(floor, [*data, data[0][:10]], [*said, said[0]])
+    assert figure == pytest.approx(log_likelihood, abs=1e-9)
+    assert same.mixtures.means == pytest.approx(better.mixtures.means, abs=1e-5)
+    assert same.log_stay == pytest.approx(better.log_stay, abs=1e-6)
+
+
+def test_no_state_may_last_longer_than_its_limit():
+    """Otherwise the closure of a stop absorbs the silence before it."""
+    who = speaker(1)
+    data = [np.repeat(who.say(np.random.default_rng(n), ("sil", "a", "sil"))[0], 12, axis=0) for n in range(3)]
+    hmm = known_hmm(who)
+    better, _ = step(hmm, data, [("sil", "a", "sil")] * 3)
+    lasting = {name: 1 / -np.expm1(float(stay)) for name, stay in zip(hmm.table.names, better.log_stay, strict=True)}
+    assert [lasting[f"a.{state}"] for state in range(3)] == pytest.approx([module.LONGEST_STATE_FRAMES] * 3, rel=1e-4)
+    assert module.LONGEST_STATE_FRAMES < lasting["sil.0"] < module.LONGEST_SILENCE_FRAMES
+
+
+def coarticulated(count: int):
+    """Return models, utterances in which the start of ``a`` depends on the unit before it, and their units."""
+    who = speaker(1)
+    transcribed, said, _ = recordings(1, count, who)
+    data = []
+    for utterance, units in zip(transcribed, said, strict=True):
+        x = utterance.features.copy()
+        path = state_sequence(known_hmm(who), units)
+        first = {position for position, unit in enumerate(units) if unit == "a" and units[position - 1] == "d"}
+        nearest = unit_training.state_path(known_hmm(who), log_likelihoods_of(known_hmm(who), x), units)[1]
+        for position in first:
+            x[(path.positions[nearest] == position) & (nearest % 3 == 0)] += [0, 0, 1.5, 0]
+        data.append(x)
+    return known_hmm(who), data, said
+
+
+def in_context(hmm, data, said):
+    """Return the models with states in context, and the likelihood before every step of adapting them."""
+    hmm = unit_training._with_contexts(hmm, unit_training._frequent_contexts(hmm, data, said))
+    result = adapt_contexts(hmm, data, said, hmm.config.iterations)
+    return result.model, result.log_likelihoods
+
+
+def test_contexts_get_densities_where_there_are_frames_enough():
+    hmm, data, said = coarticulated(30)
+    hmm = replace(hmm, config=HmmConfig(mixtures=1, context_frames=40, relevance=5.0))
+    better, log = in_context(hmm, data, said)
+    plain = len(hmm.table.names)
+    assert better.table.names[:plain] == hmm.table.names
+    assert np.array_equal(better.mixtures.means[:plain], hmm.mixtures.means)  # those without context are kept
+    assert "a.0<d" in better.table.names
+    shift = better.mixtures.means[better.table.density("a", 0, "d")] - hmm.mixtures.means[hmm.table.density("a", 0)]
+    assert shift[0] == pytest.approx([0, 0, 1.5, 0], abs=0.35)
+    assert log[-1] > log[0]
+    fewer = in_context(replace(hmm, config=replace(hmm.config, context_frames=150)), data, said)[0]
+    assert set(fewer.table.names) < set(better.table.names)
+    none = in_context(replace(hmm, config=replace(hmm.config, context_frames=10**6)), data, said)[0]
+    assert none.table == hmm.table
+    assert np.array_equal(none.mixtures.means, hmm.mixtures.means)

@@ -1,0 +1,157 @@
+"""The whole training, on utterances of a speaker whose units are known."""
+
+from itertools import groupby, pairwise
+
+import numpy as np
+import pytest
+
+from hmm.synthetic import INVENTORY, PAUSE, SILENCE, UNITS, recordings, sentences, speaker
+from lipmotion.errors import CorpusError
+from lipmotion.hmm import unit_training
+from lipmotion.hmm.align import align_units, choose_pronunciations
+from lipmotion.hmm.baum_welch import LONGEST_SILENCE_FRAMES, LONGEST_STATE_FRAMES
+from lipmotion.hmm.decode import decode_units, unit_loop
+from lipmotion.hmm.log_likelihoods import log_likelihoods_of
+from lipmotion.hmm.model import HmmConfig
+from lipmotion.hmm.unit_training import TranscribedUtterance, train_hmm
+from lipmotion.stats.bigram import estimate_bigram
+from lipmotion.types.progress import silent_monitor
+
+CONFIG = HmmConfig(mixtures=2, context_frames=20)
+
+
+@pytest.fixture(scope="module")
+def trained():
+    """Models, the speaker, the utterances, their units, the first frames of these, and the log."""
+    log: list[tuple[str, float]] = []
+    who = speaker(0)
+    corpus = recordings(0, 30, who, pauses=True)
+    hmm = train_hmm(corpus[0], INVENTORY, CONFIG, lambda e: log.append((e.stage, e.figure)))
+    return hmm, who, *corpus, log
+
+
+def test_no_iteration_of_any_stage_lowers_the_likelihood(trained):
+    *_, log = trained
+    stages = {stage: [value for _, value in steps] for stage, steps in groupby(log, key=lambda step: step[0])}
+    stages = {stage: [value for value in values if value is not None] for stage, values in stages.items()}
+    first, *others = ["flat start", "pronunciations", "2 Gaussians", "pronunciations again", "contexts"]
+    assert list(stages) == [first, *others[:-1], "states in context", others[-1]]
+    for stage, values in stages.items():
+        assert all(after >= before - 1e-5 for before, after in pairwise(values)), stage
+
+
+def test_boundaries_are_found_within_two_frames(trained):
+    hmm, _, transcribed, said, edges, _ = trained
+    errors = [
+        align_units(hmm, log_likelihoods_of(hmm, utterance.features), units) - where
+        for utterance, units, where in zip(transcribed, said, edges, strict=True)
+    ]
+    assert np.abs(np.concatenate(errors)).max() <= 2
+    assert np.abs(np.concatenate(errors)).mean() < 0.1
+
+
+def test_pauses_are_found_where_they_were_made(trained):
+    hmm, _, transcribed, said, _, _ = trained
+    for utterance, units in zip(transcribed, said, strict=True):
+        chosen = choose_pronunciations(hmm, log_likelihoods_of(hmm, utterance.features), utterance.words, PAUSE)
+        assert tuple(unit for part in chosen for unit in part.units) == units
+
+
+def test_pauses_are_found_at_the_first_choice_already(monkeypatch):
+    """A pause has the density of silence before any is chosen; otherwise a unit beside it learns both sounds."""
+    chosen = []
+
+    def choose(*arguments):
+        chosen.append(choose_pronunciations(*arguments))
+        return chosen[-1]
+
+    monkeypatch.setattr(unit_training, "choose_pronunciations", choose)
+    transcribed, said, _ = recordings(0, 20, speaker(0, spread=0.8), pauses=True)
+    unit_training.train_hmm(transcribed, INVENTORY, CONFIG, silent_monitor)
+    assert [tuple(unit for part in parts for unit in part.units) for parts in chosen[:20]] == said
+
+
+def test_new_sentences_are_recognised(trained):
+    hmm, who, _, said, *_ = trained
+    seen = {pair for units in said for pair in pairwise(units)}
+    for number, words in enumerate(sentences(99, 15)):
+        units = (SILENCE, *(unit for word in words for unit in word), SILENCE)
+        features, edges = who.say(np.random.default_rng([99, number]), units)
+        found, bounds = decode_units(unit_loop(hmm, (SILENCE, *UNITS)), log_likelihoods_of(hmm, features))
+        assert found == units, f"{set(pairwise(units)) - seen} were never seen in training"
+        assert bounds == pytest.approx(edges, abs=2)
+
+
+def test_the_pronunciation_said_is_learned():
+    """Half of the time a word is not pronounced as the first variant of the lexicon."""
+    who, draw = speaker(5), np.random.default_rng(5)
+    variants = (("a", "b"), ("c", "b"))
+    transcribed, said = [], []
+    for number, words in enumerate(sentences(5, 30)):
+        units = [SILENCE, *variants[number % 2], *(unit for word in words for unit in word), SILENCE]
+        features, _ = who.say(draw, units)
+        transcribed.append(TranscribedUtterance(features, (variants, *((word,) for word in words))))
+        said.append(tuple(units))
+    hmm = train_hmm(transcribed, INVENTORY, CONFIG, silent_monitor)
+    for utterance, units in zip(transcribed, said, strict=True):
+        chosen = choose_pronunciations(hmm, log_likelihoods_of(hmm, utterance.features), utterance.words, PAUSE)
+        assert tuple(unit for part in chosen for unit in part.units) == units
+
+
+def test_clicks_in_the_silence_behind_the_last_word_do_not_become_part_of_it():
+    """One word always comes last: only its sound distinguishes it from the silence that always follows it."""
+    who, draw = speaker(6), np.random.default_rng(6)
+    transcribed, said, edges = [], [], []
+    for number, sentence in enumerate(sentences(6, 30, words=3)):
+        last = ("b", "c") if number % 2 else ("e",)
+        words = [tuple("a" if unit == "e" else unit for unit in word) for word in sentence]
+        units = (SILENCE, *(unit for word in words for unit in word), *last, SILENCE)
+        features, where = who.say(draw, units)
+        room = np.repeat(who.means[SILENCE][:1], 60, axis=0) + draw.normal(0, who.spread, (60, 4))
+        for click in draw.integers(5, 55, size=3):
+            room[click : click + 2] = draw.normal([3.0, 0, 0, 0], 2, (2, 4))
+        transcribed.append(
+            TranscribedUtterance(np.r_[features, room].astype(np.float32), tuple((w,) for w in (*words, last)))
+        )
+        said.append(units)
+        edges.append([*where[:-1], where[-1] + 60])
+    hmm = train_hmm(transcribed, INVENTORY, CONFIG, silent_monitor)
+    errors = [
+        np.abs(align_units(hmm, log_likelihoods_of(hmm, utterance.features), units) - where).max()
+        for utterance, units, where in zip(transcribed, said, edges, strict=True)
+    ]
+    assert max(errors) <= 3
+
+
+def test_no_state_lasts_longer_than_it_may(trained):
+    hmm, *_ = trained
+    lasting = {name: 1 / -np.expm1(float(stay)) for name, stay in zip(hmm.table.names, hmm.log_stay, strict=False)}
+    for name, frames in lasting.items():
+        free = name.split(".")[0] in (SILENCE, PAUSE)
+        assert frames <= (LONGEST_SILENCE_FRAMES if free else LONGEST_STATE_FRAMES) * 1.001
+    units = [sum(lasting[f"{unit}.{state}"] for state in range(3)) for unit in UNITS]
+    assert np.mean(units) == pytest.approx(9, abs=0.6)  # each state lasts 2, 3 or 4 frames
+
+
+def test_the_bigram_is_that_of_what_was_said_pauses_being_silence(trained):
+    hmm, _, _, said, _, _ = trained
+    silent = [tuple(SILENCE if unit == PAUSE else unit for unit in units) for units in said]
+    assert hmm.bigram.units == (SILENCE, PAUSE, *UNITS)
+    wanted = estimate_bigram(hmm.bigram.units, silent)
+    assert np.array_equal(hmm.bigram.log_probability, wanted.log_probability)
+
+
+def test_nothing_to_train_on_says_so():
+    with pytest.raises(CorpusError, match="none of 0"):
+        train_hmm([], INVENTORY, CONFIG, silent_monitor)
+    short = TranscribedUtterance(np.zeros((8, 4), np.float32), ((("a",),),))
+    with pytest.raises(CorpusError, match="none of 1"):
+        train_hmm([short], INVENTORY, CONFIG, silent_monitor)
+
+
+def test_an_utterance_too_short_for_its_words_is_left_out():
+    transcribed, _, _ = recordings(2, 10, speaker(2))
+    short = TranscribedUtterance(transcribed[0].features[:15], transcribed[0].words)
+    with_it = train_hmm([short, *transcribed], INVENTORY, CONFIG, silent_monitor)
+    without = train_hmm(transcribed, INVENTORY, CONFIG, silent_monitor)
+    assert np.array_equal(with_it.mixtures.means, without.mixtures.means)

@@ -1,0 +1,282 @@
+"""Films: any motion of the person, at any rate, of any length, in any background."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+import pytest
+
+from lipmotion.appearance.person import Appearance
+from lipmotion.errors import ExportError, InputError, ModelFormatError
+from lipmotion.export.synthetic_mark import SOURCE_TYPE
+from lipmotion.faces.filmed.face import FilmedFace
+from lipmotion.faces.filmed.renderer import Stitcher, StitchingOptions
+from lipmotion.pipeline.film import filmed_video as module
+from lipmotion.pipeline.film.background import stored_sequence
+from lipmotion.pipeline.film.filmed_video import FilmOptions, film_of, write_film
+from lipmotion.pipeline.generate.animate import animate
+from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.outputs.output import OutputSettings
+from lipmotion.pipeline.outputs.shown_faces import shown_face
+from lipmotion.pipeline.outputs.write import write
+from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.testing.toy import ToySentence, toy_motion
+from lipmotion.testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH
+from lipmotion.types import Audio, Channel, Item, Motion, Progress
+from speech.sounds import tone, write_sound
+
+MIDDLE = (slice(150, 230), slice(70, 154))
+"""Rows and columns of the background in which the mouth is."""
+
+
+@pytest.fixture(scope="module")
+def motion(toy_sentence: ToySentence) -> Motion:
+    return toy_motion(toy_sentence.units, 100.0)
+
+
+@pytest.fixture(scope="module")
+def brief(motion: Motion) -> Motion:
+    """The beginning of the sentence: 0.8 s, in which the mouth opens."""
+    return Motion(motion.values[40:120], 100.0, motion.channels)
+
+
+def dark(frames: list[np.ndarray]) -> np.ndarray:
+    """Return how many pixels of the mouth are dark: how far it is open [shape=(T,)]."""
+    return np.array([(frame[MIDDLE] < 90).all(axis=2).sum() for frame in frames])
+
+
+def pictures(path: Path) -> tuple[list[np.ndarray], Any, dict[str, str]]:
+    """Return the frames of a video, its frame rate, and its tags."""
+    with av.open(str(path)) as container:
+        stream = container.streams.video[0]
+        frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(stream)]
+        return frames, stream.average_rate, dict(container.metadata)
+
+
+def test_any_rate(filmed_face: FilmedFace, motion: Motion) -> None:
+    for fps in (None, 12.5, 30.0):
+        film = film_of(filmed_face, motion, fps=fps)
+        frames = list(film.frames)
+        assert film.rate_hz == pytest.approx(fps or 25.0)
+        assert len(frames) == int((len(motion.values) - 1) / 100 * film.rate_hz + 1e-9) + 1
+        assert {(frame.shape, str(frame.dtype)) for frame in frames} == {((FRAME_HEIGHT, FRAME_WIDTH, 3), "uint8")}
+        opening = motion.at(np.arange(len(frames)) / film.rate_hz)[:, 0]
+        assert np.corrcoef(dark(frames), opening)[0, 1] > 0.85
+    for fps in (0.0, -25.0, float("nan"), float("inf")):
+        with pytest.raises(InputError, match=r"the frame rate is .*, required more than 0"):
+            film_of(filmed_face, motion, fps=fps)
+
+
+def test_speech_longer_and_shorter_than_the_background(filmed_face: FilmedFace, motion: Motion) -> None:
+    frames = list(film_of(filmed_face, motion).frames)
+    assert len(frames) == pytest.approx(len(motion.values) / 4, abs=1)
+    assert len(frames) > len(filmed_face.background.video)
+    for samples, count in ((9, 3), (1, 1)):
+        short = Motion(motion.values[:samples], 100.0, motion.channels)
+        assert len(list(film_of(filmed_face, short).frames)) == count
+
+
+def test_the_jaw_follows_what_it_is_told(filmed_face: FilmedFace, brief: Motion, toy_sentence: ToySentence) -> None:
+    closed = Motion(np.tile([[0.0, 0.55, 0.22]], (len(brief.values), 1)), 100.0, brief.channels)
+    sound = Audio(toy_sentence.audio.samples[16_000 * 4 // 10 :], 16_000)
+    films = {
+        jaw: np.stack(list(film_of(filmed_face, closed, sound=sound, options=FilmOptions(jaw=jaw)).frames)).astype(int)
+        for jaw in ("motion", "energy", "none")
+    }
+    below = (slice(None), slice(212, 240), slice(90, 134))  # the chin
+    assert np.abs(films["motion"][below] - films["energy"][below]).mean() > 0.3
+    assert np.abs(films["motion"][below] - films["none"][below]).mean() > 0.3
+    shown = np.stack([each.copy() for each in filmed_face.background.video.frames(range(20))]).astype(int)
+    assert np.array_equal(films["none"][:20][:, 225:], shown[:, 225:])  # the background's own jaw
+    with pytest.raises(InputError, match="a jaw that follows the energy needs the sound; give the recording"):
+        film_of(filmed_face, brief, options=FilmOptions(jaw="energy"))
+
+
+@pytest.mark.long
+def test_sound_and_pictures_are_as_long(
+    filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence, tmp_path: Path
+) -> None:
+    write_film(tmp_path / "a.mp4", film_of(filmed_face, motion), toy_sentence.audio)
+    frames, rate, _ = pictures(tmp_path / "a.mp4")
+    assert rate == 25
+    assert len(frames) / 25 == pytest.approx(toy_sentence.audio.duration_s, abs=0.08)
+    drawn = list(film_of(filmed_face, motion).frames)
+    assert np.abs(np.stack(frames).astype(int) - np.stack(drawn)).mean() < 2
+
+
+def test_the_mark(filmed_face: FilmedFace, brief: Motion, tmp_path: Path) -> None:
+    path, sound = tmp_path / "a.mp4", Audio(np.zeros(16_000 * 8 // 10, np.float32), 16_000)
+    plain = np.stack(list(film_of(filmed_face, brief).frames))[::10].astype(int)
+    for mark in ("metadata", "visible", "none"):
+        options: dict[str, Any] = {} if mark == "metadata" else {"mark": mark}  # it is the default
+        write_film(path, film_of(filmed_face, brief), sound, **options)
+        frames, _, tags = pictures(path)
+        assert tags.get("comment", "").startswith("synthetic:") == (mark != "none")
+        assert (SOURCE_TYPE.encode() in path.read_bytes()) == (mark != "none")
+        corners = np.abs(np.stack(frames)[::10].astype(int) - plain)[:, -40:]
+        assert (corners.max() > 60) == (mark == "visible")
+
+
+def test_motion_that_the_face_cannot_show(
+    filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence, tmp_path: Path
+) -> None:
+    blendshapes = Motion(motion.values, 100.0, tuple(Channel(name, "weight") for name in ("jawOpen", "a", "b")))
+    with pytest.raises(InputError, match=r"no channel 'opening' \(3 of the 3 that this face needs are missing\)"):
+        film_of(filmed_face, blendshapes)
+    broken = motion.values.copy()
+    broken[48:53, 1] = np.nan
+    with pytest.raises(InputError, match="not finite"):
+        write_film(tmp_path / "a.mp4", film_of(filmed_face, Motion(broken, 100.0, motion.channels)), toy_sentence.audio)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_overlays_need_the_video(filmed_face: FilmedFace, motion: Motion, toy_speech: Path, tmp_path: Path) -> None:
+    words = "an overlay shows the video of the speech: give a video as speech, and no background"
+    for overlay in ("inset", "mouth"):
+        with pytest.raises(InputError, match=words):
+            film_of(filmed_face, motion, options=FilmOptions(overlay=overlay))
+        (tmp_path / "b.mp4").write_text("video")
+        both = FilmOptions(overlay=overlay, background=tmp_path / "b.mp4")
+        with pytest.raises(InputError, match=words):
+            film_of(filmed_face, motion, speech=toy_speech, options=both)
+        with pytest.raises(InputError, match="has no pictures, and an overlay shows them; give a video as speech"):
+            film_of(filmed_face, motion, speech=toy_speech, options=FilmOptions(overlay=overlay))
+
+
+@pytest.mark.long
+def test_progress_is_that_of_the_frames(
+    filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence, tmp_path: Path
+) -> None:
+    events: list[Progress | Item] = []
+    film = film_of(filmed_face, motion)
+    write_film(tmp_path / "a.mp4", film, toy_sentence.audio, monitor=events.append)
+    shares = [event.share for event in events if isinstance(event, Progress)]
+    assert len(shares) == len(events) > 2
+    assert shares == sorted(shares)
+    assert shares[-1] == pytest.approx(1.0)
+    assert {event.steps for event in events if isinstance(event, Progress)} == {film.count}
+    assert len(pictures(tmp_path / "a.mp4")[0]) == film.count
+
+
+def test_options_of_filmed_faces_alone(tmp_path: Path, toy_speech: Path) -> None:
+    drawn = shown_face("portrait")
+    video = tmp_path / "a.mp4"
+    video.touch()
+    for options, words in (
+        (FilmOptions(background=video), "a background"),
+        (FilmOptions(overlay="inset"), "an overlay"),
+        (FilmOptions(jaw="energy"), "another jaw"),
+        (FilmOptions(mark="visible"), "a visible mark"),
+    ):
+        with pytest.raises(InputError, match=rf"{words} is for filmed faces; give one: --face FILE\.face"):
+            drawn.check(OutputSettings(drawn, toy_speech, film=options))
+    for unmarked in ("metadata", "none"):
+        drawn.check(OutputSettings(drawn, toy_speech, film=FilmOptions(mark=unmarked)))  # a drawn face needs no mark
+
+
+def test_an_inset_on_the_video_of_the_speech(filmed_face: FilmedFace, motion: Motion, tmp_path: Path) -> None:
+    """The video is shorter than the speech: as many frames as there are of both."""
+    video = write_sound(tmp_path / "a.mkv", tone(16_000, 2.0), 16_000, "flac", video=True)
+    film = film_of(filmed_face, motion, speech=video, options=FilmOptions(overlay="inset"))
+    frames = np.stack(list(film.frames))
+    assert frames.shape == (25, 48, 64, 3)
+    assert film.rate_hz == pytest.approx(25.0)
+    left, top, right, bottom = film.covered
+    assert 0 < left < right <= 64  # the inset
+    assert 0 < top < bottom <= 48
+    assert np.ptp(frames[:, :20, :30]) == 0  # the video itself, flat and grey
+    assert np.ptp(frames[0, -19:, -24:]) > 60
+
+
+@pytest.mark.long
+def test_eigenlips_become_the_person(
+    filmed_face: FilmedFace, pictured_model: Model, toy_sentence: ToySentence, tmp_path: Path
+) -> None:
+    """A model of mouth pictures drives the mouth by its pictures, and the jaw by points where it has them."""
+    request = SpeechRequest(toy_sentence.audio, units=toy_sentence.units)
+    result = animate(request, model=pictured_model)
+    eigenlips = pictured_model.eigenlips
+    assert eigenlips is not None
+    names = {channel.name for channel in eigenlips.channels}
+    assert names < set(result.motion.names)
+    frames = list(film_of(filmed_face, result.motion, model=pictured_model).frames)
+    opening = toy_motion(toy_sentence.units, 25.0)["opening"][: len(frames)]
+    assert np.corrcoef(dark(frames)[: len(opening)], opening)[0, 1] > 0.7
+    only = [n for n, name in enumerate(result.motion.names) if name in names]
+    alone = Motion(result.motion.values[:, only], 100.0, tuple(result.motion.channels[n] for n in only))
+    again = list(film_of(filmed_face, alone, model=pictured_model).frames)
+    assert np.corrcoef(dark(again), dark(frames))[0, 1] > 0.9
+    with pytest.raises(InputError, match="no channel 'opening'"):
+        film_of(filmed_face, alone)
+    write(result, tmp_path / "a.mp4", speech=toy_sentence.audio, model=pictured_model, face=filmed_face)
+    assert len(pictures(tmp_path / "a.mp4")[0]) == len(frames)
+
+
+@pytest.mark.long
+def test_another_persons_motion_is_mapped_onto_the_face(
+    toy_model: Model, filmed_face: FilmedFace, toy_sentence: ToySentence
+) -> None:
+    """The person of the face opens the mouth half as far, and says the same."""
+    takes = tuple(
+        replace(take, motion=Motion(take.motion.values * [0.5, 1, 0.5], 25.0, take.motion.channels))
+        for take in filmed_face.takes
+    )
+    other = replace(filmed_face, about=filmed_face.about | {"corpus": ["someone/else"]}, takes=takes)
+    own, mapped = (
+        animate(SpeechRequest(toy_sentence.audio, units=toy_sentence.units, onto=onto), model=toy_model).motion
+        for onto in (None, other)
+    )
+    ratio = np.percentile(mapped["opening"], 95) / np.percentile(own["opening"], 95)
+    assert 0.35 < ratio < 0.75
+    assert np.corrcoef(own["opening"], mapped["opening"])[0, 1] > 0.95
+    mute = replace(other, takes=())
+    with pytest.raises(InputError, match=r"the face: 0\.00 s of speech with a measured face, required 0\.5 s or more"):
+        animate(SpeechRequest(toy_sentence.audio, onto=mute), model=toy_model)
+
+
+def test_writing_is_whole_or_not_at_all(
+    filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence, tmp_path: Path
+) -> None:
+    (tmp_path / "a.mp4").write_text("older")
+    with pytest.raises(ExportError):
+        write_film(tmp_path / "a.mp4", film_of(filmed_face, motion), Audio(np.zeros(0, np.float32), 16_000))
+    damaged = replace(filmed_face.background.video, data=_spoiled(filmed_face.background.video.data))
+    background = replace(filmed_face.background, video=damaged)
+    with pytest.raises(ModelFormatError):
+        write_film(tmp_path / "a.mp4", film_of(replace(filmed_face, background=background), motion), toy_sentence.audio)
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("a.mp4", "older")]
+
+
+def _spoiled(data: np.ndarray) -> np.ndarray:
+    """Return a stream whose frames begin as they should, and hold zeros from the middle on."""
+    changed = data.copy()
+    starts = np.flatnonzero((data[:-3] == 0) & (data[1:-2] == 0) & (data[2:-1] == 1))
+    keep = np.zeros(len(data), bool)
+    for start in starts:
+        keep[max(0, start - 1) : start + 6] = True
+    changed[~keep & (np.arange(len(data)) > len(data) // 2)] = 77
+    return changed
+
+
+def test_a_mouth_over_the_speakers_own_is_larger_and_has_no_jaw(
+    filmed_face: FilmedFace, brief: Motion, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    video = write_sound(tmp_path / "a.mkv", tone(16_000, 2.0), 16_000, "flac", video=True)
+    stitched, sequence = [], stored_sequence(filmed_face.background)
+
+    class Noted(Stitcher):
+        def __init__(self, appearance: Appearance, options: StitchingOptions) -> None:
+            stitched.append(options.jaw)
+            super().__init__(appearance, options)
+
+    monkeypatch.setattr(module, "Stitcher", Noted)
+    monkeypatch.setattr(module, "open_background", lambda *_, in_time: sequence if in_time else None)
+    film_of(filmed_face, brief)
+    film = film_of(filmed_face, brief, speech=video, fps=50.0, options=FilmOptions(overlay="mouth"))
+    assert stitched == [True, False]
+    assert film.rate_hz == pytest.approx(25.0)
+    assert film.covered == pytest.approx(sequence.enlarged(1.3).face_box)

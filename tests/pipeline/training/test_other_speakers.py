@@ -1,0 +1,215 @@
+"""Many speakers: what they say, what recordings say, and who is kept aside."""
+
+from __future__ import annotations
+
+import shutil
+import wave
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.errors import CorpusError, MissingDependencyError
+from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.training import other_speakers as module
+from lipmotion.pipeline.training.other_speakers import (
+    is_held_out_speaker,
+    recorded_sentences,
+    synthetic_sentences,
+    voice_examples,
+)
+from lipmotion.speech.features.mfcc import FEATURES
+from lipmotion.speech.recognition.recogniser import Recogniser
+from lipmotion.speech.sound.noise import spoken_samples
+from lipmotion.speech.voices.installed import installed_voices
+from lipmotion.speech.voices.synthesiser import SyntheticVoice
+from lipmotion.testing.formant_synthesiser import synthesise
+from lipmotion.testing.toy import ToySentence, toy_sentences
+from lipmotion.types import Audio, Item, Timeline, Unit
+from lipmotion.units import Lexicon, words_of
+
+VOICES = [SyntheticVoice("low", "flite", "anna"), SyntheticVoice("high", "flite", "bert")]
+TEXTS = ["Blue baby.", "Five tea."]
+Sayings = Iterator[tuple[Audio, Timeline[Unit]]]
+
+
+@pytest.fixture
+def spoken(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every voice speaks as the formant synthesiser does, without any pause."""
+
+    def say(texts: list[str], voice: SyntheticVoice, _: Lexicon | None) -> Sayings:
+        for text in texts:
+            phones = [phone for word in words_of(text) for phone in Lexicon().pronunciations(word)[0]]
+            yield synthesise([(phone, 0.12) for phone in phones], pitch_hz=100 if voice.name == "low" else 200)
+
+    monkeypatch.setattr(module, "speak_sentences", say)
+    monkeypatch.setattr(module, "installed_voices", lambda: tuple(VOICES))
+
+
+@pytest.mark.usefixtures("spoken")
+def test_every_text_in_every_voice() -> None:
+    sentences = list(synthetic_sentences(TEXTS))
+    assert [sentence.name for sentence in sentences] == [
+        "flite-low-001",
+        "flite-low-002",
+        "flite-high-001",
+        "flite-high-002",
+    ]
+    assert [sentence.speaker for sentence in sentences] == ["anna", "anna", "bert", "bert"]
+    assert [s.name for s in synthetic_sentences(TEXTS, VOICES[1:])] == ["flite-high-001", "flite-high-002"]
+
+
+@pytest.mark.usefixtures("spoken")
+def test_sentences_stand_between_pauses_over_a_faint_noise() -> None:
+    for sentence in synthetic_sentences(TEXTS):
+        first, last = sentence.phones[0], sentence.phones[-1]
+        assert first.label == last.label == Unit("sil")
+        assert (first.start_s, first.end_s) == (0, 0.25)
+        assert last.end_s == pytest.approx(sentence.audio.duration_s)
+        assert last.duration_s == pytest.approx(0.25)
+        assert all(a.end_s == b.start_s for a, b in pairwise(sentence.phones))
+        loud = sentence.audio.samples[spoken_samples(sentence.audio)].std()
+        for part in (sentence.audio.samples[:4000], sentence.audio.samples[-4000:]):
+            assert 20 * np.log10(loud / part.std()) == pytest.approx(50, abs=0.6)
+
+
+@pytest.mark.usefixtures("spoken")
+def test_pauses_of_the_synthesiser_become_longer(monkeypatch: pytest.MonkeyPatch) -> None:
+    phones = [("sil", 0.1), ("b", 0.1), ("iy", 0.2), ("sil", 0.2)]
+    monkeypatch.setattr(module, "speak_sentences", lambda *_: iter([synthesise(phones)]))
+    (sentence,) = synthetic_sentences(["Bee"], VOICES[:1])
+    assert [span.label.phone for span in sentence.phones] == ["sil", "b", "iy", "sil"]
+    assert [span.start_s for span in sentence.phones] == pytest.approx([0, 0.35, 0.45, 0.65])
+    assert sentence.phones[-1].end_s == pytest.approx(1.1)
+
+
+@pytest.mark.usefixtures("spoken")
+def test_the_same_again_shared_or_not() -> None:
+    shared = synthetic_sentences(TEXTS, each=lambda function, items: iter([function(item) for item in list(items)]))
+    for one, other in zip(synthetic_sentences(TEXTS), shared, strict=True):
+        assert np.array_equal(one.audio.samples, other.audio.samples)
+        assert one.phones == other.phones
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("spoken")
+def test_texts_by_default_say_every_phone_of_the_dictionary() -> None:
+    sentences = list(synthetic_sentences(voices=VOICES[:1]))
+    said = {span.label.phone for sentence in sentences for span in sentence.phones}
+    assert len(sentences) == 60
+    assert {"er", "hh", "ng", "oy", "sh", "uh", "zh"} <= said
+    assert len(said) == 43  # 42 of the dictionary, and silence
+
+
+@pytest.mark.usefixtures("spoken")
+def test_sentences_become_training_data() -> None:
+    sentences = list(synthetic_sentences(TEXTS))
+    for sentence, (features, units, speaker) in zip(sentences, voice_examples(sentences), strict=True):
+        assert features.values.shape == (int(sentence.audio.duration_s * 100 + 1e-9) + 1, FEATURES)
+        assert features.values.mean(axis=0) == pytest.approx(np.zeros(FEATURES), abs=1e-4)
+        assert units == sentence.phones
+        assert speaker == sentence.speaker
+
+
+def test_without_voices_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "installed_voices", lambda: ())
+    with pytest.raises(MissingDependencyError, match="apt install flite festival festvox-us-slt-hts espeak-ng"):
+        next(synthetic_sentences(TEXTS))
+
+
+def test_sides_never_change() -> None:
+    named = {"slt": True, "espeak-f2": True, "espeak-m7": True, "kal": False, "awb": False, "rms": False}
+    assert {speaker: is_held_out_speaker(speaker) for speaker in named} == named
+
+
+def test_a_quarter_is_kept_aside() -> None:
+    assert np.mean([is_held_out_speaker(f"speaker {number}") for number in range(2000)]) == pytest.approx(
+        0.25, abs=0.03
+    )
+
+
+def write(path: Path, audio: Audio, text: str | None = None) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with wave.open(str(path), "wb") as file:
+        file.setparams((1, 2, audio.rate_hz, 0, "NONE", ""))
+        file.writeframes(np.round(audio.samples * 32767).astype("<i2").tobytes())
+    if text is not None:
+        path.with_suffix(".txt").write_text(text, encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def own(toy_model: Model) -> Recogniser:
+    return Recogniser(toy_model.phones, "own")
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Two recordings that can be used, and four that cannot."""
+    first, second, third = toy_sentences(3)
+    write(tmp_path / "anna" / "one.wav", first.audio, " ".join(first.words))
+    write(tmp_path / "two.wav", second.audio, " ".join(second.words).upper())
+    write(tmp_path / "unsaid.wav", third.audio)
+    write(tmp_path / "too long.wav", Audio(third.audio.samples[:6000], 16_000), " ".join(third.words * 4))
+    write(tmp_path / "unsayable.wav", third.audio, "猫")
+    (tmp_path / "broken.wav").write_bytes(b"RIFF nothing")
+    (tmp_path / "broken.txt").write_text("blue", encoding="utf-8")
+    return tmp_path
+
+
+def test_recordings_are_aligned(folder: Path, own: Recogniser, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "agreement_score", lambda *_: 0.0)
+    items: list[Item] = []
+    given = {"anna-*": "Anna B."}
+    sentences = list(recorded_sentences(folder, own, speakers=given, monitor=items.append))  # type: ignore[arg-type]
+    assert [(s.name, s.speaker) for s in sentences] == [("anna-one", "Anna B."), ("two", "two")]
+    for sentence, toy in zip(sentences, toy_sentences(3), strict=False):
+        assert [span.label for span in sentence.phones] == [span.label for span in toy.units]
+        late_s = [a.start_s - b.start_s for a, b in zip(sentence.phones, toy.units, strict=True)]
+        assert np.median(np.abs(late_s)) < 0.04  # the toy model is a crude one
+    assert sorted((item.name, item.outcome) for item in items) == [
+        ("broken", "skipped"),
+        ("too long", "skipped"),
+        ("unsayable", "skipped"),
+    ]
+
+
+def test_a_transcript_of_other_words_is_detected(
+    folder: Path, own: Recogniser, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "agreement_score", lambda *_: -4.3)
+    items: list[Item] = []
+    assert list(recorded_sentences(folder, own, monitor=items.append)) == []  # type: ignore[arg-type]
+    assert "agree with the sound at -4.3, required -4.2 or more" in {item.name: item.reason for item in items}["two"]
+
+
+@pytest.mark.parametrize("name", ["nothing", ""])
+def test_a_folder_without_transcripts(tmp_path: Path, own: Recogniser, toy_sentence: ToySentence, name: str) -> None:
+    write(tmp_path / "unsaid.wav", toy_sentence.audio)
+    with pytest.raises(CorpusError, match="no such folder" if name else "no recording with a transcript"):
+        next(recorded_sentences(tmp_path / name, own))
+
+
+@pytest.mark.recordings
+def test_real_recordings(recordings: Path, toy_model: Model) -> None:
+    folder = recordings / "speech-open"
+    if not folder.is_dir():
+        pytest.skip("speech-open is not here")
+    items: list[Item] = []
+    general = Recogniser(toy_model.phones, "general")
+    sentences = list(recorded_sentences(folder, general, speakers={"sense_*": "reader"}, monitor=items.append))  # type: ignore[arg-type]
+    assert len(sentences) == 11
+    assert sum(s.speaker == "reader" for s in sentences) == 5
+    assert sorted(item.name for item in items) == ["13697_11991_000000", "common_voice_ja_24511055"]
+
+
+@pytest.mark.skipif(not any(map(shutil.which, ("flite", "festival", "espeak-ng"))), reason="no synthesiser is here")
+def test_real_voices() -> None:
+    voices = installed_voices()[-1:]
+    if not voices:
+        pytest.skip("the synthesisers have no voices")
+    (sentence,) = synthetic_sentences(["My baby may be home."], voices)
+    closed = [span.label.phone for span in sentence.phones if span.label.phone in ("m", "b")]
+    assert closed == list("mbbmbm")
+    assert sentence.phones[0].duration_s >= 0.25

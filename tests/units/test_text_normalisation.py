@@ -1,0 +1,120 @@
+from __future__ import annotations
+
+import unicodedata
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lipmotion.errors import InputError
+from lipmotion.units import words_of
+from lipmotion.units.text_normalisation import MOST_MARKS, ONES, SCALES, TENS, normalised_text, number_words
+
+
+def test_texts() -> None:
+    for text, words in (
+        ("Hello, world!", "hello world"),
+        ("twenty-one well—known", "twenty one well known"),
+        ("DON'T don’t rock'n'roll O’Neil’s", "don't don't rock'n'roll o'neil's"),
+        ("“Hello there”", "hello there"),
+        ("one\ttwo\r\nthree\n\n", "one two three"),
+        ("a_b", "a b"),
+        ("ﬁne Ｏｋ", "fine ok"),  # ligature and full-width letters
+        ("cafe\u0301 CAFÉ", "café café"),  # composed or not, a letter is the same
+        ("\ufeffhello", "hello"),
+        ("日本 ελλάδα", "日本 ελλάδα"),
+        ("[laughs] (hm) *so*", "laughs hm so"),
+        ("bin blue at f 2 now", "bin blue at f two now"),
+        ("x2", "x two"),
+        ("1,234 and 12,34", "one thousand two hundred thirty four and twelve thirty four"),
+        ("007", "zero zero seven"),
+        ("٣", "three"),
+        ("the 3rd, 21ST and 12th", "the third twenty first and twelfth"),
+        ("30th 100th 1,000th", "thirtieth one hundredth one thousandth"),
+        ("3 rd 3rds x3rd", "three rd three rds x three rd"),
+        ("$5.50", "five dollars and fifty cents"),
+        ("$1 £1.01 €0.50", "one dollar one pound and one penny fifty cents"),
+        ("$1,234.05", "one thousand two hundred thirty four dollars and five cents"),
+        ("$3 million, £2.5 billion", "three million dollars two point five billion pounds"),
+        ("$0 $0.00 $5.5", "zero dollars zero dollars five point five dollars"),
+        ("$ 7", "seven dollars"),
+        ("$1.2.3 $x", "one two three x"),
+        ("7% 8 % ٩٪ %", "seven percent eight percent nine"),
+        ("you & me, AT&T", "you and me at and t"),
+        ("you &amp; me", "you amp me"),  # references are resolved in subtitles alone
+    ):
+        assert " ".join(words_of(text)) == words
+
+
+def test_quotation_marks_are_not_spoken() -> None:
+    for text in ("say 'hello'.", "say ‘Hello’", "say hello'", "say 'hello", "say “hello”", "SAY «HELLO»"):
+        assert words_of(text) == ("say", "hello")
+
+
+def test_a_text_without_words_is_refused() -> None:
+    for text in ("", "   \n", "...", "—", "'", "’’", "🙂", "_"):
+        with pytest.raises(InputError, match="holds no word; give the words that are spoken"):
+            words_of(text)
+
+
+def test_numbers() -> None:
+    for digits, words in (
+        ("0", "zero"),
+        ("10", "ten"),
+        ("19", "nineteen"),
+        ("20", "twenty"),
+        ("99", "ninety nine"),
+        ("100", "one hundred"),
+        ("101", "one hundred one"),
+        ("1000", "one thousand"),
+        ("1001", "one thousand one"),
+        ("110000", "one hundred ten thousand"),
+        ("2000000", "two million"),
+        ("1000000001", "one billion one"),
+        ("1000000000000", "one" + " zero" * 12),
+        ("00", "zero zero"),
+    ):
+        assert " ".join(number_words(digits)) == words
+
+
+@settings(max_examples=60)
+@given(st.integers(0, 10**12 - 1))
+def test_a_number_comes_back_from_its_words(number: int) -> None:
+    values = {word: n for n, word in enumerate(ONES)} | {word: 10 * n for n, word in enumerate(TENS) if n > 1}
+    scales = {name: scale for scale, name in SCALES}
+    total = part = 0
+    for word in number_words(str(number)):
+        if word == "hundred":
+            part *= 100
+        elif word in scales:
+            total, part = total + part * scales[word], 0
+        else:
+            part += values[word]
+    assert total + part == number
+
+
+@settings(max_examples=60)
+@given(st.text(max_size=60))
+def test_any_text_gives_words_or_says_that_there_are_none(text: str) -> None:
+    try:
+        words = words_of(text)
+    except InputError:
+        return
+    assert words
+    for word in words:
+        assert word == word.lower()
+        assert not any(character.isspace() or character.isdecimal() for character in word)
+    assert words_of(" ".join(words)) == words
+
+
+def test_a_letter_keeps_thirty_marks() -> None:
+    """More would be sorted, which takes the square of the time; half-width and Tibetan marks hide what they are."""
+    for mark in ("\u0301", "\u0316\u0301", "\u0f73", "\uff9e"):
+        many = "a" + mark * 200_000
+        kept = "a" + (mark * 200_000)[:MOST_MARKS]
+        assert normalised_text(many) == unicodedata.normalize("NFKC", kept)
+        assert normalised_text("e\u0301" * 100) == "é" * 100
+
+
+def test_numbers_of_any_length_are_digits() -> None:
+    assert words_of("7" * 10_000) == ("seven",) * 10_000
