@@ -16,8 +16,8 @@ def _option(name: str, code: int, message: str, *more: object) -> None:
         return bench.animate(None, *more)
 
 
-_option("--fps inf", 3, "the frame rate is inf, required 1 to 1000 a second", "--fps=inf")
-_option("--rate nan", 3, "the frame rate is nan, required 1 to 1000 a second", "--rate=nan")
+_option("--fps inf", 3, "the frame rate is inf a second, required 1 to 1000 a second", "--fps=inf")
+_option("--rate nan", 3, "the frame rate is nan a second, required 1 to 1000 a second", "--rate=nan")
 _option("--channels of an empty text", 3, "no motion channel ''", "--channels", "")
 _option("--channels of one name twice", 3, "channel names repeat", "--channels", "opening,opening")
 _option(

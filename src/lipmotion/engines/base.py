@@ -47,8 +47,8 @@ class Inputs:
     """What an engine takes besides acoustic features, phones in time and motion.
 
     f0           : F0, ``Speech.log_f0``
-    conditions   : acoustic conditions in which training takes each example (``Example.condition_spectra``), and with them spectra
-                   (``Speech.spectrum``); 0: neither
+    conditions   : acoustic conditions in which training takes each example (``Example.condition_spectra``), and with
+                   them spectra (``Speech.spectrum``); 0: neither
     prior        : what another model makes of the speech, ``Speech.prior``: its models can stand on other ones
     speech_alone : examples without any valid frame: of other speakers, for instance
     """

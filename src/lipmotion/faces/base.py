@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from lipmotion.articulation.liveliness import Liveliness, liveliness
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion.types.staging import SCENE as SCENE  # noqa: PLC0414 (part of this module's interface)
-from lipmotion.types.staging import SMALLEST as SMALLEST  # noqa: PLC0414 (part of this module's interface)
+from lipmotion.types.staging import SMALLEST_PX as SMALLEST_PX  # noqa: PLC0414 (part of this module's interface)
 from lipmotion.types.staging import TRANSPARENT as TRANSPARENT  # noqa: PLC0414 (part of this module's interface)
 from lipmotion.types.staging import Staging as Staging  # noqa: PLC0414 (part of this module's interface)
 

@@ -140,7 +140,7 @@ def articulators(units: Timeline[Unit], frames: int, reliability: Array | float 
             row = table[phone if phone in table else most_similar_phone(phone, list(table))]
             time_s = np.arange(first, stop) / FRAME_RATE_HZ
             third = (time_s - span.start_s) / max(span.duration_s, 1e-9) * len(THIRDS)
-            thirds, sure = np.clip(third.astype(int), 0, len(THIRDS) - 1), relied[first:stop]
+            thirds, sure = np.minimum(np.maximum(third.astype(int), 0), len(THIRDS) - 1), relied[first:stop]
             mean = row if is_silent(phone) else means[phone in VOWELS]
             steps[first:stop] = sure * row[thirds] + (1 - sure) * mean[thirds]
     return smoothed(steps)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from math import ceil
 from typing import NamedTuple
 
 import numpy as np
@@ -110,14 +111,18 @@ def full_context_states(units: Timeline[Unit], frames: int, layout: StateLayout)
     result = [layout.rest] * frames
     away = away_from_speech(np.arange(frames) / FRAME_RATE_HZ, speech_intervals(units), layout.rest_s)
     for left, span, right in with_neighbours(units):
-        edges = np.ceil(np.array([span.start_s, span.end_s]) * FRAME_RATE_HZ - 1e-6)
-        first, stop = np.clip(edges, 0, frames).astype(int).tolist()
+        first, stop = (
+            ceil(min(max(edge_s * FRAME_RATE_HZ - 1e-6, 0), frames)) for edge_s in (span.start_s, span.end_s)
+        )
         time_s = np.arange(first, stop) / FRAME_RATE_HZ
         left_unit, unit, right_unit = map(layout.units.unit, (left, span.label.phone, right))
+        count = layout.states(unit)
+        named = [FullContextState(left_unit, unit, right_unit, number) for number in range(count)]
         rests = is_silent(span.label.phone) & away[first:stop]
-        state = _states(time_s, span.start_s, span.end_s, layout.states(unit), layout.edge_s)
-        for i in np.nonzero(~rests)[0]:
-            result[first + i] = FullContextState(left_unit, unit, right_unit, int(state[i]))
+        state = _states(time_s, span.start_s, span.end_s, count, layout.edge_s)
+        for frame, number, at_rest in zip(range(first, stop), state.tolist(), rests.tolist(), strict=True):
+            if not at_rest:
+                result[frame] = named[number]
     return result
 
 
@@ -129,4 +134,4 @@ def _states(time_s: NDArray[np.float64], start_s: float, end_s: float, states: i
     before = np.floor(from_start + 1e-9)
     after = states - np.ceil(from_end - 1e-9)
     state = np.where(from_start < half, before, np.where(from_end <= half + 1e-9, after, half))
-    return np.clip(state, 0, states - 1).astype(np.intp)
+    return np.minimum(np.maximum(state, 0), states - 1).astype(np.intp)

@@ -68,7 +68,8 @@ class Predictor(ABC):
 
     name              : under which it is registered, and its arrays are stored
     ARRAYS            : the stored arrays, where Q is the number of dimensions of motion
-    least_motion_s    : seconds of measured motion from which on training gets acoustic conditions (``Example.condition_spectra``)
+    least_motion_s    : seconds of measured motion from which on training gets acoustic conditions
+                        (``Example.condition_spectra``)
     uses_prior        : whether it predicts from ``Speech.prior``: then the model stands on another model
     uses_articulation : whether the table of articulation is among its inputs: then engines do not lean on it once more
     variances         : of the error of static value, Δ and Δ² [shape=(3, Q)]

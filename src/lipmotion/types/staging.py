@@ -10,7 +10,7 @@ from lipmotion.errors import InputError, shortened
 from lipmotion.types.configuration import Configuration, Rule, option
 
 SCENE, TRANSPARENT = "scene", "transparent"
-SMALLEST, LARGEST = 64, 4096
+SMALLEST_PX, LARGEST_PX = 64, 4096
 """Range of the height of pictures, in pixels."""
 _MOVING: dict[str, Any] = {
     "still": "--still",
@@ -43,8 +43,10 @@ class Staging(Configuration):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.size and not (SMALLEST <= self.size <= LARGEST and self.size % 2 == 0):
-            raise InputError(f"the size is {self.size} pixels, required an even number from {SMALLEST} to {LARGEST}")
+        if self.size and not (SMALLEST_PX <= self.size <= LARGEST_PX and self.size % 2 == 0):
+            raise InputError(
+                f"the size is {self.size} pixels, required an even number from {SMALLEST_PX} to {LARGEST_PX}"
+            )
         if self.background not in (SCENE, TRANSPARENT) and not re.fullmatch("#[0-9a-fA-F]{6}", self.background):
             raise InputError(
                 f"the background is {shortened(self.background)!r}, required scene, transparent, or a colour as "

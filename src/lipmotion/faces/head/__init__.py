@@ -14,7 +14,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.faces.base import SMALLEST, TRANSPARENT, DrawnMotion, Face, Picture, Staging
+from lipmotion.faces.base import SMALLEST_PX, TRANSPARENT, DrawnMotion, Face, Picture, Staging
 from lipmotion.faces.head.performance import head_poses
 from lipmotion.faces.head.pose import CharacterPose
 from lipmotion.types import Motion, Prosody, Timeline, Unit
@@ -51,7 +51,7 @@ class Head(Face):
     @cached_property
     def _painter(self) -> Callable[[CharacterPose], Picture]:
         height = self.staging.size or OWN_SIZE
-        return _painter(max(2 * round(height * 8 / 9), SMALLEST), height, self.staging)
+        return _painter(max(2 * round(height * 8 / 9), SMALLEST_PX), height, self.staging)
 
 
 def render(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.mouth import frame_times
 from lipmotion.errors import InputError
-from lipmotion.faces.base import SMALLEST, TRANSPARENT, DrawnMotion, Face, Picture, Staging, alive
+from lipmotion.faces.base import SMALLEST_PX, TRANSPARENT, DrawnMotion, Face, Picture, Staging, alive
 from lipmotion.faces.mesh.stage import MeshStage
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter, DrivenPose
@@ -87,7 +87,7 @@ class MeshFace(Face):
     def _painter(self) -> Callable[[MeshPose], Picture]:
         width, height = self._size
         if self.staging.size:
-            width, height = max(2 * round(self.staging.size * 8 / 9), SMALLEST), self.staging.size
+            width, height = max(2 * round(self.staging.size * 8 / 9), SMALLEST_PX), self.staging.size
         stage = MeshStage(self._character, width, height, self.staging.colour)
         draw = stage.cut_out if self.staging.background == TRANSPARENT else stage.picture
         return lambda pose: draw(self._character.posed(pose.row), pose.turn, pose.look)

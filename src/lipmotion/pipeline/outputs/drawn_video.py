@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion.errors import ExportError
-from lipmotion.faces.base import SMALLEST, TRANSPARENT, DrawsPlanes, Face, Staging
+from lipmotion.faces.base import SMALLEST_PX, TRANSPARENT, DrawsPlanes, Face, Staging
 from lipmotion.faces.registry import staged_face
 from lipmotion.kernels.choice import numba_works
 from lipmotion.meshes.fitting.blendshape_motion import is_of_blendshapes
@@ -141,6 +141,6 @@ def load_drawing(face: Face) -> None:
     """Load what draws a face for videos (compiled kernels), so that drawing it begins sooner."""
     if isinstance(face, DrawsPlanes) and numba_works():
         closed = Motion(np.zeros((1, 1)), 1.0, (Channel("opening"),))
-        smallest = staged_face(face, Staging(size=SMALLEST))
+        smallest = staged_face(face, Staging(size=SMALLEST_PX))
         if isinstance(smallest, DrawsPlanes) and (frames := smallest.render_planes(closed, Timeline(()))) is not None:
             list(frames)
