@@ -3,78 +3,67 @@
 from __future__ import annotations
 
 import json
-import sys
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from lipmotion.articulation.pauses import REST
 from lipmotion.errors import InputError, shortened
 from lipmotion.export.motion.document import parse_units, unit_rows
 from lipmotion.pipeline.edits import FORMS, Edits
+from lipmotion.pipeline.job import Request, located
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.outputs.scenes import sound_reference
 from lipmotion.pipeline.session import Session
+from lipmotion.pipeline.understand.read_request import read_request
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.storage.files import read_text_file, whole_file
 from lipmotion.storage.json_text import as_json, from_json
+from lipmotion.storage.toml_text import read_toml
 from lipmotion.types import Outlook, Timeline, Unit
-from lipmotion.units import Lexicon
 
 FORMAT, VERSION = "lipmotion.edits", 1
 JSON, TOML = SUFFIXES = (".json", ".toml")
 """Suffixes of files of edits."""
-OPTIONS = ("recogniser", "speaker", "pauses", "asymmetry")
-"""Options of a ``SpeechRequest`` that such a file holds."""
+HELD = ("recording", "model", "lexicon", "recogniser", "speaker", "pauses", "asymmetry")
+"""What of a request such a file holds; words and phones that were given are in the phones in time."""
 
 
 @dataclass(frozen=True, eq=False)
 class EditFile:
     """The content of a file of edits.
 
-    edits     : what was changed
-    recording : the recording; None: the file does not say which
-    units     : its phones in time before the edits, so that no recogniser changes what they mean; None: not known
-    outlook   : what to expect of the motion; None: not known
-    model     : the model file; None: the shipped model
-    lexicon   : pronunciations of words; None: those of the dictionary
-    options   : of the request, by name (``OPTIONS``)
+    edits   : what was changed
+    named   : the recording and what else the file says of it (``HELD``)
+    units   : its phones in time before the edits, so that no recogniser changes what they mean; None: not known
+    outlook : what to expect of the motion; None: not known
     """
 
     edits: Edits = field(default_factory=Edits)
-    recording: Path | None = None
+    named: Request = field(default_factory=Request)
     units: Timeline[Unit] | None = None
     outlook: Outlook | None = None
-    model: Path | None = None
-    lexicon: Path | None = None
-    options: Mapping[str, Any] = field(default_factory=dict)
-
-    def request(self, asked: SpeechRequest | None = None) -> SpeechRequest:
-        """Return the request of the recording; or a given one, with the phones that were edited, if it has none.
-
-        Raises InputError: the file names no recording, and there is no other request.
-        """
-        if asked is None:
-            if self.recording is None:
-                raise InputError("the edits name no recording; give it: lipmotion animate RECORDING --edits FILE")
-            lexicon = Lexicon.from_file(self.lexicon) if self.lexicon else None
-            asked = SpeechRequest(self.recording, lexicon=lexicon, **self.options)
-        given = asked.units is not None or asked.transcript is not None
-        return asked if given or self.units is None else replace(asked, units=self.units)
 
     def session(self, asked: SpeechRequest | None = None, *, model: Model | None = None, **more: Any) -> Session:
-        """Return a session of the request. more : of ``Session``.  Raises as ``request``, ``load_model``."""
-        request = self.request(asked)
-        outlook = self.outlook if request.units is self.units else None
-        return Session(request, model=model or load_model(self.model), outlook=outlook, **more)
+        """Return a session of the recording; or of a given request, with the phones of the file if it has none.
+
+        more : of ``Session``
+        Raises InputError: the file names no recording, and there is no other request. Others as ``load_model``.
+        """
+        if asked is None:
+            if self.named.recording is None:
+                raise InputError("the edits name no recording; give it: lipmotion animate RECORDING --edits FILE")
+            asked = read_request(self.named)
+        if self.units is None or asked.units is not None or asked.transcript is not None:
+            return Session(asked, model=model or load_model(self.named.model), **more)
+        request = replace(asked, units=self.units)
+        return Session(request, model=model or load_model(self.named.model), outlook=self.outlook, **more)
 
 
-def begun(request: SpeechRequest, recording: Path, model: Path | None, lexicon: Path | None) -> EditFile:
+def begun(asked: Request) -> EditFile:
     """Return a file without edits of a recording, whose phones are recognised or aligned now. Raises as ``animate``."""
-    session = Session(request, model=load_model(model))
-    options = {name: getattr(request, name) for name in OPTIONS}
-    return EditFile(Edits(), recording, session.units(), session.generated().outlook, model, lexicon, options)
+    session = Session(read_request(asked), model=load_model(asked.model))
+    named = Request(**{name: getattr(asked, name) for name in HELD})
+    return EditFile(Edits(), named, session.units(), session.generated().outlook)
 
 
 def edit_file(edits: EditFile | Edits | str | Path | None) -> EditFile:
@@ -98,11 +87,16 @@ def read_edits(path: str | Path) -> EditFile:
     Raises InputError: no such file, another suffix, or not a file of edits of this version.
     """
     path = Path(path)
-    text = read_text_file(path, "edits")
-    try:
-        members = _parsed(path, text)
-    except ValueError as error:
-        raise InputError(f"{path}: not a file of edits ({error})") from error
+    kind = path.suffix.lower()
+    if kind not in SUFFIXES:
+        raise InputError(f"{path}: a file of edits ends in one of: {', '.join(SUFFIXES)}")
+    if kind == TOML:
+        members: Any = read_toml(path, "edits", f"use {JSON}")
+    else:
+        try:
+            members = from_json(read_text_file(path, "edits"))
+        except ValueError as error:
+            raise InputError(f"{path}: not a file of edits ({error})") from error
     if not isinstance(members, dict) or members.get("format") != FORMAT:
         raise InputError(f'{path}: not a file of edits; it must begin with "format": "{FORMAT}"')
     if members.get("version") != VERSION:
@@ -114,33 +108,18 @@ def read_edits(path: str | Path) -> EditFile:
         raise InputError(f"{path}: {error}") from error
 
 
-def _parsed(path: Path, text: str) -> Any:
-    """Return the content of JSON or TOML. Raises ValueError: it is none. InputError: another suffix, an old Python."""
-    kind = path.suffix.lower()
-    if kind == JSON:
-        return from_json(text)
-    if kind != TOML:
-        raise InputError(f"{path}: a file of edits ends in one of: {', '.join(SUFFIXES)}")
-    if sys.version_info < (3, 11):
-        raise InputError(f"{path}: {TOML} is read by Python 3.11 or newer; use {JSON}")
-    import tomllib
-
-    return tomllib.loads(text)
-
-
 def _content(members: dict[str, Any], folder: Path) -> EditFile:
-    known = {"format", "version", "recording", "model", "lexicon", *OPTIONS, "steps", "units", "recognised", "outlook"}
+    known = {"format", "version", *HELD, "steps", "units", "recognised", "outlook"}
     if unknown := sorted(set(members) - known):
         raise InputError(f"unknown member {unknown[0]!r}; required some of: {', '.join(sorted(known))}")
     steps, outlook = members.get("steps", []), members.get("outlook")
     if not isinstance(steps, list) or not all(isinstance(step, str) for step in steps):
         raise InputError(f"the steps are {shortened(repr(steps))}, required a list of sentences: {FORMS[0]!r}")
-    files = {name: folder / members[name] if members.get(name) else None for name in ("recording", "model", "lexicon")}
+    named = located(Request.parsed({name: members[name] for name in HELD if name in members}), folder)
     units = parse_units(members["units"], members.get("recognised", ())) if "units" in members else None
     if outlook is not None:
         outlook = Outlook(**{"voice": None} | outlook | {"advice": tuple(outlook["advice"])})
-    options = {name: members[name] for name in OPTIONS if name in members}
-    return EditFile(Edits().then(*steps), units=units, outlook=outlook, options=options, **files)
+    return EditFile(Edits().then(*steps), named, units, outlook)
 
 
 def write_edits(file: EditFile, path: str | Path) -> None:
@@ -149,10 +128,11 @@ def write_edits(file: EditFile, path: str | Path) -> None:
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"{path}: a file of edits ends in one of: {', '.join(SUFFIXES)}")
     members: dict[str, Any] = {"format": FORMAT, "version": VERSION}
-    named = {"recording": file.recording, "model": file.model, "lexicon": file.lexicon}
-    members |= {name: sound_reference(source, path) for name, source in named.items() if source is not None}
-    usual = {"recogniser": "auto", "speaker": "", "pauses": REST, "asymmetry": 0.0}
-    members |= {name: value for name, value in file.options.items() if value != usual[name]}
+    usual = Request()
+    for name in HELD:
+        value = getattr(file.named, name)
+        if value != getattr(usual, name):
+            members[name] = sound_reference(value, path) if isinstance(value, Path) else value
     members["steps"] = list(file.edits.sentences)
     if file.units is not None:
         members |= unit_rows(file.units)

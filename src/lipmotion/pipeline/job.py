@@ -7,13 +7,13 @@ what the help says of it (``types.configuration.option``). Nothing is read or im
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args
 
 from lipmotion.errors import InputError
 from lipmotion.storage.sources import is_file
+from lipmotion.storage.toml_text import read_toml
 from lipmotion.types.configuration import Configuration, Rule, option
 from lipmotion.types.delivery import Delivery
 from lipmotion.types.staging import Staging
@@ -232,16 +232,10 @@ class Job(Configuration):
         Paths begin at the folder of the file.
         Raises InputError: no such file, no TOML, an unknown name, a value that is not allowed, or Python 3.10.
         """
-        if sys.version_info < (3, 11):
-            raise InputError(f"{path}: job files are read by Python 3.11 or newer; give the options themselves")
-        import tomllib
-
-        from lipmotion.storage.files import read_text_file
-
-        text = read_text_file(Path(path), "job")
+        members = read_toml(Path(path), "job", "give the options themselves")
         try:
-            return cls.parsed(tomllib.loads(text)).at(Path(path).parent)
-        except (ValueError, RecursionError) as error:
+            return cls.parsed(members).at(Path(path).parent)
+        except InputError as error:
             raise InputError(f"{path}: {error}") from error
 
     def of(self, recording: Path, files: tuple[str, ...] | None = None) -> Job:
@@ -252,8 +246,8 @@ class Job(Configuration):
     def at(self, folder: Path) -> Job:
         """Return the same job with paths that begin at a folder."""
         files = [file if file == "-" else f"{folder / file}{'/' * file.endswith('/')}" for file in self.outputs.files]
-        outputs = replace(_located(self.outputs, folder), files=tuple(files))
-        return replace(self, request=_located(self.request, folder), outputs=outputs)
+        outputs = replace(located(self.outputs, folder), files=tuple(files))
+        return replace(self, request=located(self.request, folder), outputs=outputs)
 
     def run(self, *, workers: int = 1) -> Generation:
         """Animate the recording and write the files, as ``lipmotion animate``; return the motion.
@@ -266,7 +260,7 @@ class Job(Configuration):
         return opened(self).run(workers=workers)
 
 
-def _located(part: PartT, folder: Path) -> PartT:
+def located(part: PartT, folder: Path) -> PartT:
     """Return a part with paths that begin at a folder; a text that is no file there is left as it is."""
     found: dict[str, Any] = {}
     for each in fields(part):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from lipmotion.faces.base import Staging
 from lipmotion.pipeline.edit_files import EditFile, begun, read_edits, write_edits
 from lipmotion.pipeline.edits import STEPS, Edits, step_of
 from lipmotion.pipeline.generate.animate import animate
+from lipmotion.pipeline.job import Request
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.types import Outlook, Span, Timeline, Unit
@@ -71,7 +73,7 @@ def test_what_is_written_is_read_again(tmp_path: Path, suffix: str) -> None:
     spans = (Span(0.0, 0.3, Unit("sil")), Span(0.3, 1 / 3 + 0.1, Unit("p", "sil-p+l", 'pl"ease', confidence=0.25)))
     outlook = Outlook("words", 0.5, None, 30.5, ("a \\ transcript",))
     file = EditFile(
-        Edits().then(*SENTENCES), tmp_path / "in" / "a b.wav", Timeline(spans), outlook, options={"pauses": "natural"}
+        Edits().then(*SENTENCES), Request(tmp_path / "in" / "a b.wav", pauses="natural"), Timeline(spans), outlook
     )
     write_edits(file, path)
     if suffix == ".toml" and sys.version_info < (3, 11):
@@ -80,7 +82,7 @@ def test_what_is_written_is_read_again(tmp_path: Path, suffix: str) -> None:
         return
     found = read_edits(path)
     assert (found.edits, found.units, found.outlook) == (file.edits, file.units, file.outlook)
-    assert (found.recording, found.options) == (file.recording, {"pauses": "natural"})
+    assert found.named == file.named
 
 
 @pytest.mark.parametrize(
@@ -104,18 +106,11 @@ def test_files_that_are_refused(tmp_path: Path, text: str, message: str) -> None
 
 def test_a_file_replays_what_was_recognised(toy_speech: Path, toy_model_file: Path, tmp_path: Path) -> None:
     """The phones in the file are the base: the motion is that of the session in which they were edited."""
-    request = SpeechRequest(toy_speech, recogniser="own")
-    file = begun(request, toy_speech, toy_model_file, None)
-    path = tmp_path / "a.json"
-    edits = Edits().then("phone 3 is p", "pin jawOpen 0.2 at 1.0")
-    write_edits(
-        EditFile(edits, *(getattr(file, n) for n in ("recording", "units", "outlook", "model")), options=file.options),
-        path,
-    )
+    asked = Request(toy_speech, recogniser="own", model=toy_model_file)
+    path, edits = tmp_path / "a.json", Edits().then("phone 3 is p", "pin jawOpen 0.2 at 1.0")
+    write_edits(replace(begun(asked), edits=edits), path)
     read = read_edits(path)
-    plain, replayed = (
-        animate(request, model=load_model(toy_model_file), edits=edits),
-        read.session().generated(read.edits),
-    )
+    plain = animate(SpeechRequest(toy_speech, recogniser="own"), model=load_model(toy_model_file), edits=edits)
+    replayed = read.session().generated(read.edits)
     assert np.array_equal(replayed.motion.values, plain.motion.values)
     assert (replayed.units, replayed.outlook, replayed.curve_edits) == (plain.units, plain.outlook, plain.curve_edits)

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from lipmotion.cli.arguments.declared import add_options, part_of
 from lipmotion.cli.arguments.options import add_machine_readable
 from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.pipeline.job import Request
 from lipmotion.printable import printable
-
-if TYPE_CHECKING:
-    from lipmotion.pipeline.edit_files import EditFile
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -35,7 +31,7 @@ def run(options: argparse.Namespace) -> None:
     """Read or begin the file, add the edits, try them out, and write it."""
     from lipmotion.cli.terminal.progress import reporting
     from lipmotion.errors import InputError
-    from lipmotion.pipeline.edit_files import read_edits, write_edits
+    from lipmotion.pipeline.edit_files import begun, read_edits, write_edits
     from lipmotion.pipeline.edits import Edits
 
     with reporting(options) as report:
@@ -43,7 +39,8 @@ def run(options: argparse.Namespace) -> None:
             raise InputError(f"{options.file}: no such file; begin one: lipmotion edit {options.file} --of RECORDING")
         if options.of is not None and options.file.exists():
             raise InputError(f"{options.file}: exists; add edits without --of, or delete it to begin again")
-        file = _begun(options) if options.of is not None else read_edits(options.file)
+        asked = part_of(options, Request(), recording=options.of)
+        file = begun(asked) if options.of is not None else read_edits(options.file)
         before = file.edits.steps
         if not 0 <= options.undo <= len(before):
             raise InputError(f"--undo {options.undo}, required 0 to {len(before)}: there are no more edits")
@@ -60,12 +57,3 @@ def run(options: argparse.Namespace) -> None:
         phones = [[span.start_s, span.end_s, span.label.phone, span.label.word] for span in units]
         text = "\n".join(map(printable, lines)) if lines else printable(str(options.file))
         report.finish(text, files=[str(options.file)], edits=list(edits.sentences), phones=phones)
-
-
-def _begun(options: argparse.Namespace) -> EditFile:
-    """Return a file without edits of the recording, whose phones are recognised or aligned now."""
-    from lipmotion.pipeline.edit_files import begun
-    from lipmotion.pipeline.understand.read_request import read_request
-
-    asked = part_of(options, Request(), recording=options.of)
-    return begun(read_request(asked), options.of, asked.model, asked.lexicon)

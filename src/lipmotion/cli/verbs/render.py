@@ -79,10 +79,9 @@ def _replay(job: OpenedJob, path: Path, monitor: Monitor) -> None:
     asked, edits = job.job.request, read_edits(path)
     if asked.recording or asked.units:
         raise InputError(f"{path}: names its recording and holds its phones; leave --sound and --units out")
-    if edits.recording is None:
+    if edits.named.recording is None:
         raise InputError(f"{path}: names no recording; give it: lipmotion animate RECORDING --edits {path}")
-    request = replace(asked, recording=edits.recording, edits=path, model=edits.model, lexicon=edits.lexicon)
-    opened(replace(job.job, request=replace(request, **edits.options))).run(monitor=monitor)
+    opened(replace(job.job, request=replace(edits.named, edits=path))).run(monitor=monitor)
 
 
 SILENT_HZ = 16_000
