@@ -24,7 +24,13 @@ from lipmotion.motion.closure import Closure
 from lipmotion.motion.frame_labels import StateLayout
 from lipmotion.motion.generation import LearnedMotion
 from lipmotion.motion.limits import MotionLimits, check_poses, limits_of
-from lipmotion.motion.predictors import Predictor, names_of_predictors, predictor_arrays, predictor_from_arrays
+from lipmotion.motion.predictors import (
+    ADDED,
+    Predictor,
+    names_of_predictors,
+    predictor_arrays,
+    predictor_from_arrays,
+)
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.variance_scaling import VarianceScaling
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
@@ -100,7 +106,8 @@ def model_from_arrays(arrays: Arrays, layout: Callable[[UnitSet], StateLayout], 
         emission = emission_from_arrays(arrays, layout(unit_set), space.dimensions)
         factors = checked_arrays(arrays, VARIANCE_FACTORS, Q=space.dimensions)["gain"]
         recogniser, network = recogniser_from_arrays(arrays), predictor_from_arrays(arrays, space.dimensions)
-        share = float(checked_arrays(arrays, SHARE)["network_share"][0]) if "network_share" in arrays else NETWORK_SHARE
+        stored = "network_share" in arrays or any(name.startswith(ADDED) for name in others)  # not in former models
+        share = float(checked_arrays(arrays, SHARE)["network_share"][0]) if stored else NETWORK_SHARE
         model = TrajectoryModel(unit_set, space, emission, factors, closure, recogniser, network, prior, share)
         check_poses(model.poses, space, closure)
         return model
