@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.types import Motion, Timeline, Unit
 from lipmotion.types.motion import between_frames
-from lipmotion.units import LIP_CLOSING
+from lipmotion.units import closing_phones
 
 Curve = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -79,8 +79,8 @@ def closures(motion: Motion, units: Timeline[Unit]) -> list[ClosedPhone]:
     if "opening" not in motion.names:
         return []
     gap, found = gap_in(motion), dict[int, ClosedPhone]()
-    for span in units:
-        if span.label.phone in LIP_CLOSING:
+    for span, closing in zip(units, closing_phones(units), strict=True):
+        if closing:
             first = max(int(np.ceil(span.start_s * motion.rate_hz - 1e-6)), 0)
             stop = min(int(np.floor(span.end_s * motion.rate_hz + 1e-6)) + 1, len(gap))
             if first >= stop:  # a phone between two frames: the nearer one

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.articulation.contact import CLOSED_OPENING
 from lipmotion.articulation.rest import rest_frames
 from lipmotion.types import EYE_DISTANCE, Generation, Motion, Span, Timeline, Unit
-from lipmotion.units import LIP_CLOSING, is_silent
+from lipmotion.units import closing_phones, is_silent
 
 Curve = NDArray[np.float64]
 
@@ -111,16 +111,12 @@ def with_pauses(generation: Generation, style: str, pinned_s: Sequence[float] = 
 def _breaths(units: Timeline[Unit], time_s: Curve) -> Curve:
     """Return the least opening of lips that part for a breath, in eye distances [shape=(T,)]; 0 away from breaths."""
     least = np.zeros(len(time_s))
-    spoken = [span for span in units if not is_silent(span.label.phone)]
-    begins_s = np.array([span.start_s for span in spoken])
+    phones = zip(units, closing_phones(units), strict=True)
+    spoken = [(span, closing) for span, closing in phones if not is_silent(span.label.phone)]
+    begins_s = np.array([span.start_s for span, _ in spoken])
     for start_s, end_s, _, before_speech in pauses(units):
         following = int(np.searchsorted(begins_s, end_s - 1e-6))
-        if (
-            before_speech
-            and end_s - start_s >= LEAST_BREATH_S
-            and following < len(spoken)
-            and spoken[following].label.phone not in LIP_CLOSING
-        ):
+        if before_speech and end_s - start_s >= LEAST_BREATH_S and following < len(spoken) and not spoken[following][1]:
             near = slice(*np.searchsorted(time_s, (end_s - OPENING_S, end_s + OPENING_S)))
             share = np.clip(1 - np.abs(time_s[near] - end_s + BREATH_S) / (OPENING_S - BREATH_S), 0, 1)
             least[near] = np.maximum(least[near], BREATH_GAP * share * share * (3 - 2 * share))

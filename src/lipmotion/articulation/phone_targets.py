@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
-from lipmotion.units import LIP_CLOSING
+from lipmotion.units import LIP_CLOSING, closing_phones
 
 Curve = NDArray[np.float64]
 GESTURES = ("tongue", "lip_tuck", "protrusion", "spread", "lip_press", "teeth")
@@ -146,8 +146,8 @@ def with_gestures(motion: Motion, units: Timeline[Unit], names: Collection[str] 
 def _curve(name: str, units: Timeline[Unit], time_s: Curve) -> Curve:
     default, targets = _TARGETS[name]
     weighted, weights = np.full(len(time_s), 1e-6 * default.begin), np.full(len(time_s), 1e-6)
-    for span in units:
-        target = targets.get(span.label.phone, default)
+    for span, closing in zip(units, closing_phones(units), strict=True):
+        target = targets.get(LIP_CLOSING[0] if closing else span.label.phone, default)
         first, last = np.searchsorted(
             time_s, (span.start_s - REACH * target.width_s, span.end_s + REACH * target.width_s)
         )

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.types import FRAME_RATE_HZ, Example, Timeline, Unit
-from lipmotion.units import LIP_CLOSING
+from lipmotion.units import closing_phones
 
 OPENING = "opening"
 REACH_S = 0.02
@@ -45,9 +45,9 @@ def closable_ranges(
                     do not; its middle always does
     """
     ranges = []
-    for span in units:
+    for span, closing in zip(units, closing_phones(units), strict=True):
         label = span.label
-        if label.phone in LIP_CLOSING or (not label.phone and label.unit in closing_units):
+        if closing or (not label.phone and label.unit in closing_units):
             inside_s = min(-reach_s, span.duration_s / 2)
             first = max(int(np.ceil((span.start_s + inside_s) * FRAME_RATE_HZ - 1e-6)), 0)
             stop = min(int(np.floor((span.end_s - inside_s) * FRAME_RATE_HZ + 1e-6)) + 1, frames)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from lipmotion.errors import shortened
+from lipmotion.types import Timeline, Unit
 from lipmotion.units.visemes import VISEME_OF, VISEMES
 
 SILENCE = "sil"
@@ -71,6 +72,15 @@ SIMILAR_PHONES: dict[str, tuple[str, ...]] = {
 def is_silent(phone: str) -> bool:
     """Return whether a phone is silence or a pause."""
     return phone in (SILENCE, PAUSE)
+
+
+def closing_phones(units: Timeline[Unit]) -> list[bool]:
+    """Return for each phone in time whether the lips meet in it. The rule of every part that closes lips:
+
+    contact (``articulation.contact``), lips and tongue by phones (``articulation.phone_targets``), breaths in pauses,
+    the closures of engines (``motion.closure``), cues (``export.cues``).
+    """
+    return [span.label.phone in LIP_CLOSING for span in units]
 
 
 def unknown_phone_message(phone: str, where: str = "") -> str:

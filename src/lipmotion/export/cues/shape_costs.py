@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lipmotion.export.cues.cue_shapes import SHAPES, PhoneShapes, shapes_of_phone
 from lipmotion.types import Generation, Motion, Span, Timeline, Unit
-from lipmotion.units import LIP_CLOSING, SILENCE, VISEMES, is_silent
+from lipmotion.units import SILENCE, VISEMES, closing_phones, is_silent
 
 Array = NDArray[np.float64]
 COST_RATE_HZ = 24.0
@@ -126,8 +126,9 @@ def _relative_spread(width: Array, nominal: Array, voiced: Array) -> Array:
 
 def _required_shapes(generation: Generation, frames: int, fps: float) -> Iterator[tuple[int, str, float]]:
     """Yield the frame in which each p b m and f v must be shown, its shape, and the cost of other shapes."""
-    for span in generation.units:
-        if span.label.phone in LIP_CLOSING:
+    units = generation.units
+    for span, closing in zip(units, closing_phones(units), strict=True):
+        if closing:
             yield min(int(_least_open_s(span, generation.motion) * fps), frames - 1), "A", UNCLOSED_COST
         elif span.label.phone in LIP_BITING:
             yield min(int(_least_open_s(span, generation.motion) * fps), frames - 1), "G", UNBITTEN_COST
