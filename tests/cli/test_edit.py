@@ -25,7 +25,8 @@ def test_what_is_edited_is_replayed_by_all_verbs(
     of = ("--of", speech, "--model", toy_model_file, "--recogniser", "own")
     done = run("edit", file, "phone 3 is p", *of, "--list")
     assert done.code == 0
-    assert any(line.startswith("   3 ") and " p " in line for line in done.out)
+    assert any(line.startswith("   3 ") and line.split()[3:4] == ["p"] for line in done.out)
+    assert run("edit", file, "--machine-readable").code == 0
     assert run("edit", file, "pin jawOpen 0.7 at 1.2", "set intensity 1.2", "remove phone 99").code == 3
     assert json.loads(file.read_text())["steps"] == ["phone 3 is p"]  # none of them, for one is not possible
     assert run("edit", file, "pin jawOpen 0.7 at 1.2", "set intensity 1.2").code == 0

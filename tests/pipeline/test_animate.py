@@ -143,7 +143,10 @@ def test_pins_are_met_exactly(move: Animate, toy_sentence: ToySentence) -> None:
 
 def test_a_pin_that_cannot_be_met(move: Animate) -> None:
     for pin, message in (
-        (Pin(0.5, "jaw", 0.1), "cannot pin 'jaw'; channels that can be pinned: opening, width, outer"),
+        (
+            Pin(0.5, "jaw", 0.1),
+            r"cannot pin 'jaw' \(is it jawOpen\?\); channels that can be pinned: opening, width, outer",
+        ),
         (Pin(9.0, "opening", 0.1), r"pin at 9.0 s lies outside the recording \(0 to 2.76 s\)"),
         (Pin(-0.1, "opening", 0.1), "pin at -0.1 s lies outside"),
         (Pin(0.5, "opening", float("nan")), "has the value nan, required a finite number"),

@@ -42,7 +42,7 @@ def with_edited_curves(motion: Motion, units: Timeline[Unit], edits: Sequence[Pi
         column = motion.column(edit.channel)
         is_weight = motion.channels[column].unit == WEIGHT
         if isinstance(edit, Pin):
-            pins.append((_pinned_frame(edit, motion, is_weight=is_weight), column, edit.value))
+            pins.append((pinned_frame(edit, motion, is_weight=is_weight), column, edit.value))
             continue
         still = 0.0 if is_weight else float(np.median(values[rest, column]))
         factor = 1 + (edit.factor - 1) * span_weight(motion.time_s, edit.start_s, edit.end_s, GAIN_EDGE_S)
@@ -69,8 +69,12 @@ def bend_through_pins(values: Curve, pins: Sequence[tuple[int, int, float]], rea
         values[frame, column] = value
 
 
-def _pinned_frame(pin: Pin, motion: Motion, *, is_weight: bool) -> int:
-    """Return the frame of a pin. Raises InputError: outside the motion, or a value that is not possible."""
+def pinned_frame(pin: Pin, motion: Motion, *, is_weight: bool) -> int:
+    """Return the frame of a pin in motion.
+
+    is_weight : whether its curve is a weight, 0 to 1
+    Raises InputError: a time outside the motion, or a value that is not possible.
+    """
     if not np.isfinite(pin.value) or (is_weight and not 0 <= pin.value <= 1):
         required = "0 to 1" if is_weight else "a finite number"
         raise InputError(f"pin at {pin.time_s} s sets {pin.channel} to {pin.value}, required {required}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.storage.toml_text import read_toml
 from lipmotion.types import Outlook, Timeline, Unit
 
+LOG = logging.getLogger("lipmotion")
 FORMAT, VERSION = "lipmotion.edits", 1
 JSON, TOML = SUFFIXES = (".json", ".toml")
 """Suffixes of files of edits."""
@@ -53,10 +55,14 @@ class EditFile:
             if self.named.recording is None:
                 raise InputError("the edits name no recording; give it: lipmotion animate RECORDING --edits FILE")
             asked = read_request(self.named)
-        if self.units is None or asked.units is not None or asked.transcript is not None:
-            return Session(asked, model=model or load_model(self.named.model), **more)
-        request = replace(asked, units=self.units)
-        return Session(request, model=model or load_model(self.named.model), outlook=self.outlook, **more)
+        model = model or load_model(self.named.model)
+        if self.units is None:
+            return Session(asked, model=model, **more)
+        if asked.units is not None or asked.transcript is not None:
+            LOG.warning("the phones that were edited are not used: words or phones are given; numbers may mean others")
+            return Session(asked, model=model, **more)
+        request, lasts_s = replace(asked, units=self.units), max((span.end_s for span in self.units), default=0.0)
+        return Session(request, model=model, outlook=self.outlook, lasts_s=lasts_s, **more)
 
 
 def begun(asked: Request) -> EditFile:
@@ -75,7 +81,9 @@ def edit_file(edits: EditFile | Edits | str | Path | None) -> EditFile:
 
 def is_edit_file(path: Path) -> bool:
     """Return whether a file is one of edits, by its suffix and how it begins."""
-    if path.suffix.lower() not in SUFFIXES or not path.is_file():
+    if path.suffix.lower() == TOML:
+        return True  # nothing else that is read ends so
+    if path.suffix.lower() != JSON or not path.is_file():
         return False
     with path.open("rb") as file:
         return FORMAT.encode() in file.read(100)

@@ -256,9 +256,42 @@ class LockStep(Step):
         if not self.start_s < self.end_s:
             raise InputError(f"{str(self)!r}: required an end after the start")
 
+    def holds(self, edit: Pin | Gain) -> bool:
+        """Return whether a pin or all of a gain lies in the locked span."""
+        if isinstance(edit, Pin):
+            return self.covers(edit.time_s, edit.time_s)
+        return self.start_s <= edit.start_s and edit.end_s <= self.end_s
+
     def covers(self, start_s: float, end_s: float) -> bool:
         """Return whether some time lies in the locked span."""
         return start_s <= self.end_s - 1e-9 and end_s >= self.start_s + 1e-9
+
+
+@dataclass(frozen=True)
+class UnlockStep(Step):
+    """A lock of the same times holds no longer, and holds nothing of what it held."""
+
+    form: ClassVar[str] = "unlock from {start_s} to {end_s}"
+    start_s: float
+    end_s: float
+
+
+def locks(steps: Sequence[Step]) -> dict[int, LockStep]:
+    """Return the locks that hold after some edits, by their places among these.
+
+    Raises InputError: what is taken out was not locked.
+    """
+    held: dict[int, LockStep] = {}
+    for place, step in enumerate(steps):
+        if isinstance(step, LockStep):
+            held[place] = step
+        elif isinstance(step, UnlockStep):
+            same = [n for n, lock in held.items() if (lock.start_s, lock.end_s) == (step.start_s, step.end_s)]
+            if not same:
+                found = "; ".join(map(repr, map(str, held.values()))) or "nothing"
+                raise InputError(f"{str(step)!r}: locked is {found}")
+            del held[same[-1]]
+    return held
 
 
 @dataclass(frozen=True)
@@ -300,7 +333,7 @@ def _names(kind: type[Any]) -> tuple[str, ...]:
 
 STEPS: tuple[type[Step], ...] = (
     WordIs, PhoneIs, PhoneBegins, PhoneEnds, PhoneRemoved, PhoneInserted,
-    PinStep, GainStep, CurveGainStep, LockStep, SetStep,
+    PinStep, GainStep, CurveGainStep, LockStep, UnlockStep, SetStep,
 )  # fmt: skip
 """All edits that a sentence can state."""
 FORMS = tuple(re.sub(r"{(\w+?)(?:_s)?}", lambda name: name[1].upper(), step.form) for step in STEPS)
@@ -315,11 +348,16 @@ def step_of(sentence: str) -> Step:
     >>> str(step_of("pin  jawOpen .2 at 1"))
     'pin jawOpen 0.2 at 1.0'
     """
+    if not isinstance(sentence, str):
+        raise InputError(f"an edit is {shortened(repr(sentence))}, required a sentence: {FORMS[0]!r}")
     for kind in STEPS:
         step = kind.parsed(sentence)
         if step is not None:
             return step
-    raise InputError(f"{shortened(repr(sentence))} is no edit; required one of: {'; '.join(FORMS)} (seconds)")
+    first = sentence.split()[:1]
+    near = [form for form in FORMS if form.split()[:1] == first] or FORMS
+    required = f"required {'one of: ' if len(near) > 1 else ''}{'; '.join(near)}"
+    raise InputError(f"{shortened(repr(sentence))} is no edit; {required} (whole numbers, seconds as 1.24, one word)")
 
 
 @dataclass(frozen=True)

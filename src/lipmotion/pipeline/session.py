@@ -6,14 +6,16 @@ Each stage is kept by the edits that it depends on.
 
 from __future__ import annotations
 
+import re
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterable
 from dataclasses import replace
+from difflib import get_close_matches
 from pathlib import Path
 from threading import RLock
 from typing import Any, Generic, TypeVar
 
-from lipmotion.articulation.curve_edits import with_edited_curves, with_gain, with_locked
+from lipmotion.articulation.curve_edits import pinned_frame, with_edited_curves, with_gain, with_locked
 from lipmotion.articulation.pauses import with_pauses
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
 from lipmotion.articulation.symmetry import symmetrical
@@ -26,7 +28,17 @@ from lipmotion.meshes.fitting.facial_animation import PARAMETERS
 from lipmotion.meshes.fitting.oculus_visemes import VISEME_CHANNELS
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS
 from lipmotion.motion.speaker_maps import SpeakerMap
-from lipmotion.pipeline.edits import CurveStep, Edits, LockStep, PhoneStep, PinStep, Step, WordIs, with_span
+from lipmotion.pipeline.edits import (
+    CurveStep,
+    Edits,
+    LockStep,
+    PhoneStep,
+    Step,
+    UnlockStep,
+    WordIs,
+    locks,
+    with_span,
+)
 from lipmotion.pipeline.generate.generation_for import generate_for
 from lipmotion.pipeline.generate.outlook import outlook_of
 from lipmotion.pipeline.generate.prior import with_prior
@@ -51,6 +63,7 @@ from lipmotion.types import (
     Gain,
     Generation,
     Monitor,
+    Motion,
     Outlook,
     Pin,
     Progress,
@@ -68,8 +81,12 @@ UNDERSTANDING = 0.9
 """The share of the work that is recognition, in reports; the rest is the generation of motion."""
 MODELLED = ("opening", "width", "outer")
 """Channels, beside weights, that models generate as they are, so that motion runs smoothly through their pins."""
-KNOWN_CURVES = (*ARKIT_MOUTH, *ARKIT_OTHERS, *VISEME_CHANNELS, *(row[1] for row in PARAMETERS))
+WEIGHTS = (*ARKIT_MOUTH, *ARKIT_OTHERS, *VISEME_CHANNELS)
+KNOWN_CURVES = (*WEIGHTS, *(row[1] for row in PARAMETERS))
 """Curves that outputs may have, whatever the motion has: ARKit's blendshapes, visemes, MPEG-4's parameters."""
+LIP_POINT = re.compile(r"[xyz]_\d+")
+LATE_S = 0.1
+"""Seconds by which times of edits may lie after the end; editing programs round times."""
 KEPT = 4
 """Results that each stage keeps: the last ones that were asked for."""
 INTERACTIVE = 3
@@ -103,6 +120,7 @@ class Session:
     meanwhile : is called while these processes work, where there are several
     curves    : names of further curves that outputs will have: controls of a rig, blendshapes of a character
     outlook   : what to expect of the motion, where it is known; None: it follows from the speech
+    lasts_s   : duration of the recording that was edited, in seconds: another one is refused; None: not known
     A session may be used by several threads, one at a time; several sessions do not disturb one another.
     Raises InputError: the model knows no such speaker.  Raises ModelFormatError: as ``load_model``.
 
@@ -113,7 +131,7 @@ class Session:
     0.02
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913
         self,
         speech: SpeechInput,
         *,
@@ -123,6 +141,7 @@ class Session:
         meanwhile: Callable[[], None] | None = None,
         curves: Iterable[str] = (),
         outlook: Outlook | None = None,
+        lasts_s: float | None = None,
     ) -> None:
         self.request: SpeechRequest = request_of(speech)
         self.model = model if isinstance(model, Model) else load_model(model)
@@ -137,7 +156,7 @@ class Session:
         self._delivered: _Kept[Generation] = _Kept()
         self._faces: _Kept[DrawsSingly] = _Kept()
         self._drawn: _Kept[DrawnMotion[Any]] = _Kept()
-        self._motions = 0
+        self._lasts_s, self._motions = lasts_s, 0
         self._one_at_a_time = RLock()
 
     def units(self, edits: Edits = NO_EDITS) -> Timeline[Unit]:
@@ -203,6 +222,11 @@ class Session:
 
         def first() -> UnderstoodSpeech:
             self._speaker()  # what is refused is refused before the long work
+            if self._lasts_s is not None and abs(self._audio().duration_s - self._lasts_s) > LATE_S:
+                raise InputError(
+                    f"the recording lasts {self._audio().duration_s:.2f} s, the edited one {self._lasts_s:.2f} s: the "
+                    "edits are of another recording; make some of this one: lipmotion edit FILE --of RECORDING"
+                )
             return understood_speech(self.model, self.request, self._work, self._monitor)
 
         return self._understood.once(None, first)
@@ -212,20 +236,20 @@ class Session:
 
     def _edited_units(self, steps: tuple[Step, ...]) -> Timeline[Unit]:
         """Return the phones in time after some edits; each edit sees those that the ones before it left."""
-        ours = tuple(step for step in steps if isinstance(step, PhoneStep | WordIs | LockStep))
-        while ours and isinstance(ours[-1], LockStep):
+        ours = tuple(step for step in steps if isinstance(step, PhoneStep | WordIs | LockStep | UnlockStep))
+        while ours and isinstance(ours[-1], LockStep | UnlockStep):
             ours = ours[:-1]
         if not ours:
             return self._recording().speech.units
         return self._units.once(ours, lambda: self._changed_units(ours))
 
-    def _changed_units(self, ours: tuple[PhoneStep | WordIs | LockStep, ...]) -> Timeline[Unit]:
+    def _changed_units(self, ours: tuple[PhoneStep | WordIs | LockStep | UnlockStep, ...]) -> Timeline[Unit]:
         before, step = self._edited_units(ours[:-1]), ours[-1]
-        if isinstance(step, LockStep):
+        if isinstance(step, LockStep | UnlockStep):
             return before
         after = self._reworded(before, step) if isinstance(step, WordIs) else step.applied(before)
         changed = {*before} ^ {*after}
-        for lock in (each for each in ours if isinstance(each, LockStep)):
+        for lock in locks(ours).values():
             if any(lock.covers(span.start_s, span.end_s) for span in changed):
                 raise InputError(f"{str(step)!r} changes what is locked ({str(lock)!r}); take the lock out first")
         return after
@@ -261,15 +285,12 @@ class Session:
     def _with_locks(self, steps: tuple[Step, ...]) -> Generation:
         """Return the motion after some edits, with locked spans as they were when they were locked."""
         self._edited_units(steps)  # refuses phones that change what is locked
-        generation = self._with_curves(tuple(step for step in steps if not isinstance(step, LockStep)))
-        for place, lock in enumerate(steps):
-            if not isinstance(lock, LockStep):
-                continue
+        generation = self._with_curves(tuple(step for step in steps if not isinstance(step, LockStep | UnlockStep)))
+        for place, lock in locks(steps).items():
             for later in steps[place + 1 :]:
-                if isinstance(later, PinStep) and lock.covers(later.time_s, later.time_s):
+                if isinstance(later, CurveStep) and lock.holds(later.edit):
                     raise InputError(f"{str(later)!r} lies in what is locked ({str(lock)!r}); take the lock out first")
-            before = self._before(steps[:place])
-            generation = with_locked(generation, before, lock.start_s, lock.end_s)
+            generation = with_locked(generation, self._before(steps[:place]), lock.start_s, lock.end_s)
         return generation
 
     def _before(self, steps: tuple[Step, ...]) -> Generation:
@@ -291,14 +312,27 @@ class Session:
             generation = with_motion(generation, with_gestures(generation.motion, generation.units, asked))
         motion = with_edited_curves(generation.motion, generation.units, curves)
         others = tuple(edit for edit in curves if edit.channel not in motion.names)
-        for edit in others:
-            if edit.channel not in {*KNOWN_CURVES, *self._curves}:
-                what, names = "pin" if isinstance(edit, Pin) else "change", ", ".join((*motion.names, *GESTURES))
-                raise InputError(
-                    f"cannot {what} {shortened(repr(edit.channel))}; channels that can be pinned: {names}; curves: "
-                    f"{', '.join(KNOWN_CURVES)}"
-                )
+        for edit in edits:
+            self._check_edit(edit, motion)
         return replace(generation, motion=motion, curve_edits=others)
+
+    def _check_edit(self, edit: Pin | Gain, motion: Motion) -> None:
+        """Raise InputError if an edit is of no curve that is known, or of no time of the recording."""
+        known = (*motion.names, *GESTURES, *KNOWN_CURVES, *self._curves)
+        if edit.channel and edit.channel not in known:
+            what, lower = "pin" if isinstance(edit, Pin) else "change", {name.lower(): name for name in known}
+            near = get_close_matches(edit.channel.lower(), lower, 1)
+            others = ", ".join(name for name in (*motion.names, *GESTURES) if not LIP_POINT.fullmatch(name))
+            named = shortened(repr(edit.channel)) + (f" (is it {lower[near[0]]}?)" if near else "")
+            raise InputError(
+                f"cannot {what} {named}; channels that can be pinned: {others}; lip points, as y_14; curves, as jawOpen, "
+                "viseme_PP, open_jaw"
+            )
+        last_s = (len(motion.values) - 1) / motion.rate_hz
+        if isinstance(edit, Pin):
+            pinned_frame(edit, motion, is_weight=edit.channel in WEIGHTS)
+        elif not 0 <= edit.start_s <= edit.end_s <= last_s + LATE_S:
+            raise InputError(f"gain from {edit.start_s} to {edit.end_s} s, required times from 0 to {last_s:.2f} s")
 
     def _phone_steps(self, steps: tuple[Step, ...]) -> tuple[Step, ...]:
         return tuple(step for step in steps if isinstance(step, PhoneStep | WordIs))

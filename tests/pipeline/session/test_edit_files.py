@@ -31,6 +31,7 @@ SENTENCES = (
     "gain 1.3 from 1.0 to 2.0",
     "gain jawOpen 0.8 from 1.0 to 2.0",
     "lock from 1.0 to 1.5",
+    "unlock from 1.0 to 1.5",
     "set intensity 1.2",
 )
 
@@ -45,7 +46,9 @@ def test_every_kind_of_edit_is_a_sentence() -> None:
 @pytest.mark.parametrize(
     ("sentence", "message"),
     [
-        ("phone twelve is p", "is no edit; required one of: word NUMBER is WORD"),
+        ("phone twelve is p", "is no edit; required one of: phone NUMBER is PHONE; phone NUMBER begins"),
+        ("jump", "is no edit; required one of: word NUMBER is WORD"),
+        ("pin opening 1,2 at 1", "is no edit; required pin CHANNEL VALUE at TIME"),
         ("pin opening nan at 1", "is no edit"),
         ("gain 9 from 0 to 1", "the gain is 9, required 0 to 3"),
         ("lock from 2 to 1", "required an end after the start"),

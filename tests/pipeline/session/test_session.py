@@ -15,6 +15,7 @@ from lipmotion.articulation.delivery import Delivery
 from lipmotion.errors import InputError
 from lipmotion.faces.registry import staged_face
 from lipmotion.pipeline import session as session_module
+from lipmotion.pipeline.edit_files import EditFile
 from lipmotion.pipeline.edits import Edits
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import Model
@@ -28,7 +29,7 @@ from lipmotion.pipeline.outputs.write import write
 from lipmotion.pipeline.session import Session
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.testing.toy import ToySentence
-from lipmotion.types import Generation, Timeline, Unit
+from lipmotion.types import Audio, Timeline, Unit
 
 
 @pytest.fixture
@@ -153,9 +154,18 @@ def test_a_locked_span_stays_as_it_was(session: Session) -> None:
     assert jump < 2 * np.abs(np.diff(session.generated(edited("gain 2 from 0.2 to 2.0")).motion["opening"])).max()
     assert LOCK_EDGE_S > 0
     number = next(n for n, span in enumerate(session.units(), 1) if span.start_s > 0.6)
-    for refused in (f"phone {number} is p", "pin opening 0.2 at 0.7"):
+    for refused in (f"phone {number} is p", "pin opening 0.2 at 0.7", "gain 2 from 0.7 to 0.8"):
         with pytest.raises(InputError, match=r"locked \('lock from 0.6 to 1.0'\); take the lock out first"):
             session.generated(first.then(refused))
+    freed = session.generated(later.then("unlock from 0.6 to 1.0", "pin opening 0.2 at 0.7"))
+    assert freed.motion["opening"][70] == pytest.approx(0.2)
+
+
+def test_edits_of_another_recording_are_refused(session: Session, toy_model: Model, request_: SpeechRequest) -> None:
+    file = EditFile(edited("phone 3 is p"), units=session.units())
+    half = Audio(request_.recording.samples[:16_000], 16_000)  # type: ignore[union-attr]
+    with pytest.raises(InputError, match=r"the recording lasts 1\.00 s, the edited one .* of another recording"):
+        animate(SpeechRequest(half), model=toy_model, edits=file)
 
 
 @pytest.mark.parametrize(
@@ -167,16 +177,15 @@ def test_a_locked_span_stays_as_it_was(session: Session) -> None:
         ("phone 2 ends 99", "required .* between the phones beside it"),
         ("insert p from 2 to 1", r"required at least 0\.01 s within"),
         ("pin jaw 0.1 at 0.5", "cannot pin 'jaw'"),
-        ("pin jawOpen 0.1 at 99", None),
+        ("pin jawOpen 0.1 at 99", "outside the recording"),
+        ("pin jawOpen 5 at 1", "sets jawOpen to 5.0, required 0 to 1"),
+        ("pin jawopen 0.1 at 1", r"'jawopen' \(is it jawOpen\?\)"),
+        ("gain 2 from 0 to 99", "required times from 0 to"),
+        ("unlock from 1.0 to 2.0", "locked is nothing"),
         ("gain lips 2 from 0 to 1", "cannot change 'lips'"),
     ],
 )
-def test_edits_that_are_not_possible(session: Session, sentence: str, message: str | None) -> None:
-    if message is None:  # of a curve that outputs have: they say so
-        found: Generation = session.generated(edited(sentence))
-        with pytest.raises(InputError, match="outside the recording"):
-            curves_of(found.motion, found.units, "arkit", edits=found.curve_edits)
-        return
+def test_edits_that_are_not_possible(session: Session, sentence: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
         session.generated(edited(sentence))
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 OPTIONS = ("--machine-readable", "--machineReadable")
 STATUS_VERBS, LINES_VERBS = (
     ("cues",),
-    ("animate", "batch", "render", "face", "speak", "words", "corpus", "train", "evaluate", "experiment"),
+    ("animate", "batch", "render", "edit", "face", "speak", "words", "corpus", "train", "evaluate", "experiment"),
 )
 
 STANDARD_OUTPUT = "-"

@@ -33,6 +33,7 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.errors import InputError
     from lipmotion.pipeline.edit_files import begun, read_edits, write_edits
     from lipmotion.pipeline.edits import Edits
+    from lipmotion.units import words_in_time
 
     with reporting(options) as report:
         if options.of is None and not options.file.exists():
@@ -43,7 +44,7 @@ def run(options: argparse.Namespace) -> None:
         file = begun(asked) if options.of is not None else read_edits(options.file)
         before = file.edits.steps
         if not 0 <= options.undo <= len(before):
-            raise InputError(f"--undo {options.undo}, required 0 to {len(before)}: there are no more edits")
+            raise InputError(f"--undo {options.undo}, required 0 to {len(before)}: the number of edits")
         edits = Edits(before[: len(before) - options.undo]).then(*options.sentences)
         session = file.session()
         units = session.generated(edits).units if edits.steps else session.units()
@@ -53,7 +54,14 @@ def run(options: argparse.Namespace) -> None:
         if options.list:
             lines.append("")
             spans = enumerate(units, 1)
-            lines += [f"{n:4} {s.start_s:8.3f} {s.end_s:8.3f}  {s.label.phone:4} {s.label.word}" for n, s in spans]
+            words = iter(enumerate((span for span in words_in_time(units) if span.label), 1))
+            number, word = next(words, (0, None))
+            for n, span in spans:
+                begins = word is not None and span.start_s == word.start_s
+                said = f"  word {number} {word.label}" if begins and word is not None else ""
+                lines.append(f"{n:4} {span.start_s:8.3f} {span.end_s:8.3f}  {span.label.phone:4}{said}".rstrip())
+                if begins:
+                    number, word = next(words, (0, None))
         phones = [[span.start_s, span.end_s, span.label.phone, span.label.word] for span in units]
         text = "\n".join(map(printable, lines)) if lines else printable(str(options.file))
         report.finish(text, files=[str(options.file)], edits=list(edits.sentences), phones=phones)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -33,6 +34,7 @@ from lipmotion.types import Generation, Motion, Prosody
 if TYPE_CHECKING:
     from lipmotion.pipeline.model import Model
 
+LOG = logging.getLogger("lipmotion")
 AnyFace = str | Path | Face | FilmedFace
 
 
@@ -91,6 +93,9 @@ class ShownDrawing(ShownFace):
 
     def write_video(self, path: Path, performance: Performance) -> None:  # noqa: D102
         settings, played = performance.settings, performance.once(sound_track)
+        if performance.generation.curve_edits and self.character is None:
+            named = ", ".join(dict.fromkeys(edit.channel for edit in performance.generation.curve_edits))
+            LOG.warning("%s: the face has no curves, so changed %s does not show; pin the opening", path, named)
         seen, prosody = performance.once(_seen), performance.once(_played_prosody)
         monitor, hertz = performance.monitor, _frame_rate(settings)
         write_drawn_face(path, seen, played, hertz, self.face, settings.staging, monitor, prosody)

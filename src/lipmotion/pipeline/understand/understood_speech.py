@@ -20,6 +20,7 @@ from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.transcribe import read_transcript, transcribe, warn_of_guesses
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.f0 import log_f0
+from lipmotion.speech.features.mfcc import HOP
 from lipmotion.speech.features.speaker_similarity import speaker_similarity
 from lipmotion.speech.recognition.agreement import TranscriptFit
 from lipmotion.speech.recognition.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
@@ -146,7 +147,13 @@ def aligned_within(
     words = words_of(word)
     warn_of_guesses(words, lexicon)
     piece = audio.stretch(first, stop)
+    if stop > len(audio.samples) // HOP:
+        raise AlignmentError(f"the recording ends at {audio.duration_s:.2f} s")
     spans = list(phones.align(piece, piece.mfcc(), words, lexicon).shifted(start_s))
+    while len(spans) > 1 and is_silent(spans[0].label.phone):
+        del spans[0]
+    while len(spans) > 1 and is_silent(spans[-1].label.phone):
+        del spans[-1]
     spans[0], spans[-1] = replace(spans[0], start_s=start_s), replace(spans[-1], end_s=end_s)
     return spans
 
