@@ -325,8 +325,8 @@ class Session:
             others = ", ".join(name for name in (*motion.names, *GESTURES) if not LIP_POINT.fullmatch(name))
             named = shortened(repr(edit.channel)) + (f" (is it {lower[near[0]]}?)" if near else "")
             raise InputError(
-                f"cannot {what} {named}; channels that can be pinned: {others}; lip points, as y_14; curves, as jawOpen, "
-                "viseme_PP, open_jaw"
+                f"cannot {what} {named}; channels that can be pinned: {others}; lip points, as y_14; curves, as "
+                "jawOpen, viseme_PP, open_jaw"
             )
         last_s = (len(motion.values) - 1) / motion.rate_hz
         if isinstance(edit, Pin):
