@@ -57,7 +57,7 @@ def measured(audio: Audio) -> dict[str, float]:
     found = {"first motion": timed(session.generated)}
     warm = [timed(lambda n=n: session.generated(lipmotion.Edits().then(f"pin width 1 at {n + 1}"))) for n in range(4)]
     found["the slowest of the first edits, which loads kernels"] = max(warm)
-    found["nothing: undo"] = timed(session.generated)
+    found["undo of the last edit"] = timed(lambda: session.generated(lipmotion.Edits().then("pin width 1 at 3")))
     for kind, edits in sentences(session, audio.duration_s).items():
         first, times_s = lipmotion.Edits(), []
         for sentence in edits:
