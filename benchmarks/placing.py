@@ -23,8 +23,9 @@ from poisson import DirectSolver, error
 from scipy.ndimage import binary_erosion, distance_transform_edt
 
 from lipmotion.appearance.mouth_region import HEIGHT, WIDTH
-from lipmotion.appearance.placing import Kind, feather, inverse_map, place, resampling
+from lipmotion.appearance.placing import Kind, feather, inverse_map, place
 from lipmotion.appearance.poisson import cloning_system
+from lipmotion.kernels.pixels.affine import resample
 from lipmotion.vision.face_follower import FaceFollower
 from lipmotion.vision.frames import open_video
 from lipmotion.vision.mouth import face_to_image, region_to_image
@@ -113,7 +114,7 @@ def one(
 
 def aligned(frame: Picture, to_frame: NDArray[np.float64], kind: Kind) -> Picture:
     """Return the mouth region of a frame."""
-    region = resampling(to_frame, frame.shape[:2], (HEIGHT, WIDTH), kind).apply(frame[None])[0]
+    region = resample(frame[None], to_frame, (HEIGHT, WIDTH), kind)[0]
     rounded: Picture = np.clip(np.rint(region), 0, 255).astype(np.uint8)
     return rounded
 
@@ -122,16 +123,15 @@ def add(
     frame: Picture, change: NDArray[np.float32], weight: NDArray[np.float32], to_frame: NDArray[np.float64], kind: Kind
 ) -> None:
     """Add an aligned change to a frame, instead of blending a patch into it."""
-    rows = resampling(inverse_map(to_frame), (HEIGHT, WIDTH), frame.shape[:2], kind).apply(change[None])[0]
-    share = resampling(inverse_map(to_frame), (HEIGHT, WIDTH), frame.shape[:2], "linear").apply(weight[None, ..., None])
+    rows = resample(change[None], inverse_map(to_frame), frame.shape[:2], kind)[0]
+    share = resample(weight[None, ..., None], inverse_map(to_frame), frame.shape[:2], "linear")
     frame[...] = np.clip(np.rint(frame + share[0] * rows), 0, 255)
 
 
 def outline(mask: NDArray[np.bool_], to_frame: NDArray[np.float64], frame: Picture) -> NDArray[np.bool_]:
     """Return the mask in the frame."""
-    shown = resampling(inverse_map(to_frame), (HEIGHT, WIDTH), frame.shape[:2], "linear")
-    placed: NDArray[np.bool_] = shown.apply(mask[None, ..., None].astype(np.float32))[0, :, :, 0] > 0.5
-    return placed
+    given = mask[None, ..., None].astype(np.float32)
+    return resample(given, inverse_map(to_frame), frame.shape[:2], "linear")[0, :, :, 0] > 0.5
 
 
 def slope(frame: Picture) -> NDArray[np.float64]:

@@ -120,14 +120,15 @@ def overview(found: Mapping[str, Sheet], current: frozenset[str]) -> str:
     lines = ["# Figures at a glance", "", *glance["text"], ""]
     for table in glance["tables"].values():
         lines += [f"## {table['title']}", "", *table.get("text", []), "", rendered(table, current)]
-    lines += ["## All figures", "", *glance["all"], "", "| page | tables | commits | models |", "|---|---|---|---|"]
+    lines += ["## All figures", "", *glance["all"], ""]
+    pages: dict[bool, dict[str, str]] = {False: {}, True: {}}
     for name, sheet in found.items():
         if name != "glance":
-            tables = list(sheet["tables"].values())
-            commits = " ".join(dict.fromkeys(t["commit"] for t in tables))
-            made = dict.fromkeys(made_by(t["model"], current).removeprefix(" · ") or "none" for t in tables)
+            earlier = any("earlier" in made_by(table["model"], current) for table in sheet["tables"].values())
             target = f"../{sheet['page']}".replace("../results/", "")
-            lines.append(f"| [{name}]({target}) | {len(tables)} | {commits} | {'; '.join(made)} |")
+            pages[earlier][target] = f"[{name}]({target})"
+    lines += [f"- Of today's models, or of none: {', '.join(pages[False].values())}"]
+    lines += [f"- With figures from an earlier model: {', '.join(pages[True].values())}"]
     return re.sub(r"\n{3,}", "\n\n", "\n".join(lines)) + "\n"
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -20,10 +20,12 @@ from lipmotion.speech.features.lip_speed import (
     FRAME_OFFSETS,
     STATIC_FEATURES,
     WEIGHTS,
-    fit_opening_speed,
+    context_features,
     measured_opening_speed,
 )
 from lipmotion.types import FRAME_RATE_HZ, Features
+
+RIDGE = 100.0
 
 
 def main() -> None:
@@ -46,6 +48,24 @@ def main() -> None:
     target = Path(__file__).parents[1] / "src" / "lipmotion" / "models" / WEIGHTS
     target.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
     print(f"{target}: {STATIC_FEATURES * len(FRAME_OFFSETS)} weights from {len(names)} clips")
+
+
+def fit_opening_speed(examples: Iterable[tuple[Features, np.ndarray]]) -> np.ndarray:
+    """Return the weights of the prediction [shape=(143,)], by ridge regression.
+
+    examples : features, and the ``measured_opening_speed`` of the lips [shape=(at most T,)], of clips where both are in
+               step
+    """
+    count = STATIC_FEATURES * len(FRAME_OFFSETS)
+    products = RIDGE * np.eye(count)
+    targets = np.zeros(count)
+    for features, measured in examples:
+        inputs = context_features(features)[: len(measured)]
+        inputs -= inputs.mean(axis=0)
+        target = measured[: len(inputs)] / max(float(measured.std()), 1e-9)
+        products += inputs.T @ inputs
+        targets += inputs.T @ target
+    return np.linalg.solve(products, targets)
 
 
 def examples(corpus: lipmotion.Corpus, names: tuple[str, ...]) -> Iterator[tuple[Features, np.ndarray]]:

@@ -92,7 +92,7 @@ def verb_table() -> str:
 
 
 def option_table() -> str:
-    """Return the table of the options that three verbs or more take, each once for each meaning."""
+    """Return the table of the options that four verbs or more take, each once for each meaning."""
     found: dict[tuple[str, str], dict[str, None]] = {}
     for name, _, part in verbs(whole_parser()):
         for action in actions(part):
@@ -100,7 +100,7 @@ def option_table() -> str:
                 says = re.sub(r"\s+", " ", part._get_formatter()._expand_help(action))
                 found.setdefault((shown(action), says), {})[name.split()[0]] = None
     rows = (
-        [f"`{option}`", says, ", ".join(names)] for (option, says), names in sorted(found.items()) if len(names) > 2
+        [f"`{option}`", says, ", ".join(names)] for (option, says), names in sorted(found.items()) if len(names) > 3
     )
     return table(["option", "what it does", "verbs"], rows)
 

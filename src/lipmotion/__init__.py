@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from lipmotion.export.cues.sheet import CueSheet
     from lipmotion.faces.filmed.face import FilmedFace, load_face, save_face
     from lipmotion.pipeline.corpus.prepare import prepare
+    from lipmotion.pipeline.edits import Edits
     from lipmotion.pipeline.evaluation.evaluate import evaluate
     from lipmotion.pipeline.film.build import build_face
     from lipmotion.pipeline.film.video import FilmOptions
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from lipmotion.pipeline.model import Model, load_model, save_model
     from lipmotion.pipeline.outputs.cues import cues, write_cues
     from lipmotion.pipeline.outputs.write import write
+    from lipmotion.pipeline.session import Session
     from lipmotion.pipeline.training.adapt import adapt
     from lipmotion.pipeline.training.train import Run, train
     from lipmotion.pipeline.understand.request import SpeechRequest
@@ -36,6 +38,7 @@ if TYPE_CHECKING:
         Audio,
         Constraints,
         Explanation,
+        Gain,
         Generation,
         Motion,
         Pin,
@@ -51,9 +54,11 @@ __all__ = [
     "Constraints",
     "Corpus",
     "CueSheet",
+    "Edits",
     "Explanation",
     "FilmOptions",
     "FilmedFace",
+    "Gain",
     "Generation",
     "Lexicon",
     "Model",
@@ -61,6 +66,7 @@ __all__ = [
     "Pin",
     "Run",
     "Selection",
+    "Session",
     "Span",
     "SpeechRequest",
     "SpokenText",
@@ -89,7 +95,9 @@ __all__ = [
 ]
 
 _HOMES = {
+    "Edits": "lipmotion.pipeline.edits",
     "Run": "lipmotion.pipeline.training.train",
+    "Session": "lipmotion.pipeline.session",
     "SpeechRequest": "lipmotion.pipeline.understand.request",
     "Selection": "lipmotion.corpora.store",
     "Corpus": "lipmotion.corpora.store",

@@ -3,8 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.appearance.placing import Kind, cut, feather, inverse_map, place, resampling
+from lipmotion.appearance.placing import Kind, cut, feather, inverse_map, place
 from lipmotion.errors import InputError
+from lipmotion.kernels.pixels.affine import resample
 
 TURNED = np.array([[0.7, -0.1, 12.3], [0.12, 0.68, 8.6]])
 
@@ -16,9 +17,9 @@ def noise(shape: tuple[int, ...], seed: int = 0) -> np.ndarray:
 @pytest.mark.parametrize("kind", ["linear", "cubic"])
 def test_nothing_moves_and_whole_pixels_move_exactly(kind: Kind) -> None:
     pictures = noise((2, 20, 30, 3))
-    still = resampling(np.eye(2, 3), (20, 30), (20, 30), kind).apply(pictures)
+    still = resample(pictures, np.eye(2, 3), (20, 30), kind)
     assert still == pytest.approx(pictures, abs=1e-4)
-    moved = resampling(np.array([[1.0, 0, 4], [0, 1, 7]]), (20, 30), (10, 20), kind).apply(pictures)
+    moved = resample(pictures, np.array([[1.0, 0, 4], [0, 1, 7]]), (10, 20), kind)
     assert moved == pytest.approx(pictures[:, 7:17, 4:24], abs=1e-4)
 
 
@@ -28,7 +29,7 @@ def test_smooth_functions_are_exact_between_pixels(kind: Kind, power: int) -> No
         return (3 + x - 2 * y) ** power
 
     y, x = np.mgrid[:60, :60] / 60
-    made = resampling(TURNED, (60, 60), (40, 40), kind).apply(function(x, y)[None, :, :, None])[0, :, :, 0]
+    made = resample(function(x, y)[None, :, :, None], TURNED, (40, 40), kind)[0, :, :, 0]
     row, column = np.mgrid[:40, :40]
     at_x, at_y = (TURNED[i, 0] * column + TURNED[i, 1] * row + TURNED[i, 2] for i in range(2))
     assert made == pytest.approx(function(at_x / 60, at_y / 60), abs=1e-4)
@@ -36,7 +37,7 @@ def test_smooth_functions_are_exact_between_pixels(kind: Kind, power: int) -> No
 
 def test_pixels_outside_repeat_the_outermost() -> None:
     pictures = noise((1, 6, 6, 3))
-    made = resampling(np.array([[1.0, 0, -4], [0, 1, -4]]), (6, 6), (14, 14)).apply(pictures)
+    made = resample(pictures, np.array([[1.0, 0, -4], [0, 1, -4]]), (14, 14), "cubic")
     assert made[0, :4, :4] == pytest.approx(np.broadcast_to(pictures[0, 0, 0], (4, 4, 3)), abs=1e-3)
     assert made[0, 11:, 11:] == pytest.approx(np.broadcast_to(pictures[0, 5, 5], (3, 3, 3)), abs=1e-3)
 
@@ -91,13 +92,11 @@ def test_what_does_not_fit_is_refused() -> None:
     for affine in (np.zeros((2, 3)), np.eye(3), np.full((2, 3), np.nan)):
         with pytest.raises(InputError, match="affine map"):
             place(frame, patch, weight, affine)
-    with pytest.raises(InputError, match="required"):
-        resampling(TURNED, (60, 60), (10, 10)).apply(noise((1, 61, 60, 3)))
 
 
 def test_a_patch_of_pixels_as_large_as_the_frames_is_resampled() -> None:
     frame = noise((60, 60, 3))
-    assert (cut(frame, TURNED, (20, 24)) == resampling(TURNED, (60, 60), (20, 24)).apply(frame[None])[0]).all()
+    assert (cut(frame, TURNED, (20, 24)) == resample(frame[None], TURNED, (20, 24), "cubic")[0]).all()
     assert cut(frame, TURNED, (20, 24)).dtype == np.float32
 
 

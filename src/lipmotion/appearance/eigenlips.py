@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.appearance.placing import resampling
 from lipmotion.errors import InputError
+from lipmotion.kernels.pixels import affine
 from lipmotion.stats.pca import check_orthonormal, fit_pca
 from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
 from lipmotion.types import GREY, Channel
@@ -94,10 +94,10 @@ def enlarged(eigenlips: Eigenlips, scale: int) -> Eigenlips:
     height, width = eigenlips.size
     middle = (0.5 / scale) - 0.5
     to_source = np.array([[1 / scale, 0, middle], [0, 1 / scale, middle]])
-    finer = resampling(to_source, eigenlips.size, (scale * height, scale * width))
 
     def larger(rows: NDArray[np.float32]) -> NDArray[np.float32]:
-        pictures = finer.apply(rows.reshape(-1, height, width, 1))
+        size = scale * height, scale * width
+        pictures = affine.resample(rows.reshape(-1, height, width, 1), to_source, size, "cubic")
         return pictures.reshape(*rows.shape[:-1], -1)
 
     return Eigenlips(

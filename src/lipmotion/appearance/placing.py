@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,49 +17,6 @@ Kind = affine.Kind
 """Interpolation between pixels: bilinear from 2 × 2, or bicubic from 4 × 4 of them."""
 MOST_SAMPLES = 16
 """Most samples along each side of a pixel that are averaged where the frame is larger than the patch."""
-
-
-@dataclass(frozen=True, eq=False)
-class Resampling:
-    """Where the pixels of a new picture lie in a given one; made by ``resampling``, for any picture of that size.
-
-    to_source   : affine map from a new pixel to its position in the given picture [shape=(2, 3)]
-    source_size : height and width of the given picture, px
-    size        : height and width of the new picture, px
-    kind        : how to interpolate
-    """
-
-    to_source: Array
-    source_size: tuple[int, int]
-    size: tuple[int, int]
-    kind: Kind
-
-    def apply(self, pictures: Pictures) -> Floats:
-        """Return the new pictures [shape=(T, h, w, C)]. ``pictures`` : [shape=(T, H, W, C)].
-
-        Raises InputError: pictures of another size.
-        """
-        if pictures.ndim != 4 or pictures.shape[1:3] != self.source_size:
-            height, width = self.source_size
-            raise InputError(f"pictures of shape {pictures.shape}, required (T, {height}, {width}, C)")
-        return affine.resample(pictures, self.to_source, self.size, self.kind)
-
-
-def resampling(
-    to_source: Array, source_size: tuple[int, int], size: tuple[int, int], kind: Kind = "cubic"
-) -> Resampling:
-    """Return the resampling of pictures by an affine map.
-
-    to_source   : affine map [shape=(2, 3)] from the centre of a new pixel (x to the right, y down) to its position in
-                  the given picture, px, as ``region_to_image`` of ``vision.mouth`` returns it; integers are centres
-    source_size : height and width of the given pictures
-    size        : height and width of the new pictures
-    kind        : how to interpolate. Pixels outside the given picture repeat its outermost ones.
-    Raises InputError: not such a map.
-    Source: Keys 1981 (cubic). A new picture that is much smaller than the given one would skip pixels: use ``cut``.
-    """
-    _check_map(to_source)
-    return Resampling(to_source, source_size, size, kind)
 
 
 def cut(frame: NDArray[np.uint8], to_frame: Array, size: tuple[int, int], kind: Kind = "cubic") -> Floats:

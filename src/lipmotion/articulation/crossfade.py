@@ -23,8 +23,7 @@ def phone_weights(units: Timeline[Unit], time_s: Array, kind: Callable[[str], st
 
     kind : the kind of each phone; before the first and after the last unit, and in gaps, it is that of an empty phone
     Neighbours are cross-faded by half a cosine around the border between them. The middle of a phone of 50 ms or
-    more is
-    wholly its own.
+    more is wholly its own.
     """
     names, borders, halves = _segments(units, kind)
     weights: dict[str, Array] = {name: np.zeros(len(time_s)) for name in names}

@@ -5,7 +5,7 @@ Each function returns a new generation; the values are those of the engine until
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from lipmotion.articulation.contact import CLOSED_BELOW, closures
 from lipmotion.articulation.rest import rest_frames
 from lipmotion.errors import InputError
 from lipmotion.kernels.sequences.holds import best_holds
-from lipmotion.types import EYE_DISTANCE, WEIGHT, Generation, Motion, Span, StateTrace, Timeline, Unit
+from lipmotion.types import EYE_DISTANCE, WEIGHT, Gain, Generation, Motion, Pin, Span, StateTrace, Timeline, Unit
 from lipmotion.types.generation import ReducedVariance
 from lipmotion.units import is_silent
 
@@ -117,7 +117,17 @@ def moved_in_time(generation: Generation, delivery: Delivery) -> Generation:
             generation.units, by_s, max(duration_s, _end_s(generation.units) + delivery.offset_ms / 1000)
         ),
         trace=StateTrace(generation.trace.states, generation.trace.frames[nearest]),
+        curve_edits=tuple(_moved_edits(generation.curve_edits, by_s, duration_s)),
     )
+
+
+def _moved_edits(edits: Sequence[Pin | Gain], by_s: float, end_s: float) -> Iterator[Pin | Gain]:
+    """Yield pins and gains so many seconds later; pins that are then outside 0 to ``end_s`` are left out."""
+    for edit in edits:
+        if isinstance(edit, Gain):
+            yield replace(edit, start_s=edit.start_s + by_s, end_s=edit.end_s + by_s)
+        elif 0 <= edit.time_s + by_s <= end_s:
+            yield replace(edit, time_s=edit.time_s + by_s)
 
 
 def moved_units(units: Timeline[Unit], by_s: float, end_s: float) -> Timeline[Unit]:

@@ -25,6 +25,7 @@ from lipmotion.cli.verbs import (
     cite,
     corpus,
     cues,
+    edit,
     evaluate,
     experiment,
     explain,
@@ -38,7 +39,7 @@ from lipmotion.cli.verbs import (
 from lipmotion.errors import ExportError
 
 VERBS = (
-    *(animate, batch, speak, render, explain, cues, words, corpus, train, adapt, face),
+    *(animate, batch, speak, render, edit, explain, cues, words, corpus, train, adapt, face),
     *(character, addon, evaluate, experiment, info, cite),
 )
 EXIT_CODES = """exit codes: 0 done, 1 a bug, 2 wrong command line, 3 unusable input, 4 corpus, 5 alignment,

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from functools import cached_property
+from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +18,10 @@ from lipmotion.articulation.liveliness import Liveliness, liveliness
 from lipmotion.errors import InputError, shortened
 from lipmotion.types import Configuration, Motion, Prosody, Rule, Timeline, Unit, option
 
+PoseT = TypeVar("PoseT")
+Picture = NDArray[np.uint8]
+THREADS = 2
+"""Pictures that are drawn at the same time."""
 SCENE, TRANSPARENT = "scene", "transparent"
 SMALLEST, LARGEST = 64, 4096
 """Range of the height of pictures, in pixels."""
@@ -35,6 +42,59 @@ class Face(ABC):
         The last frame is at or before the last frame of the motion. The same input gives the same pixels.
         units : phones in time; may be empty
         Raises InputError: a channel that the face needs is missing, values are not finite, or fps is not positive.
+        """
+
+
+class DrawnMotion(Generic[PoseT]):
+    """The pictures of a motion as a face draws them: all in order, or single ones.
+
+    poses   : of every frame
+    painter : returns what draws the picture of a pose; called when the first picture is asked for. Several threads use
+              what it returns
+    ahead   : pictures that are drawn before they are asked for, by ``THREADS`` threads
+    The same pose gives the same pixels, whatever was drawn before.
+    """
+
+    def __init__(
+        self, poses: Sequence[PoseT], painter: Callable[[], Callable[[PoseT], Picture]], ahead: int = 6
+    ) -> None:
+        self._poses, self._painter, self._ahead = poses, painter, ahead
+
+    def __len__(self) -> int:
+        return len(self._poses)
+
+    def picture(self, number: int) -> Picture:
+        """Return the picture of a frame [shape as of ``Face.render``]."""
+        return self._paint(self._poses[number])
+
+    def __iter__(self) -> Iterator[Picture]:
+        """Yield the pictures in order; they are drawn while earlier ones are used."""
+        waiting: deque[Future[Picture]] = deque()
+        with ThreadPoolExecutor(THREADS) as threads:
+            try:
+                for pose in self._poses:
+                    waiting.append(threads.submit(self._paint, pose))
+                    if len(waiting) > self._ahead:
+                        yield waiting.popleft().result()
+                while waiting:
+                    yield waiting.popleft().result()
+            finally:  # the pictures may not all have been asked for
+                for future in waiting:
+                    future.cancel()
+
+    @cached_property
+    def _paint(self) -> Callable[[PoseT], Picture]:
+        return self._painter()
+
+
+@runtime_checkable
+class DrawsSingly(Protocol):
+    """A face that can draw single pictures; a face has this ability if it has the method."""
+
+    def drawn(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> DrawnMotion[Any]:
+        """Return the pictures of ``Face.render``, each of which can be drawn alone. Raises as ``render``.
+
+        A face that is asked again, for other motion, does not paint again what does not move.
         """
 
 

@@ -27,6 +27,11 @@ def compiled_pays(numpy_s: float) -> bool:
     return (_requested_s[0] > START_UP_S or "numba" in sys.modules) and numba_works()
 
 
+def expect_more() -> None:
+    """Use the compiled forms from now on: more of the same work will follow, as in an interactive program."""
+    _requested_s[0] += START_UP_S
+
+
 @cache
 def numba_works() -> bool:
     """Return whether numba can be imported; this imports it."""

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import lru_cache
+from threading import Lock
 from typing import Any
 
 
@@ -15,13 +16,34 @@ def one_thread() -> Iterator[None]:
 
     The last bits of a product depend on the number of threads: with one, results do not depend on ``OMP_NUM_THREADS``,
     nor on the division of work among processes. For products as small as ours one thread is no slower. The limit holds
-    for the whole process; of several Python threads the first that sets it decides (threadpoolctl). Libraries that
-    cannot be limited (Accelerate on macOS) are not changed.
+    for the whole process, until the last of several Python threads has left such a block. Libraries that cannot be
+    limited (Accelerate on macOS) are not changed.
     """
     import numpy as np  # noqa: F401 # only what is loaded can be limited
 
-    with _loaded_libraries(len(sys.modules)).limit(limits=1, user_api="blas"):
+    with _LIMIT:
         yield
+
+
+class _SharedLimit:
+    """The limit of one thread, from when the first Python thread needs it until the last one leaves."""
+
+    def __init__(self) -> None:
+        self._lock, self._users, self._limits = Lock(), 0, ExitStack()
+
+    def __enter__(self) -> None:
+        with self._lock:
+            self._limits.enter_context(_loaded_libraries(len(sys.modules)).limit(limits=1, user_api="blas"))
+            self._users += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._users -= 1
+            if not self._users:
+                self._limits.close()
+
+
+_LIMIT = _SharedLimit()
 
 
 @lru_cache(maxsize=1)

@@ -61,7 +61,8 @@ class AcousticNetwork:
         """
         if speech.spectrum is None:
             raise InputError("the speech has no spectrum; an engine that uses one says so by ``conditions``")
-        return self._predict(speech.spectrum)
+        spectrum = speech.spectrum
+        return speech.once(self, lambda: self._predict(spectrum))
 
     def _predict(self, spectrum: NDArray[np.floating]) -> tuple[Array, Array]:
         """Return motion and distortion, from a normalised log mel spectrum [shape=(T, 40)]."""

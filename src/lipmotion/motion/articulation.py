@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
+from math import ceil
 from typing import Any
 
 import numpy as np
@@ -277,9 +278,11 @@ def _merged(phone: str) -> str:
 
 def frames_of(span: Span[Unit], frames: int) -> tuple[int, int]:
     """Return the first frame of a span, and the one after its last."""
-    edges = np.ceil(np.array([span.start_s, span.end_s]) * FRAME_RATE_HZ - 1e-6)
-    first, stop = np.clip(edges, 0, frames).astype(int).tolist()
-    return first, stop
+    return _frame_after(span.start_s, frames), _frame_after(span.end_s, frames)
+
+
+def _frame_after(time_s: float, frames: int) -> int:
+    return ceil(min(max(time_s * FRAME_RATE_HZ - 1e-6, 0), frames))
 
 
 def _spoken(example: Example) -> NDArray[np.bool_]:

@@ -15,6 +15,7 @@ from lipmotion.types.features import ENERGY_FEATURE, FRAME_RATE_HZ, SPECTRUM_BAN
 from lipmotion.types.generation import (
     Constraints,
     Example,
+    Gain,
     Generation,
     HeardSpectrum,
     Outlook,
@@ -51,6 +52,7 @@ __all__ = [
     "Example",
     "Explanation",
     "Features",
+    "Gain",
     "Generation",
     "HeardSpectrum",
     "Item",

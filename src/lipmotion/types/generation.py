@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, field, replace
 from numbers import Real
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,8 @@ from lipmotion.types.audio import Audio
 from lipmotion.types.features import Features
 from lipmotion.types.motion import Motion, between_frames
 from lipmotion.types.timeline import Timeline, Unit
+
+KeptT = TypeVar("KeptT")
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +47,7 @@ class Speech:
                   one of each frame [shape=(T,)] where somebody has corrected some of the recognised units
     prior       : what another model makes of the same speech, on which this engine's model stands (None: on none)
     voice       : 0 to 1, how well the model's training knows the voice
+    kept        : what was computed of the sound alone (``once``); speech with other units shares it
     """
 
     features: Features
@@ -55,6 +58,19 @@ class Speech:
     confidence: float | NDArray[np.float64] = 1.0
     prior: PriorOutput | None = None
     voice: float = 1.0
+    kept: dict[Any, Any] = field(default_factory=dict, repr=False)
+
+    def once(self, of: Any, make: Callable[[], KeptT]) -> KeptT:
+        """Return what a function makes of the sound; speech of the same sound with other units shares it.
+
+        of : the object that the result belongs to, as a network; the result must depend on it and the sound alone
+        """
+        sound = (self.features, self.log_f0, self.spectrum)
+        found = self.kept.get(of)
+        if found is None or any(ours is not theirs for ours, theirs in zip(sound, found[0], strict=True)):
+            found = self.kept[of] = (sound, make())
+        made: KeptT = found[1]
+        return made
 
     @property
     def units_decide(self) -> bool:
@@ -113,6 +129,36 @@ class Pin:
         for name, number in (("time", self.time_s), ("value", self.value)):
             if not _is_number(number):
                 raise InputError(f"the {name} of a pin is {shortened(repr(number))}, required a number")
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Movements that are made larger or smaller for a time.
+
+    start_s, end_s : seconds; the factor grows and fades within 0.1 s before and after them
+    factor  : 1: as generated; 0: the rest pose
+    channel : name of a channel or curve; empty: all movements of the mouth
+    Raises InputError: a factor that is not 0 to 3, or an end before the start.
+
+    >>> Gain(1.0, 2.0, 1.3)
+    Gain(start_s=1.0, end_s=2.0, factor=1.3, channel='')
+    """
+
+    start_s: float
+    end_s: float
+    factor: float
+    channel: str = ""
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.factor <= LARGEST_GAIN:
+            raise InputError(f"the gain is {self.factor:g}, required 0 to {LARGEST_GAIN:g}")
+        if not self.start_s <= self.end_s:
+            raise InputError(
+                f"the gain lasts from {self.start_s:g} to {self.end_s:g} s, required an end after the start"
+            )
+
+
+LARGEST_GAIN = 3.0
 
 
 @dataclass(frozen=True)
@@ -223,6 +269,7 @@ class Generation:
     trace  : the state of the model in every frame
     outlook : how well the model knew words and voice (None: not from ``animate``)
     stepped : channels of held poses, which change at once: formats that can say so do
+    curve_edits : pins and gains of curves that follow from the motion, as ``jawOpen``, wherever these are made
 
     >>> import lipmotion
     >>> result = lipmotion.animate("examples/welcome.flac")
@@ -238,6 +285,7 @@ class Generation:
     trace: StateTrace
     outlook: Outlook | None = None
     stepped: tuple[str, ...] = ()
+    curve_edits: tuple[Pin | Gain, ...] = ()
 
     def __repr__(self) -> str:
         frames, channels = self.motion.values.shape

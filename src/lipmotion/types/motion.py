@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 from unicodedata import normalize
 
@@ -73,7 +74,7 @@ class Motion:
         if len(set(self.names)) != len(self.channels):
             raise InputError(f"motion channel names repeat: {', '.join(self.names)}")
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """The names of the channels, in order."""
         return tuple(channel.name for channel in self.channels)

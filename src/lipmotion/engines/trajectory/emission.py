@@ -13,10 +13,13 @@ from numpy.typing import NDArray
 from lipmotion.motion.context_window import WINDOW, AcousticContext, acoustic_context_arrays, acoustic_context_from
 from lipmotion.motion.frame_labels import FullContextState, StateLayout
 from lipmotion.motion.limits import check_spread
-from lipmotion.stats.trees import TREES, Tree, tree_arrays, trees_from_arrays
+from lipmotion.stats.trees import TREES, Context, Tree, tree_arrays, trees_from_arrays
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays
 
 Array = NDArray[np.float64]
+
+MOST_CONTEXTS = 50_000
+"""Contexts whose leaves are kept, so that motion is generated again sooner."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,18 +64,36 @@ class Emission:
         if state == layout.rest:
             return len(self.means) - 1
         name = layout.name(state)
-        leaf = self.forest[name].path(state.context)[-1]
-        return self._first[name] + int(self._rank[name][leaf])
+        return self._first[name] + int(self._rank[name][self._leaf(name, state.context)])
+
+    def _leaf(self, name: str, context: Context) -> int:
+        """Return the leaf of a context in a tree; it is looked for once."""
+        found = self._leaves.get((name, context))
+        if found is None:
+            if len(self._leaves) > MOST_CONTEXTS:
+                self._leaves.clear()
+            found = self._leaves[name, context] = self.forest[name].path(context)[-1]
+        return found
+
+    @cached_property
+    def _leaves(self) -> dict[tuple[str, Context], int]:
+        return {}
+
+    @cached_property
+    def _names(self) -> dict[tuple[str, int], str]:
+        return {}
 
     def source(self, state: FullContextState, layout: StateLayout) -> str:
         """Return the origin of the density of a state, in words: its tree, its leaf, and the frames of the leaf."""
         if state == layout.rest:
             return "rest"
         name = layout.name(state)
-        tree = self.forest[name]
-        leaf = tree.path(state.context)[-1]
+        leaf = self._leaf(name, state.context)
+        if (name, leaf) not in self._names:
+            tree = self.forest[name]
+            self._names[name, leaf] = f"{tree.name(leaf)} ({tree.frames[leaf]:.0f} frames)"
         left, unit, right = state.context
-        return f"{left}-{unit}+{right} {name}: {tree.name(leaf)} ({tree.frames[leaf]:.0f} frames)"
+        return f"{left}-{unit}+{right} {name}: {self._names[name, leaf]}"
 
     def statistics(self, rows: NDArray[np.intp], features: NDArray[np.float32], frames: slice) -> tuple[Array, Array]:
         """Return means and precisions [each shape=(N, 3, Q)] of N successive frames.

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.errors import InputError
@@ -57,7 +56,6 @@ from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import Audio, Monitor, sub_monitor, with_progress
 from lipmotion.units import Lexicon
 
-Array = NDArray[np.float64]
 STATES = 5
 """Per unit, in the paper."""
 BABBLE = "babble"

@@ -32,10 +32,15 @@ def header(generation: Generation) -> dict[str, Any]:
 def units_and_origin(generation: Generation, source: Mapping[str, str], model: Mapping[str, str]) -> dict[str, Any]:
     """Return the members ``units``, ``recognised`` (if phones were), ``outlook`` (if known), ``source``, ``model``."""
     outlook = {} if generation.outlook is None else {"outlook": asdict(generation.outlook)}
-    units: dict[str, Any] = {"units": [_row(span) for span in generation.units]}
-    if recognised := recognised_phones(generation.units):
-        units[RECOGNISED] = recognised
-    return {**units, **outlook, "source": dict(source), "model": dict(model)}
+    return {**unit_rows(generation.units), **outlook, "source": dict(source), "model": dict(model)}
+
+
+def unit_rows(units: Timeline[Unit]) -> dict[str, Any]:
+    """Return the members ``units`` and ``recognised`` (if phones were), for ``parse_units``."""
+    rows: dict[str, Any] = {"units": [_row(span) for span in units]}
+    if recognised := recognised_phones(units):
+        rows[RECOGNISED] = recognised
+    return rows
 
 
 def parse(document: Any, values: Any) -> tuple[Motion, Timeline[Unit]]:

@@ -7,28 +7,24 @@ rasteriser. The forms are made once: ``forms`` (skin), ``hair``, ``body``.
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
-from typing import TYPE_CHECKING, final
+from collections.abc import Callable, Iterator
+from functools import cached_property
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.faces.base import SMALLEST, TRANSPARENT, Face, Staging
+from lipmotion.faces.base import SMALLEST, TRANSPARENT, DrawnMotion, Face, Picture, Staging
 from lipmotion.faces.head.performance import head_poses
 from lipmotion.faces.head.pose import CharacterPose
 from lipmotion.types import Motion, Prosody, Timeline, Unit
-
-if TYPE_CHECKING:
-    from lipmotion.meshes.rendering.rasteriser import Camera
 
 __all__ = ["Head", "render"]
 
 OWN_SIZE = 720
 """Height of pictures whose size is not given."""
-THREADS = 2
-"""Frames that are drawn at the same time."""
+AHEAD = 2
+"""Pictures that are drawn before they are asked for."""
 
 
 @final
@@ -46,10 +42,16 @@ class Head(Face):
         return Head(staging, prosody)
 
     def render(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> Iterator[NDArray[np.uint8]]:  # noqa: D102
+        return iter(self.drawn(motion, units, fps=fps))
+
+    def drawn(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> DrawnMotion[CharacterPose]:  # noqa: D102
+        poses = head_poses(motion, units, fps, self.staging, self.prosody)
+        return DrawnMotion(poses, lambda: self._painter, AHEAD)
+
+    @cached_property
+    def _painter(self) -> Callable[[CharacterPose], Picture]:
         height = self.staging.size or OWN_SIZE
-        width = max(2 * round(height * 8 / 9), SMALLEST)
-        staging, prosody = self.staging, self.prosody
-        return render(motion, units, fps=fps, width=width, height=height, staging=staging, prosody=prosody)
+        return _painter(max(2 * round(height * 8 / 9), SMALLEST), height, self.staging)
 
 
 def render(
@@ -78,19 +80,13 @@ def render(
     from lipmotion.faces.head.stage import camera_for
 
     chosen = staging or Staging()
-    return _frames(head_poses(motion, units, fps, chosen, prosody), camera_for(width, height), chosen)
+    poses = head_poses(motion, units, fps, chosen, prosody)
+    camera_for(width, height)  # refuses sizes before the first picture is asked for
+    return iter(DrawnMotion(poses, lambda: _painter(width, height, chosen), AHEAD))
 
 
-def _frames(poses: list[CharacterPose], camera: Camera, staging: Staging) -> Iterator[NDArray[np.uint8]]:
-    from lipmotion.faces.head.stage import Stage
+def _painter(width: int, height: int, staging: Staging) -> Callable[[CharacterPose], Picture]:
+    from lipmotion.faces.head.stage import Stage, camera_for
 
-    stage = Stage(camera, staging.colour)
-    draw = stage.cut_out if staging.background == TRANSPARENT else stage.picture
-    with ThreadPoolExecutor(THREADS) as threads:
-        waiting: deque[Future[NDArray[np.uint8]]] = deque()
-        for pose in poses:
-            waiting.append(threads.submit(draw, pose))
-            if len(waiting) > THREADS:
-                yield waiting.popleft().result()
-        while waiting:
-            yield waiting.popleft().result()
+    stage = Stage(camera_for(width, height), staging.colour)
+    return stage.cut_out if staging.background == TRANSPARENT else stage.picture

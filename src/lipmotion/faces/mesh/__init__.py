@@ -2,28 +2,35 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
-from typing import final
+from collections.abc import Callable, Iterator
+from functools import cached_property
+from typing import NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.mouth import frame_times
 from lipmotion.errors import InputError
-from lipmotion.faces.base import SMALLEST, TRANSPARENT, Face, Staging, alive
+from lipmotion.faces.base import SMALLEST, TRANSPARENT, DrawnMotion, Face, Picture, Staging, alive
 from lipmotion.faces.mesh.stage import MeshStage
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
-from lipmotion.meshes.fitting.driven import DrivenCharacter
+from lipmotion.meshes.fitting.driven import CharacterPose, DrivenCharacter
 from lipmotion.meshes.fitting.eyes_and_brows import eye_and_brow_weights
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 
 __all__ = ["MeshFace", "MeshStage"]
 
 WIDTH, HEIGHT = 1280, 720
-THREADS = 2
-"""Pictures that are drawn at the same time."""
+AHEAD = 2
+"""Pictures that are drawn before they are asked for."""
+
+
+class MeshPose(NamedTuple):
+    """A character in one frame: of ``DrivenCharacter.poses``, angles of the head, and of the eyes, in radians."""
+
+    row: CharacterPose
+    turn: tuple[float, float, float]
+    look: tuple[float, float]
 
 
 @final
@@ -60,22 +67,27 @@ class MeshFace(Face):
         return MeshFace(self._character, *self._size, staging, prosody)
 
     def render(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> Iterator[NDArray[np.uint8]]:  # noqa: D102
+        return iter(self.drawn(motion, units, fps=fps))
+
+    def drawn(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> DrawnMotion[MeshPose]:  # noqa: D102
         if not 0 < fps < np.inf:
             raise InputError(f"the frame rate is {fps}, required more than 0")
+        time_s = frame_times(len(motion.values), motion.rate_hz, fps)
+        moved = alive(time_s, with_mouth(motion), units, self.staging, self._prosody)
+        rows = self._character.poses(motion, units, time_s, eye_and_brow_weights(moved))
+        gaze = moved.gaze if not self._character.has_shape("eyeLookOutLeft") else np.zeros_like(moved.gaze)
+        turns, looks = moved.turn.tolist(), gaze.tolist()
+        poses = [
+            MeshPose(row, (yaw, pitch, roll), (across, up))
+            for row, (yaw, pitch, roll), (across, up) in zip(rows, turns, looks, strict=True)
+        ]
+        return DrawnMotion(poses, lambda: self._painter, AHEAD)
+
+    @cached_property
+    def _painter(self) -> Callable[[MeshPose], Picture]:
         width, height = self._size
         if self.staging.size:
             width, height = max(2 * round(self.staging.size * 8 / 9), SMALLEST), self.staging.size
         stage = MeshStage(self._character, width, height, self.staging.colour)
         draw = stage.cut_out if self.staging.background == TRANSPARENT else stage.picture
-        time_s = frame_times(len(motion.values), motion.rate_hz, fps)
-        moved = alive(time_s, with_mouth(motion), units, self.staging, self._prosody)
-        frames = self._character.vertices(motion, units, time_s, eye_and_brow_weights(moved))
-        gaze = moved.gaze if not self._character.has_shape("eyeLookOutLeft") else np.zeros_like(moved.gaze)
-        with ThreadPoolExecutor(THREADS) as threads:
-            waiting: deque[Future[NDArray[np.uint8]]] = deque()
-            for vertices, turn, look in zip(frames, moved.turn.tolist(), gaze.tolist(), strict=True):
-                waiting.append(threads.submit(draw, vertices, tuple(turn), tuple(look)))
-                if len(waiting) > THREADS:
-                    yield waiting.popleft().result()
-            while waiting:
-                yield waiting.popleft().result()
+        return lambda pose: draw(self._character.posed(pose.row), pose.turn, pose.look)

@@ -10,24 +10,32 @@ A character is a ``design``: ``woman``, ``man``, ``cartoon``.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterator
-from typing import final
+from collections.abc import Callable, Iterator
+from functools import cached_property
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.faces.base import TRANSPARENT, Face, Staging
+from lipmotion.faces.base import TRANSPARENT, DrawnMotion, Face, Staging
 from lipmotion.faces.portrait.design import Design
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 
-__all__ = ["Cartoon", "DrawnFace", "Man", "Portrait", "Woman", "render"]
+if TYPE_CHECKING:
+    from lipmotion.faces.portrait.rasteriser import FacePose
+
+__all__ = ["Cartoon", "DrawnFace", "Man", "Portrait", "Woman"]
 
 OWN_SIZE = 640
 """Height of pictures whose size is not given."""
 
 
 class DrawnFace(Face):
-    """A drawn character; ``design`` says which."""
+    """A drawn character; ``design`` says which.
+
+    Motion needs ``opening``; ``width``, ``outer``, the chin ``y_152`` and the articulatory channels are used where they
+    exist. ``width`` and ``outer`` are taken relative to the rest pose in silence, so they suit any speaker.
+    """
 
     def __init__(self, staging: Staging | None = None, prosody: Prosody | None = None) -> None:
         self.staging, self.prosody = staging or Staging(), prosody
@@ -45,12 +53,27 @@ class DrawnFace(Face):
         return type(self)(staging, prosody)
 
     def render(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> Iterator[NDArray[np.uint8]]:  # noqa: D102
-        return render(self.design, motion, units, fps=fps, staging=self.staging, prosody=self.prosody)
+        return iter(self.drawn(motion, units, fps=fps))
+
+    def drawn(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> DrawnMotion[FacePose]:  # noqa: D102
+        from lipmotion.faces.portrait.frames import face_poses
+
+        poses = face_poses(motion, units, fps, self.staging, self.prosody)
+        return DrawnMotion(poses, lambda: self._painter)
+
+    @cached_property
+    def _painter(self) -> Callable[[FacePose], NDArray[np.uint8]]:
+        from lipmotion.faces.portrait.frames import painter
+        from lipmotion.faces.portrait.rasteriser import Rasteriser
+
+        chosen = self.staging
+        background = None if chosen.background == TRANSPARENT else chosen.colour or chosen.background
+        return painter(Rasteriser(self.design, chosen.size or OWN_SIZE, background))
 
     def render_planes(  # noqa: D102
         self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0
     ) -> Iterator[NDArray[np.uint8]] | None:
-        from lipmotion.faces.portrait.frames import face_poses, pictures
+        from lipmotion.faces.portrait.frames import face_poses, painter
         from lipmotion.faces.portrait.planar import PlanarRasteriser
 
         chosen = self.staging
@@ -58,7 +81,7 @@ class DrawnFace(Face):
             return None
         poses = face_poses(motion, units, fps, chosen, self.prosody)
         background, size = chosen.colour or chosen.background, chosen.size or OWN_SIZE
-        return pictures(lambda: PlanarRasteriser(self.design, size, background), poses)
+        return iter(DrawnMotion(poses, lambda: painter(PlanarRasteriser(self.design, size, background))))
 
 
 @final
@@ -96,31 +119,3 @@ class Cartoon(DrawnFace):
         from lipmotion.faces.portrait.cartoon import CARTOON
 
         return CARTOON
-
-
-def render(
-    design: Design,
-    motion: Motion,
-    units: Timeline[Unit],
-    *,
-    fps: float = 25.0,
-    staging: Staging | None = None,
-    prosody: Prosody | None = None,
-) -> Iterator[NDArray[np.uint8]]:
-    """Yield frames of a motion to its end, frame n at ``n / fps`` seconds.
-
-    motion : needs ``opening``; ``width``, ``outer``, the chin ``y_152`` and the articulatory channels are used where
-             they exist. ``width`` and ``outer`` are taken relative to the rest pose in silence, so they suit any
-             speaker
-    units  : the phones, from which the articulatory channels follow that the motion lacks; may be empty
-    Returns RGB [shape=(size, size, 3)], or RGBA with straight alpha where the background is transparent.
-    Raises InputError: no ``opening``, no frames, values that are not finite, or fps not positive.
-    The same input gives the same pixels.
-    """
-    from lipmotion.faces.portrait.frames import face_poses, pictures
-    from lipmotion.faces.portrait.rasteriser import Rasteriser
-
-    chosen = staging or Staging()
-    poses = face_poses(motion, units, fps, chosen, prosody)
-    background = None if chosen.background == TRANSPARENT else chosen.colour or chosen.background
-    return pictures(lambda: Rasteriser(design, chosen.size or OWN_SIZE, background), poses)

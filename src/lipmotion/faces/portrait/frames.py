@@ -1,18 +1,16 @@
-"""The frames of a motion: a pose for each, drawn by a few threads."""
+"""The frames of a motion: a pose for each, and what draws it."""
 
 from __future__ import annotations
 
 import threading
-from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable
 from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.mouth import spoken_mouth
-from lipmotion.faces.base import Staging, alive
+from lipmotion.faces.base import Picture, Staging, alive
 from lipmotion.faces.portrait.movement import HeadPlacement
 from lipmotion.faces.portrait.pose import mouth_poses
 from lipmotion.faces.portrait.rasteriser import FacePose
@@ -25,8 +23,6 @@ LOOK, YAW, PITCH = 0.25, 0.3, 0.4
 """How far an iris moves for an angle of the eyes, and features for angles of the head, in eye distances a radian."""
 SWAY_X, SWAY_Y = 0.25, 0.12
 """How far the head moves to the side and up for the same angles."""
-THREADS, AHEAD = 2, 6
-"""Threads that draw, and frames that may be drawn before they are asked for."""
 
 
 def face_poses(
@@ -57,28 +53,13 @@ class Draws(Protocol[CanvasT]):
         """Return one frame."""
 
 
-def pictures(rasteriser: Callable[[], Draws[CanvasT]], poses: Sequence[FacePose]) -> Iterator[NDArray[np.uint8]]:
-    """Yield the pictures of poses in order; they are drawn while earlier ones are used.
-
-    rasteriser : makes what draws; called when the first picture is asked for
-    """
-    drawing = rasteriser()
+def painter(drawing: Draws[CanvasT]) -> Callable[[FacePose], Picture]:
+    """Return what draws the picture of a pose, on a canvas of the thread that calls it."""
     canvases = threading.local()
 
-    def drawn(pose: FacePose) -> NDArray[np.uint8]:
+    def painted(pose: FacePose) -> Picture:
         if not hasattr(canvases, "own"):
             canvases.own = drawing.canvas()
         return drawing.picture(pose, canvases.own)
 
-    waiting: deque[Future[NDArray[np.uint8]]] = deque()
-    with ThreadPoolExecutor(THREADS) as threads:
-        try:
-            for pose in poses:
-                waiting.append(threads.submit(drawn, pose))
-                if len(waiting) > AHEAD:
-                    yield waiting.popleft().result()
-            while waiting:
-                yield waiting.popleft().result()
-        finally:  # the pictures may not all have been asked for
-            for future in waiting:
-                future.cancel()
+    return painted

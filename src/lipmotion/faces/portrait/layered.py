@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from copy import copy
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import NamedTuple, final
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
-from lipmotion.faces.base import SCENE, TRANSPARENT, Face, Staging
+from lipmotion.faces.base import SCENE, TRANSPARENT, DrawnMotion, Face, Staging
 from lipmotion.faces.portrait.frames import face_poses
 from lipmotion.faces.portrait.movement import PIVOT_Y, HeadPlacement
 from lipmotion.faces.portrait.pose import MouthPose
@@ -65,8 +65,8 @@ class LayeredFace(Face):
     def __init__(self, path: Path, staging: Staging | None = None, prosody: Prosody | None = None) -> None:
         """Raise InputError: the file is no drawing, or has no layer ``mouth-rest``."""
         self.path, self.staging, self.prosody = path, staging or Staging(), prosody
-        self.drawing = read_drawing(path)
-        names = {name for layers, _ in self.drawing.shapes for name in layers}
+        self.layers = read_drawing(path)
+        names = {name for layers, _ in self.layers.shapes for name in layers}
         self.mouths = tuple(name for name in MOUTHS if MOUTH + name in names)
         unknown = sorted(name for name in names if name.startswith(MOUTH) and name[len(MOUTH) :] not in MOUTHS)
         if unknown:
@@ -78,18 +78,24 @@ class LayeredFace(Face):
     def staged(self, staging: Staging, prosody: Prosody | None = None) -> LayeredFace:
         """Return the same drawing with other settings; ``prosody`` is of the speech that will be rendered."""
         other = copy(self)
+        other.__dict__.pop("_painter", None)
         other.staging, other.prosody = staging, prosody
         return other
 
     def render(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> Iterator[NDArray[np.uint8]]:  # noqa: D102
+        return iter(self.drawn(motion, units, fps=fps))
+
+    def drawn(  # noqa: D102
+        self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0
+    ) -> DrawnMotion[tuple[FacePose, str]]:
         poses = face_poses(motion, units, fps, self.staging, self.prosody)
         shown = chosen_mouths([pose.mouth for pose in poses], self.mouths, fps)
-        return self._frames(poses, shown)
+        return DrawnMotion(list(zip(poses, shown, strict=True)), lambda: self._painter)
 
-    def _frames(self, poses: Sequence[FacePose], shown: Sequence[str]) -> Iterator[NDArray[np.uint8]]:
-        picture = _LayeredPicture(self.drawing, self.staging)
-        for pose, mouth in zip(poses, shown, strict=True):
-            yield picture.frame(pose, mouth)
+    @cached_property
+    def _painter(self) -> Callable[[tuple[FacePose, str]], NDArray[np.uint8]]:
+        picture = _LayeredPicture(self.layers, self.staging)
+        return lambda pose: picture.frame(*pose)
 
 
 def chosen_mouths(poses: Sequence[MouthPose], mouths: Sequence[str], fps: float) -> list[str]:

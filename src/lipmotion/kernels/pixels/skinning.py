@@ -16,8 +16,7 @@ def skinned(weights: csr_array, matrices: NDArray[np.float64], vertices: NDArray
     vertices : at rest [shape=(N, 3)]
     v′ = Σ wᵢ Mᵢ v + (1 − Σ wᵢ) v: the matrices are blended, then applied, which is the same and costs less.
     Source: Hofer 2008, Eq. 12.  Deviation: a fixed control point has what the weights leave of 1, so that the face
-    beyond the
-    mouth stands still.
+    beyond the mouth stands still.
     Cost: O(12 · (number of weights) + 12 N).
     """
     still = np.eye(3, 4)

@@ -57,8 +57,7 @@ def load_binding(path: Path, mesh: Mesh) -> ControlBinding:
     """Return the binding of a file, for the mesh that it was made for.
 
     Raises InputError: no such file, or it was made for a mesh of another number of vertices. Raises
-    ModelFormatError: it
-    is no binding, damaged, or of another version.
+    ModelFormatError: it is no binding, damaged, or of another version.
     """
     check_source(path, "binding")
     try:

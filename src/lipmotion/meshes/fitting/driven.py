@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,17 @@ Array = NDArray[np.float64]
 METRIC = (".glb", ".gltf", ".vrm")
 """Suffixes of characters whose unit is the metre."""
 EYES_AND_BROWS = tuple(name for name in ARKIT_OTHERS if name.startswith(("eyeBlink", "eyeLook", "brow")))
+
+
+class CharacterPose(NamedTuple):
+    """What moves a character in one frame.
+
+    mouth  : weights of its blendshapes of the mouth [shape=(S,)], or displacements of points [shape=(52, 3)]
+    others : weights of its blendshapes of eyes and brows [shape=(S',)]
+    """
+
+    mouth: Array
+    others: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,14 +71,14 @@ class DrivenCharacter:
             )
         return shape_weights(motion, units, self.shapes)
 
-    def vertices(
+    def poses(
         self,
         motion: Motion,
         units: Timeline[Unit],
         time_s: Array,
         others: Mapping[str, Array] | None = None,
-    ) -> Iterator[Array]:
-        """Yield the vertices at some times in seconds, evenly spaced [each shape=(V, 3)].
+    ) -> list[CharacterPose]:
+        """Return the pose at some times in seconds, evenly spaced, for ``posed``.
 
         others : weights of ARKit's blendshapes of eyes and brows, 0 to 1 [each shape=(T,)]; those that the mesh does
                  not have are left out; None: they stay at rest
@@ -75,16 +87,32 @@ class DrivenCharacter:
         """
         points = point_motion(motion, units)
         beside, contact = self._beside(others or {}, len(time_s)), points.mouth.contact
+        moved = points.displacements
         if self.shapes is not None:
-            weights = shape_weights(motion, units, self.shapes).values.astype(np.float64)
-            for row, other in zip(in_pictures(weights, contact, motion.rate_hz, time_s), beside, strict=True):
-                yield self._shaped(row @ self._displacements, other)
-        elif self.binding is not None:
-            rows = in_pictures(points.displacements, contact, motion.rate_hz, time_s)
-            for row, other in zip(rows, beside, strict=True):
-                vertices = self.binding.moved(self.mesh, row)
-                vertices[self.moving] += (other @ self._others).reshape(-1, 3)
-                yield vertices
+            moved = shape_weights(motion, units, self.shapes).values.astype(np.float64)
+        rows = in_pictures(moved, contact, motion.rate_hz, time_s)
+        return list(map(CharacterPose, rows, beside))
+
+    def vertices(
+        self, motion: Motion, units: Timeline[Unit], time_s: Array, others: Mapping[str, Array] | None = None
+    ) -> Iterator[Array]:
+        """Yield the vertices at some times [each shape=(V, 3)], as of ``poses``."""
+        return map(self.posed, self.poses(motion, units, time_s, others))
+
+    def posed(self, pose: CharacterPose) -> Array:
+        """Return the vertices in a pose [shape=(V, 3)]."""
+        if self.shapes is not None:
+            return self._shaped(pose.mouth @ self._displacements, pose.others)
+        vertices = self._binding.moved(self.mesh, pose.mouth)
+        vertices[self.moving] += (pose.others @ self._others).reshape(-1, 3)
+        return vertices
+
+    @property
+    def _binding(self) -> ControlBinding:
+        """The weights of control points. Raises InputError: blendshapes move the character, and none of the mouth."""
+        if self.binding is None:
+            raise InputError("the character has neither blendshapes of the mouth nor a binding; give it a binding")
+        return self.binding
 
     @cached_property
     def moving(self) -> NDArray[np.int64]:

@@ -16,8 +16,7 @@ FAP = "fap"
 STEPS = 1024.0
 MOUTH_TO_NOSE = 0.30
 """The distance from the nose to where the lips meet (MNS0) in a mean face, in eye distances; the width of the mouth
-(MW0)
-is the template's."""
+(MW0) is the template's."""
 PARAMETERS = (
     # number, name, point, axis (x left, y up, z out), sign, unit (N: mouth to nose, W: width of the mouth)
     (3, "open_jaw", 152, 1, -1, "N"),

@@ -35,8 +35,7 @@ DETOUR = 2.0
 distance between neighbours."""
 LIP_LINE = 0.1
 """Vertices this close to the line between the corners, in widths of the mouth, are not joined with others at their
-place
-where no blendshape tells the lips apart."""
+place where no blendshape tells the lips apart."""
 FRONT = 0.04
 """Behind the foremost of such pairs by more than this share are the insides of the mouth."""
 DEPTH_WEIGHT = 0.35

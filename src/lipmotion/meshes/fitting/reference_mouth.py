@@ -1,8 +1,7 @@
 """A mouth that has ARKit's blendshapes and nothing else: motion becomes ARKit's weights without any mesh.
 
 The places are those of the template, the shapes are formulas on them: what ARKit's documentation shows of each
-shape, in
-eye distances. docs/results/rig.md compares them with a scanned head's.
+shape, in eye distances. docs/results/rig.md compares them with a scanned head's.
 """
 
 from __future__ import annotations

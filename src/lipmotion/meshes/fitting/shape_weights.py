@@ -102,8 +102,7 @@ def with_gap(weights: Array, shapes: FaceShapes, gap: Array, kept: Collection[st
     kept    : known names of shapes that stay as they are
     The projection onto the weights with that gap: as smooth as the weights and the gap are. Shapes that hardly part the
     lips remain. ``mouthClose`` takes its part by closing the lips in front of an open jaw. Where no weights between
-    0 and 1
-    have the gap, those that come nearest.
+    0 and 1 have the gap, those that come nearest.
     """
     jaw, close = shapes.row("jawOpen"), shapes.row("mouthClose")
     apart, weights = shapes.gap.copy(), weights.copy()

@@ -30,6 +30,7 @@ VISEME_PHONES = {
 }
 """The phones of each viseme (the groups of the Oculus LipSync reference, in the project's phones)."""
 VISEME_OF_PHONE = {phone: viseme for viseme, phones in VISEME_PHONES.items() for phone in phones.split()}
+VISEME_CHANNELS = tuple(f"viseme_{name}" for name in VISEMES_15)
 NEAREST_VOWEL = {
     **{"TH": "ih", "DD": "ih", "kk": "ih", "CH": "ou", "SS": "ih", "nn": "ih", "RR": "oh", "E": "ee"},
     **{"aa": "aa", "ih": "ih", "oh": "oh", "ou": "ou"},
@@ -68,7 +69,7 @@ def viseme_motion(units: Timeline[Unit], mouth: SpokenMouth) -> Motion:
     curves |= {"sil": closed * silent, "PP": closed * (1 - silent)}
     curves[LAX] += np.where(asked < 1 - LITTLE, 0.0, 1 - closed)
     values = np.stack([np.clip(curves[name], 0, 1) for name in VISEMES_15], axis=1)
-    return Motion(values, mouth.rate_hz, tuple(Channel(f"viseme_{name}", WEIGHT) for name in VISEMES_15))
+    return Motion(values, mouth.rate_hz, tuple(Channel(name, WEIGHT) for name in VISEME_CHANNELS))
 
 
 def viseme_curves(units: Timeline[Unit], time_s: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:

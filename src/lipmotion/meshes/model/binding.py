@@ -86,8 +86,7 @@ def bind(mesh: Mesh, surface: MeshSurface, placement: LipPlacement) -> ControlBi
 
     A control point acts within its reach: wᵢ ∝ ((Rᵢ − dᵢ) / (Rᵢ (dᵢ + s)))², normalised over the control points; all of
     them together fade out as the nearest one gets out of reach. Distances are measured along the surface, so the
-    upper lip
-    does not drag the lower, however near it is. Pieces inside the mouth below the lips follow the jaw as one.
+    upper lip does not drag the lower, however near it is. Pieces inside the mouth below the lips follow the jaw as one.
     Source: Hofer 2008, Eq. 12, which gives no form of the weights; Franke & Nielson 1980 (modified Shepard weights).
     """
     template = mouth_template()

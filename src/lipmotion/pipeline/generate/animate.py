@@ -1,49 +1,25 @@
-"""Speech to motion: ``animate(speech) → generation``; motion to files: ``write(generation, files)``."""
+"""Speech to motion in one call: ``animate(speech) → generation``; one pass through a session."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
-from lipmotion.articulation.pauses import with_pauses
-from lipmotion.articulation.symmetry import symmetrical
 from lipmotion.errors import InputError
-from lipmotion.kernels.threads import one_thread
-from lipmotion.motion.speakers import SpeakerMap
-from lipmotion.pipeline.generate.generation_for import generate_for
-from lipmotion.pipeline.generate.outlook import outlook_of
-from lipmotion.pipeline.generate.transfer import person_of
+from lipmotion.pipeline.edit_files import EditFile, read_edits
+from lipmotion.pipeline.edits import Edits
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.understand.request import SpeechInput, SpeechRequest, request_of
-from lipmotion.pipeline.understand.understood_speech import UnderstoodSpeech, understood_speech
-from lipmotion.pipeline.workers import map_in_processes
-from lipmotion.types import (
-    Constraints,
-    Generation,
-    Monitor,
-    Progress,
-    TimedTranscript,
-    silent_monitor,
-)
-
-SOUND_RATE_HZ = 48_000
-"""Sampling rate of the sound track of a drawn video."""
-DRAWN_HZ = 25.0
-"""Frame rate of videos of drawn faces."""
-MOVING = 0.9
-"""The share of the work that is recognition, in reports; the rest is the generation of motion."""
-SLOWEST_HZ, FASTEST_HZ = 1.0, 1000.0
-"""Smallest and largest frame rate of a file; a mistyped rate must not fill the memory."""
+from lipmotion.pipeline.understand.request import SpeechInput, request_of
+from lipmotion.types import Constraints, Generation, Monitor, TimedTranscript, silent_monitor
 
 
-@one_thread()
-def animate(
+def animate(  # noqa: PLR0913
     speech: SpeechInput,
     *,
     model: Model | str | Path | None = None,
     transcript: str | Path | TimedTranscript | None = None,
     constraints: Constraints | None = None,
+    edits: Edits | str | Path | None = None,
     workers: int = 1,
     monitor: Monitor = silent_monitor,
     meanwhile: Callable[[], None] | None = None,
@@ -53,7 +29,10 @@ def animate(
     speech      : an audio or video file, samples at 16 kHz, or a ``SpeechRequest`` with all that is known of it
     model       : from ``load_model``, or the path of a model file; None: the shipped model
     transcript  : the spoken words, or a Path of a file with them; the same as a ``SpeechRequest`` with this transcript
-    constraints : values that the motion must take exactly, in the units of the request's speaker
+    constraints : values that the motion must take exactly, in the units of the request's speaker; also of curves that
+                  follow from it (``Session.generated``)
+    edits       : what is changed of the motion, or the path of a file of edits (docs/edit.md), whose phones are used
+                  where the request has no words and no phones
     workers     : number of processes that recognise the words of a long recording. With more than one, a script must be
                   guarded by ``if __name__ == "__main__":``
     monitor     : receives reports of the progress
@@ -72,30 +51,9 @@ def animate(
     """
     if not isinstance(constraints, Constraints | None):
         raise InputError(f"the constraints are a {type(constraints).__name__}, required Constraints((Pin(...),))")
-    chosen = model if isinstance(model, Model) else load_model(model)
     request = request_of(speech, transcript)
-    person = person_of(chosen, request)
-    understood = understood_speech(chosen, request, map_in_processes(workers, meanwhile), monitor)
-    monitor(Progress("moving the mouth", 0, 1, MOVING))
-    generation = generation_of(request, person, chosen, understood, constraints)
-    monitor(Progress("moving the mouth", 1, 1, 1.0))
-    return generation
-
-
-def generation_of(
-    request: SpeechRequest,
-    person: SpeakerMap | None,
-    model: Model,
-    understood: UnderstoodSpeech,
-    constraints: Constraints | None = None,
-) -> Generation:
-    """Return the motion of understood speech, with pauses and asymmetry as asked for, and what to expect of it.
-
-    person : of ``person_of``
-    Raises InputError: a constraint is not usable.
-    """
-    generation = generate_for(person, model.engine, model.learned, understood.speech, constraints)
-    pinned_s = [pin.time_s for pin in constraints.pins] if constraints else []
-    if request.onto is None:
-        generation = replace(generation, motion=symmetrical(generation.motion, request.asymmetry))
-    return replace(with_pauses(generation, request.pauses, pinned_s), outlook=outlook_of(request, understood))
+    file = EditFile(edits or Edits()) if isinstance(edits, Edits | None) else read_edits(edits)
+    model = model if isinstance(model, Model) else load_model(model)
+    session = file.session(request, model=model, workers=workers, monitor=monitor, meanwhile=meanwhile)
+    pins = Edits.of_pins(constraints.pins if constraints else ())
+    return session.generated(file.edits.then(*pins.steps))

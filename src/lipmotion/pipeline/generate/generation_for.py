@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.curve_edits import bend_through_pins
 from lipmotion.engines import Animator
 from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING
@@ -22,7 +23,6 @@ from lipmotion.types import (
     Constraints,
     Explanation,
     Generation,
-    Motion,
     Pin,
     ReducedVariance,
     Speech,
@@ -31,7 +31,7 @@ from lipmotion.types import (
 
 ModelT = TypeVar("ModelT")
 REACH_FRAMES = 10
-"""Frames around a pin over which a value is reached that the mean person's mouth cannot take."""
+"""Frames on both sides of a pin over which a value is reached that the mean person's mouth cannot take."""
 
 
 def speaker_map(maps: SpeakerMaps | None, speaker: str) -> SpeakerMap | None:
@@ -78,7 +78,9 @@ def generate_for(
         poses = mean.motion.values[block]
         values[block] = fitted.to_person(poses + fitted.shift(poses, visemes[block]), restful[block])
     motion = replace(mean.motion, values=values)
-    _hold_pins(motion, pins)
+    held = [(frame_of(pin.time_s, len(values), FRAME_RATE_HZ), motion.column(pin.channel), pin.value) for pin in pins]
+    inside = [(frame, column, value) for frame, column, value in held if frame is not None]
+    bend_through_pins(values, inside, REACH_FRAMES)
     bounded = [_is_never_negative(channel) for channel in motion.channels]
     values[:, bounded] = np.maximum(values[:, bounded], 0)
     return replace(mean, motion=motion, spread=_spread(mean.spread, np.square(fitted.gain)))
@@ -123,21 +125,6 @@ def _mean_pin(person: SpeakerMap, restful: NDArray[np.float64], pin: Pin) -> Pin
         return pin
     value = float(person.ordered([channel]).to_mean(np.array([[pin.value]]), restful[frame : frame + 1])[0, 0])
     return replace(pin, value=max(value, 0.0) if _is_never_negative(channel) else value)
-
-
-def _hold_pins(motion: Motion, pins: tuple[Pin, ...]) -> None:
-    """Change values in place so that all pins hold: some are less than the mean person's mouth can do."""
-    values = motion.values
-    window = np.hanning(2 * REACH_FRAMES + 3)[1:-1]
-    frames = [(frame_of(pin.time_s, len(values), FRAME_RATE_HZ), motion.column(pin.channel), pin.value) for pin in pins]
-    for frame, column, value in frames:
-        if frame is not None and abs(lacking := value - values[frame, column]) > 1e-9:
-            first, stop = max(frame - REACH_FRAMES, 0), min(frame + REACH_FRAMES + 1, len(values))
-            shift = frame - REACH_FRAMES
-            values[first:stop, column] += lacking * window[first - shift : stop - shift]
-    for frame, column, value in frames:
-        if frame is not None:
-            values[frame, column] = value
 
 
 def _is_never_negative(channel: Channel) -> bool:

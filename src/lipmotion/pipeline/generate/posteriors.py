@@ -8,11 +8,9 @@ from lipmotion.engines import ENGINES
 from lipmotion.engines.base import HasPosteriors
 from lipmotion.errors import ExportError, InputError
 from lipmotion.kernels.threads import one_thread
-from lipmotion.pipeline.generate.animate import generation_of
-from lipmotion.pipeline.generate.transfer import person_of
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.understand.request import SpeechInput, request_of
-from lipmotion.pipeline.understand.understood_speech import understood_speech
+from lipmotion.pipeline.session import Session
+from lipmotion.pipeline.understand.request import SpeechInput
 from lipmotion.storage.files import check_target, whole_file
 from lipmotion.types import ChainPosteriors, Generation
 
@@ -32,10 +30,8 @@ def animate_with_posteriors(speech: SpeechInput, *, model: Model) -> tuple[Gener
             f"the engine {engine.name!r} has no chains of states whose posteriors could be shown; give a model that "
             f"was trained with --engine {' or '.join(having)}"
         )
-    request = request_of(speech)
-    person = person_of(model, request)
-    understood = understood_speech(model, request)
-    return generation_of(request, person, model, understood), engine.posteriors(learned, understood.speech)
+    session = Session(speech, model=model)
+    return session.generated(), engine.posteriors(learned, session.understood().speech)
 
 
 def check_picture(path: Path, speech: Path | None = None) -> None:

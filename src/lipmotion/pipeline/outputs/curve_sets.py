@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from lipmotion.articulation.curve_edits import with_edited_curves
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.errors import InputError
 from lipmotion.faces.base import Staging
@@ -18,9 +19,10 @@ from lipmotion.meshes.fitting.facial_animation import fap_motion
 from lipmotion.meshes.fitting.reference_mouth import arkit_mouth
 from lipmotion.meshes.fitting.shape_weights import shape_weights
 from lipmotion.meshes.fitting.visemes import viseme_motion
+from lipmotion.meshes.model.shape_names import arkit_name
 from lipmotion.pipeline.outputs.living_curves import living_curves
 from lipmotion.storage.files import whole_file
-from lipmotion.types import Generation, Motion, Prosody, Timeline, Unit
+from lipmotion.types import Gain, Generation, Motion, Pin, Prosody, Timeline, Unit
 
 ARKIT, WHOLE_FACE = "arkit", "face"
 SHAPE_SETS = (ARKIT, WHOLE_FACE, "visemes", "fap")
@@ -43,6 +45,7 @@ def curves_of(
     *,
     staging: Staging | None = None,
     prosody: Prosody | None = None,
+    edits: Sequence[Pin | Gain] = (),
 ) -> Motion:
     """Return motion as curves that drive a character.
 
@@ -50,26 +53,45 @@ def curves_of(
     curves : ``arkit``, ``face``, ``visemes``, ``fap``, a table of a rig's controls (``.csv``), or a character with
              blendshapes
     staging, prosody : of the eyes, brows and head of ``face``, as of ``living_curves``
+    edits  : pins and gains of curves; controls of a rig also follow those of the curves that they are made of
     Raises InputError: no such set or file, the character has no blendshapes, or the motion has no channel ``opening``.
     """
+
+    def plain(name: str) -> Motion:
+        return with_edited_curves(_curves_of(motion, units, name, staging, prosody), units, edits)
+
     if isinstance(curves, DrivenCharacter):
-        return curves.weights(motion, units)
+        return edited_weights(curves.weights(motion, units), units, edits)
     check_curve_set(curves)
-    if curves == ARKIT:
+    if curves in SHAPE_SETS:
+        return plain(str(curves))
+    rows = read_rig_table(Path(curves))
+    sets = [with_mouth(motion), plain(ARKIT), plain("visemes")]
+    if not all(row.source in {"", *(name for each in sets for name in each.names)} for row in rows):
+        sets.append(living_curves(with_mouth(motion), units, staging, prosody))
+    sources = {name: each[name].astype(np.float64) for each in sets for name in each.names}
+    own = [edit for edit in edits if edit.channel not in sources]
+    return with_edited_curves(rig_motion(rows, sources, motion.rate_hz), units, own)
+
+
+def edited_weights(weights: Motion, units: Timeline[Unit], edits: Sequence[Pin | Gain]) -> Motion:
+    """Return weights of a character with pins and gains, which name its blendshapes as it does or as ARKit does."""
+    named = {arkit_name(name) or name: name for name in weights.names} | {name: name for name in weights.names}
+    ours = [replace(edit, channel=named[edit.channel]) for edit in edits if edit.channel in named]
+    return with_edited_curves(weights, units, ours)
+
+
+def _curves_of(
+    motion: Motion, units: Timeline[Unit], name: str, staging: Staging | None, prosody: Prosody | None
+) -> Motion:
+    """Return the curves of one of ``SHAPE_SETS``."""
+    if name == ARKIT:
         return shape_weights(motion, units, arkit_mouth())
     motion = with_mouth(motion)
-    if curves == WHOLE_FACE:
-        return beside(curves_of(motion, units, ARKIT), living_curves(motion, units, staging, prosody))
-    if curves == "visemes":
-        return viseme_motion(units, spoken_mouth(motion, units))
-    if curves == "fap":
-        return fap_motion(motion, units)
-    rows = read_rig_table(Path(curves))
-    sets = [motion, curves_of(motion, units, ARKIT), curves_of(motion, units, "visemes")]
-    if not all(row.source in {"", *(name for each in sets for name in each.names)} for row in rows):
-        sets.append(living_curves(motion, units, staging, prosody))
-    sources = {name: each[name].astype(np.float64) for each in sets for name in each.names}
-    return rig_motion(rows, sources, motion.rate_hz)
+    if name == WHOLE_FACE:
+        mouth = shape_weights(motion, units, arkit_mouth())
+        return beside(mouth, living_curves(motion, units, staging, prosody))
+    return viseme_motion(units, spoken_mouth(motion, units)) if name == "visemes" else fap_motion(motion, units)
 
 
 def beside(first: Motion, second: Motion) -> Motion:
@@ -96,7 +118,8 @@ def with_curves(
     Channels that the motion has already are replaced. The variance of all channels of ``curves_of`` is 0.
     Raises InputError: as ``curves_of``.
     """
-    added = curves_of(generation.motion, generation.units, curves, staging=staging, prosody=prosody)
+    edits = generation.curve_edits
+    added = curves_of(generation.motion, generation.units, curves, staging=staging, prosody=prosody, edits=edits)
     kept = [name for name in generation.motion.names if name not in added.names]
     if len(kept) < len(generation.motion.names):
         generation = generation.selected(kept)

@@ -43,6 +43,8 @@ def shown(
     character : whose weights are shown, if the face is a character with blendshapes
     """
     moved = with_drawn_channels(delivered(generation, delivery))
+    if moved.curve_edits and character is not None and character.shapes is not None:
+        moved = with_curves(moved, character)[0]
     frames = delivery.hold_frames(fps)
     if not frames:
         return moved

@@ -72,7 +72,14 @@ class PicturesOutput(VideoOutput):
 
 def sound_track(performance: Performance) -> Audio:
     """Return the sound of videos. Raises InputError: the recording cannot be read."""
-    return performance.sound or read_audio(Path(str(performance.settings.recording)), SOUND_RATE_HZ, warn=False)
+    return read_sound(performance.sound or performance.settings.recording)
+
+
+def read_sound(recording: str | Path | Audio | None) -> Audio:
+    """Return the sound of a recording as videos have it. Raises InputError: it cannot be read."""
+    if isinstance(recording, Audio):
+        return recording
+    return read_audio(Path(str(recording)), SOUND_RATE_HZ, warn=False)
 
 
 def shows_face(path: Path) -> bool:

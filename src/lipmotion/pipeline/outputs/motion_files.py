@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion.articulation.contact import in_pictures
+from lipmotion.articulation.curve_edits import with_edited_curves
 from lipmotion.articulation.delivery import closed_on_grid, closed_times
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
@@ -152,6 +153,7 @@ def in_format(
     others = form.other_curves and all(channel.unit in CURVES for channel in held.motion.channels)
     if form.curves and not others:
         curves = _curves(generation, form.curves, staging, prosody)
+        curves = with_edited_curves(curves, generation.units, generation.curve_edits)
         held = replace(generation, motion=curves, spread=np.zeros(curves.values.shape))
         own = [name for name in channels or () if name in curves.names]
         held = held.selected(own) if own else held

@@ -23,6 +23,7 @@ from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.mesh import Blendshape
 from lipmotion.meshes.model.scene import HeadTurn, Scene
 from lipmotion.meshes.model.shape_names import by_arkit_name
+from lipmotion.pipeline.outputs.curve_sets import curves_of, edited_weights
 from lipmotion.pipeline.outputs.delivered import delivered, held_mouth, with_drawn_channels
 from lipmotion.pipeline.outputs.drawn_video import check_drawable
 from lipmotion.pipeline.outputs.living_curves import living_curves
@@ -128,6 +129,7 @@ def head_scene(
     weights = Motion(
         np.stack([curves[name] for name in names], axis=1), hertz, tuple(Channel(name, WEIGHT) for name in names)
     )
+    weights = edited_weights(weights, generation.units, generation.curve_edits)
     shapes = tuple(Blendshape(each.name, each.rows, METRES * each.displacements) for each in mesh.shapes)
     scaled = replace(mesh, vertices=METRES * mesh.vertices, shapes=shapes)
     rotations = Rotation.from_matrix(np.stack([turned(*pose.turn) for pose in poses])).as_quat()
@@ -150,7 +152,7 @@ def character_scene(
     Raises InputError: the character has no blendshapes, or the motion has no channel ``opening``.
     """
     motion, units = generation.motion, generation.units
-    weights = character.weights(motion, units)
+    weights = curves_of(motion, units, character, edits=generation.curve_edits)
     known = by_arkit_name(character.mesh.shape_names)
     living = living_curves(with_mouth(motion), units, staging, prosody)
     added = [name for name in living.names if name in known and known[name] not in weights.names]

@@ -41,6 +41,8 @@ class ShownFace(ABC):
 
     has_own_background = False
     """Whether the background is footage, and not a colour."""
+    character: DrivenCharacter | None = None
+    """The character that is drawn, of which curves may be edited."""
 
     @abstractmethod
     def check(self, settings: OutputSettings) -> None:
@@ -102,7 +104,7 @@ class ShownCharacter(ShownDrawing):
 
     def __init__(self, face: MeshFace) -> None:
         super().__init__(face)
-        self.character = face.character
+        self.character: DrivenCharacter = face.character
 
     def scene(self, generation: Generation, settings: OutputSettings, prosody: Prosody | None) -> Scene:  # noqa: D102
         return character_scene(generation, self.character, settings.rate_hz, staging=settings.staging, prosody=prosody)
@@ -177,6 +179,8 @@ def _seen(performance: Performance) -> Generation:
     """Return the motion as videos show it."""
     settings = performance.settings
     character = settings.curves if isinstance(settings.curves, DrivenCharacter) else None
+    if performance.generation.curve_edits:
+        character = character or settings.face.character
     return shown(performance.generation, settings.delivery, _frame_rate(settings), character)
 
 

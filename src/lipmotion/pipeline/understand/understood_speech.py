@@ -18,7 +18,7 @@ from lipmotion.hmm.model import UnitHmm
 from lipmotion.pipeline.generate.prior import with_prior
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.understand.request import SpeechRequest
-from lipmotion.pipeline.understand.transcribe import read_transcript, transcribe
+from lipmotion.pipeline.understand.transcribe import read_transcript, transcribe, warn_of_guesses
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.speaker_similarity import speaker_similarity
@@ -35,6 +35,7 @@ from lipmotion.types import (
     Monitor,
     ParallelMap,
     Progress,
+    Span,
     Speech,
     TimedTranscript,
     Timeline,
@@ -127,6 +128,28 @@ def known_voice(
     if found is not None and found.similarity is not None:
         return voice_knowledge(found.similarity)
     return voice_knowledge(speaker_similarity(phones, analysed(audio)).score)
+
+
+def aligned_within(
+    model: Model, request: SpeechRequest, audio: AnalysedAudio, word: str, start_s: float, end_s: float
+) -> list[Span[Unit]]:
+    """Return the phones in time of a word that is said from ``start_s`` to ``end_s``, by forced alignment there.
+
+    audio : the recording of the request
+    Raises AlignmentError: the word does not fit in there.
+    """
+    installed = request.recogniser in INSTALLED_RECOGNISERS
+    phones = cached_recogniser(model.phones, "auto" if installed else request.recogniser, model.adaptation)
+    (first, stop), lexicon = (
+        (round(time_s * FRAME_RATE_HZ) for time_s in (start_s, end_s)),
+        request.lexicon or Lexicon(),
+    )
+    words = words_of(word)
+    warn_of_guesses(words, lexicon)
+    piece = audio.stretch(first, stop)
+    spans = list(phones.align(piece, piece.mfcc(), words, lexicon).shifted(start_s))
+    spans[0], spans[-1] = replace(spans[0], start_s=start_s), replace(spans[-1], end_s=end_s)
+    return spans
 
 
 def _reported(each: ParallelMap, duration_s: float, monitor: Monitor) -> ParallelMap:

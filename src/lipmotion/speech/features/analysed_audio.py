@@ -67,6 +67,39 @@ class AnalysedAudio(Audio):
             self._stretches[frames] = AnalysedAudio(samples, self.rate_hz)
         return self._stretches[frames]
 
+    def stretch(self, first: int, stop: int) -> AnalysedAudio:
+        """Return some frames of the recording, with the features that they have in the whole."""
+        return _Stretch(self.samples[first * HOP : stop * HOP], self.rate_hz, whole=self, first=first)
+
+
+@dataclass(frozen=True, eq=False)
+class _Stretch(AnalysedAudio):
+    """Frames of a recording, from ``first`` on, whose features are those of the whole: normalised as these."""
+
+    whole: AnalysedAudio = field(default=None, repr=False, kw_only=True)  # type: ignore[assignment]
+    first: int = field(default=0, kw_only=True)
+
+    def mfcc_of_warps(self, warps: Sequence[float]) -> list[Features]:
+        return [Features(self._rows(each.values), self.duration_s) for each in self.whole.mfcc_of_warps(warps)]
+
+    @cached_property
+    def log_energy(self) -> NDArray[np.float32]:
+        return self._rows(self.whole.log_energy)
+
+    @cached_property
+    def general_features(self) -> NDArray[np.float32]:
+        return self._rows(self.whole.general_features)
+
+    @cached_property
+    def spectrum(self) -> NDArray[np.float32]:
+        return self._rows(self.whole.spectrum)
+
+    def loudest_stretch(self, frames: int) -> AnalysedAudio:
+        return self.whole.loudest_stretch(frames)
+
+    def _rows(self, rows: NDArray[np.float32]) -> NDArray[np.float32]:
+        return rows[self.first : self.first + len(self.samples) // HOP + 1]
+
 
 def analysed(audio: Audio, features: Features | None = None) -> AnalysedAudio:
     """Return a recording that keeps its features: the same object if it already does.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
 from functools import cache
 from importlib import resources
 
@@ -19,7 +18,6 @@ STATIC_FEATURES = 13
 """The first columns of the features, which are used: c1–c12 and log energy; their context holds the deltas."""
 FRAME_OFFSETS = tuple(range(-15, 16, 3))
 """The context of a frame, in frames from it: 150 ms before and after."""
-RIDGE = 100.0
 WEIGHTS = "lip-speed.json"
 
 
@@ -28,7 +26,7 @@ def predicted_opening_speed(features: Features) -> Array:
 
     It is of no use as lip motion; the shift at which it correlates best with tracked lips is the offset of the video.
     """
-    return _context(features) @ _weights()
+    return context_features(features) @ _weights()
 
 
 def measured_opening_speed(opening: Array) -> Array:
@@ -39,25 +37,7 @@ def measured_opening_speed(opening: Array) -> Array:
     return regression_delta(opening.astype(np.float32)[:, None])[:, 0].astype(float)
 
 
-def fit_opening_speed(examples: Iterable[tuple[Features, Array]]) -> Array:
-    """Return the weights of the prediction [shape=(143,)], by ridge regression.
-
-    examples : features, and the ``measured_opening_speed`` of the lips [shape=(at most T,)], of clips where both are in
-               step
-    """
-    count = STATIC_FEATURES * len(FRAME_OFFSETS)
-    products: Array = RIDGE * np.eye(count)
-    targets: Array = np.zeros(count)
-    for features, measured in examples:
-        inputs = _context(features)[: len(measured)]
-        inputs -= inputs.mean(axis=0)
-        target = measured[: len(inputs)] / max(float(measured.std()), 1e-9)
-        products += inputs.T @ inputs
-        targets += inputs.T @ target
-    return np.asarray(np.linalg.solve(products, targets), float)
-
-
-def _context(features: Features) -> Array:
+def context_features(features: Features) -> Array:
     """Return the static features of every frame and its context [shape=(T, 143)]; the ends are repeated."""
     static = features.values[:, :STATIC_FEATURES].astype(float)
     frames = np.arange(len(static))[:, None] + np.array(FRAME_OFFSETS)

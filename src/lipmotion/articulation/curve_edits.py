@@ -1,0 +1,118 @@
+"""Pins and gains of curves that exist already: of channels that no model generates by themselves, of blendshapes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.articulation.delivery import intensified
+from lipmotion.articulation.rest import rest_frames
+from lipmotion.errors import InputError
+from lipmotion.types import WEIGHT, Gain, Generation, Motion, Pin, Timeline, Unit, frame_of
+
+Curve = NDArray[np.float64]
+
+PIN_REACH_S = 0.1
+"""A pin bends a curve within this time before and after it."""
+GAIN_EDGE_S = 0.1
+"""A gain grows and fades in this time."""
+LOCK_EDGE_S = 0.05
+"""Motion goes over into a locked span, and out of it, in this time."""
+
+
+def with_edited_curves(motion: Motion, units: Timeline[Unit], edits: Sequence[Pin | Gain]) -> Motion:
+    """Return motion with pins and gains of its channels; those of other channels change nothing.
+
+    A pinned value holds exactly in the frame nearest to its time, also where a gain acts; the curve bends towards it
+    within ``PIN_REACH_S``. A gain multiplies weights, and the distance of other channels to their rest pose. Weights
+    stay between 0 and 1.
+    units : phones in time, whose silences show the rest pose
+    Raises InputError: a pin outside the motion, or a weight that is pinned to less than 0 or more than 1.
+    """
+    ours = [edit for edit in edits if edit.channel in motion.names]
+    edited = {edit.channel for edit in ours}
+    if not ours:
+        return motion
+    values, rest = motion.values.astype(np.float64), rest_frames(motion, units)
+    pins = []
+    for edit in ours:
+        column = motion.column(edit.channel)
+        is_weight = motion.channels[column].unit == WEIGHT
+        if isinstance(edit, Pin):
+            pins.append((_pinned_frame(edit, motion, is_weight=is_weight), column, edit.value))
+            continue
+        still = 0.0 if is_weight else float(np.median(values[rest, column]))
+        factor = 1 + (edit.factor - 1) * span_weight(motion.time_s, edit.start_s, edit.end_s, GAIN_EDGE_S)
+        values[:, column] = still + factor * (values[:, column] - still)
+    bend_through_pins(values, pins, max(round(PIN_REACH_S * motion.rate_hz), 1))
+    channels = zip(motion.channels, range(len(motion.channels)), strict=True)
+    weights = [column for channel, column in channels if channel.unit == WEIGHT and channel.name in edited]
+    values[:, weights] = np.clip(values[:, weights], 0, 1)
+    return replace(motion, values=values)
+
+
+def bend_through_pins(values: Curve, pins: Sequence[tuple[int, int, float]], reach: int) -> None:
+    """Bend curves through pins, in place, within ``reach`` frames of each; all pins hold exactly.
+
+    values : [shape=(T, P)]
+    pins   : frame, column and value of each; of two in one frame and column the last holds
+    """
+    for frame, column, value in pins:
+        if abs(lacking := value - values[frame, column]) > 1e-9:
+            first, stop = max(frame - reach, 0), min(frame + reach + 1, len(values))
+            distance = np.abs(np.arange(first, stop) - frame) / (reach + 1)
+            values[first:stop, column] += lacking * (1 + np.cos(np.pi * distance)) / 2
+    for frame, column, value in pins:
+        values[frame, column] = value
+
+
+def _pinned_frame(pin: Pin, motion: Motion, *, is_weight: bool) -> int:
+    """Return the frame of a pin. Raises InputError: outside the motion, or a value that is not possible."""
+    if not np.isfinite(pin.value) or (is_weight and not 0 <= pin.value <= 1):
+        required = "0 to 1" if is_weight else "a finite number"
+        raise InputError(f"pin at {pin.time_s} s sets {pin.channel} to {pin.value}, required {required}")
+    frame = frame_of(pin.time_s, len(motion.values), motion.rate_hz)
+    if frame is None:
+        last_s = (len(motion.values) - 1) / motion.rate_hz
+        raise InputError(f"pin at {pin.time_s} s lies outside the recording (0 to {last_s:.2f} s)")
+    return frame
+
+
+def with_gain(generation: Generation, gain: Gain) -> Generation:
+    """Return a generation whose mouth moves more, or less, for a time; what is closed stays so (``intensified``)."""
+    motion = generation.motion
+    weight = span_weight(motion.time_s, gain.start_s, gain.end_s, GAIN_EDGE_S)
+    larger = intensified(generation, gain.factor)
+    return _blended(generation, larger, weight)
+
+
+def with_locked(generation: Generation, locked: Generation, start_s: float, end_s: float) -> Generation:
+    """Return a generation that is another one from ``start_s`` to ``end_s``, and goes over to it beside this span.
+
+    locked : of the same recording, with the same channels
+    """
+    return _blended(generation, locked, span_weight(generation.motion.time_s, start_s, end_s, LOCK_EDGE_S))
+
+
+def _blended(first: Generation, second: Generation, weight: Curve) -> Generation:
+    """Return the first generation where the weight is 0, the second one where it is 1 [shape=(T,)]; also variances."""
+    values = first.motion.values.astype(np.float64)
+    inside = np.nonzero(weight)[0]
+    share = weight[inside, None]
+    values[inside] += share * (second.motion.values[inside] - values[inside])
+    whole = weight == 1
+    values[whole] = second.motion.values[whole]
+    variance = np.array(first.variance)
+    variance[inside] += share * (second.variance[inside] - variance[inside])
+    return replace(first, motion=replace(first.motion, values=values), spread=variance)
+
+
+def span_weight(time_s: Curve, start_s: float, end_s: float, edge_s: float) -> Curve:
+    """Return 1 within a span, falling to 0 within ``edge_s`` before and after it [shape=(T,)]."""
+    outside = np.maximum(np.maximum(start_s - time_s, time_s - end_s), 0)
+    outside[outside < 1e-9] = 0.0  # the time of a frame is rounded
+    weight: Curve = (1 + np.cos(np.pi * np.clip(outside / edge_s, 0, 1))) / 2
+    return weight

@@ -1,0 +1,366 @@
+"""Edits of generated motion: sentences that say what is changed, as values, and as a file."""
+
+from __future__ import annotations
+
+import re
+from abc import abstractmethod
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar, get_type_hints
+
+from lipmotion.articulation.delivery import Delivery
+from lipmotion.errors import InputError, shortened
+from lipmotion.faces.base import Staging
+from lipmotion.types import Gain, Pin, Span, Timeline, Unit
+from lipmotion.units import PHONES, unknown_phone_message
+
+LEAST_PHONE_S = 0.01
+"""Shortest phone that an edit may leave."""
+_READ = {int: (r"\d+", int), float: (r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", float), str: (r"\S+", str)}
+
+
+@dataclass(frozen=True)
+class Step:
+    """An edit that one sentence states; ``form`` is the sentence, with the names of the fields."""
+
+    form: ClassVar[str]
+
+    def __str__(self) -> str:
+        return self.form.format(**{field.name: _written(getattr(self, field.name)) for field in fields(self)})
+
+    @classmethod
+    def parsed(cls, sentence: str) -> Step | None:
+        """Return the edit that a sentence states; None: it has another form.
+
+        Raises InputError: a value is not allowed.
+        """
+        types = get_type_hints(cls)
+        pattern = re.sub(r"\\{(\w+)\\}", lambda name: f"({_READ[types[name[1]]][0]})", re.escape(cls.form))
+        found = re.fullmatch(pattern.replace(r"\ ", r"\s+"), sentence.strip())
+        if found is None:
+            return None
+        names = re.findall(r"{(\w+)}", cls.form)
+        return cls(**{name: _READ[types[name]][1](text) for name, text in zip(names, found.groups(), strict=True)})
+
+
+def _written(value: object) -> str:
+    return repr(value) if isinstance(value, float) else str(value)
+
+
+class PhoneStep(Step):
+    """An edit of the phones in time; they are numbered from 1, as they are after the edits before it."""
+
+    @abstractmethod
+    def applied(self, units: Timeline[Unit]) -> Timeline[Unit]:
+        """Return the phones in time after the edit. Raises InputError: it is not possible."""
+
+    def _index(self, units: Timeline[Unit], number: int) -> int:
+        """Return the place of a phone. Raises InputError: there is none of that number."""
+        if not 1 <= number <= len(units):
+            raise InputError(f"{str(self)!r}: there is no phone {number}, required 1 to {len(units)}")
+        return number - 1
+
+
+def _known(phone: str, word: str = "") -> Unit:
+    """Return the label of a phone that a user gives. Raises InputError: there is no such phone."""
+    if phone not in PHONES:
+        raise InputError(unknown_phone_message(phone))
+    return Unit(phone, word=word)
+
+
+@dataclass(frozen=True)
+class PhoneIs(PhoneStep):
+    """Another phone is said in the same time."""
+
+    form: ClassVar[str] = "phone {number} is {phone}"
+    number: int
+    phone: str
+
+    def applied(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
+        place = self._index(units, self.number)
+        spans = list(units)
+        spans[place] = replace(spans[place], label=_known(self.phone, spans[place].label.word))
+        return Timeline(tuple(spans))
+
+
+def _moved_border(step: PhoneStep, units: Timeline[Unit], before: int, time_s: float) -> Timeline[Unit]:
+    """Return phones with another time between the phone at place ``before`` and the next one.
+
+    Raises InputError: one of both would last less than ``LEAST_PHONE_S``, or there is no such border.
+    """
+    spans = list(units)
+    first_s, last_s = (
+        spans[place].start_s if end == 0 else spans[place].end_s for place, end in ((before, 0), (before + 1, 1))
+    )
+    if not first_s + LEAST_PHONE_S - 1e-9 <= time_s <= last_s - LEAST_PHONE_S + 1e-9:
+        least, most = first_s + LEAST_PHONE_S, last_s - LEAST_PHONE_S
+        raise InputError(f"{str(step)!r}: required {least:.3f} to {most:.3f} s, between the phones beside it")
+    for place, change in ((before, {"end_s": time_s}), (before + 1, {"start_s": time_s})):
+        label = replace(spans[place].label, confidence=None)
+        spans[place] = replace(spans[place], label=label, **change)
+    return Timeline(tuple(spans))
+
+
+@dataclass(frozen=True)
+class PhoneBegins(PhoneStep):
+    """A phone begins at another time, and the one before it ends there."""
+
+    form: ClassVar[str] = "phone {number} begins {time_s}"
+    number: int
+    time_s: float
+
+    def applied(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
+        place = self._index(units, self.number)
+        if place == 0:
+            raise InputError(f"{str(self)!r}: the first phone begins with the recording")
+        return _moved_border(self, units, place - 1, self.time_s)
+
+
+@dataclass(frozen=True)
+class PhoneEnds(PhoneStep):
+    """A phone ends at another time, and the one after it begins there."""
+
+    form: ClassVar[str] = "phone {number} ends {time_s}"
+    number: int
+    time_s: float
+
+    def applied(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
+        place = self._index(units, self.number)
+        if place == len(units) - 1:
+            raise InputError(f"{str(self)!r}: the last phone ends with the recording")
+        return _moved_border(self, units, place, self.time_s)
+
+
+@dataclass(frozen=True)
+class PhoneRemoved(PhoneStep):
+    """A phone is not said; the one before it, or else the one after it, takes its time."""
+
+    form: ClassVar[str] = "remove phone {number}"
+    number: int
+
+    def applied(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
+        place = self._index(units, self.number)
+        spans = list(units)
+        if len(spans) == 1:
+            raise InputError(f"{str(self)!r}: it is the only phone; say what it is: 'phone 1 is sil'")
+        gone = spans.pop(place)
+        change = {"end_s": gone.end_s} if place else {"start_s": gone.start_s}
+        other = max(place - 1, 0)
+        spans[other] = replace(spans[other], label=replace(spans[other].label, confidence=None), **change)
+        return Timeline(tuple(spans))
+
+
+@dataclass(frozen=True)
+class PhoneInserted(PhoneStep):
+    """A phone is said from one time to another; what was said there is cut, or gone."""
+
+    form: ClassVar[str] = "insert {phone} from {start_s} to {end_s}"
+    phone: str
+    start_s: float
+    end_s: float
+
+    def applied(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
+        last_s = units[-1].end_s if len(units) else 0.0
+        if not (self.start_s >= 0 and self.start_s + LEAST_PHONE_S - 1e-9 <= self.end_s <= last_s + 1e-9):
+            raise InputError(f"{str(self)!r}: required at least {LEAST_PHONE_S} s within 0 to {last_s:.3f} s")
+        return with_span(units, [Span(self.start_s, min(self.end_s, last_s), _known(self.phone))])
+
+
+def with_span(units: Timeline[Unit], spans: Sequence[Span[Unit]]) -> Timeline[Unit]:
+    """Return phones in time with others in place of what was said from their start to their end."""
+    start_s, end_s = spans[0].start_s, spans[-1].end_s
+    before = [replace(span, end_s=min(span.end_s, start_s)) for span in units if span.start_s < start_s - 1e-9]
+    after = [replace(span, start_s=max(span.start_s, end_s)) for span in units if span.end_s > end_s + 1e-9]
+    return Timeline((*before, *spans, *after))
+
+
+@dataclass(frozen=True)
+class WordIs(Step):
+    """Another word is said in the same time; words are numbered from 1. Its phones are aligned with the sound there."""
+
+    form: ClassVar[str] = "word {number} is {word}"
+    number: int
+    word: str
+
+
+class CurveStep(Step):
+    """An edit of values: a pin or a gain."""
+
+    @property
+    @abstractmethod
+    def edit(self) -> Pin | Gain:
+        """The pin or gain."""
+
+
+@dataclass(frozen=True)
+class PinStep(CurveStep):
+    """A channel or a curve takes a value at a time."""
+
+    form: ClassVar[str] = "pin {channel} {value} at {time_s}"
+    channel: str
+    value: float
+    time_s: float
+
+    @property
+    def edit(self) -> Pin:
+        """The pin."""
+        return Pin(self.time_s, self.channel, self.value)
+
+
+@dataclass(frozen=True)
+class GainStep(CurveStep):
+    """The whole mouth moves more, or less, for a time."""
+
+    form: ClassVar[str] = "gain {factor} from {start_s} to {end_s}"
+    factor: float
+    start_s: float
+    end_s: float
+
+    def __post_init__(self) -> None:
+        self.edit  # noqa: B018 # checks the values
+
+    @property
+    def edit(self) -> Gain:
+        """The gain."""
+        return Gain(self.start_s, self.end_s, self.factor)
+
+
+@dataclass(frozen=True)
+class CurveGainStep(CurveStep):
+    """A channel or a curve moves more, or less, for a time."""
+
+    form: ClassVar[str] = "gain {channel} {factor} from {start_s} to {end_s}"
+    channel: str
+    factor: float
+    start_s: float
+    end_s: float
+
+    def __post_init__(self) -> None:
+        self.edit  # noqa: B018 # checks the values
+
+    @property
+    def edit(self) -> Gain:
+        """The gain."""
+        return Gain(self.start_s, self.end_s, self.factor, self.channel)
+
+
+@dataclass(frozen=True)
+class Lock(Step):
+    """The motion in a span stays as it is with the edits before this one, whatever comes after."""
+
+    form: ClassVar[str] = "lock from {start_s} to {end_s}"
+    start_s: float
+    end_s: float
+
+    def __post_init__(self) -> None:
+        if not self.start_s < self.end_s:
+            raise InputError(f"{str(self)!r}: required an end after the start")
+
+    def covers(self, start_s: float, end_s: float) -> bool:
+        """Return whether some time lies in the locked span."""
+        return start_s <= self.end_s - 1e-9 and end_s >= self.start_s + 1e-9
+
+
+@dataclass(frozen=True)
+class SetStep(Step):
+    """How the motion is delivered, or how a drawn face is shown (docs/controls.md, docs/faces.md)."""
+
+    form: ClassVar[str] = "set {name} {value}"
+    name: str
+    value: str
+
+    def __post_init__(self) -> None:
+        kind = next((kind for kind in (Delivery, Staging) if self.name in _names(kind)), None)
+        if kind is None:
+            known = ", ".join((*_names(Delivery), *_names(Staging)))
+            raise InputError(f"{str(self)!r}: nothing is called {shortened(repr(self.name))}; required one of: {known}")
+        value: Any = self.parsed_value
+        kind(**{self.name: value})  # checks it
+
+    @property
+    def parsed_value(self) -> bool | float | int | str:
+        """The value, of the type of what is set. Raises InputError: it is of another."""
+        usual = next(getattr(kind(), self.name) for kind in (Delivery, Staging) if self.name in _names(kind))
+        if isinstance(usual, bool):
+            if self.value not in _TRUTH:
+                raise InputError(f"{str(self)!r}: required one of: {', '.join(_TRUTH)}")
+            return _TRUTH[self.value]
+        try:
+            return type(usual)(self.value)
+        except ValueError as error:
+            raise InputError(f"{str(self)!r}: required a number") from error
+
+
+_TRUTH = {"true": True, "false": False, "yes": True, "no": False}
+
+
+def _names(kind: type[Any]) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(kind))
+
+
+STEPS: tuple[type[Step], ...] = (
+    WordIs, PhoneIs, PhoneBegins, PhoneEnds, PhoneRemoved, PhoneInserted,
+    PinStep, GainStep, CurveGainStep, Lock, SetStep,
+)  # fmt: skip
+"""All edits that a sentence can state."""
+FORMS = tuple(re.sub(r"{(\w+?)(?:_s)?}", lambda name: name[1].upper(), step.form) for step in STEPS)
+"""Their sentences, for messages and help; times are in seconds."""
+
+
+def step_of(sentence: str) -> Step:
+    """Return the edit that a sentence states. Raises InputError: it states none, or a value is not allowed.
+
+    >>> step_of("phone 12 ends 1.24")
+    PhoneEnds(number=12, time_s=1.24)
+    >>> str(step_of("pin  jawOpen .2 at 1"))
+    'pin jawOpen 0.2 at 1.0'
+    """
+    for kind in STEPS:
+        step = kind.parsed(sentence)
+        if step is not None:
+            return step
+    raise InputError(f"{shortened(repr(sentence))} is no edit; required one of: {'; '.join(FORMS)} (seconds)")
+
+
+@dataclass(frozen=True)
+class Edits:
+    """What a user has changed of generated motion: a value; undoing is going back to an earlier one.
+
+    steps : edits, in the order in which they were made
+
+    >>> Edits().then("phone 2 is p", "pin opening 0.02 at 1.2").sentences
+    ('phone 2 is p', 'pin opening 0.02 at 1.2')
+    >>> Edits().then("set intensity 1.3").delivery(Delivery(anticipation_ms=40))
+    Delivery(intensity=1.3, anticipation_ms=40, offset_ms=0.0, min_hold_ms=0.0, stepped=False)
+    """
+
+    steps: tuple[Step, ...] = ()
+
+    def then(self, *edits: str | Step) -> Edits:
+        """Return these edits and some more, sentences or values. Raises InputError: a sentence states no edit."""
+        return Edits(self.steps + tuple(edit if isinstance(edit, Step) else step_of(edit) for edit in edits))
+
+    @classmethod
+    def of_pins(cls, pins: Iterable[Pin]) -> Edits:
+        """Return edits that are pins alone."""
+        return cls(tuple(PinStep(pin.channel, pin.value, pin.time_s) for pin in pins))
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """The steps as sentences."""
+        return tuple(map(str, self.steps))
+
+    def delivery(self, asked: Delivery = Delivery()) -> Delivery:  # noqa: B008 # a frozen value
+        """Return how the motion is delivered: as is asked for, and where nothing is, as these edits set it."""
+        return replace(asked, **self._set(asked, Delivery()))
+
+    def staging(self, asked: Staging = Staging()) -> Staging:  # noqa: B008 # a frozen value
+        """Return how a drawn face is shown: as is asked for, and where nothing is, as these edits set it."""
+        return replace(asked, **self._set(asked, Staging()))
+
+    def _set(self, asked: Delivery | Staging, usual: Delivery | Staging) -> dict[str, Any]:
+        """Return what is set of the fields that are as usual, by name."""
+        found = {step.name: step.parsed_value for step in self.steps if isinstance(step, SetStep)}
+        names = (field.name for field in fields(usual))
+        free = (name for name in names if getattr(asked, name) == getattr(usual, name))
+        return {name: found[name] for name in free if name in found}

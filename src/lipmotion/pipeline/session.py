@@ -1,0 +1,343 @@
+"""Sessions: one recording whose motion is edited; what an edit does not change is not computed again.
+
+A recording is understood (words, phones in time), moved (motion from phones), delivered (intensity, offsets), drawn.
+Each stage is kept by the edits that it depends on.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Iterable
+from dataclasses import replace
+from pathlib import Path
+from threading import RLock
+from typing import Any, Generic, TypeVar
+
+from lipmotion.articulation.curve_edits import with_edited_curves, with_gain, with_locked
+from lipmotion.articulation.pauses import with_pauses
+from lipmotion.articulation.phone_targets import GESTURES, with_gestures
+from lipmotion.articulation.symmetry import symmetrical
+from lipmotion.errors import AlignmentError, InputError, shortened
+from lipmotion.faces.base import DrawnMotion, DrawsSingly, Face, Picture
+from lipmotion.faces.registry import staged_face
+from lipmotion.kernels.choice import expect_more
+from lipmotion.kernels.threads import one_thread
+from lipmotion.meshes.fitting.facial_animation import PARAMETERS
+from lipmotion.meshes.fitting.visemes import VISEME_CHANNELS
+from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS
+from lipmotion.motion.speakers import SpeakerMap
+from lipmotion.pipeline.edits import CurveStep, Edits, Lock, PhoneStep, PinStep, Step, WordIs, with_span
+from lipmotion.pipeline.generate.generation_for import generate_for
+from lipmotion.pipeline.generate.outlook import outlook_of
+from lipmotion.pipeline.generate.prior import with_prior
+from lipmotion.pipeline.generate.transfer import person_of
+from lipmotion.pipeline.model import Model, load_model
+from lipmotion.pipeline.outputs.delivered import delivered, shown, with_motion
+from lipmotion.pipeline.outputs.drawn_video import DRAWN_HZ, read_sound
+from lipmotion.pipeline.outputs.prosody import moved_prosody, prosody_of_speech
+from lipmotion.pipeline.understand.request import SpeechInput, SpeechRequest, request_of
+from lipmotion.pipeline.understand.understood_speech import (
+    UnderstoodSpeech,
+    aligned_within,
+    audio_of,
+    understood_speech,
+    with_units,
+)
+from lipmotion.pipeline.workers import map_in_processes
+from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
+from lipmotion.types import (
+    WEIGHT,
+    Constraints,
+    Gain,
+    Generation,
+    Monitor,
+    Outlook,
+    Pin,
+    Progress,
+    Speech,
+    Timeline,
+    Unit,
+    frame_of,
+    silent_monitor,
+)
+from lipmotion.units import words_in_time
+
+KeptT = TypeVar("KeptT")
+
+UNDERSTANDING = 0.9
+"""The share of the work that is recognition, in reports; the rest is the generation of motion."""
+MODELLED = ("opening", "width", "outer")
+"""Channels, beside weights, that models generate as they are, so that motion runs smoothly through their pins."""
+KNOWN_CURVES = (*ARKIT_MOUTH, *ARKIT_OTHERS, *VISEME_CHANNELS, *(row[1] for row in PARAMETERS))
+"""Curves that outputs may have, whatever the motion has: ARKit's blendshapes, visemes, MPEG-4's parameters."""
+KEPT = 4
+"""Results that each stage keeps: the last ones that were asked for."""
+INTERACTIVE = 3
+"""A session that generates motion for the third time will do so often: kernels are loaded that pay then."""
+NO_EDITS = Edits()
+
+
+class _Kept(Generic[KeptT]):
+    """The last results of a stage, by what they depend on."""
+
+    def __init__(self) -> None:
+        self._results: OrderedDict[Hashable, KeptT] = OrderedDict()
+
+    def once(self, key: Hashable, make: Callable[[], KeptT]) -> KeptT:
+        """Return the result for a key, made if it is not kept."""
+        if key not in self._results:
+            self._results[key] = make()
+            while len(self._results) > KEPT:
+                self._results.popitem(last=False)
+        self._results.move_to_end(key)
+        return self._results[key]
+
+
+class Session:
+    """One recording with one model: motion for any edits, of which only what they change is computed.
+
+    speech    : as of ``animate``
+    model     : from ``load_model``, or the path of a model file; None: the shipped model
+    workers   : number of processes that recognise the words of a long recording
+    monitor   : receives reports of the progress of the first motion
+    meanwhile : is called while these processes work, where there are several
+    curves    : names of further curves that outputs will have: controls of a rig, blendshapes of a character
+    outlook   : what to expect of the motion, where it is known; None: it follows from the speech
+    A session may be used by several threads, one at a time; several sessions do not disturb one another.
+    Raises InputError: the model knows no such speaker.  Raises ModelFormatError: as ``load_model``.
+
+    >>> import lipmotion
+    >>> session = lipmotion.Session("examples/welcome.flac")
+    >>> closed = lipmotion.Edits().then("pin opening 0.02 at 0.5")
+    >>> round(float(session.generated(closed).motion["opening"][50]), 6)
+    0.02
+    """
+
+    def __init__(
+        self,
+        speech: SpeechInput,
+        *,
+        model: Model | str | Path | None = None,
+        workers: int = 1,
+        monitor: Monitor = silent_monitor,
+        meanwhile: Callable[[], None] | None = None,
+        curves: Iterable[str] = (),
+        outlook: Outlook | None = None,
+    ) -> None:
+        self.request: SpeechRequest = request_of(speech)
+        self.model = model if isinstance(model, Model) else load_model(model)
+        self._work = map_in_processes(workers, meanwhile)
+        self._monitor, self._curves, self._outlook = monitor, frozenset(curves), outlook
+        self._person: _Kept[SpeakerMap | None] = _Kept()
+        self._understood: _Kept[UnderstoodSpeech] = _Kept()
+        self._sound: _Kept[AnalysedAudio] = _Kept()
+        self._units: _Kept[Timeline[Unit]] = _Kept()
+        self._moved: _Kept[Generation] = _Kept()
+        self._generated: _Kept[Generation] = _Kept()
+        self._delivered: _Kept[Generation] = _Kept()
+        self._faces: _Kept[DrawsSingly] = _Kept()
+        self._drawn: _Kept[DrawnMotion[Any]] = _Kept()
+        self._motions = 0
+        self._one_at_a_time = RLock()
+
+    def units(self, edits: Edits = NO_EDITS) -> Timeline[Unit]:
+        """Return the phones in time with the edits of words and phones.
+
+        Raises InputError, AlignmentError: as ``animate``; or an edit is not possible.
+        """
+        with self._one_at_a_time, one_thread():
+            return self._edited_units(edits.steps)
+
+    def generated(self, edits: Edits = NO_EDITS) -> Generation:
+        """Return the motion with all edits but the delivery; with none, that of ``animate``.
+
+        Pins hold exactly: those of channels that the model generates bend the motion as it does, others bend their
+        own curve. Pins and gains of curves that the motion has not, as ``jawOpen``, are in ``Generation.curve_edits``,
+        and hold in every output that has the curve.
+        Raises InputError, AlignmentError: as ``units``; or a pin is not possible.
+        """
+        with self._one_at_a_time, one_thread():
+            return self._generated.once(edits.steps, lambda: self._with_locks(edits.steps))
+
+    def delivered(self, edits: Edits = NO_EDITS) -> Generation:
+        """Return the motion as files hold it: with its intensity, anticipation and offset (docs/controls.md)."""
+        with self._one_at_a_time, one_thread():
+            return self._delivered.once(edits.steps, lambda: delivered(self.generated(edits), edits.delivery()))
+
+    def picture(
+        self, time_s: float, edits: Edits = NO_EDITS, *, face: str | Face = "portrait", fps: float = DRAWN_HZ
+    ) -> Picture:
+        """Return the picture of a drawn face that is shown at a time in a video [shape as of ``Face.render``].
+
+        fps : frames a second of the video
+        What of the face does not move is painted once.
+        Raises InputError: as ``generated``; a time outside the recording, or a face that cannot draw single pictures.
+        """
+        with self._one_at_a_time, one_thread():
+            staging, delivery = edits.staging(), edits.delivery()
+
+            def staged() -> DrawsSingly:
+                prosody = prosody_of_speech(read_sound(self.request.recording))
+                found = staged_face(face, staging, moved_prosody(prosody, delivery))
+                if not isinstance(found, DrawsSingly):
+                    raise InputError(f"the face {face!r} draws no single pictures; write a video")
+                return found
+
+            def drawn() -> DrawnMotion[Any]:
+                seen = shown(self.generated(edits), delivery, fps)
+                return self._faces.once((face, staging, delivery), staged).drawn(seen.motion, seen.units, fps=fps)
+
+            pictures = self._drawn.once((edits.steps, face, fps), drawn)
+            frame = frame_of(time_s, len(pictures), fps)
+            if frame is None:
+                raise InputError(f"{time_s} s lies outside the video (0 to {(len(pictures) - 1) / fps:.2f} s)")
+            return pictures.picture(frame)
+
+    def understood(self, edits: Edits = NO_EDITS) -> UnderstoodSpeech:
+        """Return the speech as input of the engine, with the phones of ``units``."""
+        with self._one_at_a_time, one_thread():
+            return self._edited_speech(edits.steps)
+
+    def _recording(self) -> UnderstoodSpeech:
+        """Return the speech without edits."""
+
+        def first() -> UnderstoodSpeech:
+            self._speaker()  # what is refused is refused before the long work
+            return understood_speech(self.model, self.request, self._work, self._monitor)
+
+        return self._understood.once(None, first)
+
+    def _speaker(self) -> SpeakerMap | None:
+        return self._person.once(None, lambda: person_of(self.model, self.request))
+
+    def _edited_units(self, steps: tuple[Step, ...]) -> Timeline[Unit]:
+        """Return the phones in time after some edits; each edit sees those that the ones before it left."""
+        ours = tuple(step for step in steps if isinstance(step, PhoneStep | WordIs | Lock))
+        while ours and isinstance(ours[-1], Lock):
+            ours = ours[:-1]
+        if not ours:
+            return self._recording().speech.units
+        return self._units.once(ours, lambda: self._changed_units(ours))
+
+    def _changed_units(self, ours: tuple[PhoneStep | WordIs | Lock, ...]) -> Timeline[Unit]:
+        before, step = self._edited_units(ours[:-1]), ours[-1]
+        if isinstance(step, Lock):
+            return before
+        after = self._reworded(before, step) if isinstance(step, WordIs) else step.applied(before)
+        changed = {*before} ^ {*after}
+        for lock in (each for each in ours if isinstance(each, Lock)):
+            if any(lock.covers(span.start_s, span.end_s) for span in changed):
+                raise InputError(f"{str(step)!r} changes what is locked ({str(lock)!r}); take the lock out first")
+        return after
+
+    def _reworded(self, units: Timeline[Unit], step: WordIs) -> Timeline[Unit]:
+        """Return phones in time with another word in the time of one, aligned with the sound there."""
+        words = [span for span in words_in_time(units) if span.label]
+        if not 1 <= step.number <= len(words):
+            found = f"1 to {len(words)}" if words else "words: give a transcript, or edit phones"
+            raise InputError(f"{str(step)!r}: there is no word {step.number}, required {found}")
+        where = words[step.number - 1]
+        try:
+            said = aligned_within(self.model, self.request, self._audio(), step.word, where.start_s, where.end_s)
+        except AlignmentError as error:
+            raise InputError(
+                f"{str(step)!r}: does not fit into {where.start_s:.2f} to {where.end_s:.2f} s, where {where.label!r} "
+                f"was ({error}); make room with 'phone N ends TIME' first"
+            ) from error
+        return with_span(units, said)
+
+    def _audio(self) -> AnalysedAudio:
+        return self._sound.once(None, lambda: analysed(audio_of(self.request)))
+
+    def _edited_speech(self, steps: tuple[Step, ...]) -> UnderstoodSpeech:
+        plain, units = self._recording(), self._edited_units(steps)
+        if units is plain.speech.units:
+            return plain
+        return self._understood.once(tuple(units), lambda: replace(plain, speech=self._spoken(plain.speech, units)))
+
+    def _spoken(self, speech: Speech, units: Timeline[Unit]) -> Speech:
+        return replace(with_prior(self.model.prior, with_units(speech, units)), voice=speech.voice)
+
+    def _with_locks(self, steps: tuple[Step, ...]) -> Generation:
+        """Return the motion after some edits, with locked spans as they were when they were locked."""
+        self._edited_units(steps)  # refuses phones that change what is locked
+        generation = self._with_curves(tuple(step for step in steps if not isinstance(step, Lock)))
+        for place, lock in enumerate(steps):
+            if not isinstance(lock, Lock):
+                continue
+            for later in steps[place + 1 :]:
+                if isinstance(later, PinStep) and lock.covers(later.time_s, later.time_s):
+                    raise InputError(f"{str(later)!r} lies in what is locked ({str(lock)!r}); take the lock out first")
+            before = self._before(steps[:place])
+            generation = with_locked(generation, before, lock.start_s, lock.end_s)
+        return generation
+
+    def _before(self, steps: tuple[Step, ...]) -> Generation:
+        return self._generated.once(steps, lambda: self._with_locks(steps))
+
+    def _with_curves(self, steps: tuple[Step, ...]) -> Generation:
+        """Return the motion after some edits without locks: the engine's, then gains and what bends single curves."""
+        edits = [step.edit for step in steps if isinstance(step, CurveStep)]
+        modelled = tuple(edit for edit in edits if isinstance(edit, Pin) and self._is_modelled(edit.channel, steps))
+        generation = self._with_pins(self._phone_steps(steps), modelled)
+        for edit in edits:
+            if isinstance(edit, Gain) and not edit.channel:
+                generation = with_gain(generation, edit)
+        curves = [edit for edit in edits if edit.channel and edit not in modelled]
+        if any(not edit.channel for edit in edits):
+            curves = [*modelled, *curves]  # a gain has moved their values
+        asked = [edit.channel for edit in curves if edit.channel in GESTURES]
+        if asked:
+            generation = with_motion(generation, with_gestures(generation.motion, generation.units, asked))
+        motion = with_edited_curves(generation.motion, generation.units, curves)
+        others = tuple(edit for edit in curves if edit.channel not in motion.names)
+        for edit in others:
+            if edit.channel not in {*KNOWN_CURVES, *self._curves}:
+                what, names = "pin" if isinstance(edit, Pin) else "change", ", ".join((*motion.names, *GESTURES))
+                raise InputError(
+                    f"cannot {what} {shortened(repr(edit.channel))}; channels that can be pinned: {names}; curves: "
+                    f"{', '.join(KNOWN_CURVES)}"
+                )
+        return replace(generation, motion=motion, curve_edits=others)
+
+    def _phone_steps(self, steps: tuple[Step, ...]) -> tuple[Step, ...]:
+        return tuple(step for step in steps if isinstance(step, PhoneStep | WordIs))
+
+    def _is_modelled(self, channel: str, steps: tuple[Step, ...]) -> bool:
+        """Return whether the model generates a channel as it is."""
+        if channel in MODELLED:
+            return True
+        motion = self._with_pins(self._phone_steps(steps), ()).motion
+        return channel in motion.names and motion.channels[motion.column(channel)].unit == WEIGHT
+
+    def _with_pins(self, phone_steps: tuple[Step, ...], pins: tuple[Pin, ...]) -> Generation:
+        return self._moved.once((phone_steps, pins), lambda: self._generation(phone_steps, pins))
+
+    def _generation(self, phone_steps: tuple[Step, ...], pins: tuple[Pin, ...]) -> Generation:
+        understood = self._edited_speech(phone_steps)
+        self._motions += 1
+        if self._motions == INTERACTIVE:
+            expect_more()
+        self._monitor(Progress("moving the mouth", 0, 1, UNDERSTANDING))
+        generation = generation_of(self.request, self._speaker(), self.model, understood, Constraints(pins))
+        self._monitor(Progress("moving the mouth", 1, 1, 1.0))
+        return generation if self._outlook is None else replace(generation, outlook=self._outlook)
+
+
+def generation_of(
+    request: SpeechRequest,
+    person: SpeakerMap | None,
+    model: Model,
+    understood: UnderstoodSpeech,
+    constraints: Constraints | None = None,
+) -> Generation:
+    """Return the motion of understood speech, with pauses and asymmetry as asked for, and what to expect of it.
+
+    person : of ``person_of``
+    Raises InputError: a constraint is not usable.
+    """
+    generation = generate_for(person, model.engine, model.learned, understood.speech, constraints)
+    pinned_s = [pin.time_s for pin in constraints.pins] if constraints else []
+    if request.onto is None:
+        generation = replace(generation, motion=symmetrical(generation.motion, request.asymmetry))
+    return replace(with_pauses(generation, request.pauses, pinned_s), outlook=outlook_of(request, understood))

@@ -1,0 +1,121 @@
+"""Edits as sentences, and in files: what is written is read again; what is wrong is named."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.articulation.delivery import Delivery
+from lipmotion.errors import InputError
+from lipmotion.faces.base import Staging
+from lipmotion.pipeline.edit_files import EditFile, begun, read_edits, write_edits
+from lipmotion.pipeline.edits import STEPS, Edits, step_of
+from lipmotion.pipeline.generate.animate import animate
+from lipmotion.pipeline.model import load_model
+from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.types import Outlook, Span, Timeline, Unit
+
+SENTENCES = (
+    "word 3 is blue",
+    "phone 12 is p",
+    "phone 12 begins 1.2",
+    "phone 12 ends 1.24",
+    "remove phone 2",
+    "insert m from 0.5 to 0.56",
+    "pin jawOpen 1e-05 at 1.2",
+    "gain 1.3 from 1.0 to 2.0",
+    "gain jawOpen 0.8 from 1.0 to 2.0",
+    "lock from 1.0 to 1.5",
+    "set intensity 1.2",
+)
+
+
+def test_every_kind_of_edit_is_a_sentence() -> None:
+    steps = [step_of(sentence) for sentence in SENTENCES]
+    assert {type(step) for step in steps} == set(STEPS)
+    assert tuple(map(str, steps)) == SENTENCES
+    assert [step_of(str(step)) for step in steps] == steps
+
+
+@pytest.mark.parametrize(
+    ("sentence", "message"),
+    [
+        ("phone twelve is p", "is no edit; required one of: word NUMBER is WORD"),
+        ("pin opening nan at 1", "is no edit"),
+        ("gain 9 from 0 to 1", "the gain is 9, required 0 to 3"),
+        ("lock from 2 to 1", "required an end after the start"),
+        ("set loudness 2", "nothing is called 'loudness'; required one of: intensity"),
+        ("set intensity loud", "required a number"),
+        ("set intensity 9", "required 0 to 3"),
+        ("set stepped maybe", "required one of: true, false"),
+    ],
+)
+def test_sentences_that_state_no_edit(sentence: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        step_of(sentence)
+
+
+def test_delivery_and_staging_are_set_where_nothing_else_is_asked_for() -> None:
+    edits = Edits().then("set intensity 1.2", "set stepped true", "set size 360", "set intensity 1.3")
+    assert edits.delivery() == Delivery(intensity=1.3, stepped=True)
+    assert edits.delivery(Delivery(intensity=2.0)).intensity == 2.0
+    assert edits.staging() == Staging(size=360)
+
+
+@pytest.mark.parametrize("suffix", [".json", ".toml"])
+def test_what_is_written_is_read_again(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"a.edits{suffix}"
+    spans = (Span(0.0, 0.3, Unit("sil")), Span(0.3, 1 / 3 + 0.1, Unit("p", "sil-p+l", 'pl"ease', confidence=0.25)))
+    outlook = Outlook("words", 0.5, None, 30.5, ("a \\ transcript",))
+    file = EditFile(
+        Edits().then(*SENTENCES), tmp_path / "in" / "a b.wav", Timeline(spans), outlook, options={"pauses": "natural"}
+    )
+    write_edits(file, path)
+    if suffix == ".toml" and sys.version_info < (3, 11):
+        with pytest.raises(InputError, match=r"read by Python 3\.11"):
+            read_edits(path)
+        return
+    found = read_edits(path)
+    assert (found.edits, found.units, found.outlook) == (file.edits, file.units, file.outlook)
+    assert (found.recording, found.options) == (file.recording, {"pauses": "natural"})
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[]", "not a file of edits"),
+        ("{", "not a file of edits"),
+        ('{"format": "lipmotion.edits", "version": 9}', "edits of version 9, required 1"),
+        ('{"format": "lipmotion.edits", "version": 1, "stops": []}', "unknown member 'stops'"),
+        ('{"format": "lipmotion.edits", "version": 1, "steps": "lock"}', "required a list of sentences"),
+        ('{"format": "lipmotion.edits", "version": 1, "steps": ["jump"]}', "'jump' is no edit"),
+        ('{"format": "lipmotion.edits", "version": 1, "units": [{"phone": "p"}]}', "start_s"),
+    ],
+)
+def test_files_that_are_refused(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "a.json"
+    path.write_text(text)
+    with pytest.raises(InputError, match=message):
+        read_edits(path)
+
+
+def test_a_file_replays_what_was_recognised(toy_speech: Path, toy_model_file: Path, tmp_path: Path) -> None:
+    """The phones in the file are the base: the motion is that of the session in which they were edited."""
+    request = SpeechRequest(toy_speech, recogniser="own")
+    file = begun(request, toy_speech, toy_model_file, None)
+    path = tmp_path / "a.json"
+    edits = Edits().then("phone 3 is p", "pin jawOpen 0.2 at 1.0")
+    write_edits(
+        EditFile(edits, *(getattr(file, n) for n in ("recording", "units", "outlook", "model")), options=file.options),
+        path,
+    )
+    read = read_edits(path)
+    plain, replayed = (
+        animate(request, model=load_model(toy_model_file), edits=edits),
+        read.session().generated(read.edits),
+    )
+    assert np.array_equal(replayed.motion.values, plain.motion.values)
+    assert (replayed.units, replayed.outlook, replayed.curve_edits) == (plain.units, plain.outlook, plain.curve_edits)

@@ -1,0 +1,216 @@
+"""Sessions: the same motion as in one pass, only what changed computed again, edits that hold, threads."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from threading import Barrier
+
+import numpy as np
+import pytest
+
+import lipmotion
+from lipmotion.articulation.curve_edits import GAIN_EDGE_S, LOCK_EDGE_S
+from lipmotion.articulation.delivery import Delivery
+from lipmotion.errors import InputError
+from lipmotion.faces.registry import staged_face
+from lipmotion.pipeline.edits import Edits
+from lipmotion.pipeline.generate.animate import animate
+from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.outputs.curve_sets import curves_of
+from lipmotion.pipeline.outputs.delivered import shown
+from lipmotion.pipeline.outputs.drawn_video import sound_track
+from lipmotion.pipeline.outputs.output import OutputSettings, Performance
+from lipmotion.pipeline.outputs.prosody import prosody_of_speech
+from lipmotion.pipeline.outputs.shown_faces import shown_face
+from lipmotion.pipeline.outputs.write import write
+from lipmotion.pipeline.session import Session
+from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.testing.toy import ToySentence
+from lipmotion.types import Generation, Timeline, Unit
+
+
+@pytest.fixture
+def request_(toy_sentence: ToySentence) -> SpeechRequest:
+    return SpeechRequest(toy_sentence.audio, " ".join(toy_sentence.words))
+
+
+@pytest.fixture
+def session(request_: SpeechRequest, toy_model: Model) -> Session:
+    return Session(request_, model=toy_model)
+
+
+def phones(units: Timeline[Unit]) -> list[str]:
+    return [span.label.phone for span in units]
+
+
+def edited(*sentences: str) -> Edits:
+    return Edits().then(*sentences)
+
+
+def test_a_session_gives_what_one_pass_gives(session: Session, request_: SpeechRequest, toy_model: Model) -> None:
+    """Whatever was asked for before; with phones edited in a session, or given."""
+    place = phones(session.units()).index("iy") + 1
+    edits = edited(f"phone {place} is aa", "pin opening 0.05 at 1.0")
+    session.generated(edited("remove phone 3"))
+    for found in (session.generated(edits), animate(request_, model=toy_model, edits=edits)):
+        assert found.units[place - 1].label.phone == "aa"
+        assert np.array_equal(found.motion.values, session.generated(edits).motion.values)
+        assert np.array_equal(found.variance, session.generated(edits).variance)
+    given = replace(request_, transcript=None, units=session.units(edits))
+    assert animate(given, model=toy_model, edits=edited("pin opening 0.05 at 1.0")).motion.values == pytest.approx(
+        session.generated(edits).motion.values, abs=1e-6
+    )
+    assert np.array_equal(session.generated().motion.values, animate(request_, model=toy_model).motion.values)
+
+
+def test_only_what_changed_is_computed_again(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[str] = []
+    for name in ("understood_speech", "generate_for"):
+        plain = getattr(lipmotion.pipeline.session, name)
+
+        def counted(*given: object, name: str = name, plain: object = plain, **more: object) -> object:
+            calls.append(name)
+            return plain(*given, **more)  # type: ignore[operator]
+
+        monkeypatch.setattr(lipmotion.pipeline.session, name, counted)
+    first = session.generated()
+    session.generated(edited("phone 3 is p"))
+    session.generated(edited("phone 3 is p", "pin jawOpen 0.2 at 1.0"))  # a curve: no new motion
+    session.delivered(edited("phone 3 is p", "set intensity 1.5"))
+    assert session.generated() is first  # undone
+    assert calls == ["understood_speech", "generate_for", "generate_for"]
+
+
+def test_edits_of_phones(session: Session) -> None:
+    plain = session.units()
+    third = plain[2]
+    moved = session.units(edited(f"phone 3 ends {third.end_s - 0.02:.3f}"))
+    assert moved[2].end_s == moved[3].start_s == pytest.approx(third.end_s - 0.02)
+    assert phones(moved) == phones(plain)
+    assert moved[2].label.confidence is None
+    gone = session.units(edited("remove phone 3"))
+    assert phones(gone) == [*phones(plain)[:2], *phones(plain)[3:]]
+    assert gone[1].end_s == third.end_s
+    middle_s = (third.start_s + third.end_s) / 2
+    more = session.units(edited(f"insert m from {third.start_s:.3f} to {middle_s:.3f}"))
+    assert phones(more) == [*phones(plain)[:2], "m", *phones(plain)[2:]]
+    numbered = session.units(edited("remove phone 3", "phone 3 is b"))  # numbers are those after the edits before
+    assert numbered[2].label.phone == "b"
+    assert all(a.end_s == pytest.approx(b.start_s) for a, b in zip(more.spans, more.spans[1:], strict=False))
+
+
+def test_another_word_is_aligned_where_it_was(session: Session) -> None:
+    word = next(span.label.word for span in session.units() if span.label.word)
+    plain = [span for span in session.units() if span.label.word == word]
+    found = [span for span in session.units(edited("word 1 is mama")) if span.label.word == "mama"]
+    assert phones(Timeline(tuple(found)))[0] == "m"
+    spans = session.units(edited("word 1 is mama"))
+    before = [span for span in session.units() if span.end_s <= plain[0].start_s + 1e-9]
+    assert list(spans)[: len(before)] == before
+    assert spans[len(before)].start_s == plain[0].start_s
+    with pytest.raises(InputError, match="there is no word 99, required 1 to"):
+        session.units(edited("word 99 is mama"))
+
+
+def test_pins_hold_for_channels_and_curves(session: Session, tmp_path: Path) -> None:
+    edits = edited(
+        "pin opening 0.1 at 0.8", "pin jawOpen 0.7 at 1.2", "gain 1.5 from 0.5 to 1.0", "pin viseme_PP 0.4 at 1.5"
+    )
+    found = session.generated(edits)
+    assert found.motion["opening"][80] == pytest.approx(0.1, abs=1e-9)
+    arkit = curves_of(found.motion, found.units, "arkit", edits=found.curve_edits)
+    plain = curves_of(found.motion, found.units, "arkit")
+    assert arkit["jawOpen"][120] == pytest.approx(0.7)
+    assert np.array_equal(arkit["jawOpen"][:100], plain["jawOpen"][:100])  # bent within a tenth of a second alone
+    write(found, tmp_path / "a.csv", curves="visemes")
+    rows = np.genfromtxt(tmp_path / "a.csv", delimiter=",", names=True)
+    assert rows["viseme_PP"][150] == pytest.approx(0.4)
+    later = session.delivered(edits.then("set offset_ms 500"))
+    assert curves_of(later.motion, later.units, "arkit", edits=later.curve_edits)["jawOpen"][170] == pytest.approx(0.7)
+
+
+def test_gains_make_movements_larger_for_a_time(session: Session) -> None:
+    plain, larger = session.generated(), session.generated(edited("gain 2 from 0.6 to 1.4"))
+    span = slice(60, 141)
+    assert np.ptp(larger.motion["opening"][span]) > 1.3 * np.ptp(plain.motion["opening"][span])
+    edge = round(GAIN_EDGE_S * 100)
+    assert np.array_equal(larger.motion.values[: 60 - edge], plain.motion.values[: 60 - edge])
+    assert np.array_equal(larger.motion.values[141 + edge :], plain.motion.values[141 + edge :])
+    still = session.generated(edited("gain width 0 from 0.6 to 1.4"))
+    assert np.ptp(still.motion["width"][span]) < 1e-9
+    assert np.array_equal(still.motion["opening"], plain.motion["opening"])
+
+
+def test_a_locked_span_stays_as_it_was(session: Session) -> None:
+    first = edited("pin opening 0.1 at 0.8", "lock from 0.6 to 1.0")
+    later = first.then("gain 2 from 0.2 to 2.0", f"phone {len(session.units()) - 2} is aa")
+    before, after = session.generated(edited("pin opening 0.1 at 0.8")), session.generated(later)
+    assert np.array_equal(after.motion.values[60:101], before.motion.values[60:101])
+    assert not np.allclose(after.motion.values[120:160], before.motion.values[120:160])
+    jump = np.abs(np.diff(after.motion["opening"])).max()
+    assert jump < 2 * np.abs(np.diff(session.generated(edited("gain 2 from 0.2 to 2.0")).motion["opening"])).max()
+    assert LOCK_EDGE_S > 0
+    number = next(n for n, span in enumerate(session.units(), 1) if span.start_s > 0.6)
+    for refused in (f"phone {number} is p", "pin opening 0.2 at 0.7"):
+        with pytest.raises(InputError, match=r"locked \('lock from 0.6 to 1.0'\); take the lock out first"):
+            session.generated(first.then(refused))
+
+
+@pytest.mark.parametrize(
+    ("sentence", "message"),
+    [
+        ("phone 99 is p", "there is no phone 99, required 1 to"),
+        ("phone 2 is xx", "unknown phone 'xx'"),
+        ("phone 1 begins 0.1", "the first phone begins with the recording"),
+        ("phone 2 ends 99", "required .* between the phones beside it"),
+        ("insert p from 2 to 1", r"required at least 0\.01 s within"),
+        ("pin jaw 0.1 at 0.5", "cannot pin 'jaw'"),
+        ("pin jawOpen 0.1 at 99", None),
+        ("gain lips 2 from 0 to 1", "cannot change 'lips'"),
+    ],
+)
+def test_edits_that_are_not_possible(session: Session, sentence: str, message: str | None) -> None:
+    if message is None:  # of a curve that outputs have: they say so
+        found: Generation = session.generated(edited(sentence))
+        with pytest.raises(InputError, match="outside the recording"):
+            curves_of(found.motion, found.units, "arkit", edits=found.curve_edits)
+        return
+    with pytest.raises(InputError, match=message):
+        session.generated(edited(sentence))
+
+
+def test_single_pictures_are_those_of_the_video(session: Session, request_: SpeechRequest) -> None:
+    """Any frame, before and after an edit; what is not at that time is refused."""
+    for edits in (Edits(), edited("pin opening 0.2 at 1.0", "set size 64", "set background #40a0ff")):
+        performance = Performance(
+            session.generated(edits),
+            OutputSettings(shown_face("portrait"), None, sounded=True, staging=edits.staging()),
+            sound=request_.recording,  # type: ignore[arg-type]
+        )
+        seen, prosody = shown(performance.generation, Delivery(), 25.0), prosody_of_speech(sound_track(performance))
+        frames = list(staged_face("portrait", edits.staging(), prosody).render(seen.motion, seen.units, fps=25.0))
+        for number in (25, 3):
+            assert np.array_equal(session.picture(number / 25, edits), frames[number])
+    with pytest.raises(InputError, match="9 s lies outside the video"):
+        session.picture(9)
+
+
+def test_sessions_in_two_threads_do_not_disturb_each_other(toy_model: Model, toy_sentence: ToySentence) -> None:
+    """Each alone and both at once give the same bits; the matrix products of one do not change those of the other."""
+    requests = [SpeechRequest(toy_sentence.audio, " ".join(toy_sentence.words)), SpeechRequest(toy_sentence.audio)]
+    edits = [edited("phone 3 is p"), edited("pin opening 0.05 at 1.0")]
+    alone = [
+        Session(request, model=toy_model).generated(edit).motion.values
+        for request, edit in zip(requests, edits, strict=True)
+    ]
+    both = Barrier(2)
+
+    def work(number: int) -> list[np.ndarray]:
+        both.wait(60)
+        return [Session(requests[number], model=toy_model).generated(edits[number]).motion.values for _ in range(3)]
+
+    with ThreadPoolExecutor(2) as pool:
+        for number, found in enumerate(pool.map(work, range(2))):
+            assert all(np.array_equal(values, alone[number]) for values in found)
