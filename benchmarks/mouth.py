@@ -236,14 +236,12 @@ def vowels_of(length: str, name: str, each: Take, model: Model) -> dict[str, Any
 
 @dataclass(frozen=True, eq=False)
 class Covered:
-    """An acoustic network that hears all sound as wholly covered by noise."""
+    """An acoustic network that hears all sound as wholly covered by noise; all else is as of the network."""
 
     network: Predictor
 
-    @property
-    def variances(self) -> Array:
-        """Of the network."""
-        return self.network.variances
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.network, name)
 
     def predict(self, speech: Speech) -> tuple[Array, Array]:
         """Return the network's motion, and the largest distortion in all frames."""

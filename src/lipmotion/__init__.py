@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from lipmotion.pipeline.generate.speak import speak
     from lipmotion.pipeline.generate.state_runs import state_runs
     from lipmotion.pipeline.generate.transfer import map_onto, with_person
+    from lipmotion.pipeline.job import Job, Outputs, Request
     from lipmotion.pipeline.model import Model, load_model, save_model
     from lipmotion.pipeline.outputs.cues import cues, write_cues
     from lipmotion.pipeline.outputs.write import write
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from lipmotion.types import (
         Audio,
         Constraints,
+        Delivery,
         Explanation,
         Gain,
         Generation,
@@ -44,6 +46,7 @@ if TYPE_CHECKING:
         Pin,
         Span,
         SpokenText,
+        Staging,
         Timeline,
         Unit,
     )
@@ -54,22 +57,27 @@ __all__ = [
     "Constraints",
     "Corpus",
     "CueSheet",
+    "Delivery",
     "Edits",
     "Explanation",
     "FilmOptions",
     "FilmedFace",
     "Gain",
     "Generation",
+    "Job",
     "Lexicon",
     "Model",
     "Motion",
+    "Outputs",
     "Pin",
+    "Request",
     "Run",
     "Selection",
     "Session",
     "Span",
     "SpeechRequest",
     "SpokenText",
+    "Staging",
     "Timeline",
     "Unit",
     "adapt",
@@ -102,6 +110,9 @@ _HOMES = {
     "Selection": "lipmotion.corpora.store",
     "Corpus": "lipmotion.corpora.store",
     "CueSheet": "lipmotion.export.cues.sheet",
+    "Job": "lipmotion.pipeline.job",
+    "Outputs": "lipmotion.pipeline.job",
+    "Request": "lipmotion.pipeline.job",
     "Lexicon": "lipmotion.units",
     "Model": "lipmotion.pipeline.model",
     "adapt": "lipmotion.pipeline.training.adapt",

@@ -1,4 +1,4 @@
-"""Registries of extensions: engines, faces, motion formats and corpus readers that installed packages add.
+"""Registries of extensions: engines, faces, motion formats and more that installed packages add.
 
 A package declares extensions as Python entry points in its ``pyproject.toml``: for instance, in the table
 ``[project.entry-points."lipmotion.engines"]``, ``ridge = "my_package:RidgeEngine"``. When the package is installed,
@@ -21,7 +21,7 @@ from lipmotion.errors import InputError
 ExtensionT = TypeVar("ExtensionT")
 GROUPS = (
     *("lipmotion.engines", "lipmotion.faces", "lipmotion.exporters", "lipmotion.corpus_readers"),
-    "lipmotion.outputs",
+    *("lipmotion.outputs", "lipmotion.predictors", "lipmotion.trackers"),
 )
 """Every group of entry points that is read."""
 OWN = {"lipmotion", "argparse"}

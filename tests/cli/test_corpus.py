@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -87,7 +88,7 @@ def test_without_the_packages_for_video(run: RunCommand, here: Path, monkeypatch
     def missing() -> dict[str, str]:
         raise MissingDependencyError('face tracking needs MediaPipe; pip install "lipmotion[video]"')
 
-    monkeypatch.setattr(prepare, "package_versions", missing)
+    monkeypatch.setattr(prepare, "tracker_named", lambda _: SimpleNamespace(versions=missing))
     (here / "videos").mkdir()
     (here / "videos" / "a.mp4").touch()
     assert is_one_error(run("corpus", "prepare", "videos", "-o", "mine"), 8)

@@ -85,6 +85,18 @@ def test_an_installed_engine_trains_saves_loads_and_animates(
 
 
 @pytest.mark.long
+def test_an_installed_predictor_is_chosen_by_name(toy_corpus: Corpus, toy_speech: Path, tmp_path: Path) -> None:
+    package, model = Package("predictor.md", tmp_path / "package"), tmp_path / "frames.lipmotion"
+    package.lipmotion("train", toy_corpus.path, "-o", model, "--set", "predictor=frames")
+    assert "predictor=frames" in package.lipmotion("info", model)
+    package.lipmotion("animate", toy_speech, "--model", model, "-o", tmp_path / "a.csv")
+    assert (tmp_path / "a.csv").read_text(encoding="utf-8").startswith("time_s,opening")
+    missing = run_child([*LIPMOTION, "animate", toy_speech, "--model", model, "-o", tmp_path / "b.csv"])
+    assert missing.returncode == 6
+    assert "no predictor 'frames'; there are: network, prior; install the package that adds it" in missing.stderr
+
+
+@pytest.mark.long
 def test_an_installed_face_and_format_work_from_the_command_line(toy_speech: Path, tmp_path: Path) -> None:
     face, table = Package("face.md", tmp_path / "face"), Package("exporter.md", tmp_path / "table")
     face.lipmotion("animate", toy_speech, "-o", tmp_path / "a.mp4", "--face", "bar")

@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.kernels.sequences import forward_backward
-from lipmotion.kernels.sequences.forward_backward import IMPOSSIBLE, chain_posteriors
-from oracles import chains
+from lipmotion.kernels.sequences.forward_backward import IMPOSSIBLE, chain_posteriors, log_forward_backward
+from oracles import chains, networks
 
 
 def padded(seed: int, sizes: list[tuple[int, int]], padding: float = 0.0):
@@ -26,6 +26,44 @@ def padded(seed: int, sizes: list[tuple[int, int]], padding: float = 0.0):
         single.append((emission, np.log(keep), np.log1p(-keep)))
     frames, states = np.array(sizes, np.intp).T
     return (log_emission, log_stay, log_move, frames, states), single
+
+
+def by_definition(log_emission, log_stay, log_move):
+    """Return what ``chain_posteriors`` returns of one chain, from the definition for any network."""
+    states = np.arange(len(log_stay))
+    arcs = np.append(states, states[:-1]), np.append(states, states[1:]), np.append(log_stay, log_move[:-1])
+    begin, end = np.full((2, len(states)), -np.inf)
+    begin[0], end[-1] = 0, log_move[-1]
+    log_posterior, counts, log_likelihood = log_forward_backward(begin, log_emission, *arcs, end)
+    return np.exp(log_posterior), counts[: len(states)], log_likelihood
+
+
+@given(seed=st.integers(0, 2**32 - 1), frames=st.integers(1, 6), spread=st.sampled_from([1.0, 30.0, 1e3]))
+@settings(max_examples=25)
+def test_the_definition_agrees_with_the_enumeration_of_all_paths(seed, frames, spread):
+    draw = np.random.default_rng(seed)
+    emission, ends = draw.normal(0, spread, (frames, 3)), np.log(draw.dirichlet(np.ones(3), 2))
+    arcs = {(a, b): np.log(draw.uniform()) for a in range(3) for b in range(3) if draw.uniform() < 0.6}
+    arrays = *np.array(list(arcs), np.intp).reshape(-1, 2).T, np.array(list(arcs.values()))
+    log_posterior, counts, log_likelihood = log_forward_backward(ends[0], emission, *arrays, ends[1])
+    wanted, wanted_counts, wanted_log_likelihood = networks.posteriors(emission, np.arange(3), arcs, *ends)
+    assert np.exp(log_posterior) == pytest.approx(wanted, abs=1e-9)
+    assert counts == pytest.approx(list(wanted_counts.values()), abs=1e-9)
+    assert log_likelihood == pytest.approx(wanted_log_likelihood, abs=1e-9)
+
+
+@given(seed=st.integers(0, 2**32 - 1), loudness=st.sampled_from([1.0, 1e3]))
+@settings(max_examples=10)
+def test_chains_are_those_of_the_definition(seed, loudness):
+    sizes = [(60, 7), (31, 5), (7, 7), (3, 4)]
+    (log_emission, *rest), single = padded(seed, sizes)
+    posterior, stay, log_likelihood = chain_posteriors(log_emission * loudness, *rest)
+    for u, ((frames, states), (emission, *moves)) in enumerate(zip(sizes, single, strict=True)):
+        wanted_posterior, wanted_stay, wanted_log_likelihood = by_definition(emission * loudness, *moves)
+        assert posterior[:frames, u, :states] == pytest.approx(wanted_posterior, abs=1e-8)
+        assert stay[u, :states] == pytest.approx(wanted_stay, abs=1e-8)
+        found = log_likelihood[u] if log_likelihood[u] > IMPOSSIBLE / 2 else -np.inf
+        assert found == pytest.approx(wanted_log_likelihood, rel=1e-12)
 
 
 SIZES = st.lists(st.tuples(st.integers(1, 7), st.integers(1, 3)), min_size=1, max_size=4)

@@ -7,18 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from lipmotion.errors import CorpusError
 from lipmotion.motion import acoustic_network
-from lipmotion.motion.acoustic_network import (
-    STEP,
-    AcousticNetwork,
-    acoustic_network_arrays,
-    acoustic_network_from_arrays,
-    between_steps,
-    fit_acoustic_network,
-)
-from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
+from lipmotion.motion.acoustic_network import STEP, AcousticNetwork, between_steps
+from lipmotion.motion.predictors import PredictorTraining
+from lipmotion.storage.checkpoint import Checkpoint
 from lipmotion.testing.examples import example
-from lipmotion.types import SPECTRUM_BANDS, Example, HeardSpectrum, silent_monitor
+from lipmotion.types import SPECTRUM_BANDS, Example, HeardSpectrum
 
 
 def heard_example(seed: int, tempos: tuple[float, ...] = (1.0,)) -> tuple[Example, np.ndarray]:
@@ -45,8 +40,9 @@ def trained() -> AcousticNetwork:
     patch.setattr(acoustic_network, "LEAST_STEPS", 60)
     patch.setattr(acoustic_network, "BATCH_SIZE", 4)
     examples, values = zip(*(heard_example(seed, (1.0, 0.8, 1.25)) for seed in range(6)), strict=True)
-    result = fit_acoustic_network(examples, values, 2, 1, silent_monitor, NO_CHECKPOINT)
+    result = AcousticNetwork.fit(PredictorTraining(examples, values, 2)).predictor
     patch.undo()
+    assert isinstance(result, AcousticNetwork)
     return result
 
 
@@ -72,25 +68,24 @@ def test_a_straight_line_stays_straight_inside() -> None:
 
 
 def test_it_is_the_same_after_serialisation_but_for_half_precision(trained: AcousticNetwork) -> None:
-    again = acoustic_network_from_arrays(acoustic_network_arrays(trained), 2)
-    assert again is not None
+    again = AcousticNetwork.from_arrays(trained.arrays(), 2)
     speech = heard_example(5)[0].speech
     np.testing.assert_allclose(again.predict(speech)[0], trained.predict(speech)[0], atol=3e-3)
 
 
 @pytest.mark.parametrize("name", ["network_first", "network_layers", "network_biases", "network_output"])
 def test_a_network_without_a_part_is_refused(trained: AcousticNetwork, name: str) -> None:
-    arrays = acoustic_network_arrays(trained)
+    arrays = trained.arrays()
     del arrays[name]
     with pytest.raises(KeyError, match=name):
-        acoustic_network_from_arrays(arrays, 2)
+        AcousticNetwork.from_arrays(arrays, 2)
 
 
 def test_a_scale_of_nothing_is_refused(trained: AcousticNetwork) -> None:
-    arrays = acoustic_network_arrays(trained)
+    arrays = trained.arrays()
     arrays["network_targets"][1, 0] = 0
     with pytest.raises(ValueError, match="scale"):
-        acoustic_network_from_arrays(arrays, 2)
+        AcousticNetwork.from_arrays(arrays, 2)
 
 
 def test_a_stopped_training_goes_on_from_its_checkpoint(
@@ -99,11 +94,18 @@ def test_a_stopped_training_goes_on_from_its_checkpoint(
     checkpoint = Checkpoint(tmp_path_factory.mktemp("work"), "job")
     monkeypatch.setattr(acoustic_network, "LEAST_STEPS", 2)
     examples, values = zip(*(heard_example(seed) for seed in range(2)), strict=True)
-    first = fit_acoustic_network(examples, values, 2, 1, silent_monitor, checkpoint)
+    training = PredictorTraining(examples, values, 2, checkpoint=checkpoint)
+    first = AcousticNetwork.fit(training).predictor.arrays()
 
     def never(*_: object) -> None:
         raise AssertionError("trained again")
 
     monkeypatch.setattr(acoustic_network, "fit_network", never)
-    again = fit_acoustic_network(examples, values, 2, 1, silent_monitor, checkpoint)
-    np.testing.assert_allclose(again.network.output.weights, first.network.output.weights)
+    again = AcousticNetwork.fit(training).predictor.arrays()
+    np.testing.assert_allclose(again["network_output"], first["network_output"])
+
+
+def test_examples_without_conditions_are_refused() -> None:
+    one, values = heard_example(0)
+    with pytest.raises(CorpusError, match="120 s of measured motion"):
+        AcousticNetwork.fit(PredictorTraining([replace(one, heard=())], [values], 2))

@@ -8,13 +8,8 @@ import numpy as np
 import pytest
 
 from lipmotion.motion.acoustic_network import STEP
-from lipmotion.motion.prior_regression import (
-    PriorRegression,
-    fit_prior_regression,
-    folds,
-    prior_regression_arrays,
-    prior_regression_from_arrays,
-)
+from lipmotion.motion.predictors import PredictorFit, PredictorTraining, folds
+from lipmotion.motion.prior_regression import PriorRegression
 from lipmotion.testing.examples import example
 from lipmotion.types import SPECTRUM_BANDS, Example, PriorOutput
 
@@ -32,15 +27,15 @@ def standing(seed: int, noise: float = 0.0) -> tuple[Example, np.ndarray]:
 
 
 @pytest.fixture(scope="module")
-def fitted() -> tuple[PriorRegression, list[np.ndarray]]:
+def fitted() -> PredictorFit:
     """A regression, and its predictions in cross-validation."""
     examples, values = zip(*(standing(seed) for seed in range(4)), strict=True)
-    return fit_prior_regression(examples, values, 2)
+    return PriorRegression.fit(PredictorTraining(examples, values, 2))
 
 
-def test_it_follows_the_other_model_into_another_range(fitted: tuple[PriorRegression, list[np.ndarray]]) -> None:
+def test_it_follows_the_other_model_into_another_range(fitted: PredictorFit) -> None:
     one, motion = standing(50)
-    found, distortion = fitted[0].predict(one.speech)
+    found, distortion = fitted.predictor.predict(one.speech)
     assert found.shape == motion.shape
     assert np.corrcoef(found[:, 0], motion[:, 0])[0, 1] > 0.97
     assert np.sqrt(np.mean((found - motion) ** 2)) < 0.03
@@ -49,7 +44,8 @@ def test_it_follows_the_other_model_into_another_range(fitted: tuple[PriorRegres
 
 def test_predictions_in_cross_validation_are_not_those_of_the_training() -> None:
     examples, values = zip(*(standing(seed, noise=1.0) for seed in range(4)), strict=True)
-    regression, predictions = fit_prior_regression(examples, values, 2)
+    regression, predictions = PriorRegression.fit(PredictorTraining(examples, values, 2))
+    assert predictions is not None
     held_out = np.mean([(p - x) ** 2 for p, x in zip(predictions, values, strict=True)])
     inside = np.mean([(regression.predict(e.speech)[0] - x) ** 2 for e, x in zip(examples, values, strict=True)])
     assert held_out > inside
@@ -57,7 +53,7 @@ def test_predictions_in_cross_validation_are_not_those_of_the_training() -> None
 
 def test_a_useless_prior_is_left_out() -> None:
     examples, values = zip(*(standing(seed, noise=100.0) for seed in range(4)), strict=True)
-    regression, _ = fit_prior_regression(examples, values, 2)
+    regression, _ = PriorRegression.fit(PredictorTraining(examples, values, 2))
     one, motion = standing(50, noise=100.0)
     assert np.square(regression.predict(one.speech)[0] - motion).mean() < 1.3 * motion.var(axis=0).mean()
 
@@ -69,15 +65,14 @@ def test_folds_part_all_examples() -> None:
     assert all(not set(inside) & set(out) for inside, out in folds(5))
 
 
-def test_it_is_the_same_after_serialisation(fitted: tuple[PriorRegression, list[np.ndarray]]) -> None:
-    again = prior_regression_from_arrays(prior_regression_arrays(fitted[0]), 2)
-    assert again is not None
+def test_it_is_the_same_after_serialisation(fitted: PredictorFit) -> None:
+    again = PriorRegression.from_arrays(fitted.predictor.arrays(), 2)
     one, _ = standing(3)
-    np.testing.assert_allclose(again.predict(one.speech)[0], fitted[0].predict(one.speech)[0], atol=2e-3)
+    np.testing.assert_allclose(again.predict(one.speech)[0], fitted.predictor.predict(one.speech)[0], atol=2e-3)
 
 
-def test_sizes_that_do_not_fit_are_refused(fitted: tuple[PriorRegression, list[np.ndarray]]) -> None:
-    arrays = prior_regression_arrays(fitted[0])
+def test_sizes_that_do_not_fit_are_refused(fitted: PredictorFit) -> None:
+    arrays = fitted.predictor.arrays()
     arrays["prior_sizes"] = arrays["prior_sizes"] + 1
     with pytest.raises(ValueError, match="prior_sizes"):
-        prior_regression_from_arrays(arrays, 2)
+        PriorRegression.from_arrays(arrays, 2)

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from lipmotion.engines import Engine
+from lipmotion.engines import Engine, Inputs
 from lipmotion.errors import InputError
 from lipmotion.pipeline.generate.outlook import WHOLE_TRANSCRIPT, outlook_of
 from lipmotion.pipeline.model import Model
@@ -39,7 +39,9 @@ class RecognisingEngine(Engine[Any]):
     config: Any = None
     found: Timeline[Unit] | None = None
     name: ClassVar[str] = "recognising"
-    wants_f0: ClassVar[bool] = True  # type: ignore[misc]
+
+    def inputs(self, motion_s: float = np.inf) -> Inputs:  # noqa: ARG002
+        return Inputs(f0=True)
 
     def recognise(self, model: object, speech: Speech) -> Timeline[Unit] | None:  # noqa: ARG002
         assert len(speech.units) == 0
@@ -98,7 +100,8 @@ def test_f0_is_computed_for_engines_that_want_it(toy_sentence: ToySentence) -> N
 
     @dataclass(frozen=True)
     class Deaf(RecognisingEngine):
-        wants_f0: ClassVar[bool] = False  # type: ignore[misc]
+        def inputs(self, motion_s: float = np.inf) -> Inputs:  # noqa: ARG002
+            return Inputs()
 
     assert speech_of(Deaf(), toy_sentence.audio, features, toy_sentence.units).log_f0 is None
 

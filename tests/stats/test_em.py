@@ -29,6 +29,7 @@ def test_all_steps_are_taken_and_reported():
     result = run_em(0.0, Half, maximise, 3, lambda *step: log.append(step))
     assert result.model == 0.875
     assert result.statistics == Half(0.75)
+    assert not result.converged
     assert result.log_likelihoods == (-1, -0.5, -0.25)
     assert log == [(1, 0.5, Half(0.0)), (2, 0.75, Half(0.5)), (3, 0.875, Half(0.75))]
 
@@ -42,6 +43,7 @@ def test_it_stops_at_the_first_step_that_gains_too_little(converged, model, repo
     assert result.model == model
     assert result.log_likelihoods == (-1, -0.5, -0.25)
     assert len(log) == reported
+    assert result.converged
 
 
 def test_the_first_step_never_counts_as_converged():

@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion.vision import face_follower as follow
-from lipmotion.vision.face_finder import FaceBox
 from lipmotion.vision.landmarks import TRACKED_POINTS
+from lipmotion.vision.trackers import FaceBox, LandmarkTracker
 
 COLUMN = {index: n for n, index in enumerate(TRACKED_POINTS)}
 
@@ -37,7 +37,7 @@ class ScriptedMesh:
     def __exit__(self, *_: object) -> None:
         pass
 
-    def faces(self, _image: NDArray[np.uint8]) -> list[NDArray[np.float64]]:
+    def faces(self, image: NDArray[np.uint8]) -> list[NDArray[np.float64]]:  # noqa: ARG002
         if self.most == 1:
             ScriptedMesh.last = next(self.answers)
         return [] if self.last is None else [self.last]
@@ -46,16 +46,28 @@ class ScriptedMesh:
 class NoFinder:
     """Stands for the detector, which finds no more than the mesh."""
 
+    def __enter__(self) -> NoFinder:
+        return self
+
     def __exit__(self, *_: object) -> None:
         pass
 
-    def boxes(self, _image: NDArray[np.uint8], *, thorough: bool) -> list[FaceBox]:
-        del thorough
+    def boxes(self, image: NDArray[np.uint8], *, thorough: bool = True) -> list[FaceBox]:  # noqa: ARG002
         return []
 
 
 def script(monkeypatch: pytest.MonkeyPatch, answers: Sequence[NDArray[np.float64] | None]) -> None:
     """Let the faces of the next video be these, one answer a frame."""
     answered = iter(answers)
-    monkeypatch.setattr(follow, "FaceFinder", NoFinder)
-    monkeypatch.setattr(follow, "FaceMesh", lambda most=1: ScriptedMesh(answered, most))
+
+    class Scripted(LandmarkTracker):
+        def versions(self) -> dict[str, str]:
+            return {"mediapipe": "scripted"}
+
+        def points(self, most: int = 1) -> ScriptedMesh:
+            return ScriptedMesh(answered, most)
+
+        def boxes(self) -> NoFinder:
+            return NoFinder()
+
+    monkeypatch.setattr(follow, "tracker_named", lambda _: Scripted())

@@ -9,9 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion.vision import face_follower as follow
-from lipmotion.vision.face_finder import FaceBox
 from lipmotion.vision.face_follower import JUMP, LOST_FRAMES, MOST_THUMBNAILS, FaceFollower
 from lipmotion.vision.landmarks import EYE_CORNERS, TRACKED_POINTS
+from lipmotion.vision.trackers import FaceBox, LandmarkTracker
 
 pytestmark = pytest.mark.video
 
@@ -58,19 +58,34 @@ class Mesh:
     def __exit__(self, *_: object) -> None:
         pass
 
-    def faces(self, _image: NDArray[np.uint8]) -> list[NDArray[np.float64]]:
+    def faces(self, image: NDArray[np.uint8]) -> list[NDArray[np.float64]]:  # noqa: ARG002
         return [points(face) for face in Mesh.shown if face[0].islower() and face[3] >= SMALL][: self.most]
 
 
 class Finder:
     """Stands for the detector: finds all faces of the frame that is being shown, those in capitals too."""
 
+    def __enter__(self) -> Finder:
+        return self
+
     def __exit__(self, *_: object) -> None:
         pass
 
-    def boxes(self, _image: NDArray[np.uint8], *, thorough: bool) -> list[FaceBox]:
-        del thorough
+    def boxes(self, image: NDArray[np.uint8], *, thorough: bool = True) -> list[FaceBox]:  # noqa: ARG002
         return [FaceBox(x, y, 2 * unit, 0.9) for _, x, y, unit in Mesh.shown]
+
+
+class Shown(LandmarkTracker):
+    """Finds the faces of the frame that is being shown."""
+
+    def versions(self) -> dict[str, str]:
+        return {}
+
+    def points(self, most: int = 1) -> Mesh:
+        return Mesh(most)
+
+    def boxes(self) -> Finder:
+        return Finder()
 
 
 class SmallMesh:
@@ -78,7 +93,7 @@ class SmallMesh:
 
     open = 0
 
-    def __init__(self, box: FaceBox) -> None:
+    def __init__(self, box: FaceBox, _: LandmarkTracker) -> None:
         self.x = box.x
 
     def __enter__(self) -> SmallMesh:
@@ -102,8 +117,7 @@ Show = Callable[..., tuple[FaceFollower, list[float | None]]]
 def show(monkeypatch: pytest.MonkeyPatch) -> Show:
     """Shows frames (faces, place); returns the follower, and where the face was followed to."""
     pytest.importorskip("cv2")
-    monkeypatch.setattr(follow, "FaceMesh", Mesh)
-    monkeypatch.setattr(follow, "FaceFinder", Finder)
+    monkeypatch.setattr(follow, "tracker_named", lambda _: Shown())
     monkeypatch.setattr(follow, "WindowedMesh", SmallMesh)
 
     def run(

@@ -1,12 +1,14 @@
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import cast
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lipmotion.vision import face_window
-from lipmotion.vision.face_finder import FaceBox
 from lipmotion.vision.face_window import REACH, SIZE_PX, FaceWindow, WindowedMesh
+from lipmotion.vision.trackers import FaceBox, LandmarkTracker
 
 pytest.importorskip("cv2")
 pytestmark = pytest.mark.video
@@ -69,9 +71,8 @@ def square(x: int, side: int) -> NDArray[np.uint8]:
     return image
 
 
-def test_the_window_goes_along_and_grows_with_the_face(monkeypatch):
-    monkeypatch.setattr(face_window, "FaceMesh", BrightMesh)
-    with WindowedMesh(FaceBox(230, 330, 60, 0.9)) as mesh:
+def test_the_window_goes_along_and_grows_with_the_face():
+    with WindowedMesh(FaceBox(230, 330, 60, 0.9), cast(LandmarkTracker, SimpleNamespace(points=BrightMesh))) as mesh:
         for n in range(40):  # it moves much further than a window's side, and becomes twice as large
             x, side = 200 + 20 * n, 60 + 2 * n
             (found,) = mesh.faces(square(x, side))

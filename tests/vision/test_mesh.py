@@ -8,7 +8,8 @@ import pytest
 from children import run_child
 from lipmotion.errors import MissingDependencyError
 from lipmotion.vision.mesh import FaceMesh, quiet_stderr
-from lipmotion.vision.packages import import_face_mesh, import_opencv, package_versions
+from lipmotion.vision.packages import import_face_mesh, import_opencv
+from lipmotion.vision.trackers import tracker_named
 
 
 def test_missing_packages_are_named_with_the_way_to_install_them(monkeypatch):
@@ -31,7 +32,7 @@ def test_versions_need_the_packages(monkeypatch):
 
     monkeypatch.setattr(metadata, "version", missing)
     with pytest.raises(MissingDependencyError, match="mediapipe"):
-        package_versions()
+        tracker_named().versions()
 
 
 def test_native_messages_are_dropped_only_inside(capfd):

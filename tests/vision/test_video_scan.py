@@ -17,7 +17,8 @@ class Follower:
     share = 1.0
     last: Follower
 
-    def __init__(self) -> None:
+    def __init__(self, tracker: str) -> None:
+        assert tracker == "mediapipe"
         self.shown: list[int] = []
 
     def __enter__(self) -> Follower:

@@ -6,7 +6,7 @@ Each function returns a new generation; the values are those of the engine until
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,69 +16,18 @@ from lipmotion.articulation.rest import rest_frames
 from lipmotion.errors import InputError
 from lipmotion.kernels.sequences.holds import best_holds
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Gain, Generation, Motion, Pin, Span, StateTrace, Timeline, Unit
+from lipmotion.types.delivery import Delivery as Delivery  # noqa: PLC0414 (part of this module's interface)
 from lipmotion.types.generation import ReducedVariance
 from lipmotion.units import is_silent
 
 Curve = NDArray[np.float64]
 
-MOST_INTENSITY = 3.0
-MOST_ANTICIPATION_MS = 1000.0
-MOST_HOLD_MS = 10_000.0
-MOST_OFFSET_MS = 600_000.0
-USUAL_HOLD_MS = 2000 / 24
-"""Held poses last as long as two frames of an animation at 24 frames a second, if nothing else is asked for."""
 FREE = 0.03
 """Lips that have just parted by less than this, in eye distances, move less than in proportion to the intensity."""
 GROWING = ("protrusion", "spread")
 """The articulatory channels that grow with the intensity; the others say what touches what."""
 DECIDING = ("opening", "width", "outer")
 """The channels that decide where held poses begin, where the motion has them."""
-
-
-@dataclass(frozen=True)
-class Delivery:
-    """How motion is delivered to files and videos, beside what it says.
-
-    intensity       : 1: as spoken; up to 3: movements away from the rest pose so many times as large. What is closed
-                      stays closed, and silence stays at rest
-    anticipation_ms : the mouth moves so many milliseconds before the sound, -1000 to 1000
-    offset_ms       : the sound begins so many milliseconds after time 0 of the timeline; negative: before it, and what
-                      would be before time 0 is left out. For files that are put beside a sound; videos have their own
-    min_hold_ms     : 0: the curves are smooth; more: poses are held, each for at least so many milliseconds
-    stepped         : poses are held; with ``min_hold_ms`` 0, each for at least two frames at 24 frames a second
-    Raises InputError: a value out of its range.
-
-    >>> Delivery(anticipation_ms=40).hold_ms, Delivery(stepped=True).hold_ms > 80, Delivery(min_hold_ms=120).hold_ms
-    (0.0, True, 120)
-    """
-
-    intensity: float = 1.0
-    anticipation_ms: float = 0.0
-    offset_ms: float = 0.0
-    min_hold_ms: float = 0.0
-    stepped: bool = False
-
-    def __post_init__(self) -> None:
-        for name, least, most in (
-            ("intensity", 0.0, MOST_INTENSITY),
-            ("anticipation_ms", -MOST_ANTICIPATION_MS, MOST_ANTICIPATION_MS),
-            ("offset_ms", -MOST_OFFSET_MS, MOST_OFFSET_MS),
-            ("min_hold_ms", 0.0, MOST_HOLD_MS),
-        ):
-            value = getattr(self, name)
-            if not least <= value <= most:
-                what = name.removesuffix("_ms").replace("_", " ").replace("min hold", "least hold")
-                unit = " ms" if name.endswith("_ms") else ""
-                raise InputError(f"the {what} is {value:g}{unit}, required {least:g} to {most:g}{unit}")
-
-    @property
-    def hold_ms(self) -> float:
-        """Least duration of a held pose in milliseconds; 0: the curves are smooth."""
-        return self.min_hold_ms or (USUAL_HOLD_MS if self.stepped else 0.0)
-
-    def hold_frames(self, rate_hz: float) -> int:
-        """Return the least number of frames of a held pose, at least 1; 0: the curves are smooth."""
-        return max(int(np.ceil(self.hold_ms * rate_hz / 1000 - 1e-6)), 1) if self.hold_ms else 0
 
 
 def moved_in_time(generation: Generation, delivery: Delivery) -> Generation:

@@ -17,7 +17,6 @@ from lipmotion.units import LIP_CLOSING, is_silent
 Curve = NDArray[np.float64]
 
 REST, NATURAL = "rest", "natural"
-PAUSE_STYLES: Final = (REST, NATURAL)
 """Lips close softly in pauses; or they do in pauses what the model learned, as people who breathe and hold a sound."""
 LEAST_PAUSE_S: Final = 0.25
 """In shorter pauses the mouth goes on; silence at both ends of a line counts at any length."""

@@ -86,8 +86,11 @@ def parser() -> argparse.ArgumentParser:
 def _parsed(
     whole: argparse.ArgumentParser, arguments: Sequence[str] | None, options: argparse.Namespace
 ) -> argparse.Namespace:
-    """Return the options; of a misspelt one the error names the nearest."""
+    """Return the options, over those of a job file; of a misspelt one the error names the nearest."""
+    empty = argparse.Namespace(**vars(options))
     options, unknown = whole.parse_known_args(arguments, options)
+    if getattr(options, "job", None):  # what it says are the defaults by now
+        options, unknown = whole.parse_known_args(arguments, empty)
     if unknown:
         option = next((word for word in unknown if word.startswith("-")), unknown[0]).split("=")[0]
         near = get_close_matches(option, _option_strings(whole, options.verb), n=1)

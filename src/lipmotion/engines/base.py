@@ -1,7 +1,8 @@
-"""The interface of engines: the members of every engine, and protocols for abilities that only some engines have."""
+"""The interface of engines: what each must do, and what it may do besides, with defaults for those that do not."""
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -31,17 +32,38 @@ Arrays = Mapping[str, NDArray[Any]]
 
 @dataclass(frozen=True, eq=False)
 class Fit(Generic[ModelT]):
-    """A trained model, and figures of its training by name (``frames``, ``leaves``, ...)."""
+    """A trained model, and figures of its training by name (``frames``, ``leaves``, ...).
+
+    uses_prior : whether the model stands on another one, whose output it needs in speech (``Speech.prior``)
+    """
 
     model: ModelT
     figures: Mapping[str, float]
+    uses_prior: bool = False
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """What an engine takes besides acoustic features, phones in time and motion.
+
+    f0           : F0, ``Speech.log_f0``
+    conditions   : acoustic conditions in which training takes each example (``Example.heard``), and with them spectra
+                   (``Speech.spectrum``); 0: neither
+    prior        : what another model makes of the speech, ``Speech.prior``: its models can stand on other ones
+    speech_alone : examples without any valid frame: of other speakers, for instance
+    """
+
+    f0: bool = False
+    conditions: int = 0
+    prior: bool = False
+    speech_alone: bool = False
 
 
 class Animator(ABC, Generic[ModelT]):
     """A method that learns motion from examples and generates motion from speech.
 
-    Baselines of experiments need no more than this; an ``Engine`` also has a configuration, and its models can be saved
-    and loaded.
+    Baselines of experiments need no more than ``fit`` and ``generate``; an ``Engine`` also has a configuration, and its
+    models can be saved and loaded.
     """
 
     @abstractmethod
@@ -61,6 +83,24 @@ class Animator(ABC, Generic[ModelT]):
         constraints : values that the motion must take
         Raises InputError: a pin names no channel, lies outside the recording or is not finite; an unknown phone.
         """
+
+    def inputs(self, motion_s: float = math.inf) -> Inputs:  # noqa: ARG002
+        """Return what training and generation take.
+
+        motion_s : seconds of measured motion in training; infinite: what any model of the engine may take
+        """
+        return Inputs()
+
+    def recognise(self, model: ModelT, speech: Speech) -> Timeline[Unit] | None:  # noqa: ARG002
+        """Return the phones in time that a model recognises, or None if it was not trained on this voice.
+
+        speech : its ``units`` are empty
+        """
+        return None
+
+    def without_closures(self) -> Animator[ModelT]:
+        """Return the method without forced closures in p, b and m, for the same models; itself, if it forces none."""
+        return self
 
 
 class Engine(Animator[ModelT]):
@@ -86,91 +126,28 @@ class Engine(Animator[ModelT]):
         Raises ModelFormatError: an array is missing or unknown, or has a wrong shape, type or range.
         """
 
+    def hidden(self, model: ModelT, speech: Speech) -> tuple[NDArray[np.float32], NDArray[np.float64]] | None:  # noqa: ARG002
+        """Return features on which models of other people stand, and the distortion of the sound; None: there are none.
 
-@runtime_checkable
-class WantsF0(Protocol):
-    """An engine that can use the fundamental frequency, F0."""
-
-    @property
-    def wants_f0(self) -> bool:
-        """Whether training and generation need ``Speech.log_f0``."""
-
-
-@runtime_checkable
-class HearsConditions(Protocol):
-    """An engine that can use spectra, and trains on recordings as heard in several acoustic conditions."""
-
-    def conditions(self, motion_s: float) -> int:
-        """Return in how many acoustic conditions training hears each example (``Example.heard``); 0: none are used.
-
-        motion_s : seconds of measured motion of all examples; infinite: whether any model uses spectra
+        They have one row every 40 ms: features [shape=(ceil(T / 4), H)], distortion [shape=(ceil(T / 4),)].
         """
+        return None
 
-
-@runtime_checkable
-class HasAcousticNetwork(Protocol):
-    """An engine whose models may have an acoustic network, on which models of other people can stand."""
-
-    def hidden(self, model: Any, speech: Speech) -> tuple[NDArray[np.float32], NDArray[np.float64]] | None:
-        """Return the last hidden layer [shape=(T', H)] and the distortion of the sound [shape=(T',)], or None.
-
-        They have one row every 40 ms, T' = ceil(T / 4). None: the model has no network.
-        """
-
-
-@runtime_checkable
-class StandsOnPrior(Protocol):
-    """An engine whose models can stand on another model (``Speech.prior``)."""
-
-    def stands_on_prior(self, model: Any) -> bool:
-        """Return whether a model uses ``Speech.prior``."""
-
-
-@runtime_checkable
-class TrainsOnSpeechAlone(Protocol):
-    """An engine that can also be trained on speech without motion: of other speakers, for instance."""
-
-    @property
-    def trains_on_speech_alone(self) -> bool:
-        """Whether ``fit`` accepts examples without any valid frame."""
-
-
-@runtime_checkable
-class RecognisesPhones(Protocol):
-    """An engine whose models can recognise phones."""
-
-    def recognise(self, model: Any, speech: Speech) -> Timeline[Unit] | None:
-        """Return the phones in time that a model recognises, or None if it was not trained on this voice.
-
-        speech : its ``units`` are empty
-        """
-
-
-@runtime_checkable
-class ForcesClosures(Protocol):
-    """An engine that makes the lips meet in p, b and m."""
-
-    def without_closures(self) -> Animator[Any]:
-        """Return the engine without forced closures, for the same models; itself, if it forces none."""
-
-
-@runtime_checkable
-class Explains(Protocol):
-    """An engine that explains a frame in more detail than by its trace."""
-
-    def explain(self, model: Any, speech: Speech, frames: Sequence[int]) -> tuple[Explanation, ...]:
+    def explain(self, model: ModelT, speech: Speech, frames: Sequence[int]) -> tuple[Explanation, ...] | None:  # noqa: ARG002
         """Return an explanation of each of some frames of the motion that ``generate`` returns.
 
         frames : numbers from 0 to T - 1
+        None: there is no more to say than the trace does (``explain_by_trace``).
         """
+        return None
 
+    def posteriors(self, model: ModelT, speech: Speech) -> tuple[ChainPosteriors, ...]:  # noqa: ARG002
+        """Return, for every chain of hidden states, the posterior probability of each of its units in every frame."""
+        return ()
 
-@runtime_checkable
-class HasPosteriors(Protocol):
-    """An engine with chains of hidden states."""
-
-    def posteriors(self, model: Any, speech: Speech) -> tuple[ChainPosteriors, ...]:
-        """Return, for every chain, the posterior probability of each of its units in every frame."""
+    def describe(self, model: ModelT) -> str:  # noqa: ARG002
+        """Return a text that describes the parts of a model: its decision trees, its chains; empty: there is none."""
+        return ""
 
 
 @dataclass(frozen=True)
@@ -202,22 +179,14 @@ class SelectsRecordings(Protocol):
         """Return the median duration of a phone in the recordings."""
 
     def source_pieces(
-        self, model: Any, units: Timeline[Unit], heard: Mapping[str, NDArray[np.floating[Any]]]
+        self, model: Any, units: Timeline[Unit], features: Mapping[str, NDArray[np.floating[Any]]]
     ) -> tuple[tuple[SourcePiece, ...], Timeline[Unit]]:
         """Return the pieces of recordings that say some phones best, and the phones with the sources of their units.
 
-        units : phones in time, from 0 s
-        heard : acoustic features of every recording, by its name [each shape=(T, D)]; pieces join where these agree
+        units    : phones in time, from 0 s
+        features : acoustic features of every recording, by its name [each shape=(T, D)]; pieces join where these agree
         Raises InputError: an unknown phone, or features of other recordings.
         """
-
-
-@runtime_checkable
-class Describes(Protocol):
-    """An engine that can describe its models as text."""
-
-    def describe(self, model: Any) -> str:
-        """Return a text that describes the parts of a model: its decision trees, its chains."""
 
 
 def explain_by_trace(generation: Generation, frame: int) -> Explanation:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 
@@ -15,16 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.liveliness import Liveliness, liveliness
-from lipmotion.errors import InputError, shortened
-from lipmotion.types import Configuration, Motion, Prosody, Rule, Timeline, Unit, option
+from lipmotion.types import Motion, Prosody, Timeline, Unit
+from lipmotion.types.staging import SCENE as SCENE  # noqa: PLC0414 (part of this module's interface)
+from lipmotion.types.staging import SMALLEST as SMALLEST  # noqa: PLC0414 (part of this module's interface)
+from lipmotion.types.staging import TRANSPARENT as TRANSPARENT  # noqa: PLC0414 (part of this module's interface)
+from lipmotion.types.staging import Staging as Staging  # noqa: PLC0414 (part of this module's interface)
 
 PoseT = TypeVar("PoseT")
 Picture = NDArray[np.uint8]
 THREADS = 2
 """Pictures that are drawn at the same time."""
-SCENE, TRANSPARENT = "scene", "transparent"
-SMALLEST, LARGEST = 64, 4096
-"""Range of the height of pictures, in pixels."""
 
 
 class Face(ABC):
@@ -96,43 +94,6 @@ class DrawsSingly(Protocol):
 
         A face that is asked again, for other motion, does not paint again what does not move.
         """
-
-
-@dataclass(frozen=True)
-class Staging(Configuration):
-    """How a face is shown, beside what it says.
-
-    size       : height of the picture in pixels, an even number; 0: the face's own
-    background : ``scene`` (the face's own), ``transparent``, or a colour as ``#40a0ff``
-    blinks, gaze, brows, head : whether these move on their own
-    seed       : of the movements that depend on chance
-    Raises InputError: a value out of its range, or no such background.
-    """
-
-    size: int = option(0, Rule(least=0))
-    background: str = SCENE
-    blinks: bool = True
-    gaze: bool = True
-    brows: bool = True
-    head: bool = True
-    seed: int = option(0, Rule(least=0))
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.size and not (SMALLEST <= self.size <= LARGEST and self.size % 2 == 0):
-            raise InputError(f"the size is {self.size} pixels, required an even number from {SMALLEST} to {LARGEST}")
-        if self.background not in (SCENE, TRANSPARENT) and not re.fullmatch("#[0-9a-fA-F]{6}", self.background):
-            raise InputError(
-                f"the background is {shortened(self.background)!r}, required scene, transparent, or a colour as "
-                "#40a0ff; a video is for filmed faces; give one: --face FILE.face"
-            )
-
-    @property
-    def colour(self) -> tuple[int, int, int] | None:
-        """Red, green and blue of the background, 0..255; None: it has no single colour."""
-        if not self.background.startswith("#"):
-            return None
-        return int(self.background[1:3], 16), int(self.background[3:5], 16), int(self.background[5:7], 16)
 
 
 def alive(

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError
+from lipmotion.errors import CorpusError, InputError
+from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining
 from lipmotion.stats.convolution import (
     TAPS,
     ConvolutionalNetwork,
@@ -20,9 +21,8 @@ from lipmotion.stats.convolution import (
     initial_network,
 )
 from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
-from lipmotion.storage.checkpoint import Checkpoint
 from lipmotion.storage.schema import POSITIVE, STANDARD, Arrays, ArraySpec, checked_arrays
-from lipmotion.types import SPECTRUM_BANDS, Example, HeardSpectrum, Monitor, Progress, Speech
+from lipmotion.types import SPECTRUM_BANDS, Example, HeardSpectrum, Progress, Speech
 
 Array = NDArray[np.float64]
 STEP = 4
@@ -40,8 +40,21 @@ LONGEST_STEPS = 250
 CHECKPOINT = "network"
 
 
+WEIGHTS = {
+    "network_first": ArraySpec(np.float32, f"{TAPS * STEP * SPECTRUM_BANDS} {HIDDEN}", -STANDARD, STANDARD),
+    "network_layers": ArraySpec(np.float32, f"{len(DILATIONS) - 1} {TAPS * HIDDEN} {HIDDEN}", -STANDARD, STANDARD),
+    "network_biases": ArraySpec(np.float32, f"{len(DILATIONS)} {HIDDEN}", -STANDARD, STANDARD),
+    "network_output": ArraySpec(np.float32, f"{HIDDEN + 1} O", -STANDARD, STANDARD),
+}
+TARGETS = {
+    "network_targets": ArraySpec(np.float64, "2 Q", -1e6, 1e6),
+    "network_variances": ArraySpec(np.float64, "3 Q", POSITIVE),
+}
+
+
+@final
 @dataclass(frozen=True, eq=False)
-class AcousticNetwork:
+class AcousticNetwork(Predictor):
     """A network from spectra to motion.
 
     network   : its outputs are Q standardised dimensions of motion, and the distortion of the sound
@@ -53,6 +66,32 @@ class AcousticNetwork:
     mean: Array
     scale: Array
     variances: Array
+    name: ClassVar[str] = "network"
+    ARRAYS: ClassVar[Mapping[str, ArraySpec]] = WEIGHTS | TARGETS
+    least_motion_s: ClassVar[float] = 120.0
+
+    @classmethod
+    def fit(cls, training: PredictorTraining) -> PredictorFit:
+        """Return a network that is trained on all conditions in which each example is heard.
+
+        Each example is used in one of its conditions, drawn at random, at a time.
+        Raises CorpusError: an example without acoustic conditions.
+        """
+        examples, values = training.examples, training.values
+        if not all(example.heard for example in examples):
+            raise CorpusError(
+                f"examples without acoustic conditions; a network is trained on {cls.least_motion_s:g} s of measured "
+                "motion or more, with the option conditions from 1"
+            )
+        poses = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
+        mean, scale = poses.mean(axis=0), np.maximum(poses.std(axis=0), LEAST_DEVIATION)
+        network = _trained(training, mean, scale)
+        trained = cls(network, mean, scale, np.ones((3, len(mean))))
+        return PredictorFit(cls(network, mean, scale, _error_variances(trained, examples, values)))
+
+    def can_predict(self, speech: Speech) -> bool:
+        """Return whether speech has a spectrum."""
+        return speech.spectrum is not None
 
     def predict(self, speech: Speech) -> tuple[Array, Array]:
         """Return motion in the motion space [shape=(T, Q)] and the distortion of the sound, 0 to 1 [shape=(T,)].
@@ -60,7 +99,7 @@ class AcousticNetwork:
         Raises InputError: speech without a spectrum.
         """
         if speech.spectrum is None:
-            raise InputError("the speech has no spectrum; an engine that uses one says so by ``conditions``")
+            raise InputError("the speech has no spectrum; an engine that uses one says so by ``inputs``")
         spectrum = speech.spectrum
         return speech.once(self, lambda: self._predict(spectrum))
 
@@ -70,63 +109,63 @@ class AcousticNetwork:
         outputs = between_steps(steps, len(spectrum))
         return outputs[:, :-1] * self.scale + self.mean, np.clip(outputs[:, -1], 0, 1)
 
-    def hidden(self, spectrum: NDArray[np.floating]) -> tuple[NDArray[np.float32], Array]:
+    def hidden(self, speech: Speech) -> tuple[NDArray[np.float32], Array] | None:
         """Return the last hidden layer [shape=(ceil(T / 4), H)] and the distortion [shape=(ceil(T / 4),)] in each step.
 
-        spectrum : normalised log mel spectrum [shape=(T, 40)]
+        None: speech without a spectrum.
         """
-        hidden = self.network.hidden(_steps(spectrum))
+        if speech.spectrum is None:
+            return None
+        hidden = self.network.hidden(_steps(speech.spectrum))
         output = self.network.output
         return hidden, np.clip(hidden @ output.weights[:, -1].astype(float) + output.biases[-1], 0, 1)
 
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Serialise the network, at half precision."""
+        arrays = {name: array.astype(np.float16) for name, array in _network_arrays(self.network).items()}
+        return arrays | {"network_targets": np.stack([self.mean, self.scale]), "network_variances": self.variances}
 
-def fit_acoustic_network(
-    examples: Sequence[Example],
-    values: Sequence[Array],
-    direct: int,
-    epochs: int,
-    monitor: Monitor,
-    checkpoint: Checkpoint,
-) -> AcousticNetwork:
-    """Return a network that is trained on all conditions in which each example is heard.
+    @classmethod
+    def from_arrays(cls, arrays: Arrays, dimensions: int) -> AcousticNetwork:
+        """Deserialise a network; as ``Predictor.from_arrays``."""
+        stored = checked_arrays(arrays, TARGETS, Q=dimensions)
+        mean, scale = stored["network_targets"]
+        if not (scale > 0).all():
+            raise ValueError("network_targets with a scale that is not more than 0")
+        return cls(_network_from_arrays(arrays, dimensions), mean, scale, stored["network_variances"])
 
-    values : motion of each example in the motion space [each shape=(T, Q)]
-    direct : number of channels that are modelled as they are; they are the first dimensions
-    epochs : how often each example is used, in one of its conditions drawn at random
-    """
-    poses = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
-    mean, scale = poses.mean(axis=0), np.maximum(poses.std(axis=0), LEAST_DEVIATION)
+
+def _trained(training: PredictorTraining, mean: Array, scale: Array) -> ConvolutionalNetwork:
+    """Return the network, from the checkpoint if it is there; ``mean`` and ``scale`` standardise its targets."""
+    stored = training.checkpoint.load(CHECKPOINT)
+    if stored is not None:
+        return _network_from_arrays(stored, len(mean))
     pieces = [
         [_sequence(version, (x - mean) / scale, example.valid) for version in example.heard]
-        for example, x in zip(examples, values, strict=True)
+        for example, x in zip(training.examples, training.values, strict=True)
     ]
-    stored = checkpoint.load(CHECKPOINT)
-    if stored is not None:
-        network = _network_from_arrays(stored, len(mean))
-    else:
-        steps = max(epochs * -(-len(pieces) // BATCH_SIZE), LEAST_STEPS)
-        weights = np.ones(len(mean) + 1)
-        weights[:direct] = DIRECT_WEIGHT
+    steps = max(training.epochs * -(-len(pieces) // BATCH_SIZE), LEAST_STEPS)
+    weights = np.ones(len(mean) + 1)
+    weights[: training.direct] = DIRECT_WEIGHT
 
-        def draw(rng: np.random.Generator, number: int) -> TrainingSequence:
-            versions = pieces[number]
-            return _piece(versions[int(rng.integers(len(versions)))], rng)
+    def draw(rng: np.random.Generator, number: int) -> TrainingSequence:
+        versions = pieces[number]
+        return _piece(versions[int(rng.integers(len(versions)))], rng)
 
-        def report(step: int, error: float) -> None:
-            if step % 50 == 0 or step == steps:
-                monitor(Progress("training the network", step, steps, error))
+    def report(step: int, error: float) -> None:
+        if step % 50 == 0 or step == steps:
+            training.monitor(Progress("training the network", step, steps, error))
 
-        network = fit_network(
-            initial_network(STEP * SPECTRUM_BANDS, HIDDEN, len(mean) + 1, DILATIONS, SEED),
-            draw,
-            len(pieces),
-            weights,
-            TrainingPlan(steps, BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED),
-            report,
-        )
-        checkpoint.save(CHECKPOINT, _network_arrays(network))
-    trained = AcousticNetwork(network, mean, scale, np.ones((3, len(mean))))
-    return AcousticNetwork(network, mean, scale, _error_variances(trained, examples, values))
+    network = fit_network(
+        initial_network(STEP * SPECTRUM_BANDS, HIDDEN, len(mean) + 1, DILATIONS, SEED),
+        draw,
+        len(pieces),
+        weights,
+        TrainingPlan(steps, BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED),
+        report,
+    )
+    training.checkpoint.save(CHECKPOINT, _network_arrays(network))
+    return network
 
 
 def between_steps(steps: Array, frames: int) -> Array:
@@ -141,44 +180,6 @@ def between_steps(steps: Array, frames: int) -> Array:
     return here + u / 2 * (
         after - before + u * (2 * before - 5 * here + 4 * after - last + u * (3 * (here - after) + last - before))
     )
-
-
-def acoustic_network_arrays(acoustic: AcousticNetwork) -> dict[str, NDArray[Any]]:
-    """Serialise a network, at half precision."""
-    arrays = {name: array.astype(np.float16) for name, array in _network_arrays(acoustic.network).items()}
-    return arrays | {
-        "network_targets": np.stack([acoustic.mean, acoustic.scale]),
-        "network_variances": acoustic.variances,
-    }
-
-
-def acoustic_network_from_arrays(arrays: Arrays, dimensions: int) -> AcousticNetwork | None:
-    """Deserialise a network; None where there is none, as in models of earlier versions.
-
-    dimensions : of the motion space, Q
-    Raises KeyError, ValueError: an array is missing, or has a wrong shape, type or range.
-    """
-    if arrays.keys().isdisjoint(NETWORK_ARRAYS):
-        return None
-    stored = checked_arrays(arrays, TARGETS, Q=dimensions)
-    mean, scale = stored["network_targets"]
-    if not (scale > 0).all():
-        raise ValueError("network_targets with a scale that is not more than 0")
-    return AcousticNetwork(_network_from_arrays(arrays, dimensions), mean, scale, stored["network_variances"])
-
-
-WEIGHTS = {
-    "network_first": ArraySpec(np.float32, f"{TAPS * STEP * SPECTRUM_BANDS} {HIDDEN}", -STANDARD, STANDARD),
-    "network_layers": ArraySpec(np.float32, f"{len(DILATIONS) - 1} {TAPS * HIDDEN} {HIDDEN}", -STANDARD, STANDARD),
-    "network_biases": ArraySpec(np.float32, f"{len(DILATIONS)} {HIDDEN}", -STANDARD, STANDARD),
-    "network_output": ArraySpec(np.float32, f"{HIDDEN + 1} O", -STANDARD, STANDARD),
-}
-TARGETS = {
-    "network_targets": ArraySpec(np.float64, "2 Q", -1e6, 1e6),
-    "network_variances": ArraySpec(np.float64, "3 Q", POSITIVE),
-}
-NETWORK_ARRAYS = (*WEIGHTS, *TARGETS)
-"""Names of the arrays of ``acoustic_network_arrays``."""
 
 
 def _network_arrays(network: ConvolutionalNetwork) -> dict[str, NDArray[Any]]:

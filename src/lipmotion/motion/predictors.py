@@ -1,63 +1,216 @@
-"""Predictors of motion from speech, of which a model may have one: an acoustic network, or a regression."""
+"""Predictors: methods that predict motion from speech, beside the states or recorded units of an engine.
+
+A model has one at most. Engines know the interface alone, ``Predictor``; the registry knows the classes
+(docs/extend/predictor.md).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, TypeAlias
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple, TypeVar
 
+import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.motion.acoustic_network import (
-    NETWORK_ARRAYS,
-    AcousticNetwork,
-    acoustic_network_arrays,
-    acoustic_network_from_arrays,
-)
-from lipmotion.motion.prior_regression import (
-    PRIOR_ARRAYS,
-    PriorRegression,
-    prior_regression_arrays,
-    prior_regression_from_arrays,
-)
-from lipmotion.storage.schema import Arrays
-from lipmotion.types import FRAME_RATE_HZ, Example
+from lipmotion.errors import InputError, ModelFormatError
+from lipmotion.extensions import Registry
+from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
+from lipmotion.storage.schema import Arrays, ArraySpec, arrays_under, checked_arrays, refuse_undeclared
+from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Speech, silent_monitor
 
-Predictor: TypeAlias = AcousticNetwork | PriorRegression
-PREDICTOR_ARRAYS = (*NETWORK_ARRAYS, *PRIOR_ARRAYS)
-"""Names of the arrays of ``predictor_arrays``."""
-LEAST_NETWORK_S = 120.0
-"""The acoustic network is trained from this much measured motion on,"""
+Array = NDArray[np.float64]
+PredictorT = TypeVar("PredictorT", bound="Predictor")
+AUTOMATIC = "auto"
+"""Stands for the predictor that suits the examples, where no name is given."""
 LEAST_OWN_S = 480.0
-"""and from this much on where the model could stand on another one instead."""
+"""From this much measured motion on, a model does not stand on another one."""
+FOLDS = 4
 
 
-def measured_s(examples: Sequence[Example]) -> float:
-    """Return the seconds of measured motion of some examples."""
-    return sum(int(example.valid.sum()) for example in examples) / FRAME_RATE_HZ
+@dataclass(frozen=True, eq=False)
+class PredictorTraining:
+    """What a predictor is trained on, and with.
+
+    examples   : speech with motion; those frames count in which ``Example.valid`` is True
+    values     : the motion of each example in the motion space [each shape=(T, Q)]
+    direct     : number of channels that are modelled as they are: the first dimensions; the others are principal
+                 components
+    epochs     : how often each example is used, in methods that use it several times
+    monitor    : called with reports of progress
+    checkpoint : stores finished stages of long training
+    """
+
+    examples: Sequence[Example]
+    values: Sequence[Array]
+    direct: int
+    epochs: int = 1
+    monitor: Monitor = silent_monitor
+    checkpoint: Checkpoint = NO_CHECKPOINT
 
 
-def stands_on_another(examples: Sequence[Example]) -> bool:
-    """Return whether the motion of some examples is regressed on what another model makes of their speech."""
-    return measured_s(examples) < LEAST_OWN_S and all(example.speech.prior is not None for example in examples)
+class PredictorFit(NamedTuple):
+    """A trained predictor.
+
+    held_out : predictions for each example by predictors that were trained on the other ``folds`` [each shape=(T, Q)];
+               the trajectory engine then measures how far to rely on the predictor. None: its weight is a constant
+    """
+
+    predictor: Predictor
+    held_out: Sequence[Array] | None = None
+
+
+class Predictor(ABC):
+    """A method that predicts motion from speech.
+
+    A subclass is a frozen dataclass of what was learned; the arrays in ``ARRAYS`` are fields.
+
+    name              : under which it is registered, and its arrays are stored
+    ARRAYS            : the stored arrays, where Q is the number of dimensions of motion
+    least_motion_s    : seconds of measured motion from which on training gets acoustic conditions (``Example.heard``)
+    uses_prior        : whether it predicts from ``Speech.prior``: then the model stands on another model
+    uses_articulation : whether the table of articulation is among its inputs: then engines do not lean on it once more
+    variances         : of the error of static value, Δ and Δ² [shape=(3, Q)]
+    """
+
+    name: ClassVar[str]
+    ARRAYS: ClassVar[Mapping[str, ArraySpec]]
+    least_motion_s: ClassVar[float] = 0.0
+    uses_prior: ClassVar[bool] = False
+    uses_articulation: ClassVar[bool] = False
+    variances: Array
+
+    @classmethod
+    @abstractmethod
+    def fit(cls, training: PredictorTraining) -> PredictorFit:
+        """Return a predictor that is trained on examples. Raises CorpusError: it cannot be trained on these."""
+
+    @abstractmethod
+    def predict(self, speech: Speech) -> tuple[Array, Array]:
+        """Return motion in the motion space [shape=(T, Q)] and the distortion of the sound, 0 to 1 [shape=(T,)].
+
+        Raises InputError: an unknown phone, or speech without what ``can_predict`` asks for.
+        """
+
+    def can_predict(self, speech: Speech) -> bool:  # noqa: ARG002
+        """Return whether speech has what ``predict`` needs of it: a spectrum, for instance."""
+        return True
+
+    def hidden(self, speech: Speech) -> tuple[NDArray[np.float32], Array] | None:  # noqa: ARG002
+        """Return features on which models of other people can stand, and the distortion; None: there are none.
+
+        They have one row every 40 ms: a hidden layer [shape=(ceil(T / 4), H)], distortion [shape=(ceil(T / 4),)].
+        """
+        return None
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Serialise the predictor: the arrays of ``ARRAYS``."""
+        return {name: getattr(self, name) for name in self.ARRAYS}
+
+    @classmethod
+    def from_arrays(cls: type[PredictorT], arrays: Arrays, dimensions: int) -> PredictorT:
+        """Deserialise a predictor; other arrays are ignored.
+
+        dimensions : of the motion space, Q
+        Raises KeyError, ValueError: an array is missing, or has a wrong shape, type or range.
+        """
+        constructor: Any = cls  # every predictor is a dataclass
+        restored: PredictorT = constructor(**checked_arrays(arrays, cls.ARRAYS, Q=dimensions).arrays)
+        return restored
+
+
+PREDICTORS: Registry[type[Predictor]] = Registry(
+    "predictor",
+    "lipmotion.predictors",
+    {
+        "network": "lipmotion.motion.acoustic_network:AcousticNetwork",
+        "prior": "lipmotion.motion.prior_regression:PriorRegression",
+    },
+)
+
+
+def predictor_class(name: str) -> type[Predictor]:
+    """Return a predictor by name. Raises InputError: there is none, or a package adds something else by this name."""
+    chosen = PREDICTORS.load(name)
+    if not (isinstance(chosen, type) and issubclass(chosen, Predictor) and chosen.name == name):
+        raise InputError(
+            f"{chosen!r} is called a predictor, {name!r}, by an installed package; required a Predictor of this name"
+        )
+    return chosen
+
+
+def check_predictor(name: str) -> None:
+    """Raise InputError if no predictor can be chosen by a name, which may be ``AUTOMATIC``."""
+    if name != AUTOMATIC:
+        predictor_class(name)
+
+
+def suitable_predictor(name: str, examples: Sequence[Example]) -> type[Predictor] | None:
+    """Return the predictor of a name; for ``AUTOMATIC`` the one that suits the examples, None if there is none.
+
+    With little motion and another model to stand on, it is a regression; else a network, given acoustic conditions.
+    """
+    if name != AUTOMATIC:
+        return predictor_class(name)
+    measured_s = sum(int(example.valid.sum()) for example in examples) / FRAME_RATE_HZ
+    if measured_s < LEAST_OWN_S and all(example.speech.prior is not None for example in examples):
+        return predictor_class("prior")
+    return predictor_class("network") if all(example.heard for example in examples) else None
+
+
+def needs_conditions(name: str, motion_s: float) -> bool:
+    """Return whether training on so much measured motion takes each example in several acoustic conditions."""
+    return motion_s >= predictor_class("network" if name == AUTOMATIC else name).least_motion_s
+
+
+def folds(count: int) -> Iterator[tuple[list[int], list[int]]]:
+    """Yield the numbers of the examples inside and outside of each fold; a single example is both."""
+    if count == 1:
+        yield [0], [0]
+        return
+    for fold in range(min(FOLDS, count)):
+        outside = list(range(fold, count, FOLDS))
+        yield [number for number in range(count) if number not in outside], outside
+
+
+ADDED = "predictor."
+"""Arrays of added predictors are stored as ``predictor.NAME.ARRAY``, those of built-in ones under their own names."""
 
 
 def predictor_arrays(predictor: Predictor | None) -> dict[str, NDArray[Any]]:
     """Serialise a predictor; no array where there is none."""
     if predictor is None:
         return {}
-    if isinstance(predictor, AcousticNetwork):
-        return acoustic_network_arrays(predictor)
-    return prior_regression_arrays(predictor)
+    prefix = "" if predictor.name in PREDICTORS.built_in else f"{ADDED}{predictor.name}."
+    return {prefix + name: array for name, array in predictor.arrays().items()}
+
+
+def names_of_predictors(arrays: Arrays) -> set[str]:
+    """Return the names of those arrays that are a predictor's."""
+    built_in = {name for known in PREDICTORS.built_in for name in predictor_class(known).ARRAYS}
+    return {name for name in arrays if name in built_in or name.startswith(ADDED)}
 
 
 def predictor_from_arrays(arrays: Arrays, dimensions: int) -> Predictor | None:
-    """Deserialise a predictor; None where there is none.
+    """Deserialise a predictor; None where there is none, as in models of earlier versions.
 
     dimensions : of the motion space, Q
-    Raises KeyError, ValueError: an array is missing, or has a wrong shape, type or range.
+    Raises KeyError, ValueError: an array is missing or undeclared, or has a wrong shape, type or range; or there are
+    several predictors. ModelFormatError: the predictor is of a package that is not installed.
     """
-    network = acoustic_network_from_arrays(arrays, dimensions)
-    regression = prior_regression_from_arrays(arrays, dimensions)
-    if network is not None and regression is not None:
-        raise ValueError("a network and a regression on another model, required one of them")
-    return network or regression
+    names = {name.rpartition(".")[0] for name in arrays_under(arrays, ADDED)}
+    added = {name: arrays_under(arrays, f"{ADDED}{name}.") for name in sorted(names)}
+    stored = {name: arrays for name in PREDICTORS.built_in if arrays.keys() & predictor_class(name).ARRAYS} | added
+    if len(stored) > 1:
+        raise ValueError(f"the predictors {' and '.join(stored)}, required one of them")
+    if not stored:
+        return None
+    ((name, own),) = stored.items()
+    if name not in PREDICTORS.names:
+        known = ", ".join(PREDICTORS.names)
+        raise ModelFormatError(f"no predictor {name!r}; there are: {known}; install the package that adds it")
+    chosen = predictor_class(name)
+    if name in added:
+        refuse_undeclared(own, chosen.ARRAYS)
+    return chosen.from_arrays(own, dimensions)

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.motion.acoustic_network import STEP, between_steps
 from lipmotion.motion.articulation import ARTICULATORS, articulators
+from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining, folds
 from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays
 from lipmotion.types import SPECTRUM_BANDS, Example, Speech
@@ -18,7 +19,6 @@ from lipmotion.types import SPECTRUM_BANDS, Example, Speech
 Array = NDArray[np.float64]
 WINDOW = 4
 """Time steps of 40 ms before and after a frame whose spectrum is used: 160 ms."""
-FOLDS = 4
 RIDGES = tuple(10.0**power for power in range(0, 6))
 """Ridge parameters that cross-validation chooses from, one for each kind of regressors."""
 START = 1000.0
@@ -30,8 +30,18 @@ KINDS = ("prior", "hidden", "articulation", "spectrum")
 articulation for the phones in time, the spectrum around the frame."""
 
 
+PRIOR_ARRAYS = {
+    "prior_sizes": ArraySpec(np.int32, str(len(KINDS)), 0, 1e5),
+    "prior_inputs": ArraySpec(np.float32, "2 R", -1e6, 1e6),
+    "prior_coefficients": ArraySpec(np.float32, "R Q", -1e4, 1e4),
+    "prior_centre": ArraySpec(np.float64, "Q", -1e6, 1e6),
+    "prior_variances": ArraySpec(np.float64, "3 Q", POSITIVE),
+}
+
+
+@final
 @dataclass(frozen=True, eq=False)
-class PriorRegression:
+class PriorRegression(Predictor):
     """Ridge regression of motion on the output of another model (``Speech.prior``), the phones, and the spectrum.
 
     sizes        : number of regressors of each of ``KINDS``
@@ -47,6 +57,46 @@ class PriorRegression:
     coefficients: NDArray[np.float32]
     centre: Array
     variances: Array
+    name: ClassVar[str] = "prior"
+    ARRAYS: ClassVar[Mapping[str, ArraySpec]] = PRIOR_ARRAYS
+    uses_prior: ClassVar[bool] = True
+    uses_articulation: ClassVar[bool] = True
+
+    @classmethod
+    def fit(cls, training: PredictorTraining) -> PredictorFit:
+        """Return the regression, and its predictions for each example by regressions on the other folds.
+
+        Ridge parameters are chosen by cross-validation over examples, for the channels that are modelled as they are,
+        one kind of regressors after the other. With a single example, the predictions are those of the regression
+        itself.
+        """
+        examples, values = training.examples, training.values
+        kinds = [_regressors(example.speech) for example in examples]
+        sizes = tuple(kind.shape[1] for kind in kinds[0])
+        everything = [np.concatenate(kind, axis=1) for kind in kinds]
+        known = [example.valid[::STEP] for example in examples]
+        rows = np.concatenate([x[mask] for x, mask in zip(everything, known, strict=True)])
+        mean, scale = rows.mean(axis=0), rows.std(axis=0) + LEAST_DEVIATION
+        data = [
+            _Fold((x[mask] - mean) / scale, motion[::STEP][mask])
+            for x, motion, mask in zip(everything, values, known, strict=True)
+        ]
+        spread = np.maximum(np.concatenate([each.motion for each in data]).std(axis=0), 1e-6)
+        penalty = np.repeat(_chosen_ridges(data, sizes, (1 / spread**2)[: training.direct]), sizes)
+        predictions: list[Array] = [np.zeros(0)] * len(data)
+        for inside, outside in folds(len(data)):
+            coefficients, centre = _solved([data[n] for n in inside], penalty)
+            for number in outside:
+                steps = (everything[number] - mean) / scale @ coefficients + centre
+                predictions[number] = between_steps(steps, len(values[number]))
+        coefficients, centre = _solved(data, penalty)
+        mean_32, scale_32, coefficients_32 = (x.astype(np.float32) for x in (mean, scale, coefficients))
+        variances = _variances(predictions, values, examples)
+        return PredictorFit(cls(sizes, mean_32, scale_32, coefficients_32, centre, variances), predictions)
+
+    def can_predict(self, speech: Speech) -> bool:
+        """Return whether speech has the output of another model, or the regression uses none."""
+        return speech.prior is not None or not any(self.sizes[:2])
 
     def predict(self, speech: Speech) -> tuple[Array, Array]:
         """Return motion in the motion space [shape=(T, Q)] and the distortion of the sound, 0 to 1 [shape=(T,)].
@@ -60,103 +110,34 @@ class PriorRegression:
         outputs = between_steps(np.concatenate([steps, distortion[:, None]], axis=1), frames)
         return outputs[:, :-1], np.clip(outputs[:, -1], 0, 1)
 
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Serialise the regression; the coefficients at half precision."""
+        return {
+            "prior_sizes": np.array(self.sizes, np.int32),
+            "prior_inputs": np.stack([self.mean, self.scale]),
+            "prior_coefficients": self.coefficients.astype(np.float16),
+            "prior_centre": self.centre,
+            "prior_variances": self.variances,
+        }
+
+    @classmethod
+    def from_arrays(cls, arrays: Arrays, dimensions: int) -> PriorRegression:
+        """Deserialise a regression; as ``Predictor.from_arrays``."""
+        stored = checked_arrays(arrays, PRIOR_ARRAYS, Q=dimensions)
+        sizes = tuple(stored["prior_sizes"].tolist())
+        if sum(sizes) != stored.sizes["R"] or sizes[2:] != (len(ARTICULATORS), (2 * WINDOW + 1) * SPECTRUM_BANDS):
+            raise ValueError(f"prior_sizes {sizes}, whose sum is not {stored.sizes['R']}, or of another version")
+        mean, scale = stored["prior_inputs"]
+        if not (scale > 0).all():
+            raise ValueError("prior_inputs with a scale that is not more than 0")
+        return cls(sizes, mean, scale, stored["prior_coefficients"], stored["prior_centre"], stored["prior_variances"])
+
 
 class _Fold(NamedTuple):
     """Regressors and motion, in time steps, of some examples."""
 
     regressors: Array
     motion: Array
-
-
-def fit_prior_regression(
-    examples: Sequence[Example], values: Sequence[Array], direct: int
-) -> tuple[PriorRegression, list[Array]]:
-    """Return the regression, and its predictions for each example by regressions on the other folds.
-
-    values : motion of each example in the motion space [each shape=(T, Q)]
-    direct : number of channels that are modelled as they are; the ridge parameters are chosen for them
-    Ridge parameters are chosen by cross-validation over examples, one kind of regressors after the other. The
-    predictions are in frames [each shape=(T, Q)]; with a single example, they are those of the regression itself.
-    """
-    kinds = [_regressors(example.speech) for example in examples]
-    sizes = tuple(kind.shape[1] for kind in kinds[0])
-    everything = [np.concatenate(kind, axis=1) for kind in kinds]
-    known = [example.valid[::STEP] for example in examples]
-    rows = np.concatenate([x[mask] for x, mask in zip(everything, known, strict=True)])
-    mean, scale = rows.mean(axis=0), rows.std(axis=0) + LEAST_DEVIATION
-    data = [
-        _Fold((x[mask] - mean) / scale, motion[::STEP][mask])
-        for x, motion, mask in zip(everything, values, known, strict=True)
-    ]
-    spread = np.maximum(np.concatenate([each.motion for each in data]).std(axis=0), 1e-6)
-    ridges = _chosen_ridges(data, sizes, (1 / spread**2)[:direct])
-    penalty = np.repeat(ridges, sizes)
-    predictions: list[Array] = [np.zeros(0)] * len(data)
-    for inside, outside in folds(len(data)):
-        coefficients, centre = _solved([data[n] for n in inside], penalty)
-        for number in outside:
-            steps = (everything[number] - mean) / scale @ coefficients + centre
-            predictions[number] = between_steps(steps, len(values[number]))
-    coefficients, centre = _solved(data, penalty)
-    regression = PriorRegression(
-        sizes,
-        mean.astype(np.float32),
-        scale.astype(np.float32),
-        coefficients.astype(np.float32),
-        centre,
-        _variances(predictions, values, examples),
-    )
-    return regression, predictions
-
-
-def folds(count: int) -> Iterator[tuple[list[int], list[int]]]:
-    """Yield the numbers of the examples inside and outside of each fold; a single example is both."""
-    if count == 1:
-        yield [0], [0]
-        return
-    for fold in range(min(FOLDS, count)):
-        outside = list(range(fold, count, FOLDS))
-        yield [number for number in range(count) if number not in outside], outside
-
-
-def prior_regression_arrays(regression: PriorRegression) -> dict[str, NDArray[Any]]:
-    """Serialise a regression; the coefficients at half precision."""
-    return {
-        "prior_sizes": np.array(regression.sizes, np.int32),
-        "prior_inputs": np.stack([regression.mean, regression.scale]),
-        "prior_coefficients": regression.coefficients.astype(np.float16),
-        "prior_centre": regression.centre,
-        "prior_variances": regression.variances,
-    }
-
-
-def prior_regression_from_arrays(arrays: Arrays, dimensions: int) -> PriorRegression | None:
-    """Deserialise a regression; None where there is none.
-
-    dimensions : of the motion space, Q
-    Raises KeyError, ValueError: an array is missing, or has a wrong shape, type or range.
-    """
-    if arrays.keys().isdisjoint(PRIOR_ARRAYS):
-        return None
-    stored = checked_arrays(arrays, PRIOR_ARRAYS, Q=dimensions)
-    sizes = tuple(stored["prior_sizes"].tolist())
-    if sum(sizes) != stored.sizes["R"] or sizes[2:] != (len(ARTICULATORS), (2 * WINDOW + 1) * SPECTRUM_BANDS):
-        raise ValueError(f"prior_sizes {sizes}, whose sum is not {stored.sizes['R']}, or of another version")
-    mean, scale = stored["prior_inputs"]
-    if not (scale > 0).all():
-        raise ValueError("prior_inputs with a scale that is not more than 0")
-    return PriorRegression(
-        sizes, mean, scale, stored["prior_coefficients"], stored["prior_centre"], stored["prior_variances"]
-    )
-
-
-PRIOR_ARRAYS = {
-    "prior_sizes": ArraySpec(np.int32, str(len(KINDS)), 0, 1e5),
-    "prior_inputs": ArraySpec(np.float32, "2 R", -1e6, 1e6),
-    "prior_coefficients": ArraySpec(np.float32, "R Q", -1e4, 1e4),
-    "prior_centre": ArraySpec(np.float64, "Q", -1e6, 1e6),
-    "prior_variances": ArraySpec(np.float64, "3 Q", POSITIVE),
-}
 
 
 def _regressors(speech: Speech) -> list[Array]:

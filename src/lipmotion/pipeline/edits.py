@@ -245,7 +245,7 @@ class CurveGainStep(CurveStep):
 
 
 @dataclass(frozen=True)
-class Lock(Step):
+class LockStep(Step):
     """The motion in a span stays as it is with the edits before this one, whatever comes after."""
 
     form: ClassVar[str] = "lock from {start_s} to {end_s}"
@@ -300,7 +300,7 @@ def _names(kind: type[Any]) -> tuple[str, ...]:
 
 STEPS: tuple[type[Step], ...] = (
     WordIs, PhoneIs, PhoneBegins, PhoneEnds, PhoneRemoved, PhoneInserted,
-    PinStep, GainStep, CurveGainStep, Lock, SetStep,
+    PinStep, GainStep, CurveGainStep, LockStep, SetStep,
 )  # fmt: skip
 """All edits that a sentence can state."""
 FORMS = tuple(re.sub(r"{(\w+?)(?:_s)?}", lambda name: name[1].upper(), step.form) for step in STEPS)

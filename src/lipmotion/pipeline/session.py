@@ -26,7 +26,7 @@ from lipmotion.meshes.fitting.facial_animation import PARAMETERS
 from lipmotion.meshes.fitting.visemes import VISEME_CHANNELS
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS
 from lipmotion.motion.speakers import SpeakerMap
-from lipmotion.pipeline.edits import CurveStep, Edits, Lock, PhoneStep, PinStep, Step, WordIs, with_span
+from lipmotion.pipeline.edits import CurveStep, Edits, LockStep, PhoneStep, PinStep, Step, WordIs, with_span
 from lipmotion.pipeline.generate.generation_for import generate_for
 from lipmotion.pipeline.generate.outlook import outlook_of
 from lipmotion.pipeline.generate.prior import with_prior
@@ -212,20 +212,20 @@ class Session:
 
     def _edited_units(self, steps: tuple[Step, ...]) -> Timeline[Unit]:
         """Return the phones in time after some edits; each edit sees those that the ones before it left."""
-        ours = tuple(step for step in steps if isinstance(step, PhoneStep | WordIs | Lock))
-        while ours and isinstance(ours[-1], Lock):
+        ours = tuple(step for step in steps if isinstance(step, PhoneStep | WordIs | LockStep))
+        while ours and isinstance(ours[-1], LockStep):
             ours = ours[:-1]
         if not ours:
             return self._recording().speech.units
         return self._units.once(ours, lambda: self._changed_units(ours))
 
-    def _changed_units(self, ours: tuple[PhoneStep | WordIs | Lock, ...]) -> Timeline[Unit]:
+    def _changed_units(self, ours: tuple[PhoneStep | WordIs | LockStep, ...]) -> Timeline[Unit]:
         before, step = self._edited_units(ours[:-1]), ours[-1]
-        if isinstance(step, Lock):
+        if isinstance(step, LockStep):
             return before
         after = self._reworded(before, step) if isinstance(step, WordIs) else step.applied(before)
         changed = {*before} ^ {*after}
-        for lock in (each for each in ours if isinstance(each, Lock)):
+        for lock in (each for each in ours if isinstance(each, LockStep)):
             if any(lock.covers(span.start_s, span.end_s) for span in changed):
                 raise InputError(f"{str(step)!r} changes what is locked ({str(lock)!r}); take the lock out first")
         return after
@@ -261,9 +261,9 @@ class Session:
     def _with_locks(self, steps: tuple[Step, ...]) -> Generation:
         """Return the motion after some edits, with locked spans as they were when they were locked."""
         self._edited_units(steps)  # refuses phones that change what is locked
-        generation = self._with_curves(tuple(step for step in steps if not isinstance(step, Lock)))
+        generation = self._with_curves(tuple(step for step in steps if not isinstance(step, LockStep)))
         for place, lock in enumerate(steps):
-            if not isinstance(lock, Lock):
+            if not isinstance(lock, LockStep):
                 continue
             for later in steps[place + 1 :]:
                 if isinstance(later, PinStep) and lock.covers(later.time_s, later.time_s):

@@ -29,11 +29,13 @@ class EmResult(Generic[ModelT, StatisticsT]):
     model           : the model after the last M-step
     statistics      : the statistics of the last E-step
     log_likelihoods : mean log likelihood per frame at every E-step
+    converged       : whether EM ended for want of gain; False: after the greatest number of steps
     """
 
     model: ModelT
     statistics: StatisticsT
     log_likelihoods: tuple[float, ...]
+    converged: bool
 
 
 def no_report(step: int, model: object, statistics: object) -> None:
@@ -72,4 +74,4 @@ def run_em(
             after_step(step, model, statistics)
         if converged:
             break
-    return EmResult(model, statistics, tuple(log_likelihoods))
+    return EmResult(model, statistics, tuple(log_likelihoods), bool(converged))

@@ -1,38 +1,47 @@
-"""Data types of the whole package: frozen values without files, and without computation beyond interpolation."""
+"""Data types of the whole package: frozen values without files, and without computation beyond interpolation.
 
-from lipmotion.types.audio import Audio, from_sixteen_bits, sixteen_bits
-from lipmotion.types.configuration import Configuration, Rule, option
-from lipmotion.types.explanation import (
-    ChainPosteriors,
-    ChainStates,
-    ChannelValue,
-    DominantGaussian,
-    Explanation,
-    NamedProbability,
-    RegressedMean,
-)
-from lipmotion.types.features import ENERGY_FEATURE, FRAME_RATE_HZ, SPECTRUM_BANDS, Features, frame_of
-from lipmotion.types.generation import (
-    Constraints,
-    Example,
-    Gain,
-    Generation,
-    HeardSpectrum,
-    Outlook,
-    Pin,
-    PriorOutput,
-    ReducedVariance,
-    Speech,
-    SpokenText,
-    StateTrace,
-)
-from lipmotion.types.motion import EYE_DISTANCE, GREY, WEIGHT, Channel, Motion, check_curves, check_magnitude
-from lipmotion.types.parallel_map import ParallelMap
-from lipmotion.types.progress import Item, Monitor, Progress, silent_monitor, sub_monitor, with_progress
-from lipmotion.types.prosody import Prosody
-from lipmotion.types.timeline import Span, Timeline, Unit
-from lipmotion.types.transcript import TimedTranscript, TimedWord, TranscriptLine, in_order
-from lipmotion.types.utterance import Track, Utterance
+A name is imported when it is first used: configurations alone need no arrays, and the command line starts at once.
+"""
+
+from __future__ import annotations
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from lipmotion.types.audio import Audio, from_sixteen_bits, sixteen_bits
+    from lipmotion.types.configuration import Configuration, Rule, option
+    from lipmotion.types.delivery import Delivery
+    from lipmotion.types.explanation import (
+        ChainPosteriors,
+        ChainStates,
+        ChannelValue,
+        DominantGaussian,
+        Explanation,
+        NamedProbability,
+        RegressedMean,
+    )
+    from lipmotion.types.features import ENERGY_FEATURE, FRAME_RATE_HZ, SPECTRUM_BANDS, Features, frame_of
+    from lipmotion.types.generation import (
+        Constraints,
+        Example,
+        Gain,
+        Generation,
+        HeardSpectrum,
+        Outlook,
+        Pin,
+        PriorOutput,
+        ReducedVariance,
+        Speech,
+        SpokenText,
+        StateTrace,
+    )
+    from lipmotion.types.motion import EYE_DISTANCE, GREY, WEIGHT, Channel, Motion, check_curves, check_magnitude
+    from lipmotion.types.parallel_map import ParallelMap
+    from lipmotion.types.progress import Item, Monitor, Progress, silent_monitor, sub_monitor, with_progress
+    from lipmotion.types.prosody import Prosody
+    from lipmotion.types.staging import Staging
+    from lipmotion.types.timeline import Span, Timeline, Unit
+    from lipmotion.types.transcript import TimedTranscript, TimedWord, TranscriptLine, in_order
+    from lipmotion.types.utterance import Track, Utterance
 
 __all__ = [
     "ENERGY_FEATURE",
@@ -48,6 +57,7 @@ __all__ = [
     "ChannelValue",
     "Configuration",
     "Constraints",
+    "Delivery",
     "DominantGaussian",
     "Example",
     "Explanation",
@@ -71,6 +81,7 @@ __all__ = [
     "Span",
     "Speech",
     "SpokenText",
+    "Staging",
     "StateTrace",
     "TimedTranscript",
     "TimedWord",
@@ -90,3 +101,20 @@ __all__ = [
     "sub_monitor",
     "with_progress",
 ]
+
+_MODULES = (
+    *("configuration", "delivery", "staging", "audio", "features", "timeline", "motion", "generation", "progress"),
+    *("explanation", "parallel_map", "prosody", "transcript", "utterance"),
+)
+"""Where the names are looked for, in this order."""
+
+
+def __getattr__(name: str) -> object:
+    if name not in __all__:
+        raise AttributeError(f"module 'lipmotion.types' has no attribute {name!r}")
+    from importlib import import_module
+
+    modules = (import_module(f"lipmotion.types.{module}") for module in _MODULES)
+    value = next(getattr(module, name) for module in modules if hasattr(module, name))
+    globals()[name] = value
+    return value

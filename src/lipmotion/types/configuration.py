@@ -1,9 +1,10 @@
-"""Configurations: frozen dataclasses that check their values, parsed from texts and from headers of models."""
+"""Configurations: frozen dataclasses that check their values, parsed from texts, headers of models and job files."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import Field, asdict, dataclass, field, fields
+from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
 from lipmotion.errors import InputError, shortened
@@ -12,6 +13,7 @@ ConfigurationT = TypeVar("ConfigurationT", bound="Configuration")
 LARGEST = 1e6
 """Largest absolute value of a number in a configuration."""
 _WORDS = {bool: "true or false", int: "a whole number", float: "a number", str: "text"}
+_WORDS |= {Path: "a path", tuple: "a list of texts"}
 _BOOLEANS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
 
 
@@ -24,6 +26,7 @@ class Rule:
     odd          : only odd numbers are allowed
     power_of_two : only powers of two are allowed
     choices      : the texts that are allowed; empty: any text
+    most, unit   : largest value that is allowed, where there is a least one, and the unit of both
     """
 
     least: float | None = None
@@ -31,12 +34,16 @@ class Rule:
     odd: bool = False
     power_of_two: bool = False
     choices: tuple[str, ...] = ()
+    most: float | None = None
+    unit: str = ""
 
     @property
     def words(self) -> str:
         """The requirement in words, as the end of an error message."""
         if self.choices:
             return f"one of: {', '.join(self.choices)}"
+        if self.most is not None:
+            return f"{self.least:g} to {self.most:g}{self.unit}"
         kind = "an odd number" if self.odd else "a power of two" if self.power_of_two else ""
         bound = f" from {self.least:g}" if self.least is not None else ""
         return kind + (f" more than {self.above:g}" if self.above is not None else bound)
@@ -47,23 +54,34 @@ class Rule:
             return value in self.choices
         if (self.odd and value % 2 != 1) or (self.power_of_two and (value < 1 or value & (value - 1))):
             return False
+        if self.most is not None and not value <= self.most:
+            return False
         return (self.least is None or value >= self.least) and (self.above is None or value > self.above)
 
 
 ANY = Rule()
 
 
-def option(default: Any, rule: Rule) -> Any:
-    """Return a dataclass field with a default value and a rule for its values."""
-    return field(default=default, metadata={"rule": rule})
+def option(default: Any, rule: Rule = ANY, **told: Any) -> Any:
+    """Return a dataclass field with a default value and a rule for its values.
+
+    told : ``kind``: the type of the values, where it is not that of the default: None, which then is allowed;
+           ``what``: what messages call it. What the command line shows, of options that are there
+           (``cli.arguments.declared``): ``help``, ``metavar``, ``flags`` (the names, where they are others than the
+           field's), ``still`` (the option that lists what of several is switched off). Of files: ``reads`` (what it
+           is), ``replaceable``, ``default_path``, ``writes``, all as of ``cli.arguments.paths``. ``later``: the option
+           was added after models were published: a header leaves it out where it has its default value, so that earlier
+           versions can read the model
+    """
+    return field(default=default, metadata={"rule": rule, **told})
 
 
 @dataclass(frozen=True)
 class Configuration:
     """Base class of configurations. A subclass is a frozen dataclass; every field is an option and has a default value.
 
-    The type of an option is that of its default: bool, int, float or str. The values are checked when the configuration
-    is created.
+    The type of an option is that of its default: bool, int, float, str, Path, tuple (of texts), or a configuration. The
+    values are checked when the configuration is created; texts become paths and lists tuples where these are asked for.
 
     presets : combinations of options by name
     former  : former names of options, mapped to the present names; both are accepted
@@ -79,6 +97,9 @@ class Configuration:
 
     def __post_init__(self) -> None:
         for option_field in fields(self):
+            given, kind = getattr(self, option_field.name), kind_of(option_field)
+            if (kind is Path and isinstance(given, str)) or (kind is tuple and isinstance(given, list)):
+                object.__setattr__(self, option_field.name, kind(given))
             check_value(option_field, getattr(self, option_field.name))
 
     def check_files(self) -> None:
@@ -90,7 +111,7 @@ class Configuration:
 
         Raises InputError: unknown option, or a value that is not allowed.
         """
-        known = {option_field.name for option_field in fields(cls)}
+        known = {option_field.name: kind_of(option_field) for option_field in fields(cls)}
         options: dict[str, Any] = {}
         for name, value in values.items():
             if name in cls.gone and name not in known:
@@ -100,7 +121,7 @@ class Configuration:
             present = cls.former.get(name, name)
             if present not in known:
                 raise InputError(cls._unknown(name))
-            options[present] = value
+            options[present] = _part(present, known[present], value)
         return cls(**options)
 
     @classmethod
@@ -126,34 +147,58 @@ class Configuration:
         """Return the message that there is no option of this name."""
         if name in cls.hints:
             return f"no option {name!r}; {cls.hints[name]}"
+        for option_field in fields(cls):
+            if f"--{name.replace('_', '-')}" in option_field.metadata.get("flags", ()):
+                return f"no option {name!r}; here it is called {option_field.name!r}"
         return f"no option {name!r}; there are: {', '.join(option_field.name for option_field in fields(cls))}"
 
     def as_mapping(self) -> dict[str, Any]:
         """Return the values of all options, by name, as the header of a model stores them."""
-        return asdict(self)
+        later = {each.name: each.default for each in fields(self) if each.metadata.get("later")}
+        return {name: value for name, value in asdict(self).items() if name not in later or value != later[name]}
 
 
 def check_value(option_field: Field[Any], value: Any) -> None:
     """Raise InputError unless a value has the type of an option and satisfies its rule."""
-    kind, rule = _kind(option_field), option_field.metadata.get("rule", ANY)
-    fits = type(value) is kind or (kind is float and type(value) is int)
+    kind, rule = kind_of(option_field), option_field.metadata.get("rule", ANY)
+    if value is None and option_field.default is None:
+        return
+    fits = type(value) is kind or (kind in (float, Path) and isinstance(value, kind))
+    fits = fits or (kind is float and type(value) is int)
+    if kind is tuple:
+        fits = fits and all(isinstance(each, str) for each in value)
+    if fits and rule.most is not None and not rule.allows(value):
+        what = option_field.metadata.get("what", option_field.name)
+        raise InputError(f"the {what} is {value:g}{rule.unit}, required {rule.words}")
     if fits and kind in (int, float) and not -LARGEST <= value <= LARGEST:
         raise InputError(f"{option_field.name} is {value}, required at most {LARGEST:g} in size")
     if not fits or not rule.allows(value):
-        is_complete = rule.odd or rule.power_of_two or bool(rule.choices)
-        required = rule.words if is_complete and fits else _WORDS[kind] + ("" if is_complete else rule.words)
+        is_complete = rule.odd or rule.power_of_two or bool(rule.choices) or rule.most is not None
+        words = _WORDS.get(kind, "a table of options")
+        required = rule.words if is_complete and fits else words + ("" if is_complete else rule.words)
         raise InputError(f"{option_field.name} is {shortened(repr(value))}, required {required}")
+
+
+def kind_of(option_field: Field[Any]) -> type[Any]:
+    """Return the type of an option: the one that it names, or else that of its default value."""
+    kind: type[Any] = option_field.metadata.get("kind") or type(option_field.default)
+    return kind
+
+
+def _part(name: str, kind: type[Any], value: Any) -> Any:
+    """Return the value of an option; of a part of a configuration, the part that a table holds."""
+    if not (issubclass(kind, Configuration) and isinstance(value, Mapping)):
+        return value
+    try:
+        return kind.parsed(value)
+    except InputError as error:
+        raise InputError(f"in [{name}]: {error}") from error
 
 
 def _from_text(option_field: Field[Any], text: str) -> Any:
     """Return the value of an option that a text holds. Raises InputError: a text of another type."""
-    kind = _kind(option_field)
+    kind = kind_of(option_field)
     try:
         return _BOOLEANS[text.lower()] if kind is bool else kind(text)
     except (ValueError, KeyError) as error:
         raise InputError(f"{option_field.name} is {text!r}, required {_WORDS[kind]}") from error
-
-
-def _kind(option_field: Field[Any]) -> type[Any]:
-    """Return the type of an option: that of its default value."""
-    return type(option_field.default)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.vision.mesh import quiet_stderr
 from lipmotion.vision.packages import import_face_detection, import_opencv
+from lipmotion.vision.trackers import FaceBox
 
 Image = NDArray[np.uint8]
 
@@ -23,16 +23,6 @@ LONGEST_PX = 1280
 """A larger picture is reduced to this for the search; the detector itself sees 192 × 192 pixels of each part."""
 LEAST_PART_PX = 480
 """Pictures with a shorter side below this are searched as a whole only: parts would show no smaller faces."""
-
-
-@dataclass(frozen=True)
-class FaceBox:
-    """A square around a face, from the brows to the chin: its middle and its side, px; and the detector's score."""
-
-    x: float
-    y: float
-    side: float
-    score: float
 
 
 class FaceFinder:

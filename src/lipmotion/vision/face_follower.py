@@ -8,11 +8,10 @@ from contextlib import ExitStack
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.vision.face_finder import FaceFinder
 from lipmotion.vision.face_window import WindowedMesh
 from lipmotion.vision.image_similarity import face_thumbnail, image_correlation, is_cut, scene_thumbnail
 from lipmotion.vision.landmarks import EYE_CORNERS, TRACKED_POINTS
-from lipmotion.vision.mesh import FaceMesh
+from lipmotion.vision.trackers import MEDIAPIPE, BoxFinder, LandmarkTracker, PointFinder, tracker_named
 
 Image = NDArray[np.uint8]
 Array = NDArray[np.float64]
@@ -44,14 +43,17 @@ class FaceFollower:
 
     The mesh finds a face that takes a fifth of the picture or more; smaller ones are found by the full-range detector
     and followed in a window.
-    person : thumbnails of the person who is to be followed; without any, it is the one with the most frames
+    person  : thumbnails of the person who is to be followed; without any, it is the one with the most frames
+    tracker : name of the tracker that finds faces and points
     Use it as a context manager.
+    Raises InputError: no tracker of that name.
     """
 
-    def __init__(self, person: Sequence[Array] = ()) -> None:
+    def __init__(self, person: Sequence[Array] = (), tracker: str = MEDIAPIPE) -> None:
         self._wanted = list(person)
-        self._finder = FaceFinder()
-        self._scenes = [_Scene(self._wanted, self._finder)]
+        self._tracker = tracker_named(tracker)
+        self._finder = self._tracker.boxes()
+        self._scenes = [_Scene(self._wanted, self._finder, self._tracker)]
         self._picture: Array | None = None
         self._scene_of_frame: list[int | None] = []  # None: no face was found
 
@@ -60,10 +62,10 @@ class FaceFollower:
 
     def __exit__(self, *_: object) -> None:
         self._scenes[-1].close()
-        self._finder.__exit__()
+        self._finder.__exit__(None, None, None)
 
     def points(self, image: Image) -> Array | None:
-        """Return the points of a face in the next frame, as of ``FaceMesh.faces``; None if there is none.
+        """Return the points of a face in the next frame, as of ``PointFinder.faces``; None if there is none.
 
         Of several faces it is the one followed so far; where a scene begins, one that was followed before, else the
         largest and most central.
@@ -107,7 +109,7 @@ class FaceFollower:
     def _begin_scene(self) -> None:
         self._scenes[-1].close()
         known = self._wanted or [thumbnail for scene in self._scenes for thumbnail in scene.thumbnails]
-        self._scenes.append(_Scene(known, self._finder))
+        self._scenes.append(_Scene(known, self._finder, self._tracker))
 
     def _scenes_of_person(self) -> set[int]:
         """Return the scene with the most frames, and all whose face resembles one of a scene returned.
@@ -136,18 +138,18 @@ class _Scene:
     is_lost        : whether the mesh, which follows one face, has changed to another one
     """
 
-    def __init__(self, known: Sequence[Array], finder: FaceFinder) -> None:
+    def __init__(self, known: Sequence[Array], finder: BoxFinder, tracker: LandmarkTracker) -> None:
         self.thumbnails: list[Array] = []
         self.missing_frames = 0
         self.is_lost = False
         self._known = known
-        self._finder = finder
+        self._finder, self._tracker = finder, tracker
         self._searches = 0
         self._first: Array | None = None
         self._last: Array | None = None
         self._frames = 0
         self._open = ExitStack()
-        self._mesh: FaceMesh | WindowedMesh | None = None
+        self._mesh: PointFinder | WindowedMesh | None = None
         self._is_crowd = False
 
     def close(self) -> None:
@@ -204,7 +206,7 @@ class _Scene:
         found: list[tuple[Array, WindowedMesh]] = []
         with ExitStack() as tried:
             for box in boxes[:MOST_FACES]:
-                mesh = tried.enter_context(WindowedMesh(box))
+                mesh = tried.enter_context(WindowedMesh(box, self._tracker))
                 found += [(face, mesh) for face in mesh.faces(image) if last is None or self._could_be(face, last)]
             if not found:
                 return None
@@ -219,12 +221,12 @@ class _Scene:
 
     def _faces(self, image: Image) -> list[Array]:
         if self._mesh is None:
-            self._mesh = self._open.enter_context(FaceMesh())
+            self._mesh = self._open.enter_context(self._tracker.points())
         return self._mesh.faces(image)
 
     def _several(self, image: Image) -> list[Array]:
         """Return all faces if there are several, and follow all of them from now on, which takes twice the time."""
-        crowd = self._open.enter_context(FaceMesh(MOST_FACES))
+        crowd = self._open.enter_context(self._tracker.points(MOST_FACES))
         faces = crowd.faces(image)
         if len(faces) < 2:
             return []

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.vision.face_finder import FaceBox
-from lipmotion.vision.mesh import FaceMesh
 from lipmotion.vision.packages import import_opencv
+from lipmotion.vision.trackers import FaceBox, LandmarkTracker
 
 Image = NDArray[np.uint8]
 Array = NDArray[np.float64]
@@ -58,25 +57,25 @@ class FaceWindow:
 
 
 class WindowedMesh:
-    """Follows one face with the mesh in a window that goes along with it.
+    """Follows one face with the mesh of a tracker in a window that goes along with it.
 
-    It answers as ``FaceMesh`` does. As the window moves with the face, the mesh sees a face that hardly moves.
+    It is a ``PointFinder``. As the window moves with the face, the mesh sees a face that hardly moves.
     box : of the face in the first picture
     Use it as a context manager.
     """
 
-    def __init__(self, box: FaceBox) -> None:
+    def __init__(self, box: FaceBox, tracker: LandmarkTracker) -> None:
         self._window = FaceWindow.around(box.x, box.y, REACH * box.side)
-        self._mesh = FaceMesh()
+        self._mesh = tracker.points()
 
     def __enter__(self) -> WindowedMesh:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._mesh.__exit__()
+        self._mesh.__exit__(None, None, None)
 
     def faces(self, image: Image) -> list[Array]:
-        """Return the points of the face in the next picture, as ``FaceMesh.faces``; none or one."""
+        """Return the points of the face in the next picture, as ``PointFinder.faces``; none or one."""
         found = [self._window.to_picture(face) for face in self._mesh.faces(self._window.shown(image))]
         if found:
             self._window = self._following(found[0])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from importlib import import_module, metadata
+from importlib import import_module
 from typing import Any
 
 from lipmotion.errors import MissingDependencyError
@@ -14,7 +14,7 @@ def import_opencv() -> Any:
     try:
         import cv2
     except ImportError as error:
-        raise _missing("OpenCV", error) from error
+        raise missing("OpenCV", error) from error
     return cv2
 
 
@@ -34,20 +34,12 @@ def _import_solution(name: str) -> Any:
     try:
         solutions = import_module("mediapipe.python.solutions")  # all of them
     except ImportError as error:
-        raise _missing("MediaPipe", error) from error
+        raise missing("MediaPipe", error) from error
     return getattr(solutions, name)
 
 
-def package_versions() -> dict[str, str]:
-    """Return the versions of the packages that tracking depends on, by name. Raises MissingDependencyError."""
-    try:
-        mediapipe = metadata.version("mediapipe")
-    except metadata.PackageNotFoundError as error:
-        raise _missing("MediaPipe", error) from error
-    return {"mediapipe": mediapipe, "opencv": str(import_opencv().__version__), "av": metadata.version("av")}
-
-
-def _missing(package: str, error: ImportError) -> MissingDependencyError:
+def missing(package: str, error: ImportError) -> MissingDependencyError:
+    """Return the error that a package cannot be imported, which says how to install it."""
     return MissingDependencyError(
         f"face tracking needs {package}, which cannot be imported ({error}); "
         'pip install "lipmotion[video]" with Python 3.10 to 3.12 (MediaPipe needs Python < 3.13)'

@@ -15,6 +15,7 @@ from lipmotion.vision.mouth import face_to_image, mouth_crop
 from lipmotion.vision.pose import without_head_motion
 from lipmotion.vision.timing import nearest_indices, resample_to_constant_rate
 from lipmotion.vision.tracked_frames import TrackedFrames, distance_px, tracked_frames
+from lipmotion.vision.trackers import MEDIAPIPE
 
 Array = NDArray[np.float64]
 
@@ -27,23 +28,30 @@ CHANNELS = tuple(
 
 
 def track(
-    path: Path, *, crops: bool = True, span: VideoSpan = WHOLE, person: Sequence[NDArray[np.float64]] = ()
+    path: Path,
+    *,
+    crops: bool = True,
+    span: VideoSpan = WHOLE,
+    person: Sequence[NDArray[np.float64]] = (),
+    tracker: str = MEDIAPIPE,
 ) -> Track:
     """Return the motion of lips and jaw in a video, without head motion, and the mouth pictures.
 
-    path   : a video that shows one face, more or less from the front
-    crops  : whether mouth pictures are wanted
-    span   : the part of the video that is tracked
-    person : thumbnails of the face that is wanted, of ``VideoScan``; without any, the one with the most frames
+    path    : a video that shows one face, more or less from the front
+    crops   : whether mouth pictures are wanted
+    span    : the part of the video that is tracked
+    person  : thumbnails of the face that is wanted, of ``VideoScan``; without any, the one with the most frames
+    tracker : name of the tracker that finds the face and its points (``vision.trackers``)
     Returns a Track at the video's nominal frame rate, frame n at n / rate seconds after the start of the container, or
     of the span, not smoothed. Frames that were dropped or damaged, show no face or another one, or in which the mouth
     is occluded, are interpolated, False in ``seen``, and have the mouth picture of the nearest frame that is seen. Of
     several people the largest and most central is followed. ``notes`` reports damage, cuts, other faces, and a face
     that is very small.
-    Raises InputError: not a video, damaged or cut short before half of it, or the face in too few of the frames.
-    Raises MissingDependencyError: MediaPipe or OpenCV is not installed.
+    Raises InputError: not a video, damaged or cut short before half of it, or the face in too few of the frames; no
+    tracker of that name.
+    Raises MissingDependencyError: MediaPipe, or what another tracker needs, or OpenCV is not installed.
     """
-    return track_of(path, span, tracked_frames(path, span, person), crops=crops)
+    return track_of(path, span, tracked_frames(path, span, person, tracker), crops=crops)
 
 
 def track_of(path: Path, span: VideoSpan, frames: TrackedFrames, *, crops: bool) -> Track:

@@ -16,6 +16,7 @@ from lipmotion.vision.image_similarity import mouth_thumbnail, occluded_mouths
 from lipmotion.vision.landmarks import EYE_CORNERS, TRACKED_POINTS
 from lipmotion.vision.mouth import eyes_to_image, mouth_crop
 from lipmotion.vision.timing import check_rate, frame_count, nominal_rate_hz
+from lipmotion.vision.trackers import MEDIAPIPE
 
 Array = NDArray[np.float64]
 
@@ -94,14 +95,14 @@ class _Found:
         return int(wrong.sum())
 
 
-def tracked_frames(path: Path, span: VideoSpan, person: Sequence[Array]) -> TrackedFrames:
+def tracked_frames(path: Path, span: VideoSpan, person: Sequence[Array], tracker: str = MEDIAPIPE) -> TrackedFrames:
     """Return the pictures of a video and where one person's face is in them; the video is decoded once.
 
-    path, span, person, and errors : as of ``vision.track.track``
+    path, span, person, tracker, and errors : as of ``vision.track.track``
     Memory: the points of every frame; no picture is kept.
     """
     found = _Found()
-    with open_video(path, span) as video, FaceFollower(person) as follower:
+    with open_video(path, span) as video, FaceFollower(person, tracker) as follower:
         for frame in video.frames:
             found.add(frame.time_s, frame.image, follower.points(frame.image))
     if not found.times_s:

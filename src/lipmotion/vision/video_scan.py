@@ -13,6 +13,7 @@ from lipmotion.vision.face_follower import FaceFollower
 from lipmotion.vision.frames import damage_notes, open_video
 from lipmotion.vision.image_similarity import is_cut, scene_thumbnail
 from lipmotion.vision.timing import check_rate, nominal_rate_hz
+from lipmotion.vision.trackers import MEDIAPIPE
 
 LOOK_PX = 640
 """Pictures are reduced to this while they are converted."""
@@ -46,17 +47,18 @@ class VideoScan:
         return float(self.times_s[-1]) + 1 / self.rate_hz
 
 
-def scan_video(path: Path, reached: Callable[[float], None] = lambda _: None) -> VideoScan:
+def scan_video(path: Path, reached: Callable[[float], None] = lambda _: None, tracker: str = MEDIAPIPE) -> VideoScan:
     """Return the times and cuts of a video, and the person in it; every picture is decoded once, at a small size.
 
     reached : called now and then with the share of the stated duration that is done
-    Raises InputError: as ``open_video``, or an impossible frame rate.
+    tracker : name of the tracker that finds faces
+    Raises InputError: as ``open_video``, an impossible frame rate, or no tracker of that name.
     Raises MissingDependencyError: OpenCV or MediaPipe is not installed.
     """
     times_s: list[float] = []
     cuts_s: list[float] = []
     before = None
-    with open_video(path, longest_px=LOOK_PX) as video, FaceFollower() as follower:
+    with open_video(path, longest_px=LOOK_PX) as video, FaceFollower(tracker=tracker) as follower:
         for frame in video.frames:
             picture = scene_thumbnail(frame.image)
             if is_cut(before, picture):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from lipmotion.corpora.store import Corpus, Selection
+from lipmotion.engines import Fit
 from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.errors import InputError
@@ -66,7 +67,7 @@ def _known_acc(scores: dict[int, float], _: object, __: object, engine: CoupledE
 
 
 def test_the_best_is_taken_and_of_equals_the_smallest(monkeypatch: pytest.MonkeyPatch) -> None:
-    models = [lambda count=count: f"model of {count}" for count in (1, 2, 4)]
+    models = [lambda count=count: Fit(f"model of {count}", {}) for count in (1, 2, 4)]
     monkeypatch.setattr(mixtures, "growing_models", lambda *_: iter(models))
     for scores, wanted in (
         ({1: 0.5, 2: 0.7, 4: 0.6}, 2),

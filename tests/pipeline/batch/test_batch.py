@@ -21,12 +21,14 @@ from lipmotion.articulation.delivery import Delivery
 from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.export.base import motion_suffixes
 from lipmotion.faces.filmed.face import FilmedFace
-from lipmotion.pipeline.batch import BatchLine, BatchSettings, batch, one_line, read_lines
+from lipmotion.pipeline.batch import BatchLine, batch, one_line, read_lines
 from lipmotion.pipeline.batch import run as run_module
 from lipmotion.pipeline.batch.ledger import Place
 from lipmotion.pipeline.batch.one_line import LineWork, finished_line
 from lipmotion.pipeline.batch.pool import WorkerDied
+from lipmotion.pipeline.job import Job, Outputs, Request
 from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.opened_job import OpenedJob
 from lipmotion.pipeline.outputs.shown_faces import shown_face
 from lipmotion.types import Item
 
@@ -44,8 +46,8 @@ def sounds(tmp_path: Path, toy_speech: Path) -> Path:
 
 
 @pytest.fixture
-def settings(toy_model_file: Path) -> BatchSettings:
-    return BatchSettings(model=str(toy_model_file), recogniser="own")
+def settings(toy_model_file: Path) -> Job:
+    return Job(Request(model=toy_model_file, recogniser="own"))
 
 
 def ledger_rows(out: Path) -> list[dict]:
@@ -58,11 +60,11 @@ def contents(out: Path) -> dict[str, bytes]:
     return {path.relative_to(out).as_posix(): path.read_bytes() for path in files}
 
 
-def test_the_outputs_are_those_of_animate(sounds: Path, settings: BatchSettings, tmp_path: Path) -> None:
+def test_the_outputs_are_those_of_animate(sounds: Path, settings: Job, tmp_path: Path) -> None:
     (sounds / "broken.wav").write_text("no sound")
     events: list[Item] = []
     out = tmp_path / "out"
-    settings = BatchSettings(("json", "cues.tsv", "TextGrid"), recogniser="own", model=settings.model)
+    settings = replace(settings, outputs=Outputs(kinds=("json", "cues.tsv", "TextGrid")))
     found = batch(sounds, out, settings, jobs=1, monitor=lambda e: events.append(e) if isinstance(e, Item) else None)
     assert (found.done, found.kept, found.failed) == (3, 0, 1)
     assert {item.name: item.outcome for item in events} == {
@@ -70,7 +72,7 @@ def test_the_outputs_are_those_of_animate(sounds: Path, settings: BatchSettings,
     }  # fmt: skip
     kinds = ("json", "cues.tsv", "TextGrid")
     assert set(contents(out)) == {f"{name}.{kind}" for name in ("one", "deep/two", "three") for kind in kinds}
-    model = lipmotion.load_model(settings.model)
+    model = lipmotion.load_model(settings.request.model)
     alone = lipmotion.animate(
         lipmotion.SpeechRequest(sounds / "one.wav", "see papa mama", recogniser="own"), model=model
     )
@@ -87,16 +89,16 @@ def test_the_face_of_another_person_is_mapped_onto_once(
     filmed_face: FilmedFace, toy_model: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     mapped: list[str] = []
-    monkeypatch.setattr(one_line, "_face", lambda *_: shown_face(filmed_face))
     monkeypatch.setattr(one_line, "map_onto", lambda *_, speaker: mapped.append(speaker) or "a map")
     other = replace(toy_model, about=toy_model.about | {"corpus": ["another"]})
     lines = [BatchLine(name, f"/{name}.wav", "hello") for name in "ab"]
-    assert [one_line._request(line, BatchSettings(), other).onto for line in lines] == ["a map", "a map"]
+    shown = OpenedJob(Job(), shown_face(filmed_face), None)
+    assert [one_line._request(line, shown, other).onto for line in lines] == ["a map", "a map"]
     assert mapped == [""]
-    assert one_line._request(lines[0], BatchSettings(), toy_model).onto is None
+    assert one_line._request(lines[0], shown, toy_model).onto is None
 
 
-def test_what_was_done_is_kept(sounds: Path, settings: BatchSettings, tmp_path: Path) -> None:
+def test_what_was_done_is_kept(sounds: Path, settings: Job, tmp_path: Path) -> None:
     out = tmp_path / "out"
     batch(sounds, out, settings, jobs=1)
     before = {name: (out / name).stat().st_mtime_ns for name in contents(out)}
@@ -108,10 +110,10 @@ def test_what_was_done_is_kept(sounds: Path, settings: BatchSettings, tmp_path: 
     changed = {name for name, time in before.items() if (out / name).stat().st_mtime_ns != time}
     assert changed == {"one.json", "three.json"}
     assert Counter(row["name"] for row in ledger_rows(out)) == {"one": 2, "three": 2, "deep/two": 1}
-    assert batch(sounds, out, BatchSettings(("csv",), model=settings.model), jobs=1).done == 3
+    assert batch(sounds, out, replace(settings, outputs=Outputs(kinds=("csv",))), jobs=1).done == 3
 
 
-def test_inputs_are_never_outputs(sounds: Path, settings: BatchSettings) -> None:
+def test_inputs_are_never_outputs(sounds: Path, settings: Job) -> None:
     with pytest.raises(ExportError, match="lies in the list or folder of recordings"):
         batch(sounds, sounds / "out", settings, jobs=1)
     with pytest.raises(ExportError, match="holds the recording"):
@@ -120,24 +122,26 @@ def test_inputs_are_never_outputs(sounds: Path, settings: BatchSettings) -> None
 
 def test_a_mistake_in_the_settings_ends_it_before_the_first_line(sounds: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such model"):
-        batch(sounds, tmp_path / "out", BatchSettings(model="missing.lipmotion"), jobs=1)
+        batch(sounds, tmp_path / "out", Job(Request(model=Path("missing.lipmotion"))), jobs=1)
     with pytest.raises(ExportError, match="required some of"):
-        batch(sounds, tmp_path / "out", BatchSettings(("wav",)), jobs=1)
+        batch(sounds, tmp_path / "out", Job(outputs=Outputs(kinds=("wav",))), jobs=1)
     with pytest.raises(ExportError, match="a video has its own sound"):
-        batch(sounds, tmp_path / "out", BatchSettings(("mp4",), delivery=Delivery(offset_ms=50)), jobs=1)
+        batch(sounds, tmp_path / "out", Job(outputs=Outputs(kinds=("mp4",)), delivery=Delivery(offset_ms=50)), jobs=1)
     assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"kinds": ("cues.tsv",), "fps": 120.0}, "frame rate is 120"),
-        ({"channels": ("nope",)}, "nope"),
-        ({"speaker": "nobody"}, "nobody"),
+        ({"outputs": Outputs(kinds=("cues.tsv",), fps=120.0)}, "frame rate is 120"),
+        ({"outputs": Outputs(channels=("nope",))}, "nope"),
+        ({"request": Request(speaker="nobody")}, "nobody"),
+        ({"request": Request(Path("one.wav"))}, "the job of a batch has 'recording', which belongs to one recording"),
+        ({"outputs": Outputs(("one.json",))}, "the job of a batch has 'files'"),
     ],
 )
 def test_what_no_line_could_do_ends_it_before_the_first_line(
-    sounds: Path, settings: BatchSettings, tmp_path: Path, wrong: dict, message: str
+    sounds: Path, settings: Job, tmp_path: Path, wrong: dict, message: str
 ) -> None:
     with pytest.raises((InputError, ExportError), match=message):
         batch(sounds, tmp_path / "out", replace(settings, **wrong), jobs=1)
@@ -145,27 +149,32 @@ def test_what_no_line_could_do_ends_it_before_the_first_line(
 
 
 @pytest.mark.parametrize("jobs", [0, -3])
-def test_a_number_of_processes(sounds: Path, settings: BatchSettings, tmp_path: Path, jobs: int) -> None:
+def test_a_number_of_processes(sounds: Path, settings: Job, tmp_path: Path, jobs: int) -> None:
     with pytest.raises(InputError, match="processes, required 1 or more"):
         batch(sounds, tmp_path / "out", settings, jobs=jobs)
 
 
-def test_silence_can_have_every_form_that_speech_can(settings: BatchSettings) -> None:
+def test_silence_can_have_every_form_that_speech_can(settings: Job) -> None:
     kinds = tuple(suffix.removeprefix(".") for suffix in motion_suffixes())
     late = Delivery(offset_ms=-5000, stepped=True)
-    one_line.check_line_settings(replace(settings, kinds=kinds, articulation=True, delivery=late))
-    one_line.check_line_settings(replace(settings, kinds=("json",), curves="face", rate_hz=30.0))
+    one_line.check_line_job(replace(settings, outputs=Outputs(kinds=kinds, articulation=True), delivery=late))
+    one_line.check_line_job(replace(settings, outputs=Outputs(curves="face", rate_hz=30.0)))
 
 
-def test_files_that_refer_to_the_sound(sounds: Path, settings: BatchSettings, tmp_path: Path) -> None:
+def test_files_that_refer_to_the_sound(sounds: Path, settings: Job, tmp_path: Path) -> None:
     """The outputs are written under other names first; what they refer to is found from where they end."""
     out = tmp_path / "out"
-    batch([BatchLine("deep/two", str(sounds / "deep/two.wav"))], out, replace(settings, kinds=("usda",)), jobs=1)
+    batch(
+        [BatchLine("deep/two", str(sounds / "deep/two.wav"))],
+        out,
+        replace(settings, outputs=Outputs(kinds=("usda",))),
+        jobs=1,
+    )
     assert "@../../sounds/deep/two.wav@" in (out / "deep/two.usda").read_text()
     assert [path.name for path in (out / "deep").iterdir()] == ["two.usda"]
 
 
-def test_what_a_killed_run_left_is_removed(sounds: Path, settings: BatchSettings, tmp_path: Path) -> None:
+def test_what_a_killed_run_left_is_removed(sounds: Path, settings: Job, tmp_path: Path) -> None:
     out = tmp_path / "out"
     (out / "deep").mkdir(parents=True)
     (out / "deep" / ".part-batch-0123-4567.json").touch()
@@ -188,7 +197,7 @@ class DyingPool:
             yield function(item)
 
 
-def waiting(sounds: Path, settings: BatchSettings, out: Path) -> list[LineWork]:
+def waiting(sounds: Path, settings: Job, out: Path) -> list[LineWork]:
     place = Place(str(out), "run")
     for name in ("receipts", "work"):
         (place.own / name).mkdir(parents=True)
@@ -197,7 +206,7 @@ def waiting(sounds: Path, settings: BatchSettings, out: Path) -> list[LineWork]:
 
 
 @pytest.mark.parametrize(("times", "outcome"), [(1, "done"), (2, "failed")])
-def test_a_worker_dies(sounds: Path, settings: BatchSettings, tmp_path: Path, times: int, outcome: str) -> None:
+def test_a_worker_dies(sounds: Path, settings: Job, tmp_path: Path, times: int, outcome: str) -> None:
     works = waiting(sounds, settings, tmp_path / "out")
     records = list(run_module._finished(DyingPool("one", times), works))
     assert {record["name"]: record["outcome"] for record in records} == {
@@ -206,7 +215,7 @@ def test_a_worker_dies(sounds: Path, settings: BatchSettings, tmp_path: Path, ti
     assert len(records) == 3
 
 
-def test_workers_that_never_begin_end_the_batch(sounds: Path, settings: BatchSettings, tmp_path: Path) -> None:
+def test_workers_that_never_begin_end_the_batch(sounds: Path, settings: Job, tmp_path: Path) -> None:
     def dead(*_):
         raise WorkerDied("no memory")
         yield
@@ -215,9 +224,7 @@ def test_workers_that_never_begin_end_the_batch(sounds: Path, settings: BatchSet
         list(run_module._finished(dead, waiting(sounds, settings, tmp_path / "out")))
 
 
-def test_a_line_that_another_worker_finished_is_not_done_again(
-    sounds: Path, settings: BatchSettings, tmp_path: Path
-) -> None:
+def test_a_line_that_another_worker_finished_is_not_done_again(sounds: Path, settings: Job, tmp_path: Path) -> None:
     work = waiting(sounds, settings, tmp_path / "out")[0]
     first = finished_line(work)
     path = tmp_path / "out" / next(iter(first["outputs"]))
@@ -229,7 +236,7 @@ def test_a_line_that_another_worker_finished_is_not_done_again(
     assert path.is_file()
 
 
-def test_a_worker_of_an_earlier_run_writes_nothing(sounds: Path, settings: BatchSettings, tmp_path: Path) -> None:
+def test_a_worker_of_an_earlier_run_writes_nothing(sounds: Path, settings: Job, tmp_path: Path) -> None:
     work = waiting(sounds, settings, tmp_path / "out")[0]
     (work.place.own / "run").write_text("a later one")
     with pytest.raises(ExportError, match="another run of this batch has begun"):
@@ -237,9 +244,7 @@ def test_a_worker_of_an_earlier_run_writes_nothing(sounds: Path, settings: Batch
     assert contents(tmp_path / "out").keys() == {".batch/run"}
 
 
-def test_an_output_that_cannot_be_written_is_a_line_that_fails(
-    sounds: Path, settings: BatchSettings, tmp_path: Path
-) -> None:
+def test_an_output_that_cannot_be_written_is_a_line_that_fails(sounds: Path, settings: Job, tmp_path: Path) -> None:
     out = tmp_path / "out"
     (out / "one.json").mkdir(parents=True)
     (out / "deep").touch()
@@ -253,7 +258,7 @@ def test_an_output_that_cannot_be_written_is_a_line_that_fails(
 
 
 def test_an_output_that_cannot_be_renamed_is_a_line_that_fails(
-    sounds: Path, settings: BatchSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    sounds: Path, settings: Job, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     work = waiting(sounds, settings, tmp_path / "out")[0]
     monkeypatch.setattr("lipmotion.pipeline.batch.one_line.check_target", lambda _: None)
@@ -263,7 +268,7 @@ def test_an_output_that_cannot_be_renamed_is_a_line_that_fails(
 
 
 def test_a_bug_that_one_line_meets_does_not_end_the_batch(
-    sounds: Path, settings: BatchSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    sounds: Path, settings: Job, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def broken(*_: object) -> None:
         raise ZeroDivisionError("float division")
@@ -276,7 +281,7 @@ def test_a_bug_that_one_line_meets_does_not_end_the_batch(
 
 @pytest.mark.skipif(sys.platform == "win32", reason="devices, pipes and links as POSIX has them")
 def test_lines_that_would_wait_or_lead_elsewhere_fail_and_the_others_go_on(
-    toy_speech: Path, settings: BatchSettings, tmp_path: Path
+    toy_speech: Path, settings: Job, tmp_path: Path
 ) -> None:
     out, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
     elsewhere.mkdir()
@@ -314,9 +319,7 @@ def test_lines_that_would_wait_or_lead_elsewhere_fail_and_the_others_go_on(
     assert not (out / "two.json").is_symlink()  # replaced, not what it points to
 
 
-def test_what_a_killed_process_was_writing_is_deleted(
-    toy_speech: Path, settings: BatchSettings, tmp_path: Path
-) -> None:
+def test_what_a_killed_process_was_writing_is_deleted(toy_speech: Path, settings: Job, tmp_path: Path) -> None:
     """A process that ends within a write leaves a file of a name that no other run would write to."""
     sounds, out = many(tmp_path / "sounds", toy_speech, 1), tmp_path / "out"
     out.mkdir()
@@ -351,11 +354,11 @@ def events_of(process: Child) -> Iterator[dict]:
 @pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.parametrize("whom", ["first process", "a worker"])
-def test_kills(toy_speech: Path, settings: BatchSettings, tmp_path: Path, whom: str) -> None:
+def test_kills(toy_speech: Path, settings: Job, tmp_path: Path, whom: str) -> None:
     """The same command again gives the same files, each written once; a worker's death alone changes nothing."""
     sounds = many(tmp_path / "sounds", toy_speech, 40)
     batch(sounds, tmp_path / "whole", settings, jobs=1)
-    how = [sounds, "--out", tmp_path / "out", "--model", settings.model, "--recogniser", "own", "--jobs", 2]
+    how = [sounds, "--out", tmp_path / "out", "--model", settings.request.model, "--recogniser", "own", "--jobs", 2]
     with child(command(*how)) as process:
         items = 0
         for event in events_of(process):
@@ -407,13 +410,23 @@ def cluster(tmp_path: Path) -> Iterator[tuple[str, list[Child]]]:
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.filterwarnings("ignore")
 def test_a_worker_of_a_cluster_is_killed(
-    cluster: tuple[str, list[Child]], toy_speech: Path, settings: BatchSettings, tmp_path: Path
+    cluster: tuple[str, list[Child]], toy_speech: Path, settings: Job, tmp_path: Path
 ) -> None:
     """Nothing is lost, and nothing is done twice."""
     address, processes = cluster
     sounds = many(tmp_path / "sounds", toy_speech, 60)
     batch(sounds, tmp_path / "whole", settings, jobs=1)
-    how = [sounds, "--out", tmp_path / "out", "--model", settings.model, "--recogniser", "own", "--cluster", address]
+    how = [
+        sounds,
+        "--out",
+        tmp_path / "out",
+        "--model",
+        settings.request.model,
+        "--recogniser",
+        "own",
+        "--cluster",
+        address,
+    ]
     with child(command(*how)) as process:
         items = 0
         for event in events_of(process):
@@ -430,7 +443,7 @@ def test_a_worker_of_a_cluster_is_killed(
 
 @pytest.mark.long
 @pytest.mark.filterwarnings("ignore")
-def test_no_cluster_answers(sounds: Path, settings: BatchSettings, tmp_path: Path, monkeypatch) -> None:
+def test_no_cluster_answers(sounds: Path, settings: Job, tmp_path: Path, monkeypatch) -> None:
     pytest.importorskip("distributed")
     monkeypatch.setattr("lipmotion.pipeline.batch.pool.CONNECT_S", 1)
     with pytest.raises(InputError, match="no Dask scheduler answers"):

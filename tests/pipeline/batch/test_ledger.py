@@ -16,12 +16,12 @@ from lipmotion.pipeline.batch.lines import OWN_FILES, OWN_FOLDER, BatchLine
 from lipmotion.pipeline.batch.record import DONE, LARGEST_RECORD, Record
 from lipmotion.pipeline.batch.report import write_reports
 from lipmotion.pipeline.batch.settings import (
-    BatchSettings,
     check_kinds,
     fingerprint_of,
     input_files,
     line_fingerprint,
 )
+from lipmotion.pipeline.job import Job, Request
 from lipmotion.storage.files import LOCK
 
 CONTENT = b"motion"
@@ -217,10 +217,10 @@ def test_a_later_run_ends_the_earlier_one(out: Path) -> None:
 
 def test_settings_have_a_fingerprint(tmp_path: Path) -> None:
     (tmp_path / "words.txt").write_text("a AH")
-    plain = BatchSettings()
-    assert fingerprint_of(plain) == fingerprint_of(BatchSettings())
-    assert fingerprint_of(plain) != fingerprint_of(BatchSettings(recogniser="fast"))
-    lexicon = BatchSettings(lexicon=str(tmp_path / "words.txt"))
+    plain = Job()
+    assert fingerprint_of(plain) == fingerprint_of(Job())
+    assert fingerprint_of(plain) != fingerprint_of(Job(Request(recogniser="fast")))
+    lexicon = Job(Request(lexicon=tmp_path / "words.txt"))
     before = fingerprint_of(lexicon)
     (tmp_path / "words.txt").write_text("a EY")
     assert fingerprint_of(lexicon) != before

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from fractions import Fraction
 from pathlib import Path
+from types import SimpleNamespace
 
 import av
 import numpy as np
@@ -71,12 +72,14 @@ def scanned(monkeypatch) -> dict[str, tuple[float, ...]]:
     """Replaces the tracker and the scan of the pictures; the cuts and the face to be found may be set."""
     told: dict[str, tuple[float, ...]] = {"cuts_s": (), "person": ()}
 
-    def scan(_path: Path, reached=lambda _: None) -> VideoScan:
+    def scan(_path: Path, reached, tracker: str) -> VideoScan:
+        assert tracker == "mediapipe"
         reached(0.5)
         person = tuple(np.full((24, 36, 3), value) for value in told["person"])
         return VideoScan(np.arange(round(DURATION_S * 25)) / 25, np.array(told["cuts_s"]), 25.0, person)
 
-    def track(_path: Path, *, crops: bool = True, span: VideoSpan = WHOLE, person=()) -> Track:
+    def track(_path: Path, *, crops: bool, span: VideoSpan = WHOLE, person=(), tracker: str) -> Track:
+        assert tracker == "mediapipe"
         count = round((min(span.end_s, DURATION_S) - span.start_s) * 25)
         told["followed"] = tuple(float(face.mean()) for face in person)
         images = np.zeros((count, 56, 72, 3), np.uint8) if crops else None
@@ -84,7 +87,11 @@ def scanned(monkeypatch) -> dict[str, tuple[float, ...]]:
 
     monkeypatch.setattr(long_videos, "scan_video", scan)
     monkeypatch.setattr(module, "track", track)
-    monkeypatch.setattr(module, "package_versions", lambda: {"mediapipe": "0", "opencv": "4", "av": "1"})
+    monkeypatch.setattr(
+        module,
+        "tracker_named",
+        lambda _: SimpleNamespace(versions=lambda: {"mediapipe": "0", "opencv": "4", "av": "1"}),
+    )
     return told
 
 

@@ -6,6 +6,7 @@ import signal
 import sys
 import wave
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -44,7 +45,8 @@ def tracked(monkeypatch) -> list[str]:
     """Replaces face tracking; lists the names of the videos it was asked for."""
     asked: list[str] = []
 
-    def track(path: Path, *, crops: bool = True) -> Track:
+    def track(path: Path, *, crops: bool, tracker: str) -> Track:
+        assert tracker == "mediapipe"
         asked.append(path.stem)
         if "broken" in path.stem:
             raise InputError(f"{path}: no face in 25 of 25 frames")
@@ -55,7 +57,11 @@ def tracked(monkeypatch) -> list[str]:
         return Track(Motion(np.ones((25, 1)), 25.0, (Channel("opening"),)), np.arange(25) > 1, images, notes)
 
     monkeypatch.setattr(module, "track", track)
-    monkeypatch.setattr(module, "package_versions", lambda: {"mediapipe": "0", "opencv": "4", "av": "1"})
+    monkeypatch.setattr(
+        module,
+        "tracker_named",
+        lambda _: SimpleNamespace(versions=lambda: {"mediapipe": "0", "opencv": "4", "av": "1"}),
+    )
     return asked
 
 
@@ -171,7 +177,7 @@ def test_missing_packages_are_reported_at_once(studio, tmp_path, monkeypatch):
     def missing() -> dict[str, str]:
         raise MissingDependencyError("pip install")
 
-    monkeypatch.setattr(module, "package_versions", missing)
+    monkeypatch.setattr(module, "tracker_named", lambda _: SimpleNamespace(versions=missing))
     with pytest.raises(MissingDependencyError):
         prepare(studio, tmp_path / "corpus")
     assert not (tmp_path / "corpus").exists()
@@ -182,10 +188,10 @@ def test_an_interrupted_run_goes_on_where_it_stopped(studio, tmp_path, monkeypat
     prepare(studio, tmp_path / "whole", workers=1)
     good = module.track  # type: ignore[attr-defined]
 
-    def interrupted(path: Path, *, crops: bool = True) -> Track:
+    def interrupted(path: Path, *, crops: bool, tracker: str) -> Track:
         if path.stem == "b":
             raise KeyboardInterrupt
-        return good(path, crops=crops)
+        return good(path, crops=crops, tracker=tracker)
 
     with monkeypatch.context() as patch:
         patch.setattr(module, "track", interrupted)

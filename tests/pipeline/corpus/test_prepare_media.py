@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
+from types import SimpleNamespace
 
 import av
 import numpy as np
@@ -67,7 +68,10 @@ def test_variable_frame_rate_with_subtitles_and_a_cover(recordings: Path, tmp_pa
 
 
 def test_each_of_many_unusable_files_is_reported_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("lipmotion.pipeline.corpus.prepare.package_versions", lambda: {"mediapipe": "1"})
+    monkeypatch.setattr(
+        "lipmotion.pipeline.corpus.prepare.tracker_named",
+        lambda _: SimpleNamespace(versions=lambda: {"mediapipe": "1"}),
+    )
     names = [f"clip{number:03d}" for number in range(30)]
     (tmp_path / "clips").mkdir()
     for name in names:

@@ -3,6 +3,7 @@ from __future__ import annotations
 import wave
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -50,7 +51,7 @@ def studio(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     def missing() -> dict[str, str]:
         raise MissingDependencyError("pip install")
 
-    monkeypatch.setattr(module, "package_versions", missing)
+    monkeypatch.setattr(module, "tracker_named", lambda _: SimpleNamespace(versions=missing))
     folder = tmp_path / "studio"
     (folder / "anna").mkdir(parents=True)
     for seed, (name, suffix) in enumerate((("a", ".npz"), ("b", ".json"), ("anna/c", ".csv"))):

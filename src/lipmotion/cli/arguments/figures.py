@@ -6,9 +6,10 @@ import argparse
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from lipmotion.cli.arguments.declared import add_options
 from lipmotion.cli.arguments.options import add_machine_readable
 from lipmotion.cli.arguments.paths import add_output
-from lipmotion.cli.arguments.speech import add_lexicon_argument
+from lipmotion.pipeline.job import Request
 
 if TYPE_CHECKING:
     from lipmotion.types import Monitor
@@ -19,7 +20,7 @@ Figures = dict[str, Any]
 
 def add_figures_arguments(parser: argparse.ArgumentParser) -> None:
     """Add ``--lexicon``, ``--output`` and ``--machine-readable``."""
-    add_lexicon_argument(parser)
+    add_options(parser, Request, "lexicon")
     add_output(parser, "-o", "--output", force=True, metavar="FILE.json", help="also write all figures to this file")
     add_machine_readable(parser)
 

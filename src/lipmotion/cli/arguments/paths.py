@@ -98,7 +98,7 @@ def _sources(options: argparse.Namespace) -> Iterator[Source]:
 
 def _paths(value: Any) -> list[Path]:
     """Return the values of an argument as paths; none where it was left out."""
-    given = value if isinstance(value, list) else [value]
+    given = value if isinstance(value, list | tuple) else [value]
     return [Path(text) for text in given if text is not None]
 
 

@@ -63,18 +63,18 @@ def read_pipe(path: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def written_pipe(options: argparse.Namespace) -> Iterator[bool]:
+def written_pipe(options: argparse.Namespace) -> Iterator[tuple[tuple[str, ...], bool]]:
     """Let ``-`` among the outputs be a temporary file, and write it to standard output at the end.
 
-    Yields whether standard output is an output; then nothing else may be printed there.
+    Yields the outputs, and whether standard output is one of them; then nothing else may be printed there.
     """
-    if PIPE not in options.output:
-        yield False
+    outputs = tuple(options.output)
+    if PIPE not in outputs:
+        yield outputs, False
         return
     with tempfile.TemporaryDirectory(prefix="lipmotion-") as folder:
         kept = Path(folder) / f"motion.{options.format}"
-        options.output = [str(kept) if output == PIPE else output for output in options.output]
-        yield True
+        yield tuple(str(kept) if output == PIPE else output for output in outputs), True
         write_bytes(kept)
 
 

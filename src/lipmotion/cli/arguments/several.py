@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from lipmotion.cli.arguments.options import worker_count
 from lipmotion.cli.arguments.pipes import is_pipe
 from lipmotion.cli.terminal.outcome import outcome
 from lipmotion.cli.terminal.output import print_lines
@@ -14,20 +16,13 @@ from lipmotion.printable import printable
 
 if TYPE_CHECKING:
     from lipmotion.cli.terminal.progress import Report
-
-KINDS = "json"
-
-
-def add_kinds_argument(parser: argparse.ArgumentParser) -> None:
-    """Add ``--to``: what is written into a folder of outputs."""
-    help_text = "what is written into an output folder, as json,mp4 (default: json)"
-    parser.add_argument("--to", default=KINDS, metavar="KIND,KIND", help=help_text)
+    from lipmotion.pipeline.job import Job
+    from lipmotion.pipeline.model import Model
+    from lipmotion.pipeline.opened_job import OpenedJob
 
 
-def animated_one_by_one(
-    options: argparse.Namespace, report: Report, animate_one: Callable[[argparse.Namespace, Report], object]
-) -> bool:
-    """Call a function for the options of each recording, if there are several or the output is a folder.
+def animated_one_by_one(job: Job, given: Sequence[Path], options: argparse.Namespace, report: Report) -> bool:
+    """Run a job for each of several recordings, or for all of a folder, or where the output is a folder.
 
     Each recording is reported; at the end the paths that were written are printed.
     Returns False, and does nothing, where there is one recording and its outputs are files.
@@ -38,80 +33,72 @@ def animated_one_by_one(
     from lipmotion.errors import InputError
     from lipmotion.pipeline.understand.recordings import is_for_several, recordings_of
 
-    if len(options.speech) == 1 and not (options.speech[0].is_dir() or any(map(is_for_several, options.output))):
+    if len(given) == 1 and not (given[0].is_dir() or any(map(is_for_several, job.outputs.files))):
         return False
-    for speech in options.speech:
-        if is_pipe(speech):
+    for recording in given:
+        if is_pipe(recording):
             raise InputError(
-                f"{speech}: what comes through a pipe has no name for a file in a folder; animate it alone, with the "
-                "name of a file: -o FILE.json"
+                f"{recording}: what comes through a pipe has no name for a file in a folder; animate it alone, with "
+                "the name of a file: -o FILE.json"
             )
-    _animate_each(_one_by_one(options, recordings_of(options.speech)), report, animate_one)
+    _animate_each(_one_by_one(job, recordings_of(given)), options, report)
     return True
 
 
-def _one_by_one(options: argparse.Namespace, recordings: Sequence[Path]) -> list[argparse.Namespace]:
-    """Return the options of each recording, its outputs instead of folders and templates; make the folders.
+def _one_by_one(job: Job, recordings: Sequence[Path]) -> list[OpenedJob]:
+    """Return the job of each recording, its outputs instead of folders and templates; make the folders.
 
-    Words and phones in files beside a recording are used, where none are given, as a corpus and a batch use them.
     Faces and characters are opened once, for all recordings. What cannot be leaves no new folders.
     """
-    from lipmotion.cli.arguments.results import check_results, open_faces
     from lipmotion.errors import InputError
+    from lipmotion.pipeline.opened_job import opened
     from lipmotion.pipeline.understand.recordings import planned_outputs
     from lipmotion.storage.files import made_folders
 
-    for name in ("transcript", "units", "posteriors"):
-        if getattr(options, name) is not None and len(recordings) > 1:
+    alone = {"transcript": job.request.transcript, "units": job.request.units, "posteriors": job.outputs.posteriors}
+    for name, value in alone.items():
+        if value is not None and len(recordings) > 1:
             raise InputError(f"--{name} belongs to one recording, and there are {len(recordings)}; animate each alone")
-    planned = planned_outputs(recordings, options.output, options.to.split(","))
-    open_faces(options)
-    shared = {**vars(options), "words_beside": True}
-    pairs = zip(recordings, planned, strict=True)
-    jobs = [argparse.Namespace(**{**shared, "speech": speech, "output": files}) for speech, files in pairs]
+    planned = planned_outputs(recordings, job.outputs.files, job.outputs.kinds)
+    shared = opened(job)
+    jobs = [shared.of(recording, tuple(files)) for recording, files in zip(recordings, planned, strict=True)]
     with made_folders({Path(file).parent for files in planned for file in files}):
-        for job in jobs:
-            check_results(job, job.speech)
+        for each, recording in zip(jobs, recordings, strict=True):
+            each.checked(recording)
     return jobs
 
 
-def _animate_each(
-    jobs: Sequence[argparse.Namespace], report: Report, animate_one: Callable[[argparse.Namespace, Report], object]
-) -> None:
+def _animate_each(jobs: Sequence[OpenedJob], options: argparse.Namespace, report: Report) -> None:
+    """Run the jobs, with the words and phones in files beside the recordings, as a corpus and a batch use them."""
     from lipmotion.errors import LipMotionError
-    from lipmotion.types.progress import Item
+    from lipmotion.types.progress import Item, sub_monitor
+
+    @cache
+    def load() -> Model:
+        from lipmotion.pipeline.model import load_model
+
+        return load_model(jobs[0].job.request.model)
 
     written: list[str] = []
-    failures: list[tuple[int, Path, Exception]] = []
-    for number, job in enumerate(jobs):
+    failures: list[tuple[int, str, Exception]] = []
+    for number, each in enumerate(jobs):
+        name = str(each.job.request.recording)
+        part = sub_monitor(report.receive, number / len(jobs), (number + 1) / len(jobs))
         try:
-            animate_one(job, _Part(report, number / len(jobs), (number + 1) / len(jobs)))
-            written += job.output
-            report.receive(Item(str(job.speech), "animated"))
+            each.run(load, words_beside=True, workers=worker_count(options), monitor=part)
+            written += each.job.outputs.files
+            report.receive(Item(name, "animated"))
         except Exception as error:
             known = outcome(error)
             if known is None:
                 raise
-            failures.append((known[0], job.speech, error))
-            report.receive(Item(str(job.speech), "skipped", known[1]))
+            failures.append((known[0], name, error))
+            report.receive(Item(name, "skipped", known[1]))
     if not failures:
         report.finish("\n".join(map(printable, written)), files=written)
         return
-    if written and not jobs[0].machine_readable:
+    if written and not options.machine_readable:
         print_lines("\n".join(map(printable, written)))
     _, speech, worst = max(failures, key=lambda failure: failure[0])
     kind = type(worst) if isinstance(worst, LipMotionError) else LipMotionError
     raise kind(f"{len(failures)} of {len(jobs)} recordings were not animated, {speech} for one") from worst
-
-
-class _Part:
-    """The report of one recording among several; its progress is a part of theirs, and the result comes at the end."""
-
-    def __init__(self, report: Report, start: float, stop: float) -> None:
-        from lipmotion.types.progress import sub_monitor
-
-        self.receive = sub_monitor(report.receive, start, stop)
-        self.warn = report.warn
-
-    def finish(self, text: str, **figures: object) -> None:
-        """Do nothing: the result is that of all recordings."""

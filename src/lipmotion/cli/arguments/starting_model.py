@@ -27,13 +27,12 @@ def model_to_start_from(name: str, engine: Engine[Any]) -> Model | None:
 
     Raises InputError: a model is given, but the engine's models do not stand on others.
     """
-    from lipmotion.engines.base import StandsOnPrior
     from lipmotion.errors import InputError
     from lipmotion.pipeline.model import load_model
 
     if name == NONE:
         return None
-    if isinstance(engine, StandsOnPrior):
+    if engine.inputs().prior:
         return load_model(name or None)
     if name:
         raise InputError(f"the engine {engine.name!r} does not start from another model; leave --from out")

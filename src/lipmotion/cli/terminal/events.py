@@ -46,7 +46,7 @@ class JsonLines(Events):
 
     def start(self, options: Namespace) -> None:  # noqa: D102
         outputs = getattr(options, "output", None)
-        self._on_error = isinstance(outputs, list) and STANDARD_OUTPUT in outputs
+        self._on_error = isinstance(outputs, list | tuple) and STANDARD_OUTPUT in outputs
         self.emit("start")
 
     def emit(self, kind: str, /, **fields: Any) -> None:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from lipmotion.cli.arguments.declared import add_options
 from lipmotion.cli.arguments.paths import add_input, add_output
-from lipmotion.cli.arguments.speech import add_model_argument
 from lipmotion.cli.terminal.output import print_line
+from lipmotion.pipeline.job import Request
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -15,7 +16,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = verbs.add_parser("adapt", help="adapt a model to a voice, from recordings without transcripts")
     recordings: dict[str, Any] = {"nargs": "+", "metavar": "RECORDING", "help": "audio or video of this voice"}
     add_input(parser, "recordings", what="recording", **recordings)
-    add_model_argument(parser)
+    add_options(parser, Request, "model")
     add_output(parser, "-o", "--output", force=True, required=True, metavar="MODEL")
     parser.set_defaults(run=run)
 

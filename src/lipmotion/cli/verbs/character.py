@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import argparse
 
-from lipmotion.cli.arguments.curve_arguments import add_character_file, driven
+from lipmotion.cli.arguments.declared import add_options, part_of
 from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.cli.terminal.output import print_line, print_lines
+from lipmotion.pipeline.job import Outputs
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -16,7 +17,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     kinds = "FILE.glb .gltf .vrm .obj, or a folder of .obj files"
     add_input(parser, "character", what="character", metavar="FILE", help=kinds)
-    add_character_file(parser)
+    add_options(parser, Outputs, "lip_points", "binding", "control_points")
     points = "write the vertex of each lip point, to correct and give back: point,vertex"
     add_output(parser, "--write-points", metavar="FILE.csv", help=points)
     weights = "write the weights of control points, to paint and give back: vertex,point,weight"
@@ -29,10 +30,11 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> None:
     """Print what was found; write what was asked for."""
     from lipmotion.meshes.files.binding_files import save_binding, write_points, write_weights
+    from lipmotion.pipeline.opened_job import character_of
     from lipmotion.pipeline.outputs.curve_sets import described, write_picture
 
-    options.control_points |= bool(options.write_weights or options.write_binding)
-    character = driven(options)
+    by_points = bool(options.control_points or options.write_weights or options.write_binding)
+    character = character_of(part_of(options, Outputs(), control_points=by_points))
     print_lines("\n".join(described(character)))
     if options.write_points:
         write_points(options.write_points, character.placement)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import argparse
 
+from lipmotion.cli.arguments.declared import add_options
 from lipmotion.cli.arguments.paths import add_input
-from lipmotion.cli.arguments.speech import add_lexicon_argument
 from lipmotion.cli.terminal.output import print_error, print_json, print_line
+from lipmotion.pipeline.job import Request
 
 LINES = 12
 
@@ -17,7 +18,7 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add_input(parser, "corpus", what="corpus")
     sentences = "the sentences whose sounds are needed, one per line (default: those of lipmotion corpus prompts)"
     add_input(parser, "--text", what="text", metavar="FILE", help=sentences)
-    add_lexicon_argument(parser)
+    add_options(parser, Request, "lexicon")
     most = f"at most N lines each of phones, diphones and triphones (default: {LINES})"
     parser.add_argument("--count", type=int, default=LINES, metavar="N", help=most)
     parser.add_argument("--json", action="store_true", help="print one JSON object, with everything that is missing")

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import argparse
 
+from lipmotion.cli.arguments.declared import add_options
 from lipmotion.cli.arguments.paths import add_input
-from lipmotion.cli.arguments.speech import add_lexicon_argument
 from lipmotion.cli.terminal.output import print_error, print_line
+from lipmotion.pipeline.job import Request
 
 
 def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -17,7 +18,7 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add_input(parser, "--text", what="text", metavar="FILE", help=sentences)
     covered = "do not count what this corpus covers already"
     add_input(parser, "--have", what="corpus", metavar="CORPUS", help=covered)
-    add_lexicon_argument(parser)
+    add_options(parser, Request, "lexicon")
     parser.set_defaults(run=run)
 
 

@@ -6,12 +6,13 @@ import argparse
 from contextlib import nullcontext
 from typing import Any
 
-from lipmotion.cli.arguments.delivery import add_delivery_arguments, delivery_of
+from lipmotion.cli.arguments.declared import add_options, part_of
 from lipmotion.cli.arguments.paths import add_output
 from lipmotion.cli.arguments.pipes import is_pipe, read_pipe
-from lipmotion.cli.arguments.speech import add_speech_arguments, request_and_model
 from lipmotion.cli.terminal.output import flush_output, print_line, print_lines
 from lipmotion.cli.terminal.status import status_lines
+from lipmotion.pipeline.job import Request
+from lipmotion.types.delivery import Delivery
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -19,7 +20,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = verbs.add_parser(
         "cues", help="turn speech into mouth shapes for 2D animation (Rhubarb, Moho, OpenToonz, Papagayo)"
     )
-    add_speech_arguments(parser)
+    add_options(parser, Request)
     add = parser.add_argument
     outputs: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
     add_output(parser, "-o", "--output", force=True, help="FILE.tsv .xml .json .dat .pgo, or several", **outputs)
@@ -33,28 +34,31 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add("--hold", type=int, metavar="FRAMES", help="minimum length of a shape (default: that of two frames at 24 fps)")
     add("--shapes", default="GHX", help="optional shapes that the character has (default: GHX; none: '')")
     add("--machine-readable", "--machineReadable", action="store_true", help="progress as JSON lines on standard error")
-    add_delivery_arguments(parser, steps=False)
+    hold = "hold every shape for at least N ms, as --hold FRAMES"
+    add_options(parser, Delivery, but=("stepped",), min_hold_ms={"help": hold})
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.animate``, ``lipmotion.cues`` and ``lipmotion.write_cues``; print the cues or their paths."""
     from lipmotion.pipeline.generate.animate import animate
+    from lipmotion.pipeline.model import load_model
     from lipmotion.pipeline.outputs.cues import check_cue_options, check_cue_outputs, cue_text, cues, write_cues
+    from lipmotion.pipeline.understand.read_request import read_request
 
     status = status_lines(options) if options.machine_readable else nullcontext(lambda _: None)
     piped = is_pipe(options.speech)
-    with status as set_progress, read_pipe(options.speech) as options.speech:
-        delivery = delivery_of(options)
+    with status as set_progress, read_pipe(options.speech) as speech:
+        delivery, asked = part_of(options, Delivery()), part_of(options, Request(), recording=speech)
         check_cue_options(options.fps, options.hold, options.shapes)
-        check_cue_outputs(options.output, options.speech, options.format)
+        check_cue_outputs(options.output, speech, options.format)
         set_progress(0.0)
-        request, model = request_and_model(options)
+        request, model = read_request(asked), load_model(asked.model)
         set_progress(0.1)
         result = animate(request, model=model)
         set_progress(0.9)
         sheet = cues(result, fps=options.fps, hold_frames=options.hold, shapes=options.shapes, delivery=delivery)
-        heard_in = "" if piped else options.speech
+        heard_in = "" if piped else speech
         write_cues(sheet, options.output, speech=heard_in, form=options.format)
         set_progress(1.0)
         for path in options.output:

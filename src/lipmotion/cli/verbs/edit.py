@@ -7,16 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from lipmotion.cli.arguments.declared import add_options, part_of
 from lipmotion.cli.arguments.options import add_machine_readable
 from lipmotion.cli.arguments.paths import add_input
-from lipmotion.cli.arguments.speech import (
-    LEXICON,
-    MODEL,
-    add_recogniser_argument,
-    add_speaker_argument,
-    add_style_arguments,
-    style_of,
-)
+from lipmotion.pipeline.job import Request
 from lipmotion.printable import printable
 
 if TYPE_CHECKING:
@@ -30,12 +24,8 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     sentence = "'phone 12 ends 1.24', 'word 3 is blue', 'pin jawOpen 0.1 at 1.2', ... (docs/edit.md)"
     parser.add_argument("edits", nargs="*", metavar="EDIT", help=sentence)
     add_input(parser, "--of", what="recording", metavar="RECORDING", help="begin a file of edits of this recording")
-    words = "the words that are spoken, if known: also subtitles, and what recognisers write"
-    add_input(parser, "--transcript", what="transcript", replaceable=True, type=str, metavar="TEXT|FILE", help=words)
-    add_input(parser, "--lexicon", what="lexicon", replaceable=True, metavar="FILE", help=LEXICON)
-    add_input(parser, "--model", what="model", replaceable=True, help=MODEL)
-    for add_arguments in (add_recogniser_argument, add_speaker_argument, add_style_arguments):
-        add_arguments(parser)
+    known = ("transcript", "lexicon", "model", "recogniser", "speaker", "pauses", "asymmetry")
+    add_options(parser, Request, *known)
     parser.add_argument("--undo", type=int, default=0, metavar="N", help="take back the last N edits first")
     parser.add_argument("--list", action="store_true", help="print the edits, and the phones with their numbers")
     add_machine_readable(parser)
@@ -75,17 +65,8 @@ def run(options: argparse.Namespace) -> None:
 
 def _begun(options: argparse.Namespace) -> EditFile:
     """Return a file without edits of the recording, whose phones are recognised or aligned now."""
-    from lipmotion.cli.arguments.texts import text_or_file_content
     from lipmotion.pipeline.edit_files import begun
-    from lipmotion.pipeline.understand.request import SpeechRequest
-    from lipmotion.units import Lexicon
+    from lipmotion.pipeline.understand.read_request import read_request
 
-    request = SpeechRequest(
-        options.of,
-        transcript=text_or_file_content(options.transcript) if options.transcript is not None else None,
-        lexicon=Lexicon.from_file(options.lexicon) if options.lexicon else None,
-        recogniser=options.recogniser,
-        speaker=options.speaker,
-        **style_of(options),
-    )
-    return begun(request, options.of, options.model, options.lexicon)
+    asked = part_of(options, Request(), recording=options.of)
+    return begun(read_request(asked), options.of, asked.model, asked.lexicon)

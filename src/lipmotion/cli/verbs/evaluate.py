@@ -5,10 +5,11 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from lipmotion.cli.arguments.declared import add_options
 from lipmotion.cli.arguments.figures import add_figures_arguments, report_figures
 from lipmotion.cli.arguments.options import list_or_all
 from lipmotion.cli.arguments.paths import add_input
-from lipmotion.cli.arguments.speech import add_recogniser_argument
+from lipmotion.pipeline.job import Request
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -18,7 +19,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add_input(parser, "corpus", what="corpus")
     parser.add_argument("--split", default="test", help="train, val, test or all (default: test)")
     parser.add_argument("--speaker", action="append", default=[], metavar="NAME", help="only this speaker (repeatable)")
-    add_recogniser_argument(parser)
+    add_options(parser, Request, "recogniser")
     add_figures_arguments(parser)
     parser.set_defaults(run=run)
 

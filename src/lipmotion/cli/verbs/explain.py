@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import argparse
 
+from lipmotion.cli.arguments.declared import add_options, part_of
 from lipmotion.cli.arguments.paths import add_input
-from lipmotion.cli.arguments.speech import add_speech_arguments, request_and_model
 from lipmotion.cli.terminal.output import print_json, print_lines
+from lipmotion.pipeline.job import Request
 
 RUNS = 2000
 
@@ -17,7 +18,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add_input(
         parser, "former_model", what="model", nargs="?", help=argparse.SUPPRESS
     )  # explain MODEL SPEECH, before 0.2
-    add_speech_arguments(parser)
+    add_options(parser, Request)
     times = "time of a frame (repeatable; default: list the states of the whole recording)"
     parser.add_argument("--at", type=float, action="append", metavar="SECONDS", help=times)
     most = f"without --at: print at most N lines (default: {RUNS})"
@@ -30,9 +31,11 @@ def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.explain`` and print the explanations; without a time, ``lipmotion.state_runs`` and the runs."""
     from lipmotion.pipeline.generate.explain import explain, explanation_document, explanation_text
     from lipmotion.pipeline.generate.state_runs import run_document, run_lines, state_runs
+    from lipmotion.pipeline.model import load_model
+    from lipmotion.pipeline.understand.read_request import read_request
 
-    options.model = options.former_model or options.model
-    request, model = request_and_model(options)
+    asked = part_of(options, Request())
+    request, model = read_request(asked), load_model(options.former_model or asked.model)
     if options.at is not None:
         explanations = explain(request, at=options.at, model=model)
         documents, text = map(explanation_document, explanations), "\n\n".join(map(explanation_text, explanations))

@@ -23,16 +23,16 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Print the header of the model, or its structure."""
-    from lipmotion.engines.base import Describes
     from lipmotion.errors import InputError
     from lipmotion.pipeline.model import load_model, read_header, shipped_path
 
     path = options.model or shipped_path()
     if options.structure:
         model = load_model(path)
-        if not isinstance(model.engine, Describes):
+        text = model.engine.describe(model.learned)
+        if not text:
             raise InputError(f"models of the engine {model.engine.name!r} cannot be printed; leave --structure out")
-        print_lines(model.engine.describe(model.learned))
+        print_lines(text)
         return
     header = read_header(path)
     print_line(f"{'file':14} {path} ({path.stat().st_size / 1e6:.1f} MB)")

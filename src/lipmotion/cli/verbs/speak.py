@@ -6,10 +6,10 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from lipmotion.cli.arguments.declared import add_options, add_outputs, part_of
 from lipmotion.cli.arguments.options import add_machine_readable
 from lipmotion.cli.arguments.paths import add_input
-from lipmotion.cli.arguments.results import add_result_arguments, check_results, write_results
-from lipmotion.cli.arguments.speech import add_text_arguments, style_of
+from lipmotion.pipeline.job import Job, Request
 from lipmotion.printable import printable
 from lipmotion.storage.sources import is_file
 
@@ -26,9 +26,9 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--voice", metavar="NAME", help=named)
     add_input(parser, "--corpus", what="corpus", metavar="FOLDER", help="whose recordings speak, for --voice corpus")
     parser.add_argument("--voices", action="store_true", help="list the installed voices")
-    add_text_arguments(parser)
+    add_options(parser, Request, "lexicon", "model", "speaker", "onto", "onto_speaker", "pauses", "asymmetry")
     suffixes = "FILE.mp4 .webm .mov %%05d.png .wav .flac .ogg .json .csv .npz .TextGrid .vtt, ... (docs/formats.md)"
-    add_result_arguments(parser, suffixes, required=False)
+    add_outputs(parser, suffixes, required=False)
     add_machine_readable(parser)
     parser.set_defaults(run=run, wrong=parser.error)
 
@@ -55,14 +55,25 @@ def _speak(options: argparse.Namespace, report: Report) -> None:
     from lipmotion.corpora.store import Corpus
     from lipmotion.pipeline.generate.speak import read_text, speak
     from lipmotion.pipeline.model import load_model
-    from lipmotion.units import Lexicon
+    from lipmotion.pipeline.opened_job import opened
+    from lipmotion.pipeline.understand.read_request import read_lexicon
 
-    check_results(options)
-    text = read_text(options.text) if options.text else options.words
-    lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
-    model, corpus = load_model(options.model), Corpus.open(options.corpus) if options.corpus else None
-    how = {"voice": options.voice, "corpus": corpus, "model": model, "lexicon": lexicon, "speaker": options.speaker}
-    onto = options.onto or options.face.other_person(model, options.speaker)
-    sound, result = speak(text, **how, onto=onto, onto_speaker=options.onto_speaker, **style_of(options))
-    write_results(options, result, sound, model, report)
+    job = opened(part_of(options, Job()))
+    job.checked()
+    asked, text = job.job.request, read_text(options.text) if options.text else options.words
+    lexicon = read_lexicon(asked)
+    model, corpus = load_model(asked.model), Corpus.open(options.corpus) if options.corpus else None
+    sound, result = speak(
+        text,
+        voice=options.voice,
+        corpus=corpus,
+        model=model,
+        lexicon=lexicon,
+        speaker=asked.speaker,
+        onto=asked.onto or job.face.other_person(model, asked.speaker),
+        onto_speaker=asked.onto_speaker,
+        pauses=asked.pauses,
+        asymmetry=asked.asymmetry,
+    )
+    job.write(result, sound, model, monitor=report.receive)
     report.finish("\n".join(map(printable, options.output)), files=options.output, seconds=round(sound.duration_s, 3))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 
+from lipmotion.cli.arguments.declared import add_options
 from lipmotion.cli.arguments.options import add_execution, list_or_all, worker_count
 from lipmotion.cli.arguments.paths import add_input, add_output
-from lipmotion.cli.arguments.speech import add_lexicon_argument
 from lipmotion.cli.arguments.starting_model import add_start_argument, model_to_start_from
+from lipmotion.pipeline.job import Request
 
 ENGINE = "trajectory (default), coupled (chains of states for speech and for lips) or joint (one model, five streams)"
 SYSTEM = "structure of the coupled engine: ph-HMM, ph-MSHMM, ph-FHMM, ph-vi-FHMM, ph-CHMM or ph-vi-CHMM (default)"
@@ -22,7 +23,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add_output(parser, "-o", "--output", force=True, keeps_work=True, required=True, metavar="MODEL")
     parser.add_argument("--split", default="train", help="train, val, test or all (default: train)")
     parser.add_argument("--speaker", action="append", default=[], metavar="NAME", help="only this speaker (repeatable)")
-    add_lexicon_argument(parser)
+    add_options(parser, Request, "lexicon")
     parser.add_argument("--engine", default="trajectory", help=ENGINE)
     parser.add_argument("--system", metavar="NAME", help=SYSTEM)
     add_input(parser, "--units", what="table of units", replaceable=True, type=str, metavar="SET", help=UNITS)

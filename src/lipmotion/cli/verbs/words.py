@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from lipmotion.cli.arguments.declared import add_options
 from lipmotion.cli.arguments.options import add_execution, worker_count
 from lipmotion.cli.arguments.paths import add_input, add_output
-from lipmotion.cli.arguments.speech import add_model_argument
+from lipmotion.pipeline.job import Request
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -19,7 +20,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add_output(parser, "-o", "--output", force=True, help=written, **outputs)
     kinds = "words: all; auto: those that fit the sound (default: words)"
     parser.add_argument("--recogniser", default="words", metavar="KIND", help=kinds)
-    add_model_argument(parser)
+    add_options(parser, Request, "model")
     add_execution(parser)
     parser.set_defaults(run=run)
 

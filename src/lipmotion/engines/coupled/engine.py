@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, final
@@ -9,7 +10,7 @@ from typing import Any, ClassVar, final
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.base import Arrays, Engine, Fit, explain_by_trace
+from lipmotion.engines.base import Arrays, Engine, Fit, Inputs, explain_by_trace
 from lipmotion.engines.coupled.arrays import coupled_arrays, coupled_from_arrays
 from lipmotion.engines.coupled.chains.densities import Single
 from lipmotion.engines.coupled.chains.lattice import Lattice
@@ -52,9 +53,8 @@ class CoupledEngine(Engine[CoupledModel]):
     name: ClassVar[str] = "coupled"
     Config: ClassVar[type[Configuration]] = CoupledConfig
 
-    @property
-    def trains_on_speech_alone(self) -> bool:  # noqa: D102
-        return True
+    def inputs(self, motion_s: float = math.inf) -> Inputs:  # noqa: D102, ARG002
+        return Inputs(speech_alone=True)
 
     def fit(  # noqa: D102
         self,
@@ -62,9 +62,7 @@ class CoupledEngine(Engine[CoupledModel]):
         monitor: Monitor,
         checkpoint: Checkpoint = NO_CHECKPOINT,  # noqa: ARG002 - training takes a minute
     ) -> Fit[CoupledModel]:
-        model = fit_coupled(examples, self.config, monitor)
-        frames = sum(int(example.valid.sum()) for example in examples)
-        return Fit(model, {"frames": frames, "joint_states": model.chains.transitions.product.chain_states.shape[1]})
+        return fit_coupled(examples, self.config, monitor)
 
     def without_closures(self) -> CoupledEngine:  # noqa: D102
         return replace(self, config=replace(self.config, closures=False))

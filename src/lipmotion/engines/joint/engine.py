@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -10,7 +11,7 @@ from typing import Any, ClassVar, final
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.base import Arrays, Engine, Fit
+from lipmotion.engines.base import Arrays, Engine, Fit, Inputs
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.multistream.align import StatePath, align
 from lipmotion.hmm.multistream.arrays import joint_arrays, joint_from_arrays
@@ -159,9 +160,8 @@ class JointEngine(Engine[JointModel]):
     name: ClassVar[str] = "joint"
     Config: ClassVar[type[Configuration]] = JointEngineConfig
 
-    @property
-    def wants_f0(self) -> bool:  # noqa: D102
-        return self.config.f0
+    def inputs(self, motion_s: float = math.inf) -> Inputs:  # noqa: D102, ARG002
+        return Inputs(f0=self.config.f0)
 
     def fit(  # noqa: D102
         self,

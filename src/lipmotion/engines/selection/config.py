@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from lipmotion.engines.selection.lip_reading import OVERLAPS, parsed_invisible
 from lipmotion.errors import InputError
+from lipmotion.motion.predictors import AUTOMATIC, check_predictor
 from lipmotion.types import Configuration, Rule, option
 
 NOT_NEGATIVE = Rule(least=0)
@@ -43,6 +44,7 @@ class SelectionConfig(Configuration):
     joint_recogniser : train the joint model as well, where there is enough speech: it recognises phones of this speaker
     closures   : make the lips meet in every p, b and m
     articulation : lean on the table of English articulation in contexts that training saw little of
+    predictor  : name of the predictor that is the guide (docs/extend/predictor.md); ``auto``: as suits the recordings
     """
 
     window: int = option(5, Rule(least=3, odd=True))
@@ -69,12 +71,16 @@ class SelectionConfig(Configuration):
     joint_recogniser: bool = True
     closures: bool = True
     articulation: bool = True
+    predictor: str = option(AUTOMATIC, later=True)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         parsed_invisible(self.invisible)
         if self.window > LARGEST_WINDOW:
             raise InputError(f"window is {self.window}, required an odd number from 3 to {LARGEST_WINDOW}")
+
+    def check_files(self) -> None:  # noqa: D102
+        check_predictor(self.predictor)
 
     @property
     def invisible_phones(self) -> frozenset[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, final
@@ -10,7 +11,7 @@ from typing import Any, ClassVar, final
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.base import Arrays, Engine, Fit, SourcePiece
+from lipmotion.engines.base import Arrays, Engine, Fit, Inputs, SourcePiece
 from lipmotion.engines.selection.concatenation import concatenated, pieces_of, shown_units
 from lipmotion.engines.selection.config import SelectionConfig
 from lipmotion.engines.selection.costs import Costs, Target
@@ -22,8 +23,7 @@ from lipmotion.engines.selection.targets import target_of
 from lipmotion.engines.selection.train import fit_selection
 from lipmotion.errors import InputError
 from lipmotion.motion.generation import Statistics
-from lipmotion.motion.predictors import LEAST_NETWORK_S
-from lipmotion.motion.prior_regression import PriorRegression
+from lipmotion.motion.predictors import needs_conditions
 from lipmotion.motion.rest import away_from_speech, runs, speech_intervals, unheard_frames
 from lipmotion.printable import printable
 from lipmotion.stats.delta_windows import with_dynamics
@@ -64,9 +64,9 @@ class SelectionEngine(Engine[SelectionModel]):
     name: ClassVar[str] = "selection"
     Config: ClassVar[type[Configuration]] = SelectionConfig
 
-    @property
-    def wants_f0(self) -> bool:  # noqa: D102
-        return self.config.joint_recogniser
+    def inputs(self, motion_s: float = math.inf) -> Inputs:  # noqa: D102
+        has_conditions = self.config.guide and needs_conditions(self.config.predictor, motion_s)
+        return Inputs(self.config.joint_recogniser, self.config.conditions if has_conditions else 0, prior=True)
 
     def fit(  # noqa: D102
         self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NO_CHECKPOINT
@@ -74,13 +74,7 @@ class SelectionEngine(Engine[SelectionModel]):
         model, deviations = fit_selection(examples, self.config, monitor, checkpoint)
         frames = sum(int(example.valid.sum()) for example in examples)
         figures = {"frames": frames, "units": int(model.inventory.usable.sum()), "deviation": float(deviations[0])}
-        return Fit(model, figures)
-
-    def conditions(self, motion_s: float) -> int:  # noqa: D102
-        return self.config.conditions if self.config.guide and motion_s >= LEAST_NETWORK_S else 0
-
-    def stands_on_prior(self, model: SelectionModel) -> bool:  # noqa: D102
-        return model.guide is not None and isinstance(model.guide.predictor, PriorRegression)
+        return Fit(model, figures, model.guide is not None and model.guide.predictor.uses_prior)
 
     def recognise(self, model: SelectionModel, speech: Speech) -> Timeline[Unit] | None:  # noqa: D102
         return model.phone_recogniser.phones(speech) if model.phone_recogniser is not None else None
@@ -156,9 +150,9 @@ class SelectionEngine(Engine[SelectionModel]):
         return typical_duration_s(model.inventory, phone)
 
     def source_pieces(  # noqa: D102
-        self, model: SelectionModel, units: Timeline[Unit], heard: Mapping[str, NDArray[np.floating[Any]]]
+        self, model: SelectionModel, units: Timeline[Unit], features: Mapping[str, NDArray[np.floating[Any]]]
     ) -> tuple[tuple[SourcePiece, ...], Timeline[Unit]]:
-        return source_pieces(model, self.config, units, heard)
+        return source_pieces(model, self.config, units, features)
 
     def describe(self, model: SelectionModel) -> str:  # noqa: D102
         return inventory_text(model.inventory)

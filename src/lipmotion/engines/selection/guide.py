@@ -23,7 +23,7 @@ UNHEARD_EXPANSION = 1.05
 class Guide:
     """A predictor of motion, and how much narrower its predictions are than recorded motion.
 
-    predictor : an acoustic network, or a regression
+    predictor : of any kind
     centre    : mean of the recorded motion [shape=(Q,)]
     expansion : standard deviation of recorded by that of predicted motion [shape=(Q,)]
     """

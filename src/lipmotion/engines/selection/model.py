@@ -22,7 +22,7 @@ from lipmotion.hmm.multistream.phone_recogniser import (
 )
 from lipmotion.motion.arrays import LEARNED_MOTION_ARRAYS, learned_motion_arrays, learned_motion_from_arrays
 from lipmotion.motion.generation import LearnedMotion
-from lipmotion.motion.predictors import PREDICTOR_ARRAYS, predictor_arrays, predictor_from_arrays
+from lipmotion.motion.predictors import names_of_predictors, predictor_arrays, predictor_from_arrays
 from lipmotion.motion.store import motion_store_arrays, motion_store_from_arrays
 from lipmotion.storage.schema import (
     POSITIVE,
@@ -112,7 +112,7 @@ def model_from_arrays(arrays: Arrays) -> SelectionModel:
     """
     with format_errors("the model of recorded units"):
         named = (name for name in arrays if name.startswith((JOINT_PREFIX, STORE_PREFIX)))
-        refuse_undeclared(arrays, LEARNED_MOTION_ARRAYS, PREDICTOR_ARRAYS, UNITS, GUIDE, named)
+        refuse_undeclared(arrays, LEARNED_MOTION_ARRAYS, names_of_predictors(arrays), UNITS, GUIDE, named)
         motion = learned_motion_from_arrays(arrays)
         dimensions = motion.space.dimensions
         stored = checked_arrays(arrays, UNITS, Q=dimensions)

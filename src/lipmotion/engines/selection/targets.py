@@ -11,7 +11,6 @@ from lipmotion.engines.selection.costs import Costs, Target
 from lipmotion.engines.selection.guide import at_points
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.windows import covering, phone_windows
-from lipmotion.motion.acoustic_network import AcousticNetwork
 from lipmotion.motion.reliability import phone_reliability
 from lipmotion.types import FRAME_RATE_HZ, Span, Speech, Timeline, Unit
 from lipmotion.units import SILENCE
@@ -36,8 +35,7 @@ def target_of(
     frames = len(speech.features.values)
     duration_s = (frames - 1) / FRAME_RATE_HZ
     units, guide = covering(speech.units, duration_s), model.guide
-    unheard = guide is not None and isinstance(guide.predictor, AcousticNetwork) and speech.spectrum is None
-    if guide is None or unheard or not costs.config.guide:
+    if guide is None or not guide.predictor.can_predict(speech) or not costs.config.guide:
         return costs.target(phone_windows([units]), None, None)
     motion, distortion = guide.predict(speech)
     by_sound = bool(phone_reliability(speech, distortion, frames).mean() < LEAST_RELIABILITY)

@@ -19,11 +19,9 @@ from lipmotion.engines.selection.targets import target_of
 from lipmotion.engines.selection.windows import covering, phone_windows
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.multistream.phone_recogniser import fit_phone_recogniser
-from lipmotion.motion.acoustic_network import fit_acoustic_network
 from lipmotion.motion.closure import OPENING
 from lipmotion.motion.fit import fit_motion
-from lipmotion.motion.predictors import Predictor, stands_on_another
-from lipmotion.motion.prior_regression import fit_prior_regression
+from lipmotion.motion.predictors import PredictorTraining, predictor_class, suitable_predictor
 from lipmotion.motion.rest import away_from_speech, runs, speech_intervals
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.store import LIP_WIDTH_SHARE, MotionStore, compress, lip_tolerance
@@ -61,8 +59,10 @@ def fit_selection(
         recogniser = fit_phone_recogniser(examples, values, sub_monitor(monitor, 0, 0.3), checkpoint)
     guide = None
     if config.guide:
-        predictor = _predictor(examples, values, motion.space, config, sub_monitor(monitor, 0.3, 0.9), checkpoint)
-        guide = fit_guide(predictor, examples, values)
+        kind = suitable_predictor(config.predictor, examples) or predictor_class("prior")
+        direct, of_guide = len(motion.space.direct), sub_monitor(monitor, 0.3, 0.9)
+        training = PredictorTraining(examples, values, direct, config.epochs, of_guide, checkpoint)
+        guide = fit_guide(kind.fit(training).predictor, examples, values)
     monitor(Progress(_STAGE, 1, 3, 0.0))
     inventory = inventory_of(examples, values, motion.space, guide)
     monitor(Progress(_STAGE, 2, 3, 0.0))
@@ -122,20 +122,6 @@ def comparison_scale(recorded: Array, space: MotionSpace) -> Array:
     weights = np.ones(len(deviations))
     weights[:direct] = [CHANNEL_WEIGHTS.get(name, 1.0) for name in space.direct_names]
     return np.sqrt(weights) / deviations
-
-
-def _predictor(
-    examples: Sequence[Example],
-    values: Sequence[Array],
-    space: MotionSpace,
-    config: SelectionConfig,
-    monitor: Monitor,
-    checkpoint: Checkpoint,
-) -> Predictor:
-    direct = len(space.direct)
-    if not stands_on_another(examples) and all(example.heard for example in examples):
-        return fit_acoustic_network(examples, values, direct, config.epochs, monitor, checkpoint)
-    return fit_prior_regression(examples, values, direct)[0]
 
 
 def _stored(

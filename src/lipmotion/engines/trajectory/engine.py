@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, final
@@ -9,15 +10,13 @@ from typing import Any, ClassVar, final
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines.base import Arrays, Engine, Fit
+from lipmotion.engines.base import Arrays, Engine, Fit, Inputs
 from lipmotion.engines.trajectory.experts import Experts
 from lipmotion.engines.trajectory.model import TrajectoryModel, model_arrays, model_from_arrays
 from lipmotion.engines.trajectory.train import fit_trajectory
 from lipmotion.engines.trajectory.training_data import TrainingOptions
-from lipmotion.motion.acoustic_network import AcousticNetwork
 from lipmotion.motion.frame_labels import StateLayout, full_context_states, with_unit_names
-from lipmotion.motion.predictors import LEAST_NETWORK_S
-from lipmotion.motion.prior_regression import PriorRegression
+from lipmotion.motion.predictors import AUTOMATIC, check_predictor, needs_conditions
 from lipmotion.motion.rest import unheard_frames
 from lipmotion.printable import printable
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
@@ -61,6 +60,8 @@ class TrajectoryConfig(Configuration):
     conditions : acoustic conditions in which each recording is heard in the training of the acoustic network; 0: no
                  network
     epochs     : how often the training of the network uses each recording
+    predictor  : name of the predictor beside the states (docs/extend/predictor.md); ``auto``: an acoustic network, or,
+                 where the model stands on another one, a regression on what that makes of the speech
     articulation : lean on the table of English articulation in contexts that training saw little of
     units      : name of a unit set, or path of a table of units (docs/unit-sets.md), which training reads
     """
@@ -85,6 +86,7 @@ class TrajectoryConfig(Configuration):
     epochs: int = option(100, Rule(least=1))
     articulation: bool = True
     units: str = "phone"
+    predictor: str = option(AUTOMATIC, later=True)
 
     former: ClassVar[Mapping[str, str]] = {
         "parts": "states",
@@ -98,6 +100,7 @@ class TrajectoryConfig(Configuration):
 
     def check_files(self) -> None:  # noqa: D102
         unit_set(self.units)
+        check_predictor(self.predictor)
 
     def layout(self, units: UnitSet) -> StateLayout:
         """Return the states of phones and silences, for a unit set."""
@@ -123,29 +126,22 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
     name: ClassVar[str] = "trajectory"
     Config: ClassVar[type[Configuration]] = TrajectoryConfig
 
-    @property
-    def wants_f0(self) -> bool:  # noqa: D102
-        return self.config.joint_recogniser
+    def inputs(self, motion_s: float = math.inf) -> Inputs:  # noqa: D102
+        conditions = self.config.conditions if needs_conditions(self.config.predictor, motion_s) else 0
+        return Inputs(self.config.joint_recogniser, conditions, prior=True)
 
     def fit(  # noqa: D102
         self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NO_CHECKPOINT
     ) -> Fit[TrajectoryModel]:
         model = fit_trajectory(examples, self.config.training, monitor, checkpoint)
         frames = sum(int(example.valid.sum()) for example in examples)
-        return Fit(model, {"frames": frames, "leaves": len(model.emission.means)})
-
-    def conditions(self, motion_s: float) -> int:  # noqa: D102
-        return self.config.conditions if motion_s >= LEAST_NETWORK_S else 0
+        uses_prior = model.network is not None and model.network.uses_prior
+        return Fit(model, {"frames": frames, "leaves": len(model.emission.means)}, uses_prior)
 
     def hidden(  # noqa: D102
         self, model: TrajectoryModel, speech: Speech
     ) -> tuple[NDArray[np.float32], NDArray[np.float64]] | None:
-        if not isinstance(model.network, AcousticNetwork) or speech.spectrum is None:
-            return None
-        return model.network.hidden(speech.spectrum)
-
-    def stands_on_prior(self, model: TrajectoryModel) -> bool:  # noqa: D102
-        return isinstance(model.network, PriorRegression)
+        return model.network.hidden(speech) if model.network is not None else None
 
     def recognise(self, model: TrajectoryModel, speech: Speech) -> Timeline[Unit] | None:  # noqa: D102
         return model.phone_recogniser.phones(speech) if model.phone_recogniser is not None else None

@@ -1,4 +1,4 @@
-"""Two experts that predict each frame together: the states, and the acoustic network."""
+"""Two experts that predict each frame together: the states, and a predictor without states."""
 
 from __future__ import annotations
 
@@ -12,22 +12,21 @@ from lipmotion.engines.trajectory.emission import Emission
 from lipmotion.motion.articulation import ArticulationPrior, dynamics_of
 from lipmotion.motion.generation import Statistics
 from lipmotion.motion.predictors import Predictor
-from lipmotion.motion.prior_regression import PriorRegression
 from lipmotion.motion.reliability import phone_reliability
 from lipmotion.types import Speech
 
 Array = NDArray[np.float64]
 NETWORK_SHARE = 0.5
-"""Weight of the network beside the states, 0 to 1, in models that have no other."""
+"""Weight of the predictor beside the states, 0 to 1, in models that have no other."""
 
 
 @dataclass(frozen=True, eq=False)
 class Experts:
-    """The states and the network on one recording.
+    """The states and the predictor on one recording.
 
     emission, rows : densities, and the one of each frame [shape=(T,)]; the last density is that of the rest pose
     network        : predicts motion without the states (None: there was too little speech to train it)
-    network_share  : weight of the network, 0 to 1, in contexts that training knows well
+    network_share  : weight of that predictor, 0 to 1, in contexts that training knows well
     prior          : says how well training knows a phone in its context (None: taken as well known)
     """
 
@@ -41,35 +40,35 @@ class Experts:
     def statistics(self, frames: slice) -> Statistics:
         """Return means and precisions of a range of N frames [each shape=(N, 3, Q)]: weighted means of both."""
         means, precisions = self.emission.statistics(self.rows[frames], np.asarray(self.speech.features.values), frames)
-        if self.network is None or self._heard is None:
+        if self.network is None or self._predicted is None:
             return means, precisions
         share = self._share[frames, None, None]
-        means += share * (dynamics_of(self._heard[0], frames) - means)
+        means += share * (dynamics_of(self._predicted[0], frames) - means)
         precisions += share * (1 / self.network.variances - precisions)
         return means, precisions
 
     @cached_property
     def reliability(self) -> Array:
         """How far the phones in time can be relied on, 0 to 1 [shape=(T,)]."""
-        return phone_reliability(self.speech, None if self._heard is None else self._heard[1], len(self.rows))
+        return phone_reliability(self.speech, None if self._predicted is None else self._predicted[1], len(self.rows))
 
     @cached_property
-    def _heard(self) -> tuple[Array, Array] | None:
-        """Motion [shape=(T, Q)] and distortion [shape=(T,)] by the network."""
-        if self.network is None or (self.speech.spectrum is None and self.speech.prior is None):
+    def _predicted(self) -> tuple[Array, Array] | None:
+        """Motion [shape=(T, Q)] and distortion [shape=(T,)] by the predictor."""
+        if self.network is None or not self.network.can_predict(self.speech):
             return None
         return self.network.predict(self.speech)
 
     @cached_property
     def _share(self) -> Array:
-        """The share of the network in every frame, 0 to 1 [shape=(T,)].
+        """The share of the predictor in every frame, 0 to 1 [shape=(T,)].
 
         It is ``network_share`` where training knows the phone in its context, and all where not; in the rest pose the
-        states alone count. Beside a regression on another model, contexts are not asked for: its share was chosen with
-        those that training does not know. Phones that cannot be relied on leave all to the network.
+        states alone count. Beside a predictor that uses the table of articulation itself, contexts are not asked for.
+        Phones that cannot be relied on leave all to the predictor.
         """
         familiarity = np.ones(len(self.rows))
-        if self.prior is not None and not isinstance(self.network, PriorRegression):
+        if self.prior is not None and not (self.network is not None and self.network.uses_articulation):
             familiarity = self.prior.familiarity(self.speech.units, len(self.rows))
         resting = self.rows == len(self.emission.means) - 1
         states = (1 - self.network_share) * self.reliability * familiarity

@@ -24,8 +24,7 @@ from lipmotion.motion.closure import Closure
 from lipmotion.motion.frame_labels import StateLayout
 from lipmotion.motion.generation import LearnedMotion
 from lipmotion.motion.limits import MotionLimits, check_poses, limits_of
-from lipmotion.motion.predictors import PREDICTOR_ARRAYS, Predictor, predictor_arrays, predictor_from_arrays
-from lipmotion.motion.prior_regression import PriorRegression
+from lipmotion.motion.predictors import Predictor, names_of_predictors, predictor_arrays, predictor_from_arrays
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.variance_scaling import VarianceScaling
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays, format_errors, refuse_undeclared
@@ -42,9 +41,8 @@ class TrajectoryModel:
     variance_factors : factors of variance scaling about the rest pose [shape=(Q,)]
     closure  : of the lips in p, b and m (None: the motion has no channel ``opening``)
     phone_recogniser : recognises the phones of speakers that it was trained on (None: there was too little speech)
-    network  : motion from the sound alone, or, where the model stands on another one, by regression on what that makes
-               of the speech (None: there was too little speech, and no other model)
-    network_share : weight of the network, 0 to 1, beside the states in contexts that training knows well
+    network  : predicts motion without the states (None: there was too little speech, and no other model)
+    network_share : weight of this predictor, 0 to 1, beside the states in contexts that training knows well
     prior    : the table of articulation in the speaker's range (None: it is not used)
     """
 
@@ -67,7 +65,7 @@ class TrajectoryModel:
     def motion(self) -> LearnedMotion:
         """Motion space, closure, limits and variance scaling, which turn predicted means into motion."""
         scaling = VarianceScaling(self.variance_factors, self.emission.means[-1, 0])
-        has_table = isinstance(self.network, PriorRegression)  # among its regressors
+        has_table = self.network is not None and self.network.uses_articulation
         prior = None if has_table else self.prior
         return LearnedMotion(self.space, self.closure, self.limits, scaling, prior)
 
@@ -96,7 +94,8 @@ def model_from_arrays(arrays: Arrays, layout: Callable[[UnitSet], StateLayout], 
     """
     with format_errors("the trajectory model"):
         joint = (name for name in arrays if name.startswith(JOINT_PREFIX))
-        refuse_undeclared(arrays, MOTION_ARRAYS, EMISSION, VARIANCE_FACTORS, PREDICTOR_ARRAYS, SHARE, joint)
+        others = names_of_predictors(arrays)
+        refuse_undeclared(arrays, MOTION_ARRAYS, EMISSION, VARIANCE_FACTORS, others, SHARE, joint)
         unit_set, space, closure, prior = motion_from_arrays(arrays, units)
         emission = emission_from_arrays(arrays, layout(unit_set), space.dimensions)
         factors = checked_arrays(arrays, VARIANCE_FACTORS, Q=space.dimensions)["gain"]

@@ -15,12 +15,10 @@ from lipmotion.engines.trajectory.training_data import TrainingClip, TrainingOpt
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.multistream.phone_recogniser import fit_phone_recogniser
 from lipmotion.kernels.sequences.banded import generate
-from lipmotion.motion.acoustic_network import fit_acoustic_network
 from lipmotion.motion.articulation import ArticulationPrior, fit_articulation_prior
 from lipmotion.motion.closure import fit_closure
 from lipmotion.motion.frame_labels import FullContextState, StateLayout, full_context_states
-from lipmotion.motion.predictors import Predictor, stands_on_another
-from lipmotion.motion.prior_regression import fit_prior_regression, folds
+from lipmotion.motion.predictors import Predictor, PredictorTraining, folds, suitable_predictor
 from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.motion.variance_scaling import scaling_factors
 from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
@@ -61,12 +59,14 @@ def fit_trajectory(
     prior = fit_articulation_prior(space, values, examples) if options.articulation else None
     network: Predictor | None = None
     share = NETWORK_SHARE
-    if stands_on_another(examples):
-        network, predictions = fit_prior_regression(examples, values, len(space.direct))
-        share = _share_of_regression(predictions, clips, options, len(space.direct))
-    elif all(example.heard for example in examples):
-        network_monitor = sub_monitor(monitor, 0.4, 0.99)
-        network = fit_acoustic_network(examples, values, len(space.direct), options.epochs, network_monitor, checkpoint)
+    kind, direct = suitable_predictor(options.predictor, examples), len(space.direct)
+    if kind is not None:
+        of_predictor = sub_monitor(monitor, 0.4, 0.99)
+        network, held_out = kind.fit(
+            PredictorTraining(examples, values, direct, options.epochs, of_predictor, checkpoint)
+        )
+        if held_out is not None:
+            share = _share_of_predictor(held_out, clips, options, direct)
     factors = _scaling_factors(emission, network, prior, share, clips, options)
     monitor(Progress(_STAGE, 3, 3, 1.0))
     closure = fit_closure(space.direct_names, values, examples)
@@ -79,14 +79,14 @@ _STAGE = "trees"
 """Name of this stage in reports of progress."""
 
 
-def _share_of_regression(
+def _share_of_predictor(
     predictions: Sequence[Array], clips: Sequence[TrainingClip], options: TrainingOptions, direct: int
 ) -> float:
-    """Return the weight of a regression on another model beside the states, by cross-validation: 0 to 1.
+    """Return the weight of a predictor beside the states, by cross-validation: 0 to 1.
 
-    predictions : of each clip by regressions on other clips [each shape=(T, Q)]
+    predictions : of each clip by predictors that were trained on the other folds [each shape=(T, Q)]
     direct      : number of channels that are modelled as they are; the weight is chosen for them
-    The states are trained on the same folds. With a single clip, the regression has all the weight.
+    The states are trained on the same folds. With a single clip, the predictor has all the weight.
     """
     if len(clips) < 2:
         return 1.0
@@ -99,9 +99,9 @@ def _share_of_regression(
             clip = clips[number]
             rows = density_rows(emission, clip.states, options.layout)
             states = generate(*emission.statistics(rows, clip.features, slice(None)))[0][clip.frames, :direct]
-            recorded, regressed = clip.rows[:, 0, :direct], predictions[number][clip.frames, :direct]
+            recorded, predicted = clip.rows[:, 0, :direct], predictions[number][clip.frames, :direct]
             spread = np.maximum(recorded.std(axis=0), 1e-6)
-            change = (regressed - states) / spread
+            change = (predicted - states) / spread
             products += float((change * (recorded - states) / spread).sum())
             squares += float(np.square(change).sum())
     return float(np.clip(products / max(squares, 1e-12), 0, 1))

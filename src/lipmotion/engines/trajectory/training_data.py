@@ -28,8 +28,9 @@ class TrainingOptions:
                    all nodes share towards zero
     ridge_frames : smallest number of frames of a node with a regression of its own
     joint_recogniser : train the joint model as well
-    epochs : how often the training of the acoustic network uses each recording
+    epochs : how often the training of the predictor uses each recording
     articulation : lean on the table of articulation
+    predictor : name of the predictor, or ``auto``
     """
 
     layout: StateLayout
@@ -46,6 +47,7 @@ class TrainingOptions:
     joint_recogniser: bool
     epochs: int
     articulation: bool
+    predictor: str
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,6 @@ import numpy as np
 
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import Animator
-from lipmotion.engines.base import ForcesClosures
 from lipmotion.experiments.comparison import correlation_statistic, opening_curves
 from lipmotion.experiments.engines.disagreement import disagreement_figures, openings_of_clips
 from lipmotion.experiments.engines.hybrid import Hybrid, HybridModel
@@ -133,7 +132,7 @@ def _made(recordings: HeldOutRecordings, condition: str, system: ComparedEngine)
     known = replace(recordings, speakers=system.speakers)
     speech = speech_of_condition(known, condition, system.engine, system.learned)
     pinned = compare_with_recorded(known, speech, system.engine, system.learned)
-    free = system.engine.without_closures() if isinstance(system.engine, ForcesClosures) else system.engine
+    free = system.engine.without_closures()
     return _MadeClips(
         pinned, compare_with_recorded(known, speech, free, system.learned) if free != system.engine else pinned
     )

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, final
 
 import numpy as np
 
-from lipmotion.engines import Animator, Fit
+from lipmotion.engines import Animator, Fit, Inputs
 from lipmotion.engines.selection.engine import SelectionEngine
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.trajectory.engine import TrajectoryEngine
@@ -43,27 +44,14 @@ class Hybrid(Animator[HybridModel]):
     guiding: TrajectoryEngine
     selecting: SelectionEngine
 
-    @property
-    def wants_f0(self) -> bool:
-        """Whether either engine needs F0."""
-        return self.guiding.wants_f0 or self.selecting.wants_f0
+    def inputs(self, motion_s: float = math.inf) -> Inputs:  # noqa: D102
+        guiding, selecting = self.guiding.inputs(motion_s), self.selecting.inputs(motion_s)
+        return Inputs(guiding.f0 or selecting.f0, max(guiding.conditions, selecting.conditions))
 
-    def conditions(self, motion_s: float) -> int:
-        """Return the greater number of acoustic conditions that one of both engines hears in training.
-
-        motion_s : seconds of measured motion
-        """
-        return max(self.guiding.conditions(motion_s), self.selecting.conditions(motion_s))
-
-    def recognise(self, model: HybridModel, speech: Speech) -> Timeline[Unit] | None:
-        """Return the phones in time that the trajectory engine's model recognises, or None.
-
-        speech : its ``units`` are empty
-        """
+    def recognise(self, model: HybridModel, speech: Speech) -> Timeline[Unit] | None:  # noqa: D102
         return self.guiding.recognise(model.guiding, speech)
 
-    def without_closures(self) -> Hybrid:
-        """Return the hybrid of both engines without forced closures."""
+    def without_closures(self) -> Hybrid:  # noqa: D102
         return Hybrid(self.guiding.without_closures(), self.selecting.without_closures())
 
     def fit(  # noqa: D102

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
 
+from lipmotion.engines import Fit
 from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledModel
@@ -60,7 +61,7 @@ def select_mixtures(
     for count, make_model, seconds in _stages(examples, _with_mixtures(config, most), monitor):
         if count not in counts:
             continue
-        model = make_model()
+        model = make_model().model
         if validation is not None:
             engine = CoupledEngine(_with_mixtures(config, count))
             validation_acc[count] = _mean_acc(validation, condition, engine, model)
@@ -85,7 +86,7 @@ def _with_mixtures(config: CoupledConfig, count: int) -> CoupledConfig:
 
 def _stages(
     examples: Sequence[Example], config: CoupledConfig, monitor: Monitor
-) -> Iterator[tuple[int, Callable[[], CoupledModel], float]]:
+) -> Iterator[tuple[int, Callable[[], Fit[CoupledModel]], float]]:
     """Yield, for each stage of training, the number of Gaussians, a function that returns the model, and the seconds.
 
     The seconds are those of all training up to this stage.

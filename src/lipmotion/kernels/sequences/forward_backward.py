@@ -1,4 +1,8 @@
-"""State posteriors of left-to-right chains by forward–backward, for many utterances at a time."""
+"""Forward–backward: first as it is defined, for any network of states, then for many left-to-right chains at a time.
+
+``log_forward_backward`` is the definition. The other forms are faster, and tests compare them with it:
+``chain_posteriors``, here, and ``ForwardBackwardNetwork`` (``kernels.sequences.network``), which falls back on it.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +12,46 @@ from numpy.typing import NDArray
 from lipmotion.kernels.choice import compiled_pays
 
 Array = NDArray[np.float64]
+Index = NDArray[np.intp]
 IMPOSSIBLE = -1e30
 """Stands for the log probability -inf: sums and differences of it are no NaN."""
 LEAST_LOG = -700.0
 """Probabilities with smaller logarithms are set to 0."""
 CELL_S = 60e-9
 """Time that NumPy takes for one state of one utterance in one frame (docs/results/kernels.md)."""
+
+
+def log_forward_backward(
+    log_initial: Array, log_emission: Array, arc_from: Index, arc_to: Index, arc_log: Array, log_final: Array
+) -> tuple[Array, Array, float]:
+    """Return the log posteriors of states, the expected counts of arcs, and the log likelihood, of one recording.
+
+    log_initial, log_final : log P of beginning in each state, and of ending in it [shapes=(S,)]
+    log_emission : log density of each frame in each state [shape=(T, S)]
+    arc_from, arc_to, arc_log : source, target and log P of each arc [shapes=(E,)]
+    Returns log P(state of frame t | recording) [shape=(T, S)]; the expected number of times that each arc is followed
+    [shape=(E,)]; and log P(recording), -inf if there is no path: then posteriors are -inf, counts 0.
+
+    alpha[t, s] = log P(frames up to t, state s at t); beta[t, s] = log P(frames after t | state s at t).
+    Source: Rabiner 1989, §III, in logarithms.  Cost: O(T·E).
+    """
+    alpha, beta = np.full((2, *log_emission.shape), -np.inf)
+    counts, last = np.zeros(len(arc_log)), len(log_emission) - 1
+
+    alpha[0] = log_initial + log_emission[0]
+    for t in range(1, last + 1):
+        np.logaddexp.at(alpha[t], arc_to, alpha[t - 1, arc_from] + arc_log)
+        alpha[t] += log_emission[t]
+    log_likelihood = float(np.logaddexp.reduce(alpha[last] + log_final))
+    if np.isneginf(log_likelihood):
+        return beta, counts, log_likelihood
+
+    beta[last] = log_final
+    for t in range(last - 1, -1, -1):
+        onward = arc_log + (log_emission[t + 1] + beta[t + 1])[arc_to]
+        np.logaddexp.at(beta[t], arc_from, onward)
+        counts += np.exp(alpha[t, arc_from] + onward - log_likelihood)
+    return alpha + beta - log_likelihood, counts, log_likelihood
 
 
 def chain_posteriors(
@@ -25,13 +63,15 @@ def chain_posteriors(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Return posteriors of chains without skips, each entered in its first state and left from its last.
 
+    They are those of ``log_forward_backward``, for networks in which each state leads to itself and to the next one.
+
     log_emission : [shape=(T, U, S)], U utterances padded to T frames and S states, with any finite number
     log_stay, log_move : [shape=(U, S)], of transitions to the same and to the next state
     frames, states     : [shape=(U,)], of each utterance without padding
     Returns the posterior of each state [shape=(T, U, S)], 0 in the padding; the expected number of transitions of each
     state to itself [shape=(U, S)]; and the log likelihood [shape=(U,)]. Where it is <= IMPOSSIBLE / 2 there is
     no path (fewer frames than states), and the other two are 0.
-    Source: the standard recursions, in the log domain.  Cost: O(T·U·S).
+    Cost: O(T·U·S).
     """
     arrays = (log_emission, log_stay, log_move, frames, states)
     if compiled_pays(log_emission.size * CELL_S):

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.kernels.choice import numba_works
 from lipmotion.kernels.sequences.arcs import PADDED, ArcLayout, ArcWeights, arc_layout, arc_weights
+from lipmotion.kernels.sequences.forward_backward import log_forward_backward
 
 Index = NDArray[np.intp]
 Array = NDArray[np.float64]
@@ -132,8 +133,8 @@ class ForwardBackwardNetwork(NamedTuple):
             at place s is the sum over chains of ``log_emissions[c][:, columns[c][s]]``
         columns       : of each chain [shape=(S,)]
         frames        : [shape=(U,)], number of frames of each recording
-        Source: the standard recursions, compiled, in the precision of ``log_emissions``; for recordings of which that
-        would lose what counts, in double precision, and at last in logarithms by NumPy.
+        What is computed is ``log_forward_backward``: compiled, in the precision of ``log_emissions``; for recordings of
+        which that would lose what counts, in double precision, and at last in logarithms by NumPy.
         Cost: O(T·E), and exponentials of the chains' densities; in double precision twice, in logarithms some fifty
         times as slow.
         """
@@ -187,24 +188,12 @@ class ForwardBackwardNetwork(NamedTuple):
 
         log_density : [shape=(T, S)], by place
         """
-        order, log_emission = self.layout.order, log_density[:, self.layout.place]
-        (T, states), arc_from = log_emission.shape, self.arc_from
-        arc_to = np.repeat(np.arange(states), np.diff(self.arc_start, append=len(arc_from)))
-        by_source = np.argsort(arc_from, kind="stable")
-        sources, source_start = np.unique(arc_from[by_source], return_index=True)
-        alpha, beta, counts = np.empty((T, states)), np.full((T, states), -np.inf), np.zeros(len(arc_from))
-        alpha[0] = self.log_initial + log_emission[0]
-        for t in range(1, T):
-            alpha[t] = np.logaddexp.reduceat(alpha[t - 1, arc_from] + self.arc_log, self.arc_start) + log_emission[t]
-        log_likelihood = float(np.logaddexp.reduce(alpha[-1] + self.log_final))
-        if not np.isfinite(log_likelihood):
-            return NetworkPosteriors(np.zeros((T, states)), counts, np.array([-np.inf]))
-        beta[-1] = self.log_final
-        for t in range(T - 2, -1, -1):
-            onward = self.arc_log + (log_emission[t + 1] + beta[t + 1])[arc_to]
-            beta[t, sources] = np.logaddexp.reduceat(onward[by_source], source_start)
-            counts += np.exp(alpha[t, arc_from] + onward - log_likelihood)
-        return NetworkPosteriors(np.exp(alpha + beta - log_likelihood)[:, order], counts, np.array([log_likelihood]))
+        arc_to = np.repeat(np.arange(len(self.arc_start)), np.diff(self.arc_start, append=len(self.arc_from)))
+        log_emission = log_density[:, self.layout.place]
+        log_posterior, counts, log_likelihood = log_forward_backward(
+            self.log_initial, log_emission, self.arc_from, arc_to, self.arc_log, self.log_final
+        )
+        return NetworkPosteriors(np.exp(log_posterior)[:, self.layout.order], counts, np.array([log_likelihood]))
 
 
 def _roots(log_density: NDArray[np.floating[Any]]) -> tuple[NDArray[Any], NDArray[Any]]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import logging
-import os
 import shutil
 import tempfile
 import threading
@@ -17,7 +16,6 @@ from pathlib import Path
 
 import numpy as np
 
-from lipmotion.corpora.labels import labels_beside
 from lipmotion.errors import ExportError, LipMotionError
 from lipmotion.export.base import motion_suffix
 from lipmotion.extensions import failed_extension
@@ -34,18 +32,17 @@ from lipmotion.pipeline.batch.ledger import (
 )
 from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.batch.record import DONE, FAILED, Record
-from lipmotion.pipeline.batch.settings import CUES, BatchSettings, input_files, line_fingerprint
+from lipmotion.pipeline.batch.settings import CUES, input_files, line_fingerprint
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.generate.transfer import map_onto
+from lipmotion.pipeline.job import Job, Request
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.outputs.curve_sets import check_curve_set
-from lipmotion.pipeline.outputs.motion_files import with_articulation
-from lipmotion.pipeline.outputs.output import OutputSettings, checked_outputs
-from lipmotion.pipeline.outputs.shown_faces import ShownFace, shown_face
-from lipmotion.pipeline.outputs.write import write
+from lipmotion.pipeline.opened_job import OpenedJob, opened
+from lipmotion.pipeline.understand.read_request import read_lexicon, read_request
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.storage.files import check_target, sha256_of
+from lipmotion.storage.sources import is_file
 from lipmotion.types import Audio, Generation, Span, Timeline, Unit
 from lipmotion.units import Lexicon
 
@@ -65,7 +62,7 @@ class LineWork:
     """
 
     line: BatchLine
-    settings: BatchSettings
+    job: Job
     of_settings: str
     place: Place
 
@@ -90,7 +87,7 @@ def finished_line(work: LineWork) -> Record:
         try:
             return _finished(work)
         finally:
-            for kind in work.settings.kinds:
+            for kind in work.job.outputs.kinds:
                 with suppress(OSError):  # there is none, or its folder is none
                     work.place.staged(work.line.name, kind).unlink()
             shutil.rmtree(folder, ignore_errors=True)
@@ -142,7 +139,7 @@ def _is_final(error: BaseException) -> bool:
 def _put_in_place(work: LineWork, record: Record) -> None:
     """Write the receipt, and rename the outputs; one that is in place from an earlier run is left alone."""
     out = Path(work.place.out)
-    staged = {f"{work.line.name}.{kind}": work.place.staged(work.line.name, kind) for kind in work.settings.kinds}
+    staged = {f"{work.line.name}.{kind}": work.place.staged(work.line.name, kind) for kind in work.job.outputs.kinds}
     record["outputs"] = {name: sha256_of(path) for name, path in staged.items()}
     if not work.place.is_current():
         raise RunReplacedError(f"{out}: another run of this batch has begun; this one ends")
@@ -155,49 +152,28 @@ def _put_in_place(work: LineWork, record: Record) -> None:
 
 def _written(work: LineWork) -> Generation:
     """Write the outputs of a line under temporary names; return its motion. Raises as ``animate`` and ``write``."""
-    line, settings = work.line, work.settings
+    line, kinds = work.line, work.job.outputs.kinds
     work.place.made_folder(line.name)
-    staged = {kind: work.place.staged(line.name, kind) for kind in settings.kinds}
-    for kind in settings.kinds:
+    staged = tuple(str(work.place.staged(line.name, kind)) for kind in kinds)
+    for kind in kinds:
         check_target(Path(work.place.out) / f"{line.name}.{kind}")
-    model = _model(settings.model, _stamp(settings.model))
-    generation = animate(_request(line, settings, model), model=model)
-    write(
-        with_articulation(generation) if settings.articulation else generation,
-        list(staged.values()),
-        speech=line.recording,
-        model=model,
-        channels=settings.channels or None,
-        rate_hz=settings.rate_hz,
-        fps=settings.fps,
-        face=_face(settings.face, _stamp(settings.face)),
-        staging=settings.staging,
-        delivery=settings.delivery,
-        curves=settings.curves or None,
-    )
+    model, opened_job = _model(work.job.request), _opened(work.job)
+    generation = animate(_request(line, opened_job, model), model=model)
+    opened_job.of(Path(line.recording), staged).write(generation, Path(line.recording), model)
     return generation
 
 
-def _request(line: BatchLine, settings: BatchSettings, model: Model) -> SpeechRequest:
+def _request(line: BatchLine, opened_job: OpenedJob, model: Model) -> SpeechRequest:
     """Return the request of a line, with the labels beside its recording where the row has no words.
 
     Where a filmed face of another person is shown, the motion is mapped onto it, as ``lipmotion animate`` does.
     """
-    speaker = line.speaker or settings.speaker
-    face = _face(settings.face, _stamp(settings.face)).other_person(model, speaker)
-    labels = None if line.transcript else labels_beside(Path(line.recording))
-    transcript = line.transcript or (labels.transcript if labels else None)
-    return SpeechRequest(
-        line.recording,
-        transcript=transcript,
-        units=labels.phones if labels and transcript is None else None,
-        lexicon=_lexicon(settings.lexicon, _stamp(settings.lexicon)),
-        recogniser=settings.recogniser,
-        speaker=speaker,
-        pauses=settings.pauses,
-        asymmetry=settings.asymmetry,
-        onto=None if face is None else _map_onto(model, face, speaker),
-    )
+    named = opened_job.of(Path(line.recording)).job.request
+    speaker = line.speaker or named.speaker
+    read = read_request(replace(named, speaker=speaker, lexicon=None), words_beside=not line.transcript)
+    request = replace(read, transcript=line.transcript or read.transcript, lexicon=_lexicon(named))
+    face = opened_job.face.other_person(model, speaker) if named.onto is None else None
+    return request if face is None else replace(request, onto=_map_onto(model, face, speaker))
 
 
 def _findings(generation: Generation) -> Record:
@@ -243,27 +219,37 @@ def _kept_warnings() -> Iterator[list[str]]:
         LOG.handlers[:], LOG.propagate = others, goes_up
 
 
-def _stamp(path: str) -> int:
-    """Return the time of change of a file, so that what is kept of it is renewed; 0: there is no such file."""
-    try:
-        return os.stat(path).st_mtime_ns if path else 0  # noqa: PTH116
-    except OSError:
-        return 0
+def _stamp(*paths: str | Path | None) -> tuple[int, ...]:
+    """Return the times of change of files, so that what is kept of them is renewed; 0: there is no such file."""
+    return tuple(Path(path).stat().st_mtime_ns if path and is_file(Path(path)) else 0 for path in paths)
+
+
+def _model(request: Request) -> Model:
+    return _model_of(request.model, _stamp(request.model))
 
 
 @lru_cache(maxsize=1)
-def _model(path: str, _: int) -> Model:
-    return load_model(path or None)
+def _model_of(path: Path | None, _: tuple[int, ...]) -> Model:
+    return load_model(path)
+
+
+def _lexicon(request: Request) -> Lexicon | None:
+    return _lexicon_of(request, _stamp(request.lexicon))
 
 
 @lru_cache(maxsize=1)
-def _lexicon(path: str, _: int) -> Lexicon | None:
-    return Lexicon.from_file(Path(path)) if path else None
+def _lexicon_of(request: Request, _: tuple[int, ...]) -> Lexicon | None:
+    return read_lexicon(request)
+
+
+def _opened(job: Job) -> OpenedJob:
+    shown = job.outputs
+    return _opened_of(job, _stamp(shown.face, shown.character, shown.lip_points, shown.binding))
 
 
 @lru_cache(maxsize=1)
-def _face(name: str, _: int) -> ShownFace:
-    return shown_face(name)
+def _opened_of(job: Job, _: tuple[int, ...]) -> OpenedJob:
+    return opened(job)
 
 
 @lru_cache(maxsize=8)
@@ -272,48 +258,30 @@ def _map_onto(model: Model, face: FilmedFace, speaker: str) -> SpeakerMap:
     return map_onto(model, face, speaker=speaker)
 
 
-def check_line_settings(settings: BatchSettings) -> None:
+def check_line_job(job: Job) -> None:
     """Load what all lines need, so that a mistake in it ends the batch before its first line.
 
     Motion files of a moment of silence are made and deleted, so that channels, curves and formats are tried out.
-    Raises InputError, ModelFormatError, ExportError: as ``load_model``, ``Lexicon.from_file``, ``checked_outputs``,
-    ``write``.
+    Raises InputError, ModelFormatError, ExportError: as ``load_model``, ``Lexicon.from_file``, ``OpenedJob``.
     """
-    anywhere = Path(tempfile.gettempdir())
-    outputs = OutputSettings(
-        _face(settings.face, _stamp(settings.face)),
-        sounded=True,
-        rate_hz=settings.rate_hz,
-        fps=settings.fps,
-        staging=settings.staging,
-        delivery=settings.delivery,
-    )
-    checked_outputs([anywhere / f"line.{kind}" for kind in settings.kinds], outputs)
-    if settings.curves:
-        check_curve_set(settings.curves)
-    _lexicon(settings.lexicon, _stamp(settings.lexicon))
-    _try_out(settings, _model(settings.model, _stamp(settings.model)))
+    anywhere, opened_job = Path(tempfile.gettempdir()), _opened(job)
+    files = tuple(str(anywhere / f"line.{kind}") for kind in job.outputs.kinds)
+    replace(opened_job, job=job.of(anywhere, files)).checked()
+    _lexicon(job.request)
+    _try_out(opened_job, _model(job.request))
 
 
-def _try_out(settings: BatchSettings, model: Model) -> None:
+def _try_out(opened_job: OpenedJob, model: Model) -> None:
     """Write the motion files of a moment of silence into a folder that is deleted. Raises as ``animate``, ``write``."""
-    kinds = [kind for kind in settings.kinds if motion_suffix(Path(f"line.{kind}"))]
+    job = opened_job.job
+    kinds = [kind for kind in job.outputs.kinds if motion_suffix(Path(f"line.{kind}"))]
     kinds = [kind for kind in kinds if not kind.startswith(CUES)]
-    face = _face(settings.face, _stamp(settings.face))
-    if not kinds or face.other_person(model, settings.speaker) is not None:
+    if not kinds or opened_job.face.other_person(model, job.request.speaker) is not None:
         return
     silence = Audio(np.zeros(round(SPEECH_RATE_HZ * SILENCE_S), np.float32), SPEECH_RATE_HZ)
     units = Timeline((Span(0.0, SILENCE_S, Unit("sil")),))
-    request = SpeechRequest(silence, units=units, speaker=settings.speaker)
+    request = SpeechRequest(silence, units=units, speaker=job.request.speaker)
     with tempfile.TemporaryDirectory(prefix="lipmotion-") as folder:
-        generation = animate(request, model=model)
-        write(
-            with_articulation(generation) if settings.articulation else generation,
-            [Path(folder) / f"line.{kind}" for kind in kinds],
-            speech=silence,
-            channels=settings.channels or None,
-            rate_hz=settings.rate_hz,
-            staging=settings.staging,
-            delivery=replace(settings.delivery, offset_ms=0.0),
-            curves=settings.curves or None,
-        )
+        files = tuple(str(Path(folder) / f"line.{kind}") for kind in kinds)
+        early = replace(job, delivery=replace(job.delivery, offset_ms=0.0), outputs=replace(job.outputs, files=files))
+        replace(opened_job, job=early).write(animate(request, model=model), silence)

@@ -12,11 +12,12 @@ from pathlib import Path
 from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.pipeline.batch.ledger import Place, opened_ledger
 from lipmotion.pipeline.batch.lines import BatchLine, check_names, read_lines
-from lipmotion.pipeline.batch.one_line import LineWork, check_line_settings, finished_line
+from lipmotion.pipeline.batch.one_line import LineWork, check_line_job, finished_line
 from lipmotion.pipeline.batch.pool import Pool, WorkerDied, cluster_pool, died_alone, local_pool
 from lipmotion.pipeline.batch.record import FAILED, Record
 from lipmotion.pipeline.batch.report import write_reports
-from lipmotion.pipeline.batch.settings import BatchSettings, check_kinds, fingerprint_of, line_fingerprint
+from lipmotion.pipeline.batch.settings import check_job, fingerprint_of, line_fingerprint
+from lipmotion.pipeline.job import Job
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import Item, Monitor, Progress, silent_monitor
 
@@ -51,7 +52,7 @@ class BatchSummary:
 def batch(
     source: str | Path | Sequence[BatchLine],
     out: str | Path,
-    settings: BatchSettings | None = None,
+    job: Job | None = None,
     *,
     jobs: int | None = None,
     cluster: str = "",
@@ -62,7 +63,9 @@ def batch(
     source   : a folder of recordings, a list of them (docs/batch.md), or lines
     out      : folder of the outputs, created if needed; their names are those of the recordings, with the same
                sub-folders
-    settings : what is made, and how; None: motion as ``.json``
+    job      : what is made of every recording, and how; None: motion as ``.json``. Its ``outputs.kinds`` are suffixes
+               without the first dot: those of ``lipmotion.write``, and ``cues.tsv``, ``cues.xml``, ``cues.json``,
+               ``cues.dat``. Its speaker is that of lines that name none
     jobs     : number of processes; None: one a core. With more than one, a script must be guarded by
                ``if __name__ == "__main__":``
     cluster  : address of the scheduler of a Dask cluster that does the work instead of this machine
@@ -73,32 +76,32 @@ def batch(
     Raises ExportError: two lines have the same output, an output would replace a recording, another process is at
     work on the folder, or the disk is full.
 
-    >>> from lipmotion.pipeline.batch import BatchSettings, batch
-    >>> import tempfile
+    >>> import lipmotion, tempfile
+    >>> from lipmotion.pipeline.batch import batch
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     batch("examples", folder, BatchSettings(kinds=("csv",)), jobs=1).text
+    ...     batch("examples", folder, lipmotion.Job(outputs=lipmotion.Outputs(kinds=("csv",))), jobs=1).text
     '1 lines: 1 done, 0 kept, 0 failed'
     """
-    settings = settings or BatchSettings()
-    check_kinds(settings.kinds)
+    job = (job or Job()).at(Path.cwd())
+    check_job(job)
     if jobs is not None and jobs < 1:
         raise InputError(f"{jobs} processes, required 1 or more; leave the number out for one a core")
     place = Place(os.path.abspath(out), uuid.uuid4().hex)  # noqa: PTH100
     if isinstance(source, str | Path):
-        lines = read_lines(Path(source), settings.kinds)
+        lines = read_lines(Path(source), job.outputs.kinds)
         check_apart([], [Source(Path(source), "list or folder of recordings")], folders=[Path(out)])
     else:
         lines = list(source)
-        check_names(lines, settings.kinds)
+        check_names(lines, job.outputs.kinds)
     _check_outside(lines, place)
-    check_line_settings(settings)
-    of_settings = fingerprint_of(settings)
+    check_line_job(job)
+    of_settings = fingerprint_of(job)
     with opened_ledger(place, lines) as ledger:
         counter = _Counter(len(lines), monitor)
         waiting = []
         for line in lines:
             if ledger.kept(line, of_settings, Path(place.out)) is None:
-                waiting.append(LineWork(line, settings, of_settings, place))
+                waiting.append(LineWork(line, job, of_settings, place))
             else:
                 counter.count(line.name, "kept")
         processes = jobs or os.cpu_count() or 1

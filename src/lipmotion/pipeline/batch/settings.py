@@ -1,76 +1,45 @@
-"""What a batch does with every line, and the fingerprint that tells whether a line must be done again."""
+"""What the job of a batch may be, and the fingerprint that tells whether a line must be done again."""
 
 from __future__ import annotations
 
 import hashlib
 import os
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from lipmotion.articulation.delivery import Delivery
-from lipmotion.articulation.pauses import REST
 from lipmotion.corpora.labels import label_files_beside
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import motion_suffixes
 from lipmotion.export.cues import CUE_FORMATS
 from lipmotion.export.timed_labels import LABEL_SUFFIXES
 from lipmotion.extensions import installed_version
-from lipmotion.faces.base import Staging
 from lipmotion.pipeline.batch.lines import BatchLine
+from lipmotion.pipeline.job import Job
 from lipmotion.pipeline.model import shipped_path
 from lipmotion.pipeline.outputs.cues import SHEET
 from lipmotion.pipeline.outputs.drawn_video import VIDEO_SUFFIXES
 from lipmotion.pipeline.outputs.scenes import SCENE_SUFFIXES
 from lipmotion.storage.files import check_source, sha256_of
 from lipmotion.storage.json_text import as_json
+from lipmotion.storage.sources import is_file
 
 CUES = SHEET.removeprefix(".")
 """Prefix of the kinds of outputs that are cue sheets: ``cues.tsv`` is Rhubarb's table."""
 
 
-@dataclass(frozen=True)
-class BatchSettings:
-    """What is made of every recording of a batch, and how.
+def check_job(job: Job) -> None:
+    """Raise ExportError for kinds of outputs that a batch cannot write.
 
-    kinds        : suffixes of the outputs without the first dot: those of ``lipmotion.write`` (``json``, ``csv``,
-                   ``livelink.csv``, ``glb``, ``TextGrid``, ``mp4`` …), and ``cues.tsv``, ``cues.xml``, ``cues.json``,
-                   ``cues.dat``
-    recogniser   : of recordings without a transcript, as of ``SpeechRequest``
-    speaker      : of lines that name none
-    pauses, asymmetry : as of ``SpeechRequest``
-    model        : path of the model file; empty: the shipped model
-    lexicon      : path of a file of pronunciations; empty: none
-    channels     : of motion files; empty: all of the motion
-    curves       : what motion files hold instead of the motion: ``arkit``, ``visemes``, ``fap``, or the path of the
-                   table of a rig (``.csv``)
-    articulation : whether motion files get the articulatory channels
-    rate_hz      : frames per second of motion files; None: 100
-    fps          : frames per second of videos and cues; None: 25 and 24
-    face         : of videos, a name or the path of a file
-    staging      : of that face
-    delivery     : intensity, anticipation, offset and held poses of every output
-
-    >>> BatchSettings(kinds=("json", "cues.tsv")).recogniser
-    'auto'
+    Raises InputError: the job names what belongs to one recording.
     """
-
-    kinds: tuple[str, ...] = ("json",)
-    recogniser: str = "auto"
-    speaker: str = ""
-    pauses: str = REST
-    asymmetry: float = 0.0
-    model: str = ""
-    lexicon: str = ""
-    channels: tuple[str, ...] = ()
-    curves: str = ""
-    articulation: bool = False
-    rate_hz: float | None = None
-    fps: float | None = None
-    face: str = "portrait"
-    staging: Staging = field(default_factory=Staging)
-    delivery: Delivery = field(default_factory=Delivery)
+    check_kinds(job.outputs.kinds)
+    alone = {name: getattr(job.request, name) for name in ("recording", "transcript", "units")}
+    alone |= {name: getattr(job.outputs, name) for name in ("files", "overlay", "posteriors")}
+    found = next((name for name, value in alone.items() if value), None)
+    if found:
+        raise InputError(f"the job of a batch has {found!r}, which belongs to one recording; leave it out")
 
 
 def possible_kinds() -> tuple[str, ...]:
@@ -90,15 +59,18 @@ def check_kinds(kinds: Sequence[str]) -> None:
         raise ExportError(f"the outputs are {', '.join(kinds)}: one is given twice; give every kind once")
 
 
-def fingerprint_of(settings: BatchSettings) -> str:
-    """Return a digest of all settings, of the content of their files, and of the version of lipmotion."""
-    files = {"model": settings.model or str(shipped_path()), "lexicon": settings.lexicon}
-    files |= {"face": settings.face if os.path.isfile(settings.face) else ""}  # noqa: PTH113
-    files |= {"curves": settings.curves if os.path.isfile(settings.curves) else ""}  # noqa: PTH113
-    digests = {name: sha256_of(Path(path)) if path else "" for name, path in files.items()}
-    named: dict[str, Any] = asdict(settings) | {"model": "", "lexicon": ""}
-    named["lipmotion"] = installed_version()
-    return _digest(as_json([named, digests], sort_keys=True))
+def fingerprint_of(job: Job) -> str:
+    """Return a digest of a job, with the content of the files that it names, and of the version of lipmotion."""
+    request = replace(job.request, model=job.request.model or shipped_path())
+    parts = [{name: _told(value) for name, value in part.as_mapping().items()} for part in (request, job.outputs)]
+    return _digest(as_json([*parts, job.delivery.as_mapping(), job.staging.as_mapping(), installed_version()]))
+
+
+def _told(value: Any) -> Any:
+    """Return the value of an option, or the digest of the file that it names."""
+    if isinstance(value, str | Path) and is_file(Path(value)):
+        return sha256_of(Path(value))
+    return str(value) if isinstance(value, Path) else value
 
 
 def line_fingerprint(line: BatchLine, of_settings: str) -> str:

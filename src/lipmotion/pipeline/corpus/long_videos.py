@@ -61,11 +61,12 @@ def single_video(path: Path) -> RecordingFolder:
 
 
 def with_long_videos_divided(
-    folder: RecordingFolder, place: Path, monitor: Monitor
+    folder: RecordingFolder, place: Path, monitor: Monitor, tracker: str
 ) -> tuple[RecordingFolder, dict[str, VideoPart]]:
     """Return the folder with the parts of long videos in their place, and those parts by name.
 
-    place : the folder itself, where lists of splits may lie
+    place   : the folder itself, where lists of splits may lie
+    tracker : name of the tracker that finds faces
     Of a single video, without lists, the last parts become ``val`` and ``test``; others have the split of the whole.
     """
     videos = [item for item in folder.recordings if folder.kind in DIVIDED_KINDS and _is_long_video(item)]
@@ -78,7 +79,7 @@ def with_long_videos_divided(
         reached = partial(_report_share, monitor, n, len(videos))
         reached(0.0)
         try:
-            found = divided(item, reached, splits_by_time=is_only_one)
+            found = divided(item, reached, tracker, splits_by_time=is_only_one)
         except InputError as error:
             problems[item.name] = str(error)
             continue
@@ -108,15 +109,18 @@ def _is_long_video(recording: SourceRecording) -> bool:
         return False
 
 
-def divided(recording: SourceRecording, reached: Callable[[float], None], *, splits_by_time: bool) -> list[VideoPart]:
+def divided(
+    recording: SourceRecording, reached: Callable[[float], None], tracker: str, *, splits_by_time: bool
+) -> list[VideoPart]:
     """Return the utterances of a long video; each is named after its start (``talk-00h01m12.48s``).
 
     reached        : called now and then with the share of the video that was looked at
+    tracker        : name of the tracker that finds faces
     splits_by_time : give the last utterances to ``val`` and ``test``
     Words are those of the lines in time beside the video; without such lines, the utterances have none.
     Memory: the whole sound (230 MB for an hour), but not the pictures. Raises InputError: it cannot be read.
     """
-    scan = scan_video(recording.file, reached)
+    scan = scan_video(recording.file, reached, tracker)
     for note in scan.damage:
         LOG.warning("%s: %s", recording.file, note)
     audio = _sound_of(recording)

@@ -31,8 +31,8 @@ from lipmotion.storage.sources import Source, check_apart, is_folder
 from lipmotion.types import Item, Monitor, Progress, Track, Utterance, silent_monitor
 from lipmotion.units import check_words
 from lipmotion.vision.frames import VideoSpan
-from lipmotion.vision.packages import package_versions
 from lipmotion.vision.track import track
+from lipmotion.vision.trackers import MEDIAPIPE, tracker_named
 
 LOG = logging.getLogger("lipmotion")
 RECIPE = "5"
@@ -80,6 +80,7 @@ class PrepareReport:
 class _Job:
     """One recording, the folder of its utterance, its source and the settings of the preparation.
 
+    tracker : name of the tracker
     part : the part of a long video that it is; None: it is a whole file
     """
 
@@ -87,6 +88,7 @@ class _Job:
     folder: Path
     source: dict[str, str]
     settings: dict[str, str]
+    tracker: str
     part: VideoPart | None = None
 
 
@@ -108,6 +110,7 @@ def prepare(
     workers: int | None = None,
     crops: bool = True,
     offset_ms: float | None = None,
+    tracker: str = MEDIAPIPE,
     monitor: Monitor = silent_monitor,
 ) -> PrepareReport:
     """Create a corpus from recordings, or add the recordings to a corpus; return a report.
@@ -120,11 +123,13 @@ def prepare(
     crops     : store the mouth pictures, which eigenlips need
     offset_ms : by how much the sound of every recording is late against its motion; None: it is in step, or a
                 recorder's sound beside it (``take.recorder.wav``) says it. ``offsets.csv`` in the folder goes before
+    tracker   : name of the tracker that finds faces in videos (docs/corpora.md)
     monitor   : called with reports of progress, and with the outcome of every recording
     Recordings that cannot be used are reported and left out. The corpus depends neither on ``workers`` nor on
     interruptions.
-    Raises InputError, CorpusError: no recordings, none that can be used, or ``output`` is not a corpus.
-    Raises MissingDependencyError: there are videos, and MediaPipe or OpenCV is not installed.
+    Raises InputError, CorpusError: no recordings, none that can be used, or ``output`` is not a corpus; no tracker of
+    that name.
+    Raises MissingDependencyError: there are videos, and MediaPipe, or what another tracker needs, is not installed.
     Raises ExportError: the disk is full, or another process is preparing the same corpus.
 
     >>> import lipmotion
@@ -139,13 +144,15 @@ def prepare(
     folder, place = _found(directory)
     offset_s = None if offset_ms is None else offset_ms / 1000
     folder = with_separate_sounds(folder, place, offset_s, is_whole=directory.is_dir())
-    packages = package_versions() if any(item.motion_file is None for item in folder.recordings) else {}
+    chosen = tracker_named(tracker)
+    packages = chosen.versions() if any(item.motion_file is None for item in folder.recordings) else {}
     is_new = not is_folder(output)
     with locked(output):
         corpus = Corpus.create(output)
-        folder, parts = with_long_videos_divided(folder, place, monitor)
+        folder, parts = with_long_videos_divided(folder, place, monitor, tracker)
         jobs = [
-            _job(item, place.resolve(), corpus, packages, crops, parts.get(item.name)) for item in folder.recordings
+            _job(item, place.resolve(), corpus, tracker, packages, crops, parts.get(item.name))
+            for item in folder.recordings
         ]
         with _refreshed(corpus), worker_pool(min(workers or os.cpu_count() or 1, len(jobs))) as team:
             outcomes = _collected(
@@ -190,6 +197,7 @@ def _job(
     recording: SourceRecording,
     directory: Path,
     corpus: Corpus,
+    tracker: str,
     packages: dict[str, str],
     crops: bool,
     part: VideoPart | None,
@@ -199,7 +207,7 @@ def _job(
     if _is_taken(corpus.folder(name), recording.file, collection):
         name = f"{collection.replace('/', '-')}-{name}"
     if recording.motion_file is None:
-        settings = {"tracker": f"mediapipe {packages['mediapipe']}", "crops": "yes" if crops else "no"}
+        settings = {"tracker": f"{tracker} {packages[tracker]}", "crops": "yes" if crops else "no"}
     else:
         settings, packages = {"tracker": "none: motion was given"}, {"av": metadata.version("av")}
     settings["recipe"] = RECIPE
@@ -215,7 +223,7 @@ def _job(
     if recording.end_s is not None:
         source |= {"start_s": f"{recording.start_s:.3f}", "end_s": f"{recording.end_s:.3f}"}
         settings["part"] = f"{recording.start_s:.3f} to {recording.end_s:.3f} s"
-    return _Job(replace(recording, name=name), corpus.folder(name), source, settings, part)
+    return _Job(replace(recording, name=name), corpus.folder(name), source, settings, tracker, part)
 
 
 def _collection(directory: Path) -> str:
@@ -333,9 +341,9 @@ def _track(job: _Job, duration_s: float | None) -> Track:
         return supplied_track(job.recording.motion_file, duration_s)
     recording, crops = job.recording, job.settings["crops"] == "yes"
     if job.part is None or recording.end_s is None:
-        return track(recording.file, crops=crops)
+        return track(recording.file, crops=crops, tracker=job.tracker)
     span = VideoSpan(recording.start_s, recording.end_s)
-    return track(recording.file, crops=crops, span=span, person=job.part.person)
+    return track(recording.file, crops=crops, span=span, person=job.part.person, tracker=job.tracker)
 
 
 def _collected(

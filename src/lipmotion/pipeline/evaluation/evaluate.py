@@ -7,7 +7,6 @@ from typing import Any, TypeVar
 
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import Animator
-from lipmotion.engines.base import ForcesClosures
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.evaluation.conditions import (
     TEST_LIST,
@@ -123,7 +122,7 @@ def _figures_with_and_without_closures(
     """Return the figures of one condition; if the engine forces closures, ``unpinned`` holds those without them."""
     speech = speech_of_condition(recordings, condition, engine, learned)
     figures = figures_of(compare_with_recorded(recordings, speech, engine, learned), recordings, seed)
-    unpinned = engine.without_closures() if isinstance(engine, ForcesClosures) else engine
+    unpinned = engine.without_closures()
     if unpinned == engine or recordings.closed_under is None:
         return figures
     clips = compare_with_recorded(recordings, speech, unpinned, learned)

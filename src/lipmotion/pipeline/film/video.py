@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +21,7 @@ from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.faces.filmed.renderer import BATCH, STITCHING, Stitcher, StitchingOptions
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.film.background import BackgroundSequence, open_background, stored_sequence
+from lipmotion.pipeline.job import Jaw, Mark, Overlay
 from lipmotion.pipeline.model import Model
 from lipmotion.speech.sound.pauses import levels_db_at
 from lipmotion.storage.files import check_source
@@ -32,9 +32,6 @@ from lipmotion.vision.footage import untracked_frames
 
 Floats = NDArray[np.float32]
 Frames = Iterator[NDArray[np.uint8]]
-Jaw = Literal["motion", "energy", "none"]
-Overlay = Literal["inset", "mouth"]
-Mark = Literal["metadata", "visible", "none"]
 RENDERING = "rendering the video"
 """Name of the stage in reports of progress."""
 LOG = logging.getLogger("lipmotion")

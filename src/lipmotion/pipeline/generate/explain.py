@@ -8,7 +8,7 @@ from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
-from lipmotion.engines.base import Explains, explain_by_trace
+from lipmotion.engines.base import explain_by_trace
 from lipmotion.errors import InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.generate.generation_for import explanation_for, generate_for
@@ -64,8 +64,8 @@ def explain(
     frames = [_frame(time_s, count) for time_s in times]
     person = person_of(chosen, request)
     understood = understand(chosen, replace(request, recording=audio))
-    if isinstance(chosen.engine, Explains):
-        explained = chosen.engine.explain(chosen.learned, understood, frames)
+    explained = chosen.engine.explain(chosen.learned, understood, frames)
+    if explained is not None:
         return tuple(explanation_for(person, explanation, understood) for explanation in explained)
     generation = generate_for(person, chosen.engine, chosen.learned, understood)
     return tuple(explain_by_trace(generation, frame) for frame in frames)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from lipmotion.engines import ENGINES
-from lipmotion.engines.base import HasPosteriors
+from lipmotion.engines import ENGINES, Engine
 from lipmotion.errors import ExportError, InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.model import Model
@@ -24,8 +23,8 @@ def animate_with_posteriors(speech: SpeechInput, *, model: Model) -> tuple[Gener
     Raises InputError: as ``animate``, or the model's engine has no chains of states.
     """
     engine, learned = model.engine, model.learned
-    if not isinstance(engine, HasPosteriors):
-        having = [name for name in ENGINES.names if hasattr(ENGINES.load(name), "posteriors")]
+    if type(engine).posteriors is Engine.posteriors:
+        having = [name for name in ENGINES.names if ENGINES.load(name).posteriors is not Engine.posteriors]
         raise InputError(
             f"the engine {engine.name!r} has no chains of states whose posteriors could be shown; give a model that "
             f"was trained with --engine {' or '.join(having)}"

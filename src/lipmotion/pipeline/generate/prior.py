@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lipmotion.engines.base import ForcesClosures, HasAcousticNetwork
 from lipmotion.motion.acoustic_network import STEP
 from lipmotion.motion.articulation import ARTICULATORS, measured_articulators
 from lipmotion.types import PriorOutput, Speech
@@ -23,12 +22,11 @@ def with_prior(prior: Model | None, speech: Speech) -> Speech:
     """
     if prior is None:
         return speech
-    engine = prior.engine.without_closures() if isinstance(prior.engine, ForcesClosures) else prior.engine
-    motion = engine.generate(prior.learned, speech).motion
+    motion = prior.engine.without_closures().generate(prior.learned, speech).motion
     measured = measured_articulators(motion.values, motion.names)
     chosen = [measured[name][::STEP] for name in ARTICULATORS if name in measured]
     steps = len(motion.values[::STEP])
-    heard = prior.engine.hidden(prior.learned, speech) if isinstance(prior.engine, HasAcousticNetwork) else None
-    hidden, distortion = heard if heard is not None else (np.zeros((steps, 0), np.float32), np.zeros(steps))
+    nothing = np.zeros((steps, 0), np.float32), np.zeros(steps)
+    hidden, distortion = prior.engine.hidden(prior.learned, speech) or nothing
     articulators = np.stack(chosen, axis=1) if chosen else np.zeros((steps, 0))
     return replace(speech, prior=PriorOutput(articulators, hidden, distortion))

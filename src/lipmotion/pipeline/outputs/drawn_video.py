@@ -82,11 +82,6 @@ def read_sound(recording: str | Path | Audio | None) -> Audio:
     return read_audio(Path(str(recording)), SOUND_RATE_HZ, warn=False)
 
 
-def shows_face(path: Path) -> bool:
-    """Return whether a path is that of a drawn face: a video, or pictures such as ``frame%05d.png``."""
-    return path.suffix.lower() in VIDEO_SUFFIXES or is_picture_sequence(path)
-
-
 def is_picture_sequence(path: Path) -> bool:
     """Return whether a path stands for numbered pictures: ``frame%05d.png``."""
     return path.suffix.lower() == ".png" and re.search(r"%0?\d?d", path.name) is not None

@@ -18,6 +18,7 @@ from lipmotion.extensions import Registry
 from lipmotion.faces.base import Staging
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.pipeline.film.video import FILM, FilmOptions
+from lipmotion.pipeline.job import RATE
 from lipmotion.storage.files import check_distinct, check_target
 from lipmotion.types import Audio, Generation, Monitor, silent_monitor
 
@@ -26,8 +27,6 @@ if TYPE_CHECKING:
     from lipmotion.pipeline.outputs.shown_faces import ShownFace
 
 Made = TypeVar("Made")
-SLOWEST_HZ, FASTEST_HZ = 1.0, 1000.0
-"""Smallest and largest frame rate of a file; a mistyped rate must not fill the memory."""
 
 
 @dataclass(frozen=True)
@@ -54,8 +53,8 @@ class OutputSettings:
 
     def __post_init__(self) -> None:
         for hertz in (self.fps, self.rate_hz):
-            if hertz is not None and not SLOWEST_HZ <= hertz <= FASTEST_HZ:
-                raise InputError(f"the frame rate is {hertz}, required {SLOWEST_HZ:.0f} to {FASTEST_HZ:.0f} a second")
+            if hertz is not None and not RATE.allows(hertz):
+                raise InputError(f"the frame rate is {hertz}, required {RATE.words}")
 
 
 @dataclass(frozen=True, eq=False)

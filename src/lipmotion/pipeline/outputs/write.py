@@ -10,7 +10,7 @@ from lipmotion.faces.base import Staging
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.pipeline.film.video import FILM, FilmOptions
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.outputs.output import OutputSettings, Performance, checked_outputs, perform
+from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, checked_outputs, perform
 from lipmotion.pipeline.outputs.shown_faces import AnyFace, ShownFace, shown_face
 from lipmotion.pipeline.outputs.sound_files import SoundOutput
 from lipmotion.types import Audio, Generation, Monitor, silent_monitor
@@ -84,6 +84,24 @@ def write(  # noqa: PLR0913
         delivery or Delivery(),
     )
     planned = checked_outputs([outputs] if isinstance(outputs, str | Path) else outputs, settings)
+    write_planned(generation, planned, settings, sound=sound, model=model, temporary=temporary, monitor=monitor)
+
+
+def write_planned(
+    generation: Generation,
+    planned: Sequence[Output],
+    settings: OutputSettings,
+    *,
+    sound: Audio | None = None,
+    model: Model | None = None,
+    temporary: bool = False,
+    monitor: Monitor = silent_monitor,
+) -> None:
+    """Write generated motion to the outputs of ``checked_outputs``.
+
+    sound : the sound, where it is in no file
+    model, temporary, monitor : as of ``write``. Raises as ``write``.
+    """
     sounds = (output.path for output in planned if isinstance(output, SoundOutput))
     sound_file = next(sounds, None) if settings.recording is None or temporary else settings.recording
     perform(Performance(generation, settings, sound, sound_file, model, monitor), planned)

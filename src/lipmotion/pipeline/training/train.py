@@ -15,7 +15,6 @@ import numpy as np
 
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import Engine, engine_named
-from lipmotion.engines.base import HearsConditions, StandsOnPrior, TrainsOnSpeechAlone
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.kernels.threads import one_thread
@@ -128,7 +127,7 @@ def train(  # noqa: PLR0913
     visual     : ``geometry``: tracked or supplied channels; ``eigenlips``: principal components of mouth pictures
                  (docs/eigenlips.md); ``both``
     voices     : speech of other speakers, without motion, for the second stage of training
-                 (``pipeline.training.voices``); only for engines that ``TrainsOnSpeechAlone``
+                 (``pipeline.training.voices``); only for engines that take ``speech_alone`` (``Inputs``)
     prior      : a model on which the new one stands, ``load_model()`` for instance: what it makes of the speech is an
                  input of the engine, and part of the new model. None: the new model stands on none. It must not have
                  been trained on recordings that the new model is judged on
@@ -177,7 +176,7 @@ def train(  # noqa: PLR0913
         examples = [replace(example, speech=with_prior(prior, example.speech)) for example in examples]
         examples = _heard(engine, utterances, examples, sub_monitor(run.monitor, 0.5, 0.6), team.ordered_map)
     fit = engine.fit([*examples, *speech_examples], sub_monitor(run.monitor, 0.6, 1, "learning motion: "), checkpoint)
-    if not (isinstance(engine, StandsOnPrior) and engine.stands_on_prior(fit.model)):
+    if not fit.uses_prior:
         prior = None
     used = tuple(example.name for example in examples)
     about = about_training(
@@ -225,7 +224,7 @@ def examples_without_motion(
     Raises InputError: the engine is not trained on speech alone.
     """
     for number, (features, units, speaker) in enumerate(voices, start=1):
-        if not (isinstance(engine, TrainsOnSpeechAlone) and engine.trains_on_speech_alone):
+        if not engine.inputs().speech_alone:
             raise InputError(
                 f"the engine {engine.name!r} does not learn from other voices without motion; use one that does "
                 "(--engine coupled), or leave the voices out"
@@ -281,7 +280,7 @@ def _heard(
 ) -> list[Example]:
     """Return the examples in all acoustic conditions that the engine's training uses."""
     motion_s = sum(int(example.valid.sum()) for example in examples) / FRAME_RATE_HZ
-    count = engine.conditions(motion_s) if isinstance(engine, HearsConditions) else 0
+    count = engine.inputs(motion_s).conditions
     if not count:
         return list(examples)
     audio = {utterance.name: utterance.audio for utterance in utterances}

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
-from lipmotion.articulation.pauses import PAUSE_STYLES, REST
+from lipmotion.articulation.pauses import REST
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError, shortened
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.motion.speakers import SpeakerMap
+from lipmotion.pipeline.job import Request
 from lipmotion.pipeline.model import Model
 from lipmotion.types import Audio, TimedTranscript, Timeline, Unit
+from lipmotion.types.configuration import check_value
 from lipmotion.units import Lexicon
 
 Onto = str | Path | Corpus | Model | FilmedFace | SpeakerMap
@@ -63,11 +65,9 @@ class SpeechRequest:
     asymmetry: float = 0.0
 
     def __post_init__(self) -> None:
-        if self.pauses not in PAUSE_STYLES:
-            named = ", ".join(PAUSE_STYLES)
-            raise InputError(f"the style of pauses is {shortened(repr(self.pauses))}, required one of: {named}")
-        if not 0 <= self.asymmetry <= 1:
-            raise InputError(f"the asymmetry is {self.asymmetry:g}, required 0 to 1")
+        for each in fields(Request):
+            if each.name in ("pauses", "asymmetry"):
+                check_value(each, getattr(self, each.name))
         if not isinstance(self.units, Timeline | None):
             kind = type(self.units).__name__
             raise InputError(f"the units are a {kind}, required a Timeline of spans of units")

@@ -12,7 +12,6 @@ from typing import Any, TypeVar
 import numpy as np
 
 from lipmotion.engines import Animator
-from lipmotion.engines.base import HearsConditions, RecognisesPhones, WantsF0
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.pipeline.generate.prior import with_prior
@@ -217,9 +216,9 @@ def audio_of(request: SpeechRequest) -> Audio:
 
 def speech_of(engine: Animator[Any], audio: Audio, features: Features, units: Timeline[Unit]) -> Speech:
     """Return speech of features and phones in time, with F0 and spectrum of the recording if the engine needs them."""
-    f0 = log_f0(audio) if isinstance(engine, WantsF0) and engine.wants_f0 else None
-    hears = isinstance(engine, HearsConditions) and engine.conditions(np.inf)
-    spectrum = analysed(audio).spectrum if hears else None
+    inputs = engine.inputs()
+    f0 = log_f0(audio) if inputs.f0 else None
+    spectrum = analysed(audio).spectrum if inputs.conditions else None
     return with_units(Speech(features, Timeline(()), f0, spectrum=spectrum), units)
 
 
@@ -262,7 +261,7 @@ def recognised_speech(
     """
     speech = speech_of(engine, audio, features, Timeline(()))
     recognised = None
-    if isinstance(engine, RecognisesPhones) and phones.kind not in ("general", "words"):
+    if phones.kind not in ("general", "words"):
         recognised = engine.recognise(learned, speech)
     if recognised is not None:
         try:

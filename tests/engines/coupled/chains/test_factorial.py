@@ -100,9 +100,10 @@ def test_only_allowed_units_are_in_the_lattice_and_visual_ones_a_little_before_a
 def test_training_without_a_limit_rises_at_every_step():
     steps = []
     of = structure(FACTORIAL, (THREE, TWO), states=3, limit=None)
-    *_, trained = growing_chains(
+    *_, grown = growing_chains(
         of, ("speech", "seen"), sentences(), MixtureSchedule((2, 2), (1.0, 1.0), most_steps=6), steps.append
     )
+    trained = grown.model
     assert isinstance(trained.transitions, FactorialTransitions)
     assert len(trained.transitions.own_density_states) > 5
     for one, other in pairwise(steps):

@@ -97,7 +97,7 @@ def test_every_viseme_has_a_regression_for_each_position_of_a_state():
 @pytest.mark.parametrize("regression", [True, pytest.param(False, marks=pytest.mark.long)])
 def test_the_regression_brings_motion_closer(regression):
     config = CoupledConfig(acoustic_regression=regression, mixtures=1, closures=False, articulation=False)
-    model = fit_coupled(examples(6), config, silent_monitor)
+    model = fit_coupled(examples(6), config, silent_monitor).model
     assert (model.regression is not None) is regression
     held_out = example(("t", "aa", "p", "iy", "m", "uw", "s", "aa"), seed=77)
     generated = CoupledEngine(config).generate(model, held_out.speech).motion
@@ -109,7 +109,7 @@ def test_the_regression_brings_motion_closer(regression):
 def test_the_mouth_rests_in_long_silence():
     config = CoupledConfig(mixtures=1)
     engine = CoupledEngine(config)
-    model = fit_coupled(examples(), config, silent_monitor)
+    model = fit_coupled(examples(), config, silent_monitor).model
     generated = engine.generate(model, speech(timeline(("aa", "t", "aa")))).motion["opening"]
     opening = model.rest_pose[model.space.direct_names.index("opening")]
     assert np.abs(generated[:30] - opening).max() < 2e-3

@@ -12,7 +12,7 @@ from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance, allowed_units, uniform_path
 from lipmotion.engines.coupled.training.em_steps import LatticeUtterance, e_step, m_step, variance_floors
 from lipmotion.engines.coupled.training.fit import fit_coupled, frames_away_from_speech
-from lipmotion.engines.coupled.training.train import MixtureSchedule, growing_chains
+from lipmotion.engines.coupled.training.train import CONVERGED, MixtureSchedule, growing_chains
 from lipmotion.errors import InputError
 from lipmotion.testing.examples import examples
 from lipmotion.types import GREY, Channel, Example, Span, Timeline, Unit
@@ -56,9 +56,10 @@ def test_the_likelihood_rises_at_every_step():
         steps = []
         of = structure(kind, sets, states=3, limit=limit)
         mixtures = (4,) if kind == HMM else (4, 2)
-        *_, _ = growing_chains(
+        *_, grown = growing_chains(
             of, ("speech", "seen"), sentences(), MixtureSchedule(mixtures, (1.0, 1.0), most_steps=8), steps.append
         )
+        assert grown.converged is bool(steps[-1].log_likelihood - steps[-2].log_likelihood < CONVERGED)
         assert {step.mixtures[0] for step in steps} == {1, 2, 4}
         for one, other in pairwise(steps):
             if one.mixtures == other.mixtures:
@@ -155,7 +156,7 @@ def test_every_stream_has_a_chain_and_a_weight_of_its_own():
     """Speech, points and pictures on three chains."""
     data = [with_pictures(number) for number in range(5)]
     config = CoupledConfig(chains="phone viseme viseme", states=2, mixtures=1, visual_weight=0.5, eigenlips_weight=0.25)
-    model = fit_coupled(data, config, silent_monitor)
+    model = fit_coupled(data, config, silent_monitor).model
     assert model.chains.streams == ("speech", "geometry", "eigenlips")
     assert [group.weights for group in model.chains.groups] == [(1.0,), (0.5,), (0.25,)]
     assert [stream.name for stream in model.visual] == ["geometry", "eigenlips"]

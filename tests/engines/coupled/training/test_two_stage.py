@@ -53,7 +53,7 @@ def trained(kind: str = "coupled", mixtures: int = 2) -> Chains:
     groups = 1 if kind == "hmm" else 2
     how = MixtureSchedule((mixtures, 1)[:groups], (1.0, 1.0))
     *_, grown = growing_chains(structure, ("speech", "lips"), aligned(examples(4)), how)
-    return grown
+    return grown.model
 
 
 def other_speaker(example: Example, seed: int = 5) -> Example:

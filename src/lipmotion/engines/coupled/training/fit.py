@@ -14,6 +14,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.engines.base import Fit
 from lipmotion.engines.coupled.chains.densities import AudioVisualObservations
 from lipmotion.engines.coupled.chains.model import Chains
 from lipmotion.engines.coupled.chains.structures import HMM, Structure, structure_of
@@ -36,6 +37,7 @@ from lipmotion.engines.coupled.conversion.regression import (
 )
 from lipmotion.engines.coupled.model import AWAY_FROM_SPEECH_S, CoupledModel
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance
+from lipmotion.engines.coupled.training.em_steps import ChainStatistics
 from lipmotion.engines.coupled.training.speech_only import SpeechOnlySchedule, train_on_speech
 from lipmotion.engines.coupled.training.train import MixtureSchedule, TrainingStep, growing_chains
 from lipmotion.errors import CorpusError
@@ -46,6 +48,7 @@ from lipmotion.motion.rest import away_from_speech, speech_intervals
 from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.motion.variance_scaling import scaling_factors
 from lipmotion.stats.delta_windows import dynamics_known
+from lipmotion.stats.em import EmResult
 from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Progress, Timeline, Unit, sub_monitor
 from lipmotion.units import VISEME_OF, is_silent
 
@@ -54,9 +57,11 @@ ResultT = TypeVar("ResultT")
 SPEECH = "speech"
 
 
-def fit_coupled(examples: Sequence[Example], config: CoupledConfig, monitor: Monitor) -> CoupledModel:
-    """Return a coupled model trained on examples of speech with its motion.
+def fit_coupled(examples: Sequence[Example], config: CoupledConfig, monitor: Monitor) -> Fit[CoupledModel]:
+    """Return a coupled model trained on examples of speech with its motion, and figures of the training.
 
+    Its figures are ``frames``, ``joint_states``, and ``converged``: whether EM with the greatest number of Gaussians
+    ended for want of gain (1), not after the greatest number of steps (0).
     Examples without observed motion are for the second stage of training, which re-estimates the densities of speech
     from more speakers (``speech_only``). The first stage ignores them, and so does what follows the second: the
     regression of visual means, and variance scaling, which are learned from the examples with motion.
@@ -68,10 +73,10 @@ def fit_coupled(examples: Sequence[Example], config: CoupledConfig, monitor: Mon
 
 def growing_models(
     examples: Sequence[Example], config: CoupledConfig, monitor: Monitor
-) -> Iterator[Callable[[], CoupledModel]]:
+) -> Iterator[Callable[[], Fit[CoupledModel]]]:
     """Yield functions that return the models with 1, 2, 4, … Gaussians that ``fit_coupled`` passes through.
 
-    The last function returns the model of ``fit_coupled``. Raises as ``fit_coupled``.
+    The last function returns what ``fit_coupled`` does. Raises as ``fit_coupled``.
     """
     structure = structure_of(config.structure, config.chains, config.states, config.asynchrony, config.cross_units)
     moving = [example for example in examples if dynamics_known(example.valid).any()]
@@ -93,7 +98,8 @@ def growing_models(
     prior = fit_articulation_prior(space, values, moving) if config.articulation else None
     first_share, second_share = (0.4, 0.7) if speech_only else (0.7, 0.7)
 
-    def finished_model(chains: Chains) -> CoupledModel:
+    def finished(grown: EmResult[Chains, ChainStatistics]) -> Fit[CoupledModel]:
+        chains = grown.model
         if speech_only:
             second_monitor = sub_monitor(monitor, first_share, second_share)
             chains = _second_stage(chains, data, speech_only, config, second_monitor)
@@ -104,13 +110,15 @@ def growing_models(
         if config.dynamic and config.variance_scaling:
             model = replace(model, scaling=_fitted_scaling(model, data, values))
         monitor(Progress("regression of visual means", 1, 1, 1.0))
-        return model
+        joint_states = model.chains.transitions.product.chain_states.shape[1]
+        frames = sum(int(example.valid.sum()) for example in examples)
+        return Fit(model, {"frames": frames, "joint_states": joint_states, "converged": float(grown.converged)})
 
     names, schedule = (SPEECH, *(stream.name for stream in visual)), _schedule(structure, visual, config)
     most_steps = schedule.most_steps * max(schedule.mixtures).bit_length()
     report = _reporter("chains", most_steps, sub_monitor(monitor, 0, first_share))
-    for chains in growing_chains(structure, names, data, schedule, report, workers()):
-        yield partial(finished_model, chains)
+    for grown in growing_chains(structure, names, data, schedule, report, workers()):
+        yield partial(finished, grown)
 
 
 def workers() -> int:

@@ -67,9 +67,9 @@ def train_on_speech(
     present = component_counts(chains)
     most = present if chains.structure.kind == HMM else (max(schedule.mixtures, present[0]), *present[1:])
     while True:
-        chains, statistics = train_to_convergence(
+        result = train_to_convergence(
             chains, utterances, floors, schedule.most_steps, report, workers, speech_only=True
         )
-        if component_counts(chains) == most:
-            return chains
-        chains = with_split_components(chains, most, statistics)
+        if component_counts(result.model) == most:
+            return result.model
+        chains = with_split_components(result.model, most, result.statistics)

@@ -21,7 +21,7 @@ from lipmotion.engines.coupled.training.em_steps import (
     variance_floors,
 )
 from lipmotion.engines.coupled.training.initialisation import initial_chains
-from lipmotion.stats.em import run_em
+from lipmotion.stats.em import EmResult, run_em
 from lipmotion.stats.mixture import Mixtures
 
 FRAMES_A_GAUSSIAN = 25.0
@@ -70,8 +70,8 @@ def growing_chains(
     schedule: MixtureSchedule,
     report: Report = no_report,
     workers: int = 1,
-) -> Iterator[Chains]:
-    """Yield chains trained by EM, started by Viterbi training, with 1, 2, 4, … Gaussians, each to convergence.
+) -> Iterator[EmResult[Chains, ChainStatistics]]:
+    """Yield results of EM, started by Viterbi training: chains with 1, 2, 4, … Gaussians, each to convergence.
 
     streams : the names of the streams
     report  : is called after every step; while the number of components stays, the log likelihood never falls
@@ -81,12 +81,12 @@ def growing_chains(
     chains = initial_chains(structure, streams, data, schedule.weights, floors)
     utterances = [lattice_utterance(chains, utterance) for utterance in data]
     while True:
-        chains, statistics = train_to_convergence(chains, utterances, floors, schedule.most_steps, report, workers)
-        yield chains
-        counts = component_counts(chains)
+        result = train_to_convergence(chains, utterances, floors, schedule.most_steps, report, workers)
+        yield result
+        counts = component_counts(result.model)
         if all(count >= most for count, most in zip(counts, schedule.mixtures, strict=True)):
             return
-        chains = with_split_components(chains, schedule.mixtures, statistics)
+        chains = with_split_components(result.model, schedule.mixtures, result.statistics)
 
 
 def train_to_convergence(
@@ -98,15 +98,15 @@ def train_to_convergence(
     workers: int,
     *,
     speech_only: bool = False,
-) -> tuple[Chains, ChainStatistics]:
-    """Return the chains after EM with a fixed number of components, and the statistics of its last E-step.
+) -> EmResult[Chains, ChainStatistics]:
+    """Return the result of EM with a fixed number of components.
 
     floors      : the least variance of each stream [each shape=(D_s,)]
     most_steps  : greatest number of steps; fewer if the likelihood stops rising
     speech_only : re-estimate the densities of speech, and keep all else
     """
     streams = range(1 if speech_only else len(chains.streams))
-    result = run_em(
+    return run_em(
         chains,
         lambda chains: e_step(chains, utterances, workers),
         lambda chains, statistics: m_step(chains, statistics, floors, streams=streams, transitions=not speech_only),
@@ -114,7 +114,6 @@ def train_to_convergence(
         lambda _, chains, statistics: report(TrainingStep(component_counts(chains), statistics.mean_log_likelihood)),
         least_gain=CONVERGED,
     )
-    return result.model, result.statistics
 
 
 def component_counts(chains: Chains) -> tuple[int, ...]:

@@ -4,9 +4,15 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.cli.arguments.texts import text_or_file_content
 from lipmotion.errors import InputError
+from lipmotion.pipeline.understand.read_request import text_or_file_content
 from lipmotion.types import TimedTranscript
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
 
 
 @pytest.mark.usefixtures("here")

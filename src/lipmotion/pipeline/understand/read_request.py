@@ -1,16 +1,54 @@
-"""Arguments that are either a text or the path of a file with the text."""
+"""Requests from files: of a job's request, the ``SpeechRequest``; a transcript is a text, or the path of a file."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
 
+from lipmotion.corpora.labels import labels_beside
+from lipmotion.errors import InputError
+from lipmotion.pipeline.job import Request
+from lipmotion.pipeline.understand.given_units import read_units
+from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.transcribe import read_transcript
 from lipmotion.types import TimedTranscript
+from lipmotion.units import Lexicon
 
 LONGEST_NAME, LONGEST_PATH = 255, 1000
 """Most bytes of the name of a file on any usual system; most letters of an argument that may be a path."""
 _SUFFIX = re.compile(r"\.[A-Za-z]{1,10}")
+
+
+def read_request(request: Request, *, words_beside: bool = False) -> SpeechRequest:
+    """Return what is animated, with the content of its files.
+
+    words_beside : use the text, subtitles or labels beside the recording, where no words and no phones are given
+    Raises InputError: no recording is named, or a file cannot be read.
+    """
+    if request.recording is None:
+        raise InputError("the job names no recording; required: [request] recording = 'FILE'")
+    transcript = text_or_file_content(request.transcript) if request.transcript is not None else None
+    units = read_units(request.units) if request.units else None
+    labels = labels_beside(request.recording) if words_beside and transcript is None and units is None else None
+    if labels is not None:
+        transcript, units = labels.transcript, labels.phones if labels.transcript is None else None
+    return SpeechRequest(
+        request.recording,
+        transcript=transcript,
+        units=units,
+        lexicon=read_lexicon(request),
+        recogniser=request.recogniser,
+        speaker=request.speaker,
+        onto=request.onto,
+        onto_speaker=request.onto_speaker,
+        pauses=request.pauses,
+        asymmetry=request.asymmetry,
+    )
+
+
+def read_lexicon(request: Request) -> Lexicon | None:
+    """Return the pronunciations that a request names; None: it names none. Raises InputError: they cannot be read."""
+    return Lexicon.from_file(request.lexicon) if request.lexicon else None
 
 
 def text_or_file_content(argument: str) -> str | TimedTranscript:

@@ -1,0 +1,112 @@
+"""A job is the same value from Python and from a file; what it cannot be is refused in one sentence."""
+
+from __future__ import annotations
+
+import re
+import sys
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+import lipmotion
+from lipmotion import Delivery, Job, Outputs, Request, SpeechRequest, Staging, animate, load_model, write
+from lipmotion.errors import InputError
+from lipmotion.pipeline.understand.read_request import read_request
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "api.md").read_text(encoding="utf-8").partition("\n## Jobs, and files of them")[2]
+needs_toml = pytest.mark.skipif(sys.version_info < (3, 11), reason="Python 3.10 reads no TOML")
+
+
+def block(language: str) -> str:
+    (found,) = re.findall(rf"^```{language}\n(.*?)^```", PAGE.partition("\n## ")[0], re.MULTILINE | re.DOTALL)
+    return str(found)
+
+
+@needs_toml
+def test_the_page_says_one_job_twice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("scene.toml").write_text(block("toml"))
+    names = {"lipmotion": lipmotion, "Path": Path}
+    told = eval(block("python").partition("job = ")[2].partition("\nprint(")[0], names)  # noqa: S307
+    job = Job.from_file("scene.toml")
+    assert job == told
+    assert job.request.recording == Path("examples/welcome.flac")
+    assert (job.outputs.motion_hz, job.delivery.intensity, job.staging.head) == (25, 1.4, False)
+
+
+@needs_toml
+def test_paths_begin_at_the_folder_of_the_file(tmp_path: Path) -> None:
+    (tmp_path / "my.svg").write_text("<svg/>")
+    file = tmp_path / "scene.toml"
+    file.write_text(
+        "[request]\nrecording = 'takes'\ntranscript = 'my words'\nmodel = '/else/m.lipmotion'\n"
+        "[outputs]\nfiles = ['out/', '{name}.vtt', '-']\nface = 'my.svg'\ncurves = 'arkit'\n"
+    )
+    assert Job.from_file(file) == Job(
+        Request(tmp_path / "takes", "my words", model=Path("/else/m.lipmotion")),
+        Outputs((f"{tmp_path}/out/", f"{tmp_path}/{{name}}.vtt", "-"), face=str(tmp_path / "my.svg"), curves="arkit"),
+    )
+
+
+@needs_toml
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (
+            "[request]\nrecordings = 'a.wav'",
+            r"in \[request\]: no option 'recordings'; there are: recording, transcript",
+        ),
+        ("recording = 'a.wav'", "no option 'recording'; there are: request, outputs, delivery, staging"),
+        ("delivery = 3", "delivery is 3, required a table of options"),
+        ("[delivery]\nintensity = 4", r"in \[delivery\]: the intensity is 4, required 0 to 3"),
+        ("[delivery]\nstepped = 'yes'", "stepped is 'yes', required true or false"),
+        ("[outputs]\nfps = 0", "the frame rate is 0 a second, required 1 to 1000 a second"),
+        ("[outputs]\nfiles = 'a.json'", "files is 'a.json', required a list of texts"),
+        ("[outputs]\nchannels = [1]", "required a list of texts"),
+        ("[outputs]\njaw = 'sound'", "jaw is 'sound', required one of: motion, energy, none"),
+        ("[request]\nmodel = 1", "model is 1, required a path"),
+        ("[request]\nasymmetry = nan", "the asymmetry is nan, required 0 to 1"),
+        ("[staging]\nsize = 63", "the size is 63 pixels"),
+        ("[request", "Expected"),
+        ("a = " + "[" * 100_000, "scene.toml"),
+    ],
+)
+def test_what_a_file_cannot_say(tmp_path: Path, content: str, words: str) -> None:
+    (tmp_path / "scene.toml").write_text(content)
+    with pytest.raises(InputError, match=words) as error:
+        Job.from_file(tmp_path / "scene.toml")
+    assert str(error.value).startswith(str(tmp_path / "scene.toml"))
+
+
+def test_an_old_python_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.version_info", (3, 10, 4))
+    with pytest.raises(InputError, match=r"read by Python 3\.11 or newer"):
+        Job.from_file("scene.toml")
+
+
+def test_a_job_writes_what_animate_and_write_do(toy_speech: Path, toy_model_file: Path, tmp_path: Path) -> None:
+    made = [tmp_path / name for name in ("job.json", "calls.json")]
+    outputs = Outputs((str(made[0]),), fps=30, channels=("width", "tongue"))
+    delivery = Delivery(anticipation_ms=40)
+    Job(Request(toy_speech, recogniser="own", model=toy_model_file), outputs, delivery).run()
+    alone = animate(SpeechRequest(toy_speech, recogniser="own"), model=toy_model_file)
+    model = load_model(toy_model_file)
+    how = {"rate_hz": 30, "channels": ("width", "tongue"), "delivery": delivery}
+    write(alone, made[1], speech=toy_speech, model=model, **how)
+    assert made[0].read_bytes() == made[1].read_bytes()
+
+
+def test_a_request_is_read_as_it_is(toy_speech: Path) -> None:
+    """What a request and a ``SpeechRequest`` both say has the same names, and the same defaults."""
+    read, usual = read_request(Request(toy_speech)), SpeechRequest(toy_speech)
+    assert all(getattr(read, each.name) == getattr(usual, each.name) for each in fields(SpeechRequest))
+    with pytest.raises(InputError, match="names no recording"):
+        read_request(Request())
+
+
+def test_a_background_is_of_a_drawn_face_or_of_a_filmed_one(toy_speech: Path) -> None:
+    with pytest.raises(InputError, match="a video is for filmed faces"):
+        Job(Request(toy_speech), Outputs(("a.mp4",), background="sea.mp4")).run()
+    assert Staging(background="#40a0ff").colour == (64, 160, 255)

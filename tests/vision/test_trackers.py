@@ -1,0 +1,84 @@
+"""Trackers by name: one of an installed package finds the face of a video; MediaPipe is not needed for it."""
+
+from __future__ import annotations
+
+import sys
+from importlib import metadata
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.errors import InputError
+from lipmotion.extensions import GROUPS
+from lipmotion.pipeline.corpus.prepare import prepare
+from lipmotion.vision.face_finder import FaceFinder
+from lipmotion.vision.landmarks import EYE_CORNERS, TRACKED_POINTS
+from lipmotion.vision.mediapipe import MediaPipe
+from lipmotion.vision.track import track
+from lipmotion.vision.trackers import TRACKERS, LandmarkTracker, tracker_named
+from vision.scripted import NoFinder
+
+
+class Brightest(LandmarkTracker):
+    """Finds a face around the brightest place of a picture."""
+
+    def versions(self) -> dict[str, str]:
+        return {"brightest": "2"}
+
+    def points(self, most: int = 1) -> Brightest:
+        assert most in (1, 4)
+        return self
+
+    def boxes(self) -> NoFinder:
+        return NoFinder()
+
+    def __enter__(self) -> Brightest:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def faces(self, image: np.ndarray) -> list[np.ndarray]:
+        y, x = (int(place) for place in np.unravel_index(int(image[..., 0].argmax()), image.shape[:2]))
+        points = np.random.default_rng(0).uniform(-30, 30, (len(TRACKED_POINTS), 3)) + np.array([x, y, 0])
+        for side, corner in zip((-20, 20), EYE_CORNERS, strict=True):
+            points[TRACKED_POINTS.index(corner)] = x + side, y, 0
+        return [points]
+
+
+@pytest.fixture
+def installed(monkeypatch: pytest.MonkeyPatch) -> None:
+    points = {"brightest": f"{__name__}:Brightest", "wrong": "json:dumps"}
+    entries = {name: metadata.EntryPoint(name, value, TRACKERS.group) for name, value in points.items()}
+    monkeypatch.setitem(TRACKERS.__dict__, "_installed", entries)
+
+
+@pytest.mark.usefixtures("installed")
+def test_a_tracker_is_chosen_by_name() -> None:
+    assert isinstance(tracker_named(), MediaPipe)
+    assert isinstance(tracker_named().boxes(), FaceFinder)
+    assert type(tracker_named("brightest")).__name__ == "Brightest"
+    assert TRACKERS.group in GROUPS
+    with pytest.raises(InputError, match="no tracker 'other'; there are: mediapipe, brightest, wrong"):
+        tracker_named("other")
+    with pytest.raises(InputError, match="required a class of LandmarkTracker"):
+        tracker_named("wrong")
+
+
+@pytest.mark.usefixtures("installed")
+def test_an_installed_tracker_finds_the_face_of_a_video(write_video, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("cv2")
+    monkeypatch.setitem(sys.modules, "mediapipe.python.solutions", None)
+    found = track(write_video(ticks=range(20)), crops=False, tracker="brightest")
+    assert found.seen.all()
+    assert found.motion.values.shape[0] == 20
+
+
+def test_a_name_that_is_none_is_refused_before_the_work(write_video, tmp_path: Path) -> None:
+    path = write_video(ticks=range(20))
+    with pytest.raises(InputError, match="no tracker 'other'"):
+        track(path, tracker="other")
+    with pytest.raises(InputError, match="no tracker 'other'; there are: mediapipe"):
+        prepare(path, tmp_path / "corpus", tracker="other")
+    assert not (tmp_path / "corpus").exists()
