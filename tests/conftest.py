@@ -24,7 +24,7 @@ from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.model import Model, save_model
 from lipmotion.pipeline.training.train import train
 from lipmotion.testing.toy import ToySentence, toy_sentences, toy_utterances
-from lipmotion.testing.toy_face import toy_face
+from testing.toy_face import toy_face
 
 SENTENCES = 12
 FIXED, EXPLORE = "fixed", "explore"

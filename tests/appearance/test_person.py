@@ -22,8 +22,8 @@ from lipmotion.errors import InputError
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.stats.pca import evenly_spaced
 from lipmotion.testing.toy import toy_motion, toy_sentences
-from lipmotion.testing.toy_face import NOISE, SHAPE, toy_chin_px, toy_footage_pictures, toy_lower_faces
 from lipmotion.types import Motion
+from testing.toy_face import NOISE, SHAPE, toy_chin_px, toy_footage_pictures, toy_lower_faces
 
 MOUTH = (slice(None), *mouth_part(1))
 

@@ -61,3 +61,14 @@ def test_a_decorated_function_may_be_called_again():
 def test_kernels_are_named():
     assert blas_kernels() == blas_kernels() == sorted(blas_kernels())
     assert all(len(name.split()) >= 3 for name in blas_kernels())
+
+
+def test_the_limit_lasts_until_the_last_thread_leaves():
+    """Of two Python threads the first leaves while the second one still computes."""
+    first, second = one_thread(), one_thread()
+    first.__enter__()
+    second.__enter__()
+    first.__exit__(None, None, None)
+    assert threads() == {1}
+    second.__exit__(None, None, None)
+    assert threads() == {2}

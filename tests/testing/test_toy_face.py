@@ -9,7 +9,8 @@ from lipmotion.appearance.lower_face import CORNER, region_map
 from lipmotion.appearance.placing import cut
 from lipmotion.errors import InputError
 from lipmotion.testing.toy import toy_motion, toy_sentences
-from lipmotion.testing.toy_face import (
+from lipmotion.types import Motion
+from testing.toy_face import (
     toy_chin_px,
     toy_face,
     toy_footage_pictures,
@@ -17,7 +18,6 @@ from lipmotion.testing.toy_face import (
     toy_lower_faces,
     toy_places,
 )
-from lipmotion.types import Motion
 
 
 @pytest.fixture(scope="module")

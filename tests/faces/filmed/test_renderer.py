@@ -18,8 +18,8 @@ from lipmotion.faces.filmed import renderer
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.faces.filmed.renderer import BATCH, Background, Stitcher, StitchingOptions
 from lipmotion.testing.toy import toy_motion, toy_sentences
-from lipmotion.testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH, toy_chin_px, toy_frames, toy_places
 from lipmotion.types import Motion
+from testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH, toy_chin_px, toy_frames, toy_places
 
 FRAMES = 24
 """More than one batch."""

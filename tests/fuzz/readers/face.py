@@ -14,8 +14,8 @@ from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import require
 from lipmotion.faces.filmed.face import load_face, save_face
 from lipmotion.pipeline.film.filmed_video import film_of
-from lipmotion.testing.toy_face import toy_face
 from lipmotion.types import Motion
+from testing.toy_face import toy_face
 
 FRAMES = 3
 FEW = slice(6)

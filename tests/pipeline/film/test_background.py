@@ -19,8 +19,8 @@ from lipmotion.pipeline.film.background import (
     stored_sequence,
 )
 from lipmotion.testing.toy import toy_sentences
-from lipmotion.testing.toy_face import SCALE, toy_chin_px, toy_frames, toy_places
 from pipeline.film.toy_footage import ToyVideo, footage_of, install, write_video
+from testing.toy_face import SCALE, toy_chin_px, toy_frames, toy_places
 
 
 @pytest.fixture(scope="module")

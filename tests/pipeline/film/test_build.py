@@ -15,11 +15,11 @@ from lipmotion.pipeline.film.build import build_face
 from lipmotion.pipeline.film.takes import Take
 from lipmotion.speech.sound.pauses import QUIETEST_DB
 from lipmotion.testing.toy import toy_sentences
-from lipmotion.testing.toy_face import toy_chin_px
 from lipmotion.types import Audio, Channel, Item, Motion, Progress, Track
 from lipmotion.vision.footage import Footage
 from lipmotion.vision.frames import WHOLE, VideoSpan
 from pipeline.film.toy_footage import ToyVideo, footage_of, install, write_video
+from testing.toy_face import toy_chin_px
 
 SENTENCES = 3
 Videos = dict[Path, ToyVideo]

@@ -25,9 +25,9 @@ from lipmotion.pipeline.outputs.shown_faces import shown_face
 from lipmotion.pipeline.outputs.write import write
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.testing.toy import ToySentence, toy_motion
-from lipmotion.testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH
 from lipmotion.types import Audio, Channel, Item, Motion, Progress
 from speech.sounds import tone, write_sound
+from testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH
 
 MIDDLE = (slice(150, 230), slice(70, 154))
 """Rows and columns of the background in which the mouth is."""

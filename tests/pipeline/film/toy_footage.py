@@ -12,10 +12,10 @@ import pytest
 from lipmotion.export.video import write_mp4
 from lipmotion.pipeline.film import background, build
 from lipmotion.testing.toy import ToySentence, toy_motion
-from lipmotion.testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH, SHAPE, toy_chin_px, toy_frames, toy_places
 from lipmotion.types import Audio, Channel, Motion, Track
 from lipmotion.vision.footage import Footage
 from lipmotion.vision.frames import WHOLE, VideoSpan
+from testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH, SHAPE, toy_chin_px, toy_frames, toy_places
 
 EYES_PX = 90.0
 

@@ -132,6 +132,12 @@ def test_pins_hold_for_channels_and_curves(session: Session, tmp_path: Path) -> 
     assert curves_of(later.motion, later.units, "arkit", edits=later.curve_edits)["jawOpen"][170] == pytest.approx(0.7)
 
 
+def test_pins_that_are_close_together_all_hold(session: Session) -> None:
+    found = session.generated(edited("pin jawOpen 0.7 at 1.2", "pin jawOpen 0.2 at 1.25", "pin jawOpen 0.3 at 1.25"))
+    curve = curves_of(found.motion, found.units, "arkit", edits=found.curve_edits)["jawOpen"]
+    assert curve[[120, 125]] == pytest.approx([0.7, 0.3])  # of two at one time the last
+
+
 def test_gains_make_movements_larger_for_a_time(session: Session) -> None:
     plain, larger = session.generated(), session.generated(edited("gain 2 from 0.6 to 1.4"))
     span = slice(60, 141)
