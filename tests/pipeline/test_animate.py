@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -228,3 +229,9 @@ def test_the_same_bytes_again_whatever_the_number_of_threads(toy_model, toy_spee
     with threadpool_limits(2, user_api="blas"):
         write(animate(toy_speech, model=toy_model), tmp_path / "second.npz")
     assert (tmp_path / "first.npz").read_bytes() == (tmp_path / "second.npz").read_bytes()
+
+
+def test_motion_says_which_model_it_is_of(move: Animate, tmp_path: Path) -> None:
+    """Attribution is not lost where the model is not given again."""
+    write(move(), tmp_path / "a.json")
+    assert json.loads((tmp_path / "a.json").read_text())["model"]["corpus"] == "toy"

@@ -374,4 +374,5 @@ def generation_of(
     pinned_s = [pin.time_s for pin in constraints.pins] if constraints else []
     if request.onto is None:
         generation = replace(generation, motion=symmetrical(generation.motion, request.asymmetry))
-    return replace(with_pauses(generation, request.pauses, pinned_s), outlook=outlook_of(request, understood))
+    paused = with_pauses(generation, request.pauses, pinned_s)
+    return replace(paused, outlook=outlook_of(request, understood), about=model.about)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from numbers import Real
 from typing import Any, NamedTuple, TypeVar
@@ -270,6 +270,7 @@ class Generation:
     outlook : how well the model knew words and voice (None: not from ``animate``)
     stepped : channels of held poses, which change at once: formats that can say so do
     curve_edits : pins and gains of curves that follow from the motion, as ``jawOpen``, wherever these are made
+    about  : corpus, licence and attribution of the model, by name, as ``Model.about``; empty: not from ``animate``
 
     >>> import lipmotion
     >>> result = lipmotion.animate("examples/welcome.flac")
@@ -286,6 +287,7 @@ class Generation:
     outlook: Outlook | None = None
     stepped: tuple[str, ...] = ()
     curve_edits: tuple[Pin | Gain, ...] = ()
+    about: Mapping[str, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         frames, channels = self.motion.values.shape

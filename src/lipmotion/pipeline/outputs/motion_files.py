@@ -72,7 +72,7 @@ class MotionOutput(Output):
         return partial(self._write, held, performance)
 
     def _write(self, held: Generation, performance: Performance) -> None:
-        about = performance.model.about if performance.model else {}
+        about = performance.model.about if performance.model else performance.generation.about
         kept = ("name", "corpus", "licence", "attribution")
         model = {key: _text(about[key]) for key in kept if about.get(key)}
         speech, sound_s = performance.sound_file, self.settings.delivery.offset_ms / 1000

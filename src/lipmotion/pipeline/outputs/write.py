@@ -41,7 +41,8 @@ def write(  # noqa: PLR0913
                ``.webm``, ``.mov`` (a drawn face, with sound), or ``NAME%05d.png`` (its pictures, without sound); where
                ``speech`` is a sound, also ``.wav``, ``.flac``, ``.ogg``
     speech   : the recording that was animated, or the sound, as of ``speak``; a video needs it for its sound
-    model    : the model that generated the motion; motion files then name its corpus and licence
+    model    : the model that generated the motion, whose corpus and licence motion files name; None: those that the
+               generation names
     channels : channels of motion files, in this order, also articulatory ones as ``tongue`` (docs/articulation.md);
                None: all of the motion
     rate_hz  : frames per second of motion files, 1 to 1000; None: the 100 of the model (Live Link Face: 60)
