@@ -35,6 +35,16 @@ FORBIDDEN = [
         "export/motion/motion_csv.py",
         "import lipmotion.export.motion.motion_npz",
     ),
+    (
+        "Engines know predictors by their interface alone",
+        "engines/selection/engine.py",
+        "from lipmotion.motion import acoustic_network",
+    ),
+    (
+        "Tracking knows trackers by their interface alone",
+        "vision/track.py",
+        "from lipmotion.vision import face_mesh",
+    ),
     (VISION, "pipeline/training/train.py", "import cv2"),
     (NUMBA, "stats/mixture.py", "def late():\n    import numba"),
 ]
