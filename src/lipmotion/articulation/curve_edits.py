@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from lipmotion.articulation.delivery import intensified
 from lipmotion.articulation.rest import rest_frames
 from lipmotion.errors import InputError
+from lipmotion.motion.closure import OPENING
 from lipmotion.types import WEIGHT, Gain, Generation, Motion, Pin, Timeline, Unit, frame_of
 
 Curve = NDArray[np.float64]
@@ -47,6 +48,8 @@ def with_edited_curves(motion: Motion, units: Timeline[Unit], edits: Sequence[Pi
         still = 0.0 if is_weight else float(np.median(values[rest, column]))
         factor = 1 + (edit.factor - 1) * span_weight(motion.time_s, edit.start_s, edit.end_s, GAIN_EDGE_S)
         values[:, column] = still + factor * (values[:, column] - still)
+        if edit.channel == OPENING:  # closed lips are closer than at rest
+            values[:, column] = np.maximum(values[:, column], 0)
     bend_through_pins(values, pins, max(round(PIN_REACH_S * motion.rate_hz), 1))
     channels = zip(motion.channels, range(len(motion.channels)), strict=True)
     weights = [column for channel, column in channels if channel.unit == WEIGHT and channel.name in edited]

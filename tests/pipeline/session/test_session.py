@@ -145,6 +145,9 @@ def test_gains_make_movements_larger_for_a_time(session: Session) -> None:
     edge = round(GAIN_EDGE_S * 100)
     assert np.array_equal(larger.motion.values[: 60 - edge], plain.motion.values[: 60 - edge])
     assert np.array_equal(larger.motion.values[141 + edge :], plain.motion.values[141 + edge :])
+    wider = session.generated(edited("gain opening 3 from 0.6 to 1.4")).motion["opening"]
+    assert wider.min() >= 0
+    assert wider[span].max() > 2 * plain.motion["opening"][span].max()
     still = session.generated(edited("gain width 0 from 0.6 to 1.4"))
     assert np.ptp(still.motion["width"][span]) < 1e-9
     assert np.array_equal(still.motion["opening"], plain.motion["opening"])
