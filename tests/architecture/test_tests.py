@@ -8,6 +8,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+from portable.run import NUMERIC
+
 TESTS = Path(__file__).parents[1]
 STARTERS = re.compile(r"os\.(fork\w*|system|popen|spawn\w+|posix_spawnp?|exec[lv]\w*)|\w+\.create_subprocess_\w+")
 MODULES = {"subprocess", "pty"}
@@ -49,3 +51,8 @@ def test_planted_faults_still_fit_the_source() -> None:
         text = (root / "src" / "lipmotion" / mutant["path"]).read_text(encoding="utf-8")
         assert text.count(mutant["old"]) == 1, mutant["name"]
         assert all((root / test.partition("::")[0]).exists() for test in mutant.get("tests", ())), mutant["name"]
+
+
+def test_the_tests_of_rounding_are_there() -> None:
+    """Else ``make test-portable`` runs none."""
+    assert [name for name in NUMERIC if not (TESTS / name).exists()] == []

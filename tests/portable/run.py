@@ -18,11 +18,22 @@ from portable.settings import BEFORE_AVX, CORES, different_cores, environment, k
 TESTS = Path(__file__).parents[1]
 NUMERIC = (
     *("stats", "measures", "kernels/test_threads.py", "engines/trajectory/test_engine.py", "pipeline/test_animate.py"),
-    *(f"hmm/test_{name}.py" for name in ("align", "decode", "em", "states", "train")),
-    *(f"hmm/multistream/test_{name}.py" for name in ("align", "densities", "forest", "generate", "train")),
+    *(f"hmm/test_{name}.py" for name in ("align", "baum_welch", "decode", "states", "unit_training")),
+    *(
+        f"hmm/multistream/test_{name}.py"
+        for name in ("align", "densities", "forest", "generate", "multistream_training")
+    ),
     *(
         f"motion/test_{name}.py"
-        for name in ("acoustic_network", "closure", "generation", "prior_regression", "space", "speakers", "transfer")
+        for name in (
+            "acoustic_network",
+            "closure",
+            "generation",
+            "prior_regression",
+            "space",
+            "speaker_maps",
+            "transfer_map",
+        )
     ),
     *(
         f"speech/test_{name}.py"
