@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
-from math import ceil
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,7 @@ from lipmotion.motion.rest import away_from_speech, speech_intervals
 from lipmotion.motion.space import MotionSpace
 from lipmotion.stats.delta_windows import with_dynamics
 from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays
-from lipmotion.types import EYE_DISTANCE, FRAME_RATE_HZ, Example, Span, Timeline, Unit
+from lipmotion.types import EYE_DISTANCE, FRAME_RATE_HZ, Example, Timeline, Unit, frames_of
 from lipmotion.units import PHONES, SILENCE, VOWELS, is_silent, most_similar_phone, unknown_phone_message
 
 Array = NDArray[np.float64]
@@ -274,15 +273,6 @@ ARTICULATION = {
 
 def _merged(phone: str) -> str:
     return SILENCE if is_silent(phone) else phone
-
-
-def frames_of(span: Span[Unit], frames: int) -> tuple[int, int]:
-    """Return the first frame of a span, and the one after its last."""
-    return _frame_after(span.start_s, frames), _frame_after(span.end_s, frames)
-
-
-def _frame_after(time_s: float, frames: int) -> int:
-    return ceil(min(max(time_s * FRAME_RATE_HZ - 1e-6, 0), frames))
 
 
 def _spoken(example: Example) -> NDArray[np.bool_]:

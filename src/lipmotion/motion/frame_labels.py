@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from math import ceil
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.motion.rest import away_from_speech, speech_intervals
-from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit
+from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit, frames_of
 from lipmotion.units import PHONES, SILENCE, UNIT_SETS, UnitSet, is_silent, unknown_phone_message
 
 REST_STATE = -1
@@ -111,9 +110,7 @@ def full_context_states(units: Timeline[Unit], frames: int, layout: StateLayout)
     result = [layout.rest] * frames
     away = away_from_speech(np.arange(frames) / FRAME_RATE_HZ, speech_intervals(units), layout.rest_s)
     for left, span, right in with_neighbours(units):
-        first, stop = (
-            ceil(min(max(edge_s * FRAME_RATE_HZ - 1e-6, 0), frames)) for edge_s in (span.start_s, span.end_s)
-        )
+        first, stop = frames_of(span, frames)
         time_s = np.arange(first, stop) / FRAME_RATE_HZ
         left_unit, unit, right_unit = map(layout.units.unit, (left, span.label.phone, right))
         count = layout.states(unit)

@@ -13,11 +13,10 @@ from lipmotion.motion.articulation import (
     ArticulationPrior,
     Statistics,
     dynamics_of,
-    frames_of,
 )
 from lipmotion.motion.closure import OPENING, REACH_S
 from lipmotion.motion.space import MotionSpace
-from lipmotion.types import EYE_DISTANCE, Timeline, Unit
+from lipmotion.types import EYE_DISTANCE, Timeline, Unit, frames_of
 from lipmotion.units import VOWELS
 
 Array = NDArray[np.float64]

@@ -95,10 +95,7 @@ def read_edits(path: str | Path) -> EditFile:
     Raises InputError: no such file, another suffix, or not a file of edits of this version.
     """
     path = Path(path)
-    kind = path.suffix.lower()
-    if kind not in SUFFIXES:
-        raise InputError(f"{path}: a file of edits ends in one of: {', '.join(SUFFIXES)}")
-    if kind == TOML:
+    if _suffix(path) == TOML:
         members: Any = read_toml(path, "edits", f"use {JSON}")
     else:
         try:
@@ -114,6 +111,13 @@ def read_edits(path: str | Path) -> EditFile:
         return _content(members, path.parent)
     except (InputError, TypeError, KeyError) as error:
         raise InputError(f"{path}: {error}") from error
+
+
+def _suffix(path: Path) -> str:
+    """Return the suffix of a file of edits, in lower case. Raises InputError: another one."""
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(f"{path}: a file of edits ends in one of: {', '.join(SUFFIXES)}")
+    return path.suffix.lower()
 
 
 def _content(members: dict[str, Any], folder: Path) -> EditFile:
@@ -133,8 +137,7 @@ def _content(members: dict[str, Any], folder: Path) -> EditFile:
 def write_edits(file: EditFile, path: str | Path) -> None:
     """Write a file of edits. Raises InputError: another suffix.  Raises ExportError: it cannot be written."""
     path = Path(path)
-    if path.suffix.lower() not in SUFFIXES:
-        raise InputError(f"{path}: a file of edits ends in one of: {', '.join(SUFFIXES)}")
+    kind = _suffix(path)
     members: dict[str, Any] = {"format": FORMAT, "version": VERSION}
     usual = Request()
     for name in HELD:
@@ -146,7 +149,7 @@ def write_edits(file: EditFile, path: str | Path) -> None:
         members |= unit_rows(file.units)
     if file.outlook is not None:
         members["outlook"] = {name: value for name, value in asdict(file.outlook).items() if value is not None}
-    text = _as_toml(members) if path.suffix.lower() == TOML else as_json(members, indent=1) + "\n"
+    text = _as_toml(members) if kind == TOML else as_json(members, indent=1) + "\n"
     with whole_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 

@@ -8,10 +8,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, get_type_hints
 
-from lipmotion.articulation.delivery import Delivery
 from lipmotion.errors import InputError, shortened
-from lipmotion.faces.base import Staging
 from lipmotion.types import Gain, Pin, Span, Timeline, Unit
+from lipmotion.types.delivery import Delivery
+from lipmotion.types.staging import Staging
 from lipmotion.units import PHONES, unknown_phone_message
 
 LEAST_PHONE_S = 0.01
@@ -89,9 +89,7 @@ def _moved_border(step: PhoneStep, units: Timeline[Unit], before: int, time_s: f
     Raises InputError: one of both would last less than ``LEAST_PHONE_S``, or there is no such border.
     """
     spans = list(units)
-    first_s, last_s = (
-        spans[place].start_s if end == 0 else spans[place].end_s for place, end in ((before, 0), (before + 1, 1))
-    )
+    first_s, last_s = spans[before].start_s, spans[before + 1].end_s
     if not first_s + LEAST_PHONE_S - 1e-9 <= time_s <= last_s - LEAST_PHONE_S + 1e-9:
         least, most = first_s + LEAST_PHONE_S, last_s - LEAST_PHONE_S
         raise InputError(f"{str(step)!r}: required {least:.3f} to {most:.3f} s, between the phones beside it")
@@ -186,6 +184,9 @@ class WordIs(Step):
 class CurveStep(Step):
     """An edit of values: a pin or a gain."""
 
+    def __post_init__(self) -> None:
+        self.edit  # noqa: B018 # checks the values
+
     @property
     @abstractmethod
     def edit(self) -> Pin | Gain:
@@ -216,9 +217,6 @@ class GainStep(CurveStep):
     start_s: float
     end_s: float
 
-    def __post_init__(self) -> None:
-        self.edit  # noqa: B018 # checks the values
-
     @property
     def edit(self) -> Gain:
         """The gain."""
@@ -234,9 +232,6 @@ class CurveGainStep(CurveStep):
     factor: float
     start_s: float
     end_s: float
-
-    def __post_init__(self) -> None:
-        self.edit  # noqa: B018 # checks the values
 
     @property
     def edit(self) -> Gain:
@@ -303,25 +298,31 @@ class SetStep(Step):
     value: str
 
     def __post_init__(self) -> None:
+        value: Any = self.parsed_value
+        self._kind(**{self.name: value})  # checks it
+
+    @property
+    def _kind(self) -> type[Delivery] | type[Staging]:
+        """What has a field of that name. Raises InputError: nothing has."""
         kind = next((kind for kind in (Delivery, Staging) if self.name in _names(kind)), None)
         if kind is None:
             known = ", ".join((*_names(Delivery), *_names(Staging)))
             raise InputError(f"{str(self)!r}: nothing is called {shortened(repr(self.name))}; required one of: {known}")
-        value: Any = self.parsed_value
-        kind(**{self.name: value})  # checks it
+        return kind
 
     @property
     def parsed_value(self) -> bool | float | int | str:
         """The value, of the type of what is set. Raises InputError: it is of another."""
-        usual = next(getattr(kind(), self.name) for kind in (Delivery, Staging) if self.name in _names(kind))
+        usual = getattr(self._kind(), self.name)
         if isinstance(usual, bool):
             if self.value not in _TRUTH:
                 raise InputError(f"{str(self)!r}: required one of: {', '.join(_TRUTH)}")
             return _TRUTH[self.value]
         try:
-            return type(usual)(self.value)
+            value: float | int | str = type(usual)(self.value)
         except ValueError as error:
             raise InputError(f"{str(self)!r}: required a number") from error
+        return value
 
 
 _TRUTH = {"true": True, "false": False, "yes": True, "no": False}

@@ -11,6 +11,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterable
 from dataclasses import replace
 from difflib import get_close_matches
+from functools import cached_property
 from pathlib import Path
 from threading import RLock
 from typing import Any, Generic, TypeVar
@@ -67,6 +68,7 @@ from lipmotion.types import (
     Outlook,
     Pin,
     Progress,
+    Prosody,
     Speech,
     Timeline,
     Unit,
@@ -147,9 +149,7 @@ class Session:
         self.model = model if isinstance(model, Model) else load_model(model)
         self._work = map_in_processes(workers, meanwhile)
         self._monitor, self._curves, self._outlook = monitor, frozenset(curves), outlook
-        self._person: _Kept[SpeakerMap | None] = _Kept()
         self._understood: _Kept[UnderstoodSpeech] = _Kept()
-        self._sound: _Kept[AnalysedAudio] = _Kept()
         self._units: _Kept[Timeline[Unit]] = _Kept()
         self._moved: _Kept[Generation] = _Kept()
         self._generated: _Kept[Generation] = _Kept()
@@ -176,7 +176,7 @@ class Session:
         Raises InputError, AlignmentError: as ``units``; or a pin is not possible.
         """
         with self._one_at_a_time, one_thread():
-            return self._generated.once(edits.steps, lambda: self._with_locks(edits.steps))
+            return self._after(edits.steps)
 
     def delivered(self, edits: Edits = NO_EDITS) -> Generation:
         """Return the motion as files hold it: with its intensity, anticipation and offset (docs/controls.md)."""
@@ -196,8 +196,7 @@ class Session:
             staging, delivery = edits.staging(), edits.delivery()
 
             def staged() -> DrawsSingly:
-                prosody = prosody_of_speech(read_sound(self.request.recording))
-                found = staged_face(face, staging, moved_prosody(prosody, delivery))
+                found = staged_face(face, staging, moved_prosody(self._prosody, delivery))
                 if not isinstance(found, DrawsSingly):
                     raise InputError(f"the face {face!r} draws no single pictures; write a video")
                 return found
@@ -217,22 +216,32 @@ class Session:
         with self._one_at_a_time, one_thread():
             return self._edited_speech(edits.steps)
 
+    @cached_property
     def _recording(self) -> UnderstoodSpeech:
-        """Return the speech without edits."""
-
-        def first() -> UnderstoodSpeech:
-            self._speaker()  # what is refused is refused before the long work
-            if self._lasts_s is not None and abs(self._audio().duration_s - self._lasts_s) > LATE_S:
+        """The speech without edits."""
+        self._speaker  # noqa: B018 # what is refused is refused before the long work
+        request = self.request
+        if self._lasts_s is not None:
+            if abs(self._audio.duration_s - self._lasts_s) > LATE_S:
                 raise InputError(
-                    f"the recording lasts {self._audio().duration_s:.2f} s, the edited one {self._lasts_s:.2f} s: the "
+                    f"the recording lasts {self._audio.duration_s:.2f} s, the edited one {self._lasts_s:.2f} s: the "
                     "edits are of another recording; make some of this one: lipmotion edit FILE --of RECORDING"
                 )
-            return understood_speech(self.model, self.request, self._work, self._monitor)
+            request = replace(request, recording=self._audio)
+        return understood_speech(self.model, request, self._work, self._monitor)
 
-        return self._understood.once(None, first)
-
+    @cached_property
     def _speaker(self) -> SpeakerMap | None:
-        return self._person.once(None, lambda: person_of(self.model, self.request))
+        return person_of(self.model, self.request)
+
+    @cached_property
+    def _audio(self) -> AnalysedAudio:
+        return analysed(audio_of(self.request))
+
+    @cached_property
+    def _prosody(self) -> Prosody:
+        """Loudness and pitch of the sound of videos."""
+        return prosody_of_speech(read_sound(self.request.recording))
 
     def _edited_units(self, steps: tuple[Step, ...]) -> Timeline[Unit]:
         """Return the phones in time after some edits; each edit sees those that the ones before it left."""
@@ -240,7 +249,7 @@ class Session:
         while ours and isinstance(ours[-1], LockStep | UnlockStep):
             ours = ours[:-1]
         if not ours:
-            return self._recording().speech.units
+            return self._recording.speech.units
         return self._units.once(ours, lambda: self._changed_units(ours))
 
     def _changed_units(self, ours: tuple[PhoneStep | WordIs | LockStep | UnlockStep, ...]) -> Timeline[Unit]:
@@ -262,7 +271,7 @@ class Session:
             raise InputError(f"{str(step)!r}: there is no word {step.number}, required {found}")
         where = words[step.number - 1]
         try:
-            said = aligned_within(self.model, self.request, self._audio(), step.word, where.start_s, where.end_s)
+            said = aligned_within(self.model, self.request, self._audio, step.word, where.start_s, where.end_s)
         except AlignmentError as error:
             raise InputError(
                 f"{str(step)!r}: does not fit into {where.start_s:.2f} to {where.end_s:.2f} s, where {where.label!r} "
@@ -270,11 +279,8 @@ class Session:
             ) from error
         return with_span(units, said)
 
-    def _audio(self) -> AnalysedAudio:
-        return self._sound.once(None, lambda: analysed(audio_of(self.request)))
-
     def _edited_speech(self, steps: tuple[Step, ...]) -> UnderstoodSpeech:
-        plain, units = self._recording(), self._edited_units(steps)
+        plain, units = self._recording, self._edited_units(steps)
         if units is plain.speech.units:
             return plain
         return self._understood.once(tuple(units), lambda: replace(plain, speech=self._spoken(plain.speech, units)))
@@ -290,10 +296,10 @@ class Session:
             for later in steps[place + 1 :]:
                 if isinstance(later, CurveStep) and lock.holds(later.edit):
                     raise InputError(f"{str(later)!r} lies in what is locked ({str(lock)!r}); take the lock out first")
-            generation = with_locked(generation, self._before(steps[:place]), lock.start_s, lock.end_s)
+            generation = with_locked(generation, self._after(steps[:place]), lock.start_s, lock.end_s)
         return generation
 
-    def _before(self, steps: tuple[Step, ...]) -> Generation:
+    def _after(self, steps: tuple[Step, ...]) -> Generation:
         return self._generated.once(steps, lambda: self._with_locks(steps))
 
     def _with_curves(self, steps: tuple[Step, ...]) -> Generation:
@@ -353,7 +359,7 @@ class Session:
         if self._motions == INTERACTIVE:
             expect_more()
         self._monitor(Progress("moving the mouth", 0, 1, UNDERSTANDING))
-        generation = generation_of(self.request, self._speaker(), self.model, understood, Constraints(pins))
+        generation = generation_of(self.request, self._speaker, self.model, understood, Constraints(pins))
         self._monitor(Progress("moving the mouth", 1, 1, 1.0))
         return generation if self._outlook is None else replace(generation, outlook=self._outlook)
 

@@ -19,7 +19,14 @@ if TYPE_CHECKING:
         NamedProbability,
         RegressedMean,
     )
-    from lipmotion.types.features import ENERGY_FEATURE, FRAME_RATE_HZ, SPECTRUM_BANDS, Features, frame_of
+    from lipmotion.types.features import (
+        ENERGY_FEATURE,
+        FRAME_RATE_HZ,
+        SPECTRUM_BANDS,
+        Features,
+        frame_of,
+        frames_of,
+    )
     from lipmotion.types.generation import (
         ConditionSpectrum,
         Constraints,
@@ -93,6 +100,7 @@ __all__ = [
     "check_curves",
     "check_magnitude",
     "frame_of",
+    "frames_of",
     "from_sixteen_bits",
     "in_order",
     "option",

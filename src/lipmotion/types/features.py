@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import ceil
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from lipmotion.types.timeline import Span
 
 FRAME_RATE_HZ = 100.0
 """Frames per second of all models; frame n is centred at n / FRAME_RATE_HZ seconds."""
@@ -34,3 +38,15 @@ def frame_of(time_s: float, frames: int, rate_hz: float) -> int | None:
     """
     frame = np.floor(time_s * rate_hz + 0.5)
     return int(frame) if 0 <= frame < frames else None
+
+
+def frames_of(span: Span[Any], frames: int) -> tuple[int, int]:
+    """Return the first frame of a span at 100 Hz, and the one after its last.
+
+    frames : length of the recording; both are cut to it
+    """
+    return _frame_after(span.start_s, frames), _frame_after(span.end_s, frames)
+
+
+def _frame_after(time_s: float, frames: int) -> int:
+    return ceil(min(max(time_s * FRAME_RATE_HZ - 1e-6, 0), frames))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.hmm.multistream.recognise import RecognisedUnit
-from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit
+from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit, frames_of
 
 
 def units_in_frames(
@@ -30,8 +30,7 @@ def units_in_frames(
     firsts: list[int] = []
     end = 0
     for span in units:
-        edges = np.ceil(np.array([span.start_s, span.end_s]) * FRAME_RATE_HZ - 1e-6)
-        first, stop = np.clip(edges, end, frames).astype(int).tolist()
+        first, stop = (max(edge, end) for edge in frames_of(span, frames))
         if first > end:
             names.append(silence)
             firsts.append(end)

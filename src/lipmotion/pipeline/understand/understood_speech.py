@@ -40,6 +40,7 @@ from lipmotion.types import (
     TimedTranscript,
     Timeline,
     Unit,
+    frames_of,
     silent_monitor,
 )
 from lipmotion.units import Lexicon, check_phones, check_text, is_silent, without_gaps, words_of
@@ -240,8 +241,7 @@ def with_units(speech: Speech, units: Timeline[Unit]) -> Speech:
         return replace(speech, units=units, units_known=first is None, confidence=1.0 if first is None else first)
     confidence = np.ones(len(speech.features.values))
     for span, sure in zip(units, found, strict=True):
-        frames = np.ceil(np.array([span.start_s, span.end_s]) * FRAME_RATE_HZ - 1e-6).astype(int)
-        confidence[slice(*np.clip(frames, 0, len(confidence)))] = 1.0 if sure is None else sure
+        confidence[slice(*frames_of(span, len(confidence)))] = 1.0 if sure is None else sure
     return replace(speech, units=units, units_known=False, confidence=confidence)
 
 
