@@ -5,9 +5,10 @@ from __future__ import annotations
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.understood_speech import UnderstoodSpeech
 from lipmotion.speech.recognition.agreement import LEAST_FITTING_SHARE
-from lipmotion.speech.recognition.recognised_speech import CONFIDENCES, NOISY_DB
+from lipmotion.speech.recognition.recognised_speech import NOISY_DB, Recognition
 from lipmotion.speech.recognition.recogniser import FULL_WEIGHT_SCORE, own_model_weight
 from lipmotion.types import Outlook
+from lipmotion.types.generation import SURE_CONFIDENCE
 
 TRANSCRIPT = "the words that are spoken (--transcript)"
 OWN_MODEL = "recordings of this person (lipmotion adapt for the sound alone, lipmotion train with video)"
@@ -26,21 +27,23 @@ def outlook_of(request: SpeechRequest, understood: UnderstoodSpeech) -> Outlook:
         return Outlook(words, share, 1.0 if words == "own model" else None, understood.range_db, _advice(understood))
     words = "words" if found.word_s > found.phone_s else "phones"
     voice = own_model_weight(found.similarity) if found.similarity is not None else None
-    confidence = (found.confidence or 0.0) * found.word_s / max(found.word_s + found.phone_s, 1e-9)
-    return Outlook(words, confidence, voice, understood.range_db, _advice(understood))
+    return Outlook(words, _confidence(found), voice, understood.range_db, _advice(understood))
+
+
+def _confidence(found: Recognition) -> float:
+    """Return the confidence of recognised words times their share of the speech, 0 to 1."""
+    return (found.confidence or 0.0) * found.word_s / max(found.word_s + found.phone_s, 1e-9)
 
 
 def _advice(understood: UnderstoodSpeech) -> tuple[str, ...]:
-    """Return what would help, the most helpful first."""
+    """Return what would help, the most helpful first: before all else the words, where they are not sure."""
     found, advice = understood.recognition, []
-    if found is not None:
-        if found.reliability < 1:
-            advice.append(TRANSCRIPT)
-        if found.similarity is None or found.similarity < FULL_WEIGHT_SCORE:
-            advice.append(OWN_MODEL)
-    if understood.range_db < NOISY_DB:
-        unsure = found is None or (found.confidence or 0.0) < CONFIDENCES[0]
-        advice.insert(0 if unsure else len(advice), LESS_NOISE)
     if understood.fit is not None and understood.fit.share < LEAST_FITTING_SHARE:
-        advice.insert(0, WHOLE_TRANSCRIPT)
+        advice.append(WHOLE_TRANSCRIPT)
+    if found is not None and _confidence(found) < SURE_CONFIDENCE:
+        advice.append(TRANSCRIPT)
+    if understood.range_db < NOISY_DB:
+        advice.append(LESS_NOISE)
+    if found is not None and (found.similarity is None or found.similarity < FULL_WEIGHT_SCORE):
+        advice.append(OWN_MODEL)
     return tuple(advice)
