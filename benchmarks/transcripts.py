@@ -11,8 +11,8 @@ word from the true one; ``lost``: share of the words that are more than half a s
 
 With ``--doubt`` short recordings get right and wrong transcripts: sentences in all installed voices, ``speech-open``,
 GRID s1. One JSON object per set and kind of transcript: ``doubted``: as being of something else; ``left_out``: as
-leaving out words; ``either``. ``heard_…``: the same by the posteriors of hama, where it is installed; ``heard_words``:
-where words are named that are not said.
+leaving out words; ``either``, or refused as too long. ``heard_…``: the same by the posteriors of hama, where it is
+installed; ``heard_words``: where words are named that are not said.
 """
 
 from __future__ import annotations
@@ -37,9 +37,10 @@ from robust import SPOKEN
 
 import lipmotion
 from lipmotion.corpora.grid import words_of_name
+from lipmotion.errors import AlignmentError
 from lipmotion.pipeline.corpus.prompts import prompts
 from lipmotion.pipeline.understand.transcribe import read_transcript, transcribe
-from lipmotion.speech.features.analysed_audio import analysed
+from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, transcript_fit
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.recognition.transcript_evidence import transcript_evidence
@@ -55,6 +56,8 @@ Row = tuple[str, float, float]
 """A word, its start and its end in seconds."""
 Said = tuple[NDArray[np.float32], tuple[str, ...]]
 """Samples, and the words that are said."""
+Hearing = Callable[[NDArray[np.float32]], NDArray[np.float64]]
+"""Samples to log posteriors of phones and blank [shape=(T, 48)]."""
 HEARD_S = 0.02
 """From frame to frame of hama."""
 
@@ -216,18 +219,27 @@ def _print_doubts(corpora: Path) -> None:
         counts: dict[str, Counter[str]] = {}
         for kind, samples, words in _transcripts(recordings):
             audio = analysed(Audio(samples, RATE_HZ))
-            units = phones.align(audio, audio.mfcc(), words, Lexicon())
-            fit = transcript_fit(audio, units)
-            found = {"doubted": fit.score < DOUBTFUL_SCORE, "left_out": bool(fit.missing)}
-            found["either"] = any(found.values())
-            if hear is not None:
-                evidence = transcript_evidence(hear(samples), HEARD_S, units)
-                heard = {"doubted": evidence.is_doubtful, "left_out": evidence.gaps, "words": evidence.doubtful_words}
-                found |= {f"heard_{key}": bool(value) for key, value in heard.items()}
-                found["heard_either"] = any(heard.values())
+            found = _doubts(phones, audio, words, hear)
             counts.setdefault(kind, Counter()).update(found | {"count": 1})
         for kind, count in counts.items():
             print(json.dumps({"set": name, "transcript": kind, **count}), flush=True)
+
+
+def _doubts(phones: Recogniser, audio: AnalysedAudio, words: tuple[str, ...], hear: Hearing | None) -> dict[str, bool]:
+    """Return which doubts of a transcript there are; one that is refused is doubted in every way."""
+    try:
+        units = phones.align(audio, audio.mfcc(), words, Lexicon())
+    except AlignmentError:
+        return dict.fromkeys(("refused", "either", "heard_either"), True)
+    fit = transcript_fit(audio, units)
+    found = {"doubted": fit.score < DOUBTFUL_SCORE, "left_out": bool(fit.missing)}
+    found["either"] = any(found.values())
+    if hear is not None:
+        evidence = transcript_evidence(hear(audio.samples), HEARD_S, units)
+        heard = {"doubted": evidence.is_doubtful, "left_out": evidence.gaps, "words": evidence.doubtful_words}
+        found |= {f"heard_{key}": bool(value) for key, value in heard.items()}
+        found["heard_either"] = any(heard.values())
+    return found
 
 
 def _clips(folder: Path, split: str) -> list[Said]:
@@ -278,8 +290,8 @@ def _transcripts(recordings: Sequence[Said]) -> Iterator[tuple[str, NDArray[np.f
             yield "a half missing", samples, words[half:] if number % 2 else words[:half]
 
 
-def _network() -> Callable[[NDArray[np.float32]], NDArray[np.float64]] | None:
-    """Return what hears the log posteriors of phones and blank [shape=(T, 48)]; None where hama is not installed."""
+def _network() -> Hearing | None:
+    """Return what hears phones; None where hama is not installed."""
     try:
         from hama.asr import ASRModel
     except ImportError:
