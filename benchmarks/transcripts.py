@@ -58,8 +58,8 @@ Said = tuple[NDArray[np.float32], tuple[str, ...]]
 """Samples, and the words that are said."""
 Hearing = Callable[[NDArray[np.float32]], NDArray[np.float64]]
 """Samples to log posteriors of phones and blank [shape=(T, 48)]."""
-HEARD_S = 0.02
-"""From frame to frame of hama."""
+HEARD_S, PIECE_S = 0.02, 25
+"""From frame to frame of hama; what it is given at once: it hears nothing after 30 s."""
 
 
 @dataclass(frozen=True)
@@ -305,12 +305,13 @@ def _network() -> Hearing | None:
         )  # without the tie of affricates
         row[PHONES.index(phones[-1]) if phones and not unknown else -1] = 1.0
 
-    def hear(samples: NDArray[np.float32]) -> NDArray[np.float64]:
+    def hear_piece(samples: NDArray[np.float32]) -> NDArray[np.float64]:
         inputs = {"waveform": samples[None], "waveform_lengths": np.array([len(samples)], np.int64)}
         log_probabilities, frames = model.session.run(["log_probs", "out_lengths"], inputs)
         return np.log(np.exp(log_probabilities[0][: int(frames[0])].astype(float)) @ columns + 1e-10)
 
-    return hear
+    step = PIECE_S * RATE_HZ
+    return lambda samples: np.concatenate([hear_piece(samples[at : at + step]) for at in range(0, len(samples), step)])
 
 
 def _peak_mb() -> int:

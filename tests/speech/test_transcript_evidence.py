@@ -108,11 +108,16 @@ def test_a_long_recording_is_divided(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_phones_that_do_not_fit_into_the_frames() -> None:
-    found = transcript_evidence(heard([], pause=3), FRAME_S, transcript([*SAID] * 3, 0.12))
+    found = transcript_evidence(heard([], pause=12), FRAME_S, transcript([*SAID] * 3, 0.5, word_s=0.02))
     assert found.loss == np.inf
     assert {word.loss for word in found.words} == {np.inf}
+
+
+def test_posteriors_of_something_else_are_refused() -> None:
     with pytest.raises(ValueError, match="47 classes, required 48"):
-        transcript_evidence(np.zeros((5, 47)), FRAME_S, transcript(["a"], 0.1))
+        transcript_evidence(np.zeros((20, 47)), FRAME_S, transcript(["a"], 0.1))
+    with pytest.raises(ValueError, match=r"posteriors of 0\.20 s, required 0\.60"):
+        transcript_evidence(np.zeros((10, 48)), FRAME_S, transcript([*SAID], 0.7))
 
 
 def test_the_best_path_is_the_best_of_all() -> None:

@@ -89,8 +89,11 @@ def transcript_evidence(log_posteriors: Array, frame_s: float, units: Timeline[U
     frame_s : seconds from frame to frame
     units   : the phones of the transcript, aligned with the recording; of their times only the silences count, where a
               long recording is divided, and the words', which are returned
-    Raises ValueError: the posteriors are not of all phones.
+    Raises ValueError: the posteriors are not of all phones, or end before the phones.
     """
+    spoken_s = max((span.end_s for span in units if not is_silent(span.label.phone)), default=0.0)
+    if (len(log_posteriors) + 1) * frame_s < spoken_s:
+        raise ValueError(f"posteriors of {len(log_posteriors) * frame_s:.2f} s, required {spoken_s:.2f}")
     if log_posteriors.shape[1] != len(PHONES) + 1:
         raise ValueError(f"posteriors of {log_posteriors.shape[1]} classes, required {len(PHONES) + 1}")
     total, phones = 0.0, 0
