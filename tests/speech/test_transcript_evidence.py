@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion.speech.recognition import transcript_evidence as module
-from lipmotion.speech.recognition.transcript_evidence import Gap, WordLoss, _best_paths, transcript_evidence
+from lipmotion.speech.recognition.transcript_evidence import _best_paths, transcript_evidence
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import PHONES
 
@@ -58,7 +58,8 @@ def test_the_word_that_is_not_said_has_the_loss() -> None:
     said = heard(["papa", "sees", "away", "fish"], sure=0.99999)
     found = transcript_evidence(said, FRAME_S, transcript(words, 1.0))
     (wrong,) = found.doubtful_words
-    assert wrong == WordLoss("meow", pytest.approx(0.4), pytest.approx(0.5), wrong.loss)
+    assert wrong.word == "meow"
+    assert (wrong.start_s, wrong.end_s) == pytest.approx((0.4, 0.5))
     assert wrong.loss < 13 * found.loss
     assert all(word.loss < 1 for word in found.words if word != wrong)
     assert found.is_doubtful
@@ -70,9 +71,7 @@ def test_words_that_are_left_out_are_a_gap_in_their_place() -> None:
     found = transcript_evidence(heard(whole), FRAME_S, transcript(part, 1.0))
     first = 10 + 1 + 2 * 4  # pause, blank, papa
     (gap,) = found.gaps
-    assert gap == Gap(
-        pytest.approx(first * FRAME_S, abs=0.03), pytest.approx((first + 12) * FRAME_S, abs=0.03), gap.gain
-    )
+    assert (gap.start_s, gap.end_s) == pytest.approx((first * FRAME_S, (first + 12) * FRAME_S), abs=0.03)
     nothing = transcript_evidence(heard(whole), FRAME_S, Timeline((Span(0.0, 1.0, Unit("sil")),)))
     assert len(nothing.gaps) == 1
     assert nothing.words == ()
