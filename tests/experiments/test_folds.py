@@ -183,7 +183,7 @@ def test_by_speaker_everybody_is_a_stranger_once(
     assert figures["conditions"]["audio only"]["speakers"] == pytest.approx(
         {"anna": 1, "ben": -1, "eve": 1, "unknown": 1}
     )
-    assert "mean of 4 speakers unknown to the model: ACC 0.500 (anna 1.000, ben -1.000" in table(figures)
+    assert "4 speakers unknown to the model: mean ACC 0.500, -1.000 (ben) to 1.000 (unknown)" in table(figures)
     left_out.clear()
     folds(corpus, by_speaker=True, count=2)
     assert [len(each) for each in left_out] == [2, 2]
