@@ -25,8 +25,7 @@ from lipmotion.errors import InputError, LipMotionError
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.espeak_events import PART, SILENCE
 from lipmotion.speech.voices.espeak_times import corrected_phone_times
-from lipmotion.speech.voices.ipa_phones import complete_map
-from lipmotion.speech.voices.phone_maps import ESPEAK_PHONES, PhoneMap
+from lipmotion.speech.voices.phone_maps import ESPEAK_PHONES, PhoneMap, complete_map
 from lipmotion.speech.voices.programs import program_output
 from lipmotion.speech.voices.synthesiser import SynthesisedSentence, Synthesiser, SyntheticVoice
 from lipmotion.types import Span, Timeline

@@ -6,9 +6,10 @@ it. Unstressed AH, ER and IH become ax, axr and ix where the dictionary says so 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from lipmotion.units import PHONES, SILENCE
+from lipmotion.units.ipa_phones import ipa_phones
 
 PhoneMap = Mapping[str, tuple[str, ...]]
 """A synthesiser's label to phones of the inventory."""
@@ -62,3 +63,23 @@ ESPEAK_PHONES: PhoneMap = {
     label: tuple(phones.split()) for labels, phones in _ESPEAK.items() for label in labels.split()
 }
 """espeak-ng's mnemonics (as ``espeak-ng -x`` writes them), voice en-us."""
+
+
+def complete_map(labels: Iterable[str], table: PhoneMap, *, ipa: bool) -> tuple[PhoneMap, tuple[str, ...]]:
+    """Return a map for all labels, and what of them no table has.
+
+    table : labels with their phones, which count first
+    ipa   : whether the other labels are IPA; else those that are not in the table are read as if they were, and are
+            reported. A label that begins with ``_`` is a silence.
+    """
+    found: dict[str, tuple[str, ...]] = {}
+    unknown: dict[str, None] = {}
+    for label in labels:
+        if label in table:
+            found[label] = table[label]
+        elif label.startswith("_"):
+            found[label] = (SILENCE,)
+        elif label not in found:
+            found[label], letters = ipa_phones(label)
+            unknown |= dict.fromkeys(letters if ipa else [label])
+    return found, tuple(unknown)
