@@ -46,10 +46,10 @@ from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.recognition.transcript_evidence import transcript_evidence
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.installed import installed_voices, speak_sentences
-from lipmotion.speech.voices.ipa_phones import ipa_phones
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.types import Audio, TimedTranscript, Timeline, Unit
 from lipmotion.units import PHONES, Lexicon, words_of
+from lipmotion.units.ipa_phones import ipa_phones
 
 RATE_HZ, NOISE_DB, LONGEST_PAUSE_S, LOST_S = 16_000, -30, 3.0, 0.5
 Row = tuple[str, float, float]
