@@ -300,9 +300,7 @@ def _network() -> Hearing | None:
     columns = np.zeros((len(model.decoder_tokens), len(PHONES) + 1))
     for row, token in zip(columns, model.decoder_tokens, strict=True):
         plain = token.strip() and not token.startswith("<")
-        phones, unknown = (
-            ipa_phones(token.replace("\u0361", "")) if plain else ((), "")
-        )  # without the tie of affricates
+        phones, unknown = ipa_phones(token) if plain else ((), "")
         row[PHONES.index(phones[-1]) if phones and not unknown else -1] = 1.0
 
     def hear_piece(samples: NDArray[np.float32]) -> NDArray[np.float64]:
