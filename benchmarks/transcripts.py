@@ -11,8 +11,8 @@ word from the true one; ``lost``: share of the words that are more than half a s
 
 With ``--doubt`` short recordings get right and wrong transcripts: sentences in all installed voices, ``speech-open``,
 GRID s1. One JSON object per set and kind of transcript: ``doubted``: as being of something else; ``left_out``: as
-leaving out words; ``either``, or refused as too long. ``heard_…``: the same by the posteriors of hama, where it is
-installed; ``heard_words``: where words are named that are not said.
+leaving out words; ``either``, or refused as too long. ``heard_…``: the same by the posteriors of a phone
+recogniser, where one is installed; ``heard_words``: where words are named that are not said.
 """
 
 from __future__ import annotations
@@ -42,14 +42,19 @@ from lipmotion.pipeline.corpus.prompts import prompts
 from lipmotion.pipeline.understand.transcribe import read_transcript, transcribe
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, transcript_fit
+from lipmotion.speech.recognition.network.posteriors import (
+    POSTERIOR_STEP,
+    PhonePosteriors,
+    installed_phone_recogniser,
+    phone_recogniser,
+)
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.recognition.transcript_evidence import transcript_evidence
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.installed import installed_voices, speak_sentences
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
-from lipmotion.types import Audio, TimedTranscript, Timeline, Unit
-from lipmotion.units import PHONES, Lexicon, words_of
-from lipmotion.units.ipa_phones import ipa_phones
+from lipmotion.types import FRAME_RATE_HZ, Audio, TimedTranscript, Timeline, Unit
+from lipmotion.units import Lexicon, words_of
 
 RATE_HZ, NOISE_DB, LONGEST_PAUSE_S, LOST_S = 16_000, -30, 3.0, 0.5
 Row = tuple[str, float, float]
@@ -58,8 +63,8 @@ Said = tuple[NDArray[np.float32], tuple[str, ...]]
 """Samples, and the words that are said."""
 Hearing = Callable[[NDArray[np.float32]], NDArray[np.float64]]
 """Samples to log posteriors of phones and blank [shape=(T, 48)]."""
-HEARD_S, PIECE_S = 0.02, 25
-"""From frame to frame of hama; what it is given at once: it hears nothing after 30 s."""
+HEARD_S, PIECE_S = POSTERIOR_STEP / FRAME_RATE_HZ, 25
+"""From row to row of posteriors; what a network is given at once: hama hears nothing after 30 s."""
 
 
 @dataclass(frozen=True)
@@ -291,25 +296,17 @@ def _transcripts(recordings: Sequence[Said]) -> Iterator[tuple[str, NDArray[np.f
 
 
 def _network() -> Hearing | None:
-    """Return what hears phones; None where hama is not installed."""
-    try:
-        from hama.asr import ASRModel
-    except ImportError:
+    """Return what hears phones; None where no phone recogniser is installed."""
+    name = installed_phone_recogniser()
+    if name is None:
         return None
-    model = ASRModel()
-    columns = np.zeros((len(model.decoder_tokens), len(PHONES) + 1))
-    for row, token in zip(columns, model.decoder_tokens, strict=True):
-        plain = token.strip() and not token.startswith("<")
-        phones, unknown = ipa_phones(token) if plain else ((), "")
-        row[PHONES.index(phones[-1]) if phones and not unknown else -1] = 1.0
+    network, step = phone_recogniser(name), PIECE_S * RATE_HZ
 
-    def hear_piece(samples: NDArray[np.float32]) -> NDArray[np.float64]:
-        inputs = {"waveform": samples[None], "waveform_lengths": np.array([len(samples)], np.int64)}
-        log_probabilities, frames = model.session.run(["log_probs", "out_lengths"], inputs)
-        return np.log(np.exp(log_probabilities[0][: int(frames[0])].astype(float)) @ columns + 1e-10)
+    def hear(samples: NDArray[np.float32]) -> NDArray[np.float64]:
+        pieces = [network.log_posteriors(samples[at : at + step]) for at in range(0, len(samples), step)]
+        return PhonePosteriors(np.concatenate(pieces), network.tokens).of_phones.astype(float)
 
-    step = PIECE_S * RATE_HZ
-    return lambda samples: np.concatenate([hear_piece(samples[at : at + step]) for at in range(0, len(samples), step)])
+    return hear
 
 
 def _peak_mb() -> int:
