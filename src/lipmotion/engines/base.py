@@ -50,12 +50,14 @@ class Inputs:
     conditions   : acoustic conditions in which training takes each example (``Example.condition_spectra``), and with
                    them spectra (``Speech.spectrum``); 0: neither
     prior        : what another model makes of the speech, ``Speech.prior``: its models can stand on other ones
+    posteriors   : those of a phone recogniser, ``Speech.posteriors``, where one is installed
     speech_alone : examples without any valid frame: of other speakers, for instance
     """
 
     f0: bool = False
     conditions: int = 0
     prior: bool = False
+    posteriors: bool = False
     speech_alone: bool = False
 
 

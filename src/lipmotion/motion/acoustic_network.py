@@ -10,6 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import CorpusError, InputError
+from lipmotion.motion.network_steps import DIRECT_WEIGHT, LEAST_DEVIATION, STEP, between_steps, random_piece
+from lipmotion.motion.posterior_network import (
+    POSTERIOR_ARRAYS,
+    PosteriorNetwork,
+    fit_posterior_network,
+    posterior_network_from_arrays,
+)
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining
 from lipmotion.stats.convolution import (
     TAPS,
@@ -25,19 +32,14 @@ from lipmotion.storage.schema import LARGEST_MEAN, POSITIVE, Arrays, ArraySpec, 
 from lipmotion.types import SPECTRUM_BANDS, ConditionSpectrum, Example, Progress, Speech
 
 Array = NDArray[np.float64]
-STEP = 4
-"""Frames of a time step of the network, 40 ms: about a picture of a video."""
 HIDDEN_UNITS, DILATIONS = 192, (1, 2, 4, 8, 1, 2, 4, 8)
 """Units of a hidden layer, and time steps between its taps: its input is 1.2 s before and after a frame."""
 BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED = 16, 2e-3, 0.3, 0
 LEAST_STEPS = 600
 """Least number of optimiser steps: with few recordings, each is used more often."""
-DIRECT_WEIGHT = 4.0
-"""Weight of the error of a channel that is modelled as it is; that of a principal component is 1."""
-LEAST_DEVIATION = 1e-6
-LONGEST_STEPS = 250
-"""Longer recordings are cut into pieces of so many time steps, 10 s, for training."""
 CHECKPOINT = "network"
+POSTERIOR_SHARES = (0.3, 1.0)
+"""Share of the network that knows posteriors, for a voice that training knows and for one that it does not."""
 
 
 WEIGHTS = {
@@ -59,19 +61,22 @@ TARGETS = {
 @final
 @dataclass(frozen=True, eq=False)
 class AcousticNetwork(Predictor):
-    """A network from spectra to motion.
+    """A network from spectra to motion, and beside it one from the posteriors of a phone recogniser.
 
     network   : its outputs are Q standardised dimensions of motion, and the distortion of the sound
     mean, scale : mean and standard deviation of the motion in training [each shape=(Q,)]
     variances : of the error of static value, Δ and Δ² in training [shape=(3, Q)]
+    beside    : the network that knows posteriors (None: no phone recogniser was installed in training)
+    Spectra tell more of a voice that training knows, posteriors more of any other: ``POSTERIOR_SHARES``.
     """
 
     network: ConvolutionalNetwork
     mean: Array
     scale: Array
     variances: Array
+    beside: PosteriorNetwork | None = None
     name: ClassVar[str] = "network"
-    ARRAYS: ClassVar[Mapping[str, ArraySpec]] = WEIGHTS | TARGETS
+    ARRAYS: ClassVar[Mapping[str, ArraySpec]] = WEIGHTS | TARGETS | POSTERIOR_ARRAYS
     least_motion_s: ClassVar[float] = 120.0
 
     @classmethod
@@ -91,7 +96,8 @@ class AcousticNetwork(Predictor):
         mean, scale = poses.mean(axis=0), np.maximum(poses.std(axis=0), LEAST_DEVIATION)
         network = _trained(training, mean, scale)
         trained = cls(network, mean, scale, np.ones((3, len(mean))))
-        return PredictorFit(cls(network, mean, scale, _error_variances(trained, examples, values)))
+        beside = fit_posterior_network(training, mean, scale)
+        return PredictorFit(cls(network, mean, scale, _error_variances(trained, examples, values), beside))
 
     def can_predict(self, speech: Speech) -> bool:
         """Return whether speech has a spectrum."""
@@ -105,7 +111,13 @@ class AcousticNetwork(Predictor):
         if speech.spectrum is None:
             raise InputError("the speech has no spectrum; an engine that uses one says so by ``inputs``")
         spectrum = speech.spectrum
-        return speech.once(self, lambda: self._predict(spectrum))
+        motion, distortion = speech.once(self, lambda: self._predict(spectrum))
+        network, posteriors = self.beside, speech.posteriors
+        if network is None or posteriors is None:
+            return motion, distortion
+        beside = speech.once(network, lambda: network.predict(posteriors, len(motion)))
+        known, unknown = POSTERIOR_SHARES
+        return motion + (unknown + speech.voice * (known - unknown)) * (beside - motion), distortion
 
     def _predict(self, spectrum: NDArray[np.floating]) -> tuple[Array, Array]:
         """Return motion and distortion, from a normalised log mel spectrum [shape=(T, 40)]."""
@@ -126,8 +138,11 @@ class AcousticNetwork(Predictor):
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Serialise the network, at half precision."""
-        arrays = {name: array.astype(np.float16) for name, array in _network_arrays(self.network).items()}
-        return arrays | {"network_targets": np.stack([self.mean, self.scale]), "network_variances": self.variances}
+        arrays: dict[str, NDArray[Any]] = {
+            name: array.astype(np.float16) for name, array in _network_arrays(self.network).items()
+        }
+        arrays |= {"network_targets": np.stack([self.mean, self.scale]), "network_variances": self.variances}
+        return arrays | (self.beside.arrays() if self.beside is not None else {})
 
     @classmethod
     def from_arrays(cls, arrays: Arrays, dimensions: int) -> AcousticNetwork:
@@ -136,7 +151,8 @@ class AcousticNetwork(Predictor):
         mean, scale = stored["network_targets"]
         if not (scale > 0).all():
             raise ValueError("network_targets with a scale that is not more than 0")
-        return cls(_network_from_arrays(arrays, dimensions), mean, scale, stored["network_variances"])
+        beside = posterior_network_from_arrays(arrays, dimensions)
+        return cls(_network_from_arrays(arrays, dimensions), mean, scale, stored["network_variances"], beside)
 
 
 def _trained(training: PredictorTraining, mean: Array, scale: Array) -> ConvolutionalNetwork:
@@ -154,7 +170,7 @@ def _trained(training: PredictorTraining, mean: Array, scale: Array) -> Convolut
 
     def draw(rng: np.random.Generator, number: int) -> TrainingSequence:
         versions = pieces[number]
-        return _piece(versions[int(rng.integers(len(versions)))], rng)
+        return random_piece(versions[int(rng.integers(len(versions)))], rng)
 
     def report(step: int, error: float) -> None:
         if step % 50 == 0 or step == steps:
@@ -170,20 +186,6 @@ def _trained(training: PredictorTraining, mean: Array, scale: Array) -> Convolut
     )
     training.checkpoint.save(CHECKPOINT, _network_arrays(network))
     return network
-
-
-def between_steps(steps: Array, frames: int) -> Array:
-    """Return values at time steps of 40 ms [shape=(N, C)] interpolated to frames of 10 ms [shape=(frames, C)].
-
-    Source: Catmull & Rom 1974; the curve has no corners, and passes through the values.
-    """
-    padded = np.concatenate([steps[:1], steps, steps[-1:], steps[-1:]])
-    position, u = np.divmod(np.arange(frames), STEP)
-    u = (u / STEP)[:, None]
-    before, here, after, last = (padded[np.minimum(position + k, len(padded) - 1)] for k in range(4))
-    return here + u / 2 * (
-        after - before + u * (2 * before - 5 * here + 4 * after - last + u * (3 * (here - after) + last - before))
-    )
 
 
 def _network_arrays(network: ConvolutionalNetwork) -> dict[str, NDArray[Any]]:
@@ -217,16 +219,6 @@ def _sequence(version: ConditionSpectrum, targets: Array, valid: NDArray[np.bool
     distortion = np.full((len(inputs), 1), version.distortion)
     outputs = np.concatenate([targets[frames], distortion], axis=1).astype(np.float32)
     return TrainingSequence(inputs, outputs, valid[frames])
-
-
-def _piece(sequence: TrainingSequence, rng: np.random.Generator) -> TrainingSequence:
-    """Return a sequence, or a piece of it from a random place where it is long."""
-    excess = len(sequence.inputs) - LONGEST_STEPS
-    if excess <= 0:
-        return sequence
-    start = int(rng.integers(excess + 1))
-    kept = slice(start, start + LONGEST_STEPS)
-    return TrainingSequence(sequence.inputs[kept], sequence.targets[kept], sequence.valid[kept])
 
 
 def _error_variances(acoustic: AcousticNetwork, examples: Sequence[Example], values: Sequence[Array]) -> Array:

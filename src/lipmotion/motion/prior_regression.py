@@ -9,8 +9,8 @@ from typing import Any, ClassVar, NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.motion.acoustic_network import STEP, between_steps
 from lipmotion.motion.articulation import ARTICULATORS, articulators
+from lipmotion.motion.network_steps import STEP, between_steps
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining, folds
 from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         FRAME_RATE_HZ,
         SPECTRUM_BANDS,
         Features,
+        TokenPosteriors,
         frame_of,
         frames_of,
     )
@@ -93,6 +94,7 @@ __all__ = [
     "TimedTranscript",
     "TimedWord",
     "Timeline",
+    "TokenPosteriors",
     "Track",
     "TranscriptLine",
     "Unit",

@@ -31,6 +31,18 @@ class Features:
     duration_s: float
 
 
+@dataclass(frozen=True, eq=False)
+class TokenPosteriors:
+    """Posteriors of the tokens of a phone recogniser in a recording.
+
+    values : float16 array [shape=(ceil(T / 2), K)], natural logarithms; row n is centred at n / 50 seconds
+    source : name, version and digest of the recogniser
+    """
+
+    values: NDArray[np.float16]
+    source: str
+
+
 def frame_of(time_s: float, frames: int, rate_hz: float) -> int | None:
     """Return the frame nearest to a time, or None if the time is outside the recording.
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.types.audio import Audio
-from lipmotion.types.features import Features
+from lipmotion.types.features import Features, TokenPosteriors
 from lipmotion.types.motion import Motion, between_frames
 from lipmotion.types.timeline import Timeline, Unit
 
@@ -47,6 +47,7 @@ class Speech:
                   one of each frame [shape=(T,)] where somebody has corrected some of the recognised units
     prior       : what another model makes of the same speech, on which this engine's model stands (None: on none)
     voice       : 0 to 1, how well the model's training knows the voice
+    posteriors  : of a phone recogniser (None: the engine does not use them, or none is installed)
     kept        : what was computed of the sound alone (``once``); speech with other units shares it
     """
 
@@ -58,6 +59,7 @@ class Speech:
     confidence: float | NDArray[np.float64] = 1.0
     prior: PriorOutput | None = None
     voice: float = 1.0
+    posteriors: TokenPosteriors | None = None
     kept: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     def once(self, of: Any, make: Callable[[], KeptT]) -> KeptT:
@@ -65,7 +67,7 @@ class Speech:
 
         of : the object that the result belongs to, as a network; the result must depend on it and the sound alone
         """
-        sound = (self.features, self.log_f0, self.spectrum)
+        sound = (self.features, self.log_f0, self.spectrum, self.posteriors)
         found = self.kept.get(of)
         if found is None or any(ours is not theirs for ours, theirs in zip(sound, found[0], strict=True)):
             found = self.kept[of] = (sound, make())

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lipmotion.motion.acoustic_network import STEP
 from lipmotion.motion.articulation import ARTICULATORS, measured_articulators
+from lipmotion.motion.network_steps import STEP
 from lipmotion.types import PriorOutput, Speech
 
 if TYPE_CHECKING:

@@ -38,6 +38,7 @@ from lipmotion.pipeline.understand.transcribe import phones_in_time, warn_of_gue
 from lipmotion.pipeline.workers import worker_pool
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.spectrum import spectrum
+from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser, token_posteriors
 from lipmotion.speech.recognition.phone_models import train_phone_models
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
@@ -174,7 +175,9 @@ def train(  # noqa: PLR0913
         speaker_of = {utterance.name: utterance.speaker for utterance in utterances}
         examples, speakers = _of_the_mean_person(examples, speaker_of)
         examples = [replace(example, speech=with_prior(prior, example.speech)) for example in examples]
-        examples = _in_conditions(engine, utterances, examples, sub_monitor(run.monitor, 0.5, 0.6), team.ordered_map)
+        monitor = sub_monitor(run.monitor, 0.5, 0.55)
+        examples = with_posteriors(engine, utterances, examples, monitor, team.ordered_map)
+        examples = _in_conditions(engine, utterances, examples, sub_monitor(run.monitor, 0.55, 0.6), team.ordered_map)
     fit = engine.fit([*examples, *speech_examples], sub_monitor(run.monitor, 0.6, 1, "learning motion: "), checkpoint)
     if not fit.uses_prior:
         prior = None
@@ -279,12 +282,39 @@ def _in_conditions(
     each: ParallelMap,
 ) -> list[Example]:
     """Return the examples in all acoustic conditions that the engine's training uses."""
-    motion_s = sum(int(example.valid.sum()) for example in examples) / FRAME_RATE_HZ
-    count = engine.inputs(motion_s).conditions
+    count = engine.inputs(_motion_s(examples)).conditions
     if not count:
         return list(examples)
     audio = {utterance.name: utterance.audio for utterance in utterances}
     return with_conditions(examples, [audio[example.name] for example in examples], count, monitor, each)
+
+
+def with_posteriors(
+    engine: Engine[Any],
+    utterances: Sequence[Utterance],
+    examples: Sequence[Example],
+    monitor: Monitor,
+    each: ParallelMap,
+) -> list[Example]:
+    """Return examples with the posteriors of a phone recogniser (``Speech.posteriors``), if the engine uses them.
+
+    utterances : those of the examples are among them
+    each       : applies a function to many items, perhaps in several processes
+    """
+    if not engine.inputs(_motion_s(examples)).posteriors or installed_phone_recogniser() is None:
+        return list(examples)
+    audio = {utterance.name: utterance.audio for utterance in utterances}
+    result: list[Example] = []
+    found = each(token_posteriors, (audio[example.name] for example in examples))
+    for example, posteriors in zip(examples, found, strict=True):
+        result.append(replace(example, speech=replace(example.speech, posteriors=posteriors)))
+        monitor(Progress("posteriors of phones", len(result), len(examples), len(result) / len(examples)))
+    return result
+
+
+def _motion_s(examples: Sequence[Example]) -> float:
+    """Return the seconds of measured motion."""
+    return sum(int(example.valid.sum()) for example in examples) / FRAME_RATE_HZ
 
 
 def _train_phone_models(

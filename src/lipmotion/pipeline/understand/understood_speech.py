@@ -24,6 +24,7 @@ from lipmotion.speech.features.mfcc import HOP
 from lipmotion.speech.features.speaker_similarity import speaker_similarity
 from lipmotion.speech.recognition.agreement import TranscriptFit
 from lipmotion.speech.recognition.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
+from lipmotion.speech.recognition.network.posteriors import token_posteriors
 from lipmotion.speech.recognition.recognised_speech import Recognition, level_range_db
 from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, Recogniser, cached_recogniser, voice_knowledge
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ, read_audio
@@ -193,21 +194,21 @@ def _understood(model: Model, request: SpeechRequest, audio: AnalysedAudio, each
             LOG.warning("the transcript is not used: the units already say what is spoken; leave one of them out")
         _check_units(request.units, audio.duration_s)
         units = without_gaps(request.units, audio.duration_s)
-        return UnderstoodSpeech(speech_of(model.engine, audio, audio.mfcc(), units), None, range_db)
+        return UnderstoodSpeech(speech_of(model.engine, audio, audio.mfcc(), units, each), None, range_db)
     words = _words(request.transcript, audio.duration_s)
     if installed and words is None:
         words = recognise_words(audio, request.recogniser)
     features = audio.mfcc()
     if words is not None:
         units, fit = transcribe(phones, audio, features, words, request.lexicon or Lexicon())
-        return UnderstoodSpeech(speech_of(model.engine, audio, features, units), None, range_db, fit)
+        return UnderstoodSpeech(speech_of(model.engine, audio, features, units, each), None, range_db, fit)
     found: list[Recognition] = []
 
     def recognise() -> Recognition:
         found.append(phones.recognition(audio, features, each))
         return found[-1]
 
-    speech = recognised_speech(model.engine, model.learned, audio, features, phones, recognise)
+    speech = recognised_speech(model.engine, model.learned, audio, features, phones, recognise, each)
     return UnderstoodSpeech(speech, found[0] if found else None, range_db)
 
 
@@ -222,12 +223,18 @@ def audio_of(request: SpeechRequest) -> Audio:
     return read_audio(Path(recording))
 
 
-def speech_of(engine: Animator[Any], audio: Audio, features: Features, units: Timeline[Unit]) -> Speech:
-    """Return speech of features and phones in time, with F0 and spectrum of the recording if the engine needs them."""
+def speech_of(
+    engine: Animator[Any], audio: Audio, features: Features, units: Timeline[Unit], each: ParallelMap = map
+) -> Speech:
+    """Return speech of features and phones in time, and what else of the recording the engine needs.
+
+    each : applies a function to many items, perhaps in several processes
+    """
     inputs = engine.inputs()
     f0 = log_f0(audio) if inputs.f0 else None
     spectrum = analysed(audio).spectrum if inputs.conditions else None
-    return with_units(Speech(features, Timeline(()), f0, spectrum=spectrum), units)
+    posteriors = token_posteriors(audio, each) if inputs.posteriors else None
+    return with_units(Speech(features, Timeline(()), f0, spectrum=spectrum, posteriors=posteriors), units)
 
 
 def with_units(speech: Speech, units: Timeline[Unit]) -> Speech:
@@ -257,16 +264,18 @@ def recognised_speech(
     features: Features,
     phones: Recogniser,
     recognise: Callable[[], Recognition],
+    each: ParallelMap = map,
 ) -> Speech:
     """Return the speech of a recording whose words are not known, with recognised phones in time.
 
     learned   : the engine's model of motion
     phones    : the recogniser
     recognise : recognises phones in time, for speakers that the engine does not recognise itself
+    each      : applies a function to many items, perhaps in several processes
     If the engine's own model recognises phones of this speaker, these are aligned by ``phones``, as the phones of the
     training were; else the result of ``recognise`` is used.
     """
-    speech = speech_of(engine, audio, features, Timeline(()))
+    speech = speech_of(engine, audio, features, Timeline(()), each)
     recognised = None
     if phones.kind not in ("general", "words"):
         recognised = engine.recognise(learned, speech)

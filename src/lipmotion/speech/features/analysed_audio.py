@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,8 @@ from lipmotion.speech.features.mfcc import HOP, LOG_ENERGY, checked_samples, log
 from lipmotion.speech.features.spectrum import spectrum
 from lipmotion.speech.recognition.general.front_end import general_features
 from lipmotion.types import Audio, Features
+
+MadeT = TypeVar("MadeT")
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +30,14 @@ class AnalysedAudio(Audio):
 
     _mfcc: dict[float, Features] = field(default_factory=dict, repr=False)
     _stretches: dict[int, AnalysedAudio] = field(default_factory=dict, repr=False)
+    _made: dict[str, Any] = field(default_factory=dict, repr=False)
+
+    def once(self, name: str, make: Callable[[], MadeT]) -> MadeT:
+        """Return what a function makes of this recording; it is made once, and kept under a name."""
+        if name not in self._made:
+            self._made[name] = make()
+        made: MadeT = self._made[name]
+        return made
 
     def mfcc(self, warp: float = 1.0) -> Features:
         """Return the features of ``speech.features.mfcc.mfcc`` at one warp of the frequencies."""

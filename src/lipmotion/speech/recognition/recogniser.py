@@ -30,9 +30,9 @@ from lipmotion.speech.recognition.anchors import Anchors, align_within, least_fr
 from lipmotion.speech.recognition.combined_phones import CombinedPhones, combine_phones, combined_log_likelihoods
 from lipmotion.speech.recognition.network.network_search import NetworkSearch
 from lipmotion.speech.recognition.network.posteriors import (
-    PosteriorStretches,
-    begun_posteriors,
+    PosteriorStretch,
     installed_phone_recogniser,
+    posterior_stretches,
 )
 from lipmotion.speech.recognition.recognised_speech import (
     LabelledFrames,
@@ -114,7 +114,7 @@ class Recogniser:
         known = self._knows_voice_and_words(similarity)
         network = None if known else self._network
         if network is not None:
-            return self._network_recognition(audio, similarity, begun_posteriors(network, audio, each))
+            return self._network_recognition(audio, similarity, posterior_stretches(network, audio, each))
         with_words = self.kind in USING_WORDS and not known
         spoken = begun_decoding(audio, each) if with_words else None
         hmm, log_likelihoods = self._log_likelihoods(audio, similarity)
@@ -131,7 +131,7 @@ class Recogniser:
         return installed_phone_recogniser() if self.kind == "auto" else None
 
     def _network_recognition(
-        self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None, found: PosteriorStretches
+        self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None, found: Sequence[PosteriorStretch]
     ) -> Recognition:
         """Return what a phone recogniser finds in a recording, aligned."""
         features = audio.mfcc()

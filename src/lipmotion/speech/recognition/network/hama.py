@@ -5,6 +5,8 @@ from __future__ import annotations
 import platform
 import sys
 from functools import cache
+from hashlib import sha256
+from importlib import metadata, resources
 from importlib.util import find_spec
 from typing import Any, ClassVar, final
 
@@ -15,6 +17,7 @@ from lipmotion.speech.recognition.network.posteriors import PhoneRecogniser
 
 LIBRARIES = {("linux", "x86_64"), ("linux", "aarch64"), ("darwin", "x86_64"), ("darwin", "arm64")}
 """Systems and processors that the package has a library for."""
+WEIGHTS = "asr_waveform.hama"
 LEAST_SAMPLES = 1600
 """Shorter sound is filled up with silence: the network has no row for it."""
 
@@ -27,6 +30,8 @@ class Hama(PhoneRecogniser):
 
     def __init__(self) -> None:
         self.tokens = tuple(_model().decoder_tokens)
+        weights = (resources.files("hama") / "assets" / WEIGHTS).read_bytes()
+        self.source = f"{self.name} {metadata.version(self.name)} {sha256(weights).hexdigest()[:12]}"
 
     @classmethod
     def is_installed(cls) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,7 @@ from lipmotion.speech.recognition.network.posteriors import (
     BLANK,
     WORD_BOUNDARY,
     PhonePosteriors,
-    PosteriorStretches,
+    PosteriorStretch,
 )
 from lipmotion.speech.recognition.network.word_tree import FORM_OF, english_words
 from lipmotion.speech.recognition.recognised_speech import (
@@ -62,13 +63,13 @@ class NetworkSearch:
     loud: NDArray[np.bool_]
     english: bool = True
 
-    def labels(self, found: PosteriorStretches) -> tuple[list[LabelledStretch], list[RecognisedWord]]:
+    def labels(self, found: Sequence[PosteriorStretch]) -> tuple[list[LabelledStretch], list[RecognisedWord]]:
         """Return the stretches in which something is said, with their phones, and the words.
 
         Raises MissingDependencyError: words are searched, and their language model is not installed.
         """
         parts, recognised = list[LabelledStretch](), list[RecognisedWord]()
-        for stretch, posteriors in zip(found.stretches, found.posteriors, strict=True):
+        for stretch, posteriors in found:
             items = spoken_items(posteriors, english=self.english)
             if items:
                 parts += self._aligned(stretch, items, len(recognised))

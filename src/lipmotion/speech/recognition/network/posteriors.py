@@ -7,7 +7,6 @@ which its phone is said, ``BLANK`` in all others.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property, partial
 from itertools import groupby
@@ -18,16 +17,18 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.extensions import Registry
-from lipmotion.speech.features.analysed_audio import AnalysedAudio
+from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.recognition.word_decoder import FULL_SCALE, stretch_samples
 from lipmotion.speech.sound.voice_activity import Stretch, stretches_of_sound
-from lipmotion.types import FRAME_RATE_HZ, ParallelMap
+from lipmotion.types import Audio, ParallelMap, TokenPosteriors
 from lipmotion.units import PHONES
 from lipmotion.units.ipa_phones import token_phones
 
 POSTERIOR_STEP = 2
 """Frames of 10 ms from one row of posteriors to the next."""
 BLANK, WORD_BOUNDARY = "<blank>", "<wb>"
+LEAST_LOG_POSTERIOR = -16.0
+"""The logarithm of what is taken to be impossible."""
 SHORT_FRAMES = 1500
 """So little sound is recognised in this process: to start another one would take as long."""
 
@@ -37,10 +38,13 @@ class PhoneRecogniser(ABC):
 
     name   : under which it is registered, and chosen (``--recogniser``)
     tokens : phones in the International Phonetic Alphabet, ``BLANK`` and, if it has one, ``WORD_BOUNDARY``
+    source : name and version, which ``pip install NAME==VERSION`` takes, and a digest of its weights: posteriors of
+             another source are not what a model was trained on
     """
 
     name: ClassVar[str]
     tokens: tuple[str, ...]
+    source: str
 
     @classmethod
     @abstractmethod
@@ -139,29 +143,65 @@ class PhonePosteriors:
         return [phone for phone, _ in token_phones(found)]
 
 
-class PosteriorStretches(NamedTuple):
-    """Stretches of sound, and the posteriors in each of them, as soon as they are known."""
+class PosteriorStretch(NamedTuple):
+    """Frames of a recording with sound in them, and the posteriors there."""
 
-    stretches: Sequence[Stretch]
-    posteriors: Iterable[PhonePosteriors]
+    stretch: Stretch
+    posteriors: PhonePosteriors
 
 
-def begun_posteriors(name: str, audio: AnalysedAudio, each: ParallelMap = map) -> PosteriorStretches:
-    """Return the posteriors in all stretches of sound of a recording; where ``each`` starts processes, they begin now.
+def posterior_stretches(name: str, audio: AnalysedAudio, each: ParallelMap = map) -> list[PosteriorStretch]:
+    """Return the posteriors in all stretches of sound of a recording; they are computed once.
 
     name : of the phone recogniser
     each : applies a function to many items, perhaps in several processes
     Raises InputError, MissingDependencyError: as ``phone_recogniser``.
     """
-    tokens = phone_recogniser(name).tokens
-    stretches = stretches_of_sound(audio.log_energy)
-    each = each if sum(stretch.end - stretch.first for stretch in stretches) > SHORT_FRAMES else map
-    values = each(partial(stretch_posteriors, name), (stretch_samples(audio, stretch) for stretch in stretches))
-    return PosteriorStretches(stretches, _named(values, tokens))
+
+    def found() -> list[PosteriorStretch]:
+        tokens = phone_recogniser(name).tokens
+        stretches = stretches_of_sound(audio.log_energy)
+        chosen = each if sum(stretch.end - stretch.first for stretch in stretches) > SHORT_FRAMES else map
+        rows = chosen(partial(stretch_posteriors, name), (stretch_samples(audio, stretch) for stretch in stretches))
+        return [
+            PosteriorStretch(stretch, PhonePosteriors(values.astype(np.float32), tokens))
+            for stretch, values in zip(stretches, rows, strict=True)
+        ]
+
+    return audio.once(f"posteriors of {name}", found)
 
 
-def _named(values: Iterable[NDArray[np.float16]], tokens: tuple[str, ...]) -> Iterator[PhonePosteriors]:
-    return (PhonePosteriors(rows.astype(np.float32), tokens) for rows in values)
+def recording_posteriors(name: str, audio: AnalysedAudio, each: ParallelMap = map) -> PhonePosteriors:
+    """Return the posteriors in the whole of a recording; where there is no sound, nothing is said.
+
+    name, each : as of ``posterior_stretches``, whose errors it raises
+    """
+
+    def joined() -> PhonePosteriors:
+        tokens = phone_recogniser(name).tokens
+        rows = -(-len(audio.log_energy) // POSTERIOR_STEP)
+        values = np.full((rows, len(tokens)), LEAST_LOG_POSTERIOR, np.float32)
+        values[:, tokens.index(BLANK)] = 0
+        for stretch, posteriors in posterior_stretches(name, audio, each):
+            first = stretch.first // POSTERIOR_STEP
+            kept = posteriors.values[: rows - first]
+            values[first : first + len(kept)] = kept
+        return PhonePosteriors(values, tokens)
+
+    return audio.once(f"all posteriors of {name}", joined)
+
+
+def token_posteriors(audio: Audio, each: ParallelMap = map) -> TokenPosteriors | None:
+    """Return the posteriors in a recording as the input of an engine; None where no phone recogniser is installed.
+
+    audio : an ``AnalysedAudio`` shares them with what recognises its phones
+    each  : as of ``posterior_stretches``
+    """
+    name = installed_phone_recogniser()
+    if name is None:
+        return None
+    values = recording_posteriors(name, analysed(audio), each).values.astype(np.float16)
+    return TokenPosteriors(values, phone_recogniser(name).source)
 
 
 def stretch_posteriors(name: str, samples: bytes) -> NDArray[np.float16]:
@@ -170,18 +210,8 @@ def stretch_posteriors(name: str, samples: bytes) -> NDArray[np.float16]:
     name    : of the phone recogniser
     samples : 16-bit integers at 16 kHz
     """
-    numbers = np.frombuffer(samples, "<i2").astype(np.float32) / FULL_SCALE
+    numbers = np.frombuffer(samples, "<i2").astype(np.float32) / np.float32(FULL_SCALE)
     return phone_recogniser(name).log_posteriors(numbers).astype(np.float16)
-
-
-def rows_of(stretch: Stretch) -> int:
-    """Return the number of rows of posteriors that a stretch has."""
-    return -(-(stretch.end - stretch.first) // POSTERIOR_STEP)
-
-
-def row_time_s(row: float) -> float:
-    """Return the time of a row of posteriors, seconds from the first one."""
-    return row * POSTERIOR_STEP / FRAME_RATE_HZ
 
 
 @cache
