@@ -8,10 +8,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from lipmotion.corpora.labels import read_transcript
+from lipmotion.errors import InputError
 from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.understand.spoken_language import english_spoken
+from lipmotion.pipeline.understand.understood_speech import audio_of
 from lipmotion.speech.voices.pronunciations import LanguageLexicon
 from lipmotion.types import TimedTranscript, TimedWord, TranscriptLine
-from lipmotion.types.languages import ENGLISH
+from lipmotion.types.languages import AUTO, ENGLISH, LANGUAGES
+from lipmotion.units.languages_told import language_of_text
 from lipmotion.units.text_normalisation import written_words
 
 LOG = logging.getLogger("lipmotion")
@@ -20,19 +24,44 @@ LOG = logging.getLogger("lipmotion")
 def in_language(request: SpeechRequest) -> SpeechRequest:
     """Return a request whose words are those of its language, with the lexicon that pronounces them.
 
-    A request in English stays as it is.
+    A request in English stays as it is; so does one without a transcript whose language is not known.
     Raises InputError: the transcript cannot be read, or has words that nobody pronounces. Raises
     MissingDependencyError: there is neither espeak-ng nor a lexicon with the words.
     """
     if request.language == ENGLISH:
         return request
-    lexicon = LanguageLexicon(request.lexicon.user if request.lexicon else {}, request.language)
     given = request.transcript
     text = read_transcript(given) if isinstance(given, Path) else given
     transcript = _plain_transcript(written_words(text)) if isinstance(text, str) else text
+    language = request.language if request.language != AUTO else _told(request, transcript)
+    if language in (ENGLISH, AUTO):
+        return replace(request, language=language)
+    lexicon = LanguageLexicon(request.lexicon.user if request.lexicon else {}, language)
     if transcript is not None and request.units is None:
         lexicon = lexicon.with_words(transcript.words)
-    return replace(request, transcript=transcript, lexicon=lexicon)
+    return replace(request, language=language, transcript=transcript, lexicon=lexicon)
+
+
+def _told(request: SpeechRequest, transcript: TimedTranscript | None) -> str:
+    """Return the language of a request that names none, or ``AUTO``: not known; a warning says which.
+
+    Raises InputError: that of a transcript is not known.
+    """
+    if transcript is not None and request.units is None:
+        language = language_of_text(transcript.words)
+        if not language:
+            raise InputError(f"the language of the transcript is not known; give it, one of: {', '.join(LANGUAGES)}")
+        LOG.warning("the transcript is taken for %s; --language says otherwise", LANGUAGES[language].name)
+        return language
+    english = english_spoken(audio_of(request))
+    LOG.warning(
+        {
+            True: "the speech is taken for English; --language says otherwise",
+            False: "the speech is not English, in which language it is is not known; give it with --language",
+            None: "the language of the speech is not known; give it with --language",
+        }[english]
+    )
+    return ENGLISH if english else AUTO
 
 
 def _plain_transcript(words: Sequence[str]) -> TimedTranscript:
