@@ -71,7 +71,7 @@ class Request(Configuration):
         ENGLISH,
         Rule(choices=(*LANGUAGES, AUTO)),
         metavar="CODE",
-        help="that is spoken: en, es, fr, de, it, pt, nl, ja, ko, zh, ... or auto (default: en; docs/languages.md)",
+        help="that is spoken: en, es, fr, de, it, pt, nl, ja, ko, zh, ... or auto (default: en; docs/transcripts.md)",
     )
     units: Path | None = _file(
         "units file",

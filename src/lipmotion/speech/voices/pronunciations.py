@@ -59,19 +59,22 @@ def _pronounced(words: Sequence[str], language: str) -> dict[str, tuple[Pronunci
                 "another language"
             )
     try:
-        said = pronounced_words(words, spoken.voice or language)
+        found = espeak_pronunciations(words, spoken.voice or language)
     except MissingDependencyError as error:
         raise MissingDependencyError(
             f"no pronunciation of {shortened(repr(words[0]))} in {spoken.name}: install espeak-ng (pip install "
             f"'{EXTRA}'), or give a lexicon file with its {len(words)} words"
         ) from error
-    found = {word: _phones(ipa) for word, ipa in zip(words, said, strict=True)}
-    silent = next((word for word, phones in found.items() if not phones), None)
+    silent = next((word for word, (phones,) in found.items() if not phones), None)
     if silent is not None:
         raise InputError(f"{shortened(repr(silent))} has no phone in {spoken.name}; add it to a lexicon file")
-    return {word: (phones,) for word, phones in found.items()}
+    return found
 
 
-def _phones(ipa: str) -> Pronunciation:
-    """Return the phones of what ``pronounced_words`` writes of a word."""
-    return tuple(phone for label in re.split(r"[|\s]+", ipa) for phone in ipa_phones(label)[0])
+def espeak_pronunciations(words: Sequence[str], voice: str) -> dict[str, tuple[Pronunciation, ...]]:
+    """Return the pronunciation of each word by the rules of a voice. Raises as ``pronounced_words``."""
+    said = zip(words, pronounced_words(words, voice), strict=True)
+    return {
+        word: (tuple(phone for label in re.split(r"[|\s]+", ipa) for phone in ipa_phones(label)[0]),)
+        for word, ipa in said
+    }
