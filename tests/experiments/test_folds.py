@@ -27,6 +27,10 @@ PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
 SMALL = ExperimentSettings(recogniser=PHONE_MODELS)
 CONDITIONS = ["audio only", "with transcript"]
 RATE_HZ = 25
+OPENING_ROW = (
+    *("score", "precision", "timing_ms", "closings", "generated_closings", "recall_p_b_m", "p_b_m"),
+    *("acc", "nrmse", "global_variance"),
+)
 LIPS = {"false_per_minute": 1.0, "original_per_minute": 2.0}
 
 
@@ -150,3 +154,38 @@ def test_each_clip_is_held_out_once_and_never_trained_on(toy_corpus: Corpus, mon
     cut.clear()
     folds(toy_corpus, count=3, settings=ExperimentSettings(seed=1))
     assert cut != first
+
+
+def test_by_speaker_everybody_is_a_stranger_once(
+    toy_corpus: Corpus, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    people = ["anna", "ben", "", "anna", "eve", "ben", "anna", "eve"]
+    speaker_of = dict(zip(toy_corpus.names("train"), people, strict=True))
+    corpus = copied(toy_corpus, tmp_path, lambda each: replace(each, speaker=speaker_of.get(each.name, "test only")))
+    left_out: list[set[str]] = []
+
+    def result(_: object, names: Sequence[str], held_out: Sequence[str], *__: object) -> SimpleNamespace:
+        assert {speaker_of[name] for name in names}.isdisjoint(speaker_of[name] for name in held_out)
+        left_out.append({speaker_of[name] for name in held_out})
+        curve = np.arange(4.0)[:, None]
+        clips = [
+            SimpleNamespace(generated=curve if speaker_of[name] != "ben" else -curve, original=curve)
+            for name in held_out
+        ]
+        recordings = SimpleNamespace(closed_under=0.1, utterances=[corpus.utterance(name) for name in held_out])
+        return SimpleNamespace(used=names, clips={CONDITIONS[0]: clips}, recordings=recordings)
+
+    monkeypatch.setattr(module, "train_and_generate", result)
+    monkeypatch.setattr(module, "figures_of", lambda *_: {"closures_p_b_m": LIPS})
+    monkeypatch.setattr(module, "opening_row", lambda _: dict.fromkeys(OPENING_ROW, 0.5) | {"acc_95": [0.4, 0.6]})
+    figures = folds(corpus, by_speaker=True)
+    assert sorted(map(sorted, left_out)) == [[""], ["anna"], ["ben"], ["eve"]]
+    assert figures["conditions"]["audio only"]["speakers"] == pytest.approx(
+        {"anna": 1, "ben": -1, "eve": 1, "unknown": 1}
+    )
+    assert "4 speakers unknown to the model: mean ACC 0.500, -1.000 (ben) to 1.000 (unknown)" in table(figures)
+    left_out.clear()
+    folds(corpus, by_speaker=True, count=2)
+    assert [len(each) for each in left_out] == [2, 2]
+    with pytest.raises(InputError, match="5 folds; required: from 2 to 4, which is how many speakers there are"):
+        folds(corpus, by_speaker=True, count=5)

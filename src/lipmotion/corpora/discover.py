@@ -19,6 +19,8 @@ READERS: Registry[CorpusReader] = Registry(
     {
         "grid": "lipmotion.corpora.grid:read_grid",
         "facegood": "lipmotion.corpora.facegood:read_facegood",
+        "vocaset": "lipmotion.corpora.vocaset:read_vocaset",
+        "layouts": "lipmotion.corpora.layouts:read_layouts",
         "folder": "lipmotion.corpora.folder:read_folder",
     },
 )
@@ -27,7 +29,8 @@ READERS: Registry[CorpusReader] = Registry(
 def discover(directory: Path) -> RecordingFolder:
     """Return the recordings in a folder, from the first reader that recognises its kind.
 
-    GRID, FACEGOOD, then what installed packages add in alphabetical order, then any folder of videos or sounds.
+    GRID of one speaker, FACEGOOD, VOCASET, the table of known corpora (``layouts``), then what installed packages add
+    in alphabetical order, then any folder of videos or sounds.
 
     Raises InputError: no such folder. Raises CorpusError: no recordings in it, or its lists contradict each other.
     """

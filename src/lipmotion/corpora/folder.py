@@ -5,6 +5,7 @@ A video with a table of Live Link Face beside it is not tracked: the table is it
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from lipmotion.corpora.labels import RecordingLabels, labels_beside
@@ -36,19 +37,39 @@ def read_folder(directory: Path) -> RecordingFolder:
     in a sub-folder ``anna`` have the speaker ``anna``, and names as ``anna-take1``.
     """
     by_name: dict[str, list[Path]] = {}
-    for path in sorted(directory.rglob("*")):
-        inner = path.relative_to(directory)
-        if not any(part.startswith(".") for part in inner.parts) and (_has_motion(path) or video_files([path])):
-            by_name.setdefault("-".join(inner.with_suffix("").parts), []).append(path)
+    for path in files_in(directory):
+        if _has_motion(path) or video_files([path]):
+            name = "-".join(path.relative_to(directory).with_suffix("").parts)
+            by_name.setdefault(name, []).append(path)
     lists = frozenset(directory / name for name in LISTS)
+    return gathered(_kind(by_name), by_name, lambda name, path: _recording(name, path, directory, lists), directory)
+
+
+def files_in(directory: Path) -> list[Path]:
+    """Return what is in a folder and its sub-folders, sorted, without what is hidden."""
+    paths = ((path, path.relative_to(directory).parts) for path in directory.rglob("*"))
+    return sorted(path for path, parts in paths if not any(part.startswith(".") for part in parts))
+
+
+def gathered(
+    kind: str,
+    by_name: Mapping[str, list[Path]],
+    recording_of: Callable[[str, Path], SourceRecording],
+    directory: Path,
+) -> RecordingFolder:
+    """Return the recordings of the files with each name; where it has several, or cannot be read, it is a problem.
+
+    recording_of : returns a recording of its name and its file, or raises InputError
+    directory    : where the lists of the splits may lie
+    """
     recordings, problems = [], {}
     for name, paths in by_name.items():
         try:
-            recordings.append(_recording(name, _only(paths), directory, lists))
+            recordings.append(recording_of(name, _only(paths)))
         except InputError as error:
             problems[name] = str(error)
     recordings.sort(key=lambda recording: recording.name)
-    return assign_splits(RecordingFolder(_kind(by_name), tuple(recordings), problems), directory)
+    return assign_splits(RecordingFolder(kind, tuple(recordings), problems), directory)
 
 
 def _recording(name: str, path: Path, directory: Path, lists: frozenset[Path]) -> SourceRecording:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from pathlib import Path
 
 from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording, video_files
@@ -31,7 +32,7 @@ NAME = re.compile(r"[blps][bgrw][abiw][a-vx-z][z1-9][anps]")
 
 
 def read_grid(directory: Path) -> RecordingFolder | None:
-    """Return the recordings of a GRID folder, or None if most of its videos are not named like GRID's.
+    """Return the recordings of one speaker's folder, or None if most videos directly in it are not named like GRID's.
 
     directory : with clips/ or the videos themselves; align/ or .align files beside the videos; the lists of the splits
     """
@@ -67,11 +68,16 @@ def words_of_name(name: str) -> tuple[str, ...] | None:
 
 def _words(directory: Path, video: Path) -> tuple[str, ...] | None:
     """Return the words of a video: from its word-time file, else from its name; None if neither gives them."""
-    for folder in (directory / "align", video.parent):
-        path = folder / f"{video.stem}.align"
-        if path.is_file():
-            return read_aligned_words(path)
-    return words_of_name(video.stem)
+    return aligned_words(video, (directory / "align", video.parent)) or words_of_name(video.stem)
+
+
+def aligned_words(video: Path, folders: Iterable[Path]) -> tuple[str, ...] | None:
+    """Return the words of a video from the first of some folders with its word-time file, or None.
+
+    Raises InputError: as ``read_aligned_words``.
+    """
+    files = (folder / f"{video.stem}.align" for folder in folders)
+    return next((read_aligned_words(path) for path in files if path.is_file()), None)
 
 
 def read_aligned_words(path: Path) -> tuple[str, ...]:

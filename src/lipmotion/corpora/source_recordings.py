@@ -20,8 +20,8 @@ AUDIO_SUFFIXES = frozenset(f".{name}" for name in "aac aif aiff flac m4a mp3 oga
 class MotionFile:
     """A file with the motion that goes with a sound.
 
-    file     : as ``animate`` writes it (.csv .json .npz), or a bare array of numbers (.npy)
-    rate_hz  : frame rate of a bare array; None: the file states it
+    file     : as ``animate`` writes it (.csv .json .npz), a bare array of numbers (.npy), or the first mesh (.ply)
+    rate_hz  : frame rate of a bare array, or of meshes; None: the file states it
     channels : of a bare array; empty: the file states them
     """
 

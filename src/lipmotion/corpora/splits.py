@@ -21,14 +21,15 @@ MOST_MISSING_NAMES = 20_000
 def assign_splits(folder: RecordingFolder, directory: Path) -> RecordingFolder:
     """Return the recordings with the splits of the lists in ``directory``.
 
-    Without lists all are ``train``. With a train.txt, recordings that are in no list become problems, because they are
-    not meant for training; so do names without a recording.
-    A list may name files (``take08.mkv``): where no recording has that name, the suffix is left out.
+    Without lists all stay what their layout says, ``train`` as a rule. With a train.txt, recordings that are in no
+    list become problems, because they are not meant for training; so do names without a recording.
+    A list may name files (``take08.mkv``), or have remarks after a name: where no recording has that name, they are
+    left out.
     Raises CorpusError: a name is in two lists, or more than ``MOST_MISSING_NAMES`` names have no recording.
     """
     known = {recording.name for recording in folder.recordings} | folder.problems.keys()
     split_of = _read_lists(directory, known)
-    rest = None if (directory / "train.txt").is_file() else "train"
+    has_list = (directory / "train.txt").is_file()
     problems = {
         name: f"listed in {split}.txt, but there is no such recording"
         for name, split in split_of.items()
@@ -41,7 +42,7 @@ def assign_splits(folder: RecordingFolder, directory: Path) -> RecordingFolder:
         )
     recordings = []
     for recording in folder.recordings:
-        split = split_of.get(recording.name, rest)
+        split = split_of.get(recording.name, None if has_list else recording.split)
         if split is None:
             problems[recording.name] = f"in none of the lists of {directory} ({', '.join(LISTS)}); add it to one"
         else:
@@ -50,7 +51,7 @@ def assign_splits(folder: RecordingFolder, directory: Path) -> RecordingFolder:
 
 
 def _read_lists(directory: Path, known: Set[str]) -> dict[str, str]:
-    """Return the split of every listed name, without the suffix of a file if the recording's name has none.
+    """Return the split of every listed name, without a suffix or remarks if the recording's name has none.
 
     known : names of the recordings
     Raises CorpusError: a name is in two lists.
@@ -59,8 +60,8 @@ def _read_lists(directory: Path, known: Set[str]) -> dict[str, str]:
     for split in SPLITS:
         path = directory / f"{split}.txt"
         for listed in read_names(path) if path.is_file() else ():
-            stem = listed.rpartition(".")[0]
-            name = stem if listed not in known and stem in known else listed
+            shorter = (listed.rpartition(".")[0], listed.split()[0])  # without a suffix, or the remarks of LRS2's lists
+            name = listed if listed in known else next((each for each in shorter if each in known), listed)
             if split_of.setdefault(name, split) != split:
                 raise CorpusError(f"{name} is in {split_of[name]}.txt and in {split}.txt of {directory}; keep one")
     return split_of

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from time import perf_counter
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -24,6 +24,8 @@ from lipmotion.pipeline.training.train import Run, train
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.types import Monitor, silent_monitor, sub_monitor, with_progress
 from lipmotion.units import Lexicon
+
+ItemT = TypeVar("ItemT")
 
 
 @dataclass(frozen=True)
@@ -89,6 +91,7 @@ def train_and_generate(
         channels=channels,
         lexicon=lexicon,
         monitor=recognising,
+        speakers=model.speakers,
     )
     conditions = with_progress(list(recordings.conditions), "comparing", sub_monitor(monitor, 0.95, 1))
     generated = {
@@ -108,9 +111,9 @@ def channels_with_opening(corpus: Corpus, names: Sequence[str]) -> tuple[str, ..
     return channels
 
 
-def shuffled(names: Sequence[str], seed: int) -> tuple[str, ...]:
-    """Return the names in an order that depends on the seed alone."""
-    return tuple(names[i] for i in np.random.default_rng(seed).permutation(len(names)))
+def shuffled(items: Sequence[ItemT], seed: int) -> tuple[ItemT, ...]:
+    """Return the items in an order that depends on the seed alone."""
+    return tuple(items[i] for i in np.random.default_rng(seed).permutation(len(items)))
 
 
 def opening_row(figures: Mapping[str, Any]) -> dict[str, Any]:

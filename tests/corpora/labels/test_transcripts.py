@@ -171,6 +171,11 @@ OF_WORDS = {
     + "\n".join(f"a 1 {start_s} {end_s - start_s} {word.upper()} 0.9" for word, start_s, end_s in HELLO_WORDS),
     "CTM without confidence, out of order, with silence": "a A 0.0 1.0 <eps>\n"
     + "\n".join(f"a A {start_s:.2f} {end_s - start_s:.2f} {word}" for word, start_s, end_s in HELLO_WORDS[::-1]),
+    "LRS2": "Text:  HELLO\nConf:  4\n\nWORD START END ASDSCORE\n"
+    + "\n".join(f"{word.upper()} {start_s} {end_s} 7.5" for word, start_s, end_s in HELLO_WORDS),
+    "LRS3": "Text:  HELLO\nConf: 9\nRef: 0Fi83\n\nFRAME X Y W H\n000001 0.4 0.1 0.2 0.4\n\nWORD START END ASDSCORE\n"
+    + "\n".join(f"{word.upper()} {start_s} {end_s} 7.5" for word, start_s, end_s in HELLO_WORDS)
+    + "\n\nEND",
     "a TextGrid": '"ooTextFile" "TextGrid" 0 4 <exists> 1 "IntervalTier" "words" 0 4 5\n'
     + "\n".join(f'{start_s} {end_s} "{word}"' for word, start_s, end_s in HELLO_WORDS),
     "HTK's labels": "\n".join(
@@ -294,6 +299,11 @@ DAMAGED = {
     "CTM with a broken line": ("a 1 0.0 0.5 hi\na 1 0.5 you\n", r"line 2 is 'a 1 0\.5 you'; required, as in line 1"),
     "CTM with a time that is none": ("a 1 0.0 0.5 hi\na 1 nan 0.5 you\n", "line 2 has the time nan"),
     "CTM with a negative duration": ("a 1 0.0 0.5 hi\na 1 1.0 -0.5 you\n", r"line 2: a duration of -0\.5 s"),
+    "LRS with a broken line": (
+        "Text:  HI\n\nWORD START END\nHI 0.1 0.2 9\nYOU 0.2\n",
+        r"line 5 is 'YOU 0\.2'; required: word",
+    ),
+    "LRS with a time that is none": ("Text:  HI\n\nWORD START END\nHI 0.1 nan\n", "line 4 has the time nan"),
     "phones alone": ("0 1000000 sil\n1000000 2000000 p\n2000000 3500000 aa\n", "phones in time, but no words"),
 }
 

@@ -21,6 +21,7 @@ from lipmotion.export.motion.c3d_file import C3dFile
 from lipmotion.export.motion.c3d_writing import write_c3d
 from lipmotion.pipeline.corpus.supplied_motion import supplied_track
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
+from meshes.flame import head
 from meshes.live_link_app import write_take
 from robustness.case import npy
 from robustness.motion_cases import GOOD
@@ -43,6 +44,7 @@ def seeds(_: Good) -> list[Files]:
         {"a.csv": "\n".join(["time_s,opening,width", *rows]).encode()},
         {"a.json": json.dumps(document).encode()},
         {"a.npz": archive.getvalue()},
+        {"a.000001.ply": head(5, "<")},
         {VALUES: npy(values), NAMES: npy(np.array(["opening", "width"]))},
     ]
 
@@ -75,7 +77,8 @@ def read(folder: Path, good: Good) -> None:
     """Read motion; store it in a corpus, and read it again from there."""
     names = folder / NAMES
     path = folder / VALUES if names.exists() else next(folder.iterdir())
-    curves = MotionFile(path, RATE_HZ, read_channels(names)) if names.exists() else MotionFile(path)
+    rate_hz = RATE_HZ / FRAMES if path.suffix == ".ply" else RATE_HZ  # one mesh is all of the motion
+    curves = MotionFile(path, rate_hz, read_channels(names) if names.exists() else ())
     track = supplied_track(curves, short_speech(good).duration_s)
     require(bool(np.isfinite(track.motion.values).all()), "values that are not finite")
     corpus = Corpus.open(good.corpus)

@@ -53,6 +53,7 @@ TEXTS = {
     "states.lab": "0 1000000 x^sil-p+aa=t[2]\n1000000 2000000 x^sil-p+aa=t[3]\n2000000 3500000 p-aa+t[2] -61.2 baby\n",
     "starts.lab": "0 sil\n1000000 p\n2000000 aa\n",
     "audacity.txt": "0.0\t0.5\tp\n0.5\t1.25\taa\n\\\t100\t200\n",
+    "lrs.txt": "Text:  HI {LG} YOU\nConf:  4\n\nWORD START END ASDSCORE\nHI 0.5 0.7 8.1\nYOU 0.7 1.2 7\n",
     "words.txt": "Hello, you 42 people.\n",
     "said.srt": "1\n00:00:00,500 --> 00:00:01,500\n<i>Hi</i> (laughs)\n\n2\n00:00:02,000 --> 00:00:03,000\nANNA: you\n",
     "said.vtt": "WEBVTT\n\nNOTE a\n\n00:00.500 --> 00:01.500 line:0\nHi<00:01.000><c> you</c>\n\n"

@@ -17,7 +17,9 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = actions.add_parser(
         "folds", help="cross-validation: generate each part of the training list by a model of the others"
     )
-    parser.add_argument("--folds", type=int, default=5, metavar="K", help="number of parts (default: 5)")
+    parser.add_argument("--by-speaker", action="store_true", help="leave whole speakers out: strangers to the model")
+    count = "number of parts (default: 5; by speaker: one each)"
+    parser.add_argument("--folds", type=int, metavar="K", help=count)
     add_experiment_arguments(parser)
     parser.set_defaults(run=run)
 
@@ -27,6 +29,6 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.experiments.folds import folds, table
 
     def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
-        return folds(corpus, count=options.folds, settings=settings)
+        return folds(corpus, count=options.folds, by_speaker=options.by_speaker, settings=settings)
 
     run_experiment(options, experiment, table)

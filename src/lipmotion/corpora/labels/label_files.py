@@ -25,7 +25,7 @@ from lipmotion.corpora.labels.tier import (
     with_words,
 )
 from lipmotion.corpora.labels.timed_lines import parse_timed_lines
-from lipmotion.corpora.labels.word_lists import is_ctm, parse_ctm
+from lipmotion.corpora.labels.word_lists import is_ctm, is_lrs, parse_ctm, parse_lrs
 from lipmotion.errors import InputError
 from lipmotion.storage.files import check_regular
 from lipmotion.types import TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
@@ -113,7 +113,7 @@ def read_labels(path: Path) -> RecordingLabels:
     """Return the words and phones of one file.
 
     Read are TextGrids, labels with times (HTK, Audacity), subtitles (SubRip, WebVTT, SubStation), the JSON and tables
-    of recognisers (Whisper, Vosk), NIST's CTM, and plain text; the content decides, not the name.
+    of recognisers (Whisper, Vosk), NIST's CTM, the texts of LRS, and plain text; the content decides, not the name.
     Raises InputError: not text, damaged, overlapping labels, or labels among phones that are no phones.
     """
     return _read(path, unknown_json=False) or RecordingLabels()
@@ -207,6 +207,8 @@ def _timed(text: str, path: Path) -> RecordingLabels | None:
         return _chosen(parse_interval_tiers(text, where), where)
     if is_subtitles(text):
         return _spoken(parse_subtitles(text, where))
+    if is_lrs(text):
+        return _spoken(parse_lrs(text, where))
     transcript = parse_recognised(text, where) if is_json(text) else None
     if transcript is not None:
         return _spoken(transcript)

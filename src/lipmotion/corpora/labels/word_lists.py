@@ -1,4 +1,4 @@
-"""Lists of words in time, one a line: NIST's CTM."""
+"""Lists of words in time, one a line: NIST's CTM, and the texts of the lip-reading corpora LRS2 and LRS3."""
 
 from __future__ import annotations
 
@@ -7,13 +7,17 @@ from io import StringIO
 
 from lipmotion.corpora.labels.tier import SILENCES, check_count, required_time
 from lipmotion.errors import InputError, shortened
-from lipmotion.types import TimedTranscript, TimedWord, in_order
+from lipmotion.types import TimedTranscript, TimedWord, TranscriptLine, in_order
 from lipmotion.units.spoken_text import check_word_count, lines_by_pauses, spoken_text, timed_words
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?|nan|inf"
 LINE = re.compile(rf"(\S+)\s+(\S+)\s+({NUMBER})\s+({NUMBER})\s+(\S+)(?:\s+(?:{NUMBER}|NA))?(?:\s.*)?")
 """Recording, channel, start and duration in seconds, word, confidence."""
 COMMENT = (";;", "#")
+LRS_TEXT = re.compile(r"\s*Text:[ \t]+(\S.*)")
+"""The first line of a text of LRS: what is said."""
+LRS_WORDS = re.compile(r"^WORD[ \t]+START[ \t]+END\b.*$", re.MULTILINE)
+LRS_WORD = re.compile(rf"(\S+)\s+({NUMBER})\s+({NUMBER})(?:\s.*)?")
 
 
 def is_ctm(text: str) -> bool:
@@ -53,3 +57,33 @@ def parse_ctm(text: str, where: str) -> TimedTranscript:
             check_word_count(count, where)
     words.sort(key=lambda item: item[0])
     return in_order(lines_by_pauses([word for _, several in words for word in several]))
+
+
+def is_lrs(text: str) -> bool:
+    """Return whether the first line is that of a text of LRS: ``Text:  WORDS IN CAPITALS``."""
+    return LRS_TEXT.match(text) is not None
+
+
+def parse_lrs(text: str, where: str) -> TimedTranscript:
+    """Return the words of a text of LRS: with times where it has a table ``WORD START END`` of seconds.
+
+    where : the file's name, for messages
+    Raises InputError: a line of the table of another form, or with a time that is none (with its number).
+    """
+    heading = LRS_WORDS.search(text)
+    if heading is None:
+        said = LRS_TEXT.match(text)
+        words = timed_words(spoken_text(said[1] if said else ""), where=where)
+        return TimedTranscript((TranscriptLine(tuple(words)),) if words else ())
+    first = text.count("\n", 0, heading.end()) + 2
+    timed: list[TimedWord] = []
+    for number, row in enumerate(StringIO(text[heading.end() :].lstrip("\r\n")), first):
+        if not row.strip():
+            break
+        found = LRS_WORD.fullmatch(row.strip())
+        if found is None:
+            raise InputError(f"{where}: line {number} is {shortened(row.strip())!r}; required: word start end")
+        start_s, end_s = (required_time(time, f"line {number}", where) for time in found.group(2, 3))
+        timed += timed_words(spoken_text(found[1]), start_s, end_s, where)
+        check_word_count(len(timed), where)
+    return in_order(lines_by_pauses(timed))

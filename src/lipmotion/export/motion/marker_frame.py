@@ -1,14 +1,16 @@
 """The places of markers in the head's frame: eye distances, origin between the outer eye corners, x to the speaker's
-left, y up, z out of the face."""
+left, y up, z out of the face; and the motion that they make."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
+from lipmotion.types import Channel, Motion
 
 Array = NDArray[np.float64]
 
@@ -25,6 +27,28 @@ LEAST_RIGID_MARKERS = 3
 LARGEST_COORDINATE = 1e6
 LEAST_DISTANCE = 1e-3
 """Least distance of the eye corners in any frame, as a share of the median."""
+
+DISTANCES = {"opening": (13, 14), "width": (61, 291), "outer": (0, 17)}
+"""Channels that are the distance of two points."""
+MARKER = re.compile(r"(?:lip|jaw|p|point)[ _]?(\d{1,3})$", re.IGNORECASE)
+"""The name of a marker at a point of the face mesh."""
+
+
+def motion_of_markers(markers: Mapping[str, Array], rate_hz: float) -> Motion:
+    """Return the channels of markers in the head's frame, and the distances between those of the lips."""
+    points = {int(found[1]): places for name, places in markers.items() if (found := MARKER.match(name))}
+    names = [str(int(found[1])) if (found := MARKER.match(name)) else name for name in markers]
+    curves = {
+        name: np.linalg.norm(points[one] - points[other], axis=1)
+        for name, (one, other) in DISTANCES.items()
+        if one in points and other in points
+    }
+    curves |= {
+        f"{axis}_{name}": places[:, column]
+        for name, places in zip(names, markers.values(), strict=True)
+        for column, axis in enumerate("xyz")
+    }
+    return Motion(np.stack(list(curves.values()), axis=1), rate_hz, tuple(map(Channel, curves)))
 
 
 def in_head_frame(markers: Mapping[str, Array], unit: str) -> dict[str, Array]:

@@ -18,19 +18,16 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import MotionFormat
 from lipmotion.export.motion.c3d_file import LONGEST_LABEL_CHARACTERS, MOST_FRAMES, C3dFile, read_c3d
 from lipmotion.export.motion.c3d_writing import write_c3d
-from lipmotion.export.motion.marker_frame import MILLIMETRES, in_head_frame
+from lipmotion.export.motion.marker_frame import MARKER, MILLIMETRES, in_head_frame, motion_of_markers
 from lipmotion.types import EYE_DISTANCE, Channel, Generation, Motion, Timeline, Unit
 
 Array = NDArray[np.float64]
 
 SOFTWARE = "lipmotion"
 EYES = (("EYE_L", 0.5), ("EYE_R", -0.5))
-DISTANCES = {"opening": (13, 14), "width": (61, 291), "outer": (0, 17)}
-"""Channels that are the distance of two points, where the file does not hold them."""
 LEAST_SEEN_SHARE = 0.5
 """Markers that are seen in a smaller share of the frames are left out; shorter gaps are bridged by straight lines."""
 MOST_CURVES = 255
-_MARKER = re.compile(r"(?:lip|jaw|p|point)[ _]?(\d{1,3})$", re.IGNORECASE)
 _POINT = re.compile(r"[xyz]_(\d{1,3})$")
 _UNLABELLED = re.compile(r"\*|[uc]_?\d+$|unlabel|point\d+$", re.IGNORECASE)
 
@@ -95,7 +92,7 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
     if not markers:
         some = ", ".join(content.labels[:6])
         raise InputError(f"no marker with a name is seen in half of the frames; the labels: {some or 'none'}")
-    return _motion(in_head_frame(markers, content.unit), content.rate_hz), Timeline(())
+    return motion_of_markers(in_head_frame(markers, content.unit), content.rate_hz), Timeline(())
 
 
 def _points(motion: Motion) -> list[int]:
@@ -119,27 +116,10 @@ def _bridged(places: Array) -> Array | None:
     return np.stack([np.interp(frames, frames[seen], axis[seen]) for axis in places.T], axis=1)
 
 
-def _motion(markers: Mapping[str, Array], rate_hz: float) -> Motion:
-    """Return the channels of markers, and the distances between those of the lips."""
-    points = {int(found[1]): places for name, places in markers.items() if (found := _MARKER.match(name))}
-    names = [str(int(found[1])) if (found := _MARKER.match(name)) else name for name in markers]
-    curves = {
-        name: np.linalg.norm(points[one] - points[other], axis=1)
-        for name, (one, other) in DISTANCES.items()
-        if one in points and other in points
-    }
-    curves |= {
-        f"{axis}_{name}": places[:, column]
-        for name, places in zip(names, markers.values(), strict=True)
-        for column, axis in enumerate("xyz")
-    }
-    return Motion(np.stack(list(curves.values()), axis=1), rate_hz, tuple(map(Channel, curves)))
-
-
 def _as_written(content: C3dFile) -> Motion:
     """Return the motion of a file that ``write`` wrote: the curves first, then the points."""
     eyes = {name for name, _ in EYES}
-    numbers = {column: _MARKER.match(label) for column, label in enumerate(content.labels) if label not in eyes}
+    numbers = {column: MARKER.match(label) for column, label in enumerate(content.labels) if label not in eyes}
     points = {column: found[1] for column, found in numbers.items() if found}
     curves = zip(content.analog_labels, content.analog_units, strict=True)
     channels = [Channel(name, unit or EYE_DISTANCE) for name, unit in curves]

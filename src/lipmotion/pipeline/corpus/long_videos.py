@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.folder import VIDEO_KINDS
 from lipmotion.corpora.labels import labels_beside
+from lipmotion.corpora.layouts import LRS
 from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording
 from lipmotion.corpora.splits import LISTS
 from lipmotion.errors import InputError
@@ -32,7 +33,7 @@ _STAGE = "dividing long videos"
 DIVIDING_SHARE = 0.2
 """Share of the whole preparation that this takes, for reports of progress."""
 VIDEO = "one video"
-DIVIDED_KINDS = (*VIDEO_KINDS, VIDEO)
+DIVIDED_KINDS = (*VIDEO_KINDS, VIDEO, LRS)
 """Kinds of recordings of which the long ones are divided; GRID's and others hold a sentence each."""
 LONG_S = 30.0
 """Videos that state a longer duration are divided; a shorter one is one utterance."""

@@ -115,8 +115,8 @@ def prepare(
 ) -> PrepareReport:
     """Create a corpus from recordings, or add the recordings to a corpus; return a report.
 
-    directory : folder in the layout of GRID or FACEGOOD, or any folder of videos, or of sounds with motion
-                (docs/corpora.md); or one video. Videos of more than half a minute are divided into utterances
+    directory : folder in the layout of a published corpus (recipes/), or any folder of videos, or of sounds with
+                motion (docs/corpora.md); or one video. Videos of more than half a minute are divided into utterances
     output    : folder of the corpus; utterances that are up to date are kept, so that a stopped preparation continues
     workers   : number of processes; None: one for each core. With more than one, a script must be guarded by
                 ``if __name__ == "__main__":``

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from lipmotion.corpora.source_recordings import MotionFile, SourceRecording
 from lipmotion.errors import InputError
 from lipmotion.export.base import read_motion
 from lipmotion.meshes.files.live_link_table import is_live_link_file, speech_curves
+from lipmotion.pipeline.corpus.mesh_motion import SUFFIX, mesh_files, read_mesh_motion
 from lipmotion.speech.recognition.recogniser import SHORT_PAUSE_S
 from lipmotion.storage.files import sha256_of
 from lipmotion.types import Span, Timeline, Track, Unit
@@ -32,7 +34,7 @@ def source_digests(recording: SourceRecording) -> dict[str, str]:
     digests = {}
     if recording.motion_file is not None:
         digests["motion_file"] = recording.motion_file.file.name
-        digests["motion_sha256"] = sha256_of(recording.motion_file.file)
+        digests["motion_sha256"] = _motion_digest(recording.motion_file.file)
     if recording.recorder is not None:
         digests["recorder_file"] = recording.recorder.name
         digests["recorder_sha256"] = sha256_of(recording.recorder)
@@ -42,6 +44,13 @@ def source_digests(recording: SourceRecording) -> dict[str, str]:
     return digests
 
 
+def _motion_digest(file: Path) -> str:
+    """Return the digest of a motion file, of a sequence of meshes that of all their digests."""
+    if file.suffix != SUFFIX:
+        return sha256_of(file)
+    return hashlib.sha256("\n".join(map(sha256_of, mesh_files(file))).encode()).hexdigest()
+
+
 def supplied_track(curves: MotionFile, duration_s: float | None) -> Track:
     """Return the motion in a file as a track that is valid in all frames, without mouth pictures.
 
@@ -49,7 +58,10 @@ def supplied_track(curves: MotionFile, duration_s: float | None) -> Track:
     Of a table of Live Link Face, the curves that speech moves.
     Raises InputError: not a motion file, or of another length than the sound.
     """
-    motion = read_bare_motion(curves) if curves.channels else read_motion(curves.file)[0]
+    if curves.file.suffix == SUFFIX and curves.rate_hz:
+        motion = read_mesh_motion(curves.file, curves.rate_hz)
+    else:
+        motion = read_bare_motion(curves) if curves.channels else read_motion(curves.file)[0]
     if is_live_link_file(curves.file):
         motion = speech_curves(motion)
     length_s = len(motion.values) / motion.rate_hz

@@ -1,0 +1,112 @@
+"""The recipes for published corpora: three commands each, and that these do what the pages say."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import wave
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from docs.test_links import broken
+from lipmotion.cli.command_line import parser
+from lipmotion.cli.main import main
+from lipmotion.corpora.store import Corpus
+from lipmotion.hmm.model import HmmConfig
+from lipmotion.measures.bootstrap import bootstrap_interval
+from lipmotion.pipeline.corpus import prepare as prepare_module
+from lipmotion.pipeline.evaluation import figures as evaluation_figures
+from lipmotion.pipeline.model import load_model
+from lipmotion.pipeline.training import train as train_module
+from lipmotion.testing import toy_utterances
+from lipmotion.types import Track, Utterance
+
+FOLDER = Path(__file__).parents[2] / "recipes"
+INDEX = FOLDER / "README.md"
+PAGES = sorted(page for page in FOLDER.glob("*.md") if page != INDEX)
+MOST_LINES = 40
+PEOPLE = ("6331559613336179781", "anna", "ben")
+
+
+def commands(page: Path) -> list[list[str]]:
+    """Return the commands in the blocks of a page, each as its words."""
+    (block,) = re.findall(r"```sh\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+    return [shlex.split(line)[1:] for line in block.splitlines()]
+
+
+def test_a_recipe_is_a_short_page_with_three_commands() -> None:
+    understood, index = parser(), INDEX.read_text(encoding="utf-8")
+    assert len(PAGES) >= 6
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        assert len(text.splitlines()) <= MOST_LINES
+        assert f"({page.name})" in index
+        prepare, train, folds = map(understood.parse_args, commands(page))
+        assert (prepare.verb, train.verb, folds.verb) == ("corpus", "train", "experiment")
+        assert prepare.output == train.corpus == folds.corpus
+        assert (train.start, folds.by_speaker) == ("none", True)
+        assert f"    {prepare.recordings.parts[0]}/\n" in text
+
+
+def test_links_of_the_recipes_resolve() -> None:
+    assert {page.name: broken(page.read_text(encoding="utf-8"), page) for page in (INDEX, *PAGES)} == {
+        page.name: [] for page in (INDEX, *PAGES)
+    }
+
+
+@pytest.fixture
+def lrs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder of LRS2 with nine sentences of three speakers, whose tracks are known; small phone models."""
+    said = toy_utterances(9)
+    tracks: dict[Path, Track] = {}
+    for number, utterance in enumerate(said):
+        clip = tmp_path / "lrs" / "main" / PEOPLE[number % 3] / f"{number:05}.mp4"
+        clip.parent.mkdir(parents=True, exist_ok=True)
+        write_sound(clip, utterance)
+        clip.with_suffix(".txt").write_text(f"Text:  {' '.join(utterance.words or ()).upper()}\nConf:  4\n")
+        tracks[clip.resolve()] = utterance.track
+
+    def track(path: Path, **_: object) -> Track:
+        return tracks[path.resolve()]
+
+    monkeypatch.setattr(prepare_module, "track", track)
+    versions: Callable[[], dict[str, str]] = lambda: {"mediapipe": "0"}  # noqa: E731
+    monkeypatch.setattr(prepare_module, "tracker_named", lambda _: SimpleNamespace(versions=versions))
+    monkeypatch.setattr(train_module, "HmmConfig", partial(HmmConfig, mixtures=1, iterations=1))
+    monkeypatch.setattr(evaluation_figures, "bootstrap_interval", partial(bootstrap_interval, draws=20))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def write_sound(path: Path, utterance: Utterance) -> None:
+    samples = (np.clip(utterance.audio.samples, -1, 1) * 32767).astype("<i2")
+    with wave.open(str(path), "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(utterance.audio.rate_hz)
+        file.writeframes(samples.tobytes())
+
+
+@pytest.mark.long
+def test_three_commands_make_a_model_of_many_and_judge_it_on_strangers(lrs: Path) -> None:
+    prepare, train, folds = commands(FOLDER / "lrs.md")
+    folds[folds.index("5")] = "3"
+    for command in (prepare, train, folds):
+        assert main([*command, "--workers", "1"]) in (0, None)
+    corpus = Corpus.open(lrs / "lrs-corpus")
+    assert {speaker: count for speaker, (count, _) in corpus.speakers.items()} == dict.fromkeys(PEOPLE, 3)
+    assert corpus.utterance("anna-00001").words == toy_utterances(9)[1].words
+    model = load_model(lrs / "lrs.lipmotion")
+    assert model.speakers is not None
+    assert model.speakers.names == PEOPLE
+    figures = json.loads((lrs / "lrs.json").read_text())
+    assert (figures["folds"], figures["trained_on"]) == (3, [6, 6, 6])
+    for row in figures["conditions"].values():
+        assert list(row["speakers"]) == list(PEOPLE)
+        assert min(row["speakers"].values()) > 0.5
