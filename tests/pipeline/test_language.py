@@ -9,9 +9,11 @@ import pytest
 
 import lipmotion
 from lipmotion.errors import InputError
+from lipmotion.pipeline.job import Request
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.understand import language as told
 from lipmotion.pipeline.understand.language import in_language
+from lipmotion.pipeline.understand.read_request import read_request
 from lipmotion.pipeline.understand.request import SpeechRequest, request_of
 from lipmotion.speech.voices.pronunciations import MAPPED_CONFIDENCE, LanguageLexicon
 from lipmotion.testing.toy import ToySentence
@@ -73,3 +75,9 @@ def test_mapped_phones_are_not_called_sure(toy_model: Model, toy_sentence: ToySe
     assert outlook is not None
     assert outlook.words == "mapped transcript"
     assert outlook.confidence == pytest.approx(0.25)
+
+
+def test_the_option_reaches_the_request() -> None:
+    assert read_request(Request("a.wav", language="ko")).language == "ko"
+    assert request_of(SpeechRequest(SILENCE, language="ko"), language="fr").language == "fr"
+    assert request_of(SpeechRequest(SILENCE, language="ko")).language == "ko"
