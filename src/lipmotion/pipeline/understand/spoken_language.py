@@ -24,9 +24,12 @@ def english_spoken(audio: Audio) -> bool | None:
     """
     if find_spec("hama") is None:
         return None
-    from hama.asr import ASRModel  # type: ignore[import-untyped]
+    try:
+        from hama.asr import ASRModel  # type: ignore[import-untyped]
 
-    model, tokens = ASRModel(), list[str]()
+        model, tokens = ASRModel(), list[str]()
+    except (ImportError, OSError, RuntimeError):  # it has no library for this system
+        return None
     count = int(PART_S * audio.rate_hz)
     for first in range(0, min(len(audio.samples), PARTS * count), count):
         samples = np.ascontiguousarray(audio.samples[first : first + count], np.float32)
