@@ -28,6 +28,12 @@ from lipmotion.speech.features.speaker_similarity import SpeakerSimilarity, spea
 from lipmotion.speech.recognition.adaptation import Adaptation
 from lipmotion.speech.recognition.anchors import Anchors, align_within, least_frames
 from lipmotion.speech.recognition.combined_phones import CombinedPhones, combine_phones, combined_log_likelihoods
+from lipmotion.speech.recognition.network.network_search import NetworkSearch
+from lipmotion.speech.recognition.network.posteriors import (
+    PosteriorStretches,
+    begun_posteriors,
+    installed_phone_recogniser,
+)
 from lipmotion.speech.recognition.recognised_speech import (
     LabelledFrames,
     RecognisedWord,
@@ -105,7 +111,11 @@ class Recogniser:
             return recognition_of(silence, [LabelledFrames(0, SILENCE)], (), None)
         audio = analysed(audio, features)
         similarity = self._similarity(audio)
-        with_words = self.kind in USING_WORDS and not self._knows_voice_and_words(similarity)
+        known = self._knows_voice_and_words(similarity)
+        network = None if known else self._network
+        if network is not None:
+            return self._network_recognition(audio, similarity, begun_posteriors(network, audio, each))
+        with_words = self.kind in USING_WORDS and not known
         spoken = begun_decoding(audio, each) if with_words else None
         hmm, log_likelihoods = self._log_likelihoods(audio, similarity)
         path = self._loop.network.best_path(log_likelihoods)
@@ -113,12 +123,23 @@ class Recogniser:
         if spoken is not None:
             parts, recognised = self._word_search(audio, hmm, log_likelihoods, path).words_of(spoken)
             labels = spliced(labels if self.kind == "auto" else [LabelledFrames(0, SILENCE)], parts, len(path))
-        units = _timeline(
-            [(label.phone, recognised[label.word].text if label.word >= 0 else "") for label in labels],
-            np.array([*(label.first for label in labels), len(path)]),
-            features.duration_s,
-        )
-        return recognition_of(units, labels, recognised, similarity.score if similarity is not None else None)
+        return _recognition(labels, recognised, len(path), features.duration_s, similarity)
+
+    @property
+    def _network(self) -> str | None:
+        """The name of the phone recogniser that this one uses."""
+        return installed_phone_recogniser() if self.kind == "auto" else None
+
+    def _network_recognition(
+        self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None, found: PosteriorStretches
+    ) -> Recognition:
+        """Return what a phone recogniser finds in a recording, aligned."""
+        features = audio.mfcc()
+        hmm, aligning = self._log_likelihoods(audio, similarity, aligning=True)
+        loud = loud_frames(features.values[:, LOG_ENERGY], ENERGY_SMOOTHING_FRAMES)
+        parts, recognised = NetworkSearch(hmm, aligning, loud).labels(found)
+        labels = spliced([LabelledFrames(0, SILENCE)], parts, len(loud))
+        return _recognition(labels, recognised, len(loud), features.duration_s, similarity)
 
     def _free_labels(self, audio: AnalysedAudio, features: Features, path: NDArray[np.intp]) -> list[LabelledFrames]:
         """Return the phones of a recording as they are recognised without words, of their best path."""
@@ -286,6 +307,19 @@ def _aligned(
         spoken = [item.spoken for item in placed]
         of_units = unit_windows(spoken, windows, frames)
     return spoken, align_units(hmm, log_likelihoods, [unit for item in spoken for unit in item.units], of_units)
+
+
+def _recognition(
+    labels: list[LabelledFrames],
+    recognised: list[RecognisedWord],
+    frames: int,
+    duration_s: float,
+    similarity: SpeakerSimilarity | None,
+) -> Recognition:
+    """Return a recognition of so many frames."""
+    named = [(label.phone, recognised[label.word].text if label.word >= 0 else "") for label in labels]
+    units = _timeline(named, np.array([*(label.first for label in labels), frames]), duration_s)
+    return recognition_of(units, labels, recognised, similarity.score if similarity is not None else None)
 
 
 @lru_cache(maxsize=4)

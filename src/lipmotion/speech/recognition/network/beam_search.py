@@ -1,0 +1,225 @@
+"""The search for words in posteriors: the most probable sequence of words, and of phones outside of words.
+
+Words and their neighbours decide together: a path says the phones of one word after the other, each in a row of
+posteriors or several, with blanks between. Where no word fits, a path may say any phones: names, other languages, and
+what is no word.
+
+Source: Graves, Fernández, Gomez and Schmidhuber 2006, "Connectionist temporal classification" (paths with blanks); Ney,
+Haeb-Umbach, Tran and Oerder 1992, "Improvements in beam search" (the tree of words, and the score of the most probable
+word below a node). The best path counts, not the sum of all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.speech.recognition.network.posteriors import PhonePosteriors
+from lipmotion.speech.recognition.network.word_tree import FORM_OF, NO_WORD, SOUNDS, EnglishWords
+from lipmotion.units import PHONES
+
+BEAM, MOST_PATHS = 10.0, 1000
+"""Paths that are so many nats less probable than the best one, or not among so many best ones, are given up."""
+MOST_ENDS = 60
+"""Words end in so many paths of a row at most."""
+LEAST_POSTERIOR = 1e-3
+"""No posterior counts as less: the network is sure too often."""
+BLANK_LOSS = 1.0
+"""Nats by which no phone is less probable than the network says: it leaves phones out rather than adding some."""
+WORD_GAIN = 1.0
+"""Nats that a path wins with every word."""
+FREE_WORD_LOSS, FREE_PHONE_LOSS = 4.0, 2.0
+"""Nats that a path loses with phones outside of words, and with each of them."""
+INNER_BOUNDARY_LOSS = 2.0
+"""Nats that a path loses with a boundary of words within a word."""
+SILENT_ROW = -0.02
+"""Where no phone is more probable than this, as a logarithm, paths stay where they are."""
+NEVER = -1e9
+
+Scores = NDArray[np.float64]
+Indices = NDArray[np.int64]
+WordEnds = dict[tuple[int, ...], tuple[float, int, int]]
+
+
+class DecodedWord(NamedTuple):
+    """A word, and the rows of posteriors from the end of the word before to its own; empty: phones outside of words."""
+
+    text: str
+    first: int
+    end: int
+
+
+class Scored(NamedTuple):
+    """Logarithms of what a path may do in every row.
+
+    sounds : say each of ``SOUNDS`` [shape=(N, S)]
+    blank  : say nothing, within a word; between: between words [each shape=(N,)]
+    """
+
+    sounds: Scores
+    blank: Scores
+    between: Scores
+
+
+def scored(posteriors: PhonePosteriors) -> Scored:
+    """Return what paths may do, by posteriors."""
+    phones = np.exp(posteriors.of_phones.astype(float))
+    sounds = np.zeros((len(phones), len(SOUNDS)))
+    for column, phone in enumerate(PHONES):
+        form = FORM_OF.get(phone, phone)
+        if form in SOUNDS:
+            sounds[:, SOUNDS.index(form)] += phones[:, column]
+    boundary = np.exp(posteriors.word_boundary.astype(float))
+    blank = (phones[:, -1] - boundary).clip(min=0) * np.exp(-BLANK_LOSS)
+    total = sounds.sum(axis=1) + blank + boundary
+    sounds, blank, boundary = (
+        each / total.reshape(-1, *[1] * (each.ndim - 1)) + LEAST_POSTERIOR for each in (sounds, blank, boundary)
+    )
+    inside = blank + boundary * np.exp(-INNER_BOUNDARY_LOSS)
+    return Scored(np.log(sounds), np.log(inside), np.log(np.maximum(blank, boundary)))
+
+
+@dataclass
+class _Paths:
+    """The paths that are followed, P of them: the best one for each node and each two last words.
+
+    node    : of the tree [shape=(P,)]
+    context : number of the two last words [shape=(P,)]
+    blank, sound : score of the path whose last row said nothing, and whose last row said the phone of the node
+    origin  : the last word that ended, by number in the history; -1: none
+    """
+
+    node: Indices
+    context: Indices
+    blank: Scores
+    sound: Scores
+    origin: Indices
+
+    @property
+    def best(self) -> Scores:
+        """The better score of each path."""
+        return np.maximum(self.blank, self.sound)
+
+    def chosen(self, which: NDArray[np.bool_] | Indices) -> _Paths:
+        """Return some of the paths."""
+        return _Paths(self.node[which], self.context[which], self.blank[which], self.sound[which], self.origin[which])
+
+    def with_others(self, other: _Paths) -> _Paths:
+        """Return these paths and others; of those with the same node and context the better one."""
+        both = _Paths(*(np.concatenate(pair) for pair in zip(vars(self).values(), vars(other).values(), strict=True)))
+        key = both.node << 32 | both.context
+        order = np.lexsort((both.best, key))
+        ordered = key[order]
+        first = np.flatnonzero(np.concatenate([[True], ordered[1:] != ordered[:-1]]))
+        last = order[np.concatenate([first[1:], [len(ordered)]]) - 1]
+        kept = both.chosen(last)
+        kept.blank = np.maximum.reduceat(both.blank[order], first)
+        kept.sound = np.maximum.reduceat(both.sound[order], first)
+        return kept
+
+
+@dataclass
+class BeamSearch:
+    """The search through one stretch.
+
+    history  : words that ended: the number of the word before in this list, the word, the row after it
+    contexts : the two last words of a path, the last one first, with their numbers
+    """
+
+    english: EnglishWords
+    history: list[tuple[int, int, int]] = field(default_factory=list)
+    contexts: dict[tuple[int, ...], int] = field(default_factory=lambda: {(): 0})
+    named: list[tuple[int, ...]] = field(default_factory=lambda: [()])
+
+    def words(self, rows: Scored) -> list[DecodedWord]:
+        """Return the words of the best path, in order; none where every path has been given up within a word."""
+        none = np.zeros(1, np.int64)
+        paths = _Paths(none, none, np.zeros(1), np.full(1, NEVER), none - 1)
+        for row in range(len(rows.sounds)):
+            paths = self._step(paths, rows, row)
+        ended = np.where(paths.node == 0, paths.best, NEVER)
+        number = int(paths.origin[ended.argmax()]) if ended.max() > NEVER else -1
+        found: list[tuple[int, int]] = []
+        while number >= 0:
+            number, word, end = self.history[number]
+            found.append((word, end))
+        found.reverse()
+        firsts = [0, *(end for _, end in found)]
+        names = self.english.language.words
+        return [
+            DecodedWord(names[word] if word != NO_WORD else "", first, end)
+            for (word, end), first in zip(found, firsts, strict=False)
+        ]
+
+    def _step(self, paths: _Paths, rows: Scored, row: int) -> _Paths:
+        """Return the paths after one row more."""
+        tree = self.english.tree
+        sounds, between, inside = rows.sounds[row], rows.between[row], rows.blank[row]
+        root = paths.node == 0
+        said = np.where(root, NEVER, paths.sound + sounds[tree.sound[paths.node]])
+        stay = _Paths(paths.node, paths.context, paths.best + np.where(root, between, inside), said, paths.origin)
+        if max(between, inside) > SILENT_ROW:
+            stay.sound = np.full(len(said), NEVER)
+            return stay
+        entered = self._entered(paths, sounds)
+        least = max(float(stay.best.max()), float(entered.sound.max(initial=NEVER))) - BEAM
+        after = stay.chosen(stay.best > least).with_others(entered.chosen(entered.sound > least))
+        after = self._with_ended_words(after, least, row)
+        best = after.best
+        kept = best > best.max() - BEAM
+        if kept.sum() > MOST_PATHS:
+            kept = best >= np.partition(best, -MOST_PATHS)[-MOST_PATHS]
+        return after.chosen(kept)
+
+    def _entered(self, paths: _Paths, sounds: Scores) -> _Paths:
+        """Return the paths that go on to the next phone; between two that are the same there is a blank."""
+        tree, counts = self.english.tree, self.english.tree.arcs[paths.node]
+        source = np.repeat(np.arange(len(counts)), counts)
+        within = np.arange(len(source)) - np.repeat(np.cumsum(counts) - counts, counts)
+        target = tree.target[tree.first_arc[paths.node][source] + within].astype(np.int64)
+        before, sound = paths.node[source], tree.sound[target]
+        same = (sound == tree.sound[before]) & (before != 0)
+        score = np.where(same, paths.blank[source], paths.best[source]) + sounds[sound]
+        score += tree.score[target] - tree.score[before] - FREE_PHONE_LOSS * (target >= tree.free)
+        return _Paths(target, paths.context[source], np.full(len(target), NEVER), score, paths.origin[source])
+
+    def _with_ended_words(self, paths: _Paths, least: float, row: int) -> _Paths:
+        """Return the paths with those whose word ends in a row, which are at the root again."""
+        tree = self.english.tree
+        ending = np.flatnonzero(tree.is_end[paths.node] & (paths.sound > least))
+        if len(ending) > MOST_ENDS:
+            ending = ending[np.argsort(-paths.sound[ending], kind="stable")[:MOST_ENDS]]
+        ended: WordEnds = {}
+        for place in ending.tolist():
+            node, before = int(paths.node[place]), self.named[int(paths.context[place])]
+            base, origin = float(paths.sound[place] - tree.score[node]), int(paths.origin[place])
+            for word in tree.ends[node]:
+                free = word == NO_WORD
+                score = base - FREE_WORD_LOSS if free else base + WORD_GAIN + self.english.language.score(word, before)
+                context = () if free else (word, *before[:1])
+                if score > least and score > ended.get(context, (NEVER,))[0]:
+                    ended[context] = score, word, origin
+        if not ended:
+            return paths
+        contexts, origins, scores = [], [], []
+        for context, (score, word, origin) in ended.items():
+            if context not in self.contexts:
+                self.contexts[context] = len(self.named)
+                self.named.append(context)
+            contexts.append(self.contexts[context])
+            origins.append(len(self.history))
+            scores.append(score)
+            self.history.append((origin, word, row + 1))
+        count = len(scores)
+        return paths.with_others(
+            _Paths(
+                np.zeros(count, np.int64),
+                np.array(contexts, np.int64),
+                np.array(scores),
+                np.full(count, NEVER),
+                np.array(origins, np.int64),
+            )
+        )

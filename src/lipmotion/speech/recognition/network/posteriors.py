@@ -1,0 +1,197 @@
+"""Phone recognisers: networks that say in every frame how probable each phone is, whoever speaks.
+
+They are trained with connectionist temporal classification (CTC): a token is probable in a frame or two of the time in
+which its phone is said, ``BLANK`` in all others.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property, partial
+from itertools import groupby
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError, MissingDependencyError
+from lipmotion.extensions import Registry
+from lipmotion.speech.features.analysed_audio import AnalysedAudio
+from lipmotion.speech.recognition.word_decoder import FULL_SCALE, stretch_samples
+from lipmotion.speech.sound.voice_activity import Stretch, stretches_of_sound
+from lipmotion.types import FRAME_RATE_HZ, ParallelMap
+from lipmotion.units import PHONES
+from lipmotion.units.ipa_phones import token_phones
+
+POSTERIOR_STEP = 2
+"""Frames of 10 ms from one row of posteriors to the next."""
+BLANK, WORD_BOUNDARY = "<blank>", "<wb>"
+SHORT_FRAMES = 1500
+"""So little sound is recognised in this process: to start another one would take as long."""
+
+
+class PhoneRecogniser(ABC):
+    """A network that gives posteriors of tokens.
+
+    name   : under which it is registered, and chosen (``--recogniser``)
+    tokens : phones in the International Phonetic Alphabet, ``BLANK`` and, if it has one, ``WORD_BOUNDARY``
+    """
+
+    name: ClassVar[str]
+    tokens: tuple[str, ...]
+
+    @classmethod
+    @abstractmethod
+    def is_installed(cls) -> bool:
+        """Return whether the network can be used on this machine."""
+
+    @abstractmethod
+    def log_posteriors(self, samples: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return natural logarithms of the posteriors of all tokens, every 20 ms [shape=(N, K)].
+
+        samples : at 16 kHz, at most 20 s of them
+        """
+
+
+PHONE_RECOGNISERS: Registry[type[PhoneRecogniser]] = Registry(
+    "phone recogniser",
+    "lipmotion.phone_recognisers",
+    {"hama": "lipmotion.speech.recognition.network.hama:Hama"},
+)
+
+
+@cache
+def phone_recogniser(name: str) -> PhoneRecogniser:
+    """Return a phone recogniser of this process; it is loaded once.
+
+    Raises InputError: there is none of this name. Raises MissingDependencyError: it is not installed.
+    """
+    chosen = PHONE_RECOGNISERS.load(name)
+    if not (isinstance(chosen, type) and issubclass(chosen, PhoneRecogniser) and chosen.name == name):
+        raise InputError(f"{chosen!r} is called a phone recogniser, {name!r}; required a PhoneRecogniser of this name")
+    if not chosen.is_installed():
+        raise MissingDependencyError(
+            f"the phone recogniser {name!r} is not installed: pip install {name}; or leave the recogniser to 'auto', "
+            "which does without it"
+        )
+    return chosen()
+
+
+@cache
+def installed_phone_recogniser() -> str | None:
+    """Return the name of the first phone recogniser that can be used on this machine; None: there is none."""
+    return next((name for name in PHONE_RECOGNISERS.names if PHONE_RECOGNISERS.load(name).is_installed()), None)
+
+
+class FoundToken(NamedTuple):
+    """A token on the most probable path, and its rows: from ``first`` to before ``end``."""
+
+    token: str
+    first: int
+    end: int
+
+
+@dataclass(frozen=True, eq=False)
+class PhonePosteriors:
+    """Posteriors of tokens in a stretch of a recording.
+
+    values : natural logarithms, every ``POSTERIOR_STEP`` frames [shape=(N, K)]
+    tokens : K of them
+    """
+
+    values: NDArray[np.float32]
+    tokens: tuple[str, ...]
+
+    @property
+    def blank(self) -> NDArray[np.float32]:
+        """Logarithms of the posteriors of no token [shape=(N,)]."""
+        return self.values[:, self.tokens.index(BLANK)]
+
+    @property
+    def word_boundary(self) -> NDArray[np.float32]:
+        """Logarithms of the posteriors of the boundary of words [shape=(N,)]; −∞ where the network has none."""
+        if WORD_BOUNDARY not in self.tokens:
+            return np.full(len(self.values), -np.inf, np.float32)
+        return self.values[:, self.tokens.index(WORD_BOUNDARY)]
+
+    @cached_property
+    def of_phones(self) -> NDArray[np.float32]:
+        """Logarithms of the posteriors of ``PHONES``, and last of none of them [shape=(N, 48)]."""
+        summed = np.exp(self.values) @ _phones_of(self.tokens)
+        return np.log(np.maximum(summed, np.finfo(np.float32).tiny))
+
+    @cached_property
+    def best_tokens(self) -> tuple[FoundToken, ...]:
+        """The tokens of the path with the most probable token in every row, without blanks."""
+        found, at = list[FoundToken](), 0
+        for number, group in groupby(self.values.argmax(axis=1).tolist()):
+            length = len(list(group))
+            if self.tokens[number] != BLANK:
+                found.append(FoundToken(self.tokens[number], at, at + length))
+            at += length
+        return tuple(found)
+
+    def phones_between(self, first: int, end: int) -> list[str]:
+        """Return the phones of the best path that begin in some rows: from ``first`` to before ``end``."""
+        found = [each.token for each in self.best_tokens if first <= each.first < end]
+        return [phone for phone, _ in token_phones(found)]
+
+
+class PosteriorStretches(NamedTuple):
+    """Stretches of sound, and the posteriors in each of them, as soon as they are known."""
+
+    stretches: Sequence[Stretch]
+    posteriors: Iterable[PhonePosteriors]
+
+
+def begun_posteriors(name: str, audio: AnalysedAudio, each: ParallelMap = map) -> PosteriorStretches:
+    """Return the posteriors in all stretches of sound of a recording; where ``each`` starts processes, they begin now.
+
+    name : of the phone recogniser
+    each : applies a function to many items, perhaps in several processes
+    Raises InputError, MissingDependencyError: as ``phone_recogniser``.
+    """
+    tokens = phone_recogniser(name).tokens
+    stretches = stretches_of_sound(audio.log_energy)
+    each = each if sum(stretch.end - stretch.first for stretch in stretches) > SHORT_FRAMES else map
+    values = each(partial(stretch_posteriors, name), (stretch_samples(audio, stretch) for stretch in stretches))
+    return PosteriorStretches(stretches, _named(values, tokens))
+
+
+def _named(values: Iterable[NDArray[np.float16]], tokens: tuple[str, ...]) -> Iterator[PhonePosteriors]:
+    return (PhonePosteriors(rows.astype(np.float32), tokens) for rows in values)
+
+
+def stretch_posteriors(name: str, samples: bytes) -> NDArray[np.float16]:
+    """Return natural logarithms of the posteriors of a stretch of sound [shape=(N, K)].
+
+    name    : of the phone recogniser
+    samples : 16-bit integers at 16 kHz
+    """
+    numbers = np.frombuffer(samples, "<i2").astype(np.float32) / FULL_SCALE
+    return phone_recogniser(name).log_posteriors(numbers).astype(np.float16)
+
+
+def rows_of(stretch: Stretch) -> int:
+    """Return the number of rows of posteriors that a stretch has."""
+    return -(-(stretch.end - stretch.first) // POSTERIOR_STEP)
+
+
+def row_time_s(row: float) -> float:
+    """Return the time of a row of posteriors, seconds from the first one."""
+    return row * POSTERIOR_STEP / FRAME_RATE_HZ
+
+
+@cache
+def _phones_of(tokens: tuple[str, ...]) -> NDArray[np.float32]:
+    """Return which phone each token is; several share it; the last column: none [shape=(K, 48)]."""
+    table = np.zeros((len(tokens), len(PHONES) + 1), np.float32)
+    for number, token in enumerate(tokens):
+        phones = [phone for phone, _ in token_phones([token])] if token not in (BLANK, WORD_BOUNDARY) else []
+        for phone in phones:
+            table[number, PHONES.index(phone)] += 1 / len(phones)
+        if not phones:
+            table[number, -1] = 1
+    return table
