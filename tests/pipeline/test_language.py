@@ -50,7 +50,7 @@ def test_auto_says_what_it_takes_the_speech_for(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     assert in_language(SpeechRequest(SILENCE, "bin blue at f two now", language="auto")).language == "en"
-    for english, language in ((True, "en"), (False, "auto"), (None, "auto")):
+    for english, language in ((True, "en"), (False, "auto"), (None, "en")):
         monkeypatch.setattr(told, "english_spoken", lambda _, english=english: english)
         assert in_language(SpeechRequest(SILENCE, language="auto")).language == language
     said = [record.getMessage().partition(";")[0] for record in caplog.records]
@@ -58,7 +58,7 @@ def test_auto_says_what_it_takes_the_speech_for(
         "the transcript is taken for English",
         "the speech is taken for English",
         "the speech is not English, in which language it is is not known",
-        "the language of the speech is not known",
+        "the language of the speech is not known, English is assumed",
     ]
 
 

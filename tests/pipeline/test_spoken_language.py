@@ -18,7 +18,7 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 def test_nothing_is_said_without_the_network_or_speech(monkeypatch: pytest.MonkeyPatch) -> None:
     silence = Audio(np.zeros(16_000, np.float32), 16_000)
     assert english_spoken(silence) is None
-    monkeypatch.setattr(spoken_language, "find_spec", lambda _: None)
+    monkeypatch.setattr(spoken_language, "installed_phone_recogniser", lambda: None)
     assert english_spoken(silence) is None
 
 

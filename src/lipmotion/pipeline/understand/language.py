@@ -24,7 +24,7 @@ LOG = logging.getLogger("lipmotion")
 def in_language(request: SpeechRequest) -> SpeechRequest:
     """Return a request whose words are those of its language, with the lexicon that pronounces them.
 
-    A request in English stays as it is; so does one without a transcript whose language is not known.
+    A request in English stays as it is. ``AUTO`` stays where the speech is known not to be English, and no more.
     Raises InputError: the transcript cannot be read, or has words that nobody pronounces. Raises
     MissingDependencyError: there is neither espeak-ng nor a lexicon with the words.
     """
@@ -43,8 +43,9 @@ def in_language(request: SpeechRequest) -> SpeechRequest:
 
 
 def _told(request: SpeechRequest, transcript: TimedTranscript | None) -> str:
-    """Return the language of a request that names none, or ``AUTO``: not known; a warning says which.
+    """Return the language of a request that names none; a warning says which.
 
+    Without a transcript: ``AUTO``, where it is not English; English also where it is not known, as without the option.
     Raises InputError: that of a transcript is not known.
     """
     if transcript is not None and request.units is None:
@@ -58,10 +59,10 @@ def _told(request: SpeechRequest, transcript: TimedTranscript | None) -> str:
         {
             True: "the speech is taken for English; --language says otherwise",
             False: "the speech is not English, in which language it is is not known; give it with --language",
-            None: "the language of the speech is not known; give it with --language",
+            None: "the language of the speech is not known, English is assumed; give it with --language",
         }[english]
     )
-    return ENGLISH if english else AUTO
+    return AUTO if english is False else ENGLISH
 
 
 def _plain_transcript(words: Sequence[str]) -> TimedTranscript:
