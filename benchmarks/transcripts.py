@@ -1,12 +1,18 @@
-"""Alignment of long recordings with transcripts in time: error of the words, time and memory, with and without times.
+"""Transcripts: how well long recordings are aligned with them, with and without times; whether wrong ones are doubted.
 
     python benchmarks/transcripts.py [--minutes 60] [--cases lines,none] [--grid FOLDER]
+    python benchmarks/transcripts.py --doubt CORPORA
 
 Sentences in the voices of flite, whose words' times are known, follow one another with pauses of up to three seconds,
 in noise 30 dB under the speech. The transcript is written as a file and read as a user's is; its times differ as the
 case says. One JSON object per case, each in a process of its own: ``median_ms``, ``p90_ms``: distance of the start of a
 word from the true one; ``lost``: share of the words that are more than half a second away; ``wall_s``,
 ``cpu_s``: of reading the transcript and aligning it, features included; ``peak_mb``: of the process, with the sound.
+
+With ``--doubt`` short recordings get right and wrong transcripts: sentences in all installed voices, ``speech-open``,
+GRID s1. One JSON object per set and kind of transcript: ``doubted``: as being of something else; ``left_out``: as
+leaving out words; ``either``, or refused as too long. ``heard_…``: the same by the posteriors of a phone
+recogniser, where one is installed; ``heard_words``: where words are named that are not said.
 """
 
 from __future__ import annotations
@@ -18,6 +24,8 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from difflib import SequenceMatcher
 from itertools import groupby
@@ -25,20 +33,38 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from robust import SPOKEN
 
 import lipmotion
+from lipmotion.corpora.grid import words_of_name
+from lipmotion.errors import AlignmentError
 from lipmotion.pipeline.corpus.prompts import prompts
 from lipmotion.pipeline.understand.transcribe import read_transcript, transcribe
-from lipmotion.speech.features.analysed_audio import analysed
+from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
+from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, transcript_fit
+from lipmotion.speech.recognition.network.posteriors import (
+    POSTERIOR_STEP,
+    PhonePosteriors,
+    installed_phone_recogniser,
+    phone_recogniser,
+)
 from lipmotion.speech.recognition.recogniser import Recogniser
+from lipmotion.speech.recognition.transcript_evidence import transcript_evidence
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.installed import installed_voices, speak_sentences
-from lipmotion.types import Audio, TimedTranscript, Timeline, Unit
+from lipmotion.speech.voices.synthesiser import SyntheticVoice
+from lipmotion.types import FRAME_RATE_HZ, Audio, TimedTranscript, Timeline, Unit
 from lipmotion.units import Lexicon, words_of
 
 RATE_HZ, NOISE_DB, LONGEST_PAUSE_S, LOST_S = 16_000, -30, 3.0, 0.5
 Row = tuple[str, float, float]
 """A word, its start and its end in seconds."""
+Said = tuple[NDArray[np.float32], tuple[str, ...]]
+"""Samples, and the words that are said."""
+Hearing = Callable[[NDArray[np.float32]], NDArray[np.float64]]
+"""Samples to log posteriors of phones and blank [shape=(T, 48)]."""
+HEARD_S, PIECE_S = POSTERIOR_STEP / FRAME_RATE_HZ, 25
+"""From row to row of posteriors; what a network is given at once: hama hears nothing after 30 s."""
 
 
 @dataclass(frozen=True)
@@ -78,11 +104,15 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=60)
     parser.add_argument("--cases", default=",".join(CASES))
     parser.add_argument("--grid", type=Path, metavar="FOLDER", help="GRID speaker s1 in place of flite's voices")
+    parser.add_argument("--doubt", type=Path, metavar="CORPORA", help="whether wrong transcripts are doubted")
     parser.add_argument("--one", nargs=3, metavar=("FOLDER", "CASE", "RECOGNISER"), help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.one:
         folder, case, recogniser = options.one
         print(json.dumps(_measured(Path(folder), case, recogniser)), flush=True)
+        return
+    if options.doubt:
+        _print_doubts(options.doubt)
         return
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -179,6 +209,104 @@ def _measured(folder: Path, name: str, recogniser: str) -> dict[str, object]:
         "cpu_s": round(cpu_s, 1),
         "peak_mb": peak_mb,
     }
+
+
+def _print_doubts(corpora: Path) -> None:
+    """Print how many transcripts of each kind are doubted."""
+    logging.getLogger("lipmotion").setLevel(logging.ERROR)
+    phones, hear = Recogniser(lipmotion.load_model().phones), _network()
+    grid = corpora / "grid-s1"
+    sets = {f"GRID s1, {split}": _clips(grid, split) for split in ("val", "test")}
+    sets |= {"speech-open": _open_recordings(corpora / "speech-open")}
+    for makers in (("flite", "festival"), ("espeak-ng",)):
+        sets[" and ".join(makers)] = _voiced([voice for voice in installed_voices() if voice.synthesiser in makers])
+    for name, recordings in sets.items():
+        counts: dict[str, Counter[str]] = {}
+        for kind, samples, words in _transcripts(recordings):
+            audio = analysed(Audio(samples, RATE_HZ))
+            found = _doubts(phones, audio, words, hear)
+            counts.setdefault(kind, Counter()).update(found | {"count": 1})
+        for kind, count in counts.items():
+            print(json.dumps({"set": name, "transcript": kind, **count}), flush=True)
+
+
+def _doubts(phones: Recogniser, audio: AnalysedAudio, words: tuple[str, ...], hear: Hearing | None) -> dict[str, bool]:
+    """Return which doubts of a transcript there are; one that is refused is doubted in every way."""
+    try:
+        units = phones.align(audio, audio.mfcc(), words, Lexicon())
+    except AlignmentError:
+        return dict.fromkeys(("refused", "either", "heard_either"), True)
+    fit = transcript_fit(audio, units)
+    found = {"doubted": fit.score < DOUBTFUL_SCORE, "left_out": bool(fit.missing)}
+    found["either"] = any(found.values())
+    if hear is not None:
+        evidence = transcript_evidence(hear(audio.samples), HEARD_S, units)
+        heard = {"doubted": evidence.is_doubtful, "left_out": evidence.gaps, "words": evidence.doubtful_words}
+        found |= {f"heard_{key}": bool(value) for key, value in heard.items()}
+        found["heard_either"] = any(heard.values())
+    return found
+
+
+def _clips(folder: Path, split: str) -> list[Said]:
+    """Return the clips of a list of GRID s1, with their words."""
+    names = (folder / f"{split}.txt").read_text("utf-8").split()
+    return [(read_audio(folder / "clips" / f"{name}.mkv").samples, words_of_name(name) or ()) for name in names]
+
+
+def _open_recordings(folder: Path) -> list[Said]:
+    """Return the English recordings of ``speech-open``, with their words."""
+    texts = [(folder / name).with_suffix(".txt") for name in SPOKEN]
+    texts = [text if text.exists() else text.with_suffix(".lab") for text in texts]
+    words = [words_of(text.read_text("utf-8")) for text in texts]
+    return [(read_audio(folder / name).samples, said) for name, said in zip(SPOKEN, words, strict=True)]
+
+
+def _voiced(voices: Sequence[SyntheticVoice]) -> list[Said]:
+    """Return eight sentences in each of some synthetic voices, with their words."""
+    texts = [prompt.text for prompt in prompts(count=300).chosen if 5 <= len(words_of(prompt.text)) <= 12][::7][:8]
+    return [
+        (audio.samples, words_of(text))
+        for voice in voices
+        for text, (audio, _) in zip(texts, speak_sentences(texts, voice), strict=True)
+    ]
+
+
+def _transcripts(recordings: Sequence[Said]) -> Iterator[tuple[str, NDArray[np.float32], tuple[str, ...]]]:
+    """Yield recordings with right and wrong words: the kind, the samples and the words."""
+    draw = np.random.default_rng(0)
+    spoken = [word for _, words in recordings for word in words]
+    for number, (samples, words) in enumerate(recordings):
+        others = [other for _, other in recordings[number:] + recordings[:number] if other != words]
+        next_samples, next_words = recordings[(number + 1) % len(recordings)]
+        level = 10 ** (-10 / 20) * float(np.sqrt(np.mean(samples**2)))
+        noise = draw.normal(0, level, len(samples)).astype(np.float32)
+        half = (len(words) + 1) // 2
+        replaced = list(words)
+        for place in draw.choice(len(words), max(1, len(words) // 4), replace=False):
+            replaced[place] = str(draw.choice([word for word in spoken if word != words[place]]))
+        pair = np.concatenate([samples, next_samples])
+        yield "right", samples, words
+        yield "right, in noise of 10 dB", samples + noise, words
+        yield "right, two sentences", pair, words + next_words
+        yield "of another sentence", samples, others[3 % len(others)]
+        yield "one word in four replaced", samples, tuple(replaced)
+        yield "a sentence missing", pair, words
+        if len(words) > 1:
+            yield "a half missing", samples, words[half:] if number % 2 else words[:half]
+
+
+def _network() -> Hearing | None:
+    """Return what hears phones; None where no phone recogniser is installed."""
+    name = installed_phone_recogniser()
+    if name is None:
+        return None
+    network, step = phone_recogniser(name), PIECE_S * RATE_HZ
+
+    def hear(samples: NDArray[np.float32]) -> NDArray[np.float64]:
+        pieces = [network.log_posteriors(samples[at : at + step]) for at in range(0, len(samples), step)]
+        return PhonePosteriors(np.concatenate(pieces), network.tokens).of_phones.astype(float)
+
+    return hear
 
 
 def _peak_mb() -> int:

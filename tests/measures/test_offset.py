@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from lipmotion.measures.offset import best_offset, pooled_offset, shift_scores
+from lipmotion.measures.offset import LEAST_CLIPS, LEAST_SCORE, best_offset, pooled_offset, shift_scores
 
 RATE_HZ = 100.0
 REACH = 40
@@ -78,6 +78,18 @@ def test_clips_together_know_better_than_each() -> None:
     assert abs(found.late_s - 0.06) < 0.01 < worst_s
     assert found.low_s <= found.late_s <= found.high_s
     assert found.low_s < 0.06 < found.high_s or found.high_s - found.low_s < 0.01
+
+
+def test_clips_that_correlate_little_and_agree_are_known_together() -> None:
+    """As those of a voice that the prediction has not learned: 0 of 13 are known alone."""
+    clips = [scores(6.0, seed, noise=12.0) for seed in range(13)]
+    assert not any(best_offset(clip, RATE_HZ).known for clip in clips)
+    found = pooled_offset(clips, RATE_HZ)
+    assert found.score < LEAST_SCORE
+    assert found.known
+    assert not pooled_offset(clips[: LEAST_CLIPS - 1], RATE_HZ).known
+    others = [shift_scores(wave(0, seed=n), wave(0, seed=n + 50), np.ones(300, bool), REACH) for n in range(len(clips))]
+    assert not pooled_offset(others, RATE_HZ).known
     assert found == pooled_offset(clips, RATE_HZ)
 
 

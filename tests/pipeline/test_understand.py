@@ -12,7 +12,7 @@ import pytest
 
 from lipmotion.engines import Engine, Inputs
 from lipmotion.errors import InputError
-from lipmotion.pipeline.generate.outlook import WHOLE_TRANSCRIPT, outlook_of
+from lipmotion.pipeline.generate.outlook import LESS_NOISE, OWN_MODEL, TRANSCRIPT, WHOLE_TRANSCRIPT, outlook_of
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.understand import understood_speech as pipeline_understand
 from lipmotion.pipeline.understand.request import SpeechRequest, request_of
@@ -26,10 +26,10 @@ from lipmotion.pipeline.understand.understood_speech import (
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import mfcc
 from lipmotion.speech.recognition.agreement import TranscriptFit
-from lipmotion.speech.recognition.recognised_speech import Recognition
+from lipmotion.speech.recognition.recognised_speech import RecognisedWord, Recognition
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.testing.toy import ToySentence
-from lipmotion.types import Audio, Speech, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
+from lipmotion.types import Audio, Span, Speech, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
 
 
 @dataclass(frozen=True)
@@ -196,6 +196,27 @@ def test_a_transcript_beside_units_is_not_used(
     assert caplog.messages == [
         "the transcript is not used: the units already say what is spoken; leave one of them out"
     ]
+
+
+@pytest.mark.parametrize(
+    ("confidence", "word_s", "range_db", "advice"),
+    [
+        (0.6, 3.0, 30.0, (TRANSCRIPT, OWN_MODEL)),  # clear English of a stranger
+        (0.18, 3.0, 15.0, (TRANSCRIPT, LESS_NOISE, OWN_MODEL)),  # another language, or words in noise
+        (0.9, 1.0, 30.0, (TRANSCRIPT, OWN_MODEL)),  # sure words, which are few
+        (0.9, 3.0, 30.0, (OWN_MODEL,)),
+    ],
+)
+def test_unsure_words_are_asked_for_first(
+    toy_model: Model, toy_sentence: ToySentence, confidence: float, word_s: float, range_db: float, advice: tuple
+) -> None:
+    request = SpeechRequest(toy_sentence.audio, transcript=" ".join(toy_sentence.words))
+    words = Timeline((Span(0.0, 1.0, RecognisedWord("papa", confidence)),))
+    recognition = Recognition(RECOGNISED, words, word_s, 3.0 - word_s, -60.0)
+    understood = replace(understood_speech(toy_model, request), recognition=recognition, range_db=range_db, fit=None)
+    outlook = outlook_of(request, understood)
+    assert outlook.advice == advice
+    assert outlook.text.endswith(f"would help most: {advice[0]}")
 
 
 def test_the_outlook_says_how_much_of_the_speech_a_transcript_fits(toy_model: Model, toy_sentence: ToySentence) -> None:

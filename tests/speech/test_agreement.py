@@ -12,6 +12,7 @@ from lipmotion.speech.features.mfcc import mfcc
 from lipmotion.speech.recognition.agreement import (
     DOUBTFUL_SCORE,
     FRAME_STEP,
+    WORST_SCORE,
     TranscriptFit,
     _joined,
     agreement_score,
@@ -21,9 +22,10 @@ from lipmotion.speech.recognition.general.acoustic import PHONES, general_model
 from lipmotion.speech.recognition.general.front_end import general_features
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.speech.voices.installed import installed_voices, speak_sentence
 from lipmotion.testing.toy import ToySentence, toy_sentences
 from lipmotion.types import Audio, Span, Timeline, Unit
-from lipmotion.units import Lexicon
+from lipmotion.units import Lexicon, words_of
 
 
 @pytest.fixture(scope="module")
@@ -31,22 +33,25 @@ def sentences() -> list[ToySentence]:
     return toy_sentences(5)
 
 
-def test_it_is_the_mean_over_frames_of_the_best_state_of_what_is_said(sentences: list[ToySentence]) -> None:
+def test_it_is_the_mean_over_phones_and_their_frames_of_the_best_state_of_what_is_said(
+    sentences: list[ToySentence],
+) -> None:
     """Frame by frame, by name."""
     sentence = sentences[0]
     density = general_model().log_density(general_features(sentence.audio))
     names = {"ax": "AH", "axr": "ER", "ix": "IH"}
     spoken = [
-        (n, span.label.phone)
+        (n, number, span.label.phone)
         for n in range(len(density))
-        for span in sentence.units
+        for number, span in enumerate(sentence.units)
         if span.start_s - 1e-8 <= n / 100 < span.end_s - 1e-8 and span.label.phone not in ("sil", "sp")
     ]
-    wanted = []
-    for frame, phone in spoken[::FRAME_STEP]:
+    wanted: dict[int, list[float]] = {}
+    for frame, number, phone in spoken[::FRAME_STEP]:
         row = PHONES.index(names.get(phone, phone.upper()))
-        wanted.append(density[frame].reshape(len(PHONES), 3)[row].max())
-    assert agreement_score(sentence.audio, sentence.units) == pytest.approx(np.mean(wanted), abs=1e-4)
+        wanted.setdefault(number, []).append(max(density[frame].reshape(len(PHONES), 3)[row].max(), WORST_SCORE))
+    mean = np.mean([np.mean(scores) for scores in wanted.values()])
+    assert agreement_score(sentence.audio, sentence.units) == pytest.approx(mean, abs=1e-4)
 
 
 @pytest.mark.long
@@ -74,7 +79,10 @@ def test_loud_silence_is_missing_speech(sentences: list[ToySentence]) -> None:
 
 
 def test_long_phones_are_judged_by_their_sound(sentences: list[ToySentence]) -> None:
-    """A vowel that is drawn out is right; another phone in its place is stretched over speech that is left out."""
+    """A vowel that is drawn out is right; another phone in its place is stretched over speech that is left out.
+
+    Over what is quiet it is stretched, too, and nothing is left out.
+    """
     said, longer_s = sentences[0], 0.6
     spans = list(said.units)
     place = next(number for number, span in enumerate(spans) if span.label.phone == "iy")
@@ -82,17 +90,19 @@ def test_long_phones_are_judged_by_their_sound(sentences: list[ToySentence]) -> 
     first, stop = (round(time_s * rate_hz) for time_s in (spans[place].start_s + 0.03, spans[place].end_s - 0.03))
     samples = said.audio.samples
     vowel = np.resize(samples[first:stop], round(longer_s * rate_hz))
-    audio = Audio(np.concatenate([samples[:stop], vowel, samples[stop:]]), rate_hz)
     end_s = spans[place].end_s + longer_s
     later = [replace(s, start_s=s.start_s + longer_s, end_s=s.end_s + longer_s) for s in spans[place + 1 :]]
 
-    def labelled(phone: str) -> Timeline[Unit]:
-        return Timeline((*spans[:place], replace(spans[place], end_s=end_s, label=Unit(phone)), *later))
+    def missing(phone: str, gain: float = 1.0) -> tuple[tuple[float, float], ...]:
+        audio = Audio(np.concatenate([samples[:stop], gain * vowel, samples[stop:]]), rate_hz)
+        units = Timeline((*spans[:place], replace(spans[place], end_s=end_s, label=Unit(phone)), *later))
+        fit = transcript_fit(audio, units)
+        assert (fit.share < 0.8) == bool(fit.missing)
+        return fit.missing
 
-    assert transcript_fit(audio, labelled("iy")).missing == ()
-    fit = transcript_fit(audio, labelled("m"))
-    assert fit.missing == ((spans[place].start_s, end_s),)
-    assert fit.share < 0.8
+    assert missing("iy") == ()
+    assert missing("m") == ((spans[place].start_s, end_s),)
+    assert missing("m", gain=0.003) == ()
 
 
 def test_places_near_one_another_are_one_stretch() -> None:
@@ -134,3 +144,17 @@ def test_real_recordings(recordings: Path) -> None:
             found.append(agreement_score(audio, phones.align(audio, features, words, Lexicon())))
     assert min(right) > DOUBTFUL_SCORE
     assert np.mean(np.array(wrong) < DOUBTFUL_SCORE) > 0.6
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not installed_voices(), reason="no synthesiser is here")
+def test_synthetic_voices_are_believed() -> None:
+    """What they say in their own way does not decide alone: by the mean over frames most of them were doubted."""
+    texts = "Loyal boys voice their choice to employers.", "Sharp knives belong in the upper drawer."
+    phones = Recogniser(load_model().phones, "auto")
+    for voice in installed_voices()[::2]:
+        audio, _ = speak_sentence(texts[0], voice)
+        right, wrong = (
+            agreement_score(audio, phones.align(audio, mfcc(audio), words_of(text), Lexicon())) for text in texts
+        )
+        assert right > DOUBTFUL_SCORE > wrong

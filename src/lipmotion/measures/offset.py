@@ -13,9 +13,12 @@ from lipmotion.measures.curves import correlation
 Array = NDArray[np.float64]
 
 LEAST_SCORE = 0.5
-"""Least correlation at which an offset is known."""
+"""Least correlation at which the offset of one clip is known."""
 LEAST_MARGIN = 0.15
 """Least difference between the best and the second maximum at which an offset is known."""
+LEAST_CLIPS, WIDEST_S = 5, 0.06
+"""An offset of so many clips together is known at any correlation if its interval is as narrow: curves of a voice that
+the prediction has not learned correlate less, and agree on the offset all the same (docs/robustness.md)."""
 PEAK_S = 0.12
 """Maxima further from the best than this, in seconds, are other ones."""
 LEAST_SHARE = 0.5
@@ -32,6 +35,7 @@ class Offset:
     score  : correlation of the two curves at this offset
     margin : difference to the highest correlation further than ``PEAK_S`` away
     low_s, high_s : 95 % interval where several clips were pooled, else both ``late_s``
+    clips  : how many clips were pooled
     """
 
     late_s: float
@@ -39,11 +43,13 @@ class Offset:
     margin: float
     low_s: float
     high_s: float
+    clips: int = 1
 
     @property
     def known(self) -> bool:
-        """Whether the correlation is high enough, and has one maximum only."""
-        return self.score > LEAST_SCORE and self.margin > LEAST_MARGIN
+        """Whether the correlation has one maximum only, and is high enough or agreed on by enough clips."""
+        agreed = self.clips >= LEAST_CLIPS and self.high_s - self.low_s <= WIDEST_S
+        return self.margin > LEAST_MARGIN and (self.score > LEAST_SCORE or agreed)
 
 
 def shift_scores(predicted: Array, measured: Array, valid: NDArray[np.bool_], reach: int) -> Array:
@@ -68,7 +74,7 @@ def pooled_offset(scores: Sequence[Array], rate_hz: float, seed: int = 0) -> Off
     draw = np.random.default_rng(seed)
     draws = [_highest(clips[draw.integers(len(clips), size=len(clips))].mean(axis=0), rate_hz)[0] for _ in range(DRAWS)]
     low_s, high_s = np.percentile(draws, [2.5, 97.5])
-    return Offset(late_s, score, margin, float(low_s), float(high_s))
+    return Offset(late_s, score, margin, float(low_s), float(high_s), len(clips))
 
 
 def _score(predicted: Array, measured: Array, valid: NDArray[np.bool_], shift: int) -> float:

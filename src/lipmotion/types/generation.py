@@ -216,6 +216,8 @@ class ReducedVariance:
 
 FULL_FIT_SHARE = 0.995
 """A transcript that fits as large a share of the speech fits all of it, rounded."""
+SURE_CONFIDENCE = 0.8
+"""Words that were recognised with less confidence deserve an ear, and a transcript."""
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,7 @@ GOOD |= {"closures_heard": 2, "closures_made": 2, "duration_s": 1.5, "seconds": 
         ({"words": "no speech"}, {"warnings": ["a"]}),
         ({"warnings": ["a", "b"]}, {"warnings": ["a"]}),
         ({"words": "words", "confidence": 0.3}, {"words": "words", "confidence": 0.6}),
+        ({"words": "phones", "confidence": 0.1}, {"words": "words", "confidence": 0.6}),
         ({"confidence": 0.5}, {"confidence": 0.9}),
         ({"range_db": 10.0}, {}),
         ({"closures_made": 1}, {}),

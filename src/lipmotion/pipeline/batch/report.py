@@ -17,7 +17,7 @@ from lipmotion.pipeline.batch.record import FAILED, Record
 from lipmotion.printable import printable
 from lipmotion.speech.recognition.recognised_speech import NOISY_DB
 from lipmotion.storage.files import as_text, whole_file
-from lipmotion.types.generation import FULL_FIT_SHARE
+from lipmotion.types.generation import FULL_FIT_SHARE, SURE_CONFIDENCE
 
 CSV_REPORT, HTML_REPORT = "report.csv", "report.html"
 COLUMNS = (
@@ -29,8 +29,6 @@ ROWS, BETWEEN = "/*ROWS*/", " | "
 """Where the page has its rows; what stands between several texts in a field of the CSV file."""
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """What makes a field a formula for spreadsheets, at its beginning."""
-SURE_CONFIDENCE = 0.8
-"""Words that were recognised with less confidence deserve an ear."""
 
 
 def write_reports(lines: Sequence[BatchLine], ledger: Ledger, out: Path) -> tuple[Path, Path]:
@@ -66,7 +64,7 @@ def doubt_of(record: Record) -> float:
     doubt = 50.0 if words == "no speech" else 0.0
     doubt += 10 * len(record.get("warnings", ()))
     doubt += 5 * (record.get("range_db", NOISY_DB) < NOISY_DB)
-    if words == "words":
+    if words in ("words", "phones"):
         doubt += 10 * max(SURE_CONFIDENCE - record["confidence"], 0) / SURE_CONFIDENCE
     if words in ("transcript", "mapped transcript") and record["confidence"] < FULL_FIT_SHARE:
         doubt += 10 * (1 - record["confidence"])

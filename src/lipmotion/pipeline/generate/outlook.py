@@ -6,10 +6,11 @@ from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.transcribe import is_other_language
 from lipmotion.pipeline.understand.understood_speech import UnderstoodSpeech
 from lipmotion.speech.recognition.agreement import LEAST_FITTING_SHARE
-from lipmotion.speech.recognition.recognised_speech import CONFIDENCES, NOISY_DB
+from lipmotion.speech.recognition.recognised_speech import NOISY_DB, Recognition
 from lipmotion.speech.recognition.recogniser import FULL_WEIGHT_SCORE, own_model_weight
 from lipmotion.speech.voices.pronunciations import MAPPED_CONFIDENCE
 from lipmotion.types import Outlook
+from lipmotion.types.generation import SURE_CONFIDENCE
 from lipmotion.types.languages import ENGLISH
 from lipmotion.units import Lexicon, words_in_time
 
@@ -32,8 +33,12 @@ def outlook_of(request: SpeechRequest, understood: UnderstoodSpeech) -> Outlook:
         return Outlook(words, share, 1.0 if words == "own model" else None, understood.range_db, _advice(understood))
     words = "words" if found.word_s > found.phone_s else "phones"
     voice = own_model_weight(found.similarity) if found.similarity is not None else None
-    confidence = (found.confidence or 0.0) * found.word_s / max(found.word_s + found.phone_s, 1e-9)
-    return Outlook(words, confidence, voice, understood.range_db, _advice(understood))
+    return Outlook(words, _confidence(found), voice, understood.range_db, _advice(understood))
+
+
+def _confidence(found: Recognition) -> float:
+    """Return the confidence of recognised words times their share of the speech, 0 to 1."""
+    return (found.confidence or 0.0) * found.word_s / max(found.word_s + found.phone_s, 1e-9)
 
 
 def _known_share(request: SpeechRequest, understood: UnderstoodSpeech) -> float:
@@ -46,16 +51,14 @@ def _known_share(request: SpeechRequest, understood: UnderstoodSpeech) -> float:
 
 
 def _advice(understood: UnderstoodSpeech) -> tuple[str, ...]:
-    """Return what would help, the most helpful first."""
+    """Return what would help, the most helpful first: before all else the words, where they are not sure."""
     found, advice = understood.recognition, []
-    if found is not None:
-        if found.reliability < 1:
-            advice.append(TRANSCRIPT)
-        if found.similarity is None or found.similarity < FULL_WEIGHT_SCORE:
-            advice.append(OWN_MODEL)
-    if understood.range_db < NOISY_DB:
-        unsure = found is None or (found.confidence or 0.0) < CONFIDENCES[0]
-        advice.insert(0 if unsure else len(advice), LESS_NOISE)
     if understood.fit is not None and understood.fit.share < LEAST_FITTING_SHARE:
-        advice.insert(0, WHOLE_TRANSCRIPT)
+        advice.append(WHOLE_TRANSCRIPT)
+    if found is not None and _confidence(found) < SURE_CONFIDENCE:
+        advice.append(TRANSCRIPT)
+    if understood.range_db < NOISY_DB:
+        advice.append(LESS_NOISE)
+    if found is not None and (found.similarity is None or found.similarity < FULL_WEIGHT_SCORE):
+        advice.append(OWN_MODEL)
     return tuple(advice)

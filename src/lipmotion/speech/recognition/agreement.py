@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +15,15 @@ from lipmotion.types import FRAME_RATE_HZ, Audio, Span, Timeline, Unit
 from lipmotion.units import is_silent
 
 DOUBTFUL_SCORE = -4.2
-"""Under this score the transcript is probably wrong: right ones score -1 to -4, wrong ones -2 to -9
+"""Under this score the transcript is probably wrong: right ones score 0 to -4.1, wrong ones -2 to -8
 (docs/robustness.md)."""
+WORST_SCORE = -9.0
+"""No frame counts for less: a sound that a voice makes in its own way, as synthetic ones do, does not decide alone."""
 FRAME_STEP = 4
 """Only every fourth frame is scored: its neighbours are much like it."""
-LONG_PHONE_S, LONG_PHONE_SCORE = 0.4, -4.0
-"""A phone that lasts as long and agrees with the sound less is stretched over speech that the transcript leaves out. A
-sound that is drawn out lasts longer, too, but agrees."""
+LONG_PHONE_S, LONG_PHONE_SCORE, LEAST_LOUD_S = 0.35, -4.0, 0.2
+"""A phone that lasts as long, agrees with the sound less and is loud for as long is stretched over speech that the
+transcript leaves out. A sound that is drawn out lasts longer, too, but agrees; a pause before a word is quiet."""
 LEAST_VOICE_S = 1.0
 """Silence with so much loud sound in it is speech that the transcript leaves out; breath and coughs are shorter."""
 LEAST_FITTING_SHARE = 0.9
@@ -66,22 +69,22 @@ def transcript_fit(audio: Audio, units: Timeline[Unit]) -> TranscriptFit:
     Raises MissingDependencyError: pocketsphinx is not installed.
     """
     analysis = analysed(audio)
-    frames, scores = _frame_scores(analysis, units)
+    scored = _scored_frames(analysis, units)
     loud = loud_frames(analysis.log_energy, SMOOTHING_FRAMES)
     missing, speech_s = [], 0.0
     for span in units:
+        loud_s = (_first_frame(span.start_s) + np.flatnonzero(loud[_frames_of(span)])) / FRAME_RATE_HZ
         if is_silent(span.label.phone):
-            voiced = (_first_frame(span.start_s) + np.flatnonzero(loud[_frames_of(span)])) / FRAME_RATE_HZ
-            if len(voiced) < LEAST_VOICE_S * FRAME_RATE_HZ:
-                continue
-            missing.append((float(voiced[0]), float(voiced[-1]) + 1 / FRAME_RATE_HZ))
-            speech_s += missing[-1][1] - missing[-1][0]
+            if len(loud_s) >= LEAST_VOICE_S * FRAME_RATE_HZ:
+                missing.append((float(loud_s[0]), float(loud_s[-1]) + 1 / FRAME_RATE_HZ))
+                speech_s += missing[-1][1] - missing[-1][0]
         else:
             speech_s += span.duration_s
-            inside = slice(*np.searchsorted(frames, [_first_frame(span.start_s), _first_frame(span.end_s)]))
-            if span.duration_s >= LONG_PHONE_S and float(scores[inside].mean()) < LONG_PHONE_SCORE:
-                missing.append((span.start_s, span.end_s))
-    return TranscriptFit(float(scores.mean()) if len(scores) else 0.0, _joined(missing), speech_s)
+            if span.duration_s >= LONG_PHONE_S and len(loud_s) >= LEAST_LOUD_S * FRAME_RATE_HZ:
+                inside = slice(*np.searchsorted(scored.frames, [_first_frame(span.start_s), _first_frame(span.end_s)]))
+                if float(scored.scores[inside].mean()) < LONG_PHONE_SCORE:
+                    missing.append((span.start_s, span.end_s))
+    return TranscriptFit(scored.mean(), _joined(missing), speech_s)
 
 
 def _joined(places: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
@@ -100,22 +103,41 @@ def agreement_score(audio: Audio, units: Timeline[Unit]) -> float:
 
     audio : an ``AnalysedAudio`` shares its features with what else is computed of it
     units : of the audio, as ``Recogniser.align`` returns them
-    Returns the mean, over frames of speech, of the log density of the frame's phone less that of the best phone: 0
-    where no other phone is more probable, or nothing is spoken.
+    Returns the mean over phones of the mean over their frames of the log density of the phone less that of the best
+    phone (at least ``WORST_SCORE``): 0 where no other phone is more probable, or nothing is spoken.
     Raises MissingDependencyError: pocketsphinx is not installed.
     """
-    scores = _frame_scores(analysed(audio), units)[1]
-    return float(scores.mean()) if len(scores) else 0.0
+    return _scored_frames(analysed(audio), units).mean()
 
 
-def _frame_scores(audio: AnalysedAudio, units: Timeline[Unit]) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
-    """Return every fourth frame of speech, and how well its phone agrees with the sound there [shapes=(S,), (S,)]."""
-    frames, states = (rows[::FRAME_STEP] for rows in _spoken_frames(units))
+class _ScoredFrames(NamedTuple):
+    """Every fourth frame of speech.
+
+    frames : their numbers [shape=(S,)]
+    phones : the number of the phone in each, among those that are no silence [shape=(S,)]
+    scores : how well the phone agrees with the sound there [shape=(S,)]
+    """
+
+    frames: NDArray[np.intp]
+    phones: NDArray[np.intp]
+    scores: NDArray[np.float32]
+
+    def mean(self) -> float:
+        """Return the agreement score: every phone counts the same."""
+        if not len(self.frames):
+            return 0.0
+        counts = np.bincount(self.phones)
+        sums = np.bincount(self.phones, np.maximum(self.scores, WORST_SCORE))
+        return float((sums[counts > 0] / counts[counts > 0]).mean())
+
+
+def _scored_frames(audio: AnalysedAudio, units: Timeline[Unit]) -> _ScoredFrames:
+    frames, phones, states = (rows[::FRAME_STEP] for rows in _spoken_frames(units))
     if not len(frames):
-        return frames, np.zeros(0, np.float32)
+        return _ScoredFrames(frames, phones, np.zeros(0, np.float32))
     log_densities = general_model().log_density(audio.general_features[frames])
     of_phone = np.take_along_axis(log_densities, states[:, None] + np.arange(STATES), axis=1)
-    return frames, of_phone.max(axis=1)
+    return _ScoredFrames(frames, phones, of_phone.max(axis=1))
 
 
 def _first_frame(time_s: float) -> int:
@@ -127,12 +149,10 @@ def _frames_of(span: Span[Unit]) -> slice:
     return slice(_first_frame(span.start_s), _first_frame(span.end_s))
 
 
-def _spoken_frames(units: Timeline[Unit]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the frames of speech, and in each the general density of its phone's first state [shapes=(S,), (S,)]."""
-    frames, states = [np.zeros(0, np.intp)], [np.zeros(0, np.intp)]
-    for span in units:
-        if not is_silent(span.label.phone):
-            of_span = _frames_of(span)
-            frames.append(np.arange(of_span.start, of_span.stop))
-            states.append(np.full(len(frames[-1]), density_column(span.label.phone, 0, STATES)))
-    return np.concatenate(frames), np.concatenate(states)
+def _spoken_frames(units: Timeline[Unit]) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+    """Return the frames of speech, and in each the number of its phone, and the general density of the first state."""
+    spoken = [span for span in units if not is_silent(span.label.phone)]
+    frames = [np.arange(of_span.start, of_span.stop) for of_span in map(_frames_of, spoken)]
+    first = [density_column(span.label.phone, 0, STATES) for span in spoken]
+    phones = np.repeat(np.arange(len(spoken)), [len(each) for each in frames])
+    return np.concatenate([np.zeros(0, np.intp), *frames]), phones, np.array(first, np.intp)[phones]
