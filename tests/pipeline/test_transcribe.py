@@ -15,7 +15,7 @@ from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Audio, Features, TimedTranscript, TimedWord, TranscriptLine
-from lipmotion.units import Lexicon, words_of
+from lipmotion.units import Lexicon, lexicon, words_of
 
 
 @pytest.fixture
@@ -48,6 +48,13 @@ def test_unknown_words_are_recognised(
     assert not any(span.label.word for span in units)
 
 
+@pytest.fixture
+def rules(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Words that are in no dictionary are read by rules."""
+    monkeypatch.setattr(lexicon, "network_pronunciation", lambda _: ())
+
+
+@pytest.mark.usefixtures("rules")
 def test_what_is_not_in_the_dictionary_is_reported_once(
     phones: Recogniser, audio: Audio, features: Features, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -147,6 +154,7 @@ def test_a_long_word_is_not_repeated_in_full(caplog: pytest.LogCaptureFixture) -
     assert len(record.getMessage()) < 300
 
 
+@pytest.mark.usefixtures("rules")
 def test_of_many_guesses_some_are_reported_one_by_one(caplog: pytest.LogCaptureFixture) -> None:
     warn_of_guesses([f"bimab{'ab' * i}" for i in range(MOST_WARNINGS + 7)], Lexicon())
     *each, last = [record.getMessage() for record in caplog.records]

@@ -64,7 +64,7 @@ def test_a_word_with_accents_is_said_as_the_dictionary_says_it_without() -> None
 
 def test_it_says_what_it_cannot_guess() -> None:
     for word, message in (
-        ("日本", r"how '日本' is said \(日 本\): add it to a lexicon file"),
+        ("日本", r"how '日本' is said \(日 本\): give the language of the words \(--language\), or add it"),
         ("éкран", r"\(а к н р\)"),
         ("한", r"\(한\)"),
         ("mp3", r"\(3\)"),

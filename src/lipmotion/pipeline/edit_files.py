@@ -26,7 +26,7 @@ LOG = logging.getLogger("lipmotion")
 FORMAT, VERSION = "lipmotion.edits", 1
 JSON, TOML = SUFFIXES = (".json", ".toml")
 """Suffixes of files of edits."""
-HELD = ("recording", "model", "lexicon", "recogniser", "speaker", "pauses", "asymmetry")
+HELD = ("recording", "model", "lexicon", "language", "recogniser", "speaker", "pauses", "asymmetry")
 """What of a request such a file holds; words and phones that were given are in the phones in time."""
 
 

@@ -16,6 +16,7 @@ from lipmotion.storage.sources import is_file
 from lipmotion.storage.toml_text import read_toml
 from lipmotion.types.configuration import Configuration, Rule, option
 from lipmotion.types.delivery import Delivery
+from lipmotion.types.languages import AUTO, ENGLISH, LANGUAGES
 from lipmotion.types.staging import Staging
 
 if TYPE_CHECKING:
@@ -65,6 +66,12 @@ class Request(Configuration):
     )
     lexicon: Path | None = _file(
         "lexicon", "FILE", "pronunciations, one per line: WORD PHONE PHONE ...", replaceable=True
+    )
+    language: str = option(
+        ENGLISH,
+        Rule(choices=(*LANGUAGES, AUTO)),
+        metavar="CODE",
+        help="that is spoken: en, es, fr, de, it, pt, nl, ja, ko, zh, ... or auto (default: en; docs/transcripts.md)",
     )
     units: Path | None = _file(
         "units file",

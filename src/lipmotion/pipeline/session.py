@@ -48,6 +48,7 @@ from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.outputs.delivered import delivered, shown, with_motion
 from lipmotion.pipeline.outputs.drawn_video import DRAWN_HZ, read_sound
 from lipmotion.pipeline.outputs.prosody import moved_prosody, prosody_of_speech
+from lipmotion.pipeline.understand.language import in_language
 from lipmotion.pipeline.understand.request import SpeechInput, SpeechRequest, request_of
 from lipmotion.pipeline.understand.understood_speech import (
     UnderstoodSpeech,
@@ -145,7 +146,7 @@ class Session:
         outlook: Outlook | None = None,
         lasts_s: float | None = None,
     ) -> None:
-        self.request: SpeechRequest = request_of(speech)
+        self.request: SpeechRequest = in_language(request_of(speech))
         self.model = model if isinstance(model, Model) else load_model(model)
         self._work = map_in_processes(workers, meanwhile)
         self._monitor, self._curves, self._outlook = monitor, frozenset(curves), outlook

@@ -226,11 +226,12 @@ SURE_CONFIDENCE = 0.8
 class Outlook:
     """What to expect of generated motion: how well the model knew the words and the voice.
 
-    words      : where the phones come from: ``transcript``, ``given units``, ``own model`` (the engine's own
+    words      : where the phones come from: ``transcript``, ``mapped transcript`` (in another language, by the nearest
+                 English phones), ``given units``, ``own model`` (the engine's own
                  recognition of a speaker that it was trained on), ``words`` or ``phones`` (recognised, for the most
                  part), ``no speech`` (none was found)
     confidence : 0 to 1, of recognised words, by their share of the speech; of a transcript, the share of the speech
-                 that it fits (1 where that is not known); 1 where units were given
+                 that it fits (1 where that is not known), of a mapped one at most 0.8; 1 where units were given
     voice      : 0 (unknown) to 1 (as in the training); None where it was not needed
     range_db   : decibels between loud and quiet moments; under 20 the recording is noisy
     advice     : what would help, the most helpful first
@@ -250,6 +251,8 @@ class Outlook:
         """The outlook in one line."""
         recognised = self.words in ("words", "phones")
         parts = [f"{self.words} recognised, confidence {self.confidence:.2f}" if recognised else f"words: {self.words}"]
+        if self.words == "mapped transcript":
+            parts = [f"words: transcript, mapped to English phones, confidence {self.confidence:.2f}"]
         if self.words == "no speech":
             parts = ["no speech found"]
         elif self.words == "transcript" and self.confidence < FULL_FIT_SHARE:

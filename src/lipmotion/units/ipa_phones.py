@@ -44,9 +44,9 @@ VOWEL_CHART: dict[str, Vowel] = {
 }
 """The vowels, front to back in every row. A rounded one has the phone of its height, wherever the tongue is."""
 _OTHERS: dict[str, str] = {
-    # diphthongs; a long eː is as close at its end as ey; Japanese ɯᵝ is rounded a little
+    # diphthongs; a long eː is as close at its end as ey; Japanese ɯᵝ is rounded a little; o- is espeak-ng's Mandarin ɤ
     "aɪ ai": "ay", "aʊ au ɑu": "aw", "ɔɪ ɔʏ ɔy oɪ oi": "oy", "eɪ ei ɛɪ eː": "ey", "oʊ əʊ ou": "ow", "ɯᵝ": "uh",
-    "ə˞": "axr", "ɜ˞": "er", "˞": "r",
+    "ə˞": "axr", "ɜ˞": "er", "˞": "r", "o-": "ax",
     # both lips; the fricatives ɸ and β do not close them, the trill ʙ does; ʷ: the lips round
     "p ʘ": "p", "b ɓ ʙ": "b", "m": "m", "ɸ Φ pɸ": "f", "β": "v", "w ʍ ɥ ʷ": "w",
     # lip and teeth

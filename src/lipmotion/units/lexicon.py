@@ -1,4 +1,4 @@
-"""Pronunciations of words: from a user's file, then pocketsphinx's dictionary, then letter-to-sound rules."""
+"""Pronunciations of words: from a user's file, then pocketsphinx's dictionary, then a network or rules for spelling."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from lipmotion.errors import InputError, MissingDependencyError, shortened
 from lipmotion.storage.files import read_text_file
 from lipmotion.units.phones import PHONES, is_silent
 from lipmotion.units.spelling import guess_pronunciation, without_accents
+from lipmotion.units.spelling_network import network_pronunciation
 from lipmotion.units.text_normalisation import normalised_text
 
 Pronunciation = tuple[str, ...]
@@ -79,13 +80,17 @@ class Lexicon:
         """Return every pronunciation of a lower-case word.
 
         Of an unknown one: those of the same word without accents, if the dictionary has it (``cafe`` for ``café``),
-        else that of the letter-to-sound rules.
+        else that of ``hama``'s network, where it is installed, else that of the letter-to-sound rules.
+        Raises InputError: as ``guess_pronunciation``.
         """
         if word in self.user:
             return self.user[word]
         entries = _dictionary_entries(word) or _dictionary_entries(without_accents(word))
         variants = [with_reduced_vowels(word, entry) for entry in entries]
-        return tuple(dict.fromkeys(variants)) or (with_reduced_vowels(word, guess_pronunciation(word)),)
+        if variants:
+            return tuple(dict.fromkeys(variants))
+        by_rules = guess_pronunciation(word)
+        return (with_reduced_vowels(word, network_pronunciation(without_accents(word)) or by_rules),)
 
 
 def _add_line(user: dict[str, list[Pronunciation]], line: str) -> None:

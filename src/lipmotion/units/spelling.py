@@ -118,7 +118,7 @@ def guess_pronunciation(word: str) -> tuple[str, ...]:
     if foreign or not plain.strip("'"):
         raise InputError(
             f"cannot guess how {shortened(word)!r} is said ({shortened(' '.join(foreign)) or 'no letters'}): "
-            "add it to a lexicon file"
+            "give the language of the words (--language), or add it to a lexicon file"
         )
     phones: list[str] = []
     letters = re.sub(r"([b-df-hj-np-tv-z])\1", r"\1", plain)  # doubled consonants sound once

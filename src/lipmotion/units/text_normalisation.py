@@ -15,6 +15,8 @@ ONES = (
 TENS = "_ _ twenty thirty forty fifty sixty seventy eighty ninety".split()
 TOKEN = re.compile(rf"{ORDINAL}|[^\W\d_]+(?:'[^\W\d_]+)*|\d+")
 """An ordinal in digits, a word, or a whole number."""
+CHINESE = "[\u3400-\u4dbf\u4e00-\u9fff]"
+"""A Chinese character."""
 MOST_MARKS = 30
 """Most accents on one letter; no language has so many."""
 SCALES = ((10**9, "billion"), (10**6, "million"), (1000, "thousand"), (100, "hundred"))
@@ -44,6 +46,20 @@ def words_in(text: str) -> tuple[str, ...]:
         else:
             words.append(token)
     return tuple(words)
+
+
+def written_words(text: str) -> tuple[str, ...]:
+    """Return the lower-case words of a text in any language, as they are written: numbers in digits.
+
+    A Chinese character is a word of its own, as no blanks divide them.
+    Raises InputError: there is no word in it.
+    """
+    spaced = re.sub(CHINESE, r" \g<0> ", normalised_text(text))
+    kept = "".join(letter if letter == "'" or unicodedata.category(letter)[0] in "LMN" else " " for letter in spaced)
+    words = tuple(word.strip("'") for word in kept.split() if word.strip("'"))
+    if not words:
+        raise InputError(f"the transcript {text[:40]!r} holds no word; give the words that are spoken")
+    return words
 
 
 def normalised_text(text: str) -> str:

@@ -24,7 +24,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add_options(parser, Outputs, "kinds", kinds={"help": kinds})
     parser.add_argument("--jobs", type=int, metavar="N", help="number of processes (default: one per core)")
     parser.add_argument("--cluster", default="", metavar="ADDRESS", help="Dask scheduler, as tcp://HOST:8786")
-    add_options(parser, Request, "recogniser", "model", "lexicon", "speaker", "pauses", "asymmetry")
+    add_options(parser, Request, "recogniser", "model", "lexicon", "language", "speaker", "pauses", "asymmetry")
     said: dict[str, Any] = {
         "rate_hz": {"help": "rate of motion files (default: --fps, or 100)"},
         "fps": {"help": "frames per second of videos (default: 25) and of cues (24)"},

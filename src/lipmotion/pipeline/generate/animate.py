@@ -18,6 +18,7 @@ def animate(  # noqa: PLR0913
     *,
     model: Model | str | Path | None = None,
     transcript: str | Path | TimedTranscript | None = None,
+    language: str | None = None,
     constraints: Constraints | None = None,
     edits: EditFile | Edits | str | Path | None = None,
     workers: int = 1,
@@ -29,6 +30,7 @@ def animate(  # noqa: PLR0913
     speech      : an audio or video file, samples at 16 kHz, or a ``SpeechRequest`` with all that is known of it
     model       : from ``load_model``, or the path of a model file; None: the shipped model
     transcript  : the spoken words, or a Path of a file with them; the same as a ``SpeechRequest`` with this transcript
+    language    : that is spoken; the same as a ``SpeechRequest`` with this language (None: its own, or English)
     constraints : values that the motion must take exactly, in the units of the request's speaker; also of curves that
                   follow from it (``Session.generated``)
     edits       : what is changed of the motion, or the path of a file of edits (docs/edit.md), whose phones are used
@@ -51,7 +53,7 @@ def animate(  # noqa: PLR0913
     """
     if not isinstance(constraints, Constraints | None):
         raise InputError(f"the constraints are a {type(constraints).__name__}, required Constraints((Pin(...),))")
-    request = request_of(speech, transcript)
+    request = request_of(speech, transcript, language)
     file = edit_file(edits)
     model = model if isinstance(model, Model) else load_model(model)
     session = file.session(request, model=model, workers=workers, monitor=monitor, meanwhile=meanwhile)

@@ -14,6 +14,7 @@ from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.generate.generation_for import explanation_for, generate_for
 from lipmotion.pipeline.generate.transfer import person_of
 from lipmotion.pipeline.model import Model, load_model
+from lipmotion.pipeline.understand.language import in_language
 from lipmotion.pipeline.understand.request import SpeechInput, request_of
 from lipmotion.pipeline.understand.understood_speech import audio_of, understand
 from lipmotion.printable import printable
@@ -57,7 +58,7 @@ def explain(
     ('rest', 100)
     """
     chosen = model if isinstance(model, Model) else load_model(model)
-    request = request_of(speech, transcript)
+    request = in_language(request_of(speech, transcript))
     audio = audio_of(request)
     times = [at] if isinstance(at, int | float) else at
     count = frame_count(audio.samples)

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.understand.transcribe import is_other_language
 from lipmotion.pipeline.understand.understood_speech import UnderstoodSpeech
 from lipmotion.speech.recognition.agreement import LEAST_FITTING_SHARE
 from lipmotion.speech.recognition.recognised_speech import NOISY_DB, Recognition
 from lipmotion.speech.recognition.recogniser import FULL_WEIGHT_SCORE, own_model_weight
+from lipmotion.speech.voices.pronunciations import MAPPED_CONFIDENCE
 from lipmotion.types import Outlook
 from lipmotion.types.generation import SURE_CONFIDENCE
+from lipmotion.types.languages import ENGLISH
+from lipmotion.units import Lexicon, words_in_time
 
 TRANSCRIPT = "the words that are spoken (--transcript)"
 OWN_MODEL = "recordings of this person (lipmotion adapt for the sound alone, lipmotion train with video)"
@@ -24,6 +28,8 @@ def outlook_of(request: SpeechRequest, understood: UnderstoodSpeech) -> Outlook:
     if found is None:
         words = "given units" if request.units is not None else "transcript" if speech.units_known else "own model"
         share = understood.fit.share if understood.fit else 1.0
+        if words == "transcript" and (known := _known_share(request, understood)) < 1:
+            words, share = "mapped transcript", share * known
         return Outlook(words, share, 1.0 if words == "own model" else None, understood.range_db, _advice(understood))
     words = "words" if found.word_s > found.phone_s else "phones"
     voice = own_model_weight(found.similarity) if found.similarity is not None else None
@@ -33,6 +39,15 @@ def outlook_of(request: SpeechRequest, understood: UnderstoodSpeech) -> Outlook:
 def _confidence(found: Recognition) -> float:
     """Return the confidence of recognised words times their share of the speech, 0 to 1."""
     return (found.confidence or 0.0) * found.word_s / max(found.word_s + found.phone_s, 1e-9)
+
+
+def _known_share(request: SpeechRequest, understood: UnderstoodSpeech) -> float:
+    """Return how sure the phones of a transcript are, 0 to 1: 1 for English, less for what is mapped to English."""
+    if request.language != ENGLISH:
+        return MAPPED_CONFIDENCE
+    said, lexicon = [span.label for span in words_in_time(understood.speech.units)], request.lexicon or Lexicon()
+    words = [word for word in said if word]
+    return sum(map(lexicon.known, words)) / len(words) if is_other_language(words, lexicon) else 1.0
 
 
 def _advice(understood: UnderstoodSpeech) -> tuple[str, ...]:

@@ -37,6 +37,7 @@ def read_request(request: Request, *, words_beside: bool = False) -> SpeechReque
         transcript=transcript,
         units=units,
         lexicon=read_lexicon(request),
+        language=request.language,
         recogniser=request.recogniser,
         speaker=request.speaker,
         onto=request.onto,

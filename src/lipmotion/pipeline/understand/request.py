@@ -14,6 +14,7 @@ from lipmotion.pipeline.job import Request
 from lipmotion.pipeline.model import Model
 from lipmotion.types import Audio, TimedTranscript, Timeline, Unit
 from lipmotion.types.configuration import check_value
+from lipmotion.types.languages import ENGLISH
 from lipmotion.units import Lexicon
 
 Onto = str | Path | Corpus | Model | FilmedFace | SpeakerMap
@@ -32,6 +33,9 @@ class SpeechRequest:
     units      : phones in time, for instance those of an earlier generation, edited; with units, phones are neither
                  recognised nor aligned. Gaps between them are silence
     lexicon    : pronunciations of words, ahead of those of the dictionary
+    language   : that is spoken, a code of ``types.languages.LANGUAGES``; of another one than English, the
+                 lexicon pronounces the transcript, or espeak-ng, where it is installed, and the phones become the
+                 nearest ones of English. ``auto``: it is found by the transcript and the sound, and named in a warning
     recogniser : how speech without a transcript is recognised. ``auto``: English words where they fit the sound, phones
                  elsewhere; ``words``: words alone; ``fast``: phones alone, by the phone models of the model and those
                  of many voices, weighted by the speaker similarity score; ``own``, ``general``: by one of these alone;
@@ -57,6 +61,7 @@ class SpeechRequest:
     transcript: str | Path | TimedTranscript | None = None
     units: Timeline[Unit] | None = None
     lexicon: Lexicon | None = None
+    language: str = ENGLISH
     recogniser: str = "auto"
     speaker: str = ""
     onto: Onto | None = None
@@ -66,7 +71,7 @@ class SpeechRequest:
 
     def __post_init__(self) -> None:
         for each in fields(Request):
-            if each.name in ("pauses", "asymmetry"):
+            if each.name in ("language", "pauses", "asymmetry"):
                 check_value(each, getattr(self, each.name))
         if not isinstance(self.units, Timeline | None):
             kind = type(self.units).__name__
@@ -80,13 +85,16 @@ SpeechInput = str | Path | Audio | SpeechRequest
 """A recording alone, or a request."""
 
 
-def request_of(speech: SpeechInput, transcript: str | Path | TimedTranscript | None = None) -> SpeechRequest:
-    """Return a request for a recording, or the given request; with the transcript, if one is given.
+def request_of(
+    speech: SpeechInput, transcript: str | Path | TimedTranscript | None = None, language: str | None = None
+) -> SpeechRequest:
+    """Return a request for a recording, or the given request; with the transcript and the language that are given.
 
     Raises InputError: a transcript is given, and the request has one already.
     """
     if not isinstance(speech, SpeechRequest):
-        return SpeechRequest(speech, transcript)
+        return SpeechRequest(speech, transcript, language=language or ENGLISH)
+    speech = speech if language is None else replace(speech, language=language)
     if transcript is None:
         return speech
     if speech.transcript is not None:

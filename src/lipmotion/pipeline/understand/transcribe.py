@@ -23,6 +23,8 @@ __all__ = ["Transcription", "phones_in_time", "read_plain_text", "read_transcrip
 LOG = logging.getLogger("lipmotion")
 MOST_WARNINGS = 20
 """Largest number of guessed pronunciations that are reported one by one."""
+FOREIGN_SHARE, LEAST_FOREIGN = 0.25, 3
+"""A text of which so large a share, and so many different words, are not in the dictionary is not English."""
 MOST_STRETCHES = 3
 """Largest number of stretches without words that are named in one warning."""
 
@@ -56,7 +58,14 @@ def transcribe(
     if isinstance(words, TimedTranscript):
         loud = loud_frames(features.values[:, LOG_ENERGY], ENERGY_SMOOTHING_FRAMES)
         words = fitted(words, loud, audio.duration_s)
-    warn_of_guesses(words.words if isinstance(words, TimedTranscript) else words or (), lexicon)
+    spoken = words.words if isinstance(words, TimedTranscript) else words or ()
+    if is_other_language(spoken, lexicon):
+        LOG.warning(
+            "the transcript seems not to be English: its words are read by English rules, and the lips will be wrong; "
+            "give its language (--language)"
+        )
+    else:
+        warn_of_guesses(spoken, lexicon)
     units = phones_in_time(phones, audio, features, words, lexicon)
     if words is None or phones.kind == "own":
         return Transcription(units, None)
@@ -115,6 +124,12 @@ def _places(fit: TranscriptFit) -> str:
     more = len(fit.missing) - MOST_STRETCHES
     others = f" and at {more} more places" if more > 0 else ""
     return f"at {named}{others} ({fit.missing_s:.1f} of {fit.speech_s:.1f} s of speech)"
+
+
+def is_other_language(words: Sequence[str], lexicon: Lexicon) -> bool:
+    """Return whether words seem to be of another language than their lexicon."""
+    unknown = [word for word in words if not lexicon.known(word)]
+    return len({*unknown}) >= LEAST_FOREIGN and len(unknown) >= FOREIGN_SHARE * len(words)
 
 
 def warn_of_guesses(words: Sequence[str], lexicon: Lexicon) -> None:

@@ -21,7 +21,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from lipmotion.errors import InputError, LipMotionError
+from lipmotion.errors import InputError, LipMotionError, MissingDependencyError
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.espeak_events import PART, SILENCE
 from lipmotion.speech.voices.espeak_times import corrected_phone_times
@@ -125,6 +125,22 @@ def _synthesise(voice: str, texts: Sequence[str], folder: Path) -> Iterator[Synt
         words = _written_words(phones, [place for _, _, place in said], text)
         yield SynthesisedSentence(audio, phones, path, words, phone_map)
         path.unlink()
+
+
+def pronounced_words(words: Sequence[str], voice: str) -> list[str]:
+    """Return the phones of each word in IPA, divided by ``|`` and blanks, with marks of stress and language (``(en)``).
+
+    voice : of ``ESPEAK_NG.others()``
+    Raises MissingDependencyError: espeak-ng is not installed, or does not know the language.
+    Raises InputError: it fails.
+    """
+    if voice not in [each.name for each in _others()]:
+        raise MissingDependencyError(f"espeak-ng is not installed, or has no {voice}: pip install '{EXTRA}'")
+    task = {"voice": voice, "words": list(words)} | _library()
+    found = _answer(program_output(PROGRAM, PACKAGE, len(words), json.dumps(task)))
+    if not isinstance(found, list) or len(found) != len(words):
+        raise InputError(f"espeak-ng's library answers {str(found)[:40]!r}; install it again: {PACKAGE}")
+    return [str(phones) for phones in found]
 
 
 def _written_words(phones: Timeline[str], places: Sequence[int], text: str) -> Timeline[str]:

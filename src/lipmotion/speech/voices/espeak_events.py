@@ -4,8 +4,9 @@ It reads a task as JSON: ``{"voice", "texts", "folder", "ipa"}``, and optionally
 paths of the library and of the folder that holds ``espeak-ng-data``. It writes a list of ``[label, start_s, place]``
 for every text as JSON, and the sound of text n to ``folder/n.wav``. A label is espeak-ng's mnemonic, or with ``"ipa"``
 the phone in the International Phonetic Alphabet; ``place`` is where the written word begins in the text, in characters.
-Without ``"voice"`` it writes ``{"version", "data"}``: what is installed. It imports nothing of this package, so that it
-starts fast.
+With ``"words"`` instead of texts, it writes a list of the phones of each in IPA, divided by ``|`` and blanks; nothing
+is spoken. Without ``"voice"`` it writes ``{"version", "data"}``: what is installed. It imports nothing of this package,
+so that it starts fast.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from typing import Any
 LIBRARIES = ("libespeak-ng.so.1", "libespeak-ng.1.dylib", "libespeak-ng.dll")
 SYNCHRONOUS, PHONEME_EVENTS, IPA, UTF_8 = 2, 1, 2, 1
 END, WORD, PHONEME = 0, 1, 7
+DIVIDER = "|"
 SILENCE, PART = "_", ";"
 """The mnemonics of a silence, and of a part of the phone before. Both have no IPA."""
 
@@ -100,6 +102,17 @@ def _speak(library: Any, rate_hz: int, text: str, path: Path) -> list[tuple[str,
     return starts
 
 
+def _pronounced(library: Any, word: str) -> str:
+    """Return the phones of a word in IPA."""
+    library.espeak_TextToPhonemes.restype = ctypes.c_char_p
+    encoded = ctypes.create_string_buffer(word.encode())
+    rest, phones = ctypes.c_void_p(ctypes.addressof(encoded)), []
+    while rest.value:
+        clause = library.espeak_TextToPhonemes(ctypes.byref(rest), UTF_8, IPA | ord(DIVIDER) << 8)
+        phones.append(clause.decode(errors="ignore"))
+    return " ".join(phones)
+
+
 def _about(library: Any) -> dict[str, str]:
     library.espeak_Info.restype = ctypes.c_char_p
     data = ctypes.c_char_p()
@@ -127,6 +140,9 @@ def main() -> None:
         ctypes.byref(_Voice(languages=voice))
     ):
         sys.exit(f"no voice {task['voice']!r}")
+    if "words" in task:
+        json.dump([_pronounced(library, word) for word in task["words"]], sys.stdout)
+        return
     folder = Path(task["folder"])
     starts = [_speak(library, rate_hz, text, folder / f"{number}.wav") for number, text in enumerate(task["texts"])]
     json.dump(starts, sys.stdout)

@@ -1,0 +1,70 @@
+"""The language of a request: its transcript in the words of that language, and what pronounces them."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from lipmotion.corpora.labels import read_transcript
+from lipmotion.errors import InputError
+from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.understand.spoken_language import english_spoken
+from lipmotion.pipeline.understand.understood_speech import audio_of
+from lipmotion.speech.voices.pronunciations import LanguageLexicon
+from lipmotion.types import TimedTranscript, TimedWord, TranscriptLine
+from lipmotion.types.languages import AUTO, ENGLISH, LANGUAGES
+from lipmotion.units.languages_told import language_of_text
+from lipmotion.units.text_normalisation import written_words
+
+LOG = logging.getLogger("lipmotion")
+
+
+def in_language(request: SpeechRequest) -> SpeechRequest:
+    """Return a request whose words are those of its language, with the lexicon that pronounces them.
+
+    A request in English stays as it is. ``AUTO`` stays where the speech is known not to be English, and no more.
+    Raises InputError: the transcript cannot be read, or has words that nobody pronounces. Raises
+    MissingDependencyError: there is neither espeak-ng nor a lexicon with the words.
+    """
+    if request.language == ENGLISH:
+        return request
+    given = request.transcript
+    text = read_transcript(given) if isinstance(given, Path) else given
+    transcript = _plain_transcript(written_words(text)) if isinstance(text, str) else text
+    language = request.language if request.language != AUTO else _told(request, transcript)
+    if language in (ENGLISH, AUTO):
+        return replace(request, language=language)
+    lexicon = LanguageLexicon(request.lexicon.user if request.lexicon else {}, language)
+    if transcript is not None and request.units is None:
+        lexicon = lexicon.with_words(transcript.words)
+    return replace(request, language=language, transcript=transcript, lexicon=lexicon)
+
+
+def _told(request: SpeechRequest, transcript: TimedTranscript | None) -> str:
+    """Return the language of a request that names none; a warning says which.
+
+    Without a transcript: ``AUTO``, where it is not English; English also where it is not known, as without the option.
+    Raises InputError: that of a transcript is not known.
+    """
+    if transcript is not None and request.units is None:
+        language = language_of_text(transcript.words)
+        if not language:
+            raise InputError(f"the language of the transcript is not known; give it, one of: {', '.join(LANGUAGES)}")
+        LOG.warning("the transcript is taken for %s; --language says otherwise", LANGUAGES[language].name)
+        return language
+    english = english_spoken(audio_of(request))
+    LOG.warning(
+        {
+            True: "the speech is taken for English; --language says otherwise",
+            False: "the speech is not English, in which language it is is not known; give it with --language",
+            None: "the language of the speech is not known, English is assumed; give it with --language",
+        }[english]
+    )
+    return AUTO if english is False else ENGLISH
+
+
+def _plain_transcript(words: Sequence[str]) -> TimedTranscript:
+    """Return words without times as a transcript."""
+    return TimedTranscript((TranscriptLine(tuple(map(TimedWord, words))),))

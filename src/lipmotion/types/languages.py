@@ -1,0 +1,61 @@
+"""The languages that speech may be in: their codes, names, scripts, and what espeak-ng calls them."""
+
+from __future__ import annotations
+
+import unicodedata
+from typing import NamedTuple
+
+ENGLISH, AUTO = "en", "auto"
+
+
+class Language(NamedTuple):
+    """A language: its name, the scripts that it is written in, as Unicode names them, and espeak-ng's name of it."""
+
+    name: str
+    scripts: tuple[str, ...] = ("LATIN",)
+    voice: str = ""
+
+
+LANGUAGES: dict[str, Language] = {
+    ENGLISH: Language("English", voice="en-us"),
+    "es": Language("Spanish"),
+    "fr": Language("French"),
+    "de": Language("German"),
+    "it": Language("Italian"),
+    "pt": Language("Portuguese"),
+    "nl": Language("Dutch"),
+    "ja": Language("Japanese", ("HIRAGANA", "KATAKANA")),
+    "ko": Language("Korean", ("HANGUL",)),
+    "zh": Language("Mandarin", ("CJK",), "cmn"),
+    "ca": Language("Catalan"),
+    "cs": Language("Czech"),
+    "da": Language("Danish"),
+    "el": Language("Greek", ("GREEK",)),
+    "fi": Language("Finnish"),
+    "hr": Language("Croatian"),
+    "hu": Language("Hungarian"),
+    "id": Language("Indonesian"),
+    "nb": Language("Norwegian"),
+    "pl": Language("Polish"),
+    "ro": Language("Romanian"),
+    "ru": Language("Russian", ("CYRILLIC",)),
+    "sk": Language("Slovak"),
+    "sv": Language("Swedish"),
+    "tr": Language("Turkish"),
+    "uk": Language("Ukrainian", ("CYRILLIC",)),
+    "vi": Language("Vietnamese"),
+}
+"""By their code of ISO 639-1. Not in it: languages whose script espeak-ng was not tried on."""
+
+
+def script_of(letter: str) -> str:
+    """Return the script of a letter, as Unicode's names begin: ``LATIN``, ``CJK``; empty: it is no letter."""
+    if not unicodedata.category(letter).startswith("L"):
+        return ""
+    return unicodedata.name(letter, "").partition(" ")[0].partition("-")[0]
+
+
+def foreign_letters(word: str, language: str) -> str:
+    """Return the letters of a word that its language is not written in. Latin letters are read in every language."""
+    known = ("", "LATIN", *LANGUAGES[language].scripts)
+    return "".join(dict.fromkeys(letter for letter in word if script_of(letter) not in known))

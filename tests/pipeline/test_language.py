@@ -1,0 +1,83 @@
+"""The language of a request: whose words, whose pronunciations, and how sure the phones are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import lipmotion
+from lipmotion.errors import InputError
+from lipmotion.pipeline.job import Request
+from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.understand import language as told
+from lipmotion.pipeline.understand.language import in_language
+from lipmotion.pipeline.understand.read_request import read_request
+from lipmotion.pipeline.understand.request import SpeechRequest, request_of
+from lipmotion.speech.voices.pronunciations import MAPPED_CONFIDENCE, LanguageLexicon
+from lipmotion.testing.toy import ToySentence
+from lipmotion.types import Audio, TimedTranscript
+from lipmotion.units import Lexicon
+
+SILENCE = Audio(np.zeros(1600, np.float32), 16_000)
+USER = Lexicon({"papa": (("p", "aa", "p", "aa"),), "2": (("m", "aa"),)})
+
+
+def test_english_stays_as_it_is() -> None:
+    request = SpeechRequest(SILENCE, "two papas")
+    assert in_language(request) is request
+
+
+def test_another_language_has_its_own_words_and_lexicon(tmp_path: Path) -> None:
+    (tmp_path / "words.txt").write_text("¡Papa, 2!", encoding="utf-8")
+    for transcript in ("¡Papa, 2!", tmp_path / "words.txt"):
+        request = in_language(SpeechRequest(SILENCE, transcript, lexicon=USER, language="es"))
+        assert isinstance(request.transcript, TimedTranscript)
+        assert request.transcript.words == ("papa", "2")
+        assert isinstance(request.lexicon, LanguageLexicon)
+        assert request.lexicon.pronunciations("2") == (("m", "aa"),)
+
+
+def test_unknown_languages_are_refused() -> None:
+    with pytest.raises(InputError, match="language is 'xx', required one of: en, es, fr, "):
+        request_of(SILENCE, language="xx")
+    with pytest.raises(InputError, match="the language of the transcript is not known; give it, one of: en, es"):
+        in_language(SpeechRequest(SILENCE, "mandrusa kolpeti vastrini", language="auto"))
+
+
+def test_auto_says_what_it_takes_the_speech_for(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    assert in_language(SpeechRequest(SILENCE, "bin blue at f two now", language="auto")).language == "en"
+    for english, language in ((True, "en"), (False, "auto"), (None, "en")):
+        monkeypatch.setattr(told, "english_spoken", lambda _, english=english: english)
+        assert in_language(SpeechRequest(SILENCE, language="auto")).language == language
+    said = [record.getMessage().partition(";")[0] for record in caplog.records]
+    assert said == [
+        "the transcript is taken for English",
+        "the speech is taken for English",
+        "the speech is not English, in which language it is is not known",
+        "the language of the speech is not known, English is assumed",
+    ]
+
+
+def test_mapped_phones_are_not_called_sure(toy_model: Model, toy_sentence: ToySentence) -> None:
+    words = " ".join(toy_sentence.words)
+    lexicon = Lexicon({word: Lexicon().pronunciations(word) for word in toy_sentence.words})
+    request = SpeechRequest(toy_sentence.audio, words, lexicon=lexicon, recogniser="own", language="es")
+    outlook = lipmotion.animate(request, model=toy_model).outlook
+    assert outlook is not None
+    assert (outlook.words, outlook.confidence) == ("mapped transcript", MAPPED_CONFIDENCE)
+    assert "mapped to English phones, confidence 0.80" in outlook.text
+    foreign = " ".join(["sisa mapama bisi", *toy_sentence.words[:1]])
+    outlook = lipmotion.animate(SpeechRequest(toy_sentence.audio, foreign, recogniser="own"), model=toy_model).outlook
+    assert outlook is not None
+    assert outlook.words == "mapped transcript"
+    assert outlook.confidence == pytest.approx(0.25)
+
+
+def test_the_option_reaches_the_request() -> None:
+    assert read_request(Request("a.wav", language="ko")).language == "ko"
+    assert request_of(SpeechRequest(SILENCE, language="ko"), language="fr").language == "fr"
+    assert request_of(SpeechRequest(SILENCE, language="ko")).language == "ko"

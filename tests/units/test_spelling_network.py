@@ -1,0 +1,29 @@
+"""Words that are in no dictionary are read by a network, where it is installed, else by rules."""
+
+from __future__ import annotations
+
+import pytest
+
+from lipmotion.errors import InputError
+from lipmotion.units import Lexicon, spelling_network
+from lipmotion.units.spelling_network import network_pronunciation
+
+
+def test_a_made_up_word_is_read_as_people_read_it() -> None:
+    pytest.importorskip("hama.inference")
+    assert Lexicon().pronunciations("lipmotion") == (tuple("l ih p m ow sh ax n".split()),)
+    assert Lexicon().pronunciations("lípmotion") == Lexicon().pronunciations("lipmotion")
+    assert network_pronunciation("abc" * 20) == ()
+    with pytest.raises(InputError, match="cannot guess"):
+        Lexicon().pronunciations("лип")
+
+
+def test_without_the_network_rules_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(spelling_network, "find_spec", lambda _: None)
+    spelling_network._network.cache_clear()
+    network_pronunciation.cache_clear()
+    try:
+        assert Lexicon().pronunciations("lipmotion") == (tuple("l ih p m aa sh ax n".split()),)
+    finally:
+        spelling_network._network.cache_clear()
+        network_pronunciation.cache_clear()
