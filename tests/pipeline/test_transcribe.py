@@ -11,6 +11,7 @@ from lipmotion.pipeline.understand.transcribe import MOST_WARNINGS, transcribe, 
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.mfcc import mfcc
 from lipmotion.speech.recognition.agreement import TranscriptFit
+from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence
@@ -69,15 +70,24 @@ def test_what_is_not_in_the_dictionary_is_reported_once(
 WRONG = ("squash", "six", "fish", "chefs")
 
 
+@pytest.mark.parametrize("network", [True, False])
 def test_a_transcript_of_something_else_is_doubted(
-    toy_model: Model, audio: Audio, features: Features, caplog: pytest.LogCaptureFixture
+    toy_model: Model,
+    audio: Audio,
+    features: Features,
+    caplog: pytest.LogCaptureFixture,
+    monkeypatch: pytest.MonkeyPatch,
+    network: bool,
 ) -> None:
+    if network and installed_phone_recogniser() is None:
+        pytest.skip("no phone recogniser is installed")
+    if not network:
+        monkeypatch.setattr("lipmotion.pipeline.understand.transcribe.installed_phone_recogniser", lambda: None)
     transcribe(Recogniser(toy_model.phones, "auto"), audio, features, WRONG, Lexicon())
     (record,) = caplog.records
     assert (record.name, record.levelname) == ("lipmotion", "WARNING")
-    message = (
-        r"the transcript seems not to be what is said \(.* at -\d+\.\d, required -4\.2 or more\).*; check it, or .*"
-    )
+    why = r"missed by \d+\.\d nats each, required 1\.6 or less" if network else r"at -\d+\.\d, required -4\.2 or more"
+    message = rf"the transcript seems not to be what is said \(.* {why}\).*; check it, or .*"
     assert re.fullmatch(message, record.getMessage())
 
 

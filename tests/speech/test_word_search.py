@@ -8,7 +8,7 @@ import pytest
 
 from lipmotion.pipeline.model import load_model
 from lipmotion.speech.features.mfcc import mfcc
-from lipmotion.speech.recognition import word_search
+from lipmotion.speech.recognition import recogniser, word_search
 from lipmotion.speech.recognition.recognised_speech import Recognition
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.recognition.word_decoder import FoundWord
@@ -19,6 +19,12 @@ from lipmotion.units import Lexicon, is_silent
 
 WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
 SAID = "please speak and my lips will move five big blue boats float by".split()
+
+
+@pytest.fixture(autouse=True)
+def without_a_phone_recogniser(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Words are searched by pocketsphinx where no phone recogniser is installed."""
+    monkeypatch.setattr(recogniser, "installed_phone_recogniser", lambda: None)
 
 
 @pytest.fixture(scope="module")

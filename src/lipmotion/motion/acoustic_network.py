@@ -38,6 +38,9 @@ BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED = 16, 2e-3, 0.3, 0
 LEAST_STEPS = 600
 """Least number of optimiser steps: with few recordings, each is used more often."""
 CHECKPOINT = "network"
+SURE_POSTERIORS = (0.75, 0.9)
+"""The network that knows posteriors has no share at the first mean posterior, all of its share at the second one: it is
+trained on clean speech, the other one in noise and rooms."""
 POSTERIOR_SHARES = (0.3, 1.0)
 """Share of the network that knows posteriors, for a voice that training knows and for one that it does not."""
 
@@ -117,7 +120,8 @@ class AcousticNetwork(Predictor):
             return motion, distortion
         beside = speech.once(network, lambda: network.predict(posteriors, len(motion)))
         known, unknown = POSTERIOR_SHARES
-        return motion + (unknown + speech.voice * (known - unknown)) * (beside - motion), distortion
+        sure = np.clip((posteriors.mean - SURE_POSTERIORS[0]) / (SURE_POSTERIORS[1] - SURE_POSTERIORS[0]), 0, 1)
+        return motion + sure * (unknown + speech.voice * (known - unknown)) * (beside - motion), distortion
 
     def _predict(self, spectrum: NDArray[np.floating]) -> tuple[Array, Array]:
         """Return motion and distortion, from a normalised log mel spectrum [shape=(T, 40)]."""

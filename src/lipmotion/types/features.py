@@ -37,10 +37,12 @@ class TokenPosteriors:
 
     values : float16 array [shape=(ceil(T / 2), K)], natural logarithms; row n is centred at n / 50 seconds
     source : name, version and digest of the recogniser
+    mean   : the mean posterior of the phones that it finds, 0 to 1: how sure it is of them
     """
 
     values: NDArray[np.float16]
     source: str
+    mean: float
 
 
 def frame_of(time_s: float, frames: int, rate_hz: float) -> int | None:

@@ -32,7 +32,7 @@ def _network() -> Any:
     if find_spec("hama") is None:
         return None
     try:
-        from hama.inference import G2PModel  # type: ignore[import-untyped]
+        from hama.inference import G2PModel
 
         return G2PModel()
     except (ImportError, OSError, RuntimeError):

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 from lipmotion.errors import AlignmentError, MissingDependencyError
 from lipmotion.printable import printable
-from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, LEAST_FITTING_SHARE, TranscriptFit, transcript_fit
+from lipmotion.speech.recognition.agreement import LEAST_FITTING_SHARE, TranscriptFit, transcript_fit
 from lipmotion.types import Timeline, Unit, Utterance
 
 LOG = logging.getLogger("lipmotion")
@@ -31,9 +31,9 @@ def warn_of_doubtful_transcripts(
         for utterance, units in labelled:
             if utterance.phones is None and utterance.words:
                 fit, count = transcript_fit(utterance.audio, units), count + 1
-                if realigned is not None and (fit.score < DOUBTFUL_SCORE or fit.share < LEAST_FITTING_SHARE):
+                if realigned is not None and (fit.is_doubtful or fit.share < LEAST_FITTING_SHARE):
                     fit = _better(fit, utterance, realigned)
-                if fit.score < DOUBTFUL_SCORE:
+                if fit.is_doubtful:
                     wrong.append(utterance.name)
                 elif fit.share < LEAST_FITTING_SHARE:
                     short.append(utterance.name)
@@ -56,7 +56,7 @@ def _better(
         other = transcript_fit(utterance.audio, realigned(utterance))
     except AlignmentError:
         return fit
-    return max(fit, other, key=lambda each: (each.score >= DOUBTFUL_SCORE, each.share))
+    return max(fit, other, key=lambda each: (not each.is_doubtful, each.share))
 
 
 def warn_of_missing_transcripts(utterances: Sequence[Utterance]) -> None:

@@ -10,12 +10,20 @@ from typing import NamedTuple
 from lipmotion.corpora.labels import check_plain_text, read_transcript
 from lipmotion.errors import shortened
 from lipmotion.hmm.loudness import loud_frames
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.mfcc import LOG_ENERGY
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit, transcript_fit
 from lipmotion.speech.recognition.anchors import anchors_of, fitted
+from lipmotion.speech.recognition.network.posteriors import (
+    POSTERIOR_STEP,
+    installed_phone_recogniser,
+    recording_posteriors,
+)
 from lipmotion.speech.recognition.recogniser import ENERGY_SMOOTHING_FRAMES, Recogniser
+from lipmotion.speech.recognition.transcript_evidence import DOUBTFUL_LOSS, transcript_evidence
+from lipmotion.speech.voices.pronunciations import LanguageLexicon
 from lipmotion.storage.files import read_text_file
-from lipmotion.types import Audio, Features, TimedTranscript, Timeline, Unit
+from lipmotion.types import FRAME_RATE_HZ, Audio, Features, TimedTranscript, Timeline, Unit
 from lipmotion.units import Lexicon, check_words
 from lipmotion.units.length_limits import LARGEST_TRANSCRIPT_BYTES
 
@@ -52,7 +60,7 @@ def transcribe(
     features : of the audio, from ``mfcc``
     words    : the spoken words in lower case, also with times, within which they are aligned; or None
     Warnings are logged for guessed pronunciations and, with general phone models, for words that do not agree with the
-    sound, and speech that the words leave out.
+    sound, and speech that the words leave out. Of English words, a phone recogniser judges, where one is installed.
     Raises AlignmentError: the words cannot be aligned with the recording.
     """
     if isinstance(words, TimedTranscript):
@@ -70,6 +78,10 @@ def transcribe(
     if words is None or phones.kind == "own":
         return Transcription(units, None)
     fit = transcript_fit(audio, units)
+    name = installed_phone_recogniser() if phones.kind == "auto" and not isinstance(lexicon, LanguageLexicon) else None
+    if name is not None:
+        posteriors = recording_posteriors(name, analysed(audio)).of_phones.astype(float)
+        fit = fit.with_evidence(transcript_evidence(posteriors, POSTERIOR_STEP / FRAME_RATE_HZ, units))
     warn_of_misfit(fit)
     return Transcription(units, fit)
 
@@ -103,11 +115,10 @@ def read_plain_text(path: Path) -> str:
 
 def warn_of_misfit(fit: TranscriptFit) -> None:
     """Log a warning if a transcript seems to be of something else, or to leave out speech."""
-    if fit.score < DOUBTFUL_SCORE:
+    if fit.is_doubtful:
         LOG.warning(
-            "the transcript seems not to be what is said (its phones agree with the sound at %.1f, required %.1f or "
-            "more)%s; check it, or leave it out",
-            *(fit.score, DOUBTFUL_SCORE, f" or to leave out words {_places(fit)}" if fit.missing else ""),
+            "the transcript seems not to be what is said (%s)%s; check it, or leave it out",
+            *(_judgement(fit), f" or to leave out words {_places(fit)}" if fit.missing else ""),
         )
     elif fit.missing:
         LOG.warning(
@@ -115,6 +126,20 @@ def warn_of_misfit(fit: TranscriptFit) -> None:
             "transcript out",
             _places(fit),
         )
+    elif fit.unsaid:
+        named = [f"{shortened(word.word)!r} at {word.start_s:.1f} s" for word in fit.unsaid[:MOST_STRETCHES]]
+        more = len(fit.unsaid) - MOST_STRETCHES
+        LOG.warning(
+            "the transcript seems to have words that are not said: %s%s; correct it",
+            *(", ".join(named), f" and {more} more" if more > 0 else ""),
+        )
+
+
+def _judgement(fit: TranscriptFit) -> str:
+    """Return why a transcript is doubtful: value found, value required."""
+    if fit.evidence is not None:
+        return f"its phones are missed by {fit.evidence.loss:.1f} nats each, required {DOUBTFUL_LOSS} or less"
+    return f"its phones agree with the sound at {fit.score:.1f}, required {DOUBTFUL_SCORE} or more"
 
 
 def _places(fit: TranscriptFit) -> str:

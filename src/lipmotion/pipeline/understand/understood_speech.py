@@ -44,6 +44,7 @@ from lipmotion.types import (
     frames_of,
     silent_monitor,
 )
+from lipmotion.types.languages import ENGLISH
 from lipmotion.units import Lexicon, check_phones, check_text, is_silent, without_gaps, words_of
 
 ItemT = TypeVar("ItemT")
@@ -205,7 +206,7 @@ def _understood(model: Model, request: SpeechRequest, audio: AnalysedAudio, each
     found: list[Recognition] = []
 
     def recognise() -> Recognition:
-        found.append(phones.recognition(audio, features, each))
+        found.append(phones.recognition(audio, features, each, english=request.language == ENGLISH))
         return found[-1]
 
     speech = recognised_speech(model.engine, model.learned, audio, features, phones, recognise, each)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from lipmotion.hmm.loudness import loud_frames
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.recognition.general.acoustic import STATES, density_column, general_model
+from lipmotion.speech.recognition.transcript_evidence import TranscriptEvidence, WordLoss
 from lipmotion.types import FRAME_RATE_HZ, Audio, Span, Timeline, Unit
 from lipmotion.units import is_silent
 
@@ -41,11 +42,28 @@ class TranscriptFit:
     score    : the agreement score (``agreement_score``)
     missing  : stretches with speech that the transcript leaves out: their starts and ends in seconds, in order
     speech_s : seconds of speech in the recording, those that are missing included
+    evidence : what a phone recogniser says of the transcript, which then decides (None: there is none)
     """
 
     score: float
     missing: tuple[tuple[float, float], ...]
     speech_s: float
+    evidence: TranscriptEvidence | None = None
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether the transcript seems to be of something else."""
+        return self.evidence.is_doubtful if self.evidence is not None else self.score < DOUBTFUL_SCORE
+
+    @property
+    def unsaid(self) -> tuple[WordLoss, ...]:
+        """The words that seem not to be said."""
+        return self.evidence.doubtful_words if self.evidence is not None else ()
+
+    def with_evidence(self, evidence: TranscriptEvidence) -> TranscriptFit:
+        """Return the fit as a phone recogniser judges it."""
+        missing = tuple((gap.start_s, gap.end_s) for gap in evidence.gaps)
+        return replace(self, missing=missing, evidence=evidence)
 
     @property
     def missing_s(self) -> float:
@@ -55,7 +73,7 @@ class TranscriptFit:
     @property
     def share(self) -> float:
         """The share of the speech that the transcript fits, 0 to 1; 0 where the transcript is of something else."""
-        if self.score < DOUBTFUL_SCORE:
+        if self.is_doubtful:
             return 0.0
         return 1.0 - min(self.missing_s / max(self.speech_s, 1e-9), 1.0)
 

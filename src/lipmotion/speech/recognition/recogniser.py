@@ -32,6 +32,7 @@ from lipmotion.speech.recognition.network.network_search import NetworkSearch
 from lipmotion.speech.recognition.network.posteriors import (
     PosteriorStretch,
     installed_phone_recogniser,
+    mean_posterior,
     posterior_stretches,
 )
 from lipmotion.speech.recognition.recognised_speech import (
@@ -54,6 +55,9 @@ OWN_VOICE_SCORE, SMALL_PERPLEXITY = -3.0, 9.0
 """A voice with the first speaker similarity score or more is that of the own models; if the perplexity of their bigram
 is less than the second one, their corpus has few words, which no language model of English expects. Then the phones
 alone decide. The perplexity is 5.3 for GRID's 51 words, 18.6 for English."""
+LEAST_POSTERIOR = 0.8
+"""A phone recogniser decides from this mean posterior of its phones on: clear English of strangers has 0.71 to 0.98,
+other languages 0.58 to 0.63; under noise and in rooms that cover the speech it leaves phones out."""
 NO_WEIGHT_SCORE, FULL_WEIGHT_SCORE = -9.0, -5.0
 """Own models have no weight for recordings with the first speaker similarity score or less, and the weight of the
 general models from the second one on. The score of another speaker in the same studio is -4 to -6 for GRID's models, of
@@ -96,11 +100,14 @@ class Recogniser:
         """
         return self.recognition(audio, features).units
 
-    def recognition(self, audio: Audio, features: Features, each: ParallelMap = map) -> Recognition:
+    def recognition(
+        self, audio: Audio, features: Features, each: ParallelMap = map, *, english: bool = True
+    ) -> Recognition:
         """Return the recognised phones of a recording in time, with the words that decided them.
 
         audio, features : as of ``recognise``
         each            : applies a function to many items, perhaps in several processes
+        english         : whether English words are searched; a phone recogniser finds phones alone in other languages
         Words are recognised in every stretch of sound and aligned by our models. ``auto`` compares their likelihood
         with that of the best path of phones without words: words that fit decide their phones; of the other words, the
         phones only become more probable (``speech.recognition.word_search``).
@@ -114,7 +121,9 @@ class Recogniser:
         known = self._knows_voice_and_words(similarity)
         network = None if known else self._network
         if network is not None:
-            return self._network_recognition(audio, similarity, posterior_stretches(network, audio, each))
+            found = posterior_stretches(network, audio, each)
+            if mean_posterior(found) >= LEAST_POSTERIOR or not english:
+                return self._network_recognition(audio, similarity, found, english=english)
         with_words = self.kind in USING_WORDS and not known
         spoken = begun_decoding(audio, each) if with_words else None
         hmm, log_likelihoods = self._log_likelihoods(audio, similarity)
@@ -131,15 +140,21 @@ class Recogniser:
         return installed_phone_recogniser() if self.kind == "auto" else None
 
     def _network_recognition(
-        self, audio: AnalysedAudio, similarity: SpeakerSimilarity | None, found: Sequence[PosteriorStretch]
+        self,
+        audio: AnalysedAudio,
+        similarity: SpeakerSimilarity | None,
+        found: Sequence[PosteriorStretch],
+        *,
+        english: bool,
     ) -> Recognition:
         """Return what a phone recogniser finds in a recording, aligned."""
         features = audio.mfcc()
         hmm, aligning = self._log_likelihoods(audio, similarity, aligning=True)
         loud = loud_frames(features.values[:, LOG_ENERGY], ENERGY_SMOOTHING_FRAMES)
-        parts, recognised = NetworkSearch(hmm, aligning, loud).labels(found)
+        parts, recognised = NetworkSearch(hmm, aligning, loud, english).labels(found)
         labels = spliced([LabelledFrames(0, SILENCE)], parts, len(loud))
-        return _recognition(labels, recognised, len(loud), features.duration_s, similarity)
+        recognition = _recognition(labels, recognised, len(loud), features.duration_s, similarity)
+        return replace(recognition, posterior=mean_posterior(found))
 
     def _free_labels(self, audio: AnalysedAudio, features: Features, path: NDArray[np.intp]) -> list[LabelledFrames]:
         """Return the phones of a recording as they are recognised without words, of their best path."""

@@ -8,7 +8,7 @@ place, less what is won where anything may be said beside it. A gap is where som
 much is won if it may be.
 
 Source: Graves, Fernández, Gomez and Schmidhuber 2006, "Connectionist temporal classification". Deviations: the best
-path counts, not the sum of all; a phone may be heard as any that is similar to it (``units.SIMILAR_PHONES``).
+path counts, not the sum of all; a phone may be taken for any that is similar to it (``units.SIMILAR_PHONES``).
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def transcript_evidence(log_posteriors: Array, frame_s: float, units: Timeline[U
     total, phones = 0.0, 0
     words: list[WordLoss] = []
     gaps: list[Gap] = []
-    for stretch in _stretches(units):
+    for stretch in _parts(units):
         first, stop = round(stretch.start_s / frame_s), round(stretch.end_s / frame_s)
         if stretch.is_last:
             stop = len(log_posteriors)
@@ -123,7 +123,7 @@ def _largest(gaps: Sequence[Gap]) -> tuple[Gap, ...]:
     return tuple(sorted(kept))
 
 
-class _Stretch(NamedTuple):
+class _Part(NamedTuple):
     """A part of a recording, and the phones of its words in time."""
 
     start_s: float
@@ -136,7 +136,7 @@ class _Stretch(NamedTuple):
         return [np.array([PHONES.index(span.label.phone) for span in spans]) for spans in self.words]
 
 
-def _stretches(units: Timeline[Unit]) -> Iterator[_Stretch]:
+def _parts(units: Timeline[Unit]) -> Iterator[_Part]:
     """Yield a recording in parts that are short enough to be searched, cut in silence where there is some."""
     start_s = before_s = 0.0
     words: list[list[Span[Unit]]] = []
@@ -147,11 +147,11 @@ def _stretches(units: Timeline[Unit]) -> Iterator[_Stretch]:
         pause_s, so_far_s = spans[0].start_s - before_s, before_s - start_s
         if words and so_far_s > (LEAST_STRETCH_S if pause_s > 0 else LONGEST_STRETCH_S):
             cut_s = before_s + pause_s / 2
-            yield _Stretch(start_s, cut_s, words, is_last=False)
+            yield _Part(start_s, cut_s, words, is_last=False)
             start_s, words = cut_s, []
         words.append(spans)
         before_s = spans[-1].end_s
-    yield _Stretch(start_s, units[-1].end_s if len(units) else 0.0, words, is_last=True)
+    yield _Part(start_s, units[-1].end_s if len(units) else 0.0, words, is_last=True)
 
 
 class _Losses(NamedTuple):
@@ -171,7 +171,7 @@ def _losses(log_posteriors: Array, words: Sequence[Columns]) -> _Losses:
     """Return the losses of the words of a stretch."""
     log_posteriors = np.maximum(log_posteriors, LEAST_LOG_POSTERIOR)
     columns = np.concatenate([np.zeros(0, np.intp), *words])
-    spoken = np.log(np.exp(log_posteriors) @ _heard_as())[:, columns]
+    spoken = np.log(np.exp(log_posteriors) @ _taken_for())[:, columns]
     silent = np.logaddexp.reduce(log_posteriors[:, _silent_columns()], axis=1)
     before = _best_paths(spoken, silent, columns)
     after = _best_paths(spoken[::-1, ::-1], silent[::-1], columns[::-1])[::-1, ::-1]
@@ -214,13 +214,13 @@ def _best_paths(spoken: Array, silent: Array, columns: Columns) -> Array:
 
 
 @cache
-def _heard_as() -> Array:
-    """Return for each class and each phone whether the one may be heard in place of the other [shape=(48, 47)]."""
-    heard = np.eye(len(PHONES) + 1, len(PHONES))
+def _taken_for() -> Array:
+    """Return for each class and each phone whether the one may be taken for the other [shape=(48, 47)]."""
+    taken = np.eye(len(PHONES) + 1, len(PHONES))
     for phone, others in SIMILAR_PHONES.items():
         for other in others:
-            heard[PHONES.index(phone), PHONES.index(other)] = heard[PHONES.index(other), PHONES.index(phone)] = 1.0
-    return heard
+            taken[PHONES.index(phone), PHONES.index(other)] = taken[PHONES.index(other), PHONES.index(phone)] = 1.0
+    return taken
 
 
 def _silent_columns() -> list[int]:

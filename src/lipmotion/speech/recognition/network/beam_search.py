@@ -31,7 +31,7 @@ BLANK_LOSS = 1.0
 """Nats by which no phone is less probable than the network says: it leaves phones out rather than adding some."""
 WORD_GAIN = 1.0
 """Nats that a path wins with every word."""
-FREE_WORD_LOSS, FREE_PHONE_LOSS = 4.0, 2.0
+FREE_WORD_LOSS, FREE_PHONE_LOSS = 7.0, 2.0
 """Nats that a path loses with phones outside of words, and with each of them."""
 INNER_BOUNDARY_LOSS = 2.0
 """Nats that a path loses with a boundary of words within a word."""
@@ -121,8 +121,13 @@ class _Paths:
         return kept
 
 
+def decoded_words(english: EnglishWords, rows: Scored) -> list[DecodedWord]:
+    """Return the words of the best path, in order; none where every path has been given up within a word."""
+    return _BeamSearch(english).words(rows)
+
+
 @dataclass
-class BeamSearch:
+class _BeamSearch:
     """The search through one stretch.
 
     history  : words that ended: the number of the word before in this list, the word, the row after it
@@ -135,7 +140,7 @@ class BeamSearch:
     named: list[tuple[int, ...]] = field(default_factory=lambda: [()])
 
     def words(self, rows: Scored) -> list[DecodedWord]:
-        """Return the words of the best path, in order; none where every path has been given up within a word."""
+        """Return what ``decoded_words`` does."""
         none = np.zeros(1, np.int64)
         paths = _Paths(none, none, np.zeros(1), np.full(1, NEVER), none - 1)
         for row in range(len(rows.sounds)):

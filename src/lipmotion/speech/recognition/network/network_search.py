@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from lipmotion.errors import AlignmentError
 from lipmotion.hmm.log_likelihoods import LogLikelihoods, log_likelihoods_from, penalise_silence
 from lipmotion.hmm.model import UnitHmm
-from lipmotion.speech.recognition.network.beam_search import BeamSearch, scored
+from lipmotion.speech.recognition.network.beam_search import decoded_words, scored
 from lipmotion.speech.recognition.network.posteriors import (
-    BLANK,
     WORD_BOUNDARY,
     PhonePosteriors,
     PosteriorStretch,
@@ -101,11 +100,11 @@ def spoken_items(posteriors: PhonePosteriors, *, english: bool) -> list[SpokenIt
     if not english:
         return _phones_alone(posteriors)
     items = []
-    for word in BeamSearch(english_words()).words(scored(posteriors)):
-        heard = posteriors.phones_between(word.first, word.end)
-        variants = Lexicon().pronunciations(word.text) if word.text else (tuple(heard),)
+    for word in decoded_words(english_words(), scored(posteriors)):
+        found = posteriors.phones_between(word.first, word.end)
+        variants = Lexicon().pronunciations(word.text) if word.text else (tuple(found),)
         if variants[0]:
-            confidence = _confidence(posteriors, word.first, word.end, heard, variants) if word.text else 0.0
+            confidence = _confidence(posteriors, word.first, word.end, found, variants) if word.text else 0.0
             items.append(SpokenItem(word.text, variants, confidence))
     return items or _phones_alone(posteriors)
 
@@ -125,16 +124,11 @@ def _phones_alone(posteriors: PhonePosteriors) -> list[SpokenItem]:
 
 
 def _confidence(
-    posteriors: PhonePosteriors, first: int, end: int, heard: list[str], variants: tuple[Pronunciation, ...]
+    posteriors: PhonePosteriors, first: int, end: int, found: list[str], variants: tuple[Pronunciation, ...]
 ) -> float:
     """Return the probability that a word is right, 0 to 1."""
-    peaks = [
-        float(posteriors.values[each.first : each.end].max())
-        for each in posteriors.best_tokens
-        if first <= each.first < end and each.token not in (BLANK, WORD_BOUNDARY)
-    ]
-    sure = float(np.exp(peaks).mean()) if peaks else 0.0
-    agreement = max(1 - phone_edits(variant, heard) / max(len(variant), len(heard)) for variant in variants)
+    sure = posteriors.mean_posterior(first, end)
+    agreement = max(1 - phone_edits(variant, found) / max(len(variant), len(found)) for variant in variants)
     score = AGREEMENT_WEIGHT * agreement + POSTERIOR_WEIGHT * sure + CONSTANT
     return float(1 / (1 + np.exp(-score)))
 
@@ -147,7 +141,7 @@ def phone_edits(one: Pronunciation, other: list[str]) -> int:
     row = list(range(len(other) + 1))
     for number, phone in enumerate(one, 1):
         above, row = row, [number]
-        for column, heard in enumerate(other, 1):
-            differs = FORM_OF.get(phone, phone) != FORM_OF.get(heard, heard)
+        for column, found in enumerate(other, 1):
+            differs = FORM_OF.get(phone, phone) != FORM_OF.get(found, found)
             row.append(min(above[column] + 1, row[-1] + 1, above[column - 1] + differs))
     return row[-1]

@@ -7,6 +7,7 @@ which its phone is said, ``BLANK`` in all others.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property, partial
 from itertools import groupby
@@ -142,6 +143,15 @@ class PhonePosteriors:
         found = [each.token for each in self.best_tokens if first <= each.first < end]
         return [phone for phone, _ in token_phones(found)]
 
+    def mean_posterior(self, first: int, end: int) -> float:
+        """Return the mean posterior of the tokens of the best path that begin in some rows, 0 to 1; 0 without any."""
+        peaks = [
+            float(self.values[each.first : each.end].max())
+            for each in self.best_tokens
+            if first <= each.first < end and each.token != WORD_BOUNDARY
+        ]
+        return float(np.exp(peaks).mean()) if peaks else 0.0
+
 
 class PosteriorStretch(NamedTuple):
     """Frames of a recording with sound in them, and the posteriors there."""
@@ -169,6 +179,13 @@ def posterior_stretches(name: str, audio: AnalysedAudio, each: ParallelMap = map
         ]
 
     return audio.once(f"posteriors of {name}", found)
+
+
+def mean_posterior(found: Sequence[PosteriorStretch]) -> float:
+    """Return the mean posterior of all phones that are found in some stretches, 0 to 1; 0 where there are none."""
+    counts = [sum(each.token != WORD_BOUNDARY for each in posteriors.best_tokens) for _, posteriors in found]
+    means = [posteriors.mean_posterior(0, len(posteriors.values)) for _, posteriors in found]
+    return float(np.dot(counts, means) / max(sum(counts), 1))
 
 
 def recording_posteriors(name: str, audio: AnalysedAudio, each: ParallelMap = map) -> PhonePosteriors:
@@ -201,7 +218,8 @@ def token_posteriors(audio: Audio, each: ParallelMap = map) -> TokenPosteriors |
     if name is None:
         return None
     values = recording_posteriors(name, analysed(audio), each).values.astype(np.float16)
-    return TokenPosteriors(values, phone_recogniser(name).source)
+    mean = mean_posterior(posterior_stretches(name, analysed(audio), each))
+    return TokenPosteriors(values, phone_recogniser(name).source, mean)
 
 
 def stretch_posteriors(name: str, samples: bytes) -> NDArray[np.float16]:

@@ -1,0 +1,53 @@
+"""Write how the phone network ``hama`` spells English words, for the search of words in its posteriors.
+
+    python scripts/written_words.py
+
+It was trained on phones that its own letter-to-sound network wrote, so it finds "w ey" where somebody says "we".
+Of the most frequent words of pocketsphinx's language model, those spellings are kept that are not in the dictionary.
+hama is licensed under Apache-2.0.
+"""
+
+from __future__ import annotations
+
+import unicodedata
+from pathlib import Path
+
+from hama.inference import G2PModel
+
+from lipmotion.speech.recognition.network.hama import Hama
+from lipmotion.speech.recognition.network.word_tree import FORM_OF, english_words
+from lipmotion.units import Lexicon
+from lipmotion.units.ipa_phones import token_phones
+
+MOST_WORDS = 4000
+TARGET = Path(__file__).parents[1] / "src" / "lipmotion" / "speech" / "recognition" / "network" / "written_words.txt"
+
+
+def main() -> None:
+    """Write the file."""
+    network = G2PModel()
+    tokens = sorted((token for token in Hama().tokens if not token.startswith("<")), key=len, reverse=True)
+    lines = []
+    for word in english_words().language.words[:MOST_WORDS]:
+        known = {tuple(FORM_OF.get(phone, phone) for phone in each) for each in Lexicon().pronunciations(word)}
+        phones = spelt(unicodedata.normalize("NFC", network.predict(word).ipa), tokens)
+        if word.replace("'", "").isalpha() and phones and phones not in known:
+            lines.append(f"{word} {' '.join(phones)}\n")
+    TARGET.write_text("".join(lines), encoding="ascii")
+
+
+def spelt(ipa: str, tokens: list[str]) -> tuple[str, ...]:
+    """Return the phones of a word in IPA, as the dictionary tells them apart.
+
+    tokens : of the network, the longest first
+    """
+    found, at = [], 0
+    while at < len(ipa):
+        token = next((token for token in tokens if ipa.startswith(token, at)), "")
+        found.append(token)
+        at += len(token) or 1
+    return tuple(FORM_OF.get(phone, phone) for phone, _ in token_phones(list(filter(None, found))))
+
+
+if __name__ == "__main__":
+    main()
