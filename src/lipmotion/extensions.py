@@ -21,7 +21,7 @@ from lipmotion.errors import InputError
 ExtensionT = TypeVar("ExtensionT")
 GROUPS = (
     *("lipmotion.engines", "lipmotion.faces", "lipmotion.exporters", "lipmotion.corpus_readers"),
-    *("lipmotion.outputs", "lipmotion.predictors", "lipmotion.trackers"),
+    *("lipmotion.outputs", "lipmotion.predictors", "lipmotion.trackers", "lipmotion.phone_recognisers"),
 )
 """Every group of entry points that is read."""
 OWN = {"lipmotion", "argparse"}

@@ -218,7 +218,7 @@ def test_the_welcome_is_understood() -> None:
     assert found.posterior is not None
     assert found.posterior > 0.8
     assert found.reliability == pytest.approx(1)
-    assert [span.label.word for span in found.units if span.label.phone == "p"] == ["please", "speak", "lips"]
+    assert {"please", "speak", "lips"} <= {span.label.word for span in found.units if span.label.phone == "p"}
 
 
 @pytest.mark.skipif(not Hama.is_installed(), reason="hama has no library here")

@@ -221,7 +221,7 @@ def speech_of_condition(
         ]
     else:
         speeches = [
-            speech_of(engine, u.audio, u.features, units)
+            speech_of(engine, u.audio, u.features, units, phones.kind)
             for u, units in zip(recordings.utterances, recordings.conditions[condition], strict=True)
         ]
     return [

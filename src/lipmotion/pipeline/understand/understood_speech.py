@@ -195,14 +195,14 @@ def _understood(model: Model, request: SpeechRequest, audio: AnalysedAudio, each
             LOG.warning("the transcript is not used: the units already say what is spoken; leave one of them out")
         _check_units(request.units, audio.duration_s)
         units = without_gaps(request.units, audio.duration_s)
-        return UnderstoodSpeech(speech_of(model.engine, audio, audio.mfcc(), units, each), None, range_db)
+        return UnderstoodSpeech(speech_of(model.engine, audio, audio.mfcc(), units, phones.kind, each), None, range_db)
     words = _words(request.transcript, audio.duration_s)
     if installed and words is None:
         words = recognise_words(audio, request.recogniser)
     features = audio.mfcc()
     if words is not None:
         units, fit = transcribe(phones, audio, features, words, request.lexicon or Lexicon())
-        return UnderstoodSpeech(speech_of(model.engine, audio, features, units, each), None, range_db, fit)
+        return UnderstoodSpeech(speech_of(model.engine, audio, features, units, phones.kind, each), None, range_db, fit)
     found: list[Recognition] = []
 
     def recognise() -> Recognition:
@@ -225,16 +225,22 @@ def audio_of(request: SpeechRequest) -> Audio:
 
 
 def speech_of(
-    engine: Animator[Any], audio: Audio, features: Features, units: Timeline[Unit], each: ParallelMap = map
+    engine: Animator[Any],
+    audio: Audio,
+    features: Features,
+    units: Timeline[Unit],
+    kind: str = "auto",
+    each: ParallelMap = map,
 ) -> Speech:
     """Return speech of features and phones in time, and what else of the recording the engine needs.
 
+    kind : of the recognition; of all but ``auto``, a phone recogniser has no part in it
     each : applies a function to many items, perhaps in several processes
     """
     inputs = engine.inputs()
     f0 = log_f0(audio) if inputs.f0 else None
     spectrum = analysed(audio).spectrum if inputs.conditions else None
-    posteriors = token_posteriors(audio, each) if inputs.posteriors else None
+    posteriors = token_posteriors(audio, each) if inputs.posteriors and kind == "auto" else None
     return with_units(Speech(features, Timeline(()), f0, spectrum=spectrum, posteriors=posteriors), units)
 
 
@@ -276,7 +282,7 @@ def recognised_speech(
     If the engine's own model recognises phones of this speaker, these are aligned by ``phones``, as the phones of the
     training were; else the result of ``recognise`` is used.
     """
-    speech = speech_of(engine, audio, features, Timeline(()), each)
+    speech = speech_of(engine, audio, features, Timeline(()), phones.kind, each)
     recognised = None
     if phones.kind not in ("general", "words"):
         recognised = engine.recognise(learned, speech)
