@@ -44,12 +44,14 @@ def recognised_once() -> Iterator[None]:
     known: dict[tuple[int, str, bytes], Recognition] = {}
     plain = Recogniser.recognition
 
-    def recognition(self: Recogniser, audio: Audio, features: Features, each: ParallelMap = map) -> Recognition:
+    def recognition(
+        self: Recogniser, audio: Audio, features: Features, each: ParallelMap = map, *, english: bool = True
+    ) -> Recognition:
         key = id(self.own), self.kind, audio.samples.tobytes()
         if self.adaptation is not None:
-            return plain(self, audio, features, each)
+            return plain(self, audio, features, each, english=english)
         if key not in known:
-            known[key] = plain(self, audio, features, each)
+            known[key] = plain(self, audio, features, each, english=english)
         return known[key]
 
     with pytest.MonkeyPatch.context() as patch:

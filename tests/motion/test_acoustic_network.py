@@ -9,7 +9,8 @@ import pytest
 
 from lipmotion.errors import CorpusError
 from lipmotion.motion import acoustic_network
-from lipmotion.motion.acoustic_network import STEP, AcousticNetwork, between_steps
+from lipmotion.motion.acoustic_network import AcousticNetwork
+from lipmotion.motion.network_steps import STEP, between_steps
 from lipmotion.motion.predictors import PredictorTraining
 from lipmotion.storage.checkpoint import Checkpoint
 from lipmotion.testing.examples import example

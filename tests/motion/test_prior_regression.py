@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lipmotion.motion.acoustic_network import STEP
+from lipmotion.motion.network_steps import STEP
 from lipmotion.motion.predictors import PredictorFit, PredictorTraining, folds
 from lipmotion.motion.prior_regression import PriorRegression
 from lipmotion.testing.examples import example
