@@ -6,8 +6,8 @@
 rooms     : clips of the corpus of ``--corpus`` in babble, white noise, a room, over a telephone; ACC of opening, pooled
 strangers : GRID clips of other speakers, audio only and with transcript; mean ACC per clip, best lag within 60 ms
 phones    : ``speech-open`` with transcripts: mean opening and width by phone, and their rank correlation with the table
-open      : recordings with a face of ``--open`` (docs/results/voices.md), in pieces of five seconds; mean ACC per clip,
-            best lag within 120 ms
+open      : recordings with a face of ``--open`` (docs/results/voices.md), in pieces of 5 s or ``--whole``; mean
+            ACC per clip, best lag within 120 ms
 """
 
 from __future__ import annotations
@@ -50,6 +50,7 @@ def main() -> None:
     parser.add_argument("--corpus", type=Path, default=Path("build/grid-s1"), help="prepared, of the training speaker")
     parser.add_argument("--split", default="val")
     parser.add_argument("--open", type=Path, help="folder of videos of people who speak English")
+    parser.add_argument("--whole", action="store_true", help="open recordings as they are, not in pieces")
     parser.add_argument("--tracks", type=Path, help="where tracks of videos are kept; default: they are not")
     parser.add_argument("--model", type=Path, help="default: the one that ships")
     parser.add_argument("--recogniser", default="auto")
@@ -157,21 +158,27 @@ def open_english(options: argparse.Namespace, model: Model) -> None:
     for path in sorted(options.open.rglob("*.mp4")):
         if "french" in path.stem:
             continue
-        for name, audio, piece in pieces(path, options.tracks):
+        for name, audio, piece in pieces(path, options.tracks, whole=options.whole):
             request = SpeechRequest(audio, recogniser=options.recogniser, pauses="natural")
             each[name] = best_lag(animate(request, model=model).motion, piece, 0.12)
     show_means("open English, audio only", each)
 
 
-def pieces(path: Path, tracks: Path | None = None) -> Iterator[tuple[str, Audio, Track]]:
-    """Yield pieces of five seconds of a video: name, sound, track; the whole track is kept in ``tracks``."""
+def pieces(path: Path, tracks: Path | None = None, *, whole: bool = False) -> Iterator[tuple[str, Audio, Track]]:
+    """Yield pieces of five seconds of a video: name, sound, track; the whole track is kept in ``tracks``.
+
+    whole : the video is one piece
+    """
     audio, tracked = read_audio(path), kept_track(path, tracks)
-    whole, rate = tracked.motion, tracked.motion.rate_hz
+    if whole:
+        yield path.stem, audio, tracked
+        return
+    motion_of_all, rate = tracked.motion, tracked.motion.rate_hz
     for number in range(max(int(audio.duration_s / PIECE_S), 1)):
-        end = len(whole.values) if audio.duration_s < 2 * PIECE_S else int((number + 1) * PIECE_S * rate)
+        end = len(motion_of_all.values) if audio.duration_s < 2 * PIECE_S else int((number + 1) * PIECE_S * rate)
         start = int(number * PIECE_S * rate)
         samples = audio.samples[int(start / rate * RATE_HZ) : int(end / rate * RATE_HZ)]
-        motion = Motion(whole.values[start:end], rate, whole.channels)
+        motion = Motion(motion_of_all.values[start:end], rate, motion_of_all.channels)
         yield f"{path.stem} {number}", Audio(samples, RATE_HZ), Track(motion, tracked.seen[start:end])
 
 

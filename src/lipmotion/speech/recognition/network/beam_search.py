@@ -31,7 +31,7 @@ BLANK_LOSS = 1.0
 """Nats by which no phone is less probable than the network says: it leaves phones out rather than adding some."""
 WORD_GAIN = 1.0
 """Nats that a path wins with every word."""
-FREE_WORD_LOSS, FREE_PHONE_LOSS = 4.0, 2.0
+FREE_WORD_LOSS, FREE_PHONE_LOSS = 4.0, 2.5
 """Nats that a path loses with phones outside of words, and with each of them."""
 INNER_BOUNDARY_LOSS = 2.0
 """Nats that a path loses with a boundary of words within a word."""
