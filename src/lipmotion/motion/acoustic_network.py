@@ -18,6 +18,7 @@ from lipmotion.motion.posterior_network import (
     posterior_network_from_arrays,
 )
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining
+from lipmotion.motion.speaker_knowledge import strangeness
 from lipmotion.stats.convolution import (
     TAPS,
     ConvolutionalNetwork,
@@ -121,7 +122,8 @@ class AcousticNetwork(Predictor):
         beside = speech.once(network, lambda: network.predict(posteriors, len(motion)))
         known, unknown = POSTERIOR_SHARES
         sure = np.clip((posteriors.mean - SURE_POSTERIORS[0]) / (SURE_POSTERIORS[1] - SURE_POSTERIORS[0]), 0, 1)
-        return motion + sure * (unknown + speech.voice * (known - unknown)) * (beside - motion), distortion
+        share = sure * (known + strangeness(speech.voice) * (unknown - known))
+        return motion + share * (beside - motion), distortion
 
     def _predict(self, spectrum: NDArray[np.floating]) -> tuple[Array, Array]:
         """Return motion and distortion, from a normalised log mel spectrum [shape=(T, 40)]."""

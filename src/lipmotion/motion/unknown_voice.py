@@ -16,6 +16,7 @@ from lipmotion.motion.articulation import (
 )
 from lipmotion.motion.closure import OPENING, REACH_S
 from lipmotion.motion.space import MotionSpace
+from lipmotion.motion.speaker_knowledge import strangeness
 from lipmotion.types import EYE_DISTANCE, Timeline, Unit, frames_of
 from lipmotion.units import VOWELS
 
@@ -56,7 +57,7 @@ def with_open_vowels(
     for span in units:
         if span.label.phone in VOWELS:
             vowels[slice(*frames_of(span, frames))] = 1
-    least = LEAST_OPENING_SHARE * _strangeness(voice) * vowels * np.maximum(opening, 0)
+    least = LEAST_OPENING_SHARE * strangeness(voice) * vowels * np.maximum(opening, 0)
 
     def opened(chosen: slice) -> Statistics:
         means, precisions = statistics(chosen)
@@ -72,12 +73,7 @@ def closing_reach_s(voice: float) -> float:
 
     voice : how well training knows the voice, 0 to 1
     """
-    return REACH_S - _strangeness(voice) * (REACH_S + INSET_S)
-
-
-def _strangeness(voice: float) -> float:
-    """Return how far the measures for unknown voices apply, 0 to 1; more than half for voices half known."""
-    return float(np.sqrt(1 - voice))
+    return REACH_S - strangeness(voice) * (REACH_S + INSET_S)
 
 
 def typical_range(prior: ArticulationPrior, space: MotionSpace, voice: float, reliability: float) -> float:

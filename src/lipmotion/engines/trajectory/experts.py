@@ -13,11 +13,15 @@ from lipmotion.motion.articulation import ArticulationPrior, dynamics_of
 from lipmotion.motion.generation import Statistics
 from lipmotion.motion.predictors import Predictor
 from lipmotion.motion.reliability import phone_reliability
+from lipmotion.motion.speaker_knowledge import strangeness
 from lipmotion.types import Speech
 
 Array = NDArray[np.float64]
 NETWORK_SHARE = 0.5
 """Weight of the predictor beside the states, 0 to 1, in models that have no other."""
+
+STRANGER_LOSS = 0.8
+"""Share of their weight that states lose with voices that training does not know at all."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,12 +69,13 @@ class Experts:
 
         It is ``network_share`` where training knows the phone in its context, and all where not; in the rest pose the
         states alone count. Beside a predictor that uses the table of articulation itself, contexts are not asked for.
-        Phones that cannot be relied on leave all to the predictor.
+        Phones that cannot be relied on leave all to the predictor; voices that training does not know, most.
         """
         familiarity = np.ones(len(self.rows))
         if self.prior is not None and not (self.network is not None and self.network.uses_articulation):
             familiarity = self.prior.familiarity(self.speech.units, len(self.rows))
         resting = self.rows == len(self.emission.means) - 1
-        states = (1 - self.network_share) * self.reliability * familiarity
+        known = 1 - STRANGER_LOSS * strangeness(self.speech.voice)
+        states = (1 - self.network_share) * self.reliability * familiarity * known
         network = self.network_share * np.where(resting, 1 - self.reliability, 1.0)
         return network / np.maximum(states + network, 1e-12)
