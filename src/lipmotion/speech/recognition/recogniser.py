@@ -50,7 +50,8 @@ from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, most_similar_pho
 RECOGNISER_KINDS = ("auto", "words", "fast", "own", "general")
 """Phones are recognised by: ``own``: the model's own phone models alone; ``general``: those of many voices alone;
 ``fast``: both, the own ones weighted by how similar the speaker is to those of their training data. ``words``: English
-words are recognised and aligned. ``auto``: as ``fast``, and words where they fit."""
+words are recognised by pocketsphinx and aligned. ``auto``: by a phone recogniser, where one is installed and sure; else as ``fast``, and words where they
+fit."""
 USING_WORDS, WEIGHTED = ("auto", "words"), ("auto", "words", "fast")
 OWN_VOICE_SCORE, SMALL_PERPLEXITY = -3.0, 9.0
 """A voice with the first speaker similarity score or more is that of the own models; if the perplexity of their bigram
@@ -110,9 +111,10 @@ class Recogniser:
         audio, features : as of ``recognise``
         each            : applies a function to many items, perhaps in several processes
         english         : whether English words are searched; a phone recogniser finds phones alone in other languages
-        Words are recognised in every stretch of sound and aligned by our models. ``auto`` compares their likelihood
-        with that of the best path of phones without words: words that fit decide their phones; of the other words, the
-        phones only become more probable (``speech.recognition.word_search``).
+        Words are recognised in every stretch of sound and aligned by our models: by a phone recogniser where it is sure
+        (``speech.recognition.network``), else by pocketsphinx. Then ``auto`` compares their likelihood with that of the
+        best path of phones without words: words that fit decide their phones; of the other words, the phones only
+        become more probable (``speech.recognition.word_search``).
         Raises MissingDependencyError: as ``recognise``.
         """
         if not features.values.any():

@@ -37,7 +37,7 @@ SHORT_FRAMES = 1500
 class PhoneRecogniser(ABC):
     """A network that gives posteriors of tokens.
 
-    name   : under which it is registered, and chosen (``--recogniser``)
+    name   : under which it is registered
     tokens : phones in the International Phonetic Alphabet, ``BLANK`` and, if it has one, ``WORD_BOUNDARY``
     source : name and version, which ``pip install NAME==VERSION`` takes, and a digest of its weights: posteriors of
              another source are not what a model was trained on
