@@ -50,8 +50,8 @@ from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, most_similar_pho
 RECOGNISER_KINDS = ("auto", "words", "fast", "own", "general")
 """Phones are recognised by: ``own``: the model's own phone models alone; ``general``: those of many voices alone;
 ``fast``: both, the own ones weighted by how similar the speaker is to those of their training data. ``words``: English
-words are recognised by pocketsphinx and aligned. ``auto``: by a phone recogniser, where one is installed and sure; else as ``fast``, and words where they
-fit."""
+words are recognised by pocketsphinx and aligned. ``auto``: by a phone recogniser, where one is installed and sure; else
+as ``fast``, and words where they fit."""
 USING_WORDS, WEIGHTED = ("auto", "words"), ("auto", "words", "fast")
 OWN_VOICE_SCORE, SMALL_PERPLEXITY = -3.0, 9.0
 """A voice with the first speaker similarity score or more is that of the own models; if the perplexity of their bigram
