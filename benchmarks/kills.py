@@ -37,8 +37,6 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
 CHAIN = 4
 END_SHARE, END_S = 0.2, 0.3
 """Share of the kills that are aimed at the end of a run, and the length of the end in seconds."""
-TRIES = 5
-"""Most runs per kill: many runs end before a signal that is aimed at their end."""
 PATIENCE_S = 300
 OLD = b"an earlier output"
 
@@ -157,13 +155,10 @@ def run(job: Job, here: Path) -> subprocess.CompletedProcess[str]:
 def kill_and_finish(here: Path, chance: random.Random, kills: int, goal: Goal, record: KillRecord) -> None:
     """Kill ``kills`` runs in one folder, then let one finish, and compare its result."""
     fresh(here, record.job)
-    hit = 0
-    for _ in range(TRIES * kills):
-        if hit < kills and kill_once(here, chance, goal, record):
-            hit += 1
-        elif hit == kills:
-            break
-        else:
+    for _ in range(kills):
+        missed = 0
+        while not kill_once(here, moment_s(chance, goal.duration_s) / 2**missed, chance, goal, record):
+            missed += 1  # ended before: aim earlier, since runs are shorter once other work on the machine has ended
             compare(here, goal, record, "had ended already")
             fresh(here, record.job)
     finished = run(record.job, here)
@@ -187,9 +182,9 @@ def moment_s(chance: random.Random, duration_s: float) -> float:
     return chance.uniform(0, duration_s)
 
 
-def kill_once(here: Path, chance: random.Random, goal: Goal, record: KillRecord) -> bool:
-    """Start the job, kill it, and record its messages and files; return False if it had ended before."""
-    number, to_all, after_s = chance.choice(SIGNALS), chance.random() < 0.5, moment_s(chance, goal.duration_s)
+def kill_once(here: Path, after_s: float, chance: random.Random, goal: Goal, record: KillRecord) -> bool:
+    """Start the job, kill it after ``after_s``, record its messages and files; return False if it had ended before."""
+    number, to_all = chance.choice(SIGNALS), chance.random() < 0.5
     before, pipe = set(content(here)), subprocess.PIPE
     with subprocess.Popen(
         [*COMMAND, *record.job.arguments], cwd=here, stdout=pipe, stderr=pipe, text=True, start_new_session=True
