@@ -37,11 +37,12 @@ from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, cached_rec
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio
 from lipmotion.units import Lexicon, is_silent, words_of
+from lipmotion.units.phones import phone_edits
 from lipmotion.vision.track import track
 
 RATE_HZ = 16_000
-SAME = {"ax": "ah", "axr": "er", "ix": "ih", "el": "l", "em": "m", "en": "n", "ao": "aa", "zh": "sh"}
-"""Phones that count as equal: reduced vowels, syllabic consonants, and two pairs that accents merge."""
+SAME = {"ao": "aa", "zh": "sh"}
+"""Phones that count as equal, beside reduced and full forms: two pairs that accents merge."""
 SPOKEN = ("61-70968-0000.flac", "acoustic_corpus.wav", "cold_corpus.wav", "common_voice_en_22058264.mp3",
           "common_voice_en_22058266.mp3", "common_voice_en_22058267.mp3",
           *(f"sense_and_sensibility_01_austen_64kb-0{n}.wav" for n in (870, 880, 890, 920, 930)))  # fmt: skip
@@ -98,7 +99,7 @@ def phones(corpora: Path, model: Model, _: Path | None) -> None:
         phone_recogniser = cached_recogniser(model.phones, kind)
         found = [phone_recogniser.recognition(audio, mfcc(audio)) for audio, _ in recordings]
         errors = [
-            edits(wanted, spoken(s.label.phone for s in each.units))
+            phone_edits(wanted, spoken(s.label.phone for s in each.units))
             for each, (_, wanted) in zip(found, recordings, strict=True)
         ]
         count = sum(len(wanted) for _, wanted in recordings)
@@ -117,16 +118,6 @@ def phones(corpora: Path, model: Model, _: Path | None) -> None:
 def spoken(names: object) -> list[str]:
     """Return phones without silence; phones that count as equal get one name."""
     return [SAME.get(name, name) for name in names if not is_silent(name)]  # type: ignore[attr-defined]
-
-
-def edits(wanted: list[str], found: list[str]) -> int:
-    """Return the fewest substitutions, insertions and deletions between two sequences."""
-    row = list(range(len(found) + 1))
-    for i, phone in enumerate(wanted, 1):
-        above, row = row, [i]
-        for j, other in enumerate(found, 1):
-            row.append(min(above[j] + 1, row[-1] + 1, above[j - 1] + (phone != other)))
-    return row[-1]
 
 
 def seconds(work: object) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import CorpusError
-from lipmotion.motion import acoustic_network
+from lipmotion.motion import acoustic_network, network_steps
 from lipmotion.motion.acoustic_network import AcousticNetwork
 from lipmotion.motion.network_steps import STEP, between_steps
 from lipmotion.motion.predictors import PredictorTraining
@@ -101,7 +101,7 @@ def test_a_stopped_training_goes_on_from_its_checkpoint(
     def never(*_: object) -> None:
         raise AssertionError("trained again")
 
-    monkeypatch.setattr(acoustic_network, "fit_network", never)
+    monkeypatch.setattr(network_steps, "fit_network", never)
     again = AcousticNetwork.fit(training).predictor.arrays()
     np.testing.assert_allclose(again["network_output"], first["network_output"])
 

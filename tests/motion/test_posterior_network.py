@@ -47,7 +47,7 @@ def example(number: int, *, known: bool = True) -> Example:
 @pytest.fixture(scope="module")
 def network() -> PosteriorNetwork:
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(posterior_network, "STEPS", 30)
+        patched.setattr(posterior_network, "PLAN", replace(posterior_network.PLAN, steps=30))
         fitted = trained([example(number) for number in range(8)])
     assert fitted is not None
     return fitted

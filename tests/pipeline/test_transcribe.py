@@ -82,7 +82,7 @@ def test_a_transcript_of_something_else_is_doubted(
     if network and installed_phone_recogniser() is None:
         pytest.skip("no phone recogniser is installed")
     if not network:
-        monkeypatch.setattr("lipmotion.pipeline.understand.transcribe.installed_phone_recogniser", lambda: None)
+        monkeypatch.setattr("lipmotion.pipeline.understand.transcribe.network_of", lambda _: None)
     transcribe(Recogniser(toy_model.phones, "auto"), audio, features, WRONG, Lexicon())
     (record,) = caplog.records
     assert (record.name, record.levelname) == ("lipmotion", "WARNING")

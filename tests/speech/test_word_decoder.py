@@ -7,9 +7,9 @@ import pytest
 
 from lipmotion.errors import MissingDependencyError
 from lipmotion.speech.recognition import word_decoder
-from lipmotion.speech.recognition.word_decoder import is_filler, stretch_samples, words_in
+from lipmotion.speech.recognition.word_decoder import is_filler, words_in
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.speech.sound.voice_activity import Stretch
+from lipmotion.speech.sound.voice_activity import Stretch, stretch_samples
 from lipmotion.types import Audio
 from lipmotion.units import Lexicon
 
@@ -45,7 +45,7 @@ def test_samples_of_a_stretch_are_clipped_integers() -> None:
     samples = np.frombuffer(stretch_samples(audio, Stretch(1, 3)), "<i2")
     assert len(samples) == 320
     assert samples[0] == pytest.approx(16_383, abs=1)
-    assert samples[-1] == -32_767
+    assert samples[-1] == -32_768
 
 
 def test_fillers() -> None:

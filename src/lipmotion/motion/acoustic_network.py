@@ -10,7 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.motion.network_steps import DIRECT_WEIGHT, LEAST_DEVIATION, STEP, between_steps, random_piece
+from lipmotion.motion.network_steps import (
+    LEAST_DEVIATION,
+    STEP,
+    NetworkShape,
+    between_steps,
+    checked_scale,
+    random_piece,
+)
 from lipmotion.motion.posterior_network import (
     POSTERIOR_ARRAYS,
     PosteriorNetwork,
@@ -19,43 +26,23 @@ from lipmotion.motion.posterior_network import (
 )
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining
 from lipmotion.motion.speaker_knowledge import strangeness
-from lipmotion.stats.convolution import (
-    TAPS,
-    ConvolutionalNetwork,
-    LinearMap,
-    TrainingPlan,
-    TrainingSequence,
-    fit_network,
-    initial_network,
-)
+from lipmotion.stats.convolution import ConvolutionalNetwork, TrainingPlan, TrainingSequence
 from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
-from lipmotion.storage.schema import LARGEST_MEAN, POSITIVE, Arrays, ArraySpec, checked_arrays
-from lipmotion.types import SPECTRUM_BANDS, ConditionSpectrum, Example, Progress, Speech
+from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays
+from lipmotion.types import SPECTRUM_BANDS, ConditionSpectrum, Example, Speech
 
 Array = NDArray[np.float64]
-HIDDEN_UNITS, DILATIONS = 192, (1, 2, 4, 8, 1, 2, 4, 8)
-"""Units of a hidden layer, and time steps between its taps: its input is 1.2 s before and after a frame."""
+SHAPE = NetworkShape("network", "network", STEP * SPECTRUM_BANDS, 192, (1, 2, 4, 8, 1, 2, 4, 8))
+"""Its input is 1.2 s before and after a frame."""
 BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED = 16, 2e-3, 0.3, 0
 LEAST_STEPS = 600
 """Least number of optimiser steps: with few recordings, each is used more often."""
-CHECKPOINT = "network"
 SURE_POSTERIORS = (0.75, 0.9)
 """The network that knows posteriors has no share at the first mean posterior, all of its share at the second one: it is
 trained on clean speech, the other one in noise and rooms."""
 POSTERIOR_SHARES = (0.3, 1.0)
 """Share of the network that knows posteriors, for a voice that training knows and for one that it does not."""
 
-
-WEIGHTS = {
-    "network_first": ArraySpec(
-        np.float32, f"{TAPS * STEP * SPECTRUM_BANDS} {HIDDEN_UNITS}", -LARGEST_MEAN, LARGEST_MEAN
-    ),
-    "network_layers": ArraySpec(
-        np.float32, f"{len(DILATIONS) - 1} {TAPS * HIDDEN_UNITS} {HIDDEN_UNITS}", -LARGEST_MEAN, LARGEST_MEAN
-    ),
-    "network_biases": ArraySpec(np.float32, f"{len(DILATIONS)} {HIDDEN_UNITS}", -LARGEST_MEAN, LARGEST_MEAN),
-    "network_output": ArraySpec(np.float32, f"{HIDDEN_UNITS + 1} O", -LARGEST_MEAN, LARGEST_MEAN),
-}
 TARGETS = {
     "network_targets": ArraySpec(np.float64, "2 Q", -1e6, 1e6),
     "network_variances": ArraySpec(np.float64, "3 Q", POSITIVE),
@@ -80,7 +67,7 @@ class AcousticNetwork(Predictor):
     variances: Array
     beside: PosteriorNetwork | None = None
     name: ClassVar[str] = "network"
-    ARRAYS: ClassVar[Mapping[str, ArraySpec]] = WEIGHTS | TARGETS | POSTERIOR_ARRAYS
+    ARRAYS: ClassVar[Mapping[str, ArraySpec]] = SHAPE.specs | TARGETS | POSTERIOR_ARRAYS
     least_motion_s: ClassVar[float] = 120.0
 
     @classmethod
@@ -145,7 +132,7 @@ class AcousticNetwork(Predictor):
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Serialise the network, at half precision."""
         arrays: dict[str, NDArray[Any]] = {
-            name: array.astype(np.float16) for name, array in _network_arrays(self.network).items()
+            name: array.astype(np.float16) for name, array in SHAPE.arrays(self.network).items()
         }
         arrays |= {"network_targets": np.stack([self.mean, self.scale]), "network_variances": self.variances}
         return arrays | (self.beside.arrays() if self.beside is not None else {})
@@ -155,60 +142,25 @@ class AcousticNetwork(Predictor):
         """Deserialise a network; as ``Predictor.from_arrays``."""
         stored = checked_arrays(arrays, TARGETS, Q=dimensions)
         mean, scale = stored["network_targets"]
-        if not (scale > 0).all():
-            raise ValueError("network_targets with a scale that is not more than 0")
+        network = SHAPE.from_arrays(arrays, dimensions + 1)
         beside = posterior_network_from_arrays(arrays, dimensions)
-        return cls(_network_from_arrays(arrays, dimensions), mean, scale, stored["network_variances"], beside)
+        return cls(network, mean, checked_scale(scale, "network_targets"), stored["network_variances"], beside)
 
 
 def _trained(training: PredictorTraining, mean: Array, scale: Array) -> ConvolutionalNetwork:
-    """Return the network, from the checkpoint if it is there; ``mean`` and ``scale`` standardise its targets."""
-    stored = training.checkpoint.load(CHECKPOINT)
-    if stored is not None:
-        return _network_from_arrays(stored, len(mean))
+    """Return the trained network; ``mean`` and ``scale`` standardise its targets."""
     pieces = [
         [_sequence(version, (x - mean) / scale, example.valid) for version in example.condition_spectra]
         for example, x in zip(training.examples, training.values, strict=True)
     ]
     steps = max(training.epochs * -(-len(pieces) // BATCH_SIZE), LEAST_STEPS)
-    weights = np.ones(len(mean) + 1)
-    weights[: training.direct] = DIRECT_WEIGHT
 
     def draw(rng: np.random.Generator, number: int) -> TrainingSequence:
         versions = pieces[number]
         return random_piece(versions[int(rng.integers(len(versions)))], rng)
 
-    def report(step: int, error: float) -> None:
-        if step % 50 == 0 or step == steps:
-            training.monitor(Progress("training the network", step, steps, error))
-
-    network = fit_network(
-        initial_network(STEP * SPECTRUM_BANDS, HIDDEN_UNITS, len(mean) + 1, DILATIONS, SEED),
-        draw,
-        len(pieces),
-        weights,
-        TrainingPlan(steps, BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED),
-        report,
-    )
-    training.checkpoint.save(CHECKPOINT, _network_arrays(network))
-    return network
-
-
-def _network_arrays(network: ConvolutionalNetwork) -> dict[str, NDArray[Any]]:
-    return {
-        "network_first": network.layers[0].weights,
-        "network_layers": np.stack([layer.weights for layer in network.layers[1:]]),
-        "network_biases": np.stack([layer.biases for layer in network.layers]),
-        "network_output": np.concatenate([network.output.weights, network.output.biases[None]]),
-    }
-
-
-def _network_from_arrays(arrays: Arrays, dimensions: int) -> ConvolutionalNetwork:
-    stored = checked_arrays(arrays, WEIGHTS, O=dimensions + 1)
-    weights = [stored["network_first"], *stored["network_layers"]]
-    layers = tuple(LinearMap(each, biases) for each, biases in zip(weights, stored["network_biases"], strict=True))
-    output = stored["network_output"]
-    return ConvolutionalNetwork(layers, DILATIONS, LinearMap(output[:-1], output[-1]))
+    plan = TrainingPlan(steps, BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED)
+    return SHAPE.trained(training, len(mean) + 1, draw, plan)
 
 
 def _steps(spectrum: NDArray[np.floating]) -> NDArray[np.float32]:

@@ -1,11 +1,25 @@
-"""Time steps of networks, of 40 ms, and the frames of 10 ms between them."""
+"""What networks share: time steps of 40 ms, the frames of 10 ms between them, training and storage."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.stats.convolution import TrainingSequence
+from lipmotion.motion.predictors import PredictorTraining
+from lipmotion.stats.convolution import (
+    TAPS,
+    ConvolutionalNetwork,
+    LinearMap,
+    TrainingPlan,
+    TrainingSequence,
+    fit_network,
+    initial_network,
+)
+from lipmotion.storage.schema import LARGEST_MEAN, Arrays, ArraySpec, checked_arrays
+from lipmotion.types import Progress
 
 Array = NDArray[np.float64]
 STEP = 4
@@ -39,3 +53,89 @@ def random_piece(sequence: TrainingSequence, rng: np.random.Generator) -> Traini
     start = int(rng.integers(excess + 1))
     kept = slice(start, start + LONGEST_STEPS)
     return TrainingSequence(sequence.inputs[kept], sequence.targets[kept], sequence.valid[kept])
+
+
+@dataclass(frozen=True)
+class NetworkShape:
+    """Shape of a convolutional network, and how it is trained and stored.
+
+    prefix       : of the names of its arrays in a model file
+    name         : in messages and of its checkpoint
+    inputs       : values of a time step
+    hidden_units : of every hidden layer
+    dilations    : time steps between the taps of each layer
+    """
+
+    prefix: str
+    name: str
+    inputs: int
+    hidden_units: int
+    dilations: tuple[int, ...]
+
+    @property
+    def specs(self) -> dict[str, ArraySpec]:
+        """Shapes and ranges of the arrays; ``O`` is the number of outputs."""
+        hidden, later = self.hidden_units, len(self.dilations) - 1
+        shapes = {
+            "first": f"{TAPS * self.inputs} {hidden}",
+            "layers": f"{later} {TAPS * hidden} {hidden}",
+            "biases": f"{later + 1} {hidden}",
+            "output": f"{hidden + 1} O",
+        }
+        return {
+            f"{self.prefix}_{name}": ArraySpec(np.float32, shape, -LARGEST_MEAN, LARGEST_MEAN)
+            for name, shape in shapes.items()
+        }
+
+    def arrays(self, network: ConvolutionalNetwork) -> dict[str, NDArray[np.float32]]:
+        """Return the arrays of a network of this shape."""
+        values = (
+            network.layers[0].weights,
+            np.stack([layer.weights for layer in network.layers[1:]]),
+            np.stack([layer.biases for layer in network.layers]),
+            np.concatenate([network.output.weights, network.output.biases[None]]),
+        )
+        return dict(zip(self.specs, values, strict=True))
+
+    def from_arrays(self, arrays: Arrays, outputs: int) -> ConvolutionalNetwork:
+        """Return the network of arrays.
+
+        Raises KeyError, ValueError: an array is missing, or has a wrong shape, type or range.
+        """
+        stored = checked_arrays(arrays, self.specs, O=outputs)
+        first, later, biases, output = (stored[name] for name in self.specs)
+        layers = tuple(LinearMap(each, bias) for each, bias in zip([first, *later], biases, strict=True))
+        return ConvolutionalNetwork(layers, self.dilations, LinearMap(output[:-1], output[-1]))
+
+    def trained(
+        self,
+        training: PredictorTraining,
+        outputs: int,
+        draw: Callable[[np.random.Generator, int], TrainingSequence],
+        plan: TrainingPlan,
+    ) -> ConvolutionalNetwork:
+        """Return a network that is trained on the examples of ``training``; from its checkpoint, if that is there.
+
+        draw : returns the inputs and targets of the example of a number, or a piece of them
+        """
+        stored = training.checkpoint.load(self.name)
+        if stored is not None:
+            return self.from_arrays(stored, outputs)
+        weights = np.ones(outputs)
+        weights[: training.direct] = DIRECT_WEIGHT
+
+        def report(step: int, error: float) -> None:
+            if step % 50 == 0 or step == plan.steps:
+                training.monitor(Progress(f"training the {self.name}", step, plan.steps, error))
+
+        start = initial_network(self.inputs, self.hidden_units, outputs, self.dilations, plan.seed)
+        network = fit_network(start, draw, len(training.examples), weights, plan, report)
+        training.checkpoint.save(self.name, self.arrays(network))
+        return network
+
+
+def checked_scale(scale: Array, name: str) -> Array:
+    """Return standard deviations of targets, as stored; raise ValueError where one is not more than 0."""
+    if not (scale > 0).all():
+        raise ValueError(f"{name} with a scale that is not more than 0")
+    return scale

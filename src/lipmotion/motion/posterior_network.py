@@ -10,19 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.motion.network_steps import DIRECT_WEIGHT, LEAST_DEVIATION, STEP, between_steps, random_piece
-from lipmotion.motion.predictors import PredictorTraining
-from lipmotion.stats.convolution import (
-    TAPS,
-    ConvolutionalNetwork,
-    LinearMap,
-    TrainingPlan,
-    TrainingSequence,
-    fit_network,
-    initial_network,
+from lipmotion.motion.network_steps import (
+    LEAST_DEVIATION,
+    STEP,
+    NetworkShape,
+    between_steps,
+    checked_scale,
+    random_piece,
 )
+from lipmotion.motion.predictors import PredictorTraining
+from lipmotion.stats.convolution import ConvolutionalNetwork, TrainingPlan, TrainingSequence
 from lipmotion.storage.schema import LARGEST_MEAN, Arrays, ArraySpec, checked_arrays
-from lipmotion.types import Progress, TokenPosteriors
+from lipmotion.types import TokenPosteriors
 
 Array = NDArray[np.float64]
 ROWS = 2
@@ -34,28 +33,19 @@ LEAST_LOG_POSTERIOR = -12.0
 """Smaller logarithms count as this: the network does not mean them."""
 INPUT_SCALE = 2.0
 """Standard deviation of the first principal component as input; the others keep their proportions to it."""
-HIDDEN_UNITS, DILATIONS = 96, (1, 2, 4, 1, 2, 4)
-"""Units of a hidden layer, and time steps between its taps: its input is 0.56 s before and after a frame."""
-STEPS, BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED = 800, 16, 2e-3, 0.4, 0
-CHECKPOINT = "posterior-network"
+SHAPE = NetworkShape("posterior", "posterior-network", ROWS * COMPONENTS, 96, (1, 2, 4, 1, 2, 4))
+"""Its input is 0.56 s before and after a frame."""
+PLAN = TrainingPlan(steps=800, batch_size=16, rate=2e-3, dropout=0.4, seed=0)
 LARGEST_COMPONENT = 100.0
 """More is in no basis."""
 
-WEIGHTS = {
-    "posterior_first": ArraySpec(np.float32, f"{TAPS * ROWS * COMPONENTS} {HIDDEN_UNITS}", -LARGEST_MEAN, LARGEST_MEAN),
-    "posterior_layers": ArraySpec(
-        np.float32, f"{len(DILATIONS) - 1} {TAPS * HIDDEN_UNITS} {HIDDEN_UNITS}", -LARGEST_MEAN, LARGEST_MEAN
-    ),
-    "posterior_biases": ArraySpec(np.float32, f"{len(DILATIONS)} {HIDDEN_UNITS}", -LARGEST_MEAN, LARGEST_MEAN),
-    "posterior_output": ArraySpec(np.float32, f"{HIDDEN_UNITS + 1} Q", -LARGEST_MEAN, LARGEST_MEAN),
-}
 TARGETS = {
     "posterior_mean": ArraySpec(np.float32, "K", -LARGEST_MEAN, LARGEST_MEAN),
     "posterior_basis": ArraySpec(np.float32, f"K {COMPONENTS}", -LARGEST_COMPONENT, LARGEST_COMPONENT),
     "posterior_targets": ArraySpec(np.float64, "2 Q", -1e6, 1e6),
     "posterior_source": ArraySpec(np.str_, "1"),
 }
-POSTERIOR_ARRAYS = WEIGHTS | TARGETS
+POSTERIOR_ARRAYS = SHAPE.specs | TARGETS
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +80,7 @@ class PosteriorNetwork:
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Serialise the network, at half precision."""
-        arrays = _weights(self.network) | {"posterior_mean": self.mean, "posterior_basis": self.basis}
+        arrays = SHAPE.arrays(self.network) | {"posterior_mean": self.mean, "posterior_basis": self.basis}
         return {name: array.astype(np.float16) for name, array in arrays.items()} | {
             "posterior_targets": np.stack([self.centre, self.scale]),
             "posterior_source": np.array([self.source]),
@@ -112,30 +102,8 @@ def fit_posterior_network(training: PredictorTraining, centre: Array, scale: Arr
         _sequence(_steps(row, mean, basis), (x - centre) / scale, example.valid)
         for row, x, example in zip(rows, training.values, training.examples, strict=True)
     ]
-    weights = np.ones(len(centre))
-    weights[: training.direct] = DIRECT_WEIGHT
-    stored = training.checkpoint.load(CHECKPOINT)
-    network = _network(stored, len(centre)) if stored is not None else _trained(training, pieces, weights)
+    network = SHAPE.trained(training, len(centre), lambda rng, number: random_piece(pieces[number], rng), PLAN)
     return PosteriorNetwork(network, mean, basis, centre, scale, known[0].source)
-
-
-def _trained(training: PredictorTraining, pieces: Sequence[TrainingSequence], weights: Array) -> ConvolutionalNetwork:
-    """Return the trained network, which is stored as a checkpoint."""
-
-    def report(step: int, error: float) -> None:
-        if step % 50 == 0 or step == STEPS:
-            training.monitor(Progress("training the network of posteriors", step, STEPS, error))
-
-    network = fit_network(
-        initial_network(ROWS * COMPONENTS, HIDDEN_UNITS, len(weights), DILATIONS, SEED),
-        lambda rng, number: random_piece(pieces[number], rng),
-        len(pieces),
-        weights,
-        TrainingPlan(STEPS, BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED),
-        report,
-    )
-    training.checkpoint.save(CHECKPOINT, _weights(network))
-    return network
 
 
 def posterior_network_from_arrays(arrays: Arrays, dimensions: int) -> PosteriorNetwork | None:
@@ -148,33 +116,14 @@ def posterior_network_from_arrays(arrays: Arrays, dimensions: int) -> PosteriorN
         return None
     stored = checked_arrays(arrays, TARGETS, Q=dimensions)
     centre, scale = stored["posterior_targets"]
-    if not (scale > 0).all():
-        raise ValueError("posterior_targets with a scale that is not more than 0")
     return PosteriorNetwork(
-        _network(arrays, dimensions),
+        SHAPE.from_arrays(arrays, dimensions),
         stored["posterior_mean"],
         stored["posterior_basis"],
         centre,
-        scale,
+        checked_scale(scale, "posterior_targets"),
         str(stored["posterior_source"][0]),
     )
-
-
-def _weights(network: ConvolutionalNetwork) -> dict[str, NDArray[np.float32]]:
-    return {
-        "posterior_first": network.layers[0].weights,
-        "posterior_layers": np.stack([layer.weights for layer in network.layers[1:]]),
-        "posterior_biases": np.stack([layer.biases for layer in network.layers]),
-        "posterior_output": np.concatenate([network.output.weights, network.output.biases[None]]),
-    }
-
-
-def _network(arrays: Arrays, dimensions: int) -> ConvolutionalNetwork:
-    stored = checked_arrays(arrays, WEIGHTS, Q=dimensions)
-    weights = [stored["posterior_first"], *stored["posterior_layers"]]
-    layers = tuple(LinearMap(each, biases) for each, biases in zip(weights, stored["posterior_biases"], strict=True))
-    output = stored["posterior_output"]
-    return ConvolutionalNetwork(layers, DILATIONS, LinearMap(output[:-1], output[-1]))
 
 
 def _principal_components(rows: Sequence[NDArray[np.float32]]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

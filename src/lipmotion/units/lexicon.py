@@ -11,15 +11,13 @@ from pathlib import Path
 
 from lipmotion.errors import InputError, MissingDependencyError, shortened
 from lipmotion.storage.files import read_text_file
-from lipmotion.units.phones import PHONES, is_silent
+from lipmotion.units.phones import PHONES, REDUCED_VOWELS, is_silent
 from lipmotion.units.spelling import guess_pronunciation, without_accents
 from lipmotion.units.spelling_network import network_pronunciation
 from lipmotion.units.text_normalisation import normalised_text
 
 Pronunciation = tuple[str, ...]
 
-REDUCED_VOWELS = {"ah": "ax", "er": "axr", "ih": "ix"}
-"""ARPAbet vowels to the inventory's names of their unstressed forms."""
 FULL_VOWELS = frozenset("aa ae ao aw ay eh ey iy ow oy uh uw".split())
 WEAK_WORDS = frozenset("a an the of and from was but than that's her were your for if in is it its".split())
 """Monosyllables that are unstressed in running speech."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 from lipmotion.errors import shortened
 from lipmotion.types import Timeline, Unit
@@ -13,6 +13,11 @@ PAUSE = "sp"
 """A pause between words that is too short to be silence."""
 
 PHONES: tuple[str, ...] = tuple(sorted(VISEME_OF))
+
+REDUCED_VOWELS = {"ah": "ax", "er": "axr", "ih": "ix"}
+"""Vowels to their unstressed forms."""
+FULL_FORMS = {reduced: vowel for vowel, reduced in REDUCED_VOWELS.items()} | {"el": "l", "em": "m", "en": "n"}
+"""Unstressed vowels and syllabic consonants to the phones that a dictionary writes for them."""
 
 LIP_CLOSING: tuple[str, ...] = (*VISEMES["bi"], "em")
 """The phones in which the lips meet."""
@@ -67,6 +72,24 @@ SIMILAR_PHONES: dict[str, tuple[str, ...]] = {
     "sil": ("sp",),
     "sp": ("sil",),
 }
+
+
+def phone_edits(wanted: Sequence[str], found: Sequence[str]) -> int:
+    """Return the fewest substitutions, insertions and deletions that make one sequence of phones of another.
+
+    Full and reduced forms of a phone count as the same.
+    Source: Wagner & Fischer 1974.
+
+    >>> phone_edits(["ax", "b", "el"], ["ah", "b", "l"])
+    0
+    """
+    row = list(range(len(found) + 1))
+    for number, phone in enumerate(wanted, 1):
+        above, row = row, [number]
+        for column, other in enumerate(found, 1):
+            differs = FULL_FORMS.get(phone, phone) != FULL_FORMS.get(other, other)
+            row.append(min(above[column] + 1, row[-1] + 1, above[column - 1] + differs))
+    return row[-1]
 
 
 def is_silent(phone: str) -> bool:

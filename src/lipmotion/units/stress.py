@@ -7,10 +7,10 @@ from itertools import pairwise
 
 from lipmotion.types import Timeline, Unit
 from lipmotion.units.classes import phone_classes
-from lipmotion.units.lexicon import REDUCED_VOWELS, WEAK_WORDS, Lexicon
-from lipmotion.units.phones import is_silent
+from lipmotion.units.lexicon import WEAK_WORDS, Lexicon
+from lipmotion.units.phones import FULL_FORMS, is_silent
 
-REDUCED = frozenset({*REDUCED_VOWELS.values(), "el", "em", "en"})
+REDUCED = frozenset(FULL_FORMS)
 """Vowels, and consonants in the place of a vowel, that are not stressed in a word with a full vowel."""
 NUCLEI = phone_classes()["vowel"] | REDUCED
 """The phones that make a syllable."""

@@ -21,6 +21,7 @@ from lipmotion.units import (
     with_confidences,
     with_reduced_vowels,
 )
+from lipmotion.units.phones import REDUCED_VOWELS
 from lipmotion.units.spoken_text import line_words
 
 SILENCES = frozenset(["", *"sil sp spn pau ssil nsn h# #h # _ - silence <sil> <p:> {sil} [sil] <eps>".split()])
@@ -36,7 +37,6 @@ RECOGNISED_LABEL = re.compile(r"(\S+) (0|1|1\.0|0\.\d+|\d(?:\.\d+)?e-\d+)")
 """A phone or unit, and its confidence from 0 to 1."""
 MOST_LABELS = 250_000
 """Most labels of a file: phones of five hours of speech."""
-REDUCED_VOWELS = frozenset({"ax", "axr", "ix"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +152,7 @@ def phone_timeline(tier: LabelTier, words: LabelTier | None, where: str, *, with
             )
     labels = _without_states(tier.labels)
     phones = [_required_phone(label, where) for label in labels]
-    marked = any(re.search(r"\d$", label.text) for label in labels) or REDUCED_VOWELS & set(phones)
+    marked = any(re.search(r"\d$", label.text) for label in labels) or set(REDUCED_VOWELS.values()) & set(phones)
     if words is not None and not marked:
         phones = _reduced(labels, phones, words)
     starts_s = [label.start_s for label in labels]

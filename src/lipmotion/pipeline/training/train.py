@@ -29,16 +29,15 @@ from lipmotion.pipeline.training.channels import (
     with_common_channels,
     with_visual_channels,
 )
-from lipmotion.pipeline.training.condition_spectra import with_conditions
 from lipmotion.pipeline.training.fingerprint import fingerprint
 from lipmotion.pipeline.training.labels import label_utterances
 from lipmotion.pipeline.training.other_speakers import VoiceExample
+from lipmotion.pipeline.training.sound_inputs import with_sound_inputs
 from lipmotion.pipeline.training.transcripts import warn_of_doubtful_transcripts, warn_of_missing_transcripts
 from lipmotion.pipeline.understand.transcribe import phones_in_time, warn_of_guesses
 from lipmotion.pipeline.workers import worker_pool
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.spectrum import spectrum
-from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser, token_posteriors
 from lipmotion.speech.recognition.phone_models import train_phone_models
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
@@ -175,9 +174,8 @@ def train(  # noqa: PLR0913
         speaker_of = {utterance.name: utterance.speaker for utterance in utterances}
         examples, speakers = _of_the_mean_person(examples, speaker_of)
         examples = [replace(example, speech=with_prior(prior, example.speech)) for example in examples]
-        monitor = sub_monitor(run.monitor, 0.5, 0.55)
-        examples = with_posteriors(engine, utterances, examples, monitor, team.ordered_map)
-        examples = _in_conditions(engine, utterances, examples, sub_monitor(run.monitor, 0.55, 0.6), team.ordered_map)
+        sound = {utterance.name: utterance.audio for utterance in utterances}
+        examples = with_sound_inputs(engine, examples, sound, sub_monitor(run.monitor, 0.5, 0.6), team.ordered_map)
     fit = engine.fit([*examples, *speech_examples], sub_monitor(run.monitor, 0.6, 1, "learning motion: "), checkpoint)
     if not fit.uses_prior:
         prior = None
@@ -272,49 +270,6 @@ def _of_the_mean_person(
     if len(set(filter(None, names))) < 2:
         return examples, None
     return mean_person_examples(examples, names)
-
-
-def _in_conditions(
-    engine: Engine[Any],
-    utterances: Sequence[Utterance],
-    examples: Sequence[Example],
-    monitor: Monitor,
-    each: ParallelMap,
-) -> list[Example]:
-    """Return the examples in all acoustic conditions that the engine's training uses."""
-    count = engine.inputs(_motion_s(examples)).conditions
-    if not count:
-        return list(examples)
-    audio = {utterance.name: utterance.audio for utterance in utterances}
-    return with_conditions(examples, [audio[example.name] for example in examples], count, monitor, each)
-
-
-def with_posteriors(
-    engine: Engine[Any],
-    utterances: Sequence[Utterance],
-    examples: Sequence[Example],
-    monitor: Monitor,
-    each: ParallelMap,
-) -> list[Example]:
-    """Return examples with the posteriors of a phone recogniser (``Speech.posteriors``), if the engine uses them.
-
-    utterances : those of the examples are among them
-    each       : applies a function to many items, perhaps in several processes
-    """
-    if not engine.inputs(_motion_s(examples)).posteriors or installed_phone_recogniser() is None:
-        return list(examples)
-    audio = {utterance.name: utterance.audio for utterance in utterances}
-    result: list[Example] = []
-    found = each(token_posteriors, (audio[example.name] for example in examples))
-    for example, posteriors in zip(examples, found, strict=True):
-        result.append(replace(example, speech=replace(example.speech, posteriors=posteriors)))
-        monitor(Progress("posteriors of phones", len(result), len(examples), len(result) / len(examples)))
-    return result
-
-
-def _motion_s(examples: Sequence[Example]) -> float:
-    """Return the seconds of measured motion."""
-    return sum(int(example.valid.sum()) for example in examples) / FRAME_RATE_HZ
 
 
 def _train_phone_models(

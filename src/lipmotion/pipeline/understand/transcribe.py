@@ -14,12 +14,8 @@ from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.mfcc import LOG_ENERGY
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit, transcript_fit
 from lipmotion.speech.recognition.anchors import anchors_of, fitted
-from lipmotion.speech.recognition.network.posteriors import (
-    POSTERIOR_STEP,
-    installed_phone_recogniser,
-    recording_posteriors,
-)
-from lipmotion.speech.recognition.recogniser import ENERGY_SMOOTHING_FRAMES, Recogniser
+from lipmotion.speech.recognition.network.posteriors import POSTERIOR_STEP, recording_posteriors
+from lipmotion.speech.recognition.recogniser import ENERGY_SMOOTHING_FRAMES, Recogniser, network_of
 from lipmotion.speech.recognition.transcript_evidence import DOUBTFUL_LOSS, transcript_evidence
 from lipmotion.speech.voices.pronunciations import LanguageLexicon
 from lipmotion.storage.files import read_text_file
@@ -78,7 +74,7 @@ def transcribe(
     if words is None or phones.kind == "own":
         return Transcription(units, None)
     fit = transcript_fit(audio, units)
-    name = installed_phone_recogniser() if phones.kind == "auto" and not isinstance(lexicon, LanguageLexicon) else None
+    name = None if isinstance(lexicon, LanguageLexicon) else network_of(phones.kind)
     if name is not None:
         posteriors = recording_posteriors(name, analysed(audio)).of_phones.astype(float)
         fit = fit.with_evidence(transcript_evidence(posteriors, POSTERIOR_STEP / FRAME_RATE_HZ, units))

@@ -26,7 +26,13 @@ from lipmotion.speech.recognition.agreement import TranscriptFit
 from lipmotion.speech.recognition.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
 from lipmotion.speech.recognition.network.posteriors import token_posteriors
 from lipmotion.speech.recognition.recognised_speech import Recognition, level_range_db
-from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, Recogniser, cached_recogniser, voice_knowledge
+from lipmotion.speech.recognition.recogniser import (
+    RECOGNISER_KINDS,
+    Recogniser,
+    cached_recogniser,
+    network_of,
+    voice_knowledge,
+)
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ, read_audio
 from lipmotion.storage.sources import is_file
 from lipmotion.types import (
@@ -240,7 +246,8 @@ def speech_of(
     inputs = engine.inputs()
     f0 = log_f0(audio) if inputs.f0 else None
     spectrum = analysed(audio).spectrum if inputs.conditions else None
-    posteriors = token_posteriors(audio, each) if inputs.posteriors and kind == "auto" else None
+    network = network_of(kind) if inputs.posteriors else None
+    posteriors = token_posteriors(network, audio, each) if network is not None else None
     return with_units(Speech(features, Timeline(()), f0, spectrum=spectrum, posteriors=posteriors), units)
 
 

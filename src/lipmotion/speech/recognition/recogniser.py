@@ -123,7 +123,7 @@ class Recogniser:
         audio = analysed(audio, features)
         similarity = self._similarity(audio)
         known = self._knows_voice_and_words(similarity)
-        network = None if known else self._network
+        network = None if known else network_of(self.kind)
         if network is not None:
             found = posterior_stretches(network, audio, each)
             least = LEAST_IN_NOISE if level_range_db(audio.log_energy) < NOISE_RANGE_DB else LEAST_POSTERIOR
@@ -138,11 +138,6 @@ class Recogniser:
             parts, recognised = self._word_search(audio, hmm, log_likelihoods, path).words_of(spoken)
             labels = spliced(labels if self.kind == "auto" else [LabelledFrames(0, SILENCE)], parts, len(path))
         return _recognition(labels, recognised, len(path), features.duration_s, similarity)
-
-    @property
-    def _network(self) -> str | None:
-        """The name of the phone recogniser that this one uses."""
-        return installed_phone_recogniser() if self.kind == "auto" else None
 
     def _network_recognition(
         self,
@@ -340,6 +335,11 @@ def _recognition(
     named = [(label.phone, recognised[label.word].text if label.word >= 0 else "") for label in labels]
     units = _timeline(named, np.array([*(label.first for label in labels), frames]), duration_s)
     return recognition_of(units, labels, recognised, similarity.score if similarity is not None else None)
+
+
+def network_of(kind: str) -> str | None:
+    """Return the name of the phone recogniser that a kind of recogniser uses; None: none, or none is installed."""
+    return installed_phone_recogniser() if kind == "auto" else None
 
 
 @lru_cache(maxsize=4)

@@ -7,14 +7,8 @@ import threading
 from functools import cache
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from lipmotion.errors import MissingDependencyError
-from lipmotion.speech.features.mfcc import HOP
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
-from lipmotion.speech.sound.voice_activity import Stretch
-from lipmotion.types import Audio
 from lipmotion.units.lexicon import english_data
 
 
@@ -30,15 +24,8 @@ VARIANT = re.compile(r"\(\d+\)$")
 OPTIONS = {"fwdflat": False, "maxhmmpf": 10_000}
 """One pass over the tree of all words finds more phones, and faster, than with a second one over the words that it
 found (decision 13)."""
-FULL_SCALE = 32767
 _LOCK = threading.Lock()
 """A decoder works on one recording at a time."""
-
-
-def stretch_samples(audio: Audio, stretch: Stretch) -> bytes:
-    """Return the samples of a stretch as 16-bit integers, which ``words_in`` takes."""
-    samples: NDArray[np.float32] = audio.samples[stretch.first * HOP : stretch.end * HOP]
-    return (np.clip(samples, -1, 1) * FULL_SCALE).astype("<i2").tobytes()
 
 
 def words_in(samples: bytes) -> tuple[FoundWord, ...]:

@@ -13,10 +13,9 @@ from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.speech.recognition.combined_phones import NOISES
 from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, most_similar_phone
+from lipmotion.units.phones import FULL_FORMS
 
-GENERAL_FORM = {"ax": "ah", "axr": "er", "ix": "ih", "el": "l", "em": "m", "en": "n", PAUSE: SILENCE} | dict.fromkeys(
-    NOISES, SILENCE
-)
+COMPARED_FORMS = FULL_FORMS | {PAUSE: SILENCE} | dict.fromkeys(NOISES, SILENCE)
 """Phones that count as another one when phones of words and phones without words are compared."""
 REACH_FRAMES = 2
 """A phone of a word may be so many frames earlier or later than in its alignment; its bonus falls linearly."""
@@ -110,4 +109,4 @@ def phone_bonus(hmm: UnitHmm, aligned: AlignedWords, bonus: float) -> NDArray[np
 def _form(name: str) -> str:
     """Return the general form of the phone of a density."""
     phone = name.partition(".")[0]
-    return GENERAL_FORM.get(phone, phone)
+    return COMPARED_FORMS.get(phone, phone)

@@ -22,9 +22,9 @@ from lipmotion.speech.recognition.recognised_speech import (
     labels_of_words,
     spliced,
 )
-from lipmotion.speech.recognition.word_decoder import FoundWord, stretch_samples, words_in
+from lipmotion.speech.recognition.word_decoder import FoundWord, words_in
 from lipmotion.speech.recognition.word_fit import AlignedWords, align_recognised_words, phone_bonus
-from lipmotion.speech.sound.voice_activity import Stretch, stretches_of_sound
+from lipmotion.speech.sound.voice_activity import Stretch, stretch_samples, stretches_of_sound
 from lipmotion.types import ParallelMap
 from lipmotion.units import SILENCE, Lexicon
 

@@ -8,6 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.hmm.loudness import loud_frames
+from lipmotion.speech.features.mfcc import HOP
+from lipmotion.types import Audio
+from lipmotion.types.audio import sixteen_bits
 
 LOUD_SHARE = 0.3
 """Sound is louder than this share of the way from the recording's quiet frames to its loud ones."""
@@ -73,3 +76,8 @@ def _cut(stretch: Stretch, log_energy: NDArray[np.float32]) -> list[Stretch]:
 def _smooth(log_energy: NDArray[np.float32]) -> NDArray[np.float32]:
     padded = np.pad(log_energy, SMOOTHING_FRAMES // 2, "edge")
     return np.convolve(padded, np.full(SMOOTHING_FRAMES, 1 / SMOOTHING_FRAMES), "valid").astype(np.float32)
+
+
+def stretch_samples(audio: Audio, stretch: Stretch) -> bytes:
+    """Return the samples of a stretch of a recording at 16 kHz, as 16-bit integers."""
+    return sixteen_bits(audio.samples[stretch.first * HOP : stretch.end * HOP]).astype("<i2").tobytes()

@@ -18,8 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.speech.recognition.network.posteriors import PhonePosteriors
-from lipmotion.speech.recognition.network.word_tree import FORM_OF, NO_WORD, SOUNDS, EnglishWords
+from lipmotion.speech.recognition.network.word_tree import NO_WORD, SOUNDS, EnglishWords
 from lipmotion.units import PHONES
+from lipmotion.units.phones import FULL_FORMS
 
 BEAM, MOST_PATHS = 10.0, 1000
 """Paths that are so many nats less probable than the best one, or not among so many best ones, are given up."""
@@ -69,7 +70,7 @@ def scored(posteriors: PhonePosteriors) -> Scored:
     phones = np.exp(posteriors.of_phones.astype(float))
     sounds = np.zeros((len(phones), len(SOUNDS)))
     for column, phone in enumerate(PHONES):
-        form = FORM_OF.get(phone, phone)
+        form = FULL_FORMS.get(phone, phone)
         if form in SOUNDS:
             sounds[:, SOUNDS.index(form)] += phones[:, column]
     boundary = np.exp(posteriors.word_boundary.astype(float))

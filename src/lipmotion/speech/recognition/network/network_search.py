@@ -17,7 +17,7 @@ from lipmotion.speech.recognition.network.posteriors import (
     PhonePosteriors,
     PosteriorStretch,
 )
-from lipmotion.speech.recognition.network.word_tree import FORM_OF, english_words
+from lipmotion.speech.recognition.network.word_tree import english_words
 from lipmotion.speech.recognition.recognised_speech import (
     LabelledStretch,
     RecognisedWord,
@@ -27,6 +27,7 @@ from lipmotion.speech.recognition.word_fit import align_recognised_words
 from lipmotion.speech.sound.voice_activity import Stretch
 from lipmotion.units import Lexicon, Pronunciation
 from lipmotion.units.ipa_phones import token_phones
+from lipmotion.units.phones import phone_edits
 
 AGREEMENT_WEIGHT, POSTERIOR_WEIGHT, CONSTANT = 0.9, 4.1, -2.7
 """Coefficients of the confidence of a word: by the share of its phones that the network finds without words, and the
@@ -131,17 +132,3 @@ def _confidence(
     agreement = max(1 - phone_edits(variant, found) / max(len(variant), len(found)) for variant in variants)
     score = AGREEMENT_WEIGHT * agreement + POSTERIOR_WEIGHT * sure + CONSTANT
     return float(1 / (1 + np.exp(-score)))
-
-
-def phone_edits(one: Pronunciation, other: list[str]) -> int:
-    """Return the fewest substitutions, insertions and deletions between phones; forms of one phone are the same.
-
-    Source: Wagner & Fischer 1974.
-    """
-    row = list(range(len(other) + 1))
-    for number, phone in enumerate(one, 1):
-        above, row = row, [number]
-        for column, found in enumerate(other, 1):
-            differs = FORM_OF.get(phone, phone) != FORM_OF.get(found, found)
-            row.append(min(above[column] + 1, row[-1] + 1, above[column - 1] + differs))
-    return row[-1]

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.extensions import Registry
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
-from lipmotion.speech.recognition.word_decoder import FULL_SCALE, stretch_samples
-from lipmotion.speech.sound.voice_activity import Stretch, stretches_of_sound
+from lipmotion.speech.sound.voice_activity import Stretch, stretch_samples, stretches_of_sound
 from lipmotion.types import Audio, ParallelMap, TokenPosteriors
+from lipmotion.types.audio import from_sixteen_bits
 from lipmotion.units import PHONES
 from lipmotion.units.ipa_phones import token_phones
 
@@ -208,15 +208,12 @@ def recording_posteriors(name: str, audio: AnalysedAudio, each: ParallelMap = ma
     return audio.once(f"all posteriors of {name}", joined)
 
 
-def token_posteriors(audio: Audio, each: ParallelMap = map) -> TokenPosteriors | None:
-    """Return the posteriors in a recording as the input of an engine; None where no phone recogniser is installed.
+def token_posteriors(name: str, audio: Audio, each: ParallelMap = map) -> TokenPosteriors:
+    """Return the posteriors in a recording as the input of an engine.
 
-    audio : an ``AnalysedAudio`` shares them with what recognises its phones
-    each  : as of ``posterior_stretches``
+    audio      : an ``AnalysedAudio`` shares them with what recognises its phones
+    name, each : as of ``posterior_stretches``, whose errors it raises
     """
-    name = installed_phone_recogniser()
-    if name is None:
-        return None
     values = recording_posteriors(name, analysed(audio), each).values.astype(np.float16)
     mean = mean_posterior(posterior_stretches(name, analysed(audio), each))
     return TokenPosteriors(values, phone_recogniser(name).source, mean)
@@ -228,7 +225,7 @@ def stretch_posteriors(name: str, samples: bytes) -> NDArray[np.float16]:
     name    : of the phone recogniser
     samples : 16-bit integers at 16 kHz
     """
-    numbers = np.frombuffer(samples, "<i2").astype(np.float32) / np.float32(FULL_SCALE)
+    numbers = from_sixteen_bits(np.frombuffer(samples, "<i2"))
     return phone_recogniser(name).log_posteriors(numbers).astype(np.float16)
 
 

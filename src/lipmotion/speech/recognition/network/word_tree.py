@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import MissingDependencyError
 from lipmotion.units import PHONES, is_silent
-from lipmotion.units.lexicon import REDUCED_VOWELS, english_data
+from lipmotion.units.lexicon import english_data
+from lipmotion.units.phones import FULL_FORMS
 
-FORM_OF = {reduced: vowel for vowel, reduced in REDUCED_VOWELS.items()} | {"el": "l", "em": "m", "en": "n"}
-"""Phones that the dictionary does not tell from another one."""
-SOUNDS = tuple(phone for phone in PHONES if not is_silent(phone) and phone not in FORM_OF)
+SOUNDS = tuple(phone for phone in PHONES if not is_silent(phone) and phone not in FULL_FORMS)
 """The phones of the dictionary."""
+NUMBER = {phone: number for number, phone in enumerate(SOUNDS)}
 MOST_WORDS = 40_000
 """So many words are searched, the most probable ones."""
 LONGEST_WORD = 20
@@ -99,29 +99,30 @@ def english_words() -> EnglishWords:
         ) from error
     base = float(np.log(log_math.exp(1)))
     pronounced = _pronunciations()
-    scores = {word: model.prob([word]) * base for word in pronounced}
-    known = sorted((word for word in scores if scores[word] > LEAST_LOG_PROBABILITY), key=lambda word: -scores[word])
-    words = tuple(known[:MOST_WORDS])
-    tree = word_tree([pronounced[word] for word in words], np.array([scores[word] for word in words]) * LANGUAGE_WEIGHT)
+    names = np.array(list(pronounced))
+    scores = np.array([model.prob([word]) for word in pronounced]) * base
+    chosen = np.argsort(-scores, kind="stable")[:MOST_WORDS]
+    chosen = chosen[scores[chosen] > LEAST_LOG_PROBABILITY]
+    words = tuple(names[chosen].tolist())
+    tree = word_tree([_numbers(pronounced[word]) for word in words], scores[chosen] * LANGUAGE_WEIGHT)
     return EnglishWords(tree, LanguageModel(words, model, base))
 
 
-def _pronunciations() -> dict[str, list[bytes]]:
-    """Return the pronunciations of every word: those of the dictionary, and those that phone networks write.
-
-    Each is the numbers of its phones in ``SOUNDS``, a byte a phone.
-    """
-    found: dict[str, list[bytes]] = {}
-    number = {name: bytes([place]) for place, name in enumerate(SOUNDS)}
-    number |= {name.upper(): place for name, place in number.items()}
+def _pronunciations() -> dict[str, list[str]]:
+    """Return the pronunciations of every word: those of the dictionary, and those that phone networks write."""
+    found: dict[str, list[str]] = {}
     written = resources.files(__package__).joinpath("written_words.txt").read_text(encoding="ascii")
     lines = (english_data() / "cmudict-en-us.dict").read_text(encoding="utf-8")
     for line in (lines + written).splitlines():
-        word, *phones = line.split()
-        if len(phones) <= LONGEST_WORD:
-            name = word[:-3] if word.endswith(")") else word
-            found.setdefault(name, []).append(b"".join([number[phone] for phone in phones]))
+        word, _, phones = line.partition(" ")
+        found.setdefault(word[:-3] if word.endswith(")") else word, []).append(phones)
     return found
+
+
+def _numbers(pronunciations: list[str]) -> list[bytes]:
+    """Return the numbers of the phones in ``SOUNDS``, a byte a phone, of all pronunciations that are short enough."""
+    each = (pronunciation.lower().split() for pronunciation in pronunciations)
+    return [bytes([NUMBER[phone] for phone in phones]) for phones in each if len(phones) <= LONGEST_WORD]
 
 
 def word_tree(pronunciations: list[list[bytes]], scores: NDArray[np.float64]) -> WordTree:
