@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -11,13 +12,20 @@ from numpy.typing import NDArray
 
 from lipmotion.motion.closure import REACH_S, closable_ranges
 from lipmotion.motion.space import MotionSpace
-from lipmotion.motion.unknown_voice import INSET_S, closing_reach_s, typical_range
+from lipmotion.motion.unknown_voice import (
+    INSET_S,
+    OPENING_BY_DURATION,
+    VOWEL_S,
+    closing_reach_s,
+    typical_range,
+    with_vowel_durations,
+)
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.understood_speech import understand
 from lipmotion.speech.recognition.recogniser import voice_knowledge
 from lipmotion.testing.examples import timeline
-from lipmotion.types import Constraints, Generation, Motion, Pin, Speech
+from lipmotion.types import Constraints, Generation, Motion, Pin, Span, Speech, Timeline, Unit
 from lipmotion.units import VOWELS
 
 WELCOME = Path(__file__).parent.parent.parent / "examples" / "welcome.flac"
@@ -49,6 +57,23 @@ def shut_share(generation: Generation) -> float:
     opening = generation.motion["opening"]
     vowels = [opening[int(s.start_s * 100) : int(s.end_s * 100)] for s in generation.units if s.label.phone in VOWELS]
     return float((np.concatenate(vowels) < SHUT_OPENING).mean())
+
+
+@pytest.mark.parametrize(("voice", "change"), [(0.0, 1.0), (0.75, 0.5), (1.0, 0.0)])
+def test_long_vowels_are_more_open_and_short_ones_less(voice: float, change: float) -> None:
+    prior = load_model().learned.motion.prior
+    seconds = np.cumsum([0, 0.5, 0.5, 0.5, 0.04, 0.46, VOWEL_S, 0.4]).tolist()
+    phones = ("t", "aa", "t", "aa", "t", "aa", "t")
+    units = Timeline(tuple(Span(*edges, Unit(phone)) for edges, phone in zip(pairwise(seconds), phones, strict=True)))
+    means, precisions = np.zeros((250, 3, prior.matrix.shape[1])), np.ones((250, 3, prior.matrix.shape[1]))
+    statistics = with_vowel_durations(lambda frames: (means[frames], precisions[frames]), prior, units, 250, 1.0, voice)
+    deviation = prior.matrix[0, 0]
+    changed, kept = statistics(slice(20, 240))
+    opening = changed[:, 0, 0] / (OPENING_BY_DURATION * deviation)
+    assert opening[75 - 20] == pytest.approx(change * np.log(5), rel=0.01)
+    assert -change <= opening[152 - 20] <= -0.2 * change
+    np.testing.assert_allclose(opening[[5, 185]], 0, atol=0.01)
+    np.testing.assert_array_equal(kept, precisions[20:240])
 
 
 @pytest.mark.parametrize("confidence", CONFIDENCES)

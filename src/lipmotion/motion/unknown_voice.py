@@ -1,4 +1,4 @@
-"""Motion for voices that training does not know: vowels are open, and movements as large as people's are."""
+"""Motion for voices that training does not know: vowels open by their duration, and movements as large as people's."""
 
 from __future__ import annotations
 
@@ -12,18 +12,23 @@ from lipmotion.motion.articulation import (
     TYPICAL_DEVIATIONS,
     ArticulationPrior,
     Statistics,
+    class_means,
     dynamics_of,
+    smoothed,
 )
 from lipmotion.motion.closure import OPENING, REACH_S
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.speaker_knowledge import strangeness
-from lipmotion.types import EYE_DISTANCE, Timeline, Unit, frames_of
+from lipmotion.types import EYE_DISTANCE, FRAME_RATE_HZ, Timeline, Unit, frames_of
 from lipmotion.units import VOWELS
 
 Array = NDArray[np.float64]
 LEAST_OPENING_SHARE = 0.4
 """Share of the opening that the table of articulation gives a vowel, which a voice that training does not know has at
 least: what the model makes of its vowels is shut where it takes them for something else."""
+VOWEL_S, OPENING_BY_DURATION = 0.1, 0.5
+"""A vowel of the first duration is as open as the table says; one that is e times as long is more open by so many
+standard deviations of the speaker, and a shorter one less (docs/results/voices.md)."""
 INSET_S = 0.03
 """The lips of such a voice close in p, b and m further than this from both ends of the phone, or in its middle, so that
 short vowels beside it stay open."""
@@ -66,6 +71,36 @@ def with_open_vowels(
         return means + share[:, None, None] * (dynamics_of(values, chosen) - means), precisions
 
     return opened
+
+
+def with_vowel_durations(
+    statistics: Callable[[slice], Statistics],
+    prior: ArticulationPrior,
+    units: Timeline[Unit],
+    frames: int,
+    reliability: Array | float,
+    voice: float,
+) -> Callable[[slice], Statistics]:
+    """Return means and precisions of ranges of frames, with long vowels more open, and short ones less.
+
+    The arguments are those of ``with_open_vowels``; at ``voice`` 1 nothing changes. All articulators move as from the
+    mean consonant to the mean vowel of the table. Precisions stay those of the model.
+    Source: Lindblom 1963 (vowel reduction): the shorter a vowel, the more it misses its target.
+    """
+    longer = np.zeros((frames, 1))
+    for span in units:
+        if span.label.phone in VOWELS:
+            longer[slice(*frames_of(span, frames))] = np.log(max(span.duration_s, 1 / FRAME_RATE_HZ) / VOWEL_S)
+    more_open = (class_means()[True] - class_means()[False]).mean(axis=0)
+    more_open /= more_open[ARTICULATORS.index(OPENING)]
+    gain = OPENING_BY_DURATION * strangeness(voice) * np.broadcast_to(reliability, frames)[:, None]
+    change = gain * smoothed(longer) * more_open @ prior.matrix
+
+    def changed(chosen: slice) -> Statistics:
+        means, precisions = statistics(chosen)
+        return means + dynamics_of(change, chosen), precisions
+
+    return changed
 
 
 def closing_reach_s(voice: float) -> float:
