@@ -16,6 +16,8 @@ from pathlib import Path
 from threading import RLock
 from typing import Any, Generic, TypeVar
 
+import numpy as np
+
 from lipmotion.articulation.curve_edits import pinned_frame, with_edited_curves, with_gain, with_locked
 from lipmotion.articulation.pauses import with_pauses
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
@@ -71,6 +73,7 @@ from lipmotion.types import (
     Progress,
     Prosody,
     Speech,
+    SpeechKnowledge,
     Timeline,
     Unit,
     frame_of,
@@ -382,4 +385,5 @@ def generation_of(
     if request.onto is None:
         generation = replace(generation, motion=symmetrical(generation.motion, request.asymmetry))
     paused = with_pauses(generation, request.pauses, pinned_s)
-    return replace(paused, outlook=outlook_of(request, understood), about=model.about)
+    knowledge = SpeechKnowledge(understood.speech.voice, float(np.mean(understood.speech.confidence)))
+    return replace(paused, outlook=outlook_of(request, understood), about=model.about, knowledge=knowledge)

@@ -8,6 +8,7 @@ from __future__ import annotations
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from lipmotion.types.audio import Audio, from_sixteen_bits, sixteen_bits
+    from lipmotion.types.confidence import SpeechKnowledge
     from lipmotion.types.configuration import Configuration, Rule, option
     from lipmotion.types.delivery import Delivery
     from lipmotion.types.explanation import (
@@ -88,6 +89,7 @@ __all__ = [
     "Rule",
     "Span",
     "Speech",
+    "SpeechKnowledge",
     "SpokenText",
     "Staging",
     "StateTrace",
@@ -113,7 +115,18 @@ __all__ = [
 ]
 
 _MODULES = (
-    *("configuration", "delivery", "staging", "audio", "features", "timeline", "motion", "generation", "progress"),
+    *(
+        "configuration",
+        "delivery",
+        "staging",
+        "audio",
+        "features",
+        "timeline",
+        "motion",
+        "confidence",
+        "generation",
+        "progress",
+    ),
     *("explanation", "parallel_map", "prosody", "transcript", "utterance"),
 )
 """Where the names are looked for, in this order."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.types.audio import Audio
+from lipmotion.types.confidence import SpeechKnowledge
 from lipmotion.types.features import Features, TokenPosteriors
 from lipmotion.types.motion import Motion, between_frames
 from lipmotion.types.timeline import Timeline, Unit
@@ -278,6 +279,7 @@ class Generation:
     stepped : channels of held poses, which change at once: formats that can say so do
     curve_edits : pins and gains of curves that follow from the motion, as ``jawOpen``, wherever these are made
     about  : corpus, licence and attribution of the model, by name, as ``Model.about``; empty: not from ``animate``
+    knowledge : of voice and phones, from which ``confidence`` follows (None: not from ``animate``)
 
     >>> import lipmotion
     >>> result = lipmotion.animate("examples/welcome.flac")
@@ -295,6 +297,7 @@ class Generation:
     stepped: tuple[str, ...] = ()
     curve_edits: tuple[Pin | Gain, ...] = ()
     about: Mapping[str, Any] = field(default_factory=dict)
+    knowledge: SpeechKnowledge | None = None
 
     def __repr__(self) -> str:
         frames, channels = self.motion.values.shape
@@ -306,6 +309,19 @@ class Generation:
     def variance(self) -> NDArray[np.floating[Any]]:
         """Variance of every channel in every frame [shape=(T, P)]; in long recordings, computed at every access."""
         return self.variance_of(slice(None))
+
+    @property
+    def confidence(self) -> NDArray[np.float64] | None:
+        """How sure the motion of the mouth is in every frame, 0 to 1 [shape=(T,)]: that of its opening.
+
+        0.5 means that an error as large as the movement is to be expected (``SpeechKnowledge.confidence``).
+        None: not from ``animate``, or neither a channel ``opening`` nor ``jawOpen``.
+        """
+        names = [name for name in ("opening", "jawOpen") if name in self.motion.names]
+        if self.knowledge is None or not names or not len(self.motion.values):
+            return None
+        opening = self.selected(names[:1])
+        return self.knowledge.confidence(opening.motion.values[:, 0], opening.variance[:, 0])
 
     def variance_of(self, frames: slice) -> NDArray[np.floating[Any]]:
         """Return the variance of every channel in a range of N frames [shape=(N, P)]."""

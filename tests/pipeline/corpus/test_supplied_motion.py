@@ -17,6 +17,7 @@ from lipmotion.export.base import write_motion
 from lipmotion.export.motion.c3d_file import C3dFile
 from lipmotion.export.motion.c3d_writing import write_c3d
 from lipmotion.meshes.files.live_link_table import SPEECH_CURVES
+from lipmotion.motion import acoustic_network, posterior_network
 from lipmotion.pipeline.corpus import prepare as module
 from lipmotion.pipeline.corpus.prepare import prepare
 from lipmotion.pipeline.corpus.supplied_motion import source_digests, supplied_phones, supplied_track
@@ -166,8 +167,10 @@ def test_labels_that_go_on_after_the_sound():
 
 @pytest.mark.long
 @pytest.mark.recordings
-def test_facegood_from_recordings_to_figures(recordings: Path, tmp_path: Path) -> None:
+def test_facegood_from_recordings_to_figures(recordings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two recordings to train on, the third to test: Mandarin, 30 Hz, 116 blendshapes, no transcript."""
+    monkeypatch.setattr(acoustic_network, "LEAST_STEPS", 100)
+    monkeypatch.setattr(posterior_network, "PLAN", replace(posterior_network.PLAN, steps=100))
     from lipmotion.pipeline.evaluation.evaluate import evaluate
     from lipmotion.pipeline.generate.animate import animate
     from lipmotion.pipeline.model import load_model, save_model

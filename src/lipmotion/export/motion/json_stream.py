@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-MOST_ITEMS = 1 << 20
+MOST_ITEMS = 1 << 22
 """Most items of a list that is not rows of numbers."""
 MOST_ROWS = 1 << 22
 """Most rows of numbers: eleven hours of frames of 10 ms."""

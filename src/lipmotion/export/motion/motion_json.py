@@ -17,14 +17,17 @@ from lipmotion.units import RECOGNISED
 
 
 def write(path: Path, generation: Generation, source: Mapping[str, str], model: Mapping[str, str]) -> None:
-    """Write one JSON object: format, version, rate_hz, channels, values, units, source, model."""
+    """Write one JSON object: format, version, rate_hz, channels, values, confidence, units, source, model."""
     before = as_json(header(generation), ensure_ascii=False)
     after = as_json(units_and_origin(generation, source, model), ensure_ascii=False)
     with path.open("w", encoding="utf-8") as file:
         file.write(f'{before[:-1]}, "values": [\n')
         for number, row in enumerate(formatted_rows(generation.motion.values)):
             file.write(f",\n[{row}]" if number else f"[{row}]")
-        file.write(f"\n], {after[1:]}\n")
+        if (confidence := generation.confidence) is not None:
+            file.write(f'\n], "confidence": {confidence.round(2).tolist()}, {after[1:]}\n')
+        else:
+            file.write(f"\n], {after[1:]}\n")
 
 
 def read(path: Path) -> tuple[Motion, Timeline[Unit]]:

@@ -6,6 +6,7 @@ import json
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +25,7 @@ def write(path: Path, generation: Generation, source: Mapping[str, str], model: 
     """Write ``values`` and ``standard_deviations`` [each shape=(T, P)] and ``document``, the JSON without its values.
 
     A standard deviation is the model's, in the unit of its channel: the square root of ``Generation.variance``.
+    ``confidence`` [shape=(T,)] is ``Generation.confidence``, where that is known.
     """
     document = as_json({**header(generation), **units_and_origin(generation, source, model)}, ensure_ascii=False)
     with path.open("wb") as file:  # given a path, NumPy would add a suffix of its own
@@ -31,7 +33,14 @@ def write(path: Path, generation: Generation, source: Mapping[str, str], model: 
         for start in range(0, len(deviations), FRAMES_AT_ONCE):
             frames = slice(start, start + FRAMES_AT_ONCE)
             deviations[frames] = np.sqrt(np.maximum(generation.variance_of(frames), 0))
-        np.savez(file, values=generation.motion.values, standard_deviations=deviations, document=np.array(document))
+        arrays: dict[str, Any] = {
+            "values": generation.motion.values,
+            "standard_deviations": deviations,
+            "document": np.array(document),
+        }
+        if (confidence := generation.confidence) is not None:
+            arrays["confidence"] = confidence.astype(np.float32)
+        np.savez(file, **arrays)
 
 
 def read(path: Path) -> tuple[Motion, Timeline[Unit]]:

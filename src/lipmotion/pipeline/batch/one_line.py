@@ -22,6 +22,7 @@ from lipmotion.extensions import failed_extension
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.measures.closures import CLOSED_SHARE
 from lipmotion.motion.closure import OPENING, closable_ranges
+from lipmotion.motion.rest import speech_intervals
 from lipmotion.motion.speaker_maps import SpeakerMap
 from lipmotion.pipeline.batch.ledger import (
     Place,
@@ -185,6 +186,7 @@ def _findings(generation: Generation) -> Record:
             "range_db": round(float(outlook.range_db), 1),
             "advice": list(outlook.advice),
         }
+    found |= _confidence_of_motion(generation)
     if OPENING in motion.names and len(motion.values):
         opening = motion[OPENING]
         closed = CLOSED_SHARE * float(np.percentile(opening, 95))
@@ -195,6 +197,21 @@ def _findings(generation: Generation) -> Record:
             "closures_made": sum(bool(opening[frames].min() <= closed) for frames in ranges),
         }
     return found
+
+
+def _confidence_of_motion(generation: Generation) -> Record:
+    """Return the mean confidence of the motion in speech, and where the least sure second begins, if they are known."""
+    confidence, rate_hz = generation.confidence, generation.motion.rate_hz
+    spoken = np.zeros(len(generation.motion.values), bool)
+    for start_s, end_s in speech_intervals(generation.units):
+        spoken[round(start_s * rate_hz) : round(end_s * rate_hz)] = True
+    if confidence is None or not spoken.any():
+        return {}
+    second = np.flatnonzero(spoken) // round(rate_hz)
+    means = np.bincount(second, confidence[spoken]) / np.maximum(np.bincount(second), 1)
+    means[np.bincount(second) < rate_hz / 2] = np.inf
+    least = {"least_sure_s": int(means.argmin())} if np.isfinite(means).any() else {}
+    return {"motion": round(float(confidence[spoken].mean()), 3), **least}
 
 
 _KEPT: ContextVar[list[str] | None] = ContextVar("warnings of the line that this thread works on", default=None)

@@ -21,8 +21,8 @@ from lipmotion.types.generation import FULL_FIT_SHARE, SURE_CONFIDENCE
 
 CSV_REPORT, HTML_REPORT = "report.csv", "report.html"
 COLUMNS = (
-    "name outcome doubt duration_s words confidence voice closures_heard closures_made widest range_db warnings advice "
-    "error seconds recording outputs"
+    "name outcome doubt duration_s words confidence voice motion least_sure_s closures_heard closures_made widest "
+    "range_db warnings advice error seconds recording outputs"
 ).split()
 """Columns of the table, in order; docs/batch.md says what they mean."""
 ROWS, BETWEEN = "/*ROWS*/", " | "
@@ -68,6 +68,8 @@ def doubt_of(record: Record) -> float:
         doubt += 10 * max(SURE_CONFIDENCE - record["confidence"], 0) / SURE_CONFIDENCE
     if words in ("transcript", "mapped transcript") and record["confidence"] < FULL_FIT_SHARE:
         doubt += 10 * (1 - record["confidence"])
+    if (motion := record.get("motion")) is not None:
+        doubt += 5 * (1 - motion)
     if closures:
         doubt += 5 * (1 - record["closures_made"] / closures)
     return round(min(doubt, 99.0), 1)
