@@ -235,3 +235,28 @@ def test_motion_says_which_model_it_is_of(move: Animate, tmp_path: Path) -> None
     """Attribution is not lost where the model is not given again."""
     write(move(), tmp_path / "a.json")
     assert json.loads((tmp_path / "a.json").read_text())["model"]["corpus"] == "toy"
+
+
+def test_confidence_is_of_every_frame_that_is_delivered(move: Animate, transcript: str, tmp_path: Path) -> None:
+    result = move(transcript=transcript)
+    known = result.knowledge
+    assert known is not None
+    assert known.phones == 1.0
+    assert result.confidence is not None
+    assert len(result.confidence) == len(result.motion.values)
+    assert 0 < result.confidence.min() <= result.confidence.max() <= 1
+    stranger = replace(result, knowledge=replace(known, voice=0.0)).confidence
+    friend = replace(result, knowledge=replace(known, voice=1.0)).confidence
+    assert stranger is not None
+    assert friend is not None
+    assert (stranger < friend).all()
+    slower = result.resampled(25.0)
+    assert slower.confidence is not None
+    assert len(slower.confidence) == len(slower.motion.values)
+    assert result.selected(["width"]).confidence is None
+    for name in ("a.npz", "a.json"):
+        write(result, tmp_path / name)
+    with np.load(tmp_path / "a.npz") as arrays:
+        np.testing.assert_allclose(arrays["confidence"], result.confidence, rtol=1e-6)
+    document = json.loads((tmp_path / "a.json").read_text("utf-8"))
+    np.testing.assert_allclose(document["confidence"], result.confidence, atol=0.0051)

@@ -28,6 +28,7 @@ GOOD |= {"closures_heard": 2, "closures_made": 2, "duration_s": 1.5, "seconds": 
         ({"confidence": 0.5}, {"confidence": 0.9}),
         ({"range_db": 10.0}, {}),
         ({"closures_made": 1}, {}),
+        ({"motion": 0.3}, {"motion": 0.6}),
     ],
 )
 def test_what_is_doubtful(worse: dict, better: dict) -> None:
