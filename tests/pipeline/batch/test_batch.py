@@ -228,6 +228,8 @@ def test_workers_that_never_begin_end_the_batch(sounds: Path, settings: Job, tmp
 def test_a_line_that_another_worker_finished_is_not_done_again(sounds: Path, settings: Job, tmp_path: Path) -> None:
     work = waiting(sounds, settings, tmp_path / "out")[0]
     first = finished_line(work)
+    assert 0 < first["motion"] < 1
+    assert 0 <= first["least_sure_s"] < first["duration_s"]
     path = tmp_path / "out" / next(iter(first["outputs"]))
     before = path.stat().st_mtime_ns
     assert finished_line(work) == first

@@ -106,6 +106,7 @@ def damaged(record: Record) -> dict[str, bytes]:
         "an outcome that is a list": {"outcome": []},
         "warnings that are a number": {"warnings": 3},
         "a range that is a text": {"range_db": "loud"},
+        "a motion that is a text": {"motion": "sure"},
         "a huge number": {"widest": 10**400},
         "words without confidence": {"words": "words"},
         "closures heard, none made": {"closures_heard": 2},

@@ -67,8 +67,8 @@ def _are_inputs(value: Any) -> bool:
 FIELDS: dict[str, Callable[[Any], bool]] = {
     **dict.fromkeys(("name", "recording", "run", "fingerprint", "words", "error"), _is_text),
     **dict.fromkeys(("warnings", "advice"), _are_texts),
-    **dict.fromkeys(("duration_s", "seconds", "confidence", "range_db", "widest"), _is_number),
-    **dict.fromkeys(("closures_heard", "closures_made"), _is_number),
+    **dict.fromkeys(("duration_s", "seconds", "confidence", "range_db", "widest", "motion"), _is_number),
+    **dict.fromkeys(("closures_heard", "closures_made", "least_sure_s"), _is_number),
     "voice": lambda value: value is None or _is_number(value),
     "outcome": lambda value: value in (DONE, FAILED),
     "inputs": _are_inputs,
