@@ -11,13 +11,14 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, MissingDependencyError
+from lipmotion.hmm.log_likelihoods import log_likelihoods_from
 from lipmotion.pipeline.model import load_model
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.mfcc import mfcc
 from lipmotion.speech.recognition.network import network_search, posteriors
 from lipmotion.speech.recognition.network.beam_search import decoded_words, scored
 from lipmotion.speech.recognition.network.hama import Hama
-from lipmotion.speech.recognition.network.network_search import spoken_items
+from lipmotion.speech.recognition.network.network_search import phones_without_words, spoken_items
 from lipmotion.speech.recognition.network.posteriors import (
     BLANK,
     WORD_BOUNDARY,
@@ -96,19 +97,29 @@ def test_what_is_no_word_is_phones() -> None:
 
 def test_nothing_is_said_in_blanks() -> None:
     assert decoded_words(WORDS, scored(said())) == []
-    assert spoken_items(said(), english=True) == []
+    assert spoken_items(said()) == []
     assert mean_posterior([PosteriorStretch(Stretch(0, 2), said())]) == 0
 
 
-def test_without_english_the_phones_alone_count() -> None:
-    items = spoken_items(said("t", "͡", "ʃ", "iː", WORD_BOUNDARY, "l", "uː"), english=False)
-    assert [(item.text, item.variants) for item in items] == [("", (("ch", "iy"),)), ("", (("l", "uw"),))]
+@pytest.mark.parametrize("frames", [5, 40, 41])
+def test_posteriors_draw_phones_that_models_do_not_tell_apart(frames: int) -> None:
+    recogniser = Recogniser(load_model().phones, "fast")
+    hmm = recogniser.combined.hmm
+    same = log_likelihoods_from(np.zeros((60, len(hmm.table.names)), np.float32))
+    rows = said(*["b"] * 7, sure=0.99)
+    found = [PosteriorStretch(Stretch(10, 10 + frames), rows)]
+    (part,) = phones_without_words(hmm, recogniser._loop, same, found)
+    stretch, labels = part
+    assert stretch == found[0].stretch
+    assert labels[0].first == 10
+    assert "b" in {label.phone for label in labels}
+    assert phones_without_words(hmm, recogniser._loop, same, [PosteriorStretch(Stretch(0, 2), said())]) == []
 
 
 def test_a_sure_word_is_believed_more(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(network_search, "english_words", lambda: WORDS)
     sure, unsure, other = (
-        spoken_items(rows, english=True)[0].confidence
+        spoken_items(rows)[0].confidence
         for rows in (said("b", "l", "uː"), said("b", "l", "uː", sure=0.6), said("b", "l", "iː", sure=0.52))
     )
     assert 0 < other < unsure < sure < 1

@@ -28,7 +28,7 @@ from lipmotion.speech.features.speaker_similarity import SpeakerSimilarity, spea
 from lipmotion.speech.recognition.adaptation import Adaptation
 from lipmotion.speech.recognition.anchors import Anchors, align_within, least_frames
 from lipmotion.speech.recognition.combined_phones import CombinedPhones, combine_phones, combined_log_likelihoods
-from lipmotion.speech.recognition.network.network_search import NetworkSearch
+from lipmotion.speech.recognition.network.network_search import NetworkSearch, phones_without_words
 from lipmotion.speech.recognition.network.posteriors import (
     PosteriorStretch,
     installed_phone_recogniser,
@@ -110,7 +110,7 @@ class Recogniser:
 
         audio, features : as of ``recognise``
         each            : applies a function to many items, perhaps in several processes
-        english         : whether English words are searched; a phone recogniser finds phones alone in other languages
+        english         : whether English words are searched; in other languages, phones alone
         Words are recognised in every stretch of sound and aligned by our models: by a phone recogniser where it is sure
         (``speech.recognition.network``), else by pocketsphinx. Then ``auto`` compares their likelihood with that of the
         best path of phones without words: words that fit decide their phones; of the other words, the phones only
@@ -147,11 +147,14 @@ class Recogniser:
         *,
         english: bool,
     ) -> Recognition:
-        """Return what a phone recogniser finds in a recording, aligned."""
+        """Return what a phone recogniser finds in a recording: words, or phones that our models find as well."""
         features = audio.mfcc()
-        hmm, aligning = self._log_likelihoods(audio, similarity, aligning=True)
         loud = loud_frames(features.values[:, LOG_ENERGY], ENERGY_SMOOTHING_FRAMES)
-        parts, recognised = NetworkSearch(hmm, aligning, loud, english).labels(found)
+        hmm, log_likelihoods = self._log_likelihoods(audio, similarity, aligning=english)
+        if english:
+            parts, recognised = NetworkSearch(hmm, log_likelihoods, loud).labels(found)
+        else:
+            parts, recognised = phones_without_words(hmm, self._loop, log_likelihoods, found), []
         labels = spliced([LabelledFrames(0, SILENCE)], parts, len(loud))
         recognition = _recognition(labels, recognised, len(loud), features.duration_s, similarity)
         return replace(recognition, posterior=mean_posterior(found))

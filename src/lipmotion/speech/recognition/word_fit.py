@@ -95,9 +95,9 @@ def phone_bonus(hmm: UnitHmm, aligned: AlignedWords, bonus: float) -> NDArray[np
     bonus : in nats, where the phone is in the alignment
     The result has the shape (N, G).
     """
-    names = sorted({_form(name) for name in hmm.table.names})
-    columns = np.array([names.index(_form(name)) for name in hmm.table.names])
-    phone = np.array([names.index(_form(each)) for each in aligned.phones])[aligned.of_frame]
+    names = sorted({compared_form(name) for name in hmm.table.names})
+    columns = np.array([names.index(compared_form(name)) for name in hmm.table.names])
+    phone = np.array([names.index(compared_form(each)) for each in aligned.phones])[aligned.of_frame]
     share = np.zeros((len(phone), len(names)), np.float32)
     for shift in range(-REACH_FRAMES, REACH_FRAMES + 1):
         frames = np.arange(max(0, shift), len(phone) + min(0, shift))
@@ -106,7 +106,7 @@ def phone_bonus(hmm: UnitHmm, aligned: AlignedWords, bonus: float) -> NDArray[np
     return np.float32(bonus) * share[:, columns]
 
 
-def _form(name: str) -> str:
+def compared_form(name: str) -> str:
     """Return the general form of the phone of a density."""
     phone = name.partition(".")[0]
     return COMPARED_FORMS.get(phone, phone)

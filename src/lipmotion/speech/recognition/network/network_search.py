@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import AlignmentError
+from lipmotion.hmm.decode import UnitLoop
 from lipmotion.hmm.log_likelihoods import LogLikelihoods, log_likelihoods_from, penalise_silence
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.speech.recognition.network.beam_search import decoded_words, scored
 from lipmotion.speech.recognition.network.posteriors import (
+    POSTERIOR_STEP,
     WORD_BOUNDARY,
     PhonePosteriors,
     PosteriorStretch,
@@ -23,15 +25,17 @@ from lipmotion.speech.recognition.recognised_speech import (
     RecognisedWord,
     labels_of_words,
 )
-from lipmotion.speech.recognition.word_fit import align_recognised_words
+from lipmotion.speech.recognition.word_fit import align_recognised_words, compared_form
+from lipmotion.speech.recognition.word_search import free_labels
 from lipmotion.speech.sound.voice_activity import Stretch
-from lipmotion.units import Lexicon, Pronunciation
-from lipmotion.units.ipa_phones import token_phones
+from lipmotion.units import PHONES, Lexicon, Pronunciation, is_silent
 from lipmotion.units.phones import phone_edits
 
 AGREEMENT_WEIGHT, POSTERIOR_WEIGHT, CONSTANT = 0.9, 4.1, -2.7
 """Coefficients of the confidence of a word: by the share of its phones that the network finds without words, and the
 mean posterior of what it finds. A logistic regression on the 201 words of ``speech-open``, of which 164 are right."""
+POSTERIOR_BONUS, REACH_FRAMES = 30.0, 4
+"""By so many nats a phone is more probable where its posterior is 1; around it, by less, to nothing further away."""
 
 
 @dataclass(frozen=True)
@@ -55,22 +59,20 @@ class NetworkSearch:
     hmm      : the phone models
     aligning : log likelihoods of the recording for alignment
     loud     : frames that are too loud for silence [shape=(T,)]
-    english  : whether words are searched; else phones alone
     """
 
     hmm: UnitHmm
     aligning: LogLikelihoods
     loud: NDArray[np.bool_]
-    english: bool = True
 
     def labels(self, found: Sequence[PosteriorStretch]) -> tuple[list[LabelledStretch], list[RecognisedWord]]:
         """Return the stretches in which something is said, with their phones, and the words.
 
-        Raises MissingDependencyError: words are searched, and their language model is not installed.
+        Raises MissingDependencyError: the language model of the words is not installed.
         """
         parts, recognised = list[LabelledStretch](), list[RecognisedWord]()
         for stretch, posteriors in found:
-            items = spoken_items(posteriors, english=self.english)
+            items = spoken_items(posteriors)
             if items:
                 parts += self._aligned(stretch, items, len(recognised))
                 recognised += [RecognisedWord(item.text, item.confidence) for item in items]
@@ -94,12 +96,10 @@ class NetworkSearch:
         ]
 
 
-def spoken_items(posteriors: PhonePosteriors, *, english: bool) -> list[SpokenItem]:
-    """Return what is said in a stretch, in order; nothing where the network finds no phone."""
-    if all(found.token == WORD_BOUNDARY for found in posteriors.best_tokens):
+def spoken_items(posteriors: PhonePosteriors) -> list[SpokenItem]:
+    """Return what is said in a stretch of English, in order; nothing where the network finds no phone."""
+    if not _finds_phones(posteriors):
         return []
-    if not english:
-        return _phones_alone(posteriors)
     items = []
     for word in decoded_words(english_words(), scored(posteriors)):
         found = posteriors.phones_between(word.first, word.end)
@@ -107,21 +107,48 @@ def spoken_items(posteriors: PhonePosteriors, *, english: bool) -> list[SpokenIt
         if variants[0]:
             confidence = _confidence(posteriors, word.first, word.end, found, variants) if word.text else 0.0
             items.append(SpokenItem(word.text, variants, confidence))
-    return items or _phones_alone(posteriors)
-
-
-def _phones_alone(posteriors: PhonePosteriors) -> list[SpokenItem]:
-    """Return the phones of the best path, word by word as the network divides them."""
-    items, tokens = list[SpokenItem](), list[str]()
-    for token in [*(found.token for found in posteriors.best_tokens), WORD_BOUNDARY]:
-        if token != WORD_BOUNDARY:
-            tokens.append(token)
-            continue
-        phones = tuple(phone for phone, _ in token_phones(tokens))
-        tokens = []
-        if phones:
-            items.append(SpokenItem("", (phones,), 0.0))
     return items
+
+
+def phones_without_words(
+    hmm: UnitHmm, loop: UnitLoop, free: LogLikelihoods, found: Sequence[PosteriorStretch]
+) -> list[LabelledStretch]:
+    """Return the stretches in which something is said, with their phones: in any language, and where nobody is sure.
+
+    loop : the network of phones without words
+    free : log likelihoods of the recording
+    Every phone model becomes more probable by the posterior of its phone around each frame: where the phone recogniser
+    leaves phones out, as it does in languages that it hardly knows, the models alone decide.
+    """
+    parts = list[LabelledStretch]()
+    for stretch, posteriors in found:
+        if _finds_phones(posteriors):
+            values = free.stretch(*stretch) + _posterior_bonus(hmm, posteriors, stretch.end - stretch.first)
+            path = loop.network.best_path(log_likelihoods_from(values))
+            parts.append((stretch, free_labels(loop, path, stretch.first)))
+    return parts
+
+
+def _posterior_bonus(hmm: UnitHmm, posteriors: PhonePosteriors, frames: int) -> NDArray[np.float32]:
+    """Return what is added to the log densities of a stretch [shape=(frames, G)]."""
+    forms = sorted({compared_form(name) for name in (*hmm.table.names, *PHONES)})
+    row = np.minimum(np.arange(frames) // POSTERIOR_STEP, len(posteriors.values) - 1)
+    posterior = np.zeros((frames, len(forms)), np.float32)
+    for column, phone in enumerate(PHONES):
+        if not is_silent(phone):
+            posterior[:, forms.index(compared_form(phone))] += np.exp(posteriors.of_phones[row, column])
+    share = posterior.copy()
+    for shift in range(1, min(REACH_FRAMES, frames - 1) + 1):
+        least = np.float32(1 - shift / (REACH_FRAMES + 1))
+        np.maximum(share[shift:], least * posterior[:-shift], out=share[shift:])
+        np.maximum(share[:-shift], least * posterior[shift:], out=share[:-shift])
+    columns = [forms.index(compared_form(name)) for name in hmm.table.names]
+    bonus: NDArray[np.float32] = np.float32(POSTERIOR_BONUS) * share[:, columns]
+    return bonus
+
+
+def _finds_phones(posteriors: PhonePosteriors) -> bool:
+    return any(found.token != WORD_BOUNDARY for found in posteriors.best_tokens)
 
 
 def _confidence(
