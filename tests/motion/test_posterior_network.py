@@ -76,6 +76,8 @@ def test_it_is_stored_and_restored(network: PosteriorNetwork) -> None:
 def test_posteriors_of_another_version_are_refused(network: PosteriorNetwork) -> None:
     with pytest.raises(InputError, match=r"recogniser hama 1\.7\.0 abc, this one is hama 1\.8\.0"):
         network.predict(posteriors(0, "hama 1.8.0 def"), FRAMES)
+    with pytest.raises(InputError, match=r"recogniser hama 1\.7\.0 abc"):
+        network.hidden(posteriors(0, "hama 1.8.0 def"), 10)
 
 
 def test_without_posteriors_of_all_there_is_none() -> None:
@@ -101,3 +103,9 @@ def test_its_share_depends_on_the_voice_and_on_how_sure_the_recogniser_is(
     motion, same = replace(alone, beside=beside).predict(speech)
     assert motion == pytest.approx(without + share * (beside.predict(found, FRAMES) - without), abs=1e-6)
     assert same == pytest.approx(distortion)
+    plain, both = alone.hidden(speech), replace(alone, beside=beside).hidden(speech)
+    assert plain is not None
+    assert both is not None
+    np.testing.assert_array_equal(both[0][:, : plain[0].shape[1]], plain[0])
+    np.testing.assert_array_equal(both[0][:, plain[0].shape[1] :], beside.hidden(found, len(plain[0])))
+    assert both[1] == pytest.approx(plain[1])

@@ -42,6 +42,17 @@ def test_it_follows_the_other_model_into_another_range(fitted: PredictorFit) -> 
     assert distortion == pytest.approx(0.25)
 
 
+@pytest.mark.parametrize("hidden", [0, 2, 7])
+def test_regressors_that_are_missing_have_their_mean(fitted: PredictorFit, hidden: int) -> None:
+    """As without posteriors, or with a network that has more units: what is left tells the motion."""
+    one, motion = standing(50)
+    prior = one.speech.prior
+    assert prior is not None
+    units = np.resize(prior.hidden.T, (hidden, len(prior.hidden))).T
+    found, _ = fitted.predictor.predict(replace(one.speech, prior=replace(prior, hidden=units)))
+    assert np.corrcoef(found[:, 0], motion[:, 0])[0, 1] > 0.9
+
+
 def test_predictions_in_cross_validation_are_not_those_of_the_training() -> None:
     examples, values = zip(*(standing(seed, noise=1.0) for seed in range(4)), strict=True)
     regression, predictions = PriorRegression.fit(PredictorTraining(examples, values, 2))

@@ -121,13 +121,17 @@ class AcousticNetwork(Predictor):
     def hidden(self, speech: Speech) -> tuple[NDArray[np.float32], Array] | None:
         """Return the last hidden layer [shape=(ceil(T / 4), H)] and the distortion [shape=(ceil(T / 4),)] in each step.
 
+        After the hidden units of the network come those of the one beside it, where the speech has posteriors.
         None: speech without a spectrum.
         """
         if speech.spectrum is None:
             return None
         hidden = self.network.hidden(_steps(speech.spectrum))
         output = self.network.output
-        return hidden, np.clip(hidden @ output.weights[:, -1].astype(float) + output.biases[-1], 0, 1)
+        distortion = np.clip(hidden @ output.weights[:, -1].astype(float) + output.biases[-1], 0, 1)
+        if self.beside is not None and speech.posteriors is not None:
+            hidden = np.concatenate([hidden, self.beside.hidden(speech.posteriors, len(hidden))], axis=1)
+        return hidden, distortion
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Serialise the network, at half precision."""

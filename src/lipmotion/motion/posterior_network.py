@@ -70,13 +70,22 @@ class PosteriorNetwork:
 
         Raises InputError: posteriors of another phone recogniser than that of the training.
         """
+        steps = self.network(self._inputs(posteriors)).astype(float)
+        return between_steps(steps, frames) * self.scale + self.centre
+
+    def hidden(self, posteriors: TokenPosteriors, steps: int) -> NDArray[np.float32]:
+        """Return the last hidden layer in every time step [shape=(steps, H)]; raises InputError as ``predict``."""
+        rows = self.network.hidden(self._inputs(posteriors))
+        return rows[np.minimum(np.arange(steps), len(rows) - 1)]
+
+    def _inputs(self, posteriors: TokenPosteriors) -> NDArray[np.float32]:
+        """Return the inputs in every time step [shape=(ceil(N / 2), 240)]; raises InputError as ``predict``."""
         if posteriors.source != self.source:
             raise InputError(
                 f"the model was trained with the phone recogniser {self.source}, this one is {posteriors.source}; "
                 f"install that one (pip install {'=='.join(self.source.split()[:2])}), or use the recogniser fast"
             )
-        steps = self.network(_steps(_limited(posteriors), self.mean, self.basis)).astype(float)
-        return between_steps(steps, frames) * self.scale + self.centre
+        return _steps(_limited(posteriors), self.mean, self.basis)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Serialise the network, at half precision."""

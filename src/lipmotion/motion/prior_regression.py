@@ -26,8 +26,8 @@ INITIAL_RIDGE = 1000.0
 ROUNDS = 2
 LEAST_DEVIATION = 1e-3
 KINDS = ("prior", "hidden", "articulation", "spectrum")
-"""Kinds of regressors: the articulators of the other model's motion, the last hidden layer of its network, the table of
-articulation for the phones in time, the spectrum around the frame."""
+"""Kinds of regressors: the articulators of the other model's motion, the last hidden layers of its networks, the table
+of articulation for the phones in time, the spectrum around the frame."""
 
 
 PRIOR_ARRAYS = {
@@ -103,12 +103,23 @@ class PriorRegression(Predictor):
 
         Raises InputError: an unknown phone.
         """
-        regressors = (np.concatenate(_regressors(speech), axis=1) - self.mean) / self.scale
+        regressors = (self._known(_regressors(speech)) - self.mean) / self.scale
         steps = (regressors @ self.coefficients).astype(float) + self.centre
         frames = len(speech.features.values)
         distortion = speech.prior.distortion if speech.prior is not None else np.zeros(len(steps))
         outputs = between_steps(np.concatenate([steps, distortion[:, None]], axis=1), frames)
         return outputs[:, :-1], np.clip(outputs[:, -1], 0, 1)
+
+    def _known(self, kinds: Sequence[Array]) -> Array:
+        """Return the regressors [shape=(N, R)]; those that the training had and this speech has not have their mean.
+
+        kinds : as of ``_regressors``; of speech without posteriors, or from another version, some columns are missing
+        """
+        row, starts = self.mean.astype(float), np.cumsum([0, *self.sizes])
+        result = np.tile(row, (len(kinds[0]), 1))
+        for kind, start, size in zip(kinds, starts, self.sizes, strict=False):
+            result[:, start : start + min(size, kind.shape[1])] = kind[:, :size]
+        return result
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Serialise the regression; the coefficients at half precision."""

@@ -128,7 +128,7 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
 
     def inputs(self, motion_s: float = math.inf) -> Inputs:  # noqa: D102
         conditions = self.config.conditions if needs_conditions(self.config.predictor, motion_s) else 0
-        return Inputs(self.config.joint_recogniser, conditions, prior=True, posteriors=conditions > 0)
+        return Inputs(self.config.joint_recogniser, conditions, prior=True, posteriors=True)
 
     def fit(  # noqa: D102
         self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NO_CHECKPOINT

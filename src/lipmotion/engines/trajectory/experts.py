@@ -75,7 +75,8 @@ class Experts:
         if self.prior is not None and not (self.network is not None and self.network.uses_articulation):
             familiarity = self.prior.familiarity(self.speech.units, len(self.rows))
         resting = self.rows == len(self.emission.means) - 1
-        known = 1 - STRANGER_LOSS * strangeness(self.speech.voice)
+        own = self.network is not None and self.network.uses_prior  # states of a person, not of a distant speaker
+        known = 1.0 if own else 1 - STRANGER_LOSS * strangeness(self.speech.voice)
         states = (1 - self.network_share) * self.reliability * familiarity * known
         network = self.network_share * np.where(resting, 1 - self.reliability, 1.0)
         return network / np.maximum(states + network, 1e-12)

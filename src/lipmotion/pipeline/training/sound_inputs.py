@@ -24,7 +24,7 @@ from lipmotion.types import (
 )
 
 BLOCK = 16
-"""Recordings that are given to a process at once."""
+"""Recordings of which progress is reported at once, and that are given to a process at once."""
 VOICES = 32
 """Largest number of recordings whose voices make the babble."""
 LONGEST_VOICE_S = 10.0
@@ -61,7 +61,8 @@ def _with_posteriors(
     result: list[Example] = []
     for example, posteriors in zip(examples, each(partial(token_posteriors, name), recordings), strict=True):
         result.append(replace(example, speech=replace(example.speech, posteriors=posteriors)))
-        monitor(Progress("posteriors of phones", len(result), len(examples), len(result) / len(examples)))
+        if len(result) % BLOCK == 0 or len(result) == len(examples):
+            monitor(Progress("posteriors of phones", len(result), len(examples), len(result) / len(examples)))
     return result
 
 

@@ -173,9 +173,9 @@ def train(  # noqa: PLR0913
         )
         speaker_of = {utterance.name: utterance.speaker for utterance in utterances}
         examples, speakers = _of_the_mean_person(examples, speaker_of)
-        examples = [replace(example, speech=with_prior(prior, example.speech)) for example in examples]
         sound = {utterance.name: utterance.audio for utterance in utterances}
         examples = with_sound_inputs(engine, examples, sound, sub_monitor(run.monitor, 0.5, 0.6), team.ordered_map)
+        examples = [replace(example, speech=with_prior(prior, example.speech)) for example in examples]
     fit = engine.fit([*examples, *speech_examples], sub_monitor(run.monitor, 0.6, 1, "learning motion: "), checkpoint)
     if not fit.uses_prior:
         prior = None
