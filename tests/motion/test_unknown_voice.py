@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from lipmotion.motion.closure import REACH_S, closable_ranges
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.unknown_voice import (
+    CONSONANT_CLOSING,
     INSET_S,
     OPENING_BY_DURATION,
     VOWEL_S,
     closing_reach_s,
     typical_range,
-    with_vowel_durations,
+    with_contrast,
 )
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.understand.request import SpeechRequest
@@ -60,19 +61,20 @@ def shut_share(generation: Generation) -> float:
 
 
 @pytest.mark.parametrize(("voice", "change"), [(0.0, 1.0), (0.75, 0.5), (1.0, 0.0)])
-def test_long_vowels_are_more_open_and_short_ones_less(voice: float, change: float) -> None:
+def test_long_vowels_are_more_open_short_ones_and_consonants_less(voice: float, change: float) -> None:
     prior = load_model().learned.motion.prior
     seconds = np.cumsum([0, 0.5, 0.5, 0.5, 0.04, 0.46, VOWEL_S, 0.4]).tolist()
     phones = ("t", "aa", "t", "aa", "t", "aa", "t")
     units = Timeline(tuple(Span(*edges, Unit(phone)) for edges, phone in zip(pairwise(seconds), phones, strict=True)))
     means, precisions = np.zeros((250, 3, prior.matrix.shape[1])), np.ones((250, 3, prior.matrix.shape[1]))
-    statistics = with_vowel_durations(lambda frames: (means[frames], precisions[frames]), prior, units, 250, 1.0, voice)
+    statistics = with_contrast(lambda frames: (means[frames], precisions[frames]), prior, units, 250, 1.0, voice)
     deviation = prior.matrix[0, 0]
     changed, kept = statistics(slice(20, 240))
-    opening = changed[:, 0, 0] / (OPENING_BY_DURATION * deviation)
-    assert opening[75 - 20] == pytest.approx(change * np.log(5), rel=0.01)
-    assert -change <= opening[152 - 20] <= -0.2 * change
-    np.testing.assert_allclose(opening[[5, 185]], 0, atol=0.01)
+    opening = changed[:, 0, 0] / deviation
+    assert opening[75 - 20] == pytest.approx(change * OPENING_BY_DURATION * np.log(5), rel=0.01)
+    assert opening[[5, 215]] == pytest.approx(-change * CONSONANT_CLOSING, rel=0.01)
+    shortest = OPENING_BY_DURATION * np.log(0.04 / VOWEL_S)
+    assert change * shortest <= opening[152 - 20] <= -change * CONSONANT_CLOSING
     np.testing.assert_array_equal(kept, precisions[20:240])
 
 

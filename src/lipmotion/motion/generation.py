@@ -15,7 +15,7 @@ from lipmotion.motion.articulation import ArticulationPrior
 from lipmotion.motion.closure import OPENING, REACH_S, Closure, closable_ranges, frames_to_close
 from lipmotion.motion.limits import MotionLimits
 from lipmotion.motion.space import MotionSpace
-from lipmotion.motion.unknown_voice import closing_reach_s, typical_range, with_open_vowels, with_vowel_durations
+from lipmotion.motion.unknown_voice import closing_reach_s, typical_range, with_contrast, with_open_vowels
 from lipmotion.motion.variance_scaling import VarianceScaling
 from lipmotion.types import (
     FRAME_RATE_HZ,
@@ -92,7 +92,7 @@ class LearnedMotion:
             statistics = self.prior.blended(statistics, units, frames, reliability)
             if voice < 1 and scaling is not None and self.closure is not None:
                 column, reach_s = self.closure.column, closing_reach_s(voice)
-                statistics = with_vowel_durations(statistics, self.prior, units, frames, reliability, voice)
+                statistics = with_contrast(statistics, self.prior, units, frames, reliability, voice)
                 statistics = with_open_vowels(statistics, self.prior, column, units, frames, reliability, voice)
                 gain = typical_range(self.prior, self.space, voice, float(np.mean(reliability)))
                 scaling = scaling._replace(factors=scaling.factors * gain)

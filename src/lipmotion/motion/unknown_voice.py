@@ -20,7 +20,7 @@ from lipmotion.motion.closure import OPENING, REACH_S
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.speaker_knowledge import strangeness
 from lipmotion.types import EYE_DISTANCE, FRAME_RATE_HZ, Timeline, Unit, frames_of
-from lipmotion.units import VOWELS
+from lipmotion.units import VOWELS, is_silent
 
 Array = NDArray[np.float64]
 LEAST_OPENING_SHARE = 0.4
@@ -29,6 +29,9 @@ least: what the model makes of its vowels is shut where it takes them for someth
 VOWEL_S, OPENING_BY_DURATION = 0.1, 0.5
 """A vowel of the first duration is as open as the table says; one that is e times as long is more open by so many
 standard deviations of the speaker, and a shorter one less (docs/results/voices.md)."""
+CONSONANT_CLOSING = 0.25
+"""Consonants are less open than the table says, by so many standard deviations of the speaker: a fifth to a third of the
+phones that it was measured on are wrong, so that it has vowels too closed and consonants too open."""
 INSET_S = 0.03
 """The lips of such a voice close in p, b and m further than this from both ends of the phone, or in its middle, so that
 short vowels beside it stay open."""
@@ -73,7 +76,7 @@ def with_open_vowels(
     return opened
 
 
-def with_vowel_durations(
+def with_contrast(
     statistics: Callable[[slice], Statistics],
     prior: ArticulationPrior,
     units: Timeline[Unit],
@@ -81,20 +84,23 @@ def with_vowel_durations(
     reliability: Array | float,
     voice: float,
 ) -> Callable[[slice], Statistics]:
-    """Return means and precisions of ranges of frames, with long vowels more open, and short ones less.
+    """Return means and precisions of ranges of frames, with consonants less open, and vowels by their duration.
 
     The arguments are those of ``with_open_vowels``; at ``voice`` 1 nothing changes. All articulators move as from the
     mean consonant to the mean vowel of the table. Precisions stay those of the model.
     Source: Lindblom 1963 (vowel reduction): the shorter a vowel, the more it misses its target.
     """
-    longer = np.zeros((frames, 1))
+    wider = np.zeros((frames, 1))
     for span in units:
-        if span.label.phone in VOWELS:
-            longer[slice(*frames_of(span, frames))] = np.log(max(span.duration_s, 1 / FRAME_RATE_HZ) / VOWEL_S)
+        inside, phone = slice(*frames_of(span, frames)), span.label.phone
+        if phone in VOWELS:
+            wider[inside] = OPENING_BY_DURATION * np.log(max(span.duration_s, 1 / FRAME_RATE_HZ) / VOWEL_S)
+        elif phone and not is_silent(phone):
+            wider[inside] = -CONSONANT_CLOSING
     more_open = (class_means()[True] - class_means()[False]).mean(axis=0)
     more_open /= more_open[ARTICULATORS.index(OPENING)]
-    gain = OPENING_BY_DURATION * strangeness(voice) * np.broadcast_to(reliability, frames)[:, None]
-    change = gain * smoothed(longer) * more_open @ prior.matrix
+    gain = strangeness(voice) * np.broadcast_to(reliability, frames)[:, None]
+    change = gain * smoothed(wider) * more_open @ prior.matrix
 
     def changed(chosen: slice) -> Statistics:
         means, precisions = statistics(chosen)
