@@ -30,8 +30,8 @@ VOWEL_S, OPENING_BY_DURATION = 0.1, 0.5
 """A vowel of the first duration is as open as the table says; one that is e times as long is more open by so many
 standard deviations of the speaker, and a shorter one less (docs/results/voices.md)."""
 CONSONANT_CLOSING = 0.25
-"""Consonants are less open than the table says, by so many standard deviations of the speaker: a fifth to a third of the
-phones that it was measured on are wrong, so that it has vowels too closed and consonants too open."""
+"""Consonants are less open than the table says, by so many standard deviations of the speaker: a fifth to a third of
+the phones that it was measured on are wrong, so that it has vowels too closed and consonants too open."""
 INSET_S = 0.03
 """The lips of such a voice close in p, b and m further than this from both ends of the phone, or in its middle, so that
 short vowels beside it stay open."""
