@@ -129,7 +129,10 @@ def figures(found: list[Seconds], doubts: list[Curve]) -> dict[str, object]:
         if len(doubt) >= MANY_SECONDS
     ]
     pooled = round(rank_correlation(doubts, [each.error for each in found]), 3)
-    return {"recordings": len(found), "seconds": sum(map(len, doubts)), "rank_correlation": pooled, "alone": alone}
+    errors = np.concatenate([each.error for each in found])
+    expected = np.concatenate([1 / each.confidence - 1 for each in found])
+    means = {"error": round(float(errors.mean()), 2), "expected": round(float(expected.mean()), 2)}
+    return {"recordings": len(found), "seconds": len(errors), **means, "rank_correlation": pooled, "alone": alone}
 
 
 def fitted(found: list[Seconds]) -> Curve:

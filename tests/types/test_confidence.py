@@ -27,6 +27,12 @@ def test_knowing_more_makes_sure(better: dict[str, float]) -> None:
     assert (SpeechKnowledge(**better).confidence(CURVE, UNCERTAIN) > worse).all()
 
 
+def test_motion_of_other_words_is_not_sure_whoever_speaks() -> None:
+    for voice in (0.0, 1.0):
+        other = SpeechKnowledge(voice, 1.0, fit=0.0).confidence(CURVE, CERTAIN)
+        assert 1 / other - 1 / SpeechKnowledge(voice, 1.0).confidence(CURVE, CERTAIN) == pytest.approx(0.5)
+
+
 def test_motion_that_stands_still_has_a_confidence() -> None:
     still = SpeechKnowledge(voice=0.0, phones=1.0).confidence(np.full(5, 0.1, np.float32), np.full(5, -1e-12))
     assert (still > 0.5).all()

@@ -385,5 +385,6 @@ def generation_of(
     if request.onto is None:
         generation = replace(generation, motion=symmetrical(generation.motion, request.asymmetry))
     paused = with_pauses(generation, request.pauses, pinned_s)
-    knowledge = SpeechKnowledge(understood.speech.voice, float(np.mean(understood.speech.confidence)))
+    speech, fit = understood.speech, understood.fit
+    knowledge = SpeechKnowledge(speech.voice, float(np.mean(speech.confidence)), fit.share if fit else 1.0)
     return replace(paused, outlook=outlook_of(request, understood), about=model.about, knowledge=knowledge)

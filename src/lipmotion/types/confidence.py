@@ -14,6 +14,8 @@ independent of one another, and are not."""
 STRANGER, STRANGER_MOVEMENT, STRANGER_DOUBT = 0.45, 0.75, 0.15
 """Squared error, in the variance of the curve, of a voice that training does not know at all: in every frame, for each
 unit of squared distance from the mean, and where no phone is sure."""
+OTHER_WORDS = 0.5
+"""Squared error that a transcript of something else adds: 0.5 on average of eight strangers, 0.2 for a known voice."""
 LEAST_DEVIATION = 0.02
 """A curve that moves less, in eye distances or as a weight, counts as moving so far."""
 
@@ -24,6 +26,7 @@ class SpeechKnowledge:
 
     voice  : 0 to 1, how well training knows the voice (``Speech.voice``)
     phones : 0 to 1, how sure the phones are (``Speech.confidence``), on average; 1 where they are known
+    fit    : 0 to 1, the share of the speech that its transcript fits; 1 where there is none
 
     >>> import numpy as np
     >>> curve, variance = np.array([0.0, 0.1, 0.2, 0.1]), np.full(4, 1e-4)
@@ -35,17 +38,18 @@ class SpeechKnowledge:
 
     voice: float
     phones: float
+    fit: float = 1.0
 
     def confidence(self, curve: NDArray[np.floating], variance: NDArray[np.floating]) -> Curve:
         """Return how sure each frame of a curve is, 0 to 1 [shape=(T,)]: 1 / (1 + expected squared error).
 
         curve, variance : values and variances by the model [each shape=(T,)]
         The expected squared error is in units of the variance of the curve, so that 0.5 means an error as large as the
-        movement. Its four weights were measured on recordings whose motion is known (docs/results/voices.md).
+        movement. Its weights were measured on recordings whose motion is known (docs/results/voices.md).
         """
         values = np.asarray(curve, float)
         unit = max(float(values.var()), LEAST_DEVIATION**2)
         distance = np.square(values - values.mean()) / unit
         strange = STRANGER + STRANGER_MOVEMENT * distance + STRANGER_DOUBT * (1 - self.phones)
-        error = VARIANCE_FACTOR * np.maximum(variance, 0) / unit + (1 - self.voice) * strange
-        return 1 / (1 + error)
+        known = VARIANCE_FACTOR * np.maximum(variance, 0) / unit + (1 - self.voice) * strange
+        return 1 / (1 + known + OTHER_WORDS * (1 - self.fit))

@@ -48,5 +48,8 @@ def test_lists_have_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
     assert read_members('{"units": [1, 2, 3], "values": [[1], [2], [3]]}', "values")["units"] == [1, 2, 3]
     with pytest.raises(ValueError, match="a list of more than 3 items"):
         read_members('{"units": [1, 2, 3, 4]}', "values")
+    monkeypatch.setattr(json_stream, "MOST_ROWS", 4)
+    assert read_members('{"units": [1, 2, 3, 4]}', "values", "units")["units"] == [1, 2, 3, 4]
+    monkeypatch.setattr(json_stream, "MOST_ROWS", 3)
     with pytest.raises(ValueError, match="more than 3 rows of values"):
         read_members('{"values": [[1], [2], [3], [4]]}', "values")

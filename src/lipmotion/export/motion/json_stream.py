@@ -11,16 +11,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-MOST_ITEMS = 1 << 22
-"""Most items of a list that is not rows of numbers."""
+MOST_ITEMS = 1 << 20
+"""Most items of a list that has not one item a frame."""
 MOST_ROWS = 1 << 22
 """Most rows of numbers: eleven hours of frames of 10 ms."""
 _BLANK = re.compile(r"[ \t\n\r]*")
 _DECODER = json.JSONDecoder()
 
 
-def read_members(text: str, rows_of: str) -> dict[str, Any]:
+def read_members(text: str, rows_of: str, numbers_of: str = "") -> dict[str, Any]:
     """Return the members of a JSON object; the list called ``rows_of`` becomes an array of numbers [shape=(T, P)].
+
+    numbers_of : name of a list that may have an item for every row
 
     Raises json.JSONDecodeError, RecursionError: not one object.
     Raises ValueError, TypeError, OverflowError: a list that is too long, or rows that are uneven or no numbers.
@@ -34,7 +36,7 @@ def read_members(text: str, rows_of: str) -> dict[str, Any]:
         if is_list and key == rows_of:
             members_by_name[key], at = _rows(text, at)
         elif is_list:
-            members_by_name[key], at = _items(text, at)
+            members_by_name[key], at = _items(text, at, MOST_ROWS if key == numbers_of else MOST_ITEMS)
         else:
             members_by_name[key], at = _DECODER.raw_decode(text, at)
         return at
@@ -45,15 +47,15 @@ def read_members(text: str, rows_of: str) -> dict[str, Any]:
     return members_by_name
 
 
-def _items(text: str, at: int) -> tuple[list[Any], int]:
+def _items(text: str, at: int, most: int) -> tuple[list[Any], int]:
     """Return the items of a list, and the position of its end."""
     items: list[Any] = []
 
     def item(at: int) -> int:
         value, at = _DECODER.raw_decode(text, at)
         items.append(value)
-        if len(items) > MOST_ITEMS:
-            raise ValueError(f"a list of more than {MOST_ITEMS} items")
+        if len(items) > most:
+            raise ValueError(f"a list of more than {most} items")
         return at
 
     return items, _each(text, at, "[]", item)

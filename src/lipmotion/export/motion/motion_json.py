@@ -36,7 +36,7 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
         text = path.read_text(encoding="utf-8")
         if text.lstrip().startswith("["):
             raise InputError(f"not a motion document: its 'format' must be {FORMAT!r}")
-        document = read_members(text, "values")
+        document = read_members(text, "values", "confidence")
     except InputError:
         raise
     except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
