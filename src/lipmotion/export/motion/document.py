@@ -31,8 +31,8 @@ def header(generation: Generation) -> dict[str, Any]:
 
 def units_and_origin(generation: Generation, source: Mapping[str, str], model: Mapping[str, str]) -> dict[str, Any]:
     """Return the members ``units``, ``recognised`` (if phones were), ``outlook`` (if known), ``source``, ``model``."""
-    known = {} if generation.outlook is None else {"outlook": asdict(generation.outlook)}
-    return {**unit_rows(generation.units), **known, "source": dict(source), "model": dict(model)}
+    outlook = {} if generation.outlook is None else {"outlook": asdict(generation.outlook)}
+    return {**unit_rows(generation.units), **outlook, "source": dict(source), "model": dict(model)}
 
 
 def unit_rows(units: Timeline[Unit]) -> dict[str, Any]:
