@@ -65,8 +65,9 @@ class SelectionEngine(Engine[SelectionModel]):
     Config: ClassVar[type[Configuration]] = SelectionConfig
 
     def inputs(self, motion_s: float = math.inf) -> Inputs:  # noqa: D102
-        has_conditions = self.config.guide and needs_conditions(self.config.predictor, motion_s)
-        return Inputs(self.config.joint_recogniser, self.config.conditions if has_conditions else 0, prior=True)
+        guide, has_conditions = self.config.guide > 0, needs_conditions(self.config.predictor, motion_s)
+        conditions = self.config.conditions if guide and has_conditions else 0
+        return Inputs(self.config.joint_recogniser, conditions, prior=True, posteriors=guide)
 
     def fit(  # noqa: D102
         self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NO_CHECKPOINT
