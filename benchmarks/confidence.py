@@ -29,7 +29,6 @@ from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Generation, Track
-from lipmotion.types.confidence import LEAST_DEVIATION
 
 Curve = NDArray[np.float64]
 LEAST_FRAMES = 20
@@ -105,11 +104,7 @@ def seconds_of(kind: str, generation: Generation, track: Track, lag_s: float) ->
 
     recorded, made = track.motion["opening"][track.seen], at(opening)
     error = np.square((made - made[spoken].mean()) - (recorded - recorded[spoken].mean())) / recorded.var()
-    unit, strange = max(opening.var(), LEAST_DEVIATION**2), 1 - knowledge.voice
-    variance = generation.variance[:, generation.motion.column("opening")] / unit
-    distance = np.square(opening - opening.mean()) / unit
-    one = np.ones(len(opening))
-    causes = [variance, strange * one, strange * distance, strange * (1 - knowledge.phones) * one]
+    causes = knowledge.causes(opening, generation.selected(["opening"]).variance[:, 0])
     second = np.floor(np.maximum(time_s, 0)).astype(int)
     frames = np.bincount(second)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, ClassVar, final
 
 import numpy as np
@@ -153,14 +154,17 @@ class AcousticNetwork(Predictor):
 
 def _trained(training: PredictorTraining, mean: Array, scale: Array) -> ConvolutionalNetwork:
     """Return the trained network; ``mean`` and ``scale`` standardise its targets."""
-    pieces = [
-        [_sequence(version, (x - mean) / scale, example.valid) for version in example.condition_spectra]
-        for example, x in zip(training.examples, training.values, strict=True)
-    ]
-    steps = max(training.epochs * -(-len(pieces) // BATCH_SIZE), LEAST_STEPS)
+    steps = max(training.epochs * -(-len(training.examples) // BATCH_SIZE), LEAST_STEPS)
+
+    @cache
+    def pieces() -> list[list[TrainingSequence]]:  # not needed where the network comes from its checkpoint
+        return [
+            [_sequence(version, (x - mean) / scale, example.valid) for version in example.condition_spectra]
+            for example, x in zip(training.examples, training.values, strict=True)
+        ]
 
     def draw(rng: np.random.Generator, number: int) -> TrainingSequence:
-        versions = pieces[number]
+        versions = pieces()[number]
         return random_piece(versions[int(rng.integers(len(versions)))], rng)
 
     plan = TrainingPlan(steps, BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED)

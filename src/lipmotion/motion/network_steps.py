@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ from lipmotion.storage.schema import LARGEST_MEAN, Arrays, ArraySpec, checked_ar
 from lipmotion.types import Progress
 
 Array = NDArray[np.float64]
+FloatT = TypeVar("FloatT", bound=np.floating[Any])
 STEP = 4
 """Frames of a time step, 40 ms: about a picture of a video."""
 DIRECT_WEIGHT = 4.0
@@ -134,7 +136,7 @@ class NetworkShape:
         return network
 
 
-def checked_scale(scale: Array, name: str) -> Array:
+def checked_scale(scale: NDArray[FloatT], name: str) -> NDArray[FloatT]:
     """Return standard deviations of targets, as stored; raise ValueError where one is not more than 0."""
     if not (scale > 0).all():
         raise ValueError(f"{name} with a scale that is not more than 0")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.motion.articulation import ARTICULATORS, articulators
-from lipmotion.motion.network_steps import STEP, between_steps
+from lipmotion.motion.network_steps import STEP, between_steps, checked_scale
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining, folds
 from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays
@@ -139,8 +139,7 @@ class PriorRegression(Predictor):
         if sum(sizes) != stored.sizes["R"] or sizes[2:] != (len(ARTICULATORS), (2 * WINDOW + 1) * SPECTRUM_BANDS):
             raise ValueError(f"prior_sizes {sizes}, whose sum is not {stored.sizes['R']}, or of another version")
         mean, scale = stored["prior_inputs"]
-        if not (scale > 0).all():
-            raise ValueError("prior_inputs with a scale that is not more than 0")
+        scale = checked_scale(scale, "prior_inputs")
         return cls(sizes, mean, scale, stored["prior_coefficients"], stored["prior_centre"], stored["prior_variances"])
 
 

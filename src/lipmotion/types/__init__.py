@@ -115,19 +115,8 @@ __all__ = [
 ]
 
 _MODULES = (
-    *(
-        "configuration",
-        "delivery",
-        "staging",
-        "audio",
-        "features",
-        "timeline",
-        "motion",
-        "confidence",
-        "generation",
-        "progress",
-    ),
-    *("explanation", "parallel_map", "prosody", "transcript", "utterance"),
+    *("configuration", "delivery", "staging", "audio", "features", "timeline", "motion", "confidence"),
+    *("generation", "progress", "explanation", "parallel_map", "prosody", "transcript", "utterance"),
 )
 """Where the names are looked for, in this order."""
 

@@ -47,9 +47,18 @@ class SpeechKnowledge:
         The expected squared error is in units of the variance of the curve, so that 0.5 means an error as large as the
         movement. Its weights were measured on recordings whose motion is known (docs/results/voices.md).
         """
+        weights = (VARIANCE_FACTOR, STRANGER, STRANGER_MOVEMENT, STRANGER_DOUBT)
+        return 1 / (1 + weights @ self.causes(curve, variance) + OTHER_WORDS * (1 - self.fit))
+
+    def causes(self, curve: NDArray[np.floating], variance: NDArray[np.floating]) -> Curve:
+        """Return the causes of squared error in each frame, before they are weighed [shape=(4, T)].
+
+        They are the model's own variance and, as far as the voice is unknown: 1, the squared distance of the curve
+        from its mean, and how unsure the phones are. Variance and distance are in the variance of the curve.
+        """
         values = np.asarray(curve, float)
         unit = max(float(values.var()), LEAST_DEVIATION**2)
         distance = np.square(values - values.mean()) / unit
-        strange = STRANGER + STRANGER_MOVEMENT * distance + STRANGER_DOUBT * (1 - self.phones)
-        known = VARIANCE_FACTOR * np.maximum(variance, 0) / unit + (1 - self.voice) * strange
-        return 1 / (1 + known + OTHER_WORDS * (1 - self.fit))
+        one = np.ones(len(values))
+        strange = (1 - self.voice) * np.stack([one, distance, (1 - self.phones) * one])
+        return np.concatenate([np.maximum(variance, 0)[None] / unit, strange])

@@ -94,7 +94,7 @@ def test_stopped_again_and_again(corpus: Corpus, work: Path, tmp_path: Path) -> 
     stops = 0
     while True:
         try:
-            model = run(corpus, work, stopping_after(7))
+            model = run(corpus, work, stopping_after(6))
             break
         except Stopped:
             stops += 1

@@ -19,7 +19,6 @@ from lipmotion.types import Speech
 Array = NDArray[np.float64]
 NETWORK_SHARE = 0.5
 """Weight of the predictor beside the states, 0 to 1, in models that have no other."""
-
 STRANGER_LOSS = 0.8
 """Share of their weight that states lose with voices that training does not know at all."""
 

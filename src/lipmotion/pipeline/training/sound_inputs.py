@@ -61,7 +61,7 @@ def _with_posteriors(
     result: list[Example] = []
     for example, posteriors in zip(examples, each(partial(token_posteriors, name), recordings), strict=True):
         result.append(replace(example, speech=replace(example.speech, posteriors=posteriors)))
-        if len(result) % BLOCK == 0 or len(result) == len(examples):
+        if len(result) % BLOCK == 0:
             monitor(Progress("posteriors of phones", len(result), len(examples), len(result) / len(examples)))
     return result
 

@@ -12,7 +12,7 @@ from lipmotion.hmm.align import choose_pronunciations, state_path, state_sequenc
 from lipmotion.hmm.log_likelihoods import LogLikelihoods
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.speech.recognition.combined_phones import NOISES
-from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, most_similar_phone
+from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, is_silent, most_similar_phone
 from lipmotion.units.phones import FULL_FORMS
 
 COMPARED_FORMS = FULL_FORMS | {PAUSE: SILENCE} | dict.fromkeys(NOISES, SILENCE)
@@ -95,14 +95,25 @@ def phone_bonus(hmm: UnitHmm, aligned: AlignedWords, bonus: float) -> NDArray[np
     bonus : in nats, where the phone is in the alignment
     The result has the shape (N, G).
     """
-    names = sorted({compared_form(name) for name in hmm.table.names})
-    columns = np.array([names.index(compared_form(name)) for name in hmm.table.names])
-    phone = np.array([names.index(compared_form(each)) for each in aligned.phones])[aligned.of_frame]
-    share = np.zeros((len(phone), len(names)), np.float32)
-    for shift in range(-REACH_FRAMES, REACH_FRAMES + 1):
-        frames = np.arange(max(0, shift), len(phone) + min(0, shift))
-        least = np.float32(1 - abs(shift) / (REACH_FRAMES + 1))
-        share[frames, phone[frames - shift]] = np.maximum(share[frames, phone[frames - shift]], least)
+    present = np.zeros((len(aligned.of_frame), len(FORMS)), np.float32)
+    phone = np.array([FORMS.index(compared_form(each)) for each in aligned.phones])[aligned.of_frame]
+    present[np.arange(len(phone)), phone] = 1
+    return density_bonus(hmm, present, bonus, REACH_FRAMES)
+
+
+def density_bonus(hmm: UnitHmm, present: NDArray[np.float32], bonus: float, reach: int) -> NDArray[np.float32]:
+    """Return what is added to the log densities of a stretch, so that phones become more probable [shape=(N, G)].
+
+    present : how far each of ``FORMS`` is said in each frame, 0 to 1 [shape=(N, F)]
+    bonus   : in nats, where it is 1
+    reach   : frames before and after it, over which the bonus falls linearly
+    """
+    share = present.copy()
+    for shift in range(1, min(reach, len(present) - 1) + 1):
+        least = np.float32(1 - shift / (reach + 1))
+        np.maximum(share[shift:], least * present[:-shift], out=share[shift:])
+        np.maximum(share[:-shift], least * present[shift:], out=share[:-shift])
+    columns = [FORMS.index(compared_form(name)) for name in hmm.table.names]
     return np.float32(bonus) * share[:, columns]
 
 
@@ -110,3 +121,7 @@ def compared_form(name: str) -> str:
     """Return the general form of the phone of a density."""
     phone = name.partition(".")[0]
     return COMPARED_FORMS.get(phone, phone)
+
+
+FORMS = tuple(sorted({compared_form(phone) for phone in PHONES}))
+"""The phones that are compared."""

@@ -25,7 +25,7 @@ from lipmotion.speech.recognition.recognised_speech import (
     RecognisedWord,
     labels_of_words,
 )
-from lipmotion.speech.recognition.word_fit import align_recognised_words, compared_form
+from lipmotion.speech.recognition.word_fit import FORMS, align_recognised_words, compared_form, density_bonus
 from lipmotion.speech.recognition.word_search import free_labels
 from lipmotion.speech.sound.voice_activity import Stretch
 from lipmotion.units import PHONES, Lexicon, Pronunciation, is_silent
@@ -131,20 +131,12 @@ def phones_without_words(
 
 def _posterior_bonus(hmm: UnitHmm, posteriors: PhonePosteriors, frames: int) -> NDArray[np.float32]:
     """Return what is added to the log densities of a stretch [shape=(frames, G)]."""
-    forms = sorted({compared_form(name) for name in (*hmm.table.names, *PHONES)})
     row = np.minimum(np.arange(frames) // POSTERIOR_STEP, len(posteriors.values) - 1)
-    posterior = np.zeros((frames, len(forms)), np.float32)
+    posterior = np.zeros((frames, len(FORMS)), np.float32)
     for column, phone in enumerate(PHONES):
         if not is_silent(phone):
-            posterior[:, forms.index(compared_form(phone))] += np.exp(posteriors.of_phones[row, column])
-    share = posterior.copy()
-    for shift in range(1, min(REACH_FRAMES, frames - 1) + 1):
-        least = np.float32(1 - shift / (REACH_FRAMES + 1))
-        np.maximum(share[shift:], least * posterior[:-shift], out=share[shift:])
-        np.maximum(share[:-shift], least * posterior[shift:], out=share[:-shift])
-    columns = [forms.index(compared_form(name)) for name in hmm.table.names]
-    bonus: NDArray[np.float32] = np.float32(POSTERIOR_BONUS) * share[:, columns]
-    return bonus
+            posterior[:, FORMS.index(compared_form(phone))] += np.exp(posteriors.of_phones[row, column])
+    return density_bonus(hmm, posterior, POSTERIOR_BONUS, REACH_FRAMES)
 
 
 def _finds_phones(posteriors: PhonePosteriors) -> bool:
