@@ -83,7 +83,7 @@ def test_what_is_given_wins_over_what_the_joint_engine_recognises(
 
 
 def test_a_system_of_the_coupled_engine(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
-    wanted = ["--engine", "coupled", "--system", "ph-MSHMM", "--set", "chains=2vis", "--set", "acoustic_regression=no"]
+    wanted = ["--system", "ph-MSHMM", "--set", "chains=2vis", "--set", "acoustic_regression=no"]
     assert run("train", toy_corpus.path, "-o", "m", *wanted).code == 0
     config = load_model(here / "m").engine.config
     assert (config.structure, config.chains, config.acoustic_regression) == ("multistream", "2vis", False)
@@ -157,7 +157,7 @@ UNUSABLE = [
     ("CORPUS -o m --units folder", 3, "folder: "),
     ("CORPUS -o m --engine coupled --recordings missing", 4, "missing: no such folder"),
     ("CORPUS -o m --engine coupled --units eVis", 3, '--set chains="phone viseme"'),
-    ("CORPUS -o m --system ph-HMM", 3, "add --engine coupled"),
+    ("CORPUS -o m --engine joint --system ph-HMM", 3, "not of 'joint'; leave --engine out"),
     ("CORPUS -o m --set tree=1", 3, "no option 'tree'; there are: states, silent_states"),
     ("CORPUS -o m --engine joined", 3, "no engine 'joined'; there are: trajectory, coupled, joint"),
 ]

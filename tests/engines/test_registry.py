@@ -13,7 +13,7 @@ def test_settings_and_presets_are_options() -> None:
     for name in sorted(ENGINES.names):
         assert engine_from_settings(name) == engine_named(name, {})
     for system in SYSTEMS:
-        assert engine_from_settings("coupled", preset=system) == engine_named("coupled", SYSTEMS[system])
+        assert engine_from_settings(preset=system) == engine_named("coupled", SYSTEMS[system])
 
 
 def test_settings_are_of_the_option_s_kind_and_have_the_last_word() -> None:
@@ -40,8 +40,8 @@ def test_settings_are_of_the_option_s_kind_and_have_the_last_word() -> None:
 def test_arguments_that_are_not_allowed() -> None:
     for name, arguments, words in (
         ("joined", {}, "no engine 'joined'; there are: trajectory, coupled, joint"),
-        ("trajectory", {"preset": "ph-HMM"}, "add --engine coupled"),
-        ("coupled", {"preset": "ph-hmm"}, "no system 'ph-hmm'; there are: ph-HMM, ph-MSHMM"),
+        ("trajectory", {"preset": "ph-HMM"}, "of the engine 'coupled', not of 'trajectory'; leave --engine out"),
+        ("coupled", {"preset": "ph-hmm"}, "no preset 'ph-hmm'; there are: ph-HMM, ph-MSHMM"),
         ("coupled", {"units": "eVis"}, '--set chains="phone viseme"'),
         ("coupled", {"settings": ["state=3"]}, "no option 'state'; there are: structure, chains, states, "),
         ("coupled", {"settings": ["states=0"]}, "states is 0, required a whole number from 1"),

@@ -41,7 +41,7 @@ for _name, _options, _message in [
     ("--set without a value", ("--set", "states"), "the setting 'states' has no value; required NAME=VALUE"),
     ("--set of a text instead of a number", ("--set", "states=many"), "states is 'many', required a whole number"),
     ("--set of a number out of range", ("--set", "states=4"), "states is 4, required an odd number from 1"),
-    ("--system of an unknown name", ("--engine", "coupled", "--system", "HMM"), "no system 'HMM'; there are: ph-HMM"),
+    ("--system of an unknown name", ("--system", "HMM"), "no preset 'HMM'; there are: ph-HMM"),
 ]:
 
     @case(GROUP, f"train {_name}", 3, _message)

@@ -20,6 +20,9 @@ ENGINES: Registry[type[Engine[Any]]] = Registry(
     },
 )
 
+DEFAULT = "trajectory"
+"""The engine that is used where none is named."""
+
 
 def engine_named(name: str, configuration: Mapping[str, Any] | None = None) -> Engine[Any]:
     """Return an engine with its configuration.
@@ -40,17 +43,21 @@ def engine_named(name: str, configuration: Mapping[str, Any] | None = None) -> E
 
 
 def engine_from_settings(
-    name: str, *, preset: str | None = None, units: str | None = None, settings: Sequence[str] = ()
+    name: str | None = None, *, preset: str | None = None, units: str | None = None, settings: Sequence[str] = ()
 ) -> Engine[Any]:
     """Return an engine whose configuration is parsed from texts, as on the command line.
 
-    preset   : a named combination of options: ``ph-vi-CHMM`` of the engine ``coupled``, for instance
+    name     : of the engine; None: that of the preset, otherwise ``trajectory``
+    preset   : a named configuration: ``hofer2008``, ``xieliu2007``, ``minnis2000``, or a system as ``ph-vi-CHMM``
     units    : the unit set, for engines with an option ``units``
     settings : ``NAME=VALUE`` for any options; these override preset and units
     Raises InputError: no such engine, preset, unit set or option, or a value that is not allowed.
     """
+    options: dict[str, Any] = {}
+    if preset is not None:
+        name, options = _preset(name, preset)
+    name = name or DEFAULT
     chosen = _class_of(name)
-    options: dict[str, Any] = dict(_preset(chosen, name, preset)) if preset is not None else {}
     try:
         if units is not None:
             options |= chosen.Config.values_of([f"units={units}"])
@@ -77,13 +84,16 @@ def _create(chosen: type[Engine[Any]], config: Any) -> Engine[Any]:
     return constructor(config)
 
 
-def _preset(chosen: type[Engine[Any]], name: str, preset: str) -> Mapping[str, Any]:
-    """Return the options of a preset. Raises InputError: the engine has no such preset."""
-    presets = chosen.Config.presets
-    if preset in presets:
-        return presets[preset]
-    having = [other for other in ENGINES.names if preset in _class_of(other).Config.presets]
-    if having:
-        raise InputError(f"{preset} is a system of the engine {having[0]!r}, not of {name!r}; add --engine {having[0]}")
-    known = f"there are: {', '.join(presets)}" if presets else f"the engine {name!r} has none"
-    raise InputError(f"no system {preset!r}; {known}")
+def _preset(name: str | None, preset: str) -> tuple[str, dict[str, Any]]:
+    """Return the engine and the options of a preset.
+
+    name : the engine that was asked for; None: none was
+    Raises InputError: no engine has such a preset, or another one than that which was asked for.
+    """
+    presets = {known: engine for engine in ENGINES.names for known in _class_of(engine).Config.presets}
+    if preset not in presets:
+        raise InputError(f"no preset {preset!r}; there are: {', '.join(presets)}")
+    engine = presets[preset]
+    if name not in (None, engine):
+        raise InputError(f"{preset} is a preset of the engine {engine!r}, not of {name!r}; leave --engine out")
+    return engine, dict(_class_of(engine).Config.presets[preset])

@@ -10,8 +10,8 @@ from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.cli.arguments.starting_model import add_start_argument, model_to_start_from
 from lipmotion.pipeline.job import Request
 
-ENGINE = "trajectory (default), coupled (chains of states for speech and for lips) or joint (one model, five streams)"
-SYSTEM = "structure of the coupled engine: ph-HMM, ph-MSHMM, ph-FHMM, ph-vi-FHMM, ph-CHMM or ph-vi-CHMM (default)"
+ENGINE = "trajectory (default), coupled (chains of states), joint (one model, five streams) or selection (recordings)"
+PRESET = "a system of a paper: ph-HMM, ph-MSHMM, ph-FHMM, ph-vi-FHMM, ph-CHMM, ph-vi-CHMM; it names the engine, too"
 UNITS = "modelled units: phone (default), eVis, sVis, pbVis, 2vis, or a table file (docs/unit-sets.md)"
 OTHERS = "also train on transcribed recordings without motion (coupled)"
 
@@ -24,8 +24,8 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--split", default="train", help="train, val, test or all (default: train)")
     parser.add_argument("--speaker", action="append", default=[], metavar="NAME", help="only this speaker (repeatable)")
     add_options(parser, Request, "lexicon")
-    parser.add_argument("--engine", default="trajectory", help=ENGINE)
-    parser.add_argument("--system", metavar="NAME", help=SYSTEM)
+    parser.add_argument("--engine", help=ENGINE)
+    parser.add_argument("--preset", "--system", metavar="NAME", help=PRESET)
     add_input(parser, "--units", what="table of units", replaceable=True, type=str, metavar="SET", help=UNITS)
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="engine option (repeatable)")
     parser.add_argument("--visual", default="geometry", metavar="KIND", help="geometry (default), eigenlips or both")
@@ -49,7 +49,7 @@ def run(options: argparse.Namespace) -> None:
 
     with reporting(options) as report:
         lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
-        engine = engine_from_settings(options.engine, preset=options.system, units=options.units, settings=options.set)
+        engine = engine_from_settings(options.engine, preset=options.preset, units=options.units, settings=options.set)
         voices = other_voices(
             synthetic=options.voices, recordings=options.recordings, lexicon=lexicon, monitor=report.receive
         )
