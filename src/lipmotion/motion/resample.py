@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
+
+from lipmotion.types import FRAME_RATE_HZ, Motion, Track
 
 
 def to_model_frames(
@@ -27,3 +31,12 @@ def to_model_frames(
     nearest = np.floor(model_s * rate_hz + 0.5).astype(int)
     valid = seen[np.minimum(nearest, len(seen) - 1)] & (nearest < len(seen))
     return curves, valid
+
+
+def model_motion(track: Track, frames: int) -> tuple[Motion, NDArray[np.bool_]]:
+    """Return tracked motion in ``frames`` frames at 100 Hz, and the frames in which it is valid [shape=(frames,)]."""
+    motion = track.motion
+    values, valid = to_model_frames(
+        np.asarray(motion.values, float), np.asarray(track.seen), motion.rate_hz, frames, FRAME_RATE_HZ
+    )
+    return replace(motion, values=values, rate_hz=FRAME_RATE_HZ), valid

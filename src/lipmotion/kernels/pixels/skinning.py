@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 
 def skinned(weights: csr_array, matrices: NDArray[np.float64], vertices: NDArray[np.float64]) -> NDArray[np.float64]:

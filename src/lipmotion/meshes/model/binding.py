@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import InputError
@@ -16,6 +16,9 @@ from lipmotion.kernels.pixels.skinning import skinned
 from lipmotion.meshes.fitting.lip_placement import LipPlacement
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.meshes.model.surface import MeshSurface
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -56,6 +59,8 @@ class ControlBinding:
     @cached_property
     def matrix(self) -> csr_array:
         """The weights as sparse rows [shape=(N, C)]."""
+        from scipy.sparse import csr_array
+
         count = self.controls.shape[1]
         starts = np.arange(0, self.controls.size + 1, count)
         shape = (len(self.rows), len(self.placement.points))

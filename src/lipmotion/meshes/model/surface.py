@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components, dijkstra
 
 from lipmotion.meshes.model.mesh import Mesh
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 Rows = NDArray[np.int64]
 
@@ -50,6 +52,8 @@ class MeshSurface:
         limit : as of ``distances``
         Cost: O(N · P' log P') for N sources and the P' places within the limit.
         """
+        from scipy.sparse.csgraph import dijkstra  # takes 0.2 s, which those without a mesh would wait
+
         return np.asarray(dijkstra(self.edges, directed=False, indices=self.places[sources], limit=limit))
 
 
@@ -59,6 +63,9 @@ def mesh_surface(mesh: Mesh, split: NDArray[np.bool_] | None = None) -> MeshSurf
     split : vertices that are places of their own, even where others are at the same place, as along closed lips that no
             blendshape opens [shape=(V,)]; None: none
     """
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
+
     normals = vertex_normals(mesh.vertices, mesh.triangles)
     places = _places(mesh, normals)
     if split is not None:

@@ -15,11 +15,11 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.errors import AlignmentError, InputError
 from lipmotion.faces.filmed.face import SUFFIX, FilmedFace, load_face
 from lipmotion.kernels.threads import one_thread
+from lipmotion.motion.resample import model_motion
 from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps
 from lipmotion.motion.transfer_map import composed, measured_speech_s, transfer_map, with_channels
 from lipmotion.pipeline.generate.generation_for import generate_for, speaker_map
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.training.train import model_motion
 from lipmotion.pipeline.understand.request import Onto, SpeechRequest
 from lipmotion.pipeline.understand.understood_speech import audio_of, understand
 from lipmotion.speech.sound.audio_files import read_audio

@@ -18,7 +18,7 @@ from lipmotion.engines import Engine, engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.kernels.threads import one_thread
-from lipmotion.motion.resample import to_model_frames
+from lipmotion.motion.resample import model_motion
 from lipmotion.motion.speaker_maps import SpeakerMaps, mean_person_examples, with_habits
 from lipmotion.pipeline.generate.prior import with_prior
 from lipmotion.pipeline.model import Model, load_model
@@ -52,7 +52,6 @@ from lipmotion.types import (
     Progress,
     Speech,
     Timeline,
-    Track,
     Unit,
     Utterance,
     silent_monitor,
@@ -242,15 +241,6 @@ def phones_of(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> Tim
         return utterance.phones
     features = Features(np.asarray(utterance.features.values), utterance.features.duration_s)
     return phones_in_time(phones, utterance.audio, features, utterance.words, lexicon)
-
-
-def model_motion(track: Track, frames: int) -> tuple[Motion, Any]:
-    """Return tracked motion in ``frames`` frames at 100 Hz, and the frames in which it is valid [shape=(frames,)]."""
-    motion = track.motion
-    values, valid = to_model_frames(
-        np.asarray(motion.values, float), np.asarray(track.seen), motion.rate_hz, frames, FRAME_RATE_HZ
-    )
-    return replace(motion, values=values, rate_hz=FRAME_RATE_HZ), valid
 
 
 def _check_prior(prior: Model | None) -> None:
