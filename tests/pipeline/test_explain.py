@@ -25,6 +25,8 @@ def test_it_explains_what_animate_makes(coupled_model: Model, toy_sentence: ToyS
     assert one.state == result.trace.states[result.trace.frames[80]]
     assert [value.value for value in one.motion.values()] == pytest.approx(result.motion.values[80].tolist())
     assert one.span in result.units.spans
+    assert result.confidence is not None
+    assert [one.confidence, other.confidence] == pytest.approx(result.confidence[[80, 100]].tolist(), abs=1e-6)
     (same,) = lipmotion.explain(SpeechRequest(toy_sentence.audio, units=result.units), at=0.8, model=coupled_model)
     assert same.state == one.state
     assert [chain.name for chain in one.chains] == ["sVis", "2vis"]
@@ -49,6 +51,7 @@ def test_the_text_names_everything(coupled_model: Model, toy_sentence: ToySenten
         assert f"{gaussian.density} " in text
     opening = found.motion["opening"]
     assert f"opening {opening.value:6.3f} ± {opening.deviation:.3f}" in text
+    assert f"confidence {found.confidence:.2f}" in " ".join(text.split())
     assert max(map(len, lines)) < 150
     assert text == "\n".join(line.rstrip() for line in lines)
 

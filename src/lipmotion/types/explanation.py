@@ -95,6 +95,7 @@ class Explanation:
     span        : phone, unit and word that contain the frame (None: no span contains it)
     state       : state of the model, as in ``Generation.trace``
     motion      : value of every channel, and the standard deviation that the model gives it
+    confidence  : 0 to 1, how sure the frame is, as in ``Generation.confidence`` (None: not from ``explain``)
     chains      : posterior probabilities of the states of each chain (empty: the engine has no chains)
     joint       : the most probable joint state of all chains (None: the engine does not list joint states)
     gaussians   : the dominant Gaussian of each stream
@@ -111,6 +112,7 @@ class Explanation:
     span: Span[Unit] | None
     state: str
     motion: Mapping[str, ChannelValue]
+    confidence: float | None = None
     chains: tuple[ChainStates, ...] = ()
     joint: NamedProbability | None = None
     gaussians: tuple[DominantGaussian, ...] = ()

@@ -11,12 +11,13 @@ from typing import Any
 from lipmotion.engines.base import explain_by_trace
 from lipmotion.errors import InputError
 from lipmotion.kernels.threads import one_thread
-from lipmotion.pipeline.generate.generation_for import explanation_for, generate_for
+from lipmotion.pipeline.generate.generation_for import explanation_for
 from lipmotion.pipeline.generate.transfer import person_of
 from lipmotion.pipeline.model import Model, load_model
+from lipmotion.pipeline.session import generation_of
 from lipmotion.pipeline.understand.language import in_language
 from lipmotion.pipeline.understand.request import SpeechInput, request_of
-from lipmotion.pipeline.understand.understood_speech import audio_of, understand
+from lipmotion.pipeline.understand.understood_speech import audio_of, understood_speech
 from lipmotion.printable import printable
 from lipmotion.speech.features.mfcc import frame_count
 from lipmotion.types import (
@@ -64,12 +65,16 @@ def explain(
     count = frame_count(audio.samples)
     frames = [_frame(time_s, count) for time_s in times]
     person = person_of(chosen, request)
-    understood = understand(chosen, replace(request, recording=audio))
-    explained = chosen.engine.explain(chosen.learned, understood, frames)
-    if explained is not None:
-        return tuple(explanation_for(person, explanation, understood) for explanation in explained)
-    generation = generate_for(person, chosen.engine, chosen.learned, understood)
-    return tuple(explain_by_trace(generation, frame) for frame in frames)
+    understood = understood_speech(chosen, replace(request, recording=audio))
+    generation = generation_of(request, person, chosen, understood)
+    by_engine = chosen.engine.explain(chosen.learned, understood.speech, frames)
+    if by_engine is None:
+        found = [explain_by_trace(generation, frame) for frame in frames]
+    else:
+        found = [explanation_for(person, explanation, understood.speech) for explanation in by_engine]
+    if generation.confidence is None:
+        return tuple(found)
+    return tuple(replace(each, confidence=float(generation.confidence[each.frame])) for each in found)
 
 
 def _frame(time_s: float, frames: int) -> int:
@@ -119,6 +124,8 @@ def _rows(explanation: Explanation) -> Iterator[tuple[str, str]]:
     values = _values(explanation.motion)
     yield "generated", next(values)[1]
     yield from values
+    if explanation.confidence is not None:
+        yield "confidence", f"{explanation.confidence:.2f}"
 
 
 def _phone(explanation: Explanation) -> str:
