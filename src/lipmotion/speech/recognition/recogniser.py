@@ -135,7 +135,9 @@ class Recogniser:
         spoken = begun_decoding(audio, each) if with_words else None
         hmm, log_likelihoods = self._log_likelihoods(audio, similarity)
         path = self._loop.network.best_path(log_likelihoods)
-        labels = self._well_placed(audio, free_labels(self._loop, path), len(path))
+        labels = free_labels(self._loop, path)
+        if self.kind in WEIGHTED and self._has_few_gaussians:
+            labels = self._aligned_again(audio, labels, len(path))
         recognised = list[RecognisedWord]()
         if spoken is not None:
             parts, recognised = self._word_search(audio, hmm, log_likelihoods, path).words_of(spoken)
@@ -154,22 +156,22 @@ class Recogniser:
         features = audio.mfcc()
         loud = loud_frames(features.values[:, LOG_ENERGY], ENERGY_SMOOTHING_FRAMES)
         hmm, log_likelihoods = self._log_likelihoods(audio, similarity, aligning=with_words)
+        known = False
         if with_words:
             parts, recognised = NetworkSearch(hmm, log_likelihoods, loud).labels(found)
         else:
-            known = self._knows_voice_and_words(similarity) and not self._has_few_gaussians
-            bonus = network_search.KNOWN_BONUS if known else network_search.POSTERIOR_BONUS
+            known = self._knows_voice_and_words(similarity)
+            few = not known or self._has_few_gaussians
+            bonus = network_search.POSTERIOR_BONUS if few else network_search.KNOWN_BONUS
             parts, recognised = phones_without_words(hmm, self._loop, log_likelihoods, found, bonus), []
         labels = spliced([LabelledFrames(0, SILENCE)], parts, len(loud))
-        if not with_words:
-            labels = self._well_placed(audio, labels, len(loud))
+        if known:
+            labels = self._aligned_again(audio, labels, len(loud))
         recognition = _recognition(labels, recognised, len(loud), features.duration_s, similarity)
         return replace(recognition, posterior=mean_posterior(found))
 
-    def _well_placed(self, audio: AnalysedAudio, labels: list[LabelledFrames], frames: int) -> list[LabelledFrames]:
-        """Return recognised phones where the general models put them, if the own ones were trained on too little."""
-        if self.kind not in WEIGHTED or not self._has_few_gaussians:
-            return labels
+    def _aligned_again(self, audio: AnalysedAudio, labels: list[LabelledFrames], frames: int) -> list[LabelledFrames]:
+        """Return recognised phones where forced alignment puts them, as those of the training were put."""
         features = audio.mfcc()
         named, bounds = [(label.phone, "") for label in labels], [label.first for label in labels]
         phones = _timeline(named, np.array([*bounds, frames]), features.duration_s)
