@@ -64,6 +64,7 @@ class TrajectoryConfig(Configuration):
                  where the model stands on another one, a regression on what that makes of the speech
     articulation : lean on the table of English articulation in contexts that training saw little of
     units      : name of a unit set, or path of a table of units (docs/unit-sets.md), which training reads
+    modulation_filter : give generated motion the modulation spectrum of recorded motion (docs/results/jerk.md)
     """
 
     states: int = option(5, ODD)
@@ -87,6 +88,7 @@ class TrajectoryConfig(Configuration):
     articulation: bool = True
     units: str = "phone"
     predictor: str = option(AUTOMATIC, later=True)
+    modulation_filter: bool = option(False, later=True)
 
     former: ClassVar[Mapping[str, str]] = {
         "parts": "states",
