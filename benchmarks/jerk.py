@@ -41,7 +41,6 @@ from lipmotion.measures import closures, curves
 from lipmotion.measures.modulation import modulation_distance_db
 from lipmotion.motion import generation
 from lipmotion.motion.modulation_filter import (
-    REACH,
     RESTING_MARGIN_S,
     ModulationFilter,
     fit_modulation_filter,
@@ -162,13 +161,6 @@ def learned_filters(clips: Sequence[Clip]) -> dict[str, ModulationFilter]:
     }
 
 
-def weaker(modulation: ModulationFilter, strength: float) -> ModulationFilter:
-    """Return a filter between none (0) and itself (1), or beyond it."""
-    none = np.zeros_like(modulation.taps)
-    none[REACH] = 1
-    return ModulationFilter(none + strength * (modulation.taps - none))
-
-
 def sharpened(clip: Clip, strength: float) -> Array:
     """Return plain sharpening."""
     values = clip.generated()
@@ -230,7 +222,7 @@ def methods(clips: Sequence[Clip]) -> dict[str, Method]:
         found[f"variance of Δ² {strength}"] = lambda clip, w=wanted: with_variance(clip, w)  # type: ignore[misc]
     for name, modulation in filters.items():
         for strength in STRENGTHS:
-            part = weaker(modulation, strength)
+            part = modulation.of_strength(strength)
             found[f"{name} {strength}"] = lambda clip, p=part: clip.generated(p)  # type: ignore[misc]
     return found
 

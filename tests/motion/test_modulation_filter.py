@@ -44,6 +44,13 @@ def test_each_dimension_has_its_own_filter_without_delay() -> None:
     assert half.taps[REACH, 1] > 1.2
 
 
+def test_its_strength_is_between_nothing_and_all_of_it() -> None:
+    plain, whole = GENERATED[0], FILTER.apply(GENERATED[0])
+    assert FILTER.of_strength(0).apply(plain) == pytest.approx(plain)
+    assert FILTER.of_strength(0.5).apply(plain) == pytest.approx((plain + whole) / 2)
+    assert FILTER.of_strength(2).apply(plain) == pytest.approx(2 * whole - plain)
+
+
 def test_a_mouth_at_rest_stays_there() -> None:
     rest = np.full((60, 2), 0.3)
     assert FILTER.apply(rest) == pytest.approx(rest)

@@ -42,6 +42,12 @@ class ModulationFilter(NamedTuple):
 
     taps: Array
 
+    def of_strength(self, strength: float) -> ModulationFilter:
+        """Return a filter between none (0) and this one (1), or beyond it."""
+        none = np.zeros_like(self.taps)
+        none[REACH] = 1
+        return ModulationFilter(none + strength * (self.taps - none))
+
     def apply(self, values: Array, held: Collection[int] = ()) -> Array:
         """Return filtered motion [shape=(T, Q)].
 
@@ -98,7 +104,8 @@ def _taps(frequencies: Array, log_gains: Array) -> Array:
     return taps + (1 - taps.sum()) / window.sum() * window
 
 
-MODULATION = {"modulation": ArraySpec(np.float64, "N Q", -LARGEST_GAIN, LARGEST_GAIN)}
+MODULATION = {"modulation": ArraySpec(np.float64, "N Q", -2 * LARGEST_GAIN, 2 * LARGEST_GAIN)}
+"""Filters up to twice their strength."""
 
 
 def filter_arrays(modulation: ModulationFilter | None) -> dict[str, NDArray[Any]]:

@@ -21,6 +21,7 @@ def test_a_configuration_that_makes_no_sense_is_an_input_error():
         {"shrinkage": -1.0},
         {"silent_states": 2},
         {"ridge_frames": float("nan")},
+        {"modulation_filter": -0.5},
     ):
         with pytest.raises(InputError):
             engine_named("trajectory", options)
@@ -111,7 +112,7 @@ def test_blendshapes_without_an_opening():
 
 
 def test_the_modulation_filter_is_an_option_that_the_model_stores():
-    engine = engine_named("trajectory", {"articulation": False, "modulation_filter": True})
+    engine = engine_named("trajectory", {"articulation": False, "modulation_filter": 0.5})
     model = engine.fit(examples(), silent_monitor).model
     arrays = engine.to_arrays(model)
     again = engine.from_arrays(arrays)

@@ -122,9 +122,9 @@ def test_there_must_be_another() -> None:
 @pytest.mark.long
 @pytest.mark.video
 @pytest.mark.recordings
-def test_videos_are_tracked() -> None:
+def test_videos_are_tracked(recordings: Path) -> None:
     pytest.importorskip("mediapipe")
-    clip = next(Path("../shared/corpora/grid-others").glob("*.mpg"))
+    clip = min((recordings / "grid-others").glob("*.mpg"))
     (pair,) = compare(clip, clip)["others"]
     assert pair["acc"] == pytest.approx(1)
     assert pair["points"]["points"] == 52

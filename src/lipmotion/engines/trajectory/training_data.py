@@ -31,7 +31,7 @@ class TrainingOptions:
     epochs : how often the training of the predictor uses each recording
     articulation : lean on the table of articulation
     predictor : name of the predictor, or ``auto``
-    modulation_filter : learn the filter of generated motion
+    modulation_filter : strength of the filter of generated motion; 0: none
     """
 
     layout: StateLayout
@@ -49,7 +49,7 @@ class TrainingOptions:
     epochs: int
     articulation: bool
     predictor: str
-    modulation_filter: bool
+    modulation_filter: float
 
 
 @dataclass(frozen=True, eq=False)

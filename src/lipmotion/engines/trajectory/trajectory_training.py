@@ -73,7 +73,8 @@ def fit_trajectory(
     factors = _scaling_factors(recorded, generated, emission.means.shape[2])
     modulation = None
     if options.modulation_filter and recorded:
-        modulation = fit_modulation_filter(recorded, [factors * made for made in generated], _resting(clips))
+        whole = fit_modulation_filter(recorded, [factors * made for made in generated], _resting(clips))
+        modulation = whole.of_strength(options.modulation_filter)
     monitor(Progress(_STAGE, 3, 3, 1.0))
     closure = fit_closure(space.direct_names, values, examples)
     return TrajectoryModel(
