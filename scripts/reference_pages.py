@@ -33,6 +33,7 @@ SEE = {
     "character": "meshes",
     "addon": "formats",
     "evaluate": "measures",
+    "compare": "compare",
     "experiment": "measures",
     "info": "start",
     "cite": "glossary",

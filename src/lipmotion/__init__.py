@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from lipmotion.faces.filmed.face import FilmedFace, load_face, save_face
     from lipmotion.pipeline.corpus.prepare import prepare
     from lipmotion.pipeline.edits import Edits
+    from lipmotion.pipeline.evaluation.compare import compare
     from lipmotion.pipeline.evaluation.evaluate import evaluate
     from lipmotion.pipeline.film.build import build_face
     from lipmotion.pipeline.film.filmed_video import FilmOptions
@@ -83,6 +84,7 @@ __all__ = [
     "adapt",
     "animate",
     "build_face",
+    "compare",
     "cues",
     "engine_named",
     "evaluate",
@@ -120,6 +122,7 @@ _HOMES = {
     "FilmedFace": "lipmotion.faces.filmed.face",
     "animate": "lipmotion.pipeline.generate.animate",
     "build_face": "lipmotion.pipeline.film.build",
+    "compare": "lipmotion.pipeline.evaluation.compare",
     "cues": "lipmotion.pipeline.outputs.cues",
     "engine_named": "lipmotion.engines",
     "evaluate": "lipmotion.pipeline.evaluation.evaluate",

@@ -123,6 +123,7 @@ train c -o c/EVIL
 train c -o m --speaker EVIL-none --machine-readable
 adapt EVIL.wav -o EVIL.wav
 evaluate m.lipmotion c --split EVIL
+compare EVIL.csv EVIL.json
 experiment learning-curve c --sizes EVIL
 experiment table3 c --systems EVIL
 """.strip().splitlines()

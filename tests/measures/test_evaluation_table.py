@@ -26,6 +26,7 @@ def figures():
             "closures": {
                 "score": figure(".3f"),
                 "precision": figure(".3f"),
+                "f1": figure(".3f"),
                 "timing_ms": figure("+.0f", 1),
                 "original": int(figure(".0f", 1)),
                 "generated": int(figure(".0f", 1)),

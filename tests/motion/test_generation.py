@@ -1,10 +1,14 @@
 """Long recordings are generated block by block."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from lipmotion.engines import engine_named
 from lipmotion.motion import generation as module
+from lipmotion.motion.closure import closable_ranges
+from lipmotion.motion.modulation_filter import REACH, ModulationFilter
 from lipmotion.testing.examples import PHONES, examples, speech, timeline
 from lipmotion.types import Constraints, Pin
 from lipmotion.types.progress import silent_monitor
@@ -42,3 +46,22 @@ def test_a_long_recording_is_kept_in_single_precision(whole, monkeypatch):
     assert single.motion.values == pytest.approx(whole.motion.values, abs=1e-5)
     assert single.variance == pytest.approx(whole.variance, abs=1e-6)
     assert single.spread.reduced.shape == (len(SPOKEN.features.values), MODEL.space.dimensions)
+
+
+def test_the_modulation_filter_keeps_pins_closures_and_blocks(monkeypatch):
+    taps = np.zeros((2 * REACH + 1, MODEL.space.dimensions))
+    taps[REACH - 3 : REACH + 4 : 3] = np.array([-0.5, 2.0, -0.5])[:, None]  # sharpens
+    model = replace(MODEL, modulation=ModulationFilter(taps))
+    pins = Constraints((Pin(3.3, "opening", 0.2),))
+    filtered = ENGINE.generate(model, SPOKEN, pins).motion["opening"]
+    plain = ENGINE.generate(MODEL, SPOKEN, pins).motion["opening"]
+    assert np.abs(np.diff(filtered, 3)).mean() > 1.5 * np.abs(np.diff(plain, 3)).mean()
+    assert filtered[330] == 0.2
+    assert filtered.min() >= 0
+    ranges = closable_ranges(SPOKEN.units, len(filtered))
+    assert len(ranges) > 5
+    for each in ranges:
+        assert filtered[each].min() <= plain[each].min()
+    monkeypatch.setattr(module, "BLOCK_FRAMES", 97)
+    monkeypatch.setattr(module, "MARGIN_FRAMES", 250)
+    assert ENGINE.generate(model, SPOKEN, pins).motion["opening"] == pytest.approx(filtered, abs=1e-7)

@@ -12,9 +12,9 @@ def matchings(generated, original, reach: int):
                 yield chosen
 
 
-def nearest_first(generated, original, reach: int) -> tuple[int, ...]:
-    """Return how many pairs are 0, 1, … ``reach`` apart, in the matching with most pairs at the least distances."""
-    return max(
-        tuple(sum(abs(g - o) == distance for g, o in chosen) for distance in range(reach + 1))
-        for chosen in matchings(generated, original, reach)
+def best(generated, original, reach: int) -> tuple[int, int]:
+    """Return the largest number of pairs, and the smallest sum of distances of as many pairs."""
+    size, distance = max(
+        (len(chosen), -sum(abs(g - o) for g, o in chosen)) for chosen in matchings(generated, original, reach)
     )
+    return size, -distance

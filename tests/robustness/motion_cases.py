@@ -101,3 +101,17 @@ def _(bench: Bench) -> list[object]:
 @case(GROUP, "a recording as units", 3, "cannot read phones from '.wav'; use one of .json, .npz, .TextGrid")
 def _(bench: Bench) -> list[object]:
     return bench.animate(None, "--units", bench.speech)
+
+
+def _compared(name: str, content: str, *messages: str) -> None:
+    @case(GROUP, f"compare: {name}", 3, *messages)
+    def _(bench: Bench) -> list[object]:
+        reference = bench.file("reference.json", json.dumps(GOOD | {"values": [[0.1]] * 8}))
+        return ["compare", reference, bench.file("other.csv", content), "-o", "a.json"]
+
+
+_compared("an empty file", "", "not a table of numbers")
+_compared("no common channel", "time_s,jawOpen\n" + "".join(f"{n / 10},0\n" for n in range(8)),
+          "it has jawOpen (weight), required one of opening (eye_distance)")  # fmt: skip
+_compared("a motion of two frames", "time_s,opening\n0,0\n0.01,0\n", "2 common frames, required 4 or more")
+_compared("NaN among the values", "time_s,opening\n0,0\n0.01,nan\n", "other.csv: ")

@@ -74,15 +74,22 @@ def _summary(condition: Mapping[str, Any]) -> list[str]:
 
 def _closure_lines(condition: Mapping[str, Any]) -> list[str]:
     """Return the lines of closure figures."""
-    closures, phones = condition["closures"], condition["closures_p_b_m"]
+    phones = condition["closures_p_b_m"]
     return [
-        f"  closures: score {figure_text(closures['score'], '.3f')} of {closures['original']}, precision "
-        f"{figure_text(closures['precision'], '.3f')} of {closures['generated']}, timing "
-        f"{figure_text(closures['timing_ms'], '+.0f')} ms",
+        closures_line(condition["closures"]),
         f"  p b m: recall {figure_text(phones['recall'], '.3f')} of {phones['intervals']}, false closures "
         f"{figure_text(phones['false_per_minute'], '.1f')} a minute (original "
         f"{figure_text(phones['original_per_minute'], '.1f')})",
     ]
+
+
+def closures_line(closures: Mapping[str, Any]) -> str:
+    """Return the line of the figures of closings."""
+    return (
+        f"  closures: score {figure_text(closures['score'], '.3f')} of {closures['original']}, precision "
+        f"{figure_text(closures['precision'], '.3f')} of {closures['generated']}, F1 "
+        f"{figure_text(closures['f1'], '.3f')}, timing {figure_text(closures['timing_ms'], '+.0f')} ms"
+    )
 
 
 def _unpinned(condition: Mapping[str, Any]) -> list[str]:

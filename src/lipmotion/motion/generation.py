@@ -1,4 +1,4 @@
-"""Generation of motion from predicted means and precisions: variance scaling, pins, closures, limits, all channels."""
+"""Generation of motion from predicted means and precisions: scaling, pins, closures, filter, limits, all channels."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from lipmotion.kernels.sequences.banded import generate
 from lipmotion.motion.articulation import ArticulationPrior
 from lipmotion.motion.closure import OPENING, REACH_S, Closure, closable_ranges, frames_to_close
 from lipmotion.motion.limits import MotionLimits
+from lipmotion.motion.modulation_filter import ModulationFilter
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.unknown_voice import closing_reach_s, typical_range, with_contrast, with_open_vowels
 from lipmotion.motion.variance_scaling import VarianceScaling
@@ -50,6 +51,7 @@ class LearnedMotion:
     limits  : of plausible motion in this space
     scaling : variance scaling about the rest pose (None: movements are not scaled)
     prior   : the table of articulation, for contexts that training saw little of (None: the means are used as they are)
+    modulation : restores fast movement after generation (None: the motion stays as it is)
     """
 
     space: MotionSpace
@@ -57,6 +59,7 @@ class LearnedMotion:
     limits: MotionLimits
     scaling: VarianceScaling | None = None
     prior: ArticulationPrior | None = None
+    modulation: ModulationFilter | None = None
 
     def generate(  # noqa: PLR0913
         self,
@@ -73,8 +76,8 @@ class LearnedMotion:
         """Return the motion of all channels at 100 Hz, and its variance [shape=(T, P)], by parameter generation.
 
         The steps are blending with the table of articulation, variance scaling, parameter generation with pins,
-        closures in p, b and m, the check of the limits, and the restoration of all channels. Voices that training does
-        not know have open vowels, and the range of typical talkers (``motion.unknown_voice``).
+        closures in p, b and m, the modulation filter, the check of the limits, and the restoration of all channels.
+        Voices that training does not know have open vowels, and typical talkers' range (``motion.unknown_voice``).
         statistics    : returns the predicted means and precisions of a range of frames [each shape=(N, 3, Q)]
         frames        : length of the whole recording, T
         units         : phones in time
@@ -129,7 +132,7 @@ class LearnedMotion:
             predicted = statistics(outer)
             if scaling is not None:
                 predicted = scaling.apply(*predicted)
-            result = _generated(self.closure, predicted, block_pins, block_ranges)
+            result = _generated(self.closure, predicted, block_pins, block_ranges, self.modulation)
             self.limits.check(result[0], self.closure, block_pins)
             kept = slice(inner.start - outer.start, inner.stop - outer.start)
             values, variance = (rows[kept] for rows in result)
@@ -175,14 +178,24 @@ def generation_blocks(frames: int) -> Iterator[tuple[slice, slice]]:
         yield slice(start, stop), slice(max(start - MARGIN_FRAMES, 0), min(stop + MARGIN_FRAMES, frames))
 
 
-def _generated(closure: Closure | None, statistics: Statistics, pins: Pins, ranges: Sequence[slice]) -> Statistics:
+def _generated(
+    closure: Closure | None,
+    statistics: Statistics,
+    pins: Pins,
+    ranges: Sequence[slice],
+    modulation: ModulationFilter | None,
+) -> Statistics:
     """Return values and variances in the motion space [each shape=(T, Q)], with the lips closed in every range."""
-    result = generate(*statistics, pins)
+    values, variance = generate(*statistics, pins)
     if closure is not None:
-        _close_lips(closure, ranges, statistics, pins, result)
-        opening = result[0][:, closure.column]
+        _close_lips(closure, ranges, statistics, pins, (values, variance))
+    if modulation is not None:
+        closed = [r.start + int(values[r, closure.column].argmin()) for r in ranges] if closure is not None else []
+        values = modulation.apply(values, [*closed, *(frame for frame, _ in pins)])
+    if closure is not None:
+        opening = values[:, closure.column]
         np.maximum(opening, 0, out=opening)  # a smooth curve through a closure may overshoot
-    return result
+    return values, variance
 
 
 def _close_lips(

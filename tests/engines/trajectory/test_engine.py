@@ -21,6 +21,7 @@ def test_a_configuration_that_makes_no_sense_is_an_input_error():
         {"shrinkage": -1.0},
         {"silent_states": 2},
         {"ridge_frames": float("nan")},
+        {"modulation_filter": -0.5},
     ):
         with pytest.raises(InputError):
             engine_named("trajectory", options)
@@ -108,3 +109,18 @@ def test_blendshapes_without_an_opening():
     assert pressed.motion["jaw"][90] == 0.25
     with pytest.raises(InputError, match=r"sets jaw to -0\.1, required at least 0"):
         ENGINE.generate(kept, spoken, Constraints((Pin(0.9, "jaw", -0.1),)))
+
+
+def test_the_modulation_filter_is_an_option_that_the_model_stores():
+    engine = engine_named("trajectory", {"articulation": False, "modulation_filter": 0.5})
+    model = engine.fit(examples(), silent_monitor).model
+    arrays = engine.to_arrays(model)
+    again = engine.from_arrays(arrays)
+    assert again.modulation is not None
+    assert np.array_equal(again.modulation.taps, model.modulation.taps)
+    talk = speech(timeline(("aa", "iy", "t", "uw", "s", "aa")))
+    plain = engine.generate(replace(model, modulation=None), talk).motion.values
+    assert np.abs(engine.generate(model, talk).motion.values - plain).max() > 1e-4
+    assert MODEL.modulation is None
+    assert "modulation" not in ENGINE.to_arrays(MODEL)
+    assert "modulation_filter" not in ENGINE.config.as_mapping()

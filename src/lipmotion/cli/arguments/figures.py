@@ -18,9 +18,10 @@ if TYPE_CHECKING:
 Figures = dict[str, Any]
 
 
-def add_figures_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add ``--lexicon``, ``--output`` and ``--machine-readable``."""
-    add_options(parser, Request, "lexicon")
+def add_figures_arguments(parser: argparse.ArgumentParser, *, lexicon: bool = True) -> None:
+    """Add ``--output`` and ``--machine-readable``; and ``--lexicon``, unless it is not wanted."""
+    if lexicon:
+        add_options(parser, Request, "lexicon")
     add_output(parser, "-o", "--output", force=True, metavar="FILE.json", help="also write all figures to this file")
     add_machine_readable(parser)
 
@@ -39,8 +40,8 @@ def report_figures(
     with reporting(options) as report:
         if options.output:
             check_target(options.output)
-        lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
-        figures = compute(lexicon, report.receive)
+        file = getattr(options, "lexicon", None)
+        figures = compute(Lexicon.from_file(file) if file else None, report.receive)
         if options.output:
             with whole_file(options.output) as unfinished:
                 unfinished.write_text(as_json(nan_as_null(figures), indent=1) + "\n")

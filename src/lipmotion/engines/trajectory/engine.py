@@ -64,6 +64,8 @@ class TrajectoryConfig(Configuration):
                  where the model stands on another one, a regression on what that makes of the speech
     articulation : lean on the table of English articulation in contexts that training saw little of
     units      : name of a unit set, or path of a table of units (docs/unit-sets.md), which training reads
+    modulation_filter : how far generated motion is given the modulation spectrum of recorded motion: 0 not at all, 1
+                 wholly; more goes beyond it (docs/results/jerk.md)
     """
 
     states: int = option(5, ODD)
@@ -87,6 +89,7 @@ class TrajectoryConfig(Configuration):
     articulation: bool = True
     units: str = "phone"
     predictor: str = option(AUTOMATIC, later=True)
+    modulation_filter: float = option(0.0, Rule(least=0, most=2), later=True)
 
     former: ClassVar[Mapping[str, str]] = {
         "parts": "states",

@@ -24,6 +24,7 @@ from lipmotion.motion.closure import Closure
 from lipmotion.motion.frame_labels import StateLayout
 from lipmotion.motion.generation import LearnedMotion
 from lipmotion.motion.limits import MotionLimits, check_poses, limits_of
+from lipmotion.motion.modulation_filter import MODULATION, ModulationFilter, filter_arrays, filter_from_arrays
 from lipmotion.motion.predictors import (
     ADDED,
     Predictor,
@@ -50,6 +51,7 @@ class TrajectoryModel:
     network  : predicts motion without the states (None: there was too little speech, and no other model)
     network_share : weight of this predictor, 0 to 1, beside the states in contexts that training knows well
     prior    : the table of articulation in the speaker's range (None: it is not used)
+    modulation : restores fast movement (None: the motion stays as it is)
     """
 
     units: UnitSet
@@ -61,6 +63,7 @@ class TrajectoryModel:
     network: Predictor | None = None
     prior: ArticulationPrior | None = None
     network_share: float = NETWORK_SHARE
+    modulation: ModulationFilter | None = None
 
     @cached_property
     def limits(self) -> MotionLimits:
@@ -73,7 +76,7 @@ class TrajectoryModel:
         scaling = VarianceScaling(self.variance_factors, self.emission.means[-1, 0])
         has_table = self.network is not None and self.network.uses_articulation
         prior = None if has_table else self.prior
-        return LearnedMotion(self.space, self.closure, self.limits, scaling, prior)
+        return LearnedMotion(self.space, self.closure, self.limits, scaling, prior, self.modulation)
 
     @property
     def poses(self) -> MotionLimits:
@@ -88,7 +91,7 @@ def model_arrays(model: TrajectoryModel) -> dict[str, NDArray[Any]]:
     network = predictor_arrays(model.network)
     if model.network is not None:
         network |= {"network_share": np.array([model.network_share])}
-    return arrays | emission_arrays(model.emission) | network | recogniser
+    return arrays | emission_arrays(model.emission) | network | recogniser | filter_arrays(model.modulation)
 
 
 def model_from_arrays(arrays: Arrays, layout: Callable[[UnitSet], StateLayout], units: str) -> TrajectoryModel:
@@ -101,14 +104,17 @@ def model_from_arrays(arrays: Arrays, layout: Callable[[UnitSet], StateLayout], 
     with format_errors("the trajectory model"):
         joint = (name for name in arrays if name.startswith(JOINT_PREFIX))
         others = names_of_predictors(arrays)
-        refuse_undeclared(arrays, MOTION_ARRAYS, EMISSION, VARIANCE_FACTORS, others, SHARE, joint)
+        refuse_undeclared(arrays, MOTION_ARRAYS, EMISSION, VARIANCE_FACTORS, others, SHARE, joint, MODULATION)
         unit_set, space, closure, prior = motion_from_arrays(arrays, units)
         emission = emission_from_arrays(arrays, layout(unit_set), space.dimensions)
         factors = checked_arrays(arrays, VARIANCE_FACTORS, Q=space.dimensions)["gain"]
         recogniser, network = recogniser_from_arrays(arrays), predictor_from_arrays(arrays, space.dimensions)
         stored = "network_share" in arrays or any(name.startswith(ADDED) for name in others)  # not in former models
         share = float(checked_arrays(arrays, SHARE)["network_share"][0]) if stored else NETWORK_SHARE
-        model = TrajectoryModel(unit_set, space, emission, factors, closure, recogniser, network, prior, share)
+        modulation = filter_from_arrays(arrays, space.dimensions)
+        model = TrajectoryModel(
+            unit_set, space, emission, factors, closure, recogniser, network, prior, share, modulation
+        )
         check_poses(model.poses, space, closure)
         return model
 

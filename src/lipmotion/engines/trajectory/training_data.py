@@ -31,6 +31,7 @@ class TrainingOptions:
     epochs : how often the training of the predictor uses each recording
     articulation : lean on the table of articulation
     predictor : name of the predictor, or ``auto``
+    modulation_filter : strength of the filter of generated motion; 0: none
     """
 
     layout: StateLayout
@@ -48,6 +49,7 @@ class TrainingOptions:
     epochs: int
     articulation: bool
     predictor: str
+    modulation_filter: float
 
 
 @dataclass(frozen=True, eq=False)

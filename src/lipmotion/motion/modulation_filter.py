@@ -1,0 +1,120 @@
+"""The modulation filter: generated motion moves as much at every frequency as recorded motion.
+
+Means of states and regressions are averages, so that fast movement is missing in what is generated from them.
+Source: Takamichi, Toda, Black, Neubig, Sakti & Nakamura 2016.  Deviations: one filter without delay for all utterances,
+instead of a transform of each whole one, so that long recordings are filtered block by block; the tracker's noise is
+taken out of the spectrum that is aimed at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.stats.modulation_spectrum import modulation_spectrum
+from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays
+from lipmotion.types import FRAME_RATE_HZ
+
+Array = NDArray[np.float64]
+REACH = 24
+"""Frames before and after a frame that determine it."""
+HIGHEST_HZ, UNCHANGED_HZ = 12.5, 20.0
+"""Frequencies up to which cameras of 25 Hz show movement, and from which on it is left as it is."""
+LEAST_GAIN, LARGEST_GAIN = 0.3, 6.0
+LEAST_SHARE = 0.02
+"""At least this share of recorded power counts as movement, however strong the noise."""
+RESTING_MARGIN_S = 0.3
+"""A mouth rests so far from speech, in seconds."""
+RESTING_FRAMES = 500
+"""Without so many frames of a resting mouth the noise is not known, and not taken out."""
+HOLD_FRAMES = 5
+"""Frames on both sides of a held one over which the filter fades in."""
+
+
+class ModulationFilter(NamedTuple):
+    """Filters without delay, dimension by dimension.
+
+    taps : symmetrical, of sum 1, so that a mouth at rest stays there [shape=(2 · REACH + 1, Q)]
+    """
+
+    taps: Array
+
+    def of_strength(self, strength: float) -> ModulationFilter:
+        """Return a filter between none (0) and this one (1), or beyond it."""
+        none = np.zeros_like(self.taps)
+        none[REACH] = 1
+        return ModulationFilter(none + strength * (self.taps - none))
+
+    def apply(self, values: Array, held: Collection[int] = ()) -> Array:
+        """Return filtered motion [shape=(T, Q)].
+
+        values : generated motion at 100 Hz [shape=(T, Q)]; before its start and after its end it stands still
+        held   : frames that stay exactly as they are: pins, and closed lips
+        """
+        padded = np.pad(values, ((REACH, REACH), (0, 0)), mode="edge")
+        change = -values
+        for tap in range(2 * REACH + 1):
+            change += self.taps[tap] * padded[tap : tap + len(values)]
+        frames = np.arange(len(values))
+        weight = np.ones(len(values))
+        for frame in held:
+            near = slice(max(frame - HOLD_FRAMES, 0), frame + HOLD_FRAMES)
+            weight[near] = np.minimum(weight[near], np.abs(frames[near] - frame) / HOLD_FRAMES)
+        return values + weight[:, None] * change
+
+
+def fit_modulation_filter(
+    recorded: Sequence[NDArray[Any]], generated: Sequence[NDArray[Any]], resting: Sequence[NDArray[Any]] = ()
+) -> ModulationFilter:
+    """Return the filter that gives generated motion the modulation spectrum of recorded motion.
+
+    recorded, generated : motion of the same clips at 100 Hz [each shape=(T_i, Q)]
+    resting : recorded motion in silence, ``RESTING_MARGIN_S`` from speech: noise [each shape=(N_i, Q)]
+    """
+    frequencies, wanted = _spectrum(recorded)
+    _, made = _spectrum(generated)
+    quiet = [clip for clip in resting if len(clip) > REACH]
+    if sum(map(len, quiet)) >= RESTING_FRAMES:
+        noise = _spectrum(quiet)[1]
+        wanted = np.maximum(wanted - noise, LEAST_SHARE * wanted)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        gains = np.where(made > 0, np.sqrt(wanted / made), 1.0)
+    shown = frequencies <= HIGHEST_HZ
+    logs = np.log(np.clip(gains[shown], LEAST_GAIN, LARGEST_GAIN))
+    padded = np.pad(logs, ((1, 1), (0, 0)), mode="edge")
+    smooth = 0.25 * padded[:-2] + 0.5 * padded[1:-1] + 0.25 * padded[2:]
+    return ModulationFilter(np.stack([_taps(frequencies[shown], column) for column in smooth.T], axis=1))
+
+
+def _spectrum(clips: Sequence[NDArray[Any]]) -> tuple[Array, Array]:
+    return modulation_spectrum([clip.astype(float) for clip in clips], FRAME_RATE_HZ)
+
+
+def _taps(frequencies: Array, log_gains: Array) -> Array:
+    """Return the symmetrical filter with given gains [shape=(2 · REACH + 1,)], by the window method."""
+    size = 256
+    grid = np.fft.rfftfreq(size, 1 / FRAME_RATE_HZ)
+    known = np.concatenate([[0.0], frequencies, [UNCHANGED_HZ]])
+    response = np.fft.irfft(np.exp(np.interp(grid, known, np.concatenate([[0.0], log_gains, [0.0]]))), size)
+    middle, window = size // 2, np.hanning(2 * REACH + 3)[1:-1]
+    taps: Array = np.fft.fftshift(response)[middle - REACH : middle + REACH + 1] * window
+    return taps + (1 - taps.sum()) / window.sum() * window
+
+
+MODULATION = {"modulation": ArraySpec(np.float64, "N Q", -2 * LARGEST_GAIN, 2 * LARGEST_GAIN)}
+"""Filters up to twice their strength."""
+
+
+def filter_arrays(modulation: ModulationFilter | None) -> dict[str, NDArray[Any]]:
+    """Serialise a filter; None has no arrays."""
+    return {} if modulation is None else {"modulation": modulation.taps}
+
+
+def filter_from_arrays(arrays: Arrays, dimensions: int) -> ModulationFilter | None:
+    """Deserialise what ``filter_arrays`` returned. Raises ValueError: a wrong shape, type or range."""
+    if "modulation" not in arrays:
+        return None
+    return ModulationFilter(checked_arrays(arrays, MODULATION, N=2 * REACH + 1, Q=dimensions)["modulation"])

@@ -1,0 +1,47 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from cli.conftest import RunCommand, is_one_error
+from lipmotion.measures.comparison_table import comparison_table
+from lipmotion.pipeline.evaluation.compare import compare
+
+
+def table(factor: float) -> str:
+    rows = (f"{n / 8},{factor * (n % 5) / 10},{(n % 3) / 10}\n" for n in range(30))
+    return "time_s,opening,width\n" + "".join(rows)
+
+
+WAVE = table(1.0)
+
+
+def test_the_figures_are_those_of_the_function(run: RunCommand, here: Path) -> None:
+    (here / "a.csv").write_text(WAVE)
+    (here / "b.csv").write_text(table(0.5))
+    done = run("compare", "a.csv", "b.csv", "a.csv", "-o", "figures.json")
+    assert (done.code, done.err) == (0, [])
+    figures = compare("a.csv", "b.csv", "a.csv")
+    assert "\n".join(done.out) == comparison_table(figures)
+    assert json.loads((here / "figures.json").read_text()) == json.loads(json.dumps(figures))
+    assert done.out[0] == "reference: a.csv"
+    assert done.out[-2:] == [
+        "  mean ACC 1.000",
+        "  closures: score 1.000 of 5, precision 1.000 of 5, F1 1.000, timing +0 ms",
+    ]
+
+
+def test_what_cannot_be_used(run: RunCommand, here: Path) -> None:
+    (here / "a.csv").write_text(WAVE)
+    (here / "b.csv").write_text(WAVE.replace("opening,width", "jawOpen,mouthClose"))
+    (here / "nothing.csv").write_text("")
+    for other, words in (
+        ("nothing.csv", "nothing.csv: "),
+        ("b.csv", "no channel of a.csv"),
+        ("c.csv", "c.csv: cannot"),
+    ):
+        done = run("compare", "a.csv", other, "-o", "figures.json")
+        assert is_one_error(done, 3)
+        assert words in done.err[0]
+    assert is_one_error(run("compare", "a.csv", "a.csv", "-o", "a.csv"), 7)
+    assert not (here / "figures.json").exists()

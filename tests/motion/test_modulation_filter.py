@@ -1,0 +1,93 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter1d
+
+from lipmotion.errors import ModelFormatError
+from lipmotion.measures.modulation import modulation_distance_db
+from lipmotion.motion.modulation_filter import (
+    HOLD_FRAMES,
+    MODULATION,
+    REACH,
+    ModulationFilter,
+    filter_arrays,
+    filter_from_arrays,
+    fit_modulation_filter,
+)
+from lipmotion.storage.schema import format_errors
+from lipmotion.types import FRAME_RATE_HZ
+
+RNG = np.random.default_rng(0)
+RECORDED = [gaussian_filter1d(RNG.normal(size=(600, 2)), 1.0, axis=0) for _ in range(6)]
+GENERATED = [gaussian_filter1d(clip, 1.5, axis=0) for clip in RECORDED]
+FILTER = fit_modulation_filter(RECORDED, GENERATED)
+
+
+def test_the_filtered_motion_has_the_spectrum_of_the_recorded_motion() -> None:
+    filtered = [FILTER.apply(clip) for clip in GENERATED]
+    before = modulation_distance_db(GENERATED, RECORDED, FRAME_RATE_HZ)
+    after = modulation_distance_db(filtered, RECORDED, FRAME_RATE_HZ)
+    assert (after < 0.25 * before).all()
+    same = fit_modulation_filter(RECORDED, RECORDED).apply(RECORDED[0])
+    assert same == pytest.approx(RECORDED[0], abs=1e-9)
+
+
+def test_each_dimension_has_its_own_filter_without_delay() -> None:
+    impulse = np.zeros((101, 2))
+    impulse[50] = 1
+    answer = FILTER.apply(impulse)
+    assert answer[50 - REACH : 51 + REACH] == pytest.approx(FILTER.taps)
+    assert answer == pytest.approx(answer[::-1])
+    half = fit_modulation_filter(RECORDED, [clip * (1, 0.5) for clip in RECORDED])
+    assert half.apply(impulse)[:, 0] == pytest.approx(impulse[:, 0], abs=1e-9)
+    assert half.taps[REACH, 1] > 1.2
+
+
+def test_its_strength_is_between_nothing_and_all_of_it() -> None:
+    plain, whole = GENERATED[0], FILTER.apply(GENERATED[0])
+    assert FILTER.of_strength(0).apply(plain) == pytest.approx(plain)
+    assert FILTER.of_strength(0.5).apply(plain) == pytest.approx((plain + whole) / 2)
+    assert FILTER.of_strength(2).apply(plain) == pytest.approx(2 * whole - plain)
+
+
+def test_a_mouth_at_rest_stays_there() -> None:
+    rest = np.full((60, 2), 0.3)
+    assert FILTER.apply(rest) == pytest.approx(rest)
+    speech = np.concatenate([rest, 0.3 + RECORDED[0][:50], rest])
+    assert FILTER.apply(speech)[:30] == pytest.approx(speech[:30])
+
+
+def test_held_frames_are_what_they_were_and_their_neighbours_lead_to_them() -> None:
+    free, held = FILTER.apply(GENERATED[0]), FILTER.apply(GENERATED[0], [0, 200, 203, 599])
+    assert np.array_equal(held[[0, 200, 203, 599]], GENERATED[0][[0, 200, 203, 599]])
+    far = np.abs(np.arange(600)[:, None] - [0, 200, 203, 599]).min(axis=1) >= HOLD_FRAMES
+    assert np.array_equal(held[far], free[far])
+    change = np.abs(held - GENERATED[0]) <= np.abs(free - GENERATED[0]) + 1e-12
+    assert change.all()
+
+
+def test_noise_of_the_tracker_is_not_learned() -> None:
+    tracked = [clip + 0.6 * RNG.normal(size=clip.shape) for clip in RECORDED]
+    resting = [0.6 * RNG.normal(size=(200, 2)) for _ in range(6)]
+    noisy, freed = fit_modulation_filter(tracked, GENERATED), fit_modulation_filter(tracked, GENERATED, resting)
+    error = [np.abs(each.taps - FILTER.taps).max() for each in (noisy, freed)]
+    assert error[1] < 0.5 * error[0]
+    short = [resting[0][:REACH]] * 100
+    assert np.array_equal(fit_modulation_filter(tracked, GENERATED, short).taps, noisy.taps)
+
+
+def test_what_never_moves_is_left_as_it_is() -> None:
+    still = [np.zeros((100, 1))]
+    assert np.isfinite(fit_modulation_filter(still, still).taps).all()
+    assert fit_modulation_filter([RECORDED[0][:, :1]], still).apply(still[0]) == pytest.approx(still[0])
+
+
+def test_it_is_stored() -> None:
+    stored = filter_from_arrays(filter_arrays(FILTER), 2)
+    assert stored is not None
+    assert np.array_equal(stored.taps, FILTER.taps)
+    assert filter_from_arrays(filter_arrays(None), 2) is None
+    for taps in (FILTER.taps[:-1], FILTER.taps[:, :1], np.full_like(FILTER.taps, MODULATION["modulation"].most + 1)):
+        with pytest.raises(ModelFormatError), format_errors("the model"):
+            filter_from_arrays(filter_arrays(ModulationFilter(taps)), 2)
