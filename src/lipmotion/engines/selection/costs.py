@@ -17,7 +17,7 @@ from lipmotion.engines.selection.inventory import (
     standing_in,
     unit_index,
 )
-from lipmotion.engines.selection.lip_reading import OVERLAPS, PROTECTED_PHONES, lip_reading_class
+from lipmotion.engines.selection.lip_reading import INVISIBLE, OVERLAPS, PROTECTED_PHONES, lip_reading_class
 from lipmotion.engines.selection.windows import INVISIBLE_SYMBOL, SILENT, VISEME_NUMBER, PhoneWindows
 from lipmotion.units import PHONES
 from lipmotion.units.classes import CLASSES
@@ -81,6 +81,10 @@ class Costs:
         """The phone that stands in for each phone which the inventory lacks."""
         return standing_in(self.inventory.windows, self.inventory.usable)
 
+    def shown(self, windows: PhoneWindows) -> PhoneWindows:
+        """Return the phones of one recording without those that are suppressed, if any are."""
+        return windows.suppressed(self.config.suppressed_phones)
+
     def target(
         self, windows: PhoneWindows, guided: Array | None, predicted: Array | None, *, by_sound: bool = False
     ) -> Target:
@@ -137,7 +141,7 @@ class Costs:
         """
         pair = np.array([left]), np.array([right])
         if self._succeed(*pair)[0, 0]:
-            return NO_JOIN
+            return NO_JOIN if self.inventory.windows.adjoins[left] else ABUTTING_JOIN
         costs = [cost[0, 0] for cost in self._joins(target, number, *pair)]
         if not may_be_before:
             costs[JOIN_BEFORE] = np.inf
@@ -148,11 +152,15 @@ class Costs:
         invisible = self.config.invisible_phones
         phones = [PHONES[target.windows.phones[n]] if 0 <= n < len(target) else "sil" for n in (shared - 1, shared + 1)]
         before, after = (lip_reading_class(phone, invisible) for phone in phones)
+        hidden = target.windows.hidden
+        if hidden is not None:
+            before = INVISIBLE if 0 <= shared < len(target) and hidden[shared] else before
+            after = INVISIBLE if shared + 1 < len(target) and hidden[shared + 1] else after
         return OVERLAPS[self.config.overlap][before, after]
 
     def _joins(self, target: Target, number: int, left: UnitNumbers, right: UnitNumbers) -> tuple[Array, Array, Array]:
         """Return the costs of joins: ``ABUTTING_JOIN``, ``JOIN_BEFORE``, ``JOIN_AFTER``; infinite where none is."""
-        config, continues, symbols = self.config, self.inventory.windows.continues, self.index.contexts
+        config, adjoins, symbols = self.config, self.inventory.windows.adjoins, self.index.contexts
         middle = symbols.shape[1] // 2
         before, after = (PHONES[target.windows.phones[n]] for n in (number - 1, number))
         protects = [config.protected * (phone in PROTECTED_PHONES) for phone in (before, after)]
@@ -163,10 +171,10 @@ class Costs:
             and not target.windows.words[number, 0]
         )
         hard = self._distances(left, 1.0, right, 0.0) + config.hard + max(protects) + inside
-        earlier, later = np.maximum(right - 1, 0), np.minimum(left + 1, len(continues) - 1)
+        earlier, later = np.maximum(right - 1, 0), np.minimum(left + 1, len(adjoins) - 1)
         usable = self.inventory.usable
-        shares_before = usable[earlier] & continues[earlier] & (right > 0)
-        shares_after = usable[later] & continues[left]
+        shares_before = usable[earlier] & adjoins[earlier] & (right > 0)
+        shares_after = usable[later] & adjoins[left]
         if not target.by_sound:
             shares_before &= symbols[earlier, middle] == target.symbol(number - 1)
             shares_after &= symbols[later, middle] == target.symbol(number)

@@ -55,6 +55,14 @@ class RecordedUnits:
         knots, order = np.unique(knots, return_index=True)
         return np.stack([np.interp(frames, knots, column) for column in values[order].T], axis=1)
 
+    def without(self, phones: Collection[str]) -> RecordedUnits:
+        """Return the units of other phones; all units, if none of those is usable."""
+        windows, kept = self.windows.without(phones)
+        if not self.usable[kept].any():
+            return self
+        predicted = self.predicted[kept] if self.predicted is not None else None
+        return replace(self, windows=windows, usable=self.usable[kept], predicted=predicted)
+
     def poses(self, units: UnitNumbers, fraction: float) -> Array:
         """Return the motion at a fraction of the duration of some units [shape=(N, Q)].
 
