@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,6 +99,14 @@ class Costs:
             return Target(known, contexts, None, None)
         return Target(known, contexts, guided * self.scale, predicted * self.scale, by_sound)
 
+    def candidates(self, target: Target, number: int, excluded: NDArray[np.bool_] | None = None) -> UnitNumbers:
+        """Return the units for one phone: of each bias those of the longest agreement, and of these the cheapest.
+
+        excluded : units that are not wanted [shape=(U,)]
+        """
+        cost = partial(self._phonological_costs, target, number)
+        return self.index.candidates(target.contexts[number], self.config.candidates, excluded, cost)
+
     def target_costs(self, target: Target, number: int, units: UnitNumbers) -> Array:
         """Return the cost of each of some units for one phone [shape=(N,)]."""
         config, windows = self.config, self.inventory.windows
@@ -116,13 +124,18 @@ class Costs:
 
     def _context_costs(self, target: Target, number: int, units: UnitNumbers) -> Array:
         """Return what the phones around, words and stress of each of some units cost for one phone [shape=(N,)]."""
-        config, windows = self.config, self.inventory.windows
         differs = self.index.contexts[units] != target.contexts[number]
         differs_much = VISEME_NUMBER[self.index.contexts[units]] != VISEME_NUMBER[target.contexts[number]]
         costs = (differs + differs_much) @ (self._context_weights / 2)
+        return costs + self._phonological_costs(target, number, units)
+
+    def _phonological_costs(self, target: Target, number: int, units: UnitNumbers) -> Array:
+        """Return what other edges of a word and other stress of each of some units cost for one phone [shape=(N,)]."""
+        config, windows = self.config, self.inventory.windows
+        costs: Array = config.stress * _differ(windows.stress[units], target.windows.stress[number]).astype(float)
         if target.windows.words_known:
             costs += config.word * (windows.words[units] != target.windows.words[number]).sum(axis=1)
-        return costs + config.stress * _differ(windows.stress[units], target.windows.stress[number])
+        return costs
 
     def join_costs(self, target: Target, number: int, left: UnitNumbers, right: UnitNumbers) -> Array:
         """Return the costs of joining units of one phone with units of the next [shape=(len(left), len(right))].
