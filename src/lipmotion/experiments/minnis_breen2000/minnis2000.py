@@ -143,22 +143,18 @@ def _on_list(
         lexicon=settings.lexicon,
         monitor=sub_monitor(monitor, 0, 0.4),
     )
-    conditions: dict[str, dict[str, Any]] = {}
-    comparing = sub_monitor(monitor, 0.4, 1)
-    steps = [(condition, name) for condition in recordings.conditions for name in rows()]
+    conditions: dict[str, dict[str, Any]] = {condition: {} for condition in recordings.conditions}
     spoken: dict[tuple[str, bool], list[Speech]] = {}
     reference: dict[str, ClipStatistic] = {}
-    for condition, name in with_progress(steps, "comparing", comparing):
-        config = rows()[name]
-        key = condition, config.joint_recogniser and condition == AUDIO_ONLY
-        if key not in spoken:
-            listening = SelectionConfig(joint_recogniser=key[1])
-            spoken[key] = _speech(recordings, condition, model, listening)
+    for name, config in with_progress(list(rows().items()), "comparing", sub_monitor(monitor, 0.4, 1)):
         learned = _of_the_row(model.learned, config)
-        statistic, row = _row(recordings, spoken[key], SelectionEngine(config), learned, settings.seed)
-        reference.setdefault(condition, statistic)
-        row["acc_gain_95"] = statistic.gain(reference[condition], settings.seed)
-        conditions.setdefault(condition, {})[name] = row
+        for condition, found in conditions.items():
+            key = condition, config.joint_recogniser and condition == AUDIO_ONLY
+            if key not in spoken:
+                spoken[key] = _speech(recordings, condition, model, SelectionConfig(joint_recogniser=key[1]))
+            statistic, row = _row(recordings, spoken[key], SelectionEngine(config), learned, settings.seed)
+            reference.setdefault(condition, statistic)
+            found[name] = row | {"acc_gain_95": statistic.gain(reference[condition], settings.seed)}
     return {"clips": len(names), "closed_under": recordings.closed_under, "conditions": conditions}
 
 
