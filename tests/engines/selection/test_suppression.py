@@ -33,9 +33,11 @@ def times_of(text: str) -> dict[str, tuple[float, float]]:
     return dict(zip(names, map(tuple, windows.times_s.tolist()), strict=True))
 
 
-def test_the_phone_that_follows_takes_the_time() -> None:
+def test_the_vowel_that_follows_takes_the_time() -> None:
     assert times_of("sil t uw | m d") == {"sil": (0, 1), "uw": (1, 3), "m": (3, 5)}
-    assert times_of("aa k t s iy") == {"aa": (0, 1), "s": (1, 4), "iy": (4, 5)}
+    assert times_of("aa k t iy") == {"aa": (0, 1), "iy": (1, 4)}
+    assert times_of("aa k t s iy") == {"aa": (0, 3), "s": (3, 4), "iy": (4, 5)}
+    assert times_of("t s iy") == {"s": (0, 2), "iy": (2, 3)}
     assert times_of("aa t sil") == {"aa": (0, 2), "sil": (2, 3)}
     assert times_of("t aa") == {"aa": (0, 2)}
     assert times_of("t") == {"t": (0, 1)}

@@ -35,7 +35,7 @@ class SelectionConfig(Configuration):
     beam       : of all these, so many of the least target costs are candidates in the search
     invisible  : phones without a lip shape of their own, those of the print by default (add ``l`` for faces without a
                  tongue): they count as one phone, and their neighbours choose the unit; empty: none
-    suppressed : leave invisible phones out: the phone that follows gives the shape, and no recorded one is played
+    suppressed : leave invisible phones out: the vowel that follows gives the shape, and no recorded one is played
     overlap    : how units overlap in a phone that they share: ``learned``, ``printed`` (Table 1),
                  ``symmetric``, ``middle``
     context    : target cost of another phone beside the phone, ``farther`` times as much for each phone further away;

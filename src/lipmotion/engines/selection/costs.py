@@ -125,8 +125,8 @@ class Costs:
     def _context_costs(self, target: Target, number: int, units: UnitNumbers) -> Array:
         """Return what the phones around, words and stress of each of some units cost for one phone [shape=(N,)]."""
         differs = self.index.contexts[units] != target.contexts[number]
-        differs_much = VISEME_NUMBER[self.index.contexts[units]] != VISEME_NUMBER[target.contexts[number]]
-        costs = (differs + differs_much) @ (self._context_weights / 2)
+        other_viseme = VISEME_NUMBER[self.index.contexts[units]] != VISEME_NUMBER[target.contexts[number]]
+        costs = (differs.astype(float) + other_viseme) @ (self._context_weights / 2)
         return costs + self._phonological_costs(target, number, units)
 
     def _phonological_costs(self, target: Target, number: int, units: UnitNumbers) -> Array:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import PHONES, SILENCE, is_silent, unknown_phone_message, without_gaps
-from lipmotion.units.stress import stress_of
+from lipmotion.units.stress import NUCLEI, stress_of
 from lipmotion.units.visemes import VISEME_OF, VISEMES
 
 INVISIBLE_SYMBOL = len(PHONES)
@@ -104,9 +104,9 @@ class PhoneWindows:
         return taken, kept
 
     def suppressed(self, phones: Collection[str]) -> PhoneWindows:
-        """Return the phones of one recording without some, whose time the phone after each takes.
+        """Return the phones of one recording without some, whose time the vowel that follows takes.
 
-        Before silence, and at the end, the phone before takes it.
+        Where no vowel follows, the phone before takes it; at the start, the phone after.
         Source: Minnis & Breen 2000, §3: "the following vowel gives the shape of the mouth".
         """
         others, kept = self.without(phones)
@@ -114,8 +114,8 @@ class PhoneWindows:
         if len(kept) == len(self):
             return self
         times_s[0, 0], times_s[-1, 1] = self.times_s[0, 0], self.times_s[-1, 1]
-        silent = np.array([is_silent(PHONES[phone]) for phone in others.phones[1:]], bool)
-        times_s[1:, 0] = np.where(silent, times_s[1:, 0], times_s[:-1, 1])
+        vowel = np.array([PHONES[phone] in NUCLEI for phone in others.phones[1:]], bool)
+        times_s[1:, 0] = np.where(vowel, times_s[:-1, 1], times_s[1:, 0])
         times_s[:-1, 1] = times_s[1:, 0]
         return replace(others, times_s=times_s)
 
