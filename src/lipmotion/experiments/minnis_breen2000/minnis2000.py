@@ -37,7 +37,7 @@ from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import Monitor, Speech, sub_monitor, with_progress
 
 ENGINE = "selection"
-PRINTED, EVERYTHING = "as printed", "all additions: the default"
+PRINTED, UNGUIDED, EVERYTHING = "as printed", "all additions but the guide", "all additions: the default"
 DEFAULTS = SelectionConfig().as_mapping()
 ADDITIONS: Mapping[str, tuple[str, ...]] = {
     "300 candidates a bias": ("candidates",),
@@ -71,7 +71,8 @@ def rows() -> dict[str, SelectionConfig]:
     found = {PRINTED: printed}
     found |= {name: replace(printed, **{key: _default(key) for key in keys}) for name, keys in ADDITIONS.items()}
     found |= {name: replace(printed, **changes) for name, changes in VARIANTS.items()}
-    return found | {EVERYTHING: SelectionConfig(closures=False)}
+    everything = SelectionConfig(closures=False)
+    return found | {UNGUIDED: replace(everything, guide=0.0), EVERYTHING: everything}
 
 
 def _default(option: str) -> Any:
