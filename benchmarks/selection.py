@@ -4,7 +4,8 @@
         [--only options|joins|pruning|inventory|overlaps|speed]
 
 options   : correlation of opening, width and outer, nRMSE, global-variance ratio for other settings, with transcripts
-joins     : change of the velocity of the opening over 80 ms at joins, beside that of the recordings in all speech
+joins     : change of the velocity of the opening over 80 ms at joins, beside that of the recordings in all speech,
+            as in ``lipmotion experiment minnis2000``
 pruning   : the least cost with and without pruning, and with all units of a phone as candidates
 inventory : sentences that the model was trained on: share of their phones that come from their own recording
 overlaps  : the forward share of a shared phone that joins best, for each pair of classes, learned on one half of the
@@ -35,6 +36,7 @@ from lipmotion.engines.selection.lip_reading import INVISIBLE, NORMAL, PROTECTED
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.targets import target_of
+from lipmotion.experiments.minnis_breen2000.joins import join_figures
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.understood_speech import understand
@@ -105,36 +107,8 @@ def other_settings(model: Model, _: Corpus, spoken: Spoken) -> Iterator[dict[str
 
 def joins(model: Model, _: Corpus, spoken: Spoken) -> Iterator[dict[str, Any]]:
     """Yield the percentiles of velocity changes at joins, and of the recordings."""
-    learned: SelectionModel = model.learned
-    costs = learned.costs(model.engine.config)
-    at_joins, everywhere, kinds = [], [], []
-    for utterance, speech in spoken:
-        target = target_of(learned, costs, speech)
-        pieces = pieces_of(costs, target, select(costs, target).units)
-        opening = model.engine.generate(learned, speech).motion["opening"]
-        for piece in pieces[1:]:
-            frame = round(piece.start_s * 100)
-            at_joins.append(np.abs(velocity_change(opening))[min(frame, len(opening) - 1)])
-            kinds.append(piece.join)
-        motion = utterance.track.motion
-        recorded = np.interp(np.arange(len(opening)) / 100, motion.time_s, motion["opening"])
-        spans_s = target.windows.times_s[[0, -1]]
-        inside = slice(int(spans_s[0, 1] * 100), int(spans_s[1, 0] * 100))
-        everywhere.append(np.abs(velocity_change(recorded))[inside])
-    original = np.concatenate(everywhere)
-    yield {
-        "joins": len(at_joins),
-        "hard, before, after": [kinds.count(kind) for kind in range(3)],
-        "at joins, percentiles 50 75 95": np.percentile(at_joins, [50, 75, 95]).round(4).tolist(),
-        "recorded, percentiles 50 75 95": np.percentile(original, [50, 75, 95]).round(4).tolist(),
-        "joins within the recorded 95th": round(float(np.mean(at_joins <= np.percentile(original, 95))), 3),
-    }
-
-
-def velocity_change(curve: Array) -> Array:
-    """Return the second difference over 40 ms on both sides of each frame [shape=(T,)]: a picture of a video each."""
-    padded = np.pad(curve, 4, mode="edge")
-    return padded[8:] - 2 * padded[4:-4] + padded[:-8]
+    utterances, speech = zip(*spoken, strict=True)
+    yield join_figures(model.engine, model.learned, speech, utterances)
 
 
 def pruning(model: Model, _: Corpus, spoken: Spoken) -> Iterator[dict[str, Any]]:

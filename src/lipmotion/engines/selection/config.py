@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 from lipmotion.engines.selection.lip_reading import OVERLAPS, parsed_invisible
 from lipmotion.errors import InputError
@@ -10,6 +12,18 @@ from lipmotion.motion.predictors import AUTOMATIC, check_predictor
 from lipmotion.types import Configuration, Rule, option
 
 NOT_NEGATIVE = Rule(least=0)
+MINNIS_2000: Mapping[str, Any] = {
+    "candidates": 1,
+    "suppressed": True,
+    "overlap": "printed",
+    "duration": 0.0,
+    "guide": 0.0,
+    "join": 0.0,
+    "joint_recogniser": False,
+    "closures": False,
+    "articulation": False,
+}
+"""The system of Minnis & Breen 2000, as far as it is printed (docs/papers/minnis2000.md)."""
 
 
 @dataclass(frozen=True)
@@ -21,6 +35,7 @@ class SelectionConfig(Configuration):
     beam       : of all these, so many of the least target costs are candidates in the search
     invisible  : phones without a lip shape of their own, those of the print by default (add ``l`` for faces without a
                  tongue): they count as one phone, and their neighbours choose the unit; empty: none
+    suppressed : leave invisible phones out: the vowel that follows gives the shape, and no recorded one is played
     overlap    : how units overlap in a phone that they share: ``learned``, ``printed`` (Table 1),
                  ``symmetric``, ``middle``
     context    : target cost of another phone beside the phone, ``farther`` times as much for each phone further away;
@@ -72,6 +87,9 @@ class SelectionConfig(Configuration):
     closures: bool = True
     articulation: bool = True
     predictor: str = option(AUTOMATIC, later=True)
+    suppressed: bool = option(False, later=True)
+
+    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {"minnis2000": MINNIS_2000}
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -86,6 +104,11 @@ class SelectionConfig(Configuration):
     def invisible_phones(self) -> frozenset[str]:
         """The phones of ``invisible``."""
         return parsed_invisible(self.invisible)
+
+    @property
+    def suppressed_phones(self) -> frozenset[str]:
+        """The phones that are left out: none, or those of ``invisible``."""
+        return self.invisible_phones if self.suppressed else frozenset()
 
 
 LARGEST_WINDOW = 11

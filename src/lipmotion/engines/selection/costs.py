@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from lipmotion.engines.selection.inventory import (
     standing_in,
     unit_index,
 )
-from lipmotion.engines.selection.lip_reading import OVERLAPS, PROTECTED_PHONES, lip_reading_class
+from lipmotion.engines.selection.lip_reading import INVISIBLE, OVERLAPS, PROTECTED_PHONES, lip_reading_class
 from lipmotion.engines.selection.windows import INVISIBLE_SYMBOL, SILENT, VISEME_NUMBER, PhoneWindows
 from lipmotion.units import PHONES
 from lipmotion.units.classes import CLASSES
@@ -81,6 +81,10 @@ class Costs:
         """The phone that stands in for each phone which the inventory lacks."""
         return standing_in(self.inventory.windows, self.inventory.usable)
 
+    def shown(self, windows: PhoneWindows) -> PhoneWindows:
+        """Return the phones of one recording without those that are suppressed, if any are."""
+        return windows.suppressed(self.config.suppressed_phones)
+
     def target(
         self, windows: PhoneWindows, guided: Array | None, predicted: Array | None, *, by_sound: bool = False
     ) -> Target:
@@ -94,6 +98,14 @@ class Costs:
         if guided is None or predicted is None:
             return Target(known, contexts, None, None)
         return Target(known, contexts, guided * self.scale, predicted * self.scale, by_sound)
+
+    def candidates(self, target: Target, number: int, excluded: NDArray[np.bool_] | None = None) -> UnitNumbers:
+        """Return the units for one phone: of each bias those of the longest agreement, and of these the cheapest.
+
+        excluded : units that are not wanted [shape=(U,)]
+        """
+        cost = partial(self._phonological_costs, target, number)
+        return self.index.candidates(target.contexts[number], self.config.candidates, excluded, cost)
 
     def target_costs(self, target: Target, number: int, units: UnitNumbers) -> Array:
         """Return the cost of each of some units for one phone [shape=(N,)]."""
@@ -112,13 +124,18 @@ class Costs:
 
     def _context_costs(self, target: Target, number: int, units: UnitNumbers) -> Array:
         """Return what the phones around, words and stress of each of some units cost for one phone [shape=(N,)]."""
-        config, windows = self.config, self.inventory.windows
         differs = self.index.contexts[units] != target.contexts[number]
-        differs_much = VISEME_NUMBER[self.index.contexts[units]] != VISEME_NUMBER[target.contexts[number]]
-        costs = (differs + differs_much) @ (self._context_weights / 2)
+        other_viseme = VISEME_NUMBER[self.index.contexts[units]] != VISEME_NUMBER[target.contexts[number]]
+        costs = (differs.astype(float) + other_viseme) @ (self._context_weights / 2)
+        return costs + self._phonological_costs(target, number, units)
+
+    def _phonological_costs(self, target: Target, number: int, units: UnitNumbers) -> Array:
+        """Return what other edges of a word and other stress of each of some units cost for one phone [shape=(N,)]."""
+        config, windows = self.config, self.inventory.windows
+        costs: Array = config.stress * _differ(windows.stress[units], target.windows.stress[number]).astype(float)
         if target.windows.words_known:
             costs += config.word * (windows.words[units] != target.windows.words[number]).sum(axis=1)
-        return costs + config.stress * _differ(windows.stress[units], target.windows.stress[number])
+        return costs
 
     def join_costs(self, target: Target, number: int, left: UnitNumbers, right: UnitNumbers) -> Array:
         """Return the costs of joining units of one phone with units of the next [shape=(len(left), len(right))].
@@ -137,7 +154,7 @@ class Costs:
         """
         pair = np.array([left]), np.array([right])
         if self._succeed(*pair)[0, 0]:
-            return NO_JOIN
+            return NO_JOIN if self.inventory.windows.adjoins[left] else ABUTTING_JOIN
         costs = [cost[0, 0] for cost in self._joins(target, number, *pair)]
         if not may_be_before:
             costs[JOIN_BEFORE] = np.inf
@@ -148,11 +165,15 @@ class Costs:
         invisible = self.config.invisible_phones
         phones = [PHONES[target.windows.phones[n]] if 0 <= n < len(target) else "sil" for n in (shared - 1, shared + 1)]
         before, after = (lip_reading_class(phone, invisible) for phone in phones)
+        hidden = target.windows.hidden
+        if hidden is not None:
+            before = INVISIBLE if 0 <= shared < len(target) and hidden[shared] else before
+            after = INVISIBLE if shared + 1 < len(target) and hidden[shared + 1] else after
         return OVERLAPS[self.config.overlap][before, after]
 
     def _joins(self, target: Target, number: int, left: UnitNumbers, right: UnitNumbers) -> tuple[Array, Array, Array]:
         """Return the costs of joins: ``ABUTTING_JOIN``, ``JOIN_BEFORE``, ``JOIN_AFTER``; infinite where none is."""
-        config, continues, symbols = self.config, self.inventory.windows.continues, self.index.contexts
+        config, adjoins, symbols = self.config, self.inventory.windows.adjoins, self.index.contexts
         middle = symbols.shape[1] // 2
         before, after = (PHONES[target.windows.phones[n]] for n in (number - 1, number))
         protects = [config.protected * (phone in PROTECTED_PHONES) for phone in (before, after)]
@@ -163,10 +184,10 @@ class Costs:
             and not target.windows.words[number, 0]
         )
         hard = self._distances(left, 1.0, right, 0.0) + config.hard + max(protects) + inside
-        earlier, later = np.maximum(right - 1, 0), np.minimum(left + 1, len(continues) - 1)
+        earlier, later = np.maximum(right - 1, 0), np.minimum(left + 1, len(adjoins) - 1)
         usable = self.inventory.usable
-        shares_before = usable[earlier] & continues[earlier] & (right > 0)
-        shares_after = usable[later] & continues[left]
+        shares_before = usable[earlier] & adjoins[earlier] & (right > 0)
+        shares_after = usable[later] & adjoins[left]
         if not target.by_sound:
             shares_before &= symbols[earlier, middle] == target.symbol(number - 1)
             shares_after &= symbols[later, middle] == target.symbol(number)

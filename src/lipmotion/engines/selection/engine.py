@@ -67,7 +67,7 @@ class SelectionEngine(Engine[SelectionModel]):
     def inputs(self, motion_s: float = math.inf) -> Inputs:  # noqa: D102
         guide, has_conditions = self.config.guide > 0, needs_conditions(self.config.predictor, motion_s)
         conditions = self.config.conditions if guide and has_conditions else 0
-        return Inputs(self.config.joint_recogniser, conditions, prior=True, posteriors=guide)
+        return Inputs(self.config.joint_recogniser, conditions, prior=guide, posteriors=guide)
 
     def fit(  # noqa: D102
         self, examples: Sequence[Example], monitor: Monitor, checkpoint: Checkpoint = NO_CHECKPOINT
@@ -118,7 +118,7 @@ class SelectionEngine(Engine[SelectionModel]):
         given = _given(costs, target, speech.units)
         units = select(costs, target, given=given).units
         pieces = pieces_of(costs, target, units)
-        track = concatenated(model.inventory, target, pieces, frames)
+        track = concatenated(costs.inventory, target, pieces, frames)
         always = not is_silent(costs.stand_ins.get(SILENCE, SILENCE))
         resting = _resting(np.asarray(speech.features.values), speech.units, always=always)[:, None]
         means = with_dynamics(track + resting * (model.rest - track))
@@ -135,17 +135,18 @@ class SelectionEngine(Engine[SelectionModel]):
             close=self.config.closures,
             reliability=_substituted(costs, target, units, frames),
         )
-        sources = [source_of(model.inventory, unit) for unit in units.tolist()]
+        sources = [source_of(costs.inventory, unit) for unit in units.tolist()]
         starts_s = target.windows.times_s[:, 0]
         shown, places = np.unique(shown_units(target, pieces, frames), return_inverse=True)
-        trace = StateTrace(tuple(source_of(model.inventory, unit) for unit in shown.tolist()), places.astype(np.intp))
+        trace = StateTrace(tuple(source_of(costs.inventory, unit) for unit in shown.tolist()), places.astype(np.intp))
         return Generation(motion, variance, with_sources(speech.units, starts_s, sources), trace)
 
     def recordings(self, model: SelectionModel) -> tuple[str, ...]:  # noqa: D102
         return model.inventory.names
 
     def stand_ins(self, model: SelectionModel) -> Mapping[str, str]:  # noqa: D102
-        return model.costs(self.config).stand_ins
+        suppressed = self.config.suppressed_phones
+        return {phone: other for phone, other in model.costs(self.config).stand_ins.items() if phone not in suppressed}
 
     def typical_duration_s(self, model: SelectionModel, phone: str) -> float:  # noqa: D102
         return typical_duration_s(model.inventory, phone)

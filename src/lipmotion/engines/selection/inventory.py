@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -55,6 +55,14 @@ class RecordedUnits:
         knots, order = np.unique(knots, return_index=True)
         return np.stack([np.interp(frames, knots, column) for column in values[order].T], axis=1)
 
+    def without(self, phones: Collection[str]) -> RecordedUnits:
+        """Return the units of other phones; all units, if none of those is usable."""
+        windows, kept = self.windows.without(phones)
+        if not self.usable[kept].any():
+            return self
+        predicted = self.predicted[kept] if self.predicted is not None else None
+        return replace(self, windows=windows, usable=self.usable[kept], predicted=predicted)
+
     def poses(self, units: UnitNumbers, fraction: float) -> Array:
         """Return the motion at a fraction of the duration of some units [shape=(N, Q)].
 
@@ -98,19 +106,24 @@ class UnitIndex:
     keys: tuple[NDArray[np.int64], ...]
 
     def candidates(
-        self, window: NDArray[np.intp], count: int, excluded: NDArray[np.bool_] | None = None
+        self,
+        window: NDArray[np.intp],
+        count: int,
+        excluded: NDArray[np.bool_] | None = None,
+        costs: Callable[[UnitNumbers], Array] | None = None,
     ) -> UnitNumbers:
         """Return the units whose windows agree best with a window, in ascending order.
 
         window   : symbols [shape=(N,)]; the phone itself is in the middle
-        count    : for each bias so many of the longest agreement; of equally long ones those of the lowest keys
+        count    : for each bias so many of the longest agreement; of equally long ones those that cost least
         excluded : units that are not wanted [shape=(U,)]
+        costs    : what units cost [shape=(N,)]; where it is the same, or None, those of the lowest keys are taken
         Empty, if no unit has the phone.
         """
         found = [
             each
             for bias, (order, keys) in enumerate(zip(self.orders, self.keys, strict=True))
-            for each in _longest(order, keys, window[digits(bias, len(window))], count, excluded)
+            for each in _longest(order, keys, window[digits(bias, len(window))], count, excluded, costs)
         ]
         return np.unique(np.concatenate(found)) if found else np.zeros(0, np.intp)
 
@@ -165,6 +178,7 @@ def _longest(
     symbols: NDArray[np.intp],
     count: int,
     excluded: NDArray[np.bool_] | None,
+    costs: Callable[[UnitNumbers], Array] | None,
 ) -> Iterator[UnitNumbers]:
     """Yield units in the order of the length of their agreement, until there are ``count``."""
     inner: tuple[int, int] | None = None
@@ -177,6 +191,8 @@ def _longest(
             units = order[begin:end]
             if excluded is not None:
                 units = units[~excluded[units]]
+            if costs is not None and len(units) > count:
+                units = units[np.argsort(costs(units), kind="stable")]
             units = units[:count]
             count -= len(units)
             if len(units):

@@ -70,7 +70,7 @@ class SelectionModel:
         """Return the costs of units, for a configuration; those of the last one are kept."""
         if config not in self._costs:
             self._costs.clear()
-            self._costs[config] = Costs(self.inventory, config, self.scale)
+            self._costs[config] = Costs(self.inventory.without(config.suppressed_phones), config, self.scale)
         return self._costs[config]
 
     @cached_property

@@ -91,9 +91,9 @@ def _candidates(
         units = np.flatnonzero(usable if excluded is None else usable & ~excluded)
         units = costs.nearest(target, number, units) if prune else units
     else:
-        units = costs.index.candidates(target.contexts[number], costs.config.candidates, excluded)
+        units = costs.candidates(target, number, excluded)
     if not len(units):
-        units = costs.index.candidates(target.contexts[number], costs.config.candidates)
+        units = costs.candidates(target, number)
     each = costs.target_costs(target, number, units)
     if prune:
         kept = np.flatnonzero(each <= each.min() + 2 * costs.config.most)

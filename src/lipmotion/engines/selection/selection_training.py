@@ -177,7 +177,7 @@ def _error_variances(
         example = examples[number]
         frames = dynamics_known(example.valid)
         if frames.any():
-            generated = generated_motion(model, costs, example, model.inventory.windows.recording == number)
+            generated = generated_motion(model, costs, example, costs.inventory.windows.recording == number)
             errors.append(with_dynamics(values[number] - generated)[frames])
     variances: Array = np.square(np.concatenate(errors)).mean(axis=0) if errors else spread
     return np.maximum(variances, floor)
@@ -186,8 +186,8 @@ def _error_variances(
 def generated_motion(model: SelectionModel, costs: Costs, example: Example, excluded: NDArray[np.bool_]) -> Array:
     """Return motion of an example from other units than some [shape=(T, Q)].
 
-    excluded : the units that must not be used [shape=(U,)]
+    excluded : the units of ``costs`` that must not be used [shape=(U,)]
     """
     target = target_of(model, costs, example.speech)
     chosen = select(costs, target, excluded)
-    return concatenated(model.inventory, target, pieces_of(costs, target, chosen.units), len(example.valid))
+    return concatenated(costs.inventory, target, pieces_of(costs, target, chosen.units), len(example.valid))

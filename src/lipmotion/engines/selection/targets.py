@@ -36,10 +36,10 @@ def target_of(
     duration_s = (frames - 1) / FRAME_RATE_HZ
     units, guide = covering(speech.units, duration_s), model.guide
     if guide is None or not guide.predictor.can_predict(speech) or not costs.config.guide:
-        return costs.target(phone_windows([units]), None, None)
+        return costs.target(costs.shown(phone_windows([units])), None, None)
     motion, distortion = guide.predict(speech)
     by_sound = bool(phone_reliability(speech, distortion, frames).mean() < LEAST_RELIABILITY)
-    windows = phone_windows([_segments(duration_s) if by_sound else units])
+    windows = phone_windows([_segments(duration_s)]) if by_sound else costs.shown(phone_windows([units]))
     predicted = at_points(motion, windows.times_s)
     guided = guide.expanded(predicted) if guiding is None else at_points(guiding, windows.times_s)
     return costs.target(windows, guided, predicted, by_sound=by_sound)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import PHONES, SILENCE, is_silent, unknown_phone_message, without_gaps
-from lipmotion.units.stress import stress_of
+from lipmotion.units.stress import NUCLEI, stress_of
 from lipmotion.units.visemes import VISEME_OF, VISEMES
 
 INVISIBLE_SYMBOL = len(PHONES)
@@ -35,6 +35,7 @@ class PhoneWindows:
     words     : whether it begins a word, and whether it ends one [bool, shape=(U, 2)]
     stress    : whether its syllable is stressed, 1 or 0; -1: not known [shape=(U,)]
     words_known : whether phones know their words
+    hidden    : whether a suppressed phone came before each; None: none is suppressed [shape=(U,)]
     """
 
     recording: NDArray[np.int32]
@@ -43,6 +44,7 @@ class PhoneWindows:
     words: NDArray[np.bool_]
     stress: NDArray[np.int8]
     words_known: bool = True
+    hidden: NDArray[np.bool_] | None = None
 
     def __len__(self) -> int:
         return len(self.phones)
@@ -73,6 +75,49 @@ class PhoneWindows:
     def continues(self) -> NDArray[np.bool_]:
         """Whether the phone after each one is of the same recording [shape=(U,)]."""
         return np.append(self.recording[1:] == self.recording[:-1], False)
+
+    @property
+    def adjoins(self) -> NDArray[np.bool_]:
+        """Whether the phone after each one is of the same recording, and none was left out between them."""
+        gaps_s = np.append(self.times_s[1:, 0] - self.times_s[:-1, 1], np.inf)
+        return self.continues & (gaps_s < SHORTEST_S / 2)
+
+    def without(self, phones: Collection[str]) -> tuple[PhoneWindows, NDArray[np.intp]]:
+        """Return the other phones, with their own times, and their numbers here; all phones, if there are no others.
+
+        A phone beside one that was left out begins or ends the word that this one began or ended.
+        """
+        kept = np.flatnonzero(~np.isin(self.phones, [PHONE_NUMBER[phone] for phone in phones]))
+        if len(kept) in (0, len(self)):
+            return self, np.arange(len(self))
+        begins = np.logical_or.reduceat(self.words[: kept[-1] + 1, 0], np.append(0, kept[:-1] + 1))
+        ends = np.logical_or.reduceat(self.words[:, 1], kept)
+        taken = replace(
+            self,
+            recording=self.recording[kept],
+            phones=self.phones[kept],
+            times_s=self.times_s[kept],
+            words=np.stack([begins, ends], axis=1),
+            stress=self.stress[kept],
+            hidden=np.diff(kept, prepend=-1) > 1,
+        )
+        return taken, kept
+
+    def suppressed(self, phones: Collection[str]) -> PhoneWindows:
+        """Return the phones of one recording without some, whose time the vowel that follows takes.
+
+        Where no vowel follows, the phone before takes it; at the start, the phone after.
+        Source: Minnis & Breen 2000, §3: "the following vowel gives the shape of the mouth".
+        """
+        others, kept = self.without(phones)
+        times_s = others.times_s.copy()
+        if len(kept) == len(self):
+            return self
+        times_s[0, 0], times_s[-1, 1] = self.times_s[0, 0], self.times_s[-1, 1]
+        vowel = np.array([PHONES[phone] in NUCLEI for phone in others.phones[1:]], bool)
+        times_s[1:, 0] = np.where(vowel, times_s[:-1, 1], times_s[1:, 0])
+        times_s[:-1, 1] = times_s[1:, 0]
+        return replace(others, times_s=times_s)
 
 
 def covering(units: Timeline[Unit], duration_s: float) -> Timeline[Unit]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -34,9 +34,12 @@ class EngineModel:
     seconds: float | None
 
 
-def engine_models(corpus: Corpus, folder: Path | None, settings: ExperimentSettings) -> dict[str, EngineModel]:
-    """Return a model of each of ``ENGINES_COMPARED``, of the corpus's training list, each engine by its defaults.
+def engine_models(
+    corpus: Corpus, folder: Path | None, settings: ExperimentSettings, names: Sequence[str] = ENGINES_COMPARED
+) -> dict[str, EngineModel]:
+    """Return models of the corpus's training list, each engine by its defaults.
 
+    names  : of the engines
     folder : has or gets the models, ``trajectory.lipmotion`` and so on; None: all are trained, and none is kept.
              Training that was stopped goes on where it was.
     No model stands on another one, which may have been trained on the recordings that are compared.
@@ -53,12 +56,12 @@ def engine_models(corpus: Corpus, folder: Path | None, settings: ExperimentSetti
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise ExportError(f"{folder}: cannot be a folder for models: {error.strerror or error}") from error
-        found = _present(corpus, folder)
-    missing = [name for name in ENGINES_COMPARED if name not in found]
+        found = _present(corpus, folder, names)
+    missing = [name for name in names if name not in found]
     for number, name in enumerate(missing):
         part = sub_monitor(settings.monitor, number / len(missing), (number + 1) / len(missing), f"{name}: ")
         found[name] = _trained(corpus, name, folder, settings, Run(part, None, settings.workers))
-    return {name: found[name] for name in ENGINES_COMPARED}
+    return {name: found[name] for name in names}
 
 
 def _trained(corpus: Corpus, name: str, folder: Path | None, settings: ExperimentSettings, run: Run) -> EngineModel:
@@ -81,9 +84,9 @@ def _trained(corpus: Corpus, name: str, folder: Path | None, settings: Experimen
     return EngineModel(load_model(path), perf_counter() - start_s)  # as the next run finds it
 
 
-def _present(corpus: Corpus, folder: Path) -> dict[str, EngineModel]:
+def _present(corpus: Corpus, folder: Path, engines: Sequence[str]) -> dict[str, EngineModel]:
     """Return the models that are in a folder. Raises InputError: one of them is of something else."""
-    paths = {name: folder / f"{name}{SUFFIX}" for name in ENGINES_COMPARED}
+    paths = {name: folder / f"{name}{SUFFIX}" for name in engines}
     models = {name: load_model(path) for name, path in paths.items() if path.is_file()}
     if models:
         names = corpus.required("train")

@@ -1,0 +1,1 @@
+"""The comparisons of Minnis & Breen 2000."""

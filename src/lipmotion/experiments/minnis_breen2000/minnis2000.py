@@ -1,0 +1,186 @@
+"""Minnis & Breen 2000 on any corpus: their unit selection as printed, and what each addition of this project changes.
+
+The paper prints no figures ("initial subjective evaluation suggests …", §7); its Table 1 is one of the settings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from lipmotion.corpora.store import Corpus, Selection
+from lipmotion.engines import engine_named
+from lipmotion.engines.selection.config import MINNIS_2000, SelectionConfig
+from lipmotion.engines.selection.engine import SelectionEngine
+from lipmotion.engines.selection.model import SelectionModel
+from lipmotion.experiments.comparison import ClipStatistic, correlation_statistic, opening_curves
+from lipmotion.experiments.engines.models import EngineModel, engine_models
+from lipmotion.experiments.learning_curve import check_training_names
+from lipmotion.experiments.minnis_breen2000.joins import join_figures
+from lipmotion.experiments.runner import DEFAULT_SETTINGS, ExperimentSettings, channels_with_opening, opening_row
+from lipmotion.kernels.threads import one_thread
+from lipmotion.pipeline.evaluation.figures import figures_of
+from lipmotion.pipeline.evaluation.held_out import (
+    AUDIO_ONLY,
+    HeldOutRecordings,
+    compare_with_recorded,
+    held_out_recordings,
+    speech_of_condition,
+)
+from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.training.train import Run, train
+from lipmotion.speech.recognition.recogniser import cached_recogniser
+from lipmotion.storage.json_text import nan_as_null
+from lipmotion.types import Monitor, Speech, sub_monitor, with_progress
+
+ENGINE = "selection"
+PRINTED, UNGUIDED, EVERYTHING = "as printed", "all additions but the guide", "all additions: the default"
+DEFAULTS = SelectionConfig().as_mapping()
+ADDITIONS: Mapping[str, tuple[str, ...]] = {
+    "300 candidates a bias": ("candidates",),
+    "guide from the sound": ("guide",),
+    "300 candidates and the guide": ("candidates", "guide"),
+    "joins cost what motions differ by": ("join",),
+    "300 candidates and this": ("candidates", "join"),
+    "durations count": ("duration",),
+    "own phone recogniser": ("joint_recogniser",),
+    "table of articulation": ("articulation",),
+    "t d g k one symbol, but played": ("suppressed",),
+}
+"""Options of the preset that take the value of the default, by the name of the row."""
+VARIANTS: Mapping[str, Mapping[str, Any]] = {
+    "no phone invisible": {"suppressed": False, "invisible": ""},
+    "t d g k l suppressed": {"invisible": "t d g k l"},
+    "Table 1 symmetric: 73/27 for 77/23": {"overlap": "symmetric"},
+    "overlaps half and half": {"overlap": "middle"},
+    "overlaps learned": {"overlap": "learned"},
+    "window N = 3": {"window": 3},
+    "window N = 7": {"window": 7},
+}
+"""Other readings of the print, and what it leaves open."""
+QUICK_TRAINING, QUICK_CLIPS, QUICK_EPOCHS = 40, 8, 20
+WHAT_IS_SHOWN = ("acc", "nrmse", "global_variance", "jerk")
+
+
+def rows() -> dict[str, SelectionConfig]:
+    """Return the configuration of every row, by its name; closures are never pinned, so that units alone are judged."""
+    printed = SelectionConfig.parsed(MINNIS_2000)
+    found = {PRINTED: printed}
+    found |= {name: replace(printed, **{key: _default(key) for key in keys}) for name, keys in ADDITIONS.items()}
+    found |= {name: replace(printed, **changes) for name, changes in VARIANTS.items()}
+    everything = SelectionConfig(closures=False)
+    return found | {UNGUIDED: replace(everything, guide=0.0), EVERYTHING: everything}
+
+
+def _default(option: str) -> Any:
+    return getattr(SelectionConfig(), option)
+
+
+@one_thread()
+def minnis2000(
+    corpus: Corpus,
+    *,
+    models: Path | None = None,
+    quick: bool = False,
+    settings: ExperimentSettings = DEFAULT_SETTINGS,
+) -> dict[str, Any]:
+    """Return the figures of the paper's system and of its variants on ``val`` and ``test``.
+
+    models : folder of the model ``selection.lipmotion`` (``models.engine_models``), so that a second run does not train
+             again; None: it is trained and not kept
+    quick  : train on a few utterances, for few epochs, and compare few; nothing is kept
+    All rows use one model, with the default's inventory, guide and phone recogniser, of which each takes what it needs:
+    the row as printed is what ``train --preset minnis2000`` makes (tests/experiments/minnis_breen2000).
+    Raises CorpusError: no utterances to train on, to choose with or to compare, or motion without an opening.
+    Raises InputError, ModelFormatError, ExportError: as ``engine_models``.
+    """
+    lists = {split: corpus.required(split)[: QUICK_CLIPS if quick else None] for split in ("val", "test")}
+    for held_out in lists.values():
+        check_training_names(corpus, corpus.required("train"), held_out)
+    monitor = settings.monitor
+    training = replace(settings, monitor=sub_monitor(monitor, 0, 0.6))
+    trained = _quick_model(corpus, training) if quick else engine_models(corpus, models, training, [ENGINE])[ENGINE]
+    found = {}
+    for number, (split, names) in enumerate(lists.items()):
+        part = sub_monitor(monitor, 0.6 + 0.2 * number, 0.8 + 0.2 * number, f"{split}: ")
+        found[split] = _on_list(corpus, names, trained.model, settings, part)
+    about: dict[str, Any] = {"seed": settings.seed, "quick": quick, "seconds": trained.seconds}
+    about |= {key: trained.model.about[key] for key in ("utterances", "minutes")}
+    about |= {"rows": {name: _changes(config) for name, config in rows().items()}}
+    return nan_as_null(about | {"lists": found})
+
+
+def _changes(config: SelectionConfig) -> dict[str, Any]:
+    """Return the options that differ from the system as printed."""
+    printed = SelectionConfig.parsed(MINNIS_2000)
+    return {name: value for name, value in vars(config).items() if value != getattr(printed, name)}
+
+
+def _quick_model(corpus: Corpus, settings: ExperimentSettings) -> EngineModel:
+    start_s = perf_counter()
+    model, _ = train(
+        corpus,
+        selection=Selection(names=sorted(corpus.required("train")[:QUICK_TRAINING])),
+        engine=engine_named(ENGINE, {"epochs": QUICK_EPOCHS}),
+        recogniser=settings.recogniser,
+        lexicon=settings.lexicon,
+        run=Run(settings.monitor, None, settings.workers),
+    )
+    return EngineModel(model, perf_counter() - start_s)
+
+
+def _on_list(
+    corpus: Corpus, names: Sequence[str], model: Model, settings: ExperimentSettings, monitor: Monitor
+) -> dict[str, Any]:
+    """Return the figures of every condition and row on some utterances."""
+    recordings = held_out_recordings(
+        corpus,
+        cached_recogniser(model.phones),
+        selection=Selection(names=names),
+        channels=channels_with_opening(corpus, names),
+        lexicon=settings.lexicon,
+        monitor=sub_monitor(monitor, 0, 0.4),
+    )
+    conditions: dict[str, dict[str, Any]] = {condition: {} for condition in recordings.conditions}
+    spoken: dict[tuple[str, bool], list[Speech]] = {}
+    reference: dict[str, ClipStatistic] = {}
+    for name, config in with_progress(list(rows().items()), "comparing", sub_monitor(monitor, 0.4, 1)):
+        learned = _of_the_row(model.learned, config)
+        for condition, found in conditions.items():
+            key = condition, config.joint_recogniser and condition == AUDIO_ONLY
+            if key not in spoken:
+                spoken[key] = _speech(recordings, condition, model, SelectionConfig(joint_recogniser=key[1]))
+            statistic, row = _row(recordings, spoken[key], SelectionEngine(config), learned, settings.seed)
+            reference.setdefault(condition, statistic)
+            found[name] = row | {"acc_gain_95": statistic.gain(reference[condition], settings.seed)}
+    return {"clips": len(names), "closed_under": recordings.closed_under, "conditions": conditions}
+
+
+def _speech(recordings: HeldOutRecordings, condition: str, model: Model, listening: SelectionConfig) -> list[Speech]:
+    """Return the speech of all recordings, with all that any row needs."""
+    return speech_of_condition(recordings, condition, SelectionEngine(listening), _of_the_row(model.learned, listening))
+
+
+def _of_the_row(learned: SelectionModel, config: SelectionConfig) -> SelectionModel:
+    """Return what training with a configuration makes of the same recordings."""
+    if not config.articulation:
+        learned = replace(learned, motion=replace(learned.motion, prior=None))
+    return learned if config.joint_recogniser else replace(learned, phone_recogniser=None)
+
+
+def _row(
+    recordings: HeldOutRecordings, speech: Sequence[Speech], engine: SelectionEngine, learned: SelectionModel, seed: int
+) -> tuple[ClipStatistic, dict[str, Any]]:
+    """Return the correlation of one row, and its figures."""
+    clips = compare_with_recorded(recordings, speech, engine, learned)
+    figures = figures_of(clips, recordings, seed)
+    lips = figures["closures_p_b_m"]
+    row = opening_row(figures) | {key: lips[key] for key in ("false_per_minute", "original_per_minute")}
+    row["channels"] = {
+        channel: {figure: values[figure] for figure in WHAT_IS_SHOWN} for channel, values in figures["channels"].items()
+    }
+    row["joins"] = join_figures(engine, learned, speech, recordings.utterances)
+    return correlation_statistic(*opening_curves(recordings, clips)), row
