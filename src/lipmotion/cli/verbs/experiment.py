@@ -1,15 +1,15 @@
-"""``lipmotion experiment unit-sets|learning-curve|folds|table3|engines``: train and compare systems on a corpus."""
+"""``lipmotion experiment hofer2008|learning-curve|folds|table3|engines``: train and compare systems on a corpus."""
 
 from __future__ import annotations
 
 import argparse
 
-from lipmotion.cli.verbs import engines, folds, learning_curve, table3, unit_sets
+from lipmotion.cli.verbs import engines, folds, hofer2008, learning_curve, table3
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb and its experiments to the parser of the command line."""
     parser = verbs.add_parser("experiment", help="train and compare systems on a corpus, as in the papers")
     actions = parser.add_subparsers(title="experiments", required=True, metavar="EXPERIMENT")
-    for experiment in (unit_sets, learning_curve, folds, table3, engines):
+    for experiment in (hofer2008, learning_curve, folds, table3, engines):
         experiment.add(actions)
