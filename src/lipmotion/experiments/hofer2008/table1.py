@@ -72,7 +72,7 @@ class Table1Options:
     """
 
     states: Sequence[int] = (3, 5)
-    mixtures: Sequence[int] = (1, 2, 4, 8, 16)
+    mixtures: Sequence[int] = (1, 2, 4, 8)
     clips: int | None = None
 
 
