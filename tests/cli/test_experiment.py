@@ -26,7 +26,9 @@ def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.long
 def test_the_table_is_that_of_the_figures(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
-    done = run("experiment", "hofer2008", toy_corpus.path, "-o", "a.json", "--split", "val", "--quick", "--workers", "1")
+    done = run(
+        "experiment", "hofer2008", toy_corpus.path, "-o", "a.json", "--split", "val", "--quick", "--workers", "1"
+    )
     assert (done.code, done.err) == (0, [])
     figures = json.loads((here / "a.json").read_text())
     assert "\n".join(done.out) == table1_text.table(figures)

@@ -56,6 +56,7 @@ WEIGHT = Rule(least=0)
 HOFER_2008: Mapping[str, Any] = {
     "units": "eVis",
     "states": 5,
+    "mixtures": 8,
     "recognise_units": True,
     "own_alignment": True,
     "both_neighbours": True,

@@ -55,8 +55,8 @@ def what_held(block: Mapping[str, Any]) -> str:
     best = max(block["rows"], key=lambda units: block["rows"][units]["score"] or 0.0)
     reversed_pairs = f" ({', '.join(against)})" if against else ""
     return (
-        f"best: {best}; of the paper's {len(signs)} pairs {signs.count(1)} hold, {len(against)} are the other way round"
-        f"{reversed_pairs}, {signs.count(0)} are open"
+        f"best: {best}; of the paper's {len(signs)} pairs hold {signs.count(1)}, reversed {len(against)}"
+        f"{reversed_pairs}, open {signs.count(0)}"
     )
 
 
