@@ -193,6 +193,13 @@ def test_the_preset_is_the_system_of_the_paper() -> None:
     assert weighted.recognition == StreamWeights(1.0, 0.0, 0.0, 0.0, 0.0)
 
 
+def test_weights_that_switch_everything_off_are_refused() -> None:
+    with pytest.raises(InputError, match="no stream takes part in recognition"):
+        engine_named("joint", {"recognition_speech_weight": 0.0, "f0": False})
+    with pytest.raises(InputError, match="all streams are switched off in training"):
+        engine_named("joint", {"speech_weight": 0.0, "f0_weight": 0.0, "motion_weight": 0.0})
+
+
 def test_a_unit_of_another_set_is_refused() -> None:
     unknown = Timeline((Span(0.0, 1.0, Unit("", "WQ")),))
     with pytest.raises(InputError, match=r"unknown unit 'WQ' without a phone; give a phone, or one of aw ay"):

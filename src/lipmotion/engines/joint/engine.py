@@ -126,6 +126,9 @@ class JointEngineConfig(Configuration):
                 f"paths is {self.paths}: several are sampled only where units are recognised (recognise_units)"
             )
 
+        if not self.hmm.recognition.active:
+            raise InputError("no stream takes part in recognition; give speech or F0 a weight")
+
     def check_files(self) -> None:  # noqa: D102
         unit_set(self.units)
 
