@@ -84,6 +84,16 @@ def test_what_held_of_the_order_is_told_in_words() -> None:
     assert what_held(block) == ("best: phone; of the paper's 3 pairs hold 1, reversed 1 (phone over eVis), open 1")
 
 
+def test_a_star_is_that_of_its_own_interval() -> None:
+    results = Path(__file__).parents[3] / "docs" / "results" / "hofer2008.json"
+    figures = json.loads(results.read_text(encoding="utf-8"))
+    row = figures["tables"][0]["rows"]["eVis"] | {"score_gain_95": [1.0, 2.0], "acc_gain_95": [-1.0, 1.0]}
+    figures["tables"] = [figures["tables"][0] | {"rows": {"eVis": row}}]
+    (line,) = [line for line in table(figures).split("\n") if line.startswith("  eVis")]
+    assert f"{row['score']:.1f}* (" in line
+    assert f"{row['acc']:.3f} (" in line
+
+
 def test_nothing_to_train_on_or_to_compare_with(toy_corpus: Corpus, tmp_path: Path) -> None:
     with pytest.raises(CorpusError, match="no utterances of split 'val'"):
         hofer2008(copied(toy_corpus, tmp_path, partial(replace, split="test")))
