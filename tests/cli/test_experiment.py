@@ -10,7 +10,7 @@ from cli.conftest import RunCommand, is_one_error
 from lipmotion.corpora.store import Corpus
 from lipmotion.experiments import comparison, folds, learning_curve
 from lipmotion.experiments.engines import disagreement, text
-from lipmotion.experiments.hofer2008 import unit_sets
+from lipmotion.experiments.hofer2008 import table1, table1_text
 from lipmotion.experiments.xie_liu2007 import table3_text
 from lipmotion.measures.bootstrap import bootstrap_interval
 from lipmotion.pipeline.evaluation import figures as evaluation_figures
@@ -21,17 +21,18 @@ def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
     """Few draws of the bootstrap intervals, and only two of the paper's unit sets."""
     for module in (comparison, evaluation_figures, disagreement):
         monkeypatch.setattr(module, "bootstrap_interval", partial(bootstrap_interval, draws=20))
-    monkeypatch.setattr(unit_sets, "PAPER_SCORES", {name: unit_sets.PAPER_SCORES[name] for name in ("2vis", "phone")})
+    monkeypatch.setattr(table1, "PAPER_SCORES", {name: table1.PAPER_SCORES[name] for name in ("2vis", "phone")})
 
 
+@pytest.mark.long
 def test_the_table_is_that_of_the_figures(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
     done = run(
-        "experiment", "unit-sets", toy_corpus.path, "-o", "a.json", "--split", "val", "--closures", "--workers", "1"
+        "experiment", "hofer2008", toy_corpus.path, "-o", "a.json", "--split", "val", "--quick", "--workers", "1"
     )
     assert (done.code, done.err) == (0, [])
     figures = json.loads((here / "a.json").read_text())
-    assert "\n".join(done.out) == unit_sets.table(figures)
-    assert (figures["split"], figures["clips"], figures["closures"]) == ("val", 2, True)
+    assert "\n".join(done.out) == table1_text.table(figures)
+    assert (figures["split"], figures["clips"], figures["mixtures"]) == ("val", 2, [1, 2])
     assert [path.name for path in here.iterdir()] == ["a.json"]
 
 
@@ -109,8 +110,8 @@ UNUSABLE = [
     ("table3 CORPUS --plots missing/a", 7, "the folder missing does not exist"),
     ("engines CORPUS --models CORPUS", 7, "is the corpus itself; give another name"),
     ("engines CORPUS --models empty.txt", 7, "empty.txt: cannot be a folder for models: File exists"),
-    ("unit-sets CORPUS --split tset", 4, "no utterances of split 'tset'"),
-    ("unit-sets CORPUS --lexicon missing", 3, "missing: no such lexicon file"),
+    ("hofer2008 CORPUS --split tset", 4, "no utterances of split 'tset'"),
+    ("hofer2008 CORPUS --lexicon missing", 3, "missing: no such lexicon file"),
 ]
 
 

@@ -42,7 +42,7 @@ REFUSED = [
     ("the model itself", f"evaluate m.lipmotion {FIGURES} -o m.lipmotion"),
     ("the lexicon itself", f"evaluate m.lipmotion {FIGURES} -o l.txt"),
     ("the recording itself", "compare a.wav b.wav -o b.wav"),
-    ("the corpus c", f"experiment unit-sets {FIGURES} -o c/corpus.json"),
+    ("the corpus c", f"experiment hofer2008 {FIGURES} -o c/corpus.json"),
     ("the list itself", f"experiment learning-curve {FIGURES} --order t.txt -o t.txt"),
     ("the folder of recordings r", f"experiment table3 {FIGURES} --talkers r -o r/a.wav"),
     ("the corpus c", f"experiment table3 {FIGURES} --plots c/pictures"),

@@ -131,7 +131,7 @@ def _remade(name: str, array: str, remake: Callable[[NDArray[Any]], NDArray[Any]
 
 
 _remade("times 1e6", "motion", lambda a: a * 1e6, "required within", verb="evaluate")
-_remade("times 1e6", "motion", lambda a: a * 1e6, "required within", verb="experiment unit-sets")
+_remade("times 1e6", "motion", lambda a: a * 1e6, "required within", verb="experiment hofer2008")
 _remade("times 1e6", "features", lambda a: a * 1e6, "required -1000 to 1000", verb="train")
 _remade("of NaN", "features", lambda a: a * np.nan, "not finite", verb="train")
 _remade("in 32 bits", "audio", lambda a: a.astype(np.float32), "holds float32", verb="train")

@@ -290,7 +290,8 @@ class Session:
         return self._understood.once(tuple(units), lambda: replace(plain, speech=self._spoken(plain.speech, units)))
 
     def _spoken(self, speech: Speech, units: Timeline[Unit]) -> Speech:
-        return replace(with_prior(self.model.prior, with_units(speech, units)), voice=speech.voice)
+        spoken = with_prior(self.model.prior, with_units(speech, units))
+        return replace(spoken, voice=speech.voice, times_given=True)
 
     def _with_locks(self, steps: tuple[Step, ...]) -> Generation:
         """Return the motion after some edits, with locked spans as they were when they were locked."""

@@ -43,6 +43,7 @@ class Speech:
     log_f0      : float32 array [shape=(T,)], natural logarithm of F0 in Hz, NaN in unvoiced frames (None: the engine
                   does not use F0)
     units_known : whether the units are given, labelled, or aligned to known words; False: they were recognised
+    times_given : whether the times of the units were given with them: no engine moves these
     spectrum    : float32 array [shape=(T, 40)], the normalised log mel spectrum (None: the engine does not use it)
     confidence  : 0 to 1, how well recognised units are confirmed by words; 1 where the units are known. One number, or
                   one of each frame [shape=(T,)] where somebody has corrected some of the recognised units
@@ -61,6 +62,7 @@ class Speech:
     prior: PriorOutput | None = None
     voice: float = 1.0
     posteriors: TokenPosteriors | None = None
+    times_given: bool = False
     kept: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     def once(self, of: Any, make: Callable[[], KeptT]) -> KeptT:

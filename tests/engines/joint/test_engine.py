@@ -6,11 +6,12 @@ from functools import cache
 import numpy as np
 import pytest
 
-from lipmotion.engines import engine_named
+from lipmotion.engines import engine_from_settings, engine_named
 from lipmotion.engines.joint.engine import JointEngine, JointModel
 from lipmotion.errors import InputError
-from lipmotion.testing.examples import examples, speech, timeline
-from lipmotion.types import Generation, Span, Speech, Timeline, Unit
+from lipmotion.hmm.multistream.streams import StreamWeights
+from lipmotion.testing.examples import example, examples, speech, timeline
+from lipmotion.types import Example, Generation, Span, Speech, Timeline, Unit
 from lipmotion.types.progress import silent_monitor
 from lipmotion.units import UNIT_SETS
 
@@ -104,6 +105,99 @@ def test_a_closed_unit_that_silence_shares_closes_nothing_by_itself() -> None:
     pinned, free = recognised("2vis"), recognised("2vis", closures=False)
     assert "closed" in {span.label.unit for span in pinned.units}
     assert pinned.motion.values == pytest.approx(free.motion.values, abs=1e-9)
+
+
+def late(units: Timeline[Unit], by_s: float) -> Timeline[Unit]:
+    """Return units whose inner bounds are all later."""
+    edges = [units[0].start_s, *(span.start_s + by_s for span in units.spans[1:]), units[-1].end_s]
+    return Timeline(tuple(Span(a, b, s.label) for a, b, s in zip(edges, edges[1:], units, strict=False)))
+
+
+def test_own_alignment_gives_the_times_of_the_sound_to_the_phones_of_words() -> None:
+    mistimed = replace(SOUND, units=late(SOUND.units, 0.05))
+    kept, own = generated(mistimed), generated(mistimed, own_alignment=True)
+    assert spans(kept.units) == spans(mistimed.units)
+    assert [label for *_, label in spans(own.units)] == [label for *_, label in spans(SOUND.units)]
+    for found, said in zip(own.units, SOUND.units, strict=True):
+        assert found.start_s == pytest.approx(said.start_s, abs=0.025)
+    assert np.abs(own.motion["opening"] - kept.motion["opening"]).max() > 0.05
+    times_given = generated(replace(mistimed, times_given=True), own_alignment=True)
+    assert times_given.motion.values == pytest.approx(kept.motion.values, abs=1e-9)
+
+
+def test_units_without_room_for_their_states_keep_their_times() -> None:
+    crowded = timeline(("t", "aa") * 40, 0.02)
+    hasty = replace(SOUND, units=Timeline(tuple(span for span in crowded if span.end_s < 2.0)))
+    assert spans(generated(hasty, own_alignment=True).units) == spans(hasty.units)
+
+
+def test_a_flat_start_is_that_of_units_of_equal_length() -> None:
+    """Eight units of three states in 144 frames: six frames a state."""
+    phones = ("t", "aa", "p", "iy", "m", "aa")
+    whole = [example(phones, seed, duration_s=0.04) for seed in range(3)]
+    assert {len(each.speech.features.values) for each in whole} == {145}
+    cut = [
+        replace(
+            each,
+            speech=replace(
+                each.speech, features=replace(each.speech.features, values=each.speech.features.values[:144])
+            ),
+            motion=replace(each.motion, values=each.motion.values[:144]),
+            valid=each.valid[:144],
+        )
+        for each in whole
+    ]
+    labels = [span.label for span in whole[0].speech.units]
+    equal = Timeline(tuple(Span(0.18 * n, 0.18 * (n + 1), label) for n, label in enumerate(labels)))
+    divided = [replace(each, speech=replace(each.speech, units=equal)) for each in cut]
+
+    def means(data: list[Example], flat: bool) -> np.ndarray:
+        hmm = engine("phone", flat_start=flat).fit(data, silent_monitor).model.hmm
+        return hmm.models["speech"].tied.mixtures.means
+
+    flat = means(cut, flat=True)
+    assert flat == pytest.approx(means(divided, flat=False), abs=1e-5)
+    timed = means(cut, flat=False)
+    assert timed.shape != flat.shape or np.abs(timed - flat).max() > 0.1
+
+
+def test_the_stages_of_a_training_are_trainings_of_their_own() -> None:
+    data = examples(8)
+    stages = list(engine(mixtures=4).growing_models(data, silent_monitor))
+    assert [stage.hmm.models["speech"].tied.mixtures.size[1] for stage in stages] == [1, 2, 4]
+    alone = trained("eVis")
+    assert np.array_equal(
+        stages[0].hmm.models["speech"].tied.mixtures.means, alone.hmm.models["speech"].tied.mixtures.means
+    )
+    assert np.array_equal(stages[0].hmm.durations, alone.hmm.durations)
+
+
+def test_the_preset_is_the_system_of_the_paper() -> None:
+    config = engine_from_settings(preset="hofer2008").config
+    assert (config.units, config.states, config.f0, config.closures, config.articulation) == (
+        "eVis",
+        5,
+        True,
+        False,
+        False,
+    )
+    assert config.recognise_units
+    assert config.own_alignment
+    assert config.hmm.both_neighbours
+    assert config.hmm.recognition == StreamWeights(motion=0.0)
+    weighted = engine_from_settings(
+        preset="hofer2008",
+        settings=["speech_weight=0.5", "f0_weight=0.25", "motion_weight=2", "recognition_f0_weight=0"],
+    ).config.hmm
+    assert weighted.training == StreamWeights(0.5, 0.25, 0.25, 0.25, 2.0)
+    assert weighted.recognition == StreamWeights(1.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def test_weights_that_switch_everything_off_are_refused() -> None:
+    with pytest.raises(InputError, match="no stream takes part in recognition"):
+        engine_named("joint", {"recognition_speech_weight": 0.0, "f0": False})
+    with pytest.raises(InputError, match="all streams are switched off in training"):
+        engine_named("joint", {"speech_weight": 0.0, "f0_weight": 0.0, "motion_weight": 0.0})
 
 
 def test_a_unit_of_another_set_is_refused() -> None:

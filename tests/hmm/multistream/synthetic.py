@@ -66,7 +66,8 @@ def random_joint(
         effects = {place: draw.normal(0, 3, D) for place in product(range(3), (*known.names, ""))}
         means = np.array([sum(effects[i, context[i]] for i in range(3)) for context, _ in seen])
         sums.add(np.arange(len(seen)), 9.0 * np.concatenate([np.ones((len(seen), 2)), means, means**2 + 0.1], axis=1))
-        forest = grow_forest(name, known, questions, seen, sums, has_spaces=has_spaces, costs=TreeCosts(1.0, 1.0, 0.02))
+        costs = TreeCosts(1.0, 1.0, 0.02, changes.get("both_neighbours", False))
+        forest = grow_forest(name, known, questions, seen, sums, has_spaces=has_spaces, costs=costs)
         shape = (forest.size, components, D)
         mixtures = Mixtures(
             np.log(draw.dirichlet(np.full(components, 2.0), forest.size)).astype(np.float32),

@@ -47,9 +47,11 @@ def test_units_and_contexts_that_were_never_seen_resolve_by_class():
     assert "left is late?" in forest.text()
 
 
-@pytest.mark.parametrize("stream", ["speech", "f0", "motion"])
-def test_acoustic_streams_depend_on_one_neighbour_at_most(stream):
-    hmm = random_joint(0, ("a", "b", "c"))
+@pytest.mark.parametrize(
+    ("stream", "both"), [("speech", False), ("f0", False), ("motion", False), ("speech", True), ("f0", True)]
+)
+def test_acoustic_streams_depend_on_one_neighbour_unless_both_are_asked_about(stream, both):
+    hmm = random_joint(0, ("a", "b", "c"), both_neighbours=both)
     forest, units = hmm.models[stream].forest, hmm.inventory.names
     sides = [name for name in units if name != "sp"]
 
@@ -64,8 +66,16 @@ def test_acoustic_streams_depend_on_one_neighbour_at_most(stream):
     left = {state for unit, state in hmm.inventory.monophones if unit not in ("sil", "sp") and differs(unit, state, 0)}
     right = {state for unit, state in hmm.inventory.monophones if unit not in ("sil", "sp") and differs(unit, state, 2)}
     silent = any(differs("sil", state, position) for state in range(3) for position in (0, 2))
-    expected = ({0}, {2}, False) if stream in ACOUSTIC_STREAMS else ({0, 1, 2}, {0, 1, 2}, True)
-    assert (left, right, silent) == expected
+    one, everywhere = ({0}, {2}, False), ({0, 1, 2}, {0, 1, 2}, stream == "motion")
+    assert (left, right, silent) == (one if stream in ACOUSTIC_STREAMS and not both else everywhere)
+
+
+def test_the_grid_of_leaves_is_the_leaf_beside_each_pair_of_neighbours():
+    forest = random_joint(0, ("a", "b", "c"), both_neighbours=True).models["speech"].forest
+    for unit, state in (("a", 0), ("c", 1), ("sil", 2)):
+        grid = forest.leaf_grid(unit, state, SIDES[:-1])
+        expected = [[forest.leaf(((left, unit, right), state)) for right in SIDES[:-1]] for left in SIDES[:-1]]
+        assert grid.tolist() == expected
 
 
 def test_an_even_count_has_no_middle():

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from lipmotion.hmm.multistream.multistream_baum_welch import (
 )
 from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, mean_log_likelihood, train_joint
 from lipmotion.hmm.multistream.recognise import JointRecogniser
-from lipmotion.hmm.multistream.streams import STREAMS, StreamObservations, StreamWeights
+from lipmotion.hmm.multistream.streams import F0_STREAMS, STREAMS, Stream, StreamObservations, StreamWeights
 from lipmotion.types import Progress
 from oracles import chains
 from oracles import joint as slow
@@ -113,6 +114,24 @@ def test_what_was_learned_is_recognised(usual):
     recogniser = JointRecogniser(hmm)
     right = [tuple(s.unit for s in recogniser.recognise(u.observed)) == u.units for u in HELD_OUT]
     assert np.mean(right) >= 0.75
+
+
+def test_a_stream_counts_as_much_as_its_weight(usual):
+    """Voicing of another utterance: the less it weighs, the more units are those that speech says."""
+    hmm, _ = usual
+    right = []
+    for weight in (0.0, 1.0, 8.0):
+        recogniser = JointRecogniser(hmm, StreamWeights(1, weight, weight, weight, 0))
+        count = 0
+        for utterance, other in pairwise(HELD_OUT):
+            frames = min(utterance.observed.frames, other.observed.frames)
+            mixed = {name: of.observed.streams[name] for name, of in
+                     [("speech", utterance), *((stream, other) for stream in F0_STREAMS)]}  # fmt: skip
+            cut = {name: Stream(stream.values[:frames], stream.known[:frames]) for name, stream in mixed.items()}
+            said = [s.unit for s in recogniser.recognise(StreamObservations(cut))]
+            count += sum(a == b for a, b in zip(said, utterance.units, strict=False))
+        right.append(count)
+    assert right[0] > right[1] > right[2]
 
 
 def test_a_flat_start_finds_the_units():

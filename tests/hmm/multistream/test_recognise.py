@@ -9,6 +9,7 @@ from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.decode import decode_units, unit_loop
 from lipmotion.hmm.log_likelihoods import log_likelihoods_of
 from lipmotion.hmm.model import HmmConfig, UnitHmm
+from lipmotion.hmm.multistream.context_loop import context_loop
 from lipmotion.hmm.multistream.recognise import JointRecogniser
 from lipmotion.hmm.multistream.streams import SPEECH, StreamObservations, StreamWeights
 from lipmotion.hmm.multistream.unit_states import triphone_states
@@ -31,11 +32,11 @@ def slow_densities(hmm, data, weights):
 
 def state_posteriors(recogniser, data):
     """Return the posterior of every state without context in every frame [shape=(T, R)]."""
-    network, table = recogniser._loop.network, recogniser._states.table
+    loop = context_loop(recogniser.hmm)
     log_density = recogniser._log_likelihoods(data).log_density(0, data.frames, None)
-    posteriors, _, _ = network_posteriors(log_density, *network.arrays)
+    posteriors, _, _ = network_posteriors(log_density, *loop.network.network.arrays)
     result = np.zeros((data.frames, len(recogniser.hmm.inventory.monophones)))
-    np.add.at(result.T, table.parents()[network.emission], posteriors.T.astype(float))
+    np.add.at(result.T, loop.monophones, posteriors.T.astype(float))
     return result
 
 
@@ -53,10 +54,10 @@ def candidates(hmm, frames):
     return sequences([unit for unit in hmm.inventory.names if unit != "sp"], counts, frames)
 
 
-@pytest.mark.parametrize("seed", range(2))
-@pytest.mark.parametrize(("states", "frames"), [(2, 7), (3, 8)])
-def test_nothing_else_is_more_probable(seed, states, frames):
-    hmm = random_joint(seed, states=states, components=1 + seed % 2)
+@pytest.mark.parametrize("both", [False, True])
+@pytest.mark.parametrize(("seed", "states", "frames"), [(0, 2, 7), (1, 3, 8)])
+def test_nothing_else_is_more_probable(seed, states, frames, both):
+    hmm = random_joint(seed, states=states, components=1 + seed % 2, both_neighbours=both)
     data = observed(np.random.default_rng([seed, 1]), frames)
     density = slow_densities(hmm, data, WEIGHTS)
     best, units, lengths = max(slow.everything(hmm, density, frames, candidates(hmm, frames)))

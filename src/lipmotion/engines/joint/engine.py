@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, final
@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs
-from lipmotion.errors import CorpusError, InputError
+from lipmotion.errors import AlignmentError, CorpusError, InputError
 from lipmotion.hmm.multistream.align import StatePath, align
 from lipmotion.hmm.multistream.arrays import joint_arrays, joint_from_arrays
 from lipmotion.hmm.multistream.generate import densities_of_path, densities_of_paths, single_gaussians
 from lipmotion.hmm.multistream.model import JointConfig, JointHmm
-from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, train_joint
-from lipmotion.hmm.multistream.recognise import joint_recogniser
+from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, growing_joint, train_joint, with_durations
+from lipmotion.hmm.multistream.recognise import RecognisedUnit, joint_recogniser
 from lipmotion.hmm.multistream.streams import MOTION, StreamObservations, StreamWeights, stream_observations
 from lipmotion.hmm.multistream.unit_frames import units_in_frames, units_in_time
 from lipmotion.hmm.multistream.unit_states import Inventory
@@ -32,6 +32,7 @@ from lipmotion.motion.space import MotionSpace, fit_reduced_motion
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.storage.schema import arrays_under, format_errors, refuse_undeclared
 from lipmotion.types import (
+    FRAME_RATE_HZ,
     Configuration,
     Constraints,
     Example,
@@ -44,13 +45,25 @@ from lipmotion.types import (
     Unit,
     option,
 )
-from lipmotion.units import LIP_CLOSING, UnitSet, unit_set
+from lipmotion.units import LIP_CLOSING, UnitSet, is_silent, unit_set
 
 PREFIX = "joint_"
 """Prefix of the names of the arrays of the joint model."""
 
 
 COUNT = Rule(least=1)
+WEIGHT = Rule(least=0)
+HOFER_2008: Mapping[str, Any] = {
+    "units": "eVis",
+    "states": 5,
+    "mixtures": 8,
+    "recognise_units": True,
+    "own_alignment": True,
+    "both_neighbours": True,
+    "closures": False,
+    "articulation": False,
+}
+"""The system of Hofer 2008, as printed; docs/papers/hofer2008.md says what the print leaves open."""
 
 
 @dataclass(frozen=True)
@@ -62,9 +75,17 @@ class JointEngineConfig(Configuration):
     mixtures, motion_mixtures : Gaussians per state of speech, and of motion (powers of two)
     components : principal components that all point channels are reduced to
     f0         : model the three streams of F0 (False: their weights are 0 everywhere)
-    motion_in_training : give the motion stream weight 1 when states are aligned in training (False: weight 0)
+    motion_in_training : the motion stream takes part when states are aligned in training (False: its weight is 0)
+    speech_weight, f0_weight, motion_weight : of the streams when states are aligned in training
+    recognition_speech_weight, recognition_f0_weight : of the streams in recognition and in alignment
+    bigram_weight, insertion : scale of the log bigram, and log insertion penalty of every unit, in recognition
+    both_neighbours : trees of speech and F0 ask about both neighbours in every state (False: states before a unit's
+                 middle about the left one, those after it about the right one, and the middle about none)
+    flat_start : training starts from states of equal length (False: from the phones in time)
     recognise_units : where neither words nor units are given, recognise the units of the model by its own bigram
                  (False: use the phones of the shared recogniser)
+    own_alignment : the model itself times the phones of given words (False: they have the times of the shared
+                 aligner). Times that are given with the units stay as they are
     paths      : number of state sequences, sampled from their posterior, from which motion is generated where units are
                  recognised; 1: the best sequence. More than 1 needs ``recognise_units``
     seed       : of the sampling
@@ -80,11 +101,22 @@ class JointEngineConfig(Configuration):
     f0: bool = True
     motion_in_training: bool = True
     recognise_units: bool = False
+    own_alignment: bool = option(False, later=True)
     paths: int = option(1, COUNT)
     seed: int = option(0, Rule(least=0))
     closures: bool = True
     articulation: bool = True
+    speech_weight: float = option(1.0, WEIGHT, later=True)
+    f0_weight: float = option(1.0, WEIGHT, later=True)
+    motion_weight: float = option(1.0, WEIGHT, later=True)
+    recognition_speech_weight: float = option(1.0, WEIGHT, later=True)
+    recognition_f0_weight: float = option(1.0, WEIGHT, later=True)
+    bigram_weight: float = option(4.0, WEIGHT, later=True)
+    insertion: float = option(-4.0, later=True)
+    both_neighbours: bool = option(False, later=True)
+    flat_start: bool = option(False, later=True)
 
+    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {"hofer2008": HOFER_2008}
     former: ClassVar[Mapping[str, str]] = {"sees": "motion_in_training", "recognises": "recognise_units"}
 
     def __post_init__(self) -> None:
@@ -94,20 +126,26 @@ class JointEngineConfig(Configuration):
                 f"paths is {self.paths}: several are sampled only where units are recognised (recognise_units)"
             )
 
+        if not self.hmm.recognition.active:
+            raise InputError("no stream takes part in recognition; give speech or F0 a weight")
+
     def check_files(self) -> None:  # noqa: D102
         unit_set(self.units)
 
     @property
     def hmm(self) -> JointConfig:
         """Configuration of the joint model: its states and mixtures, and the stream weights."""
-        f0 = float(self.f0)
-        recognition = StreamWeights(f0=f0, f0_slope=f0, f0_curvature=f0, motion=0.0)
+        training, recognition = (weight if self.f0 else 0.0 for weight in (self.f0_weight, self.recognition_f0_weight))
+        motion = self.motion_weight if self.motion_in_training else 0.0
         return JointConfig(
             states=self.states,
             mixtures=self.mixtures,
             motion_mixtures=self.motion_mixtures,
-            training=StreamWeights(f0=f0, f0_slope=f0, f0_curvature=f0, motion=float(self.motion_in_training)),
-            recognition=recognition,
+            both_neighbours=self.both_neighbours,
+            bigram_weight=self.bigram_weight,
+            insertion=self.insertion,
+            training=StreamWeights(self.speech_weight, training, training, training, motion),
+            recognition=StreamWeights(self.recognition_speech_weight, recognition, recognition, recognition, 0.0),
         )
 
 
@@ -146,14 +184,30 @@ class JointModel:
         return limits_of(means * stream.scale.deviation[:Q] + stream.scale.mean[:Q])
 
 
+@dataclass(frozen=True, eq=False)
+class _Learning:
+    """What a joint model is trained on, and what its ``JointModel`` has besides."""
+
+    units: UnitSet
+    space: MotionSpace
+    utterances: Sequence[TrainingUtterance]
+    inventory: Inventory
+    closure: Closure | None
+    prior: ArticulationPrior | None
+
+    def model(self, hmm: JointHmm) -> JointModel:
+        """Return the model with a trained joint model."""
+        return JointModel(self.units, self.space, hmm, self.closure, self.prior)
+
+
 @final
 @dataclass(frozen=True)
 class JointEngine(Engine[JointModel]):
     """One model of speech, F0 and motion: speech and F0 recognise or align, motion generates.
 
-    Source: Hofer 2008, §4 and §5.  Deviations: training starts from phones in time (aligned or labelled), not from a
-    flat start; trees of speech and F0 ask about one neighbour, those of motion about both; unless ``recognise_units``
-    is set, phones of untranscribed speech are those of the shared recogniser.
+    Source: Hofer 2008, §4 and §5.  Deviations, which the preset ``hofer2008`` does not have: trees of speech and F0
+    ask about one neighbour, those of motion about both; phones of untranscribed speech are those of the shared
+    recogniser; lips are made to meet in p, b and m, and means lean on a table of articulation.
     """
 
     config: JointEngineConfig
@@ -169,6 +223,24 @@ class JointEngine(Engine[JointModel]):
         monitor: Monitor,
         checkpoint: Checkpoint = NO_CHECKPOINT,  # noqa: ARG002 - training takes two minutes
     ) -> Fit[JointModel]:
+        learning = self._learning(examples)
+        hmm = train_joint(learning.utterances, learning.inventory, learning.units.classes(), self.config.hmm, monitor)
+        figures = {f"leaves_{name}": float(stream.forest.size) for name, stream in hmm.models.items()}
+        frames = sum(int(example.valid.sum()) for example in examples)
+        return Fit(learning.model(hmm), {"frames": frames, **figures})
+
+    def growing_models(self, examples: Sequence[Example], monitor: Monitor) -> Iterator[JointModel]:
+        """Yield a model for every number of Gaussians, 1, 2, 4 …, of one training; the last is that of ``fit``.
+
+        Raises as ``fit``.
+        """
+        learning = self._learning(examples)
+        classes = learning.units.classes()
+        for hmm in growing_joint(learning.utterances, learning.inventory, classes, self.config.hmm, monitor):
+            yield learning.model(with_durations(hmm, learning.utterances))
+
+    def _learning(self, examples: Sequence[Example]) -> _Learning:
+        """Return what the joint model is trained on. Raises CorpusError: there is no speech."""
         units = unit_set(self.config.units)
         space, values = fit_reduced_motion(examples, self.config.components)
         utterances = [self._training_utterance(example, x, units) for example, x in zip(examples, values, strict=True)]
@@ -176,12 +248,9 @@ class JointEngine(Engine[JointModel]):
             raise CorpusError(f"no speech in {len(examples)} examples; train on speech")
         silence = units.silence[:1] + tuple(unit for unit in units.silence[1:] if units.silent(unit))  # only silence
         inventory = Inventory(units.units, silence, self.config.states)
-        hmm = train_joint(utterances, inventory, units.classes(), self.config.hmm, monitor)
         closure = fit_closure(space.direct_names, values, examples)
-        figures = {f"leaves_{name}": float(stream.forest.size) for name, stream in hmm.models.items()}
-        frames = sum(int(example.valid.sum()) for example in examples)
         prior = fit_articulation_prior(space, values, examples) if self.config.articulation else None
-        return Fit(JointModel(units, space, hmm, closure, prior), {"frames": frames, **figures})
+        return _Learning(units, space, utterances, inventory, closure, prior)
 
     def without_closures(self) -> JointEngine:  # noqa: D102
         return replace(self, config=replace(self.config, closures=False))
@@ -189,9 +258,15 @@ class JointEngine(Engine[JointModel]):
     def generate(self, model: JointModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         observations = self._observations(speech)
         if self.config.recognise_units and not speech.units_decide:
-            units, paths = self._recognised(model, observations, speech.features.duration_s)
+            units, paths = speech.once(
+                (model.hmm, self.config.paths, self.config.seed),
+                lambda: self._recognised(model, observations, speech.features.duration_s),
+            )
         else:
-            units, paths = speech.units, [_aligned(model, observations, speech.units)]
+            units = speech.units
+            if self.config.own_alignment and speech.units_known and not speech.times_given:
+                units = _own_times(model, observations, units, speech.features.duration_s)
+            paths = [_aligned(model, observations, units)]
         densities = densities_of_path(model.hmm, paths[0]) if len(paths) == 1 else densities_of_paths(model.hmm, paths)
         means, precisions = single_gaussians(densities)
 
@@ -242,7 +317,7 @@ class JointEngine(Engine[JointModel]):
     def _training_utterance(self, example: Example, values: NDArray[np.float64], units: UnitSet) -> TrainingUtterance:
         observations = self._observations(example.speech, values, example.valid)
         sequence, bounds = units_in_frames(example.speech.units, observations.frames, units.silence[0], units.unit_of)
-        return TrainingUtterance(observations, sequence, bounds)
+        return TrainingUtterance(observations, sequence, None if self.config.flat_start else bounds)
 
     def _recognised(
         self, model: JointModel, observations: StreamObservations, duration_s: float
@@ -255,6 +330,26 @@ class JointEngine(Engine[JointModel]):
             return units, recogniser.sampled_paths(observations, self.config.paths, self.config.seed)
         bounds = np.array([*(segment.first for segment in segments), observations.frames])
         return units, [align(model.hmm, observations, [segment.unit for segment in segments], bounds)]
+
+
+def _own_times(
+    model: JointModel, observations: StreamObservations, units: Timeline[Unit], duration_s: float
+) -> Timeline[Unit]:
+    """Return given units at the times that the model gives them by forced alignment.
+
+    Pauses that are shorter than the states of silence are left out. Units that do not fit into the recording keep the
+    times that they have.
+    """
+    least_s = model.hmm.inventory.states / FRAME_RATE_HZ
+    spoken = [span for span in units if span.duration_s >= least_s or not is_silent(span.label.phone)]
+    names = [model.units.unit_of(span.label) for span in spoken]
+    try:
+        bounds = align(model.hmm, observations, names).bounds(len(names))
+    except AlignmentError:
+        return units
+    labels = iter(span.label for span in spoken)
+    timed = [RecognisedUnit(name, int(first)) for name, first in zip(names, bounds[:-1], strict=True)]
+    return units_in_time(timed, duration_s, lambda _: next(labels))
 
 
 def _aligned(model: JointModel, observations: StreamObservations, units: Timeline[Unit]) -> StatePath:

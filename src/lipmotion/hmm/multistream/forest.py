@@ -59,6 +59,33 @@ class Forest:
         """Return the leaves of states in context [shape=(S,)]."""
         return np.array([self.leaf(state) for state in states], np.intp)
 
+    def leaf_grid(self, unit: str, state: int, neighbours: Sequence[str]) -> NDArray[np.intp]:
+        """Return the leaves of a state beside every left and every right neighbour [shape=(N, N)]."""
+        name = self.inventory.tree(unit, state)
+        tree, leaves = self.trees[name], np.empty((len(neighbours), len(neighbours)), np.intp)
+        numbers = {int(node): self._first_leaf[name] + i for i, node in enumerate(tree.leaves)}
+        beside = np.array(neighbours)
+
+        def fill(node: int, left: NDArray[np.intp], right: NDArray[np.intp]) -> None:
+            if tree.asked[node] < 0:
+                leaves[np.ix_(left, right)] = numbers[node]
+                return
+            position, _, members = tree.questions[tree.asked[node]]
+            if position == 1:
+                fill(node + 1 if unit in members else int(tree.no[node]), left, right)
+                return
+            one_of = np.isin(beside, list(members))
+            for answer, following in ((True, node + 1), (False, int(tree.no[node]))):
+                kept = [
+                    side[one_of[side] == answer] if position == at else side for at, side in ((0, left), (2, right))
+                ]
+                if len(kept[0]) and len(kept[1]):
+                    fill(following, *kept)
+
+        everything = np.arange(len(neighbours))
+        fill(0, everything, everything)
+        return leaves
+
     def name(self, leaf: int) -> str:
         """Return the tree of a leaf and the answers that lead to it, in words."""
         tree = next(name for name in reversed(self._first_leaf) if self._first_leaf[name] <= leaf)
@@ -104,32 +131,38 @@ def context_questions(inventory: Inventory, classes: Mapping[str, frozenset[str]
     return tuple(Question(position, name, members) for position in range(3) for members, name in distinct.items())
 
 
-def positions_asked(stream: str, inventory: Inventory, unit: str, state: int) -> tuple[int, ...]:
+def positions_asked(
+    stream: str, inventory: Inventory, unit: str, state: int, *, both_neighbours: bool = False
+) -> tuple[int, ...]:
     """Return the positions of the context that the tree of a state may ask about (``Question.position``).
 
-    In acoustic streams, states before a unit's middle ask about the left neighbour, those after it about the right
-    one: so whole sequences of units in context can be searched exactly. Motion, which is not searched, may ask about
-    both.
+    both_neighbours : in acoustic streams, all states ask about both; otherwise those before a unit's middle ask about
+                      the left one, those after it about the right one, and the middle about none: fewer nodes to search
+    Motion, which is not searched, may always ask about both.
     """
     if stream == MOTION:
         return (0, 2) if unit in inventory.free else (0, 1, 2)
     if unit in inventory.free:
         return ()
+    if both_neighbours:
+        return (0, 1, 2)
     return {-1: (0, 1), 0: (1,), 1: (1, 2)}[inventory.side(unit, state)]
 
 
 @dataclass(frozen=True)
 class TreeCosts:
-    """What limits the growth of trees.
+    """What trees may ask, and what limits their growth.
 
     factor         : price of a leaf, in units of its description length
     least_frames   : frames that a leaf must have
     least_variance : of a leaf's Gaussian, in the scale of the stream
+    both_neighbours : as of ``positions_asked``
     """
 
     factor: float
     least_frames: float
     least_variance: float
+    both_neighbours: bool = False
 
 
 def grow_forest(
@@ -156,7 +189,7 @@ def grow_forest(
     names = np.array([inventory.tree(context[1], state) for context, state in triphones])
     trees = {}
     for name, (unit, state) in inventory.trees.items():
-        asked = positions_asked(stream, inventory, unit, state)
+        asked = positions_asked(stream, inventory, unit, state, both_neighbours=costs.both_neighbours)
         in_tree = np.flatnonzero(names == name)
         contexts, pooled = _pooled([triphones[i][0] for i in in_tree.tolist()], values[in_tree], asked)
         trees[name] = grow_tree(

@@ -27,6 +27,7 @@ class JointConfig:
     states       : states per unit, left to right, no skips
     mixtures, motion_mixtures : most Gaussians per state of speech, and of motion (powers of two)
     plain_iterations, iterations : embedded Baum–Welch iterations without context, and in every later stage
+    both_neighbours : trees of speech and F0 ask about both neighbours in every state, not about one
     tree_factor  : price of a leaf, in units of its description length
     least_frames : frames that a leaf must have
     variance_floor : least variance, as a share of a dimension's overall variance
@@ -40,6 +41,7 @@ class JointConfig:
     motion_mixtures: int = 1
     plain_iterations: int = 6
     iterations: int = 4
+    both_neighbours: bool = False
     tree_factor: float = 1.0
     least_frames: float = 30.0
     variance_floor: float = 0.02

@@ -65,7 +65,22 @@ def train_joint(
     monitor: Monitor = silent_monitor,
     validation: Sequence[TrainingUtterance] = (),
 ) -> JointHmm:
-    """Return models of all streams, trained together.
+    """Return models of all streams, trained together: the last of ``growing_joint``, which says what it takes."""
+    *_, hmm = growing_joint(utterances, inventory, classes, config, monitor, validation)
+    return with_durations(hmm, utterances)
+
+
+def growing_joint(
+    utterances: Sequence[TrainingUtterance],
+    inventory: Inventory,
+    classes: Mapping[str, frozenset[str]],
+    config: JointConfig,
+    monitor: Monitor = silent_monitor,
+    validation: Sequence[TrainingUtterance] = (),
+) -> Iterator[JointHmm]:
+    """Yield models of all streams, trained together, of 1, 2, 4 … Gaussians for speech, then of more for motion.
+
+    Their durations are not measured (NaN): ``with_durations``.
 
     classes    : sets of units, by name, that the trees ask about, besides single units
     validation : mixtures of speech and motion are split as long as the likelihood of these utterances rises; without
@@ -75,9 +90,33 @@ def train_joint(
     Raises CorpusError: no utterance, or none with as many frames as its units have states.
     Raises InputError: an unknown unit, or no stream that is active in training.
     Source: Hofer 2008, §4 and §6; tying by minimum description length as in ``stats.trees``.  Deviations: utterances
-    with ``bounds`` start from these, not flat; trees of acoustic streams ask about one neighbour
-    (``forest.positions_asked``).
+    with ``bounds`` start from these, not flat; trees of acoustic streams ask about one neighbour, unless
+    ``both_neighbours`` is set (``forest.positions_asked``).
     """
+    hmm, prepared = _start(utterances, inventory, config)
+    splits = _doublings(config.mixtures), _doublings(config.motion_mixtures)
+    widths = [config.plain_iterations, 1, config.iterations, *(2 * config.iterations * count for count in splits), 1]
+    plain, trees, tied, *mixed, last = _part_monitors(monitor, widths)
+    hmm = _run_em(hmm, prepared, "units", config.plain_iterations, plain)
+    hmm = _tied(hmm, prepared, context_questions(inventory, classes), trees)
+    hmm = _run_em(hmm, prepared, "units in context", config.iterations, tied)
+    yield hmm
+    held_out = _prepared(hmm, validation)
+    for name, count, of_stream in zip((SPEECH, MOTION), splits, mixed, strict=True):
+        for part in _part_monitors(of_stream, [1] * count) if name in hmm.models else ():
+            split = _split(hmm, prepared, held_out, name, part)
+            if split is None:
+                break
+            hmm = split
+            yield hmm
+    last(Progress("lengths of states", 1, 1, 1.0))
+
+
+def _start(
+    utterances: Sequence[TrainingUtterance], inventory: Inventory, config: JointConfig
+) -> tuple[JointHmm, PreparedUtterances]:
+    """Return models without context that were estimated from states of equal length, and the utterances. Raises as
+    ``growing_joint``."""
     if not utterances:
         raise CorpusError("no utterances to train on; give at least one")
     streams = [name for name in STREAMS if any(name in utterance.observed.streams for utterance in utterances)]
@@ -92,20 +131,12 @@ def train_joint(
             f"none of {len(utterances)} utterances has room for the states of its units; "
             "check that units and recordings belong together, or give units fewer states"
         )
-    hmm = _initialised(hmm, prepared, [(utterance.units, utterance.bounds) for utterance in utterances])
-    splits = _doublings(config.mixtures), _doublings(config.motion_mixtures)
-    widths = [config.plain_iterations, 1, config.iterations, *(2 * config.iterations * count for count in splits), 1]
-    plain, trees, tied, *mixed, last = _part_monitors(monitor, widths)
-    hmm = _run_em(hmm, prepared, "units", config.plain_iterations, plain)
-    hmm = _tied(hmm, prepared, context_questions(inventory, classes), trees)
-    hmm = _run_em(hmm, prepared, "units in context", config.iterations, tied)
-    held_out = _prepared(hmm, validation)
-    for name, count, of_stream in zip((SPEECH, MOTION), splits, mixed, strict=True):
-        if name in hmm.models:
-            hmm = _with_mixtures(hmm, prepared, held_out, name, _part_monitors(of_stream, [1] * count))
-    hmm = replace(hmm, durations=measured_durations(hmm, [(u.observed, u.units) for u in utterances]))
-    last(Progress("lengths of states", 1, 1, 1.0))
-    return hmm
+    return _initialised(hmm, prepared, [(utterance.units, utterance.bounds) for utterance in utterances]), prepared
+
+
+def with_durations(hmm: JointHmm, utterances: Sequence[TrainingUtterance]) -> JointHmm:
+    """Return models with the durations of states that are measured in the alignment of their training."""
+    return replace(hmm, durations=measured_durations(hmm, [(u.observed, u.units) for u in utterances]))
 
 
 def _doublings(most: int) -> int:
@@ -132,7 +163,7 @@ def _tied(hmm: JointHmm, prepared: PreparedUtterances, questions: tuple[Question
     """Return the models with their states in context tied by decision trees, one Gaussian a leaf."""
     config, triphones = hmm.config, prepared.triphones
     statistics = accumulate_statistics(hmm, prepared).triphones
-    costs = TreeCosts(config.tree_factor, config.least_frames, config.variance_floor)
+    costs = TreeCosts(config.tree_factor, config.least_frames, config.variance_floor, config.both_neighbours)
     models = {}
     for step, (name, model) in enumerate(hmm.models.items(), start=1):
         has_spaces = model.tied.voiced is not None
@@ -146,27 +177,21 @@ def _tied(hmm: JointHmm, prepared: PreparedUtterances, questions: tuple[Question
     return replace(hmm, models=models)
 
 
-def _with_mixtures(
-    hmm: JointHmm, prepared: PreparedUtterances, held_out: PreparedUtterances, name: str, monitors: Sequence[Monitor]
-) -> JointHmm:
-    """Return the models with the Gaussians of a stream split, at most once for each monitor.
+def _split(
+    hmm: JointHmm, prepared: PreparedUtterances, held_out: PreparedUtterances, name: str, monitor: Monitor
+) -> JointHmm | None:
+    """Return the models with the Gaussians of a stream split, and trained.
 
-    Splitting ends when the likelihood of the held-out utterances does not rise.
+    None: none has enough data to be split, or the likelihood of the held-out utterances does not rise.
     """
-    best = mean_log_likelihood(hmm, held_out)
-    for monitor in monitors:
-        model, statistics = hmm.models[name], accumulate_statistics(hmm, prepared).leaves[name]
-        if not model.tied.can_split(statistics):
-            break
-        tied = model.tied.split(statistics)
-        new = replace(hmm, models={**hmm.models, name: replace(model, tied=tied)})
-        stage = f"{tied.mixtures.size[1]} Gaussians for {name}"
-        new = _run_em(new, prepared, stage, hmm.config.iterations, monitor)
-        figure = mean_log_likelihood(new, held_out)
-        if held_out.items and not figure > best:
-            break
-        hmm, best = new, figure
-    return hmm
+    model, statistics = hmm.models[name], accumulate_statistics(hmm, prepared).leaves[name]
+    if not model.tied.can_split(statistics):
+        return None
+    tied = model.tied.split(statistics)
+    new = replace(hmm, models={**hmm.models, name: replace(model, tied=tied)})
+    new = _run_em(new, prepared, f"{tied.mixtures.size[1]} Gaussians for {name}", hmm.config.iterations, monitor)
+    rises = not held_out.items or mean_log_likelihood(new, held_out) > mean_log_likelihood(hmm, held_out)
+    return new if rises else None
 
 
 def mean_log_likelihood(hmm: JointHmm, prepared: PreparedUtterances) -> float:

@@ -200,7 +200,8 @@ def _understood(model: Model, request: SpeechRequest, audio: AnalysedAudio, each
             LOG.warning("the transcript is not used: the units already say what is spoken; leave one of them out")
         _check_units(request.units, audio.duration_s)
         units = without_gaps(request.units, audio.duration_s)
-        return UnderstoodSpeech(speech_of(model.engine, audio, audio.mfcc(), units, phones.kind, each), None, range_db)
+        speech = speech_of(model.engine, audio, audio.mfcc(), units, phones.kind, each)
+        return UnderstoodSpeech(replace(speech, times_given=True), None, range_db)
     words = _words(request.transcript, audio.duration_s)
     if installed and words is None:
         words = recognise_words(audio, request.recogniser)
