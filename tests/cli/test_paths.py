@@ -43,8 +43,8 @@ REFUSED = [
     ("the lexicon itself", f"evaluate m.lipmotion {FIGURES} -o l.txt"),
     ("the corpus c", f"experiment unit-sets {FIGURES} -o c/corpus.json"),
     ("the list itself", f"experiment learning-curve {FIGURES} --order t.txt -o t.txt"),
-    ("the folder of recordings r", f"experiment table3 {FIGURES} --talkers r -o r/a.wav"),
-    ("the corpus c", f"experiment table3 {FIGURES} --plots c/pictures"),
+    ("the folder of recordings r", f"experiment xieliu2007 {FIGURES} --talkers r -o r/a.wav"),
+    ("the corpus c", f"experiment xieliu2007 {FIGURES} --plots c/pictures"),
     ("the folder of recordings itself", "corpus prepare r -o r"),
     ("the folder of recordings d.unfinished/r", "corpus prepare d.unfinished/r -o d.unfinished"),
 ]

@@ -124,7 +124,7 @@ train c -o m --speaker EVIL-none --machine-readable
 adapt EVIL.wav -o EVIL.wav
 evaluate m.lipmotion c --split EVIL
 experiment learning-curve c --sizes EVIL
-experiment table3 c --systems EVIL
+experiment xieliu2007 c --systems EVIL
 """.strip().splitlines()
 NOT_SHOWN = {
     "corpus sync c",
