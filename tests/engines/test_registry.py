@@ -23,7 +23,7 @@ def test_the_systems_of_xie_and_liu_are_as_printed() -> None:
     for system in SYSTEMS:
         config = engine_from_settings(preset=system).config
         assert (config.states, config.conversion, config.start, config.update) == (5, "em", "viterbi", "exact")
-        assert not (config.variance_scaling or config.closures or config.articulation or config.dynamic)
+        assert not any((config.variance_scaling, config.closures, config.articulation, config.dynamic))
         assert config.chains.split()[-1] == ("viseme" if "-vi-" in system else "phone")
         assert config.asynchrony == (-1 if "FHMM" in system else 1)
         assert (config.audio_weight, config.visual_weight, config.mixtures, config.visual_mixtures) == (1, 1, 1, 1)

@@ -44,7 +44,7 @@ SMALL = ExperimentSettings(recogniser=PHONE_MODELS)
 MULTISTREAM = "ph-MSHMM"
 CHAINS = [MULTISTREAM, REFERENCE_SYSTEM, MULTISTREAM + TUNED, REFERENCE_SYSTEM + TUNED]
 SYSTEMS = [*CHAINS, BEST_PATH, "trajectory HMM", "loudness", "mean pose"]
-BRIEF = TuningOptions(clips=3, heard=1, weights=(1.0, 0.3), mixtures=2, states=())
+BRIEF = TuningOptions(clips=3, judges=1, weights=(1.0, 0.3), mixtures=2, states=())
 PICTURE = b"\x89PNG\r\n\x1a\n"
 
 
@@ -200,7 +200,7 @@ def test_eigenlips(visual: str, toy_corpus: Corpus) -> None:
 
 def test_systems_in_the_order_of_the_table() -> None:
     assert selected_systems(["loudness", "ph-HMM"]) == ["ph-HMM", REFERENCE_SYSTEM, "loudness"]
-    assert selected_systems([MATCHED]) == ["ph-MSHMM", "ph-FHMM", REFERENCE_SYSTEM, "ph-FHMM" + TUNED, MATCHED]
+    assert selected_systems([MATCHED]) == ["ph-MSHMM", "ph-vi-FHMM", REFERENCE_SYSTEM, "ph-vi-FHMM" + TUNED, MATCHED]
     assert list(PAPER_FIGURES) == list(COMPARED_SYSTEMS)[:6]
     with pytest.raises(InputError, match="no system 'ph-RNN'; there are: ph-HMM, "):
         selected_systems(["ph-RNN"])

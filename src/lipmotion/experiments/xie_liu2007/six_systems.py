@@ -127,7 +127,7 @@ DEFAULT_OPTIONS = ComparisonOptions()
 QUICK_SIZE = 20
 QUICK = ComparisonOptions(
     systems=[*PAPER_FIGURES, *(name + TUNED for name in PAPER_FIGURES), "trajectory HMM", "mean pose"],
-    tuning=TuningOptions(clips=QUICK_SIZE, heard=4, weights=(1.0, 0.3), mixtures=2, pair_mixtures=1, states=()),
+    tuning=TuningOptions(clips=QUICK_SIZE, judges=4, weights=(1.0, 0.3), mixtures=2, pair_mixtures=1, states=()),
     most=10,
 )
 """A small comparison, of systems trained on ``QUICK_SIZE`` recordings."""
@@ -190,7 +190,7 @@ def xieliu2007(  # noqa: PLR0913
     about |= {"channels": list(recordings.channels), "closed_under": recordings.closed_under}
     chosen: dict[str, Any] = {
         "clips": options.tuning.clips,
-        "heard": options.tuning.heard,
+        "judges": options.tuning.judges,
         "validation": len(validation),
     }
     chosen |= {"tried": {name: [as_row(trial) for trial in tried] for name, tried in trials.items()}}

@@ -50,7 +50,7 @@ BLSTM = "BLSTM"
 TUNED = ", tuned"
 ABOUT = "about"
 """Name of the array with settings and figures of a stored system."""
-MATCHED = "ph-MSHMM, as large as ph-FHMM"
+MATCHED = "ph-MSHMM, as large as ph-vi-FHMM"
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ COMPARED_SYSTEMS: dict[str, ComparedSystem] = {
 """The systems of the table, in its order.
 
 The paper's six are those of ``train --preset``; ``tuned``: with the settings that were best on validation recordings;
-``as large as``: with as many Gaussians as bring the number of parameters nearest to that of the tuned ph-FHMM.
+``as large as``: with as many Gaussians as bring the number of parameters nearest to that of the tuned ph-vi-FHMM.
 ``best path``: means along the best path, no EM. ``own means``: no regression of the visual means on acoustic features.
 """
 
@@ -115,7 +115,7 @@ def selected_systems(names: Sequence[str] | None) -> list[str]:
         import_torch()
     needed = {REFERENCE_SYSTEM} | {COMPARED_SYSTEMS[name].tunes for name in names}
     if MATCHED in names:
-        needed |= {"ph-FHMM", "ph-FHMM" + TUNED}
+        needed |= {"ph-vi-FHMM", "ph-vi-FHMM" + TUNED}
     return [name for name in COMPARED_SYSTEMS if name in {*names, *needed}]
 
 
@@ -128,13 +128,13 @@ def tuned_options(
 ) -> list[Trial]:
     """Return all settings that were tried for a system of the paper.
 
-    validation : recordings by which they are judged; the first ``tuning.heard`` of them
+    validation : recordings by which they are judged; the first ``tuning.judges`` of them
     """
-    heard = validation.first(tuning.heard)
+    judges = validation.first(tuning.judges)
 
     def attempt(options: Mapping[str, Any]) -> list[Trial]:
         on_the_way = trained_on_the_way(options, examples, monitor)
-        return [trial for trial, _ in judged(on_the_way, heard, CONVERSIONS)]
+        return [trial for trial, _ in judged(on_the_way, judges, CONVERSIONS)]
 
     return tuned(SYSTEMS[name], alternatives(SYSTEMS[name], tuning), attempt)
 
@@ -170,7 +170,7 @@ def train_system(
         same = CoupledConfig.parsed(options) == printed.engine.config
         on_the_way = () if same else trained_on_the_way(options, examples, monitor)
         return chosen_by(lambda trial: trial.acc, judged([printed, *on_the_way], validation))
-    wanted = trained["ph-FHMM" + TUNED].model.chains.parameters
+    wanted = trained["ph-vi-FHMM" + TUNED].model.chains.parameters
     most = max(trial.options["mixtures"] for trial in trials[system.tunes])
     larger = trained_on_the_way({**options, "mixtures": most, "visual_mixtures": most}, examples, monitor)
     return chosen_by(lambda trial: -abs(trial.parameters - wanted), judged(larger, validation))

@@ -10,7 +10,7 @@ from lipmotion.experiments.xie_liu2007.systems import PAPER_FIGURES, REFERENCE_S
 from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.printable import printable
 
-WIDTH = 29
+WIDTH = 34
 NAMED_CHANNELS = 8
 """Most channels that are named one by one."""
 HEAD = (

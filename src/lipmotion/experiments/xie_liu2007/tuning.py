@@ -24,7 +24,8 @@ CONVERSIONS: tuple[Options, ...] = ({"start": "viterbi", "steps": 3}, {"start": 
 class TuningOptions:
     """What is tried, one kind of setting after another, each from the best before.
 
-    clips, heard    : number of recordings to train on while settings are tried, and of ``val`` to judge them by
+    clips           : number of recordings to train on while settings are tried
+    judges          : number of recordings of the list ``val`` by which they are judged
     weights         : exponents of the density of speech
     mixtures        : most Gaussians a state, of speech; 1, 2, 4, … are tried
     visual_mixtures : Gaussians a state of lips, then
@@ -33,7 +34,7 @@ class TuningOptions:
     """
 
     clips: int = 50
-    heard: int = 8
+    judges: int = 8
     weights: tuple[float, ...] = (1.0, 0.3)
     mixtures: int = 8
     visual_mixtures: int = 2
