@@ -13,10 +13,11 @@ from experiments.copies import copied
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_from_settings, engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError
+from lipmotion.experiments.noise import NoiseConditions
 from lipmotion.experiments.runner import ExperimentSettings
 from lipmotion.experiments.xie_liu2007 import systems
 from lipmotion.experiments.xie_liu2007.plots import PLOT_FILES
-from lipmotion.experiments.xie_liu2007.six_systems import ComparisonOptions, NoiseConditions, xieliu2007
+from lipmotion.experiments.xie_liu2007.six_systems import ComparisonOptions, xieliu2007
 from lipmotion.experiments.xie_liu2007.systems import (
     BEST_PATH,
     BLSTM,

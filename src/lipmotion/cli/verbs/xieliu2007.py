@@ -30,7 +30,7 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     systems = "only these systems, separated by semicolons (default: all)"
     parser.add_argument("--systems", type=lambda text: text.split(";"), metavar="NAME;NAME", help=systems)
-    quick = "the paper's systems alone, trained on 20 recordings and compared on 10: three minutes"
+    quick = "the paper's systems alone, trained on 20 recordings and compared on 6: three minutes"
     parser.add_argument("--quick", action="store_true", help=quick)
     parser.add_argument("--visual", default="geometry", metavar="KIND", help="geometry, eigenlips or both")
     parser.add_argument("--transcripts", action="store_true", help="compare also with known transcripts")
@@ -52,12 +52,11 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(options: argparse.Namespace) -> None:
     """Call ``experiment.xieliu2007`` and print its table."""
     from lipmotion.corpora.splits import read_names
-    from lipmotion.experiments.noise import read_talkers
+    from lipmotion.experiments.noise import NoiseConditions, read_talkers
     from lipmotion.experiments.xie_liu2007.six_systems import (
         DEFAULT_OPTIONS,
         QUICK,
         QUICK_SIZE,
-        NoiseConditions,
         xieliu2007,
     )
     from lipmotion.experiments.xie_liu2007.text import table
