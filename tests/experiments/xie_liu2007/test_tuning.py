@@ -34,7 +34,8 @@ SMALL = SYSTEMS["ph-MSHMM"] | {"chains": "viseme", "states": 2}
 
 @pytest.fixture(scope="module")
 def validation(toy_corpus: Corpus, toy_model: Model) -> HeldOutRecordings:
-    return held_out_recordings(toy_corpus, Recogniser(toy_model.phones, "own"), selection=Selection("val"))
+    phones = Recogniser(toy_model.phones, "own")
+    return held_out_recordings(toy_corpus, phones, selection=Selection("val"), channels=("opening", "width"))
 
 
 def test_a_model_on_the_way_is_that_of_its_own_training() -> None:

@@ -234,8 +234,10 @@ class _TrainingSetup:
                 trained[name] = system_from_arrays(found)
                 continue
             trained[name] = train_system(name, examples, validation, trials, trained, part)
-            if chains:
-                kept.save(f"system-{name}", stored_system(trained[name]))
+            if chains:  # their arrays are rounded when they are stored, and so is every model that is used
+                found = stored_system(trained[name])
+                kept.save(f"system-{name}", found)
+                trained[name] = system_from_arrays(found)
         return _TrainedSystems(tuple(example.name for example in examples), recordings, trained)
 
     def _prepared(
