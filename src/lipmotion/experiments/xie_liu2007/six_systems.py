@@ -205,15 +205,14 @@ class _TrainingSetup:
     def tune(self, systems: Sequence[str], listed: Sequence[str], monitor: Monitor) -> dict[str, list[Trial]]:
         """Return what was tried for each of some systems of the paper, trained on the first names of a list."""
         names = listed[: self.options.tuning.clips]
-        examples, validation, _ = self._prepared(names, (), sub_monitor(monitor, 0, 0.2))
+        examples, recordings = self._prepared(names, (), sub_monitor(monitor, 0, 0.2))
         trials = {}
         for number, name in enumerate(systems):
             part = sub_monitor(monitor, 0.2 + 0.8 * number / len(systems), 0.2 + 0.8 * (number + 1) / len(systems))
             kept, stage = self._checkpoint(names), f"trials-{name}"
             found = kept.load(stage)
             if found is None:
-                assert validation is not None  # noqa: S101 - there is a list val where something is tuned
-                tried = tuned_options(name, examples, validation, self.options.tuning, part)
+                tried = tuned_options(name, examples, recordings["val"], self.options.tuning, part)
                 found = {TRIALS: np.array(json.dumps([asdict(trial) for trial in tried]))}
                 kept.save(stage, found)
             trials[name] = [Trial(**trial) for trial in json.loads(str(found[TRIALS]))]
@@ -223,8 +222,7 @@ class _TrainingSetup:
         self, systems: Sequence[str], names: Sequence[str], trials: Mapping[str, Sequence[Trial]], monitor: Monitor
     ) -> _TrainedSystems:
         """Return systems, trained on the same phones of the utterances ``names``."""
-        examples, validation, recordings = self._prepared(names, self.held_out, sub_monitor(monitor, 0, 0.3))
-        assert recordings is not None  # noqa: S101 - some are held out
+        examples, recordings = self._prepared(names, self.held_out, sub_monitor(monitor, 0, 0.3))
         kept, trained = self._checkpoint(names), dict[str, TrainedSystem]()
         for number, name in enumerate(systems):
             start, stop = 0.3 + 0.7 * number / len(systems), 0.3 + 0.7 * (number + 1) / len(systems)
@@ -233,19 +231,19 @@ class _TrainingSetup:
             if found is not None:
                 trained[name] = system_from_arrays(found)
                 continue
-            trained[name] = train_system(name, examples, validation, trials, trained, part)
+            trained[name] = train_system(name, examples, recordings.get("val"), trials, trained, part)
             if chains:  # their arrays are rounded when they are stored, and so is every model that is used
                 found = stored_system(trained[name])
                 kept.save(f"system-{name}", found)
                 trained[name] = system_from_arrays(found)
-        return _TrainedSystems(tuple(example.name for example in examples), recordings, trained)
+        return _TrainedSystems(tuple(example.name for example in examples), recordings["held out"], trained)
 
     def _prepared(
         self, names: Sequence[str], held_out: Sequence[str], monitor: Monitor
-    ) -> tuple[list[Example], HeldOutRecordings | None, HeldOutRecordings | None]:
+    ) -> tuple[list[Example], dict[str, HeldOutRecordings]]:
         """Return the examples of some utterances, and recordings with the phones of models trained on these.
 
-        The recordings are those of the list ``val`` and the held-out ones; None where there are none.
+        The recordings are those of the list ``val`` and those ``held out``, by these names, where there are some.
         """
         lexicon, config = self.settings.lexicon or Lexicon(), self.settings.recogniser or HmmConfig()
         visual = self.options.visual
@@ -258,13 +256,13 @@ class _TrainingSetup:
             )
         read = partial(held_out_recordings, self.corpus, cached_recogniser(phones), lexicon=lexicon)
         read = partial(read, visual=visual, eigenlips=eigenlips)
-        recordings, channels = [], None
-        for part, number in ((held_out, 0), (self.validation, 1)):
+        parts = {name: part for name, part in (("held out", held_out), ("val", self.validation)) if part}
+        recordings: dict[str, HeldOutRecordings] = {}
+        for number, (name, part) in enumerate(parts.items()):
             reading = sub_monitor(monitor, 0.7 + 0.15 * number, 0.85 + 0.15 * number)
-            found = read(selection=Selection(names=part), channels=channels, monitor=reading) if part else None
-            channels = found.channels if found is not None else None
-            recordings.append(found)
-        return examples, recordings[1], recordings[0]
+            channels = recordings["held out"].channels if recordings else None
+            recordings[name] = read(selection=Selection(names=part), channels=channels, monitor=reading)
+        return examples, recordings
 
     def _checkpoint(self, names: Sequence[str]) -> Checkpoint:
         """Return what is kept of the work on the first recordings of a list."""
