@@ -271,7 +271,7 @@ class _TrainingSetup:
         folder = self.work / str(len(names))
         folder.mkdir(exist_ok=True)
         config, lexicon = self.settings.recogniser or HmmConfig(), self.settings.lexicon or Lexicon()
-        everything, engine = (*names, *self.validation), engine_named("coupled")
+        everything, engine = (*names, *self.corpus.names("val")), engine_named("coupled")
         of_input = fingerprint(self.corpus, everything, engine, config, lexicon, self.options.visual, None)
         return Checkpoint(folder, f"{of_input} {self.options.tuning}")
 
