@@ -25,7 +25,7 @@ from picture_measures import picture_figures, sharpness
 from lipmotion.appearance.camera_noise import NoiseSource, estimate_noise
 from lipmotion.appearance.candidates import CANDIDATES, choose_candidates, make_candidates, squared_distances
 from lipmotion.appearance.eigenlips import Eigenlips, fit_eigenlips
-from lipmotion.appearance.refinement import PAPER, RefinementOptions, Refiner
+from lipmotion.appearance.refinement import PAPER, RefinementOptions, Refiner, moving_average
 from lipmotion.corpora.store import Corpus
 from lipmotion.pipeline.training.channels import PICTURES
 from lipmotion.stats.pca import evenly_spaced
@@ -183,18 +183,6 @@ def write_sheet(path: Path, held_out: list[Pictures], wanted: list[Array], metho
         clips = [held_out[number], *(method(wanted[number]) for method in methods)]
         rows += [np.concatenate(list(clip[frames]), axis=1) for clip in clips]
     Image.fromarray(np.concatenate(rows)).save(path)
-
-
-def moving_average(coefficients: Array, frames: int = 3) -> Array:
-    """Return curves [shape=(T, C)] smoothed by a moving average of an odd width, narrower at the ends.
-
-    Source: Xie & Liu 2007, §6.
-    """
-    count = len(coefficients)
-    sums = np.concatenate([np.zeros((1, coefficients.shape[1])), np.cumsum(coefficients, axis=0, dtype=np.float64)])
-    middle = np.arange(count)
-    half = np.minimum(frames // 2, np.minimum(middle, count - 1 - middle))
-    return (sums[middle + half + 1] - sums[middle - half]) / (2 * half + 1)[:, None]
 
 
 def show(row: dict[str, Any]) -> None:

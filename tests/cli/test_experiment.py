@@ -11,7 +11,7 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.experiments import comparison, folds, learning_curve
 from lipmotion.experiments.engines import disagreement, text
 from lipmotion.experiments.hofer2008 import table1, table1_text
-from lipmotion.experiments.xie_liu2007 import table3_text
+from lipmotion.experiments.xie_liu2007 import text as xieliu2007_text
 from lipmotion.measures.bootstrap import bootstrap_interval
 from lipmotion.pipeline.evaluation import figures as evaluation_figures
 
@@ -65,18 +65,19 @@ def test_a_program_reads_them(run: RunCommand, toy_corpus: Corpus) -> None:
 
 
 @pytest.mark.long
-def test_table3_of_some_systems(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
+def test_xieliu2007_of_some_systems(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
     (here / "order.txt").write_text("\n".join(toy_corpus.names("train")))
-    few = ("--systems", "ph-MSHMM;loudness", "--states", "2", "--mixtures", "1", "--order", "order.txt")
+    few = ("--systems", "ph-MSHMM;loudness", "--order", "order.txt")
     chosen = (*few, "--sizes", "8,3", "--noise", "white", "--snr", "5", "--plots", "pictures", "--workers", "1")
-    done = run("experiment", "table3", toy_corpus.path, *chosen, "-o", "a.json")
+    done = run("experiment", "xieliu2007", toy_corpus.path, *chosen, "-o", "a.json")
     assert (done.code, done.err) == (0, [])
     figures = json.loads((here / "a.json").read_text())
-    assert "\n".join(done.out) == table3_text.table(figures)
+    assert "\n".join(done.out) == xieliu2007_text.table(figures)
     assert [row["names"] for row in figures["rows"]] == [3, 8]
-    assert (figures["order"], figures["mixtures"], figures["states"]) == ("given", [1], 2)
+    assert (figures["order"], figures["tuning"]["tried"]) == ("given", {})
     assert [(row["kind"], row["snr_db"]) for row in figures["noise"]] == [("white", 5)]
     assert len(list((here / "pictures").iterdir())) == 3
+    assert sorted(path.name for path in here.iterdir()) == ["a.json", "order.txt", "pictures"]
 
 
 @pytest.mark.long
@@ -103,11 +104,10 @@ UNUSABLE = [
     ("folds CORPUS --folds 1", 3, "1 folds; required: from 2 to 8"),
     ("folds CORPUS -o missing/a.json", 7, "the folder missing does not exist"),
     ("folds missing", 4, "missing: no such corpus; make one"),
-    ("table3 CORPUS --systems ph-RNN", 3, "no system 'ph-RNN'; there are: ph-HMM"),
-    ("table3 CORPUS --mixtures 3", 3, "numbers of Gaussians 3; required: powers of two"),
-    ("table3 CORPUS --noise babble", 3, "a babble of 0 talkers; required at least 2: --talkers"),
-    ("table3 CORPUS --talkers missing", 3, "missing: no such folder; give one with recordings of other people"),
-    ("table3 CORPUS --plots missing/a", 7, "the folder missing does not exist"),
+    ("xieliu2007 CORPUS --systems ph-RNN", 3, "no system 'ph-RNN'; there are: ph-HMM"),
+    ("xieliu2007 CORPUS --noise babble", 3, "a babble of 0 talkers; required at least 2: --talkers"),
+    ("xieliu2007 CORPUS --talkers missing", 3, "missing: no such folder; give one with recordings of other people"),
+    ("xieliu2007 CORPUS --plots missing/a", 7, "the folder missing does not exist"),
     ("engines CORPUS --models CORPUS", 7, "is the corpus itself; give another name"),
     ("engines CORPUS --models empty.txt", 7, "empty.txt: cannot be a folder for models: File exists"),
     ("hofer2008 CORPUS --split tset", 4, "no utterances of split 'tset'"),

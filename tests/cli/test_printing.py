@@ -125,7 +125,7 @@ adapt EVIL.wav -o EVIL.wav
 evaluate m.lipmotion c --split EVIL
 compare EVIL.csv EVIL.json
 experiment learning-curve c --sizes EVIL
-experiment table3 c --systems EVIL
+experiment xieliu2007 c --systems EVIL
 """.strip().splitlines()
 NOT_SHOWN = {
     "corpus sync c",

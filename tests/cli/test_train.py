@@ -170,3 +170,14 @@ def test_what_cannot_be_used(run: RunCommand, toy_corpus: Corpus, here: Path) ->
         assert is_one_error(done, code)
         assert words in done.err[0]
         assert [path.name for path in here.rglob("*")] == ["folder"]
+
+
+@pytest.mark.long
+def test_the_paper_s_system_learns_eigenlips_unless_told_otherwise(
+    run: RunCommand, toy_corpus: Corpus, here: Path
+) -> None:
+    for more, visual in (((), "eigenlips"), (("--visual", "geometry"), None)):
+        assert run("train", toy_corpus.path, "-o", "m.lipmotion", "--force", "--preset", "xieliu2007", *more).code == 0
+        model = load_model(here / "m.lipmotion")
+        assert (model.about.get("visual"), model.eigenlips is not None) == (visual, visual is not None)
+        assert (model.engine.config.conversion, model.engine.config.states) == ("em", 5)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from lipmotion.engines import ENGINES, engine_from_settings, engine_named
+from lipmotion.engines import ENGINES, engine_from_settings, engine_named, preset_visual
 from lipmotion.engines.coupled.chains.structures import SYSTEMS
 from lipmotion.errors import InputError
 
@@ -14,6 +14,19 @@ def test_settings_and_presets_are_options() -> None:
         assert engine_from_settings(name) == engine_named(name, {})
     for system in SYSTEMS:
         assert engine_from_settings(preset=system) == engine_named("coupled", SYSTEMS[system])
+    assert engine_from_settings(preset="xieliu2007") == engine_from_settings(preset="ph-vi-CHMM")
+    assert (preset_visual("xieliu2007"), preset_visual("ph-vi-CHMM"), preset_visual(None)) == ("eigenlips", None, None)
+
+
+def test_the_systems_of_xie_and_liu_are_as_printed() -> None:
+    """Five states a unit, EM from the best path, nothing after it (§4.1, §7.1, Table 2, Eqs. 17-19)."""
+    for system in SYSTEMS:
+        config = engine_from_settings(preset=system).config
+        assert (config.states, config.conversion, config.start, config.update) == (5, "em", "viterbi", "exact")
+        assert not any((config.variance_scaling, config.closures, config.articulation, config.dynamic))
+        assert config.chains.split()[-1] == ("viseme" if "-vi-" in system else "phone")
+        assert config.asynchrony == (-1 if "FHMM" in system else 1)
+        assert (config.audio_weight, config.visual_weight, config.mixtures, config.visual_mixtures) == (1, 1, 1, 1)
 
 
 def test_settings_are_of_the_option_s_kind_and_have_the_last_word() -> None:

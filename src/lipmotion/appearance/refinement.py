@@ -45,6 +45,19 @@ PAPER = RefinementOptions(together=False, steadiness=0.0, neighbours=1)
 """The refinement of the paper: the nearest candidate of every colour and frame."""
 
 
+def moving_average(coefficients: Values, frames: int = 3) -> NDArray[np.float64]:
+    """Return curves [shape=(T, C)] smoothed by a moving average of an odd width, narrower at the ends.
+
+    Source: Xie & Liu 2007, §6.
+    """
+    count = len(coefficients)
+    sums = np.concatenate([np.zeros((1, coefficients.shape[1])), np.cumsum(coefficients, axis=0, dtype=np.float64)])
+    middle = np.arange(count)
+    half = np.minimum(frames // 2, np.minimum(middle, count - 1 - middle))
+    means: NDArray[np.float64] = (sums[middle + half + 1] - sums[middle - half]) / (2 * half + 1)[:, None]
+    return means
+
+
 @dataclass(frozen=True, eq=False)
 class Refiner:
     """Turns eigenlips into pictures with recorded detail.

@@ -69,6 +69,12 @@ def engine_from_settings(
     return engine
 
 
+def preset_visual(preset: str | None) -> str | None:
+    """Return the kind of motion that a preset is trained on where none is asked for; None: the default of ``train``."""
+    kinds = [_class_of(engine).Config.preset_visual for engine in ENGINES.names]
+    return next((kind[preset] for kind in kinds if preset is not None and preset in kind), None)
+
+
 def _class_of(name: str) -> type[Engine[Any]]:
     """Return the class of an engine. Raises InputError: no such engine, or an extension that is not an ``Engine``."""
     chosen = ENGINES.load(name)

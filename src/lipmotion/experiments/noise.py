@@ -3,19 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from lipmotion.errors import InputError
 from lipmotion.pipeline.evaluation.held_out import AUDIO_ONLY, HeldOutRecordings
 from lipmotion.speech.features.mfcc import mfcc
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ, read_audio
-from lipmotion.speech.sound.noise import noisy_audio
+from lipmotion.speech.sound.noise import FEWEST_TALKERS, NOISE_KINDS, noisy_audio
 from lipmotion.storage.files import check_listable
 from lipmotion.types import Audio, Monitor, silent_monitor, with_progress
 
 LONGEST_S = 30
 """Seconds that are read of each talker."""
+BABBLE = "babble"
+RATIOS_DB = (20.0, 10.0, 5.0, 0.0)
+
+
+@dataclass(frozen=True)
+class NoiseConditions:
+    """Noise that is added to the held-out recordings.
+
+    kinds     : of ``speech.sound.noise.NOISE_KINDS``
+    ratios_db : signal-to-noise ratios
+    talkers   : recordings for the babble
+    """
+
+    kinds: tuple[str, ...] = ()
+    ratios_db: tuple[float, ...] = RATIOS_DB
+    talkers: tuple[Audio, ...] = ()
+
+    def __post_init__(self) -> None:
+        unknown = [kind for kind in self.kinds if kind not in NOISE_KINDS]
+        if unknown:
+            raise InputError(f"unknown noise {unknown[0]!r}; required some of: {', '.join(NOISE_KINDS)}")
+        if BABBLE in self.kinds and len(self.talkers) < FEWEST_TALKERS:
+            raise InputError(f"a babble of {len(self.talkers)} talkers; required at least {FEWEST_TALKERS}: --talkers")
 
 
 def recordings_in_noise(

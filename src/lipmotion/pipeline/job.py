@@ -26,6 +26,7 @@ PartT = TypeVar("PartT", bound=Configuration)
 Pauses = Literal["rest", "natural"]
 Jaw = Literal["motion", "energy", "none"]
 Overlay = Literal["inset", "mouth"]
+Refinement = Literal["steady", "paper"]
 Mark = Literal["metadata", "visible", "none"]
 
 RATE = Rule(1, most=1000, unit=" a second")
@@ -170,6 +171,11 @@ class Outputs(Configuration):
         "motion",
         Rule(choices=get_args(Jaw)),
         help="what the jaw of a filmed face follows: motion, energy or none (default: motion)",
+    )
+    refinement: Refinement = option(
+        "steady",
+        Rule(choices=get_args(Refinement)),
+        help="detail of a filmed mouth: steady, or of the nearest picture, as in the paper (default: steady)",
     )
     overlay: Overlay | None = option(
         None,

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from lipmotion.errors import InputError
+from lipmotion.faces.filmed.renderer import AS_PRINTED, STITCHING
 from lipmotion.faces.mesh import MeshFace
 from lipmotion.meshes.fitting import driven
 from lipmotion.pipeline.edit_files import EditFile, edit_file
@@ -59,7 +60,13 @@ class OpenedJob:
             self.curves,
             outputs.motion_hz,
             outputs.fps,
-            FilmOptions(Path(footage) if footage else None, outputs.jaw, outputs.overlay, outputs.mark),
+            FilmOptions(
+                Path(footage) if footage else None,
+                outputs.jaw,
+                outputs.overlay,
+                outputs.mark,
+                AS_PRINTED if outputs.refinement == "paper" else STITCHING,
+            ),
             staging,
             self.job.delivery,
         )

@@ -84,6 +84,7 @@ class Configuration:
     values are checked when the configuration is created; texts become paths and lists tuples where these are asked for.
 
     presets : combinations of options by name
+    preset_visual : the kind of motion that a preset is trained on where none is asked for (``train``), by its name
     former  : former names of options, mapped to the present names; both are accepted
     gone    : options that no longer exist, mapped to the only value that is still accepted
     hints   : names that users might try, mapped to a text that says what to use instead
@@ -91,6 +92,7 @@ class Configuration:
     """
 
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
+    preset_visual: ClassVar[Mapping[str, str]] = {}
     former: ClassVar[Mapping[str, str]] = {}
     gone: ClassVar[Mapping[str, Any]] = {}
     hints: ClassVar[Mapping[str, str]] = {}

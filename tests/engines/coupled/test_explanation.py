@@ -84,9 +84,13 @@ def test_posteriors_of_units_are_sums_over_their_states():
     np.testing.assert_array_equal(second.lead, lead_posteriors(found, posteriors)[1][1:4])
 
 
+def structure_options(name):
+    return {key: value for key, value in SYSTEMS[name].items() if key in ("structure", "chains", "asynchrony")}
+
+
 @cache
 def fitted(name):
-    engine = engine_named("coupled", {**SYSTEMS[name], "mixtures": 2})
+    engine = engine_named("coupled", {**structure_options(name), "mixtures": 2})
     model = engine.fit(examples(4), silent_monitor).model
     spoken = speech(timeline(SENTENCE))
     inference = engine.inferred(model, spoken.features.values, engine.lattice(model, spoken, slice(None)))
@@ -157,7 +161,10 @@ def test_in_silence_away_from_speech_the_mean_is_the_rest_pose():
 def test_recordings_of_several_blocks_are_explained_as_one(monkeypatch):
     monkeypatch.setattr(generation, "BLOCK_FRAMES", 60)
     monkeypatch.setattr(generation, "MARGIN_FRAMES", 50)
-    engine, (model, _) = engine_named("coupled", {**SYSTEMS["ph-vi-CHMM"], "mixtures": 2}), fitted("ph-vi-CHMM")
+    engine, (model, _) = (
+        engine_named("coupled", {**structure_options("ph-vi-CHMM"), "mixtures": 2}),
+        fitted("ph-vi-CHMM"),
+    )
     spoken = speech(timeline(SENTENCE))
     posteriors = engine.posteriors(model, spoken)
     result = engine.generate(model, spoken)

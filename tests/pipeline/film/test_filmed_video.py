@@ -14,10 +14,10 @@ from lipmotion.appearance.person import Appearance
 from lipmotion.errors import ExportError, InputError, ModelFormatError
 from lipmotion.export.synthetic_mark import SOURCE_TYPE
 from lipmotion.faces.filmed.face import FilmedFace
-from lipmotion.faces.filmed.renderer import Stitcher, StitchingOptions
+from lipmotion.faces.filmed.renderer import AS_PRINTED, Stitcher, StitchingOptions
 from lipmotion.pipeline.film import filmed_video as module
 from lipmotion.pipeline.film.background import stored_sequence
-from lipmotion.pipeline.film.filmed_video import FilmOptions, film_of, write_film
+from lipmotion.pipeline.film.filmed_video import FilmOptions, face_codes, film_of, write_film
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.output import OutputSettings
@@ -96,6 +96,21 @@ def test_the_jaw_follows_what_it_is_told(filmed_face: FilmedFace, brief: Motion,
         film_of(filmed_face, brief, options=FilmOptions(jaw="energy"))
 
 
+def test_the_refinement_as_printed(filmed_face: FilmedFace, brief: Motion) -> None:
+    """Eqs. 14-16 of Xie & Liu 2007, colour by colour, of the mean of three pictures."""
+    codes = face_codes(filmed_face, brief, 5, 25.0)
+    options = replace(AS_PRINTED, noise=False)
+    made = np.stack(list(Stitcher(filmed_face.appearance, options).mouths(codes))).astype(float)
+    space, mouths = filmed_face.appearance.mouth, filmed_face.appearance.mouths
+    wanted = np.stack([codes.mouth[max(n - 1, 0) : n + 2].mean(axis=0) for n in (1, 2, 3)])
+    known, kept = space.project(mouths), mouths - space.expand(space.project(mouths))
+    for row, values in enumerate(wanted):
+        for colour, (own, candidates) in enumerate(zip(np.split(values, 3), np.split(known, 3, axis=1), strict=True)):
+            nearest = np.linalg.norm(candidates - own, axis=1).argmin()
+            detailed = space.expand(values[None])[0, ..., colour] + kept[nearest, ..., colour]
+            assert np.abs(made[row + 1, ..., colour] - np.clip(detailed, 0, 255)).max() < 2
+
+
 @pytest.mark.long
 def test_sound_and_pictures_are_as_long(
     filmed_face: FilmedFace, motion: Motion, toy_sentence: ToySentence, tmp_path: Path
@@ -170,6 +185,7 @@ def test_options_of_filmed_faces_alone(tmp_path: Path, toy_speech: Path) -> None
         (FilmOptions(background=video), "a background"),
         (FilmOptions(overlay="inset"), "an overlay"),
         (FilmOptions(jaw="energy"), "another jaw"),
+        (FilmOptions(stitching=AS_PRINTED), "another refinement"),
         (FilmOptions(mark="visible"), "a visible mark"),
     ):
         with pytest.raises(InputError, match=rf"{words} is for filmed faces; give one: --face FILE\.face"):

@@ -11,7 +11,11 @@ from lipmotion.cli.arguments.starting_model import add_start_argument, model_to_
 from lipmotion.pipeline.job import Request
 
 ENGINE = "trajectory (default), coupled (chains of states), joint (one model, five streams) or selection (recordings)"
-PRESET = "a system of a paper: ph-HMM, ph-MSHMM, ph-FHMM, ph-vi-FHMM, ph-CHMM, ph-vi-CHMM; it names the engine, too"
+PRESET = (
+    "a system of a paper: xieliu2007, or its ph-HMM, ph-MSHMM, ph-FHMM, ph-vi-FHMM, ph-CHMM, ph-vi-CHMM; it names the "
+    "engine, too"
+)
+VISUAL = "geometry (default), eigenlips (default of xieliu2007) or both"
 UNITS = "modelled units: phone (default), eVis, sVis, pbVis, 2vis, or a table file (docs/unit-sets.md)"
 OTHERS = "also train on transcribed recordings without motion (coupled)"
 
@@ -28,7 +32,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument("--preset", "--system", metavar="NAME", help=PRESET)
     add_input(parser, "--units", what="table of units", replaceable=True, type=str, metavar="SET", help=UNITS)
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="engine option (repeatable)")
-    parser.add_argument("--visual", default="geometry", metavar="KIND", help="geometry (default), eigenlips or both")
+    parser.add_argument("--visual", metavar="KIND", help=VISUAL)
     parser.add_argument("--voices", action="store_true", help="also train on synthetic voices (coupled)")
     add_input(parser, "--recordings", what="folder of recordings", metavar="FOLDER", help=OTHERS)
     add_start_argument(parser)
@@ -40,8 +44,9 @@ def run(options: argparse.Namespace) -> None:
     """Call ``lipmotion.train`` and ``lipmotion.save_model``; report what was used."""
     from lipmotion.cli.terminal.progress import reporting
     from lipmotion.corpora.store import Corpus, Selection
-    from lipmotion.engines import engine_from_settings
+    from lipmotion.engines import engine_from_settings, preset_visual
     from lipmotion.pipeline.model import save_model
+    from lipmotion.pipeline.training.channels import GEOMETRY
     from lipmotion.pipeline.training.other_speakers import other_voices
     from lipmotion.pipeline.training.train import Run, train
     from lipmotion.storage.files import unfinished_work
@@ -59,7 +64,7 @@ def run(options: argparse.Namespace) -> None:
                 selection=Selection(list_or_all(options.split), tuple(options.speaker)),
                 engine=engine,
                 lexicon=lexicon,
-                visual=options.visual,
+                visual=options.visual or preset_visual(options.preset) or GEOMETRY,
                 voices=voices,
                 prior=model_to_start_from(options.start, engine),
                 run=Run(report.receive, work, worker_count(options)),

@@ -179,8 +179,7 @@ def _structure(arrays: Arrays, config: CoupledConfig) -> Structure:
     for number, name in enumerate(config.chains.split()):
         pairs = checked_arrays(arrays_under(arrays, f"chain_{number}/"), UNITS)["units"]
         sets.append(UnitSet(name, dict(pairs.tolist())))
-    limit = None if config.asynchrony < 0 else config.asynchrony
-    return Structure(config.structure, tuple(sets), config.states, limit, config.cross_units)
+    return config.structure_with(tuple(sets))
 
 
 def _transitions(arrays: Arrays, structure: Structure) -> Transitions | FactorialTransitions:

@@ -6,9 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from lipmotion.engines.coupled.chains.structures import STRUCTURES, SYSTEMS, structure_of
+from lipmotion.engines.coupled.chains.structures import PRESETS, STRUCTURES, UNSEEN_LOSS, Structure, unit_sets
+from lipmotion.engines.coupled.chains.visual_streams import EIGENLIPS
 from lipmotion.engines.coupled.conversion.em_conversion import EXACT, SOFT, STARTS, UPDATES, ConversionSettings
 from lipmotion.types import Configuration, Rule, option
+from lipmotion.units import UnitSet
 
 TRAJECTORY, FRAMES, PATH = "trajectory", "em", "viterbi"
 CONVERSIONS = (TRAJECTORY, FRAMES, PATH)
@@ -24,6 +26,8 @@ class CoupledConfig(Configuration):
     states     : states per unit, left to right, no skips
     asynchrony : number of states that chains may be apart; -1: no limit
     cross_units : let chains leave a unit at different times
+    start_asynchrony, unseen_loss : of factorial chains without a limit: how far apart the chains may be while the first
+                 densities are learned, and the nats that rare joint states lose (``chains.structures.Structure``)
     mixtures, visual_mixtures : Gaussians per state, of the speech stream and of visual streams (powers of two); the
                  structure ``hmm`` uses the first for both
     speech_only_mixtures, speech_only_steps, speech_only_weight : of the second stage of training, on speech without
@@ -65,8 +69,11 @@ class CoupledConfig(Configuration):
     variance_scaling: bool = True
     closures: bool = True
     articulation: bool = True
+    start_asynchrony: int = option(1, Rule(least=0), later=True)
+    unseen_loss: float = option(UNSEEN_LOSS, Rule(least=0), later=True)
 
-    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = SYSTEMS
+    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = PRESETS
+    preset_visual: ClassVar[Mapping[str, str]] = {"xieliu2007": EIGENLIPS}
     former: ClassVar[Mapping[str, str]] = {
         "crosses": "cross_units",
         "more_mixtures": "speech_only_mixtures",
@@ -80,7 +87,13 @@ class CoupledConfig(Configuration):
     }
 
     def check_files(self) -> None:  # noqa: D102
-        structure_of(self.structure, self.chains, self.states, self.asynchrony, self.cross_units)
+        self.structure_with(unit_sets(self.chains))
+
+    def structure_with(self, chains: tuple[UnitSet, ...]) -> Structure:
+        """Return the structure of chains of these unit sets. Raises InputError: as ``Structure``."""
+        limit = None if self.asynchrony < 0 else self.asynchrony
+        losses = self.start_asynchrony, self.unseen_loss
+        return Structure(self.structure, chains, self.states, limit, self.cross_units, *losses)
 
     @property
     def dynamic(self) -> bool:

@@ -106,7 +106,7 @@ class CoupledEngine(Engine[CoupledModel]):
             return model.frame_statistics([path_means(chains, path, s + 1) for s in range(len(model.visual))]), path
         inference = self.inferred(model, features, lattice)
         if self.config.conversion != TRAJECTORY:
-            streams = convert(chains, observations, lattice, self.config.em).streams[1:]
+            streams = convert(chains, observations, lattice, self.config.em, inference).streams[1:]
             return model.frame_statistics(streams), inference.posteriors.most_probable
         return model.motion_statistics(inference), inference.posteriors.most_probable
 

@@ -11,7 +11,7 @@ import numpy as np
 from lipmotion.engines.coupled.conversion.em_conversion import convert
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.errors import ExportError, MissingDependencyError
-from lipmotion.experiments.xie_liu2007.systems import TrainedSystem
+from lipmotion.experiments.xie_liu2007.tuning import TrainedSystem
 from lipmotion.pipeline.evaluation.held_out import AUDIO_ONLY, ComparedClip, HeldOutRecordings, compared_clips
 from lipmotion.storage.files import whole_file
 from lipmotion.types import GREY
@@ -53,13 +53,7 @@ def draw_plots(chains: TrainedSystem, recordings: HeldOutRecordings, folder: Pat
     Raises MissingDependencyError: no matplotlib. Raises ExportError: a picture cannot be written.
     """
     figure = import_figure()
-    some = replace(
-        recordings,
-        utterances=recordings.utterances[:CONVERGENCE_RECORDINGS],
-        reference=recordings.reference[:CONVERGENCE_RECORDINGS],
-        conditions={AUDIO_ONLY: recordings.conditions[AUDIO_ONLY][:CONVERGENCE_RECORDINGS]},
-        recognitions=recordings.recognitions[:CONVERGENCE_RECORDINGS],
-    )
+    some = recordings.first(CONVERGENCE_RECORDINGS)
     by_em = compared_clips(some, AUDIO_ONLY, chains.engine, chains.model)
     path_engine = CoupledEngine(replace(chains.engine.config, conversion="viterbi"))
     by_path = compared_clips(some, AUDIO_ONLY, path_engine, chains.model)

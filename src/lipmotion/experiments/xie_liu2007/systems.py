@@ -2,21 +2,37 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from time import perf_counter
+from dataclasses import asdict, dataclass, field, replace
+from time import process_time
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from lipmotion.engines import Animator, engine_named
+from lipmotion.engines.coupled.arrays import coupled_arrays
 from lipmotion.engines.coupled.chains.structures import SYSTEMS
 from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.errors import InputError
 from lipmotion.experiments.baselines.frame_regression import ContextRidge, LoudnessRegression, MeanPose
 from lipmotion.experiments.baselines.recurrent import BlstmBaseline, import_torch, torch_is_installed
-from lipmotion.experiments.xie_liu2007.mixtures import select_mixtures
+from lipmotion.experiments.xie_liu2007.tuning import (
+    CONVERSIONS,
+    TrainedSystem,
+    Trial,
+    TuningOptions,
+    alternatives,
+    best_trial,
+    chosen_by,
+    judged,
+    trained_on_the_way,
+    tuned,
+)
 from lipmotion.pipeline.evaluation.held_out import HeldOutRecordings
-from lipmotion.types import Example, Monitor, sub_monitor
+from lipmotion.types import Example, Monitor
 
 REFERENCE_SYSTEM = "ph-vi-CHMM"
 """The system that every other one is compared with."""
@@ -29,31 +45,33 @@ PAPER_FIGURES: dict[str, tuple[float, float]] = {
     "ph-vi-CHMM": (6.911, 0.696),
 }
 """AMSE and ACC of the paper's Table 3: eigenlips of another speaker, so only their order compares."""
-PAPER_CONVERSION: dict[str, Any] = {
-    "conversion": "em",
-    "start": "viterbi",
-    "steps": 10,
-    "variance_scaling": False,
-    "closures": False,
-}
-"""Conversion as in the paper: frame by frame, started from the best path, without changes to the generated motion."""
 BEST_PATH = "ph-vi-CHMM, best path"
 BLSTM = "BLSTM"
+TUNED = ", tuned"
+ABOUT = "about"
+"""Name of the array with settings and figures of a stored system."""
+MATCHED = "ph-MSHMM, as large as ph-vi-FHMM"
 
 
 @dataclass(frozen=True)
 class ComparedSystem:
     """How one system of the table is made.
 
-    make          : returns its engine; None: it is the coupled engine with ``options``, and its number of Gaussians is
-                    selected on validation recordings
+    make          : returns its engine; None: it is the coupled engine with ``options``
     options       : of the coupled engine
     same_model_as : the system whose model it takes, so that only the conversion differs, by the ``options``
+    tunes         : the system of the paper whose settings are chosen on validation recordings
     """
 
     make: Callable[[], Animator[Any]] | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
     same_model_as: str = ""
+    tunes: str = ""
+
+    @property
+    def is_trained_here(self) -> bool:
+        """Whether it is coupled chains of its own."""
+        return self.make is None and not self.same_model_as
 
 
 def _engine(name: str, **options: Any) -> Callable[[], Animator[Any]]:
@@ -61,7 +79,9 @@ def _engine(name: str, **options: Any) -> Callable[[], Animator[Any]]:
 
 
 COMPARED_SYSTEMS: dict[str, ComparedSystem] = {
-    **{name: ComparedSystem(options=PAPER_CONVERSION | SYSTEMS[name]) for name in PAPER_FIGURES},
+    **{name: ComparedSystem(options=SYSTEMS[name]) for name in PAPER_FIGURES},
+    **{name + TUNED: ComparedSystem(options=SYSTEMS[name], tunes=name) for name in PAPER_FIGURES},
+    MATCHED: ComparedSystem(options=SYSTEMS["ph-MSHMM"], tunes="ph-MSHMM"),
     "ph-vi-CHMM, soft start": ComparedSystem(options={"start": "soft"}, same_model_as=REFERENCE_SYSTEM),
     BEST_PATH: ComparedSystem(options={"conversion": "viterbi"}, same_model_as=REFERENCE_SYSTEM),
     "trajectory CHMM, own means": ComparedSystem(_engine("coupled", acoustic_regression=False)),
@@ -74,6 +94,8 @@ COMPARED_SYSTEMS: dict[str, ComparedSystem] = {
 }
 """The systems of the table, in its order.
 
+The paper's six are those of ``train --preset``; ``tuned``: with the settings that were best on validation recordings;
+``as large as``: with as many Gaussians as bring the number of parameters nearest to that of the tuned ph-vi-FHMM.
 ``best path``: means along the best path, no EM. ``own means``: no regression of the visual means on acoustic features.
 """
 
@@ -91,55 +113,79 @@ def selected_systems(names: Sequence[str] | None) -> list[str]:
         raise InputError(f"no system {unknown[0]!r}; there are: {', '.join(COMPARED_SYSTEMS)}")
     if BLSTM in names:
         import_torch()
-    return [name for name in COMPARED_SYSTEMS if name in names or name == REFERENCE_SYSTEM]
+    needed = {REFERENCE_SYSTEM} | {COMPARED_SYSTEMS[name].tunes for name in names}
+    if MATCHED in names:
+        needed |= {"ph-vi-FHMM", "ph-vi-FHMM" + TUNED}
+    return [name for name in COMPARED_SYSTEMS if name in {*names, *needed}]
 
 
-@dataclass(frozen=True, eq=False)
-class TrainedSystem:
-    """One trained system of the table.
+def tuned_options(
+    name: str,
+    examples: Sequence[Example],
+    validation: HeldOutRecordings,
+    tuning: TuningOptions,
+    monitor: Monitor,
+) -> list[Trial]:
+    """Return all settings that were tried for a system of the paper.
 
-    engine         : an ``Animator``
-    model          : its trained model
-    seconds        : training time
-    mixtures       : Gaussians of its densities, where they were selected
-    validation_acc : mean ACC on the validation recordings, by number of Gaussians
+    validation : recordings by which they are judged; the first ``tuning.judges`` of them
     """
+    judges = validation.first(tuning.judges)
 
-    engine: Any
-    model: Any
-    seconds: float
-    mixtures: int | None = None
-    validation_acc: Mapping[int, float] = field(default_factory=dict)
+    def attempt(options: Mapping[str, Any]) -> list[Trial]:
+        on_the_way = trained_on_the_way(options, examples, monitor)
+        return [trial for trial, _ in judged(on_the_way, judges, CONVERSIONS)]
+
+    return tuned(SYSTEMS[name], alternatives(SYSTEMS[name], tuning), attempt)
 
 
-def train_systems(
-    names: Sequence[str],
+def train_system(
+    name: str,
     examples: Sequence[Example],
     validation: HeldOutRecordings | None,
-    states: int,
-    mixtures: Sequence[int],
+    trials: Mapping[str, Sequence[Trial]],
+    trained: Mapping[str, TrainedSystem],
     monitor: Monitor,
-) -> dict[str, TrainedSystem]:
-    """Return the trained systems by name.
+) -> TrainedSystem:
+    """Return one trained system.
 
-    validation : recordings on which the number of Gaussians is selected; None: ``mixtures`` has one number only
-    states     : per unit, in the systems of the paper
-    mixtures   : numbers of Gaussians per state that these may have
+    validation : recordings that decide between the settings of a tuned system with 1, 2, 4, … Gaussians, and those of
+                 the system as printed; None: no system is tuned
+    trials     : what was tried on fewer recordings, for each system of the paper that is tuned
+    trained    : the systems before it
     """
-    trained: dict[str, TrainedSystem] = {}
-    for number, name in enumerate(names):
-        part = sub_monitor(monitor, number / len(names), (number + 1) / len(names), f"{name}: ")
-        system = COMPARED_SYSTEMS[name]
-        if system.same_model_as:
-            twin = trained[system.same_model_as]
-            trained[name] = replace(twin, engine=CoupledEngine(replace(twin.engine.config, **system.options)))
-        elif system.make is not None:
-            start_s, engine = perf_counter(), system.make()
-            model = engine.fit(examples, part).model
-            trained[name] = TrainedSystem(engine, model, perf_counter() - start_s)
-        else:
-            config = CoupledConfig(**system.options, states=states, articulation=False)
-            selection = select_mixtures(examples, validation, config, mixtures, monitor=part)
-            count, acc = selection.engine.config.mixtures, selection.validation_acc
-            trained[name] = TrainedSystem(selection.engine, selection.model, selection.seconds, count, acc)
-    return trained
+    system = COMPARED_SYSTEMS[name]
+    if system.same_model_as:
+        twin = trained[system.same_model_as]
+        return replace(twin, engine=CoupledEngine(replace(twin.engine.config, **system.options)))
+    if system.make is not None:
+        start_s, engine = process_time(), system.make()
+        return TrainedSystem(engine, engine.fit(examples, monitor).model, process_time() - start_s)
+    if not system.tunes or validation is None:
+        *_, last = trained_on_the_way(system.options, examples, monitor)
+        return last
+    options = best_trial(trials[system.tunes]).options
+    if name != MATCHED:
+        printed = trained[system.tunes]
+        same = CoupledConfig.parsed(options) == printed.engine.config
+        on_the_way = () if same else trained_on_the_way(options, examples, monitor)
+        return chosen_by(lambda trial: trial.acc, judged([printed, *on_the_way], validation))
+    wanted = trained["ph-vi-FHMM" + TUNED].model.chains.parameters
+    most = max(trial.options["mixtures"] for trial in trials[system.tunes])
+    larger = trained_on_the_way({**options, "mixtures": most, "visual_mixtures": most}, examples, monitor)
+    return chosen_by(lambda trial: -abs(trial.parameters - wanted), judged(larger, validation))
+
+
+def stored_system(system: TrainedSystem) -> dict[str, NDArray[Any]]:
+    """Return the coupled chains of a system as arrays, from which ``system_from_arrays`` makes it again."""
+    about = {"config": system.engine.config.as_mapping(), "seconds": system.seconds}
+    about["tried"] = [asdict(trial) for trial in system.tried]
+    return coupled_arrays(system.model) | {ABOUT: np.array(json.dumps(about))}
+
+
+def system_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> TrainedSystem:
+    """Return the system that ``stored_system`` stored."""
+    about = json.loads(str(arrays[ABOUT]))
+    engine = CoupledEngine(CoupledConfig.parsed(about["config"]))
+    model = engine.from_arrays({name: array for name, array in arrays.items() if name != ABOUT})
+    return TrainedSystem(engine, model, about["seconds"], tuple(Trial(**trial) for trial in about["tried"]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import islice
 
@@ -25,7 +25,7 @@ from lipmotion.appearance.lower_face import (
 from lipmotion.appearance.person import JAW_OPTIONS, Appearance, FaceCodes
 from lipmotion.appearance.placing import cut, feather, place
 from lipmotion.appearance.poisson import CloningSystem, cloning_system
-from lipmotion.appearance.refinement import STEADY, RefinementOptions, Refiner
+from lipmotion.appearance.refinement import PAPER, STEADY, RefinementOptions, Refiner, moving_average
 from lipmotion.errors import InputError
 
 Array = NDArray[np.float64]
@@ -64,6 +64,7 @@ class StitchingOptions:
 
     jaw       : whether the jaw is replaced, too; False: the background's jaw stays, the mouth alone is replaced
     mouth     : how the detail of the mouth is chosen; None: eigenlips alone, blurred
+    average   : number of pictures over which the mouth is averaged before, odd; 1: none
     jaw_detail : how the detail of the jaw is chosen
     noise     : whether the noise of the camera is added
     seed      : of the noise
@@ -71,12 +72,17 @@ class StitchingOptions:
 
     jaw: bool = True
     mouth: RefinementOptions | None = STEADY
+    average: int = 1
     jaw_detail: RefinementOptions = JAW_OPTIONS
     noise: bool = True
     seed: int = 0
 
 
 STITCHING = StitchingOptions()
+AS_PRINTED = StitchingOptions(mouth=PAPER, average=3)
+"""The mean of three pictures, then the nearest of 500 candidates for every colour and picture: Xie & Liu 2007, §6.1 and
+Eqs. 14–16.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +103,7 @@ class Stitcher:
         backgrounds : at least as many; taken a few at a time, so memory does not grow with the length
         Raises InputError: too few backgrounds.
         """
+        codes = self._averaged(codes)
         mouth_chosen = self._mouths.choose(codes.mouth)
         jaw_chosen = self._jaws.choose(codes.jaw)
         iterator = iter(backgrounds)
@@ -120,10 +127,17 @@ class Stitcher:
 
     def mouths(self, codes: FaceCodes) -> Iterator[Picture]:
         """Yield pictures of the mouth alone [shape=(56 · scale, 72 · scale, 3)], one for each frame of motion."""
+        codes = self._averaged(codes)
         chosen = self._mouths.choose(codes.mouth)
         for first in range(0, len(codes), BATCH):
             part = slice(first, first + BATCH)
             yield from self._pictures_of_mouth(codes.mouth[part], chosen[part], first)
+
+    def _averaged(self, codes: FaceCodes) -> FaceCodes:
+        """Return codes whose mouth is the mean of some pictures."""
+        if self.options.average == 1:
+            return codes
+        return replace(codes, mouth=moving_average(codes.mouth, self.options.average).astype(np.float32))
 
     def _pictures_of_mouth(self, codes: Floats, chosen: NDArray[np.intp], first: int) -> Pictures:
         if self.options.mouth is None:

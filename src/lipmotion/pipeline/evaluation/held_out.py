@@ -82,6 +82,17 @@ class HeldOutRecordings:
         known = self.speakers.names if self.speakers is not None else ()
         return tuple(sorted({utterance.speaker for utterance in self.utterances} - set(known)))
 
+    def first(self, count: int) -> HeldOutRecordings:
+        """Return the first recordings alone."""
+        parts = {name: phones[:count] for name, phones in self.conditions.items()}
+        return replace(
+            self,
+            utterances=self.utterances[:count],
+            reference=self.reference[:count],
+            conditions=parts,
+            recognitions=self.recognitions[:count],
+        )
+
     def person(self, utterance: Utterance) -> SpeakerMap | None:
         """Return the map to the motion of an utterance's speaker; None for a stranger."""
         if self.speakers is None or utterance.speaker not in self.speakers.names:

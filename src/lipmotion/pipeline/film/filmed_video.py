@@ -258,6 +258,7 @@ def refuse_film(options: FilmOptions) -> None:
         "a background": options.background,
         "an overlay": options.overlay,
         "another jaw": options.jaw if options.jaw != FILM.jaw else None,
+        "another refinement": options.stitching if options.stitching != STITCHING else None,
         "a visible mark": options.mark if options.mark == "visible" else None,
     }
     given = next((name for name, value in filmed.items() if value is not None), None)

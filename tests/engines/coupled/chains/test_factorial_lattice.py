@@ -8,10 +8,10 @@ import pytest
 
 from engines.coupled.tiny import THREE, TWO, chains, observations, structure
 from engines.coupled.training.test_training import sentences
-from lipmotion.engines.coupled.chains.factorial_lattice import UNSEEN_PENALTY, FactorialProduct, FactorialTransitions
+from lipmotion.engines.coupled.chains.factorial_lattice import FactorialProduct, FactorialTransitions
 from lipmotion.engines.coupled.chains.joint_densities import with_joint_state_densities
 from lipmotion.engines.coupled.chains.model import Chains
-from lipmotion.engines.coupled.chains.structures import FACTORIAL
+from lipmotion.engines.coupled.chains.structures import FACTORIAL, UNSEEN_LOSS
 from lipmotion.engines.coupled.conversion.em_conversion import ConversionSettings, convert
 from lipmotion.engines.coupled.training.chain_training import MixtureSchedule, growing_chains
 
@@ -37,7 +37,7 @@ def both(seed=0) -> tuple[Chains, Chains]:
 def penalised(listed: Chains, groups) -> Chains:
     """Listed chains with the same penalty for joint states without densities of their own."""
     speech = groups[0].mixtures.copy()
-    speech.log_weights[:-3] += UNSEEN_PENALTY
+    speech.log_weights[:-3] -= UNSEEN_LOSS
     return replace(listed, groups=(replace(groups[0], mixtures=speech), *groups[1:]))
 
 

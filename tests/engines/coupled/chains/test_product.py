@@ -5,8 +5,9 @@ import pytest
 
 from engines.coupled.tiny import THREE, TWO, grammar, structure
 from lipmotion.engines.coupled.chains.product import JointState, reachable
-from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM, SYSTEMS, structure_of
+from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM, SYSTEMS, unit_sets
 from lipmotion.engines.coupled.chains.transitions import initial_transitions
+from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.errors import InputError
 
 
@@ -25,8 +26,8 @@ def even(of):
 )
 def test_joint_states_of_the_papers_systems(system, cross_units, joints):
     """47 × (5 + 4 + 4) when all leave a unit together; beyond that, one chain waits in the last state for the other."""
-    options = {"asynchrony": 1} | SYSTEMS[system]
-    of = structure_of(options["structure"], options["chains"], 5, options["asynchrony"], cross_units)
+    config = CoupledConfig(**SYSTEMS[system] | {"cross_units": cross_units})
+    of = config.structure_with(unit_sets(config.chains))
     assert len(even(of).joint_states) == joints
 
 
@@ -133,10 +134,10 @@ def test_structures_that_do_not_fit_together():
         with pytest.raises(InputError, match=message):
             structure(kind, chains, states=2, limit=limit)
     with pytest.raises(InputError, match="no chains"):
-        structure_of(HMM, " ", 3, 1, True)
+        unit_sets(" ")
 
 
 def test_too_many_joint_states_to_list():
-    of = structure_of(FACTORIAL, "phone phone", 5, -1, True)
+    of = structure(FACTORIAL, unit_sets("phone phone"), states=5, limit=None)
     with pytest.raises(InputError, match="limit the asynchrony"):
         even(of)

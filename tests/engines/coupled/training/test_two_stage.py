@@ -10,7 +10,7 @@ import pytest
 
 from lipmotion.engines.coupled.chains.densities import LEAST_COMPONENT_FRAMES, AudioVisualObservations
 from lipmotion.engines.coupled.chains.model import Chains
-from lipmotion.engines.coupled.chains.structures import structure_of
+from lipmotion.engines.coupled.chains.structures import Structure, unit_sets
 from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledModel
@@ -49,7 +49,7 @@ def aligned(sentences: Sequence[Example]) -> list[AlignedUtterance]:
 
 @cache
 def trained(kind: str = "coupled", mixtures: int = 2) -> Chains:
-    structure = structure_of(kind, STRUCTURES[kind], 2, 1, True)
+    structure = Structure(kind, unit_sets(STRUCTURES[kind]), 2, 1)
     groups = 1 if kind == "hmm" else 2
     how = MixtureSchedule((mixtures, 1)[:groups], (1.0, 1.0))
     *_, grown = growing_chains(structure, ("speech", "lips"), aligned(examples(4)), how)

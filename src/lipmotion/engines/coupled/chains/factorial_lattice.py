@@ -20,9 +20,6 @@ from lipmotion.kernels.sequences.loops import FactorialLogLikelihoods, Loop, Loo
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
-UNSEEN_PENALTY = np.float32(-10)
-"""Added to the log density of a joint state without a density of its own, for which its chains' densities are used.
-Without it nothing would hold the chains together (chosen on the validation list; docs/results/coupled.md)."""
 LEAST_ADVANCE = 1e-5
 """Least probability of moving on, and of staying."""
 VISIBLE_FRAMES = 10
@@ -104,17 +101,19 @@ class FactorialLattice(Lattice):
     own_density_positions : the joint states inside with densities of their own, as positions in ``states`` of both
                             chains [shape=(P', 2)]
     visible_units         : the units of the second chain that each frame may belong to [shape=(T, V)]; None: all
+    unseen_loss           : what joint states without densities of their own lose, nats
     """
 
     units: tuple[Index, Index]
     states: tuple[Index, Index]
     own_density_positions: Index
     visible_units: NDArray[np.bool_] | None
+    unseen_loss: float
 
     def masked(self, logs: Sequence[Single]) -> tuple[Single, ...]:  # noqa: D102
         speech, *visual = super().masked(logs)
         speech = speech.copy()
-        speech[:, : len(self.states[0])] += UNSEEN_PENALTY
+        speech[:, : len(self.states[0])] -= np.float32(self.unseen_loss)
         if self.visible_units is not None:
             count = len(self.states[1])
             forbidden = ~self.visible_units[:, np.tile(self.units[1], count // max(len(self.units[1]), 1))]
@@ -206,6 +205,7 @@ def factorial_lattice(
         states=states,
         own_density_positions=own_density_positions[inside],
         visible_units=visible_units,
+        unseen_loss=structure.unseen_loss,
     )
 
 

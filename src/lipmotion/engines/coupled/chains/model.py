@@ -39,6 +39,16 @@ class Chains:
         """The structure of the chains."""
         return self.transitions.product.structure
 
+    @property
+    def parameters(self) -> int:
+        """How many numbers were learned: of all densities, and the probabilities of moving on; no bigrams of units."""
+        learned = sum(len(table) for table in self.transitions.advance)
+        for group in self.groups:
+            densities, _, size = group.mixtures.size
+            components = int(np.isfinite(group.mixtures.log_weights).sum())
+            learned += components * (2 * size + 1) - densities
+        return learned
+
     @cached_property
     def full_lattice(self) -> Lattice:
         """The lattice of all joint states, for an utterance without transcript."""

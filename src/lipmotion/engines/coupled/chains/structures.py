@@ -12,16 +12,34 @@ from lipmotion.units import PHONES, UnitSet, unit_set
 
 HMM, MULTISTREAM, FACTORIAL, COUPLED = "hmm", "multistream", "factorial", "coupled"
 STRUCTURES = (HMM, MULTISTREAM, FACTORIAL, COUPLED)
+UNSEEN_LOSS = 10.0
+"""Chosen on the validation list (docs/results/xieliu2007.md)."""
 
+AS_PRINTED: dict[str, Any] = {
+    "states": 5,
+    "mixtures": 1,
+    "conversion": "em",
+    "start": "viterbi",
+    "steps": 5,
+    "variance_scaling": False,
+    "closures": False,
+    "articulation": False,
+}
+"""What the paper's systems have in common: five states a unit, lips converted frame by frame, by EM that starts from
+the best path, and nothing done to them afterwards (§4.1, §7.1). Ours, as the print gives no number: one Gaussian a
+state, five steps of EM ("a very few").
+"""
 SYSTEMS: dict[str, dict[str, Any]] = {
-    "ph-HMM": {"structure": HMM, "chains": "phone"},
-    "ph-MSHMM": {"structure": MULTISTREAM, "chains": "phone"},
-    "ph-FHMM": {"structure": FACTORIAL, "chains": "phone phone", "asynchrony": -1},
-    "ph-vi-FHMM": {"structure": FACTORIAL, "chains": "phone viseme", "asynchrony": -1},
-    "ph-CHMM": {"structure": COUPLED, "chains": "phone phone"},
-    "ph-vi-CHMM": {"structure": COUPLED, "chains": "phone viseme"},
+    "ph-HMM": AS_PRINTED | {"structure": HMM, "chains": "phone"},
+    "ph-MSHMM": AS_PRINTED | {"structure": MULTISTREAM, "chains": "phone"},
+    "ph-FHMM": AS_PRINTED | {"structure": FACTORIAL, "chains": "phone phone", "asynchrony": -1},
+    "ph-vi-FHMM": AS_PRINTED | {"structure": FACTORIAL, "chains": "phone viseme", "asynchrony": -1},
+    "ph-CHMM": AS_PRINTED | {"structure": COUPLED, "chains": "phone phone"},
+    "ph-vi-CHMM": AS_PRINTED | {"structure": COUPLED, "chains": "phone viseme"},
 }
 """Options of the coupled engine for each system. Source: Xie & Liu 2007, Table 2."""
+PRESETS: dict[str, dict[str, Any]] = SYSTEMS | {"xieliu2007": SYSTEMS["ph-vi-CHMM"]}
+"""The systems by name, and the one that the paper proposes (docs/papers/xieliu2007.md)."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +54,9 @@ class Structure:
     states      : states per unit, left to right, without skips
     limit       : the greatest asynchrony, in states; None: no limit
     cross_units : whether chains may leave a unit at different times
+    start_limit : without a limit, the one that holds while the first densities are learned (Viterbi training)
+    unseen_loss : without a limit, what the log density of a joint state without a density of its own loses, nats; 0:
+                  all densities integrate to 1, and nothing but the shared densities holds the chains together
     Source: Xie & Liu 2007, Fig. 3 and Eqs. 17–19.
     Raises InputError: an unknown kind, or a number of chains or limit that does not fit it.
     """
@@ -45,6 +66,8 @@ class Structure:
     states: int
     limit: int | None
     cross_units: bool = True
+    start_limit: int = 1
+    unseen_loss: float = UNSEEN_LOSS
 
     def __post_init__(self) -> None:
         if self.kind not in STRUCTURES:
@@ -100,17 +123,15 @@ class Structure:
         return unit * self.states + state
 
 
-def structure_of(kind: str, chains: str, states: int, asynchrony: int, cross_units: bool) -> Structure:
-    """Return the structure that a configuration asks for.
+def unit_sets(names: str) -> tuple[UnitSet, ...]:
+    """Return the unit sets of chains, from names or files with their tables, separated by blanks.
 
-    chains     : names of unit sets, or files with their tables, separated by blanks
-    asynchrony : the greatest asynchrony, in states; negative: no limit
-    Raises InputError: no such unit set, or arguments that do not fit together.
+    Raises InputError: no such unit set, or no name.
     """
-    sets = tuple(unit_set(name) for name in chains.split())
+    sets = tuple(unit_set(name) for name in names.split())
     if not sets:
         raise InputError("no chains were given; required the unit set of each, as in 'phone viseme'")
-    return Structure(kind, sets, states, None if asynchrony < 0 else asynchrony, cross_units)
+    return sets
 
 
 def corresponding_unit(chain: UnitSet, first: UnitSet, unit: str) -> str:

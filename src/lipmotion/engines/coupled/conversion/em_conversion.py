@@ -54,17 +54,22 @@ class ConversionResult:
 
 
 def convert(
-    chains: Chains, observations: AudioVisualObservations, lattice: Lattice, settings: ConversionSettings
+    chains: Chains,
+    observations: AudioVisualObservations,
+    lattice: Lattice,
+    settings: ConversionSettings,
+    given_speech: Inference | None = None,
 ) -> ConversionResult:
     """Return the visual streams that maximise the joint likelihood with speech, near the start.
 
     observations : the first stream is speech; the values of the others are ignored
     lattice      : the joint states that the utterance may be in
+    given_speech : posteriors given speech alone, where they are known; a soft start needs them
     With ``exact`` updates the joint likelihood never falls; with ``printed`` ones it may.
     Source: Xie & Liu 2007, Eqs. 3–11, Fig. 6.
     """
     speech = without_visual_streams(observations)
-    streams = _start(chains, speech, lattice, settings)
+    streams = _start(chains, speech, lattice, settings, given_speech)
     log_likelihoods: tuple[float, ...] = ()
     if settings.most_steps:
         result = run_em(
@@ -118,13 +123,17 @@ def path_means(chains: Chains, path: NDArray[np.intp], stream: int) -> Array:
 
 
 def _start(
-    chains: Chains, speech: AudioVisualObservations, lattice: Lattice, settings: ConversionSettings
+    chains: Chains,
+    speech: AudioVisualObservations,
+    lattice: Lattice,
+    settings: ConversionSettings,
+    given_speech: Inference | None,
 ) -> tuple[Array, ...]:
     """Return the visual streams before the first step of EM [each shape=(T, D_s)]."""
     if settings.start == VITERBI:
         path, _ = chains.best_path(chains.emission_log_densities(speech, lattice), lattice)
         return tuple(path_means(chains, path, stream) for stream in visual_stream_numbers(chains))
-    return _updated_streams(chains, chains.infer(speech, lattice), EXACT)
+    return _updated_streams(chains, given_speech or chains.infer(speech, lattice), EXACT)
 
 
 def _updated_streams(chains: Chains, inference: Inference, update: str) -> tuple[Array, ...]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from lipmotion.engines.base import Fit
 from lipmotion.engines.coupled.chains.densities import AudioVisualObservations
 from lipmotion.engines.coupled.chains.model import Chains
-from lipmotion.engines.coupled.chains.structures import HMM, Structure, structure_of
+from lipmotion.engines.coupled.chains.structures import HMM, Structure, unit_sets
 from lipmotion.engines.coupled.chains.visual_streams import (
     EIGENLIPS,
     GEOMETRY,
@@ -78,7 +78,7 @@ def growing_models(
 
     The last function returns what ``fit_coupled`` does. Raises as ``fit_coupled``.
     """
-    structure = structure_of(config.structure, config.chains, config.states, config.asynchrony, config.cross_units)
+    structure = config.structure_with(unit_sets(config.chains))
     moving = [example for example in examples if dynamics_known(example.valid).any()]
     space, values = fit_reduced_motion(moving or examples, config.components)
     if all(is_silent(span.label.phone) for example in moving for span in example.speech.units):

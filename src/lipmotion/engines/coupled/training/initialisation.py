@@ -41,9 +41,13 @@ def initial_chains(
     streams : the names of the streams
     weights : the exponents of the streams
     floors  : the least variance of each stream [each shape=(D_s,)]
-    A structure without a limit of asynchrony has one during the Viterbi training.
+    A structure without a limit of asynchrony has one, ``start_limit``, during the Viterbi training.
     """
-    limited = replace(structure, limit=min(1, structure.states - 1)) if structure.limit is None else structure
+    limited = (
+        replace(structure, limit=min(structure.start_limit, structure.states - 1))
+        if structure.limit is None
+        else structure
+    )
     transitions = initial_transitions(reachable(limited, estimated_grammar(limited, data)))
     chains = _untrained_chains(streams, transitions, data, weights)
     utterances = [lattice_utterance(chains, utterance) for utterance in data]

@@ -1,8 +1,8 @@
-"""The figures of ``table3`` as text."""
+"""The figures of ``xieliu2007`` as text."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from lipmotion.experiments.comparison import significance_mark
@@ -10,32 +10,31 @@ from lipmotion.experiments.xie_liu2007.systems import PAPER_FIGURES, REFERENCE_S
 from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.printable import printable
 
-WIDTH = 27
+WIDTH = 34
 NAMED_CHANNELS = 8
 """Most channels that are named one by one."""
 HEAD = (
     f"  {'system':{WIDTH}}{'paper':>13}  {'AMSE (95 %)':25}  {'ACC (95 %)':22}  {'opening (95 %)':22}  "
-    "nRMSE    RMSE    lag  score  p b m  false  variance  K  seconds"
+    "nRMSE    RMSE    lag  score  p b m  false  variance   numbers  seconds"
 )
 
 
 def table(figures: Mapping[str, Any]) -> str:
-    """Return the figures of ``table3`` as text."""
+    """Return the figures of ``xieliu2007`` as text."""
     order = {"given": "the list given", "shuffled": f"the training list shuffled with seed {figures['seed']}"}
-    chosen = " or ".join(map(str, figures["mixtures"])) + (", the best on val" if len(figures["mixtures"]) > 1 else "")
     closed = f"; closed under {figures['closed_under']:.4f}" if figures["closed_under"] is not None else ""
     names = figures["channels"]
     compared = ", ".join(names) if len(names) <= NAMED_CHANNELS else f"{len(names)} channels"
     lines = [
         f"the first N clips of {order[figures['order']]}; split {figures['split']}: {figures['clips']} clips",
-        f"paper's systems: {figures['states']} states a unit, Gaussians a state (K): {chosen}; "
-        f"AMSE, ACC of {compared}{closed}",
+        f"AMSE, ACC of {compared}{closed}; numbers: what the chains have learned",
     ]
     for size in figures["rows"]:
         for condition, rows in size["conditions"].items():
             lines += ["", f"{condition}, {size['used']} of the first {size['names']} clips", HEAD]
             lines += [_line(name, row, size["training"][name]) for name, row in rows.items()]
             lines += _eigenlips(rows)
+        lines += [*_settings(size["training"]), *_pairs(size["pairs"])]
     for kind in dict.fromkeys(row["kind"] for row in figures["noise"]):
         lines += ["", *_noise(kind, figures)]
     lines += [
@@ -50,8 +49,37 @@ def _line(name: str, row: Mapping[str, Any], training: Mapping[str, Any]) -> str
     amse, acc = _with_interval(row, "amse", ".4f"), _with_interval(row, "acc", ".3f")
     return (
         f"  {name:{WIDTH}}{printed:>13}  {amse:25}  {acc:22}  {_opening(row)}"
-        f"{figure_text(training['mixtures'], '3.0f')}{training['seconds']:9.1f}"
+        f"{figure_text(training['parameters'], '10.0f')}{training['seconds']:9.1f}"
     )
+
+
+def _settings(training: Mapping[str, Any]) -> list[str]:
+    """Return the lines of what tuned systems do otherwise than printed ones."""
+    lines = []
+    for name, row in training.items():
+        if row["tried"]:
+            options = {key: value for key, value in row["options"].items() if key not in ("structure", "chains")}
+            changed = ", ".join(
+                f"{key}={value:g}" if key != "start" else f"{key}={value}" for key, value in options.items()
+            )
+            lines.append(f"  {name:{WIDTH}}{changed or 'as printed'}")
+    return ["", "settings, the best on val", *lines] if lines else []
+
+
+def _pairs(pairs: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return the lines of the paper's order, pair by pair."""
+    if not pairs:
+        return []
+    lines = ["", f"  {'in the paper better than':{2 * WIDTH}}{'ACC (95 %)':27}AMSE (95 %)"]
+    for pair in pairs:
+        acc, amse = (
+            "{:+.{p}f}{} ({:+.{p}f} to {:+.{p}f})".format(
+                pair[key], significance_mark(pair[f"{key}_95"]), *pair[f"{key}_95"], p=places
+            )
+            for key, places in (("acc", 3), ("amse", 4))
+        )
+        lines.append(f"  {pair['better']:{WIDTH}}{pair['worse']:{WIDTH}}{acc:27}{amse}")
+    return lines
 
 
 def _opening(row: Mapping[str, Any]) -> str:

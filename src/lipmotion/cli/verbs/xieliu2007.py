@@ -1,8 +1,10 @@
-"""``lipmotion experiment table3``: Table 3 of Xie & Liu 2007, on a corpus."""
+"""``lipmotion experiment xieliu2007``: Table 3 of Xie & Liu 2007, on a corpus."""
 
 from __future__ import annotations
 
 import argparse
+from contextlib import nullcontext
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from lipmotion.cli.arguments.experiment_options import add_experiment_arguments, run_experiment
@@ -16,7 +18,10 @@ if TYPE_CHECKING:
 
 def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the experiment to ``lipmotion experiment``."""
-    parser = actions.add_parser("table3", help="which structure of chains predicts lips best (Xie & Liu 2007, Table 3)")
+    parser = actions.add_parser(
+        "xieliu2007",
+        help="which structure of chains predicts lips best, as printed and tuned (Xie & Liu 2007, Table 3)",
+    )
     parser.add_argument("--split", default="test", help="compare on test, or another list (default: test)")
     order = "names of recordings, one per line (default: train, shuffled)"
     add_input(parser, "--order", what="list", replaceable=True, metavar="FILE", help=order)
@@ -25,9 +30,8 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     systems = "only these systems, separated by semicolons (default: all)"
     parser.add_argument("--systems", type=lambda text: text.split(";"), metavar="NAME;NAME", help=systems)
-    parser.add_argument("--states", type=int, default=5, help="states per unit, in the paper's systems (default: 5)")
-    gaussians = "Gaussians per state, in the paper's systems, selected on the list val (default: 1,2,4,8)"
-    parser.add_argument("--mixtures", type=numbers, default=[1, 2, 4, 8], metavar="K,K,...", help=gaussians)
+    quick = "the paper's systems alone, trained on 20 recordings and compared on 6: three minutes"
+    parser.add_argument("--quick", action="store_true", help=quick)
     parser.add_argument("--visual", default="geometry", metavar="KIND", help="geometry, eigenlips or both")
     parser.add_argument("--transcripts", action="store_true", help="compare also with known transcripts")
     parser.add_argument("--noise", default="", metavar="KIND,KIND", help="compare also in noise: white, babble")
@@ -46,31 +50,39 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Call ``experiment.table3`` and print its table."""
+    """Call ``experiment.xieliu2007`` and print its table."""
     from lipmotion.corpora.splits import read_names
-    from lipmotion.experiments.noise import read_talkers
-    from lipmotion.experiments.xie_liu2007.table3 import ComparisonOptions, NoiseConditions, table3
-    from lipmotion.experiments.xie_liu2007.table3_text import table
+    from lipmotion.experiments.noise import NoiseConditions, read_talkers
+    from lipmotion.experiments.xie_liu2007.six_systems import (
+        DEFAULT_OPTIONS,
+        QUICK,
+        QUICK_SIZE,
+        xieliu2007,
+    )
+    from lipmotion.experiments.xie_liu2007.text import table
+    from lipmotion.storage.files import unfinished_work
 
     def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
         kinds = tuple(kind for kind in options.noise.split(",") if kind)
         talkers = tuple(read_talkers(options.talkers)) if options.talkers else ()
-        compared = ComparisonOptions(
-            systems=options.systems,
-            states=options.states,
-            mixtures=options.mixtures,
+        few = QUICK if options.quick else DEFAULT_OPTIONS
+        compared = replace(
+            few,
+            systems=options.systems or few.systems,
             visual=options.visual,
             transcripts=options.transcripts,
             noise=NoiseConditions(kinds, tuple(map(float, options.snr)), talkers),
         )
-        return table3(
-            corpus,
-            compared,
-            split=list_or_all(options.split),
-            order=read_names(options.order) if options.order else None,
-            sizes=options.sizes,
-            plots=options.plots,
-            settings=settings,
-        )
+        with unfinished_work(options.output) if options.output else nullcontext() as work:
+            return xieliu2007(
+                corpus,
+                compared,
+                split=list_or_all(options.split),
+                order=read_names(options.order) if options.order else None,
+                sizes=options.sizes or ([QUICK_SIZE] if options.quick else None),
+                plots=options.plots,
+                work=work,
+                settings=settings,
+            )
 
     run_experiment(options, experiment, table)
