@@ -11,10 +11,11 @@ from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
+from lipmotion.motion.resample import model_motion
 from lipmotion.pipeline.model import Model, save_model
 from lipmotion.pipeline.training import train as module
 from lipmotion.pipeline.training.other_speakers import VoiceExample
-from lipmotion.pipeline.training.train import Run, about_training, model_motion, phones_of, train
+from lipmotion.pipeline.training.train import Run, about_training, phones_of, train
 from lipmotion.speech.features.mfcc import mfcc
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.testing.toy import toy_sentences

@@ -12,8 +12,8 @@ from lipmotion.pipeline.job import Request
 
 ENGINE = "trajectory (default), coupled (chains of states), joint (one model, five streams) or selection (recordings)"
 PRESET = (
-    "a system of a paper: xieliu2007, or its ph-HMM, ph-MSHMM, ph-FHMM, ph-vi-FHMM, ph-CHMM, ph-vi-CHMM; it names the "
-    "engine, too"
+    "a system of a paper, which names its engine: hofer2008, minnis2000, xieliu2007, or one of the last one's six, "
+    "ph-HMM, ph-MSHMM, ph-FHMM, ph-vi-FHMM, ph-CHMM, ph-vi-CHMM"
 )
 VISUAL = "geometry (default), eigenlips (default of xieliu2007) or both"
 UNITS = "modelled units: phone (default), eVis, sVis, pbVis, 2vis, or a table file (docs/unit-sets.md)"

@@ -28,7 +28,6 @@ from lipmotion.speech.features.speaker_similarity import SpeakerSimilarity, spea
 from lipmotion.speech.recognition.adaptation import Adaptation
 from lipmotion.speech.recognition.anchors import Anchors, align_within, least_frames
 from lipmotion.speech.recognition.combined_phones import CombinedPhones, combine_phones, combined_log_likelihoods
-from lipmotion.speech.recognition.network import network_search
 from lipmotion.speech.recognition.network.network_search import NetworkSearch, phones_without_words
 from lipmotion.speech.recognition.network.posteriors import (
     PosteriorStretch,
@@ -124,7 +123,7 @@ class Recogniser:
         audio = analysed(audio, features)
         similarity = self._similarity(audio)
         known = self._knows_voice_and_words(similarity)
-        network = network_of(self.kind)
+        network = network_of(self.kind) if self._has_few_gaussians or not known else None
         if network is not None:
             found = posterior_stretches(network, audio, each)
             least = LEAST_IN_NOISE if level_range_db(audio.log_energy) < NOISE_RANGE_DB else LEAST_POSTERIOR
@@ -161,9 +160,7 @@ class Recogniser:
             parts, recognised = NetworkSearch(hmm, log_likelihoods, loud).labels(found)
         else:
             known = self._knows_voice_and_words(similarity)
-            few = not known or self._has_few_gaussians
-            bonus = network_search.POSTERIOR_BONUS if few else network_search.KNOWN_BONUS
-            parts, recognised = phones_without_words(hmm, self._loop, log_likelihoods, found, bonus), []
+            parts, recognised = phones_without_words(hmm, self._loop, log_likelihoods, found), []
         labels = spliced([LabelledFrames(0, SILENCE)], parts, len(loud))
         if known:
             labels = self._aligned_again(audio, labels, len(loud))

@@ -34,9 +34,8 @@ from lipmotion.units.phones import phone_edits
 AGREEMENT_WEIGHT, POSTERIOR_WEIGHT, CONSTANT = 0.9, 4.1, -2.7
 """Coefficients of the confidence of a word: by the share of its phones that the network finds without words, and the
 mean posterior of what it finds. A logistic regression on the 201 words of ``speech-open``, of which 164 are right."""
-POSTERIOR_BONUS, KNOWN_BONUS, REACH_FRAMES = 30.0, 10.0, 4
-"""By so many nats a phone is more probable where its posterior is 1, the second in voices that the models know well;
-around it, by less, to nothing further away."""
+POSTERIOR_BONUS, REACH_FRAMES = 30.0, 4
+"""By so many nats a phone is more probable where its posterior is 1; around it, by less, to nothing further away."""
 
 
 @dataclass(frozen=True)
@@ -112,37 +111,32 @@ def spoken_items(posteriors: PhonePosteriors) -> list[SpokenItem]:
 
 
 def phones_without_words(
-    hmm: UnitHmm,
-    loop: UnitLoop,
-    free: LogLikelihoods,
-    found: Sequence[PosteriorStretch],
-    bonus: float = POSTERIOR_BONUS,
+    hmm: UnitHmm, loop: UnitLoop, free: LogLikelihoods, found: Sequence[PosteriorStretch]
 ) -> list[LabelledStretch]:
     """Return the stretches in which something is said, with their phones: in any language, and where nobody is sure.
 
     loop : the network of phones without words
     free : log likelihoods of the recording
-    bonus : nats by which a phone is more probable where its posterior is 1
     Every phone model becomes more probable by the posterior of its phone around each frame: where the phone recogniser
     leaves phones out, as it does in languages that it hardly knows, the models alone decide.
     """
     parts = list[LabelledStretch]()
     for stretch, posteriors in found:
         if _finds_phones(posteriors):
-            values = free.stretch(*stretch) + _posterior_bonus(hmm, posteriors, stretch.end - stretch.first, bonus)
+            values = free.stretch(*stretch) + _posterior_bonus(hmm, posteriors, stretch.end - stretch.first)
             path = loop.network.best_path(log_likelihoods_from(values))
             parts.append((stretch, free_labels(loop, path, stretch.first)))
     return parts
 
 
-def _posterior_bonus(hmm: UnitHmm, posteriors: PhonePosteriors, frames: int, bonus: float) -> NDArray[np.float32]:
+def _posterior_bonus(hmm: UnitHmm, posteriors: PhonePosteriors, frames: int) -> NDArray[np.float32]:
     """Return what is added to the log densities of a stretch [shape=(frames, G)]."""
     row = np.minimum(np.arange(frames) // POSTERIOR_STEP, len(posteriors.values) - 1)
     posterior = np.zeros((frames, len(FORMS)), np.float32)
     for column, phone in enumerate(PHONES):
         if not is_silent(phone):
             posterior[:, FORMS.index(compared_form(phone))] += np.exp(posteriors.of_phones[row, column])
-    return density_bonus(hmm, posterior, bonus, REACH_FRAMES)
+    return density_bonus(hmm, posterior, POSTERIOR_BONUS, REACH_FRAMES)
 
 
 def _finds_phones(posteriors: PhonePosteriors) -> bool:
