@@ -89,7 +89,7 @@ def test_a_system_of_the_coupled_engine(run: RunCommand, toy_corpus: Corpus, her
     assert (config.structure, config.chains, config.acoustic_regression) == ("multistream", "2vis", False)
     said = run("info", "m", "--structure").out
     assert said[0].startswith("multistream: one chain")
-    assert "chain 1: 2vis, 2 units of 3 states" in said
+    assert "chain 1: 2vis, 2 units of 5 states" in said
 
 
 @pytest.mark.long

@@ -256,4 +256,4 @@ def test_the_network_helps_with_voices_that_the_models_hardly_know(monkeypatch: 
         assert not recognition.words
         found[sure] = [span.label.phone for span in recognition.units]
     assert found[0.99].count("b") > found[1e-4].count("b") + 2
-    assert len(set(found[0.99])) > 5
+    assert len(set(found[1e-4])) > 5
