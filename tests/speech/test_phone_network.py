@@ -15,7 +15,6 @@ from lipmotion.hmm.log_likelihoods import log_likelihoods_from
 from lipmotion.pipeline.model import load_model
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.mfcc import mfcc
-from lipmotion.speech.recognition import recogniser as recogniser_module
 from lipmotion.speech.recognition.network import network_search, posteriors
 from lipmotion.speech.recognition.network.beam_search import decoded_words, scored
 from lipmotion.speech.recognition.network.hama import Hama
@@ -209,9 +208,9 @@ def test_something_else_is_no_recogniser(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_unsure_posteriors_leave_phones_to_the_models(monkeypatch: pytest.MonkeyPatch) -> None:
     audio = read_audio(WELCOME)
     with monkeypatch.context() as without:
-        without.setattr("lipmotion.speech.recognition.network.posteriors.installed_phone_recogniser", lambda: None)
+        without.setattr("lipmotion.speech.recognition.recogniser.installed_phone_recogniser", lambda: None)
         alone = Recogniser(load_model().phones, "fast").recognition(audio, mfcc(audio))
-    monkeypatch.setattr("lipmotion.speech.recognition.network.posteriors.installed_phone_recogniser", lambda: "hama")
+    monkeypatch.setattr("lipmotion.speech.recognition.recogniser.installed_phone_recogniser", lambda: "hama")
     unsure = [PosteriorStretch(Stretch(0, 100), said("b", "iː", sure=0.51))]
     monkeypatch.setattr("lipmotion.speech.recognition.recogniser.posterior_stretches", lambda *_: unsure)
     monkeypatch.setattr("lipmotion.speech.recognition.word_search.words_in", lambda _: ())
@@ -237,23 +236,3 @@ def test_the_welcome_is_understood() -> None:
 def test_very_short_sound_is_filled_up() -> None:
     assert Hama().log_posteriors(np.zeros(3, np.float32)).shape[1] == len(Hama().tokens)
     assert Hama().source.startswith("hama ")
-
-
-def test_the_network_helps_with_voices_that_the_models_hardly_know(monkeypatch: pytest.MonkeyPatch) -> None:
-    audio = analysed(read_audio(WELCOME))
-    recogniser = Recogniser(load_model().phones)
-    heard = Stretch(0, len(audio.log_energy))
-    monkeypatch.setattr(Recogniser, "_knows_voice_and_words", lambda *_: True)
-    monkeypatch.setattr(Recogniser, "_has_few_gaussians", True)
-    monkeypatch.setattr(recogniser_module, "network_of", lambda _: "any")
-    found = dict[float, list[str]]()
-    for sure in (1e-4, 0.99):
-        rows = said(*["b"] * (len(audio.log_energy) // 6), sure=sure)
-        monkeypatch.setattr(
-            recogniser_module, "posterior_stretches", lambda *_, rows=rows: [PosteriorStretch(heard, rows)]
-        )
-        recognition = recogniser.recognition(audio, audio.mfcc())
-        assert not recognition.words
-        found[sure] = [span.label.phone for span in recognition.units]
-    assert found[0.99].count("b") > found[1e-4].count("b") + 2
-    assert len(set(found[1e-4])) > 5

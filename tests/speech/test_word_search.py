@@ -24,7 +24,7 @@ SAID = "please speak and my lips will move five big blue boats float by".split()
 @pytest.fixture(autouse=True)
 def without_a_phone_recogniser(monkeypatch: pytest.MonkeyPatch) -> None:
     """Words are searched by pocketsphinx where no phone recogniser is installed."""
-    monkeypatch.setattr(recogniser, "network_of", lambda _: None)
+    monkeypatch.setattr(recogniser, "installed_phone_recogniser", lambda: None)
 
 
 @pytest.fixture(scope="module")

@@ -9,8 +9,8 @@ from lipmotion.experiments.comparison import significance_mark
 from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.pipeline.evaluation.held_out import DISTANCES
 
-COLUMN_WIDTH = 36
-HEAD = f"  {'':{COLUMN_WIDTH}}{'ACC (95 %)':23}p b m  elsewhere  joins  hard  smooth  variance and jerk: opening, width, outer"
+WIDTH = 36
+HEAD = f"  {'':{WIDTH}}{'ACC (95 %)':23}p b m  elsewhere  joins  hard  smooth  variance and jerk: opening, width, outer"
 NOTE = (
     "* differs from the system as printed: the 95 % interval of the difference on the same clips leaves out 0\n"
     "p b m: share closed, without pins, %; elsewhere: closings outside p b m a minute; joins: a clip; hard: share that "
@@ -36,7 +36,7 @@ def _line(name: str, row: Mapping[str, Any]) -> str:
     shares = [_percent(joins["hard"]), _percent(joins["smooth"])]
     ratios = ["/".join(figure_text(each[key], ".2f") for each in channels if each) for key in RATIOS]
     return (
-        f"  {name:{COLUMN_WIDTH}}{acc:23}{figure_text(row['recall_p_b_m'], '5.1f')}"
+        f"  {name:{WIDTH}}{acc:23}{figure_text(row['recall_p_b_m'], '5.1f')}"
         f"{figure_text(row['false_per_minute'], '11.1f')}{joins['per_clip']:7.1f}{shares[0]:>6}{shares[1]:>8}  "
         f"{'  '.join(ratios)}"
     )

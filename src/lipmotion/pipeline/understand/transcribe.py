@@ -14,8 +14,8 @@ from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.mfcc import LOG_ENERGY
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit, transcript_fit
 from lipmotion.speech.recognition.anchors import anchors_of, fitted
-from lipmotion.speech.recognition.network.posteriors import POSTERIOR_STEP, network_of, recording_posteriors
-from lipmotion.speech.recognition.recogniser import ENERGY_SMOOTHING_FRAMES, Recogniser
+from lipmotion.speech.recognition.network.posteriors import POSTERIOR_STEP, recording_posteriors
+from lipmotion.speech.recognition.recogniser import ENERGY_SMOOTHING_FRAMES, Recogniser, network_of
 from lipmotion.speech.recognition.transcript_evidence import DOUBTFUL_LOSS, transcript_evidence
 from lipmotion.speech.voices.pronunciations import LanguageLexicon
 from lipmotion.storage.files import read_text_file

@@ -24,12 +24,13 @@ from lipmotion.speech.features.mfcc import HOP
 from lipmotion.speech.features.speaker_similarity import speaker_similarity
 from lipmotion.speech.recognition.agreement import TranscriptFit
 from lipmotion.speech.recognition.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
-from lipmotion.speech.recognition.network.posteriors import network_of, token_posteriors
+from lipmotion.speech.recognition.network.posteriors import token_posteriors
 from lipmotion.speech.recognition.recognised_speech import Recognition, level_range_db
 from lipmotion.speech.recognition.recogniser import (
     RECOGNISER_KINDS,
     Recogniser,
     cached_recogniser,
+    network_of,
     voice_knowledge,
 )
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ, read_audio

@@ -31,8 +31,8 @@ from lipmotion.speech.recognition.combined_phones import CombinedPhones, combine
 from lipmotion.speech.recognition.network.network_search import NetworkSearch, phones_without_words
 from lipmotion.speech.recognition.network.posteriors import (
     PosteriorStretch,
+    installed_phone_recogniser,
     mean_posterior,
-    network_of,
     posterior_stretches,
 )
 from lipmotion.speech.recognition.recognised_speech import (
@@ -123,21 +123,17 @@ class Recogniser:
         audio = analysed(audio, features)
         similarity = self._similarity(audio)
         known = self._knows_voice_and_words(similarity)
-        network = network_of(self.kind) if self._has_few_gaussians or not known else None
+        network = None if known else network_of(self.kind)
         if network is not None:
             found = posterior_stretches(network, audio, each)
             least = LEAST_IN_NOISE if level_range_db(audio.log_energy) < NOISE_RANGE_DB else LEAST_POSTERIOR
-            words = english and not known
-            if mean_posterior(found) >= least or not words:
-                return self._network_recognition(audio, similarity, found, with_words=words)
+            if mean_posterior(found) >= least or not english:
+                return self._network_recognition(audio, similarity, found, english=english)
         with_words = self.kind in USING_WORDS and not known
         spoken = begun_decoding(audio, each) if with_words else None
         hmm, log_likelihoods = self._log_likelihoods(audio, similarity)
         path = self._loop.network.best_path(log_likelihoods)
-        labels = free_labels(self._loop, path)
-        if self.kind in WEIGHTED and self._has_few_gaussians:
-            labels = self._aligned_again(audio, labels, len(path))
-        recognised = list[RecognisedWord]()
+        labels, recognised = self._free_labels(audio, features, path), list[RecognisedWord]()
         if spoken is not None:
             parts, recognised = self._word_search(audio, hmm, log_likelihoods, path).words_of(spoken)
             labels = spliced(labels if self.kind == "auto" else [LabelledFrames(0, SILENCE)], parts, len(path))
@@ -149,29 +145,27 @@ class Recogniser:
         similarity: SpeakerSimilarity | None,
         found: Sequence[PosteriorStretch],
         *,
-        with_words: bool,
+        english: bool,
     ) -> Recognition:
         """Return what a phone recogniser finds in a recording: words, or phones that our models find as well."""
         features = audio.mfcc()
         loud = loud_frames(features.values[:, LOG_ENERGY], ENERGY_SMOOTHING_FRAMES)
-        hmm, log_likelihoods = self._log_likelihoods(audio, similarity, aligning=with_words)
-        known = False
-        if with_words:
+        hmm, log_likelihoods = self._log_likelihoods(audio, similarity, aligning=english)
+        if english:
             parts, recognised = NetworkSearch(hmm, log_likelihoods, loud).labels(found)
         else:
-            known = self._knows_voice_and_words(similarity)
             parts, recognised = phones_without_words(hmm, self._loop, log_likelihoods, found), []
         labels = spliced([LabelledFrames(0, SILENCE)], parts, len(loud))
-        if known:
-            labels = self._aligned_again(audio, labels, len(loud))
         recognition = _recognition(labels, recognised, len(loud), features.duration_s, similarity)
         return replace(recognition, posterior=mean_posterior(found))
 
-    def _aligned_again(self, audio: AnalysedAudio, labels: list[LabelledFrames], frames: int) -> list[LabelledFrames]:
-        """Return recognised phones where forced alignment puts them, as those of the training were put."""
-        features = audio.mfcc()
+    def _free_labels(self, audio: AnalysedAudio, features: Features, path: NDArray[np.intp]) -> list[LabelledFrames]:
+        """Return the phones of a recording as they are recognised without words, of their best path."""
+        labels = free_labels(self._loop, path)
+        if self.kind not in WEIGHTED or not self._has_few_gaussians:
+            return labels
         named, bounds = [(label.phone, "") for label in labels], [label.first for label in labels]
-        phones = _timeline(named, np.array([*bounds, frames]), features.duration_s)
+        phones = _timeline(named, np.array([*bounds, len(path)]), features.duration_s)
         try:
             aligned = self.align_phones(audio, features, phones)
         except AlignmentError:
@@ -344,6 +338,11 @@ def _recognition(
     named = [(label.phone, recognised[label.word].text if label.word >= 0 else "") for label in labels]
     units = _timeline(named, np.array([*(label.first for label in labels), frames]), duration_s)
     return recognition_of(units, labels, recognised, similarity.score if similarity is not None else None)
+
+
+def network_of(kind: str) -> str | None:
+    """Return the name of the phone recogniser that a kind of recogniser uses; None: none, or none is installed."""
+    return installed_phone_recogniser() if kind == "auto" else None
 
 
 @lru_cache(maxsize=4)

@@ -90,11 +90,6 @@ def installed_phone_recogniser() -> str | None:
     return next((name for name in PHONE_RECOGNISERS.names if PHONE_RECOGNISERS.load(name).is_installed()), None)
 
 
-def network_of(kind: str) -> str | None:
-    """Return the name of the phone recogniser that a kind of recogniser uses; None: none, or none is installed."""
-    return installed_phone_recogniser() if kind == "auto" else None
-
-
 class FoundToken(NamedTuple):
     """A token on the most probable path, and its rows: from ``first`` to before ``end``."""
 
