@@ -21,6 +21,7 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
 from lipmotion.faces.filmed.face import FilmedFace, save_face
 from lipmotion.hmm.model import HmmConfig
+from lipmotion.motion import posterior_network
 from lipmotion.pipeline.model import Model, save_model
 from lipmotion.pipeline.training.train import train
 from lipmotion.testing.toy import ToySentence, toy_sentences, toy_utterances
@@ -62,6 +63,14 @@ def ordinary_signals() -> Iterator[None]:
     yield
     for number, handler in zip((signal.SIGINT, signal.SIGTERM), before, strict=True):
         signal.signal(number, handler)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def short_training() -> Iterator[None]:
+    """The toy's motion follows so simply from its sound that a network needs half of the steps."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(posterior_network, "STEPS", posterior_network.STEPS / 2)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,7 @@ from lipmotion.pipeline.model import VERSION, load_model, read_header, save_mode
 def test_a_model_says_whose_recordings_it_comes_from(run: RunCommand, toy_model_file: Path) -> None:
     done = run("info", toy_model_file)
     assert (done.code, done.err) == (0, [])
-    assert done.out[0].split() == ["file", str(toy_model_file), "(0.2", "MB)"]
+    assert done.out[0].split() == ["file", str(toy_model_file), "(1.1", "MB)"]
     header = dict(line.split(maxsplit=1) for line in done.out if len(line.split()) > 1)
     assert header["licence"] == "synthesised by lipmotion"
     assert header["engine"] == "trajectory"

@@ -93,7 +93,10 @@ def test_an_installed_predictor_is_chosen_by_name(toy_corpus: Corpus, toy_speech
     assert (tmp_path / "a.csv").read_text(encoding="utf-8").startswith("time_s,opening")
     missing = run_child([*LIPMOTION, "animate", toy_speech, "--model", model, "-o", tmp_path / "b.csv"])
     assert missing.returncode == 6
-    assert "no predictor 'frames'; there are: network, prior; install the package that adds it" in missing.stderr
+    assert (
+        "no predictor 'frames'; there are: network, posteriors, prior; install the package that adds it"
+        in missing.stderr
+    )
 
 
 @pytest.mark.long

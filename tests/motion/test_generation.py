@@ -48,6 +48,21 @@ def test_a_long_recording_is_kept_in_single_precision(whole, monkeypatch):
     assert single.spread.reduced.shape == (len(SPOKEN.features.values), MODEL.space.dimensions)
 
 
+def test_the_filter_is_weaker_for_voices_that_are_less_known():
+    taps = np.zeros((2 * REACH + 1, MODEL.space.dimensions))
+    taps[REACH - 1 : REACH + 2] = np.array([-1.0, 3.0, -1.0])[:, None]
+    learned = replace(MODEL.motion, modulation=ModulationFilter(taps))
+    assert learned.for_voice(1.0).modulation.taps == pytest.approx(taps)
+    assert replace(learned, modulation=None).for_voice(0.3).modulation is None
+    sides = learned.for_voice(0.75).modulation.taps[REACH + 1]  # strangeness: one half
+    width = MODEL.space.direct_names.index("width")
+    assert sides[width] == pytest.approx(-0.25)
+    assert np.delete(sides, width) == pytest.approx(-0.5)
+    unknown = learned.for_voice(0.0).modulation.taps
+    assert unknown[REACH] == pytest.approx(1)
+    assert np.abs(unknown).sum(axis=0) == pytest.approx(1)
+
+
 def test_the_modulation_filter_keeps_pins_closures_and_blocks(monkeypatch):
     taps = np.zeros((2 * REACH + 1, MODEL.space.dimensions))
     taps[REACH - 3 : REACH + 4 : 3] = np.array([-0.5, 2.0, -0.5])[:, None]  # sharpens

@@ -14,8 +14,10 @@ from lipmotion.motion.modulation_filter import (
     filter_arrays,
     filter_from_arrays,
     fit_modulation_filter,
+    learned_filter,
 )
 from lipmotion.storage.schema import format_errors
+from lipmotion.testing.examples import examples
 from lipmotion.types import FRAME_RATE_HZ
 
 RNG = np.random.default_rng(0)
@@ -51,6 +53,33 @@ def test_its_strength_is_between_nothing_and_all_of_it() -> None:
     assert FILTER.of_strength(2).apply(plain) == pytest.approx(2 * whole - plain)
 
 
+def test_dimensions_may_have_strengths_of_their_own() -> None:
+    some = FILTER.of_strength(np.array([0.0, 2.0]))
+    assert some.apply(GENERATED[0])[:, 0] == pytest.approx(GENERATED[0][:, 0])
+    assert some.taps[:, 1] == pytest.approx(FILTER.of_strength(2).taps[:, 1])
+
+
+def test_an_engine_learns_it_with_the_noise_of_its_examples_and_only_if_it_is_wanted() -> None:
+    training = examples(12)
+    values = [example.motion.values[:, :2] + 0.03 * RNG.normal(size=(len(example.valid), 2)) for example in training]
+    smooth = [gaussian_filter1d(x, 2.0, axis=0) for x in values]
+    noise = [still for x in values for still in (x[:28], x[-28:])]  # at rest, and 0.3 s away from speech
+    noisy, freed = fit_modulation_filter(values, smooth), fit_modulation_filter(values, smooth, noise)
+    found = learned_filter(0.5, zip(values, smooth, strict=True), training, values)
+    assert found is not None
+    errors = [np.abs(found.taps - each.of_strength(0.5).taps).max() for each in (noisy, freed)]
+    assert errors[1] < 0.1 * errors[0]
+    nothing = learned_filter(1.0, [], training, values)
+    assert nothing is not None
+    assert nothing.apply(values[0]) == pytest.approx(values[0])
+
+    def unwanted():
+        pytest.fail("motion is generated for a filter of no strength")
+        yield
+
+    assert learned_filter(0.0, unwanted(), training, values) is None
+
+
 def test_a_mouth_at_rest_stays_there() -> None:
     rest = np.full((60, 2), 0.3)
     assert FILTER.apply(rest) == pytest.approx(rest)
@@ -60,6 +89,9 @@ def test_a_mouth_at_rest_stays_there() -> None:
 
 def test_held_frames_are_what_they_were_and_their_neighbours_lead_to_them() -> None:
     free, held = FILTER.apply(GENERATED[0]), FILTER.apply(GENERATED[0], [0, 200, 203, 599])
+    pinned = FILTER.apply(GENERATED[0], (), [(frame, 1) for frame in (0, 200, 203, 599)])
+    assert np.array_equal(pinned[:, 1], held[:, 1])
+    assert np.array_equal(pinned[:, 0], free[:, 0])
     assert np.array_equal(held[[0, 200, 203, 599]], GENERATED[0][[0, 200, 203, 599]])
     far = np.abs(np.arange(600)[:, None] - [0, 200, 203, 599]).min(axis=1) >= HOLD_FRAMES
     assert np.array_equal(held[far], free[far])
@@ -88,6 +120,8 @@ def test_it_is_stored() -> None:
     assert stored is not None
     assert np.array_equal(stored.taps, FILTER.taps)
     assert filter_from_arrays(filter_arrays(None), 2) is None
+    with pytest.raises(ModelFormatError), format_errors("the model"):
+        filter_from_arrays(filter_arrays(None), 2, needed=True)
     for taps in (FILTER.taps[:-1], FILTER.taps[:, :1], np.full_like(FILTER.taps, MODULATION["modulation"].most + 1)):
         with pytest.raises(ModelFormatError), format_errors("the model"):
             filter_from_arrays(filter_arrays(ModulationFilter(taps)), 2)

@@ -5,18 +5,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lipmotion.errors import InputError
+from lipmotion.errors import CorpusError, InputError, ModelFormatError
 from lipmotion.motion import posterior_network
 from lipmotion.motion.acoustic_network import POSTERIOR_SHARES, AcousticNetwork
-from lipmotion.motion.posterior_network import (
-    POSTERIOR_ARRAYS,
-    PosteriorNetwork,
-    fit_posterior_network,
-    posterior_network_from_arrays,
-)
-from lipmotion.motion.predictors import PredictorTraining
+from lipmotion.motion.posterior_network import PosteriorNetwork
+from lipmotion.motion.predictors import PredictorTraining, predictor_arrays, predictor_from_arrays
 from lipmotion.pipeline.model import load_model
-from lipmotion.types import Channel, Example, Features, Motion, Speech, Timeline, TokenPosteriors
+from lipmotion.types import (
+    Channel,
+    ConditionSpectrum,
+    Example,
+    Features,
+    Motion,
+    Speech,
+    Timeline,
+    TokenPosteriors,
+)
 
 TOKENS, FRAMES, SOURCE = 30, 200, "hama 1.7.0 abc"
 
@@ -30,82 +34,139 @@ def posteriors(number: int, source: str = SOURCE) -> TokenPosteriors:
     return TokenPosteriors(values.astype(np.float16), source, 0.95)
 
 
-def motion_of(found: TokenPosteriors) -> np.ndarray:
-    """Return an opening that is wide in the first token, and a width that is the other way round."""
-    opening = np.repeat((found.values[:, 0] > -1).astype(float), 2)
-    smooth = np.convolve(np.pad(opening, 8, mode="edge"), np.full(17, 1 / 17), "valid")
-    return np.stack([smooth, 1 - smooth], axis=1)
+def smooth(values: np.ndarray) -> np.ndarray:
+    return np.convolve(np.pad(values, 8, mode="edge"), np.full(17, 1 / 17), "valid")
 
 
-def example(number: int, *, known: bool = True) -> Example:
-    found = posteriors(number)
-    speech = Speech(Features(np.zeros((FRAMES, 39), np.float32), FRAMES / 100), Timeline(()))
-    motion = Motion(motion_of(found), 100.0, (Channel("opening"), Channel("width")))
-    return Example(str(number), replace(speech, posteriors=found if known else None), motion, np.ones(FRAMES, bool))
+def spectrum(number: int) -> np.ndarray:
+    """Return a spectrum whose bands rise and fall together, one time each 0.4 s."""
+    loud = np.repeat(np.random.default_rng([1, number]).integers(2, size=FRAMES // 40), 40)
+    return np.repeat(loud[:, None] * 2.0 - 1, 40, axis=1).astype(np.float32)
+
+
+def motion_of(number: int) -> np.ndarray:
+    """Return an opening that is wide in the first token, and a width that follows the spectrum."""
+    first = np.repeat((posteriors(number).values[:, 0] > -1).astype(float), 2)
+    return np.stack([smooth(first), smooth((spectrum(number)[:, 0] + 1) / 2)], axis=1)
+
+
+def speech(number: int, *, voice: float = 1.0, heard: bool = True) -> Speech:
+    features = Features(np.zeros((FRAMES, 39), np.float32), FRAMES / 100)
+    sound = spectrum(number) if heard else None
+    return Speech(features, Timeline(()), spectrum=sound, voice=voice, posteriors=posteriors(number))
+
+
+def example(number: int, *, known: bool = True, heard: bool = True) -> Example:
+    motion = Motion(motion_of(number), 100.0, (Channel("opening"), Channel("width")))
+    clean = (ConditionSpectrum(spectrum(number).astype(np.float16), 1.0, 0.0),) if heard else ()
+    spoken = speech(number) if known else replace(speech(number), posteriors=None)
+    return Example(str(number), replace(spoken, spectrum=None), motion, np.ones(FRAMES, bool), clean)
+
+
+def trained(examples: list[Example]) -> PosteriorNetwork:
+    values = [np.asarray(each.motion.values) for each in examples]
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(posterior_network, "STEPS", 15.0)
+        return PosteriorNetwork.trained(PredictorTraining(examples, values, 2))
 
 
 @pytest.fixture(scope="module")
 def network() -> PosteriorNetwork:
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(posterior_network, "PLAN", replace(posterior_network.PLAN, steps=30))
-        fitted = trained([example(number) for number in range(8)])
-    assert fitted is not None
-    return fitted
+    return trained([example(number) for number in range(12)])
 
 
-def trained(examples: list[Example]) -> PosteriorNetwork | None:
-    values = [np.asarray(each.motion.values) for each in examples]
-    return fit_posterior_network(PredictorTraining(examples, values, 2), np.full(2, 0.5), np.full(2, 0.4))
+def likeness(network: PosteriorNetwork, spoken: Speech) -> tuple[float, float]:
+    """Return the correlation of opening and of width of a new recording, number 99."""
+    made, wanted = network.predict(spoken)[0], motion_of(99)
+    return tuple(float(np.corrcoef(made[:, each], wanted[:, each])[0, 1]) for each in range(2))  # type: ignore[return-value]
 
 
-def test_motion_follows_the_posteriors(network: PosteriorNetwork) -> None:
-    new = posteriors(99)
-    assert np.corrcoef(network.predict(new, FRAMES)[:, 0], motion_of(new)[:, 0])[0, 1] > 0.8
+def test_motion_follows_the_posteriors_and_the_spectrum_of_a_known_voice(network: PosteriorNetwork) -> None:
+    opening, width = likeness(network, speech(99))
+    assert opening > 0.8
+    assert width > 0.8
+
+
+def test_the_spectrum_of_an_unknown_voice_counts_nothing(network: PosteriorNetwork) -> None:
+    unknown, unheard = speech(99, voice=0.0), speech(99, heard=False)
+    assert network.predict(unknown)[0] == pytest.approx(network.predict(unheard)[0])
+    opening, width = likeness(network, unknown)
+    assert opening > 0.8
+    assert width < 0.5
+
+
+def test_it_is_trained_without_spectra_where_one_is_missing() -> None:
+    unheard = trained([example(number, heard=number > 0) for number in range(4)])
+    with_spectrum, without = unheard.predict(speech(99))[0], unheard.predict(speech(99, heard=False))[0]
+    assert np.isfinite(with_spectrum).all()
+    assert np.isfinite(without).all()
 
 
 def test_it_is_stored_and_restored(network: PosteriorNetwork) -> None:
-    arrays = network.arrays()
-    assert arrays.keys() == POSTERIOR_ARRAYS.keys()
-    restored = posterior_network_from_arrays(arrays, 2)
-    assert restored is not None
+    arrays = predictor_arrays(network)
+    assert arrays.keys() == PosteriorNetwork.ARRAYS.keys()
+    restored = predictor_from_arrays(arrays, 2)
+    assert isinstance(restored, PosteriorNetwork)
     assert restored.source == SOURCE
-    assert restored.predict(posteriors(99), FRAMES) == pytest.approx(network.predict(posteriors(99), FRAMES), abs=0.02)
-    assert posterior_network_from_arrays({}, 2) is None
+    earlier = {name: values for name, values in arrays.items() if name != "posterior_variances"}
+    with pytest.raises(ModelFormatError, match="train again"):
+        predictor_from_arrays(earlier, 2)
+    assert restored.predict(speech(99))[0] == pytest.approx(network.predict(speech(99))[0], abs=0.02)
 
 
 def test_posteriors_of_another_version_are_refused(network: PosteriorNetwork) -> None:
+    other = posteriors(0, "hama 1.8.0 def")
     with pytest.raises(InputError, match=r"recogniser hama 1\.7\.0 abc, this one is hama 1\.8\.0"):
-        network.predict(posteriors(0, "hama 1.8.0 def"), FRAMES)
+        network.predict(replace(speech(0), posteriors=other))
     with pytest.raises(InputError, match=r"recogniser hama 1\.7\.0 abc"):
-        network.hidden(posteriors(0, "hama 1.8.0 def"), 10)
+        network.hidden_units(other, 10)
+    assert not network.can_predict(replace(speech(0), posteriors=None))
+    with pytest.raises(InputError, match="no posteriors"):
+        network.predict(replace(speech(0), posteriors=None))
 
 
 def test_without_posteriors_of_all_there_is_none() -> None:
-    assert trained([example(0), example(1, known=False)]) is None
+    with pytest.raises(CorpusError, match="without posteriors"):
+        trained([example(0), example(1, known=False)])
 
 
-@pytest.mark.parametrize(("voice", "mean", "share"), [(1, 0.95, POSTERIOR_SHARES[0]), (0, 0.95, 1), (0, 0.5, 0)])
-def test_its_share_depends_on_the_voice_and_on_how_sure_the_recogniser_is(
-    network: PosteriorNetwork, voice: float, mean: float, share: float
+@pytest.mark.parametrize(
+    ("voice", "mean", "distortion", "share"),
+    [
+        (1, 0.95, 0.9, POSTERIOR_SHARES[0]),
+        (1, 0.5, 0.9, 0),
+        (1, 0.5, 0.1, POSTERIOR_SHARES[0]),
+        (0, 0.95, 0.9, POSTERIOR_SHARES[1]),
+        (0, 0.5, 0.1, 0),
+    ],
+)
+def test_its_share_depends_on_voice_recogniser_and_noise(
+    network: PosteriorNetwork, voice: float, mean: float, distortion: float, share: float
 ) -> None:
     shipped = load_model().learned.network
     assert isinstance(shipped, AcousticNetwork)
-    alone, dimensions = replace(shipped, beside=None), len(shipped.mean)
+    dimensions = len(shipped.mean)
+    told = shipped.network.output
+    constant = told._replace(  # the last output is the distortion
+        weights=np.concatenate([told.weights[:, :-1], 0 * told.weights[:, -1:]], axis=1),
+        biases=np.append(told.biases[:-1], distortion).astype(np.float32),
+    )
+    alone = replace(shipped, beside=None, network=replace(shipped.network, output=constant))
     output, ones = network.network.output, np.ones(dimensions)
     weights = np.resize(output.weights, (len(output.weights), dimensions))
     widened = output._replace(weights=weights, biases=np.resize(output.biases, dimensions))
     beside = replace(network, network=replace(network.network, output=widened), centre=0 * ones, scale=ones)
-    spectrum = np.random.default_rng(0).normal(size=(FRAMES, 40)).astype(np.float32)
-    found = replace(posteriors(0), mean=mean)
-    features = Features(np.zeros((FRAMES, 39), np.float32), FRAMES / 100)
-    speech = Speech(features, Timeline(()), spectrum=spectrum, voice=voice, posteriors=found)
-    without, distortion = alone.predict(speech)
-    motion, same = replace(alone, beside=beside).predict(speech)
-    assert motion == pytest.approx(without + share * (beside.predict(found, FRAMES) - without), abs=1e-6)
-    assert same == pytest.approx(distortion)
-    plain, both = alone.hidden(speech), replace(alone, beside=beside).hidden(speech)
+    spoken = speech(0, voice=voice)
+    spoken = replace(spoken, posteriors=replace(posteriors(0), mean=mean))
+    without, same = alone.predict(spoken)
+    motion, distortions = replace(alone, beside=beside).predict(spoken)
+    assert distortions == pytest.approx(same)
+    assert distortions == pytest.approx(np.full(FRAMES, distortion), rel=1e-5)
+    assert motion == pytest.approx(without + share * (beside.predict(spoken)[0] - without), abs=1e-6)
+    plain, both = alone.hidden(spoken), replace(alone, beside=beside).hidden(spoken)
     assert plain is not None
     assert both is not None
-    np.testing.assert_array_equal(both[0][:, : plain[0].shape[1]], plain[0])
-    np.testing.assert_array_equal(both[0][:, plain[0].shape[1] :], beside.hidden(found, len(plain[0])))
+    assert both[0][:, : plain[0].shape[1]] == pytest.approx(plain[0])
+    wanted = beside.hidden_units(posteriors(0), len(plain[0]))
+    assert both[0][:, plain[0].shape[1] :] == pytest.approx(wanted)
     assert both[1] == pytest.approx(plain[1])

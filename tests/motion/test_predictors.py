@@ -18,19 +18,21 @@ from lipmotion.engines.trajectory.experts import NETWORK_SHARE
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.extensions import GROUPS
 from lipmotion.motion.acoustic_network import AcousticNetwork
+from lipmotion.motion.articulation import TABLE_WEIGHT_WITH_PREDICTOR
+from lipmotion.motion.posterior_network import PosteriorNetwork
 from lipmotion.motion.predictors import (
     AUTOMATIC,
     PREDICTORS,
     Predictor,
     PredictorFit,
-    needs_conditions,
+    conditions_of,
     predictor_class,
     predictor_from_arrays,
     suitable_predictor,
 )
 from lipmotion.motion.prior_regression import PriorRegression
 from lipmotion.testing.examples import example, examples, speech, timeline
-from lipmotion.types import ConditionSpectrum, PriorOutput, silent_monitor
+from lipmotion.types import ConditionSpectrum, PriorOutput, TokenPosteriors, silent_monitor
 
 PAGE = Path(__file__).parents[2] / "docs" / "extend" / "predictor.md"
 SMALL = {
@@ -83,7 +85,8 @@ def test_the_trajectory_engine_relies_on_a_predictor_as_far_as_it_is_right(
 ) -> None:
     plain = engine("trajectory", "frames").fit(examples(4), silent_monitor).model
     assert plain.network_share == NETWORK_SHARE
-    assert plain.motion.prior is plain.prior is not None
+    assert plain.motion.prior.contexts is plain.prior.contexts
+    assert plain.motion.prior.weight == TABLE_WEIGHT_WITH_PREDICTOR < plain.prior.weight
     fit = installed.fit
     monkeypatch.setattr(installed, "fit", lambda training: PredictorFit(fit(training).predictor, training.values))
     assert engine("trajectory", "frames").fit(examples(4), silent_monitor).model.network_share == pytest.approx(1)
@@ -91,7 +94,9 @@ def test_the_trajectory_engine_relies_on_a_predictor_as_far_as_it_is_right(
 
 def test_a_model_whose_predictor_is_not_installed_says_so() -> None:
     arrays = {f"{PREFIX}coefficients": np.zeros((40, 2))}
-    with pytest.raises(ModelFormatError, match=r"^no predictor 'frames'; there are: network, prior; install the pack"):
+    with pytest.raises(
+        ModelFormatError, match=r"^no predictor 'frames'; there are: network, posteriors, prior; install the pack"
+    ):
         predictor_from_arrays(arrays, 2)
     with pytest.raises(ValueError, match="prior and frames, required one of them"):
         predictor_from_arrays({**arrays, "prior_sizes": np.zeros(4)}, 2)
@@ -99,7 +104,7 @@ def test_a_model_whose_predictor_is_not_installed_says_so() -> None:
 
 def test_a_name_that_is_none_is_refused_before_the_training(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("trajectory", "selection"):
-        with pytest.raises(InputError, match="no predictor 'frames'; there are: network, prior"):
+        with pytest.raises(InputError, match="no predictor 'frames'; there are: network, posteriors, prior"):
             engine_from_settings(name, settings=["predictor=frames"])
     point = metadata.EntryPoint("frames", "json:dumps", PREDICTORS.group)
     monkeypatch.setitem(PREDICTORS.__dict__, "_installed", {"frames": point})
@@ -113,15 +118,24 @@ def test_the_recordings_choose_where_no_name_is_given() -> None:
     steps = -(-len(one.valid) // 4)
     prior = PriorOutput(np.zeros((steps, 1)), np.zeros((steps, 0), np.float32), np.zeros(steps))
     standing = replace(one, speech=replace(one.speech, prior=prior))
-    heard = replace(one, condition_spectra=(ConditionSpectrum(np.zeros((len(one.valid), 40), np.float16), 1.0, 0.0),))
+    heard = replace(
+        one,
+        valid=np.ones(12_000, bool),
+        condition_spectra=(ConditionSpectrum(np.zeros((len(one.valid), 40), np.float16), 1.0, 0.0),),
+    )
     much = replace(standing, valid=np.ones(48_000, bool), condition_spectra=heard.condition_spectra)
     assert suitable_predictor(AUTOMATIC, [one]) is None
     assert suitable_predictor(AUTOMATIC, [standing]) is PriorRegression
     assert suitable_predictor(AUTOMATIC, [heard]) is AcousticNetwork
     assert suitable_predictor(AUTOMATIC, [much]) is AcousticNetwork
     assert suitable_predictor("prior", [heard]) is PriorRegression
-    assert [needs_conditions(AUTOMATIC, motion_s) for motion_s in (119.9, 120)] == [False, True]
-    assert needs_conditions("prior", 1)
+    assert suitable_predictor(AUTOMATIC, [replace(heard, valid=np.ones(11_999, bool))]) is None
+    spoken = replace(one, speech=replace(one.speech, posteriors=TokenPosteriors(np.zeros((9, 3), np.float16), "", 1)))
+    assert suitable_predictor(AUTOMATIC, [spoken]) is PosteriorNetwork
+    assert suitable_predictor(AUTOMATIC, [spoken, one]) is None
+    assert [conditions_of(AUTOMATIC, motion_s, 4) for motion_s in (119.9, 120)] == [1, 4]
+    assert conditions_of(AUTOMATIC, 1, 0) == 0
+    assert [conditions_of(name, 1, 4) for name in ("network", "posteriors", "prior")] == [0, 1, 4]
 
 
 def test_a_header_names_the_predictor_only_where_it_was_chosen() -> None:

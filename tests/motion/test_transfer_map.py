@@ -10,7 +10,7 @@ import pytest
 from lipmotion.errors import InputError
 from lipmotion.motion.closure import closable_ranges
 from lipmotion.motion.speaker_maps import RANGE_PRIOR_S, SpeakerMap, restfulness
-from lipmotion.motion.transfer_map import composed, measured_speech_s, transfer_map, with_channels
+from lipmotion.motion.transfer_map import REST_PRIOR_S, composed, measured_speech_s, transfer_map, with_channels
 from lipmotion.testing.toy import toy_motion, toy_sentences
 from lipmotion.types import Channel, Example, Features, Motion, Span, Speech, Timeline, Unit
 
@@ -56,10 +56,21 @@ def test_motion_of_the_source_becomes_that_of_the_target() -> None:
         before = np.abs(mine.motion.values - theirs.motion.values).mean(axis=0)
         after = np.abs(mapped - theirs.motion.values).mean(axis=0)
         assert (after < 0.25 * before).all()
-        at_rest = restful(mine) > 1 - 1e-9
-        np.testing.assert_allclose(
-            np.median(mapped[at_rest], axis=0), np.median(theirs.motion.values[at_rest], axis=0), atol=5e-3
-        )
+
+
+@pytest.mark.parametrize("count", [1, 6])
+def test_the_rest_pose_counts_by_the_seconds_of_silence(count: int) -> None:
+    """With S seconds the way from the map of speech to the target's rest pose counts S / (S + 0.5)."""
+    examples = source(count)
+    wanted = target(examples)
+    person = transfer_map(examples, wanted)
+    silences = [restful(each) > 1 - 1e-9 for each in examples]
+    silence_s = sum(map(np.count_nonzero, silences)) / 100
+    for mine, theirs, silence in zip(examples, wanted, silences, strict=True):
+        from_speech = person.offset + person.gain * np.median(mine.motion.values[silence], axis=0)
+        way = np.median(theirs.motion.values[silence], axis=0) - from_speech
+        np.testing.assert_allclose(person.rest, silence_s / (silence_s + REST_PRIOR_S) * way, atol=5e-3)
+        assert np.abs(way).max() > 0.04
 
 
 def test_closed_lips_stay_closed() -> None:

@@ -59,7 +59,7 @@ def test_phones_of_a_recording_say_what_is_known_of_them(
     first = understand(toy_model, request)
     result = animate(request, model=toy_model)
     write(result, tmp_path / name)
-    given = SpeechRequest(toy_sentence.audio, units=read_units(tmp_path / name))
+    given = SpeechRequest(toy_sentence.audio, units=read_units(tmp_path / name), recogniser="own")
     again = understand(toy_model, given)
     assert (
         (again.units_known, again.confidence)

@@ -71,7 +71,7 @@ def is_like_ben(model: Model, sentence: ToySentence, onto: Onto, **more: str) ->
     own, mapped = animate(request(sentence), model=model), animate(request(sentence, onto, **more), model=model)
     wanted = OFFSET + GAIN * toy_motion(sentence.units, 100.0).values
     ranges = [np.ptp(np.percentile(values, [2, 98], axis=0), axis=0) for values in (mapped.motion.values, wanted)]
-    np.testing.assert_allclose(ranges[0] / ranges[1], 1, atol=0.25)
+    np.testing.assert_allclose(ranges[0] / ranges[1], 1, atol=0.3)
     assert np.abs(np.median(mapped.motion.values, axis=0) - np.median(wanted, axis=0)).max() < 0.03
     for name in own.motion.names:
         assert np.corrcoef(own.motion[name], mapped.motion[name])[0, 1] > 0.98

@@ -24,11 +24,12 @@ DEFAULT = "trajectory"
 """The engine that is used where none is named."""
 
 
-def engine_named(name: str, configuration: Mapping[str, Any] | None = None) -> Engine[Any]:
+def engine_named(name: str, configuration: Mapping[str, Any] | None = None, *, stored: bool = False) -> Engine[Any]:
     """Return an engine with its configuration.
 
     name          : ``trajectory``, ``coupled``, ``joint``, or the name of an engine of an installed package
     configuration : values of options, by name; all others have their default values
+    stored        : the header of a model holds these options: others have the values that headers leave out
     Raises InputError: no such engine or option, or a value that is not allowed.
 
     >>> engine = engine_named("trajectory", {"components": 8})
@@ -36,8 +37,9 @@ def engine_named(name: str, configuration: Mapping[str, Any] | None = None) -> E
     ('trajectory', 8, 5)
     """
     chosen = _class_of(name)
+    parsed = chosen.Config.stored if stored else chosen.Config.parsed
     try:
-        return _create(chosen, chosen.Config.parsed(configuration or {}))
+        return _create(chosen, parsed(configuration or {}))
     except InputError as error:
         raise InputError(f"engine {name!r}: {error}") from error
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, ClassVar, final
 
@@ -12,25 +12,22 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.motion.network_steps import (
-    LEAST_DEVIATION,
     STEP,
     NetworkShape,
     between_steps,
     checked_scale,
+    error_variances,
     random_piece,
+    spectrum_steps,
+    standard_poses,
 )
-from lipmotion.motion.posterior_network import (
-    POSTERIOR_ARRAYS,
-    PosteriorNetwork,
-    fit_posterior_network,
-    posterior_network_from_arrays,
-)
+from lipmotion.motion.posterior_network import PosteriorNetwork, have_posteriors
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining
+from lipmotion.motion.reliability import clearness
 from lipmotion.motion.speaker_knowledge import strangeness
 from lipmotion.stats.convolution import ConvolutionalNetwork, TrainingPlan, TrainingSequence
-from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays
-from lipmotion.types import SPECTRUM_BANDS, ConditionSpectrum, Example, Speech
+from lipmotion.types import SPECTRUM_BANDS, ConditionSpectrum, Speech, sub_monitor
 
 Array = NDArray[np.float64]
 SHAPE = NetworkShape("network", "network", STEP * SPECTRUM_BANDS, 192, (1, 2, 4, 8, 1, 2, 4, 8))
@@ -38,11 +35,14 @@ SHAPE = NetworkShape("network", "network", STEP * SPECTRUM_BANDS, 192, (1, 2, 4,
 BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED = 16, 2e-3, 0.3, 0
 LEAST_STEPS = 600
 """Least number of optimiser steps: with few recordings, each is used more often."""
-SURE_POSTERIORS = (0.75, 0.9)
-"""The network that knows posteriors has no share at the first mean posterior, all of its share at the second one: it is
+LEAST_MOTION_S = 120.0
+"""Seconds of measured motion from which on a network is trained."""
+POSTERIOR_SHARES = (0.7, 1.0)
+"""Share of the network that knows posteriors, for a voice that training knows and for one that it does not. It is
 trained on clean speech, the other one in noise and rooms."""
-POSTERIOR_SHARES = (0.3, 1.0)
-"""Share of the network that knows posteriors, for a voice that training knows and for one that it does not."""
+SURE_POSTERIORS = (0.75, 0.9)
+"""For an unknown voice it has no share at the first mean posterior, all of its share at the second one. A known voice
+has all of it in a clear recording, too."""
 
 TARGETS = {
     "network_targets": ArraySpec(np.float64, "2 Q", -1e6, 1e6),
@@ -53,13 +53,12 @@ TARGETS = {
 @final
 @dataclass(frozen=True, eq=False)
 class AcousticNetwork(Predictor):
-    """A network from spectra to motion, and beside it one from the posteriors of a phone recogniser.
+    """A network from spectra to motion in noise and rooms, and one beside it that knows posteriors of phones.
 
     network   : its outputs are Q standardised dimensions of motion, and the distortion of the sound
     mean, scale : mean and standard deviation of the motion in training [each shape=(Q,)]
     variances : of the error of static value, Δ and Δ² in training [shape=(3, Q)]
     beside    : the network that knows posteriors (None: no phone recogniser was installed in training)
-    Spectra tell more of a voice that training knows, posteriors more of any other: ``POSTERIOR_SHARES``.
     """
 
     network: ConvolutionalNetwork
@@ -68,8 +67,13 @@ class AcousticNetwork(Predictor):
     variances: Array
     beside: PosteriorNetwork | None = None
     name: ClassVar[str] = "network"
-    ARRAYS: ClassVar[Mapping[str, ArraySpec]] = SHAPE.specs | TARGETS | POSTERIOR_ARRAYS
-    least_motion_s: ClassVar[float] = 120.0
+    ARRAYS: ClassVar[Mapping[str, ArraySpec]] = SHAPE.specs | TARGETS
+    CONTAINS: ClassVar[frozenset[str]] = frozenset({PosteriorNetwork.name})
+
+    @classmethod
+    def conditions(cls, motion_s: float, most: int) -> int:
+        """Return all conditions, or 0 with too little motion for a network."""
+        return most if motion_s >= LEAST_MOTION_S else 0
 
     @classmethod
     def fit(cls, training: PredictorTraining) -> PredictorFit:
@@ -78,18 +82,20 @@ class AcousticNetwork(Predictor):
         Each example is used in one of its conditions, drawn at random, at a time.
         Raises CorpusError: an example without acoustic conditions.
         """
-        examples, values = training.examples, training.values
+        examples = training.examples
         if not all(example.condition_spectra for example in examples):
             raise CorpusError(
-                f"examples without acoustic conditions; a network is trained on {cls.least_motion_s:g} s of measured "
+                f"examples without acoustic conditions; a network is trained on {LEAST_MOTION_S:g} s of measured "
                 "motion or more, with the option conditions from 1"
             )
-        poses = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
-        mean, scale = poses.mean(axis=0), np.maximum(poses.std(axis=0), LEAST_DEVIATION)
-        network = _trained(training, mean, scale)
+        mean, scale = standard_poses(training)
+        network = _trained(replace(training, monitor=sub_monitor(training.monitor, 0, 0.8)), mean, scale)
         trained = cls(network, mean, scale, np.ones((3, len(mean))))
-        beside = fit_posterior_network(training, mean, scale)
-        return PredictorFit(cls(network, mean, scale, _error_variances(trained, examples, values), beside))
+        predicted = (trained._predict(example.condition_spectra[0].values)[0] for example in examples)
+        variances = error_variances(training, predicted, scale)
+        last = replace(training, monitor=sub_monitor(training.monitor, 0.8, 1))
+        beside = PosteriorNetwork.trained(last) if have_posteriors(examples) else None
+        return PredictorFit(cls(network, mean, scale, variances, beside))
 
     def can_predict(self, speech: Speech) -> bool:
         """Return whether speech has a spectrum."""
@@ -107,15 +113,15 @@ class AcousticNetwork(Predictor):
         network, posteriors = self.beside, speech.posteriors
         if network is None or posteriors is None:
             return motion, distortion
-        beside = speech.once(network, lambda: network.predict(posteriors, len(motion)))
-        known, unknown = POSTERIOR_SHARES
-        sure = np.clip((posteriors.mean - SURE_POSTERIORS[0]) / (SURE_POSTERIORS[1] - SURE_POSTERIORS[0]), 0, 1)
-        share = sure * (known + strangeness(speech.voice) * (unknown - known))
-        return motion + share * (beside - motion), distortion
+        (known, unknown), (none, full) = POSTERIOR_SHARES, SURE_POSTERIORS
+        strange, sure = strangeness(speech.voice), np.clip((posteriors.mean - none) / (full - none), 0, 1)
+        fitting = sure + (1 - strange) * np.maximum(clearness(distortion) - sure, 0)
+        share = (fitting * (known + strange * (unknown - known)))[:, None]
+        return motion + share * (network.predict(speech)[0] - motion), distortion
 
     def _predict(self, spectrum: NDArray[np.floating]) -> tuple[Array, Array]:
         """Return motion and distortion, from a normalised log mel spectrum [shape=(T, 40)]."""
-        steps = self.network(_steps(spectrum)).astype(float)
+        steps = self.network(spectrum_steps(spectrum)).astype(float)
         outputs = between_steps(steps, len(spectrum))
         return outputs[:, :-1] * self.scale + self.mean, np.clip(outputs[:, -1], 0, 1)
 
@@ -127,11 +133,11 @@ class AcousticNetwork(Predictor):
         """
         if speech.spectrum is None:
             return None
-        hidden = self.network.hidden(_steps(speech.spectrum))
+        hidden = self.network.hidden(spectrum_steps(speech.spectrum))
         output = self.network.output
         distortion = np.clip(hidden @ output.weights[:, -1].astype(float) + output.biases[-1], 0, 1)
         if self.beside is not None and speech.posteriors is not None:
-            hidden = np.concatenate([hidden, self.beside.hidden(speech.posteriors, len(hidden))], axis=1)
+            hidden = np.concatenate([hidden, self.beside.hidden_units(speech.posteriors, len(hidden))], axis=1)
         return hidden, distortion
 
     def arrays(self) -> dict[str, NDArray[Any]]:
@@ -148,7 +154,8 @@ class AcousticNetwork(Predictor):
         stored = checked_arrays(arrays, TARGETS, Q=dimensions)
         mean, scale = stored["network_targets"]
         network = SHAPE.from_arrays(arrays, dimensions + 1)
-        beside = posterior_network_from_arrays(arrays, dimensions)
+        found = not arrays.keys().isdisjoint(PosteriorNetwork.ARRAYS)
+        beside = PosteriorNetwork.from_arrays(arrays, dimensions) if found else None
         return cls(network, mean, checked_scale(scale, "network_targets"), stored["network_variances"], beside)
 
 
@@ -171,29 +178,10 @@ def _trained(training: PredictorTraining, mean: Array, scale: Array) -> Convolut
     return SHAPE.trained(training, len(mean) + 1, draw, plan)
 
 
-def _steps(spectrum: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Return the frames around every time step, concatenated [shape=(ceil(T / 4), 160)]."""
-    centres = np.arange(0, len(spectrum), STEP)
-    frames = np.clip(centres[:, None] + np.arange(STEP) - STEP // 2, 0, len(spectrum) - 1)
-    return spectrum[frames].reshape(len(centres), -1).astype(np.float32)
-
-
 def _sequence(version: ConditionSpectrum, targets: Array, valid: NDArray[np.bool_]) -> TrainingSequence:
     """Return inputs and targets of a whole recording in time steps; inputs at half precision."""
-    inputs = _steps(version.values).astype(np.float16)
+    inputs = spectrum_steps(version.values).astype(np.float16)
     frames = np.minimum(np.round(np.arange(len(inputs)) * STEP * version.tempo).astype(int), len(targets) - 1)
     distortion = np.full((len(inputs), 1), version.distortion)
     outputs = np.concatenate([targets[frames], distortion], axis=1).astype(np.float32)
     return TrainingSequence(inputs, outputs, valid[frames])
-
-
-def _error_variances(acoustic: AcousticNetwork, examples: Sequence[Example], values: Sequence[Array]) -> Array:
-    """Return the variances of the error of static value, Δ and Δ² in the examples as recorded [shape=(3, Q)]."""
-    squares, count = np.zeros((3, len(acoustic.mean))), 0
-    for example, x in zip(examples, values, strict=True):
-        frames = dynamics_known(example.valid)
-        predicted, _ = acoustic._predict(example.condition_spectra[0].values)
-        squares += np.square(with_dynamics(x - predicted)[frames]).sum(axis=0)
-        count += int(frames.sum())
-    floor = 1e-4 * np.square(acoustic.scale) + 1e-12
-    return np.maximum(squares / max(count, 1), floor)

@@ -16,6 +16,7 @@ from lipmotion.motion.articulation import (
 from lipmotion.motion.closure import OPENING, Closure
 from lipmotion.motion.generation import LearnedMotion
 from lipmotion.motion.limits import MotionLimits, check_poses
+from lipmotion.motion.modulation_filter import MODULATION, filter_arrays, filter_from_arrays
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.variance_scaling import VarianceScaling
 from lipmotion.stats.pca import Pca, check_orthonormal
@@ -45,27 +46,39 @@ def motion_arrays(
 
 
 def learned_motion_arrays(motion: LearnedMotion) -> dict[str, NDArray[Any]]:
-    """Serialise learned motion, with its limits and its variance scaling.
+    """Serialise learned motion, with its limits, its variance scaling and its modulation filter.
 
-    For engines that do not store limits and scaling in arrays of their own.
+    For engines that do not store these in arrays of their own.
     """
     arrays = motion_arrays(PHONE_SET, motion.space, motion.closure, motion.prior) | {"limits": np.stack(motion.limits)}
-    return arrays | ({"scaling": np.stack(motion.scaling)} if motion.scaling is not None else {})
+    return arrays | scaling_arrays(motion.scaling) | filter_arrays(motion.modulation)
 
 
-def learned_motion_from_arrays(arrays: Arrays) -> LearnedMotion:
+def scaling_arrays(scaling: VarianceScaling | None) -> dict[str, NDArray[Any]]:
+    """Serialise variance scaling; None has no arrays."""
+    return {"scaling": np.stack(scaling)} if scaling is not None else {}
+
+
+def scaling_from_arrays(arrays: Arrays, dimensions: int) -> VarianceScaling | None:
+    """Deserialise what ``scaling_arrays`` returned. Raises ValueError: a wrong shape, type or range."""
+    if "scaling" not in arrays:
+        return None
+    return VarianceScaling(*checked_arrays(arrays, SCALING, Q=dimensions)["scaling"])
+
+
+def learned_motion_from_arrays(arrays: Arrays, *, filtered: bool = False) -> LearnedMotion:
     """Deserialise what ``learned_motion_arrays`` returned; other arrays are ignored.
 
+    filtered : there must be a modulation filter
     Raises ModelFormatError: an array is missing, or has a wrong shape, type or range.
     """
     with format_errors("the learned motion"):
         _, space, closure, prior = motion_from_arrays(arrays, PHONE_SET.name)
         limits = MotionLimits(*checked_arrays(arrays, LIMITS, Q=space.dimensions)["limits"])
         check_poses(limits, space, closure)
-        scaling = None
-        if "scaling" in arrays:
-            scaling = VarianceScaling(*checked_arrays(arrays, SCALING, Q=space.dimensions)["scaling"])
-        return LearnedMotion(space, closure, limits, scaling, prior)
+        scaling = scaling_from_arrays(arrays, space.dimensions)
+        modulation = filter_from_arrays(arrays, space.dimensions, needed=filtered)
+        return LearnedMotion(space, closure, limits, scaling, prior, modulation)
 
 
 def motion_from_arrays(
@@ -103,7 +116,7 @@ LIMITS = {"limits": ArraySpec(np.float64, "2 Q")}
 SCALING = {"scaling": ArraySpec(np.float64, "2 Q")}
 MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *UNITS, *ARTICULATION)
 """Names of the arrays of ``motion_arrays``: P channels, of which R are reduced to K dimensions."""
-LEARNED_MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *LIMITS, *SCALING, *ARTICULATION)
+LEARNED_MOTION_ARRAYS = (*CHANNELS, *POINTS, *CLOSURE, *LIMITS, *SCALING, *ARTICULATION, *MODULATION)
 """Names of the arrays of ``learned_motion_arrays``."""
 
 

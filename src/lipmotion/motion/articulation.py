@@ -44,7 +44,9 @@ RIDGE = 1e-2
 """Ridge parameter of the map from articulators to the motion space, as a share of the number of frames."""
 LEAST_DEVIATION = 1e-6
 TABLE_WEIGHT = 4.0
-"""Weight of the table beside a model's own means, in a context that training never saw."""
+"""Weight of the table beside the means of states, in a context that training never saw."""
+TABLE_WEIGHT_WITH_PREDICTOR = 1.0
+"""The same where a predictor that asks for no context stands beside the states."""
 POWER = 3
 """The weight of the table grows with this power of the reliability, for phones that are wrong make contexts unknown,
 and of how unknown a context is: the table has a third of the weight where training saw the context once, an eighth
@@ -60,11 +62,13 @@ class ArticulationPrior:
     centre   : the pose of which the table gives deviations: the median in speech [shape=(Q,)]
     matrix   : change of the motion space with each articulator, per standard deviation of the speaker [shape=(8, Q)]
     contexts : occurrences in training of each phone between its neighbours; pauses count as silence
+    weight   : of the table beside a model's own means, in a context that training never saw
     """
 
     centre: Array
     matrix: Array
     contexts: Mapping[Context, int]
+    weight: float = TABLE_WEIGHT
 
     def trajectory(self, units: Timeline[Unit], frames: int, reliability: Array | float = 1.0) -> Array:
         """Return the motion of phones in time, in the motion space [shape=(frames, Q)].
@@ -100,7 +104,7 @@ class ArticulationPrior:
         """
         values = self.trajectory(units, frames)
         unknown = 1 - self.familiarity(units, frames)
-        weight = TABLE_WEIGHT * (np.asarray(reliability) * unknown) ** POWER
+        weight = self.weight * (np.asarray(reliability) * unknown) ** POWER
         share = (weight / (1 + weight))[:, None, None]
 
         def drawn(chosen: slice) -> Statistics:

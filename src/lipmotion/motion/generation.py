@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from lipmotion.motion.closure import OPENING, REACH_S, Closure, closable_ranges,
 from lipmotion.motion.limits import MotionLimits
 from lipmotion.motion.modulation_filter import ModulationFilter
 from lipmotion.motion.space import MotionSpace
+from lipmotion.motion.speaker_knowledge import strangeness
 from lipmotion.motion.unknown_voice import closing_reach_s, typical_range, with_contrast, with_open_vowels
 from lipmotion.motion.variance_scaling import VarianceScaling
 from lipmotion.types import (
@@ -60,6 +61,19 @@ class LearnedMotion:
     scaling: VarianceScaling | None = None
     prior: ArticulationPrior | None = None
     modulation: ModulationFilter | None = None
+
+    def for_voice(self, voice: float) -> LearnedMotion:
+        """Return the same with a modulation filter that is weaker, the less training knows the voice.
+
+        voice : how well training knows it, 0 to 1; without a filter, or at 1, nothing changes
+        Where much of the motion is wrong, fast movement makes it worse: of width, first of all (docs/results/jerk.md).
+        """
+        if self.modulation is None or voice == 1:
+            return self
+        strength = np.full(self.space.dimensions, 1 - strangeness(voice))
+        if "width" in self.space.direct_names:
+            strength[self.space.direct_names.index("width")] **= 2
+        return replace(self, modulation=self.modulation.of_strength(strength))
 
     def generate(  # noqa: PLR0913
         self,
@@ -191,7 +205,7 @@ def _generated(
         _close_lips(closure, ranges, statistics, pins, (values, variance))
     if modulation is not None:
         closed = [r.start + int(values[r, closure.column].argmin()) for r in ranges] if closure is not None else []
-        values = modulation.apply(values, [*closed, *(frame for frame, _ in pins)])
+        values = modulation.apply(values, closed, pins)
     if closure is not None:
         opening = values[:, closure.column]
         np.maximum(opening, 0, out=opening)  # a smooth curve through a closure may overshoot

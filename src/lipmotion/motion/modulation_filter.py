@@ -8,15 +8,16 @@ taken out of the spectrum that is aimed at.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.motion.rest import away_from_speech, runs, speech_intervals
 from lipmotion.stats.modulation_spectrum import modulation_spectrum
 from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays
-from lipmotion.types import FRAME_RATE_HZ
+from lipmotion.types import FRAME_RATE_HZ, Example, Rule
 
 Array = NDArray[np.float64]
 REACH = 24
@@ -32,6 +33,8 @@ RESTING_FRAMES = 500
 """Without so many frames of a resting mouth the noise is not known, and not taken out."""
 HOLD_FRAMES = 5
 """Frames on both sides of a held one over which the filter fades in."""
+STRENGTH = Rule(least=0, most=2)
+"""Strengths that the engines' option ``modulation_filter`` allows."""
 
 
 class ModulationFilter(NamedTuple):
@@ -42,28 +45,64 @@ class ModulationFilter(NamedTuple):
 
     taps: Array
 
-    def of_strength(self, strength: float) -> ModulationFilter:
-        """Return a filter between none (0) and this one (1), or beyond it."""
+    def of_strength(self, strength: float | Array) -> ModulationFilter:
+        """Return a filter between none (0) and this one (1), or beyond it; a strength, or one of each dimension."""
         none = np.zeros_like(self.taps)
         none[REACH] = 1
         return ModulationFilter(none + strength * (self.taps - none))
 
-    def apply(self, values: Array, held: Collection[int] = ()) -> Array:
+    def apply(self, values: Array, held: Collection[int] = (), pins: Collection[tuple[int, int]] = ()) -> Array:
         """Return filtered motion [shape=(T, Q)].
 
         values : generated motion at 100 Hz [shape=(T, Q)]; before its start and after its end it stands still
-        held   : frames that stay exactly as they are: pins, and closed lips
+        held   : frames that stay exactly as they are: closed lips
+        pins   : frames and dimensions that stay exactly as they are
         """
         padded = np.pad(values, ((REACH, REACH), (0, 0)), mode="edge")
-        change = -values
+        change, weight = -values, np.ones_like(values)
         for tap in range(2 * REACH + 1):
             change += self.taps[tap] * padded[tap : tap + len(values)]
-        frames = np.arange(len(values))
-        weight = np.ones(len(values))
-        for frame in held:
+        frames = np.arange(len(values))[:, None]
+        for frame, dimensions in [*((f, slice(None)) for f in held), *((f, slice(q, q + 1)) for f, q in pins)]:
             near = slice(max(frame - HOLD_FRAMES, 0), frame + HOLD_FRAMES)
-            weight[near] = np.minimum(weight[near], np.abs(frames[near] - frame) / HOLD_FRAMES)
-        return values + weight[:, None] * change
+            weight[near, dimensions] = np.minimum(weight[near, dimensions], np.abs(frames[near] - frame) / HOLD_FRAMES)
+        return values + weight * change
+
+
+def learned_filter(
+    strength: float,
+    compared: Iterable[tuple[NDArray[Any], NDArray[Any]]],
+    examples: Sequence[Example],
+    values: Sequence[Array],
+) -> ModulationFilter | None:
+    """Return the filter that an engine learns in training; None: it has no strength.
+
+    strength : 0: none; 1: generated motion gets the modulation spectrum of recorded motion; more goes beyond it
+    compared : recorded and generated motion of clips [each shape=(T_i, Q)]; not asked for where there is no strength.
+               Without any, the filter changes nothing
+    examples : all of the training, which show the tracker's noise
+    values   : their motion in the motion space [each shape=(T, Q)]
+    """
+    if not strength:
+        return None
+    pairs = list(compared)
+    if not pairs:
+        return fit_modulation_filter(values, values)
+    recorded, generated = zip(*pairs, strict=True)
+    return fit_modulation_filter(recorded, generated, resting_motion(examples, values)).of_strength(strength)
+
+
+def resting_motion(examples: Sequence[Example], values: Sequence[Array]) -> list[Array]:
+    """Return recorded motion in silence, further than ``RESTING_MARGIN_S`` from speech [each shape=(N_i, Q)].
+
+    values : motion of the examples in the motion space [each shape=(T, Q)]
+    """
+    found = []
+    for example, x in zip(examples, values, strict=True):
+        time_s, speech_s = np.arange(len(x)) / FRAME_RATE_HZ, speech_intervals(example.speech.units)
+        far = example.valid & away_from_speech(time_s, speech_s, RESTING_MARGIN_S)
+        found += [x[start:stop] for start, stop in runs(far)]
+    return found
 
 
 def fit_modulation_filter(
@@ -113,8 +152,12 @@ def filter_arrays(modulation: ModulationFilter | None) -> dict[str, NDArray[Any]
     return {} if modulation is None else {"modulation": modulation.taps}
 
 
-def filter_from_arrays(arrays: Arrays, dimensions: int) -> ModulationFilter | None:
-    """Deserialise what ``filter_arrays`` returned. Raises ValueError: a wrong shape, type or range."""
-    if "modulation" not in arrays:
+def filter_from_arrays(arrays: Arrays, dimensions: int, *, needed: bool = False) -> ModulationFilter | None:
+    """Deserialise what ``filter_arrays`` returned.
+
+    needed : there must be a filter
+    Raises KeyError, ValueError: it is missing, or has a wrong shape, type or range.
+    """
+    if "modulation" not in arrays and not needed:
         return None
     return ModulationFilter(checked_arrays(arrays, MODULATION, N=2 * REACH + 1, Q=dimensions)["modulation"])

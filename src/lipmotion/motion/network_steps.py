@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -19,6 +19,7 @@ from lipmotion.stats.convolution import (
     fit_network,
     initial_network,
 )
+from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
 from lipmotion.storage.schema import LARGEST_MEAN, Arrays, ArraySpec, checked_arrays
 from lipmotion.types import Progress
 
@@ -29,6 +30,8 @@ STEP = 4
 DIRECT_WEIGHT = 4.0
 """Weight, in training, of the error of a channel that is modelled as it is; that of a principal component is 1."""
 LEAST_DEVIATION = 1e-6
+REPORTED_STEPS = 100
+"""Progress of training is reported after so many optimiser steps."""
 LONGEST_STEPS = 250
 """Longer recordings are cut into pieces of so many time steps, 10 s, for training."""
 
@@ -45,6 +48,33 @@ def between_steps(steps: Array, frames: int) -> Array:
     return here + u / 2 * (
         after - before + u * (2 * before - 5 * here + 4 * after - last + u * (3 * (here - after) + last - before))
     )
+
+
+def spectrum_steps(spectrum: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Return the frames around every time step, concatenated [shape=(ceil(T / 4), 160)]; spectrum [shape=(T, 40)]."""
+    centres = np.arange(0, len(spectrum), STEP)
+    frames = np.clip(centres[:, None] + np.arange(STEP) - STEP // 2, 0, len(spectrum) - 1)
+    return spectrum[frames].reshape(len(centres), -1).astype(np.float32)
+
+
+def standard_poses(training: PredictorTraining) -> tuple[Array, Array]:
+    """Return mean and standard deviation of the measured motion, which standardise it [each shape=(Q,)]."""
+    poses = np.concatenate([x[example.valid] for x, example in zip(training.values, training.examples, strict=True)])
+    return poses.mean(axis=0), np.maximum(poses.std(axis=0), LEAST_DEVIATION)
+
+
+def error_variances(training: PredictorTraining, predicted: Iterable[Array], scale: Array) -> Array:
+    """Return the variances of the error of static value, Δ and Δ² in the examples [shape=(3, Q)].
+
+    predicted : motion of each example [each shape=(T, Q)]
+    scale     : standard deviation of the motion [shape=(Q,)]; the variances are not much smaller
+    """
+    squares, count = np.zeros((3, len(scale))), 0
+    for example, x, motion in zip(training.examples, training.values, predicted, strict=True):
+        frames = dynamics_known(example.valid)
+        squares += np.square(with_dynamics(x - motion)[frames]).sum(axis=0)
+        count += int(frames.sum())
+    return np.maximum(squares / max(count, 1), 1e-4 * np.square(scale) + 1e-12)
 
 
 def random_piece(sequence: TrainingSequence, rng: np.random.Generator) -> TrainingSequence:
@@ -127,8 +157,10 @@ class NetworkShape:
         weights[: training.direct] = DIRECT_WEIGHT
 
         def report(step: int, error: float) -> None:
-            if step % 50 == 0 or step == plan.steps:
-                training.monitor(Progress(f"training the {self.name}", step, plan.steps, error))
+            if step % REPORTED_STEPS == 0 or step == plan.steps:
+                training.monitor(
+                    Progress(f"training the {self.name}", step, plan.steps, step / plan.steps, figure=error)
+                )
 
         start = initial_network(self.inputs, self.hidden_units, outputs, self.dilations, plan.seed)
         network = fit_network(start, draw, len(training.examples), weights, plan, report)

@@ -1,27 +1,37 @@
-"""Posterior networks: motion from the posteriors of a phone recogniser, which are much the same for every speaker."""
+"""Posterior networks: motion from the posteriors of a phone recogniser, and from the spectrum of a voice that is known.
+
+Posteriors are much the same for every speaker. Spectra tell more, but of the voices of the training alone: in a part of
+the training they are switched off, so that one network does both.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from typing import Any, ClassVar, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError
+from lipmotion.errors import CorpusError, InputError, ModelFormatError
 from lipmotion.motion.network_steps import (
     LEAST_DEVIATION,
     STEP,
     NetworkShape,
     between_steps,
     checked_scale,
+    error_variances,
     random_piece,
+    spectrum_steps,
+    standard_poses,
 )
-from lipmotion.motion.predictors import PredictorTraining
+from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining
+from lipmotion.motion.speaker_knowledge import strangeness
 from lipmotion.stats.convolution import ConvolutionalNetwork, TrainingPlan, TrainingSequence
-from lipmotion.storage.schema import LARGEST_MEAN, Arrays, ArraySpec, checked_arrays
-from lipmotion.types import TokenPosteriors
+from lipmotion.storage.schema import LARGEST_MEAN, POSITIVE, Arrays, ArraySpec, checked_arrays
+from lipmotion.types import FRAME_RATE_HZ, SPECTRUM_BANDS, Example, Speech, TokenPosteriors
 
 Array = NDArray[np.float64]
 ROWS = 2
@@ -33,9 +43,15 @@ LEAST_LOG_POSTERIOR = -12.0
 """Smaller logarithms count as this: the network does not mean them."""
 INPUT_SCALE = 2.0
 """Standard deviation of the first principal component as input; the others keep their proportions to it."""
-SHAPE = NetworkShape("posterior", "posterior-network", ROWS * COMPONENTS, 96, (1, 2, 4, 1, 2, 4))
-"""Its input is 0.56 s before and after a frame."""
-PLAN = TrainingPlan(steps=800, batch_size=16, rate=2e-3, dropout=0.4, seed=0)
+SPECTRUM = STEP * SPECTRUM_BANDS
+"""The first inputs of a time step: the spectrum."""
+SPECTRUM_OFF = 0.3
+"""Share of the training in which the spectrum is switched off (0)."""
+SHAPE = NetworkShape("posterior", "posterior-network", SPECTRUM + ROWS * COMPONENTS, 128, (1, 2, 4, 8, 1, 2, 4))
+"""Its input is 0.88 s before and after a frame."""
+BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED = 16, 2e-3, 0.4, 0
+STEPS = 50.0
+"""Optimiser steps by the square root of the seconds of motion: 390 for a minute, 1,800 for 22 minutes."""
 LARGEST_COMPONENT = 100.0
 """More is in no basis."""
 
@@ -43,18 +59,20 @@ TARGETS = {
     "posterior_mean": ArraySpec(np.float32, "K", -LARGEST_MEAN, LARGEST_MEAN),
     "posterior_basis": ArraySpec(np.float32, f"K {COMPONENTS}", -LARGEST_COMPONENT, LARGEST_COMPONENT),
     "posterior_targets": ArraySpec(np.float64, "2 Q", -1e6, 1e6),
+    "posterior_variances": ArraySpec(np.float64, "3 Q", POSITIVE),
     "posterior_source": ArraySpec(np.str_, "1"),
 }
-POSTERIOR_ARRAYS = SHAPE.specs | TARGETS
 
 
+@final
 @dataclass(frozen=True, eq=False)
-class PosteriorNetwork:
-    """A network from posteriors to motion.
+class PosteriorNetwork(Predictor):
+    """A network from posteriors and spectra to motion.
 
     network     : its outputs are Q standardised dimensions of motion
     mean, basis : of the logarithms of the posteriors [shape=(K,)], and from them to the inputs [shape=(K, 120)]
     centre, scale : mean and standard deviation of the motion in training [each shape=(Q,)]
+    variances   : of the error of static value, Δ and Δ² in training [shape=(3, Q)]
     source      : name, version and digest of the phone recogniser (``TokenPosteriors.source``)
     """
 
@@ -63,76 +81,162 @@ class PosteriorNetwork:
     basis: NDArray[np.float32]
     centre: Array
     scale: Array
+    variances: Array
     source: str
+    name: ClassVar[str] = "posteriors"
+    ARRAYS: ClassVar[Mapping[str, ArraySpec]] = SHAPE.specs | TARGETS
 
-    def predict(self, posteriors: TokenPosteriors, frames: int) -> Array:
-        """Return motion in the motion space [shape=(frames, Q)].
+    @classmethod
+    def conditions(cls, motion_s: float, most: int) -> int:  # noqa: ARG003
+        """Return 1: the network is trained on recordings as they are; 0 where spectra are not wanted."""
+        return min(most, 1)
 
-        Raises InputError: posteriors of another phone recogniser than that of the training.
+    @classmethod
+    def fit(cls, training: PredictorTraining) -> PredictorFit:
+        """Return the network of ``trained``. Raises CorpusError."""
+        return PredictorFit(cls.trained(training))
+
+    @classmethod
+    def trained(cls, training: PredictorTraining) -> PosteriorNetwork:
+        """Return a network that is trained on examples as recorded; without spectra where one of them has none.
+
+        Raises CorpusError: an example without posteriors.
         """
-        steps = self.network(self._inputs(posteriors)).astype(float)
-        return between_steps(steps, frames) * self.scale + self.centre
+        found = _posteriors_of(training.examples)
+        if found is None:
+            raise CorpusError(
+                "examples without posteriors, which the predictor posteriors needs; train with the recogniser auto"
+            )
+        centre, scale = standard_poses(training)
+        rows = [_limited(posteriors) for posteriors in found]
+        mean, basis = _principal_components(rows)
+        spectra = _spectra_of(training.examples)
+        inputs = [_inputs(row, x, mean, basis) for row, x in zip(rows, spectra, strict=True)]
+        network = _trained(training, inputs, centre, scale)
+        predicted = (
+            between_steps(network(x).astype(float), len(values)) * scale + centre
+            for x, values in zip(inputs, training.values, strict=True)
+        )
+        variances = error_variances(training, predicted, scale)
+        return cls(network, mean, basis, centre, scale, variances, found[0].source)
 
-    def hidden(self, posteriors: TokenPosteriors, steps: int) -> NDArray[np.float32]:
-        """Return the last hidden layer in every time step [shape=(steps, H)]; raises InputError as ``predict``."""
-        rows = self.network.hidden(self._inputs(posteriors))
+    def can_predict(self, speech: Speech) -> bool:
+        """Return whether speech has posteriors."""
+        return speech.posteriors is not None
+
+    def predict(self, speech: Speech) -> tuple[Array, Array]:
+        """Return motion in the motion space [shape=(T, Q)], and no distortion: 0 [shape=(T,)].
+
+        The spectrum counts as far as training knows the voice.
+        Raises InputError: speech without posteriors, or with those of another phone recogniser than in training.
+        """
+        posteriors, frames = self._checked(speech.posteriors), len(speech.features.values)
+        share = 0.0 if speech.spectrum is None else 1 - strangeness(speech.voice)
+        motion = np.zeros((frames, len(self.centre)))
+        for spectrum, weight in ((None, 1 - share), (speech.spectrum, share)):
+            if weight > 0:
+                key, predict = (self, spectrum is None), partial(self._predict, posteriors, spectrum, frames)
+                motion += weight * speech.once(key, predict)
+        return motion, np.zeros(frames)
+
+    def hidden_units(self, posteriors: TokenPosteriors, steps: int) -> NDArray[np.float32]:
+        """Return the last hidden layer in every time step, without the spectrum [shape=(steps, H)].
+
+        Raises InputError: posteriors of another phone recogniser than in training.
+        """
+        inputs = _inputs(_limited(self._checked(posteriors)), None, self.mean, self.basis)
+        rows = self.network.hidden(inputs)
         return rows[np.minimum(np.arange(steps), len(rows) - 1)]
 
-    def _inputs(self, posteriors: TokenPosteriors) -> NDArray[np.float32]:
-        """Return the inputs in every time step [shape=(ceil(N / 2), 240)]; raises InputError as ``predict``."""
+    def _predict(self, posteriors: TokenPosteriors, spectrum: NDArray[np.floating] | None, frames: int) -> Array:
+        """Return motion in the motion space [shape=(frames, Q)], with the spectrum or without."""
+        steps = self.network(_inputs(_limited(posteriors), spectrum, self.mean, self.basis)).astype(float)
+        return between_steps(steps, frames) * self.scale + self.centre
+
+    def _checked(self, posteriors: TokenPosteriors | None) -> TokenPosteriors:
+        """Return the posteriors; raise InputError where there are none, or those of another phone recogniser."""
+        if posteriors is None:
+            raise InputError("the speech has no posteriors; an engine that uses them says so by ``inputs``")
         if posteriors.source != self.source:
             raise InputError(
                 f"the model was trained with the phone recogniser {self.source}, this one is {posteriors.source}; "
                 f"install that one (pip install {'=='.join(self.source.split()[:2])}), or use the recogniser fast"
             )
-        return _steps(_limited(posteriors), self.mean, self.basis)
+        return posteriors
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Serialise the network, at half precision."""
         arrays = SHAPE.arrays(self.network) | {"posterior_mean": self.mean, "posterior_basis": self.basis}
         return {name: array.astype(np.float16) for name, array in arrays.items()} | {
             "posterior_targets": np.stack([self.centre, self.scale]),
+            "posterior_variances": self.variances,
             "posterior_source": np.array([self.source]),
         }
 
+    @classmethod
+    def from_arrays(cls, arrays: Arrays, dimensions: int) -> PosteriorNetwork:
+        """Deserialise a network; as ``Predictor.from_arrays``. Raises ModelFormatError, too: one of an earlier form."""
+        if "posterior_variances" not in arrays:
+            raise ModelFormatError(
+                "a posterior network without spectra, as of 2026-11-23; required one with spectra: train again"
+            )
+        stored = checked_arrays(arrays, TARGETS, Q=dimensions)
+        centre, scale = stored["posterior_targets"]
+        return cls(
+            SHAPE.from_arrays(arrays, dimensions),
+            stored["posterior_mean"],
+            stored["posterior_basis"],
+            centre,
+            checked_scale(scale, "posterior_targets"),
+            stored["posterior_variances"],
+            str(stored["posterior_source"][0]),
+        )
 
-def fit_posterior_network(training: PredictorTraining, centre: Array, scale: Array) -> PosteriorNetwork | None:
-    """Return a network that is trained on the posteriors of examples; None where one of them has none.
 
-    centre, scale : of the motion [each shape=(Q,)]
-    """
-    found = [example.speech.posteriors for example in training.examples]
+def have_posteriors(examples: Sequence[Example]) -> bool:
+    """Return whether a posterior network can be trained on examples: whether all of them have posteriors."""
+    return _posteriors_of(examples) is not None
+
+
+def _posteriors_of(examples: Sequence[Example]) -> list[TokenPosteriors] | None:
+    """Return the posteriors of examples; None where one of them has none."""
+    found = [example.speech.posteriors for example in examples]
     known = [posteriors for posteriors in found if posteriors is not None]
-    if not known or len(known) < len(found):
-        return None
-    rows = [_limited(posteriors) for posteriors in known]
-    mean, basis = _principal_components(rows)
-    pieces = [
-        _sequence(_steps(row, mean, basis), (x - centre) / scale, example.valid)
-        for row, x, example in zip(rows, training.values, training.examples, strict=True)
-    ]
-    network = SHAPE.trained(training, len(centre), lambda rng, number: random_piece(pieces[number], rng), PLAN)
-    return PosteriorNetwork(network, mean, basis, centre, scale, known[0].source)
+    return known if known and len(known) == len(found) else None
 
 
-def posterior_network_from_arrays(arrays: Arrays, dimensions: int) -> PosteriorNetwork | None:
-    """Deserialise a network; None where there is none.
+def _spectra_of(examples: Sequence[Example]) -> list[NDArray[np.floating] | None]:
+    """Return the spectra of examples as recorded; None for all where one of them has none."""
+    if all(example.condition_spectra for example in examples):
+        return [example.condition_spectra[0].values for example in examples]
+    return [None] * len(examples)
 
-    dimensions : of the motion space, Q
-    Raises KeyError, ValueError: an array is missing, or has a wrong shape, type or range.
+
+def _trained(
+    training: PredictorTraining, inputs: Sequence[NDArray[np.float32]], centre: Array, scale: Array
+) -> ConvolutionalNetwork:
+    """Return the trained network.
+
+    inputs : of each example in its time steps [each shape=(N, 400)]
     """
-    if arrays.keys().isdisjoint(POSTERIOR_ARRAYS):
-        return None
-    stored = checked_arrays(arrays, TARGETS, Q=dimensions)
-    centre, scale = stored["posterior_targets"]
-    return PosteriorNetwork(
-        SHAPE.from_arrays(arrays, dimensions),
-        stored["posterior_mean"],
-        stored["posterior_basis"],
-        centre,
-        checked_scale(scale, "posterior_targets"),
-        str(stored["posterior_source"][0]),
-    )
+    pieces = []
+    for rows, x, example in zip(inputs, training.values, training.examples, strict=True):
+        frames = np.minimum(np.arange(len(rows)) * STEP, len(x) - 1)
+        targets = ((x - centre) / scale)[frames].astype(np.float32)
+        pieces.append(TrainingSequence(rows, targets, example.valid[frames]))
+
+    def draw(rng: np.random.Generator, number: int) -> TrainingSequence:
+        piece = random_piece(pieces[number], rng)
+        if rng.random() >= SPECTRUM_OFF:
+            return piece
+        rows = piece.inputs.copy()
+        rows[:, :SPECTRUM] = 0
+        return piece._replace(inputs=rows)
+
+    motion_s = sum(int(example.valid.sum()) for example in training.examples) / FRAME_RATE_HZ
+    steps = max(round(STEPS * math.sqrt(motion_s)), 1)
+    plan = TrainingPlan(steps, min(BATCH_SIZE, len(pieces)), LEARNING_RATE, DROPOUT, SEED)
+    return SHAPE.trained(training, len(centre), draw, plan)
 
 
 def _principal_components(rows: Sequence[NDArray[np.float32]]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -146,20 +250,29 @@ def _principal_components(rows: Sequence[NDArray[np.float32]]) -> tuple[NDArray[
     return mean.astype(np.float32), basis.astype(np.float32)
 
 
-def _sequence(inputs: NDArray[np.float32], targets: Array, valid: NDArray[np.bool_]) -> TrainingSequence:
-    """Return the inputs of a recording, and the targets [shape=(T, Q)] at its time steps."""
-    frames = np.minimum(np.arange(len(inputs)) * STEP, len(targets) - 1)
-    return TrainingSequence(inputs, targets[frames].astype(np.float32), valid[frames])
-
-
 def _limited(posteriors: TokenPosteriors) -> NDArray[np.float32]:
     """Return the logarithms of posteriors within the limit [shape=(N, K)]."""
     limited: NDArray[np.float32] = np.maximum(posteriors.values, LEAST_LOG_POSTERIOR).astype(np.float32)
     return limited
 
 
-def _steps(rows: NDArray[np.float32], mean: NDArray[np.float32], basis: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the components of the rows of every time step, concatenated [shape=(ceil(N / 2), 240)]."""
+def _inputs(
+    rows: NDArray[np.float32],
+    spectrum: NDArray[np.floating] | None,
+    mean: NDArray[np.float32],
+    basis: NDArray[np.float32],
+) -> NDArray[np.float32]:
+    """Return the inputs in every time step [shape=(ceil(N / 2), 400)].
+
+    rows     : logarithms of posteriors [shape=(N, K)]
+    spectrum : normalised log mel spectrum [shape=(T, 40)]; None: switched off
+    The spectrum of each time step stands before the components of the posteriors of its two rows.
+    """
     components = (rows - mean) @ basis
     filled = np.concatenate([components, np.repeat(components[-1:], len(rows) % ROWS, axis=0)])
-    return filled.reshape(-1, ROWS * basis.shape[1]).astype(np.float32)
+    result = np.zeros((len(filled) // ROWS, SHAPE.inputs), np.float32)
+    result[:, SPECTRUM:] = filled.reshape(len(result), -1)
+    if spectrum is not None:
+        steps = spectrum_steps(spectrum)
+        result[:, :SPECTRUM] = steps[np.minimum(np.arange(len(result)), len(steps) - 1)]
+    return result

@@ -68,8 +68,7 @@ class Predictor(ABC):
 
     name              : under which it is registered, and its arrays are stored
     ARRAYS            : the stored arrays, where Q is the number of dimensions of motion
-    least_motion_s    : seconds of measured motion from which on training gets acoustic conditions
-                        (``Example.condition_spectra``)
+    CONTAINS          : names of predictors whose arrays may be stored with its own: it has one of them inside
     uses_prior        : whether it predicts from ``Speech.prior``: then the model stands on another model
     uses_articulation : whether the table of articulation is among its inputs: then engines do not lean on it once more
     variances         : of the error of static value, Δ and Δ² [shape=(3, Q)]
@@ -77,7 +76,7 @@ class Predictor(ABC):
 
     name: ClassVar[str]
     ARRAYS: ClassVar[Mapping[str, ArraySpec]]
-    least_motion_s: ClassVar[float] = 0.0
+    CONTAINS: ClassVar[frozenset[str]] = frozenset()
     uses_prior: ClassVar[bool] = False
     uses_articulation: ClassVar[bool] = False
     variances: Array
@@ -86,6 +85,15 @@ class Predictor(ABC):
     @abstractmethod
     def fit(cls, training: PredictorTraining) -> PredictorFit:
         """Return a predictor that is trained on examples. Raises CorpusError: it cannot be trained on these."""
+
+    @classmethod
+    def conditions(cls, motion_s: float, most: int) -> int:  # noqa: ARG003
+        """Return in how many acoustic conditions training takes each example (``Example.condition_spectra``).
+
+        motion_s : seconds of measured motion
+        most     : as many as the configuration allows
+        """
+        return most
 
     @abstractmethod
     def predict(self, speech: Speech) -> tuple[Array, Array]:
@@ -126,6 +134,7 @@ PREDICTORS: Registry[type[Predictor]] = Registry(
     "lipmotion.predictors",
     {
         "network": "lipmotion.motion.acoustic_network:AcousticNetwork",
+        "posteriors": "lipmotion.motion.posterior_network:PosteriorNetwork",
         "prior": "lipmotion.motion.prior_regression:PriorRegression",
     },
 )
@@ -150,19 +159,30 @@ def check_predictor(name: str) -> None:
 def suitable_predictor(name: str, examples: Sequence[Example]) -> type[Predictor] | None:
     """Return the predictor of a name; for ``AUTOMATIC`` the one that suits the examples, None if there is none.
 
-    With little motion and another model to stand on, it is a regression; else a network, given acoustic conditions.
+    With little motion and another model to stand on, it is a regression; with much motion a network, given acoustic
+    conditions; else a network from posteriors, given those.
     """
     if name != AUTOMATIC:
         return predictor_class(name)
     measured_s = sum(int(example.valid.sum()) for example in examples) / FRAME_RATE_HZ
     if measured_s < LEAST_OWN_S and all(example.speech.prior is not None for example in examples):
         return predictor_class("prior")
-    return predictor_class("network") if all(example.condition_spectra for example in examples) else None
+    network = predictor_class("network")
+    if network.conditions(measured_s, 1) and all(example.condition_spectra for example in examples):
+        return network
+    if all(example.speech.posteriors is not None for example in examples):
+        return predictor_class("posteriors")
+    return None
 
 
-def needs_conditions(name: str, motion_s: float) -> bool:
-    """Return whether training on so much measured motion takes each example in several acoustic conditions."""
-    return motion_s >= predictor_class("network" if name == AUTOMATIC else name).least_motion_s
+def conditions_of(name: str, motion_s: float, most: int) -> int:
+    """Return in how many acoustic conditions training takes each example, for a predictor of a name.
+
+    motion_s : seconds of measured motion
+    most     : as many as the configuration allows
+    """
+    names = ("network", "posteriors") if name == AUTOMATIC else (name,)
+    return max(predictor_class(each).conditions(motion_s, most) for each in names)
 
 
 def folds(count: int) -> Iterator[tuple[list[int], list[int]]]:
@@ -202,7 +222,9 @@ def predictor_from_arrays(arrays: Arrays, dimensions: int) -> Predictor | None:
     """
     names = {name.rpartition(".")[0] for name in arrays_under(arrays, ADDED)}
     added = {name: arrays_under(arrays, f"{ADDED}{name}.") for name in sorted(names)}
-    stored = {name: arrays for name in PREDICTORS.built_in if arrays.keys() & predictor_class(name).ARRAYS} | added
+    found = [name for name in PREDICTORS.built_in if arrays.keys() & predictor_class(name).ARRAYS]
+    inside = {part for name in found for part in predictor_class(name).CONTAINS}
+    stored = {name: arrays for name in found if name not in inside} | added
     if len(stored) > 1:
         raise ValueError(f"the predictors {' and '.join(stored)}, required one of them")
     if not stored:

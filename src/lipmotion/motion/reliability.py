@@ -25,8 +25,18 @@ def phone_reliability(speech: Speech, distortion: Array | None, frames: int) -> 
     """
     if speech.units_known or distortion is None or not speech_intervals(speech.units):
         return np.ones(frames)
+    return np.maximum(clearness(distortion), speech.confidence)
+
+
+def clearness(distortion: Array) -> Array:
+    """Return how far a recording is free of noise and room around each frame, 0 to 1 [shape=(T,)]: ``DISTORTIONS``.
+
+    distortion : of the sound in every frame [shape=(T,)]
+    """
+    frames = len(distortion)
     reach = int(DISTORTION_S * FRAME_RATE_HZ)
     total, numbers = np.concatenate([[0.0], np.cumsum(distortion)]), np.arange(frames)
     first, stop = np.maximum(numbers - reach, 0), np.minimum(numbers + reach + 1, frames)
     mean = (total[stop] - total[first]) / (stop - first)
-    return np.maximum(np.clip((DISTORTIONS[1] - mean) / (DISTORTIONS[1] - DISTORTIONS[0]), 0, 1), speech.confidence)
+    clear: Array = np.clip((DISTORTIONS[1] - mean) / (DISTORTIONS[1] - DISTORTIONS[0]), 0, 1)
+    return clear

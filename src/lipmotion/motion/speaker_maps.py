@@ -242,6 +242,7 @@ class PersonStatistics:
     """Statistics of one person's motion.
 
     rest     : rest pose, NaN where there is no silence [shape=(P,)]
+    rest_s   : seconds of silence away from speech
     spoken   : median pose in speech [shape=(P,)]
     range    : of each channel in speech [shape=(P,)]
     follow   : change of each channel per unit of opening [shape=(P,)]; zeros without a channel of that name
@@ -250,6 +251,7 @@ class PersonStatistics:
     """
 
     rest: Array
+    rest_s: float
     spoken: Array
     range: Array
     follow: Array
@@ -294,7 +296,8 @@ def measured_person(examples: Sequence[Example], column: int | None) -> PersonSt
         if column is not None:
             ranges = closable_ranges(example.speech.units, len(values))
             smallest += [values[frames, column][valid[frames]].min() for frames in ranges if valid[frames].any()]
-    quiet, speech = _first_long([*map(np.concatenate, (silent, silence))]), np.concatenate(spoken)
+    resting, speech = np.concatenate(silent), np.concatenate(spoken)
+    quiet = _first_long([resting, np.concatenate(silence)])
     if not len(speech):
         speech = np.concatenate(measured)
     if not len(speech):
@@ -307,7 +310,8 @@ def measured_person(examples: Sequence[Example], column: int | None) -> PersonSt
         follow[column] = 1
         closed = closed_opening(smallest, speech[:, column], np.concatenate(measured)[:, column])
     rest = np.median(quiet, axis=0) if quiet is not None else np.full(speech.shape[1], np.nan)
-    return PersonStatistics(rest, np.median(speech, axis=0), high - low, follow, closed, len(speech) / FRAME_RATE_HZ)
+    seconds = [len(frames) / FRAME_RATE_HZ for frames in (resting, speech)]
+    return PersonStatistics(rest, seconds[0], np.median(speech, axis=0), high - low, follow, closed, seconds[1])
 
 
 def _first_long(candidates: Sequence[Array]) -> Array | None:

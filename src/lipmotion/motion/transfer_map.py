@@ -22,6 +22,9 @@ from lipmotion.motion.speaker_maps import (
 )
 from lipmotion.types import FRAME_RATE_HZ, Channel, Example, Motion
 
+REST_PRIOR_S = 0.5
+"""Seconds of silence that count as much as the assumption that the map of speech is right in silence, too."""
+
 
 def transfer_map(source: Sequence[Example], target: Sequence[Example]) -> SpeakerMap:
     """Return the map from the motion of a source person to that of a target person, fitted in the same speech.
@@ -32,7 +35,8 @@ def transfer_map(source: Sequence[Example], target: Sequence[Example]) -> Speake
     - The range in speech (5th to 95th percentile) maps onto the target's; points share one gain for each axis, so that
       the face keeps the shape of the target. With S seconds of speech the logarithm of a gain counts S / (S + 2), and
       gains lie between 1 / ``MOST_GAIN`` and ``MOST_GAIN``: a short recording gives place and shape alone.
-    - In silence away from speech the rest pose maps onto the target's.
+    - In silence away from speech the rest pose maps onto the target's. With S seconds of such silence that counts
+      S / (S + 0.5): people rest with closed lips in one pause and with parted lips in the next.
     The map has no habits (``SpeakerMap.habits`` is 0).
     Alternatives that were measured: docs/results/selection.md.
     """
@@ -46,7 +50,7 @@ def transfer_map(source: Sequence[Example], target: Sequence[Example]) -> Speake
     closed = people[0].closed
     if column is not None:
         offset[column] = people[1].closed - gain[column] * closed
-    rest = rests[1] - offset - gain * rests[0]
+    rest = people[1].rest_s / (people[1].rest_s + REST_PRIOR_S) * (rests[1] - offset - gain * rests[0])
     habits = np.zeros((len(VISEME_NAMES), len(channels)))
     return SpeakerMap(channels, gain, offset, rest, habits, (closed, closed + 1))
 

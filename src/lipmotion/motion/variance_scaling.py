@@ -7,7 +7,7 @@ a closed mouth stays closed.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,14 +18,15 @@ LARGEST_FACTOR = 2.0
 LEAST_DEVIATION = 1e-6
 
 
-def scaling_factors(recorded: Sequence[Array], generated: Sequence[Array]) -> Array:
+def scaling_factors(recorded: Sequence[NDArray[Any]], generated: Sequence[Array]) -> Array:
     """Return the factors by which generated movements are scaled to vary as much as recorded ones [shape=(Q,)].
 
-    recorded, generated : standard deviations within each clip [each shape=(Q,)]; at least one clip
-    A factor is the mean over clips of the recorded deviations divided by that of the generated ones, from 1 to
+    recorded, generated : motion of each clip [each shape=(T_i, Q)]; at least one clip
+    A factor is the mean over clips of the recorded standard deviations divided by that of the generated ones, from 1 to
     ``LARGEST_FACTOR``.
     """
-    ratio = np.mean(recorded, axis=0) / np.maximum(np.mean(generated, axis=0), LEAST_DEVIATION)
+    wanted, made = (np.mean([clip.std(axis=0) for clip in clips], axis=0) for clips in (recorded, generated))
+    ratio = wanted / np.maximum(made, LEAST_DEVIATION)
     return np.clip(ratio, 1.0, LARGEST_FACTOR)
 
 

@@ -188,7 +188,7 @@ def _read(path: Path) -> Model:
 
 def _engine(header: Mapping[str, Any]) -> Engine[Any]:
     """Return the engine that a header names. Raises KeyError, TypeError, InputError: it names none."""
-    return engine_named(header["engine"], _options(header, "configuration"))
+    return engine_named(header["engine"], _options(header, "configuration"), stored=True)
 
 
 def _prior(header: Mapping[str, Any], phones: UnitHmm, arrays: Mapping[str, NDArray[Any]]) -> Model | None:

@@ -72,7 +72,7 @@ def configuration_can_be_stored(trained: TrainedEngine) -> None:
     engine = trained.engine
     require(isinstance(engine.config, Configuration), "config is no Configuration")
     require(isinstance(engine.config, engine.Config), f"config is no {engine.Config.__name__}, which Config says")
-    back = engine.Config.parsed(engine.config.as_mapping())
+    back = engine.Config.stored(engine.config.as_mapping())
     require(back == engine.config, f"the configuration comes back as {back}")
     require(bool(engine.name) and engine.name.isprintable(), f"the name is {engine.name!r}")
 

@@ -87,6 +87,7 @@ class Configuration:
     preset_visual : the kind of motion that a preset is trained on where none is asked for (``train``), by its name
     former  : former names of options, mapped to the present names; both are accepted
     gone    : options that no longer exist, mapped to the only value that is still accepted
+    absent  : options that headers of models leave out where they have this value, which is not the default any more
     hints   : names that users might try, mapped to a text that says what to use instead
     Raises InputError: a value has another type than its option, or its rule does not allow it.
     """
@@ -95,6 +96,7 @@ class Configuration:
     preset_visual: ClassVar[Mapping[str, str]] = {}
     former: ClassVar[Mapping[str, str]] = {}
     gone: ClassVar[Mapping[str, Any]] = {}
+    absent: ClassVar[Mapping[str, Any]] = {}
     hints: ClassVar[Mapping[str, str]] = {}
 
     def __post_init__(self) -> None:
@@ -156,8 +158,13 @@ class Configuration:
 
     def as_mapping(self) -> dict[str, Any]:
         """Return the values of all options, by name, as the header of a model stores them."""
-        later = {each.name: each.default for each in fields(self) if each.metadata.get("later")}
+        later = {each.name: each.default for each in fields(self) if each.metadata.get("later")} | dict(self.absent)
         return {name: value for name, value in asdict(self).items() if name not in later or value != later[name]}
+
+    @classmethod
+    def stored(cls: type[ConfigurationT], values: Mapping[str, Any]) -> ConfigurationT:
+        """Return the configuration of which ``as_mapping`` returned some values. Raises as ``parsed``."""
+        return cls.parsed({**cls.absent, **values})
 
 
 def check_value(option_field: Field[Any], value: Any) -> None:

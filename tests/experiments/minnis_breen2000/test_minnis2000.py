@@ -12,7 +12,7 @@ import pytest
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_from_settings
 from lipmotion.engines.selection.config import SelectionConfig
-from lipmotion.experiments.minnis_breen2000.joins import velocity_change
+from lipmotion.experiments.minnis_breen2000.joins import join_figures, velocity_change
 from lipmotion.experiments.minnis_breen2000.minnis2000 import ADDITIONS, EVERYTHING, PRINTED, minnis2000, rows
 from lipmotion.experiments.minnis_breen2000.text import table
 from lipmotion.experiments.runner import ExperimentSettings
@@ -63,6 +63,32 @@ def test_a_second_run_does_not_train(figures: dict[str, Any], toy_corpus: Corpus
     again = minnis2000(toy_corpus, models=folder, settings=ExperimentSettings(recogniser=PHONE_MODELS))
     assert (figures["seconds"] > 0, again["seconds"]) == (True, None)
     assert again["lists"] == figures["lists"]
+
+
+@LONG
+def test_a_run_that_was_stopped_goes_on(
+    figures: dict[str, Any], toy_corpus: Corpus, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def run() -> dict[str, Any]:
+        settings = ExperimentSettings(recogniser=PHONE_MODELS)
+        return minnis2000(toy_corpus, models=folder, work=tmp_path, settings=settings)
+
+    module = "lipmotion.experiments.minnis_breen2000.minnis2000.join_figures"
+    made: list[None] = []
+
+    def stopping(*given: Any) -> dict[str, Any]:
+        made.append(None)
+        if len(made) == 4:
+            raise KeyboardInterrupt
+        return join_figures(*given)
+
+    monkeypatch.setattr(module, stopping)
+    with pytest.raises(KeyboardInterrupt):
+        run()
+    assert run()["lists"] == figures["lists"]
+    assert len(made) == 1 + sum(
+        len(systems) for found in figures["lists"].values() for systems in found["conditions"].values()
+    )
 
 
 @LONG

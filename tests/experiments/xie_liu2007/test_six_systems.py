@@ -15,7 +15,7 @@ from lipmotion.engines import engine_from_settings, engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError
 from lipmotion.experiments.noise import NoiseConditions
 from lipmotion.experiments.runner import ExperimentSettings
-from lipmotion.experiments.xie_liu2007 import systems
+from lipmotion.experiments.xie_liu2007 import six_systems, systems
 from lipmotion.experiments.xie_liu2007.plots import PLOT_FILES
 from lipmotion.experiments.xie_liu2007.six_systems import ComparisonOptions, xieliu2007
 from lipmotion.experiments.xie_liu2007.systems import (
@@ -144,6 +144,7 @@ def test_it_goes_on_from_what_is_finished(
     figures: dict[str, Any], work: Path, toy_corpus: Corpus, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(systems, "trained_on_the_way", None)
+    monkeypatch.setattr(six_systems, "compared_clips", None)
     options = ComparisonOptions(systems=[*CHAINS, "mean pose"], tuning=BRIEF)
     again = xieliu2007(toy_corpus, options, sizes=[8, 3], work=work, settings=SMALL)
     for name in CHAINS:
@@ -212,9 +213,11 @@ def test_systems_in_the_order_of_the_table() -> None:
         selected_systems(["ph-RNN"])
 
 
-def test_without_torch_the_network_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_other_engines_are_compared_when_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "torch", None)
-    assert selected_systems(None) == [name for name in COMPARED_SYSTEMS if name != BLSTM]
+    left_out = COMPARED_SYSTEMS.keys() - selected_systems(None)
+    assert left_out == {"trajectory CHMM, own means", "trajectory CHMM", "trajectory HMM", BLSTM}
+    assert set(PAPER_FIGURES) | {name + TUNED for name in PAPER_FIGURES} <= set(selected_systems(None))
     with pytest.raises(MissingDependencyError, match=r'needs PyTorch.*; pip install "lipmotion\[network\]"'):
         selected_systems([BLSTM])
 

@@ -170,7 +170,7 @@ def test_labels_that_go_on_after_the_sound():
 def test_facegood_from_recordings_to_figures(recordings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two recordings to train on, the third to test: Mandarin, 30 Hz, 116 blendshapes, no transcript."""
     monkeypatch.setattr(acoustic_network, "LEAST_STEPS", 100)
-    monkeypatch.setattr(posterior_network, "PLAN", replace(posterior_network.PLAN, steps=100))
+    monkeypatch.setattr(posterior_network, "STEPS", 6.0)
     from lipmotion.pipeline.evaluation.evaluate import evaluate
     from lipmotion.pipeline.generate.animate import animate
     from lipmotion.pipeline.model import load_model, save_model

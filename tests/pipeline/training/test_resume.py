@@ -15,6 +15,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
 from lipmotion.hmm.model import HmmConfig
+from lipmotion.motion import posterior_network
 from lipmotion.pipeline.model import Model, save_model
 from lipmotion.pipeline.training import labels
 from lipmotion.pipeline.training import train as module
@@ -41,6 +42,12 @@ def stopping_after(events: int) -> Monitor:
             raise Stopped
 
     return monitor
+
+
+@pytest.fixture(autouse=True)
+def few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A network is trained in one go, so that it must fit between two stops."""
+    monkeypatch.setattr(posterior_network, "STEPS", 4.0)
 
 
 @pytest.fixture
@@ -94,7 +101,7 @@ def test_stopped_again_and_again(corpus: Corpus, work: Path, tmp_path: Path) -> 
     stops = 0
     while True:
         try:
-            model = run(corpus, work, stopping_after(6))
+            model = run(corpus, work, stopping_after(8))
             break
         except Stopped:
             stops += 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
 
 from lipmotion.cli.arguments.experiment_options import add_experiment_arguments, run_experiment
@@ -24,11 +25,13 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Call ``experiment.minnis2000`` and print its table."""
+    """Call ``experiment.minnis2000`` and print its table; with ``--output``, a second run goes on where one stopped."""
     from lipmotion.experiments.minnis_breen2000.minnis2000 import minnis2000
     from lipmotion.experiments.minnis_breen2000.text import table
+    from lipmotion.storage.files import unfinished_work
 
     def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
-        return minnis2000(corpus, models=options.models, quick=options.quick, settings=settings)
+        with unfinished_work(options.output) if options.output else nullcontext() as work:
+            return minnis2000(corpus, models=options.models, quick=options.quick, work=work, settings=settings)
 
     run_experiment(options, experiment, table)

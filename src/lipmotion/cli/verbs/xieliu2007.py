@@ -28,7 +28,7 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument(
         "--sizes", type=numbers, metavar="N,N,...", help="numbers of recordings to train on (default: all)"
     )
-    systems = "only these systems, separated by semicolons (default: all)"
+    systems = "these systems, separated by semicolons (default: those of the paper, and baselines)"
     parser.add_argument("--systems", type=lambda text: text.split(";"), metavar="NAME;NAME", help=systems)
     quick = "the paper's systems alone, trained on 20 recordings and compared on 6: three minutes"
     parser.add_argument("--quick", action="store_true", help=quick)

@@ -22,6 +22,7 @@ from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.motion.arrays import MOTION_ARRAYS, PHONE_SET, motion_arrays, motion_from_arrays
 from lipmotion.motion.context_window import FEATURES, WINDOW, acoustic_context_from
 from lipmotion.motion.limits import check_poses, check_rest
+from lipmotion.motion.modulation_filter import MODULATION, filter_arrays, filter_from_arrays
 from lipmotion.stats.bigram import check_sums_to_one
 from lipmotion.stats.mixture import MIXTURES, mixtures_from_arrays
 from lipmotion.storage.schema import (
@@ -64,7 +65,7 @@ def coupled_arrays(model: CoupledModel) -> dict[str, NDArray[Any]]:
             f"visual_{number}/columns": stream.columns,
             f"visual_{number}/scale": np.stack([stream.mean, stream.deviation]),
         }
-    return arrays | _regression_arrays(model)
+    return arrays | _regression_arrays(model) | filter_arrays(model.modulation)
 
 
 def _group_arrays(group: StreamGroup) -> dict[str, NDArray[Any]]:
@@ -117,7 +118,10 @@ def coupled_from_arrays(arrays: Arrays, config: CoupledConfig) -> CoupledModel:
         )
         chains = Chains(streams, transitions, _groups(arrays, transitions.product.chain_states.shape[1], visual))
         regression = _regression(arrays, structure, visual) if config.dynamic and config.acoustic_regression else None
-        model = CoupledModel(chains, space, visual, regression, poses["gain"], poses["rest"], closure, prior)
+        modulation = filter_from_arrays(arrays, space.dimensions, needed=config.filtered)
+        model = CoupledModel(
+            chains, space, visual, regression, poses["gain"], poses["rest"], closure, prior, modulation
+        )
         check_rest(model.rest_pose, model.pose_limits)
         check_poses(model.pose_limits, space, closure)
         return model
@@ -170,7 +174,15 @@ def _check_names(arrays: Arrays, structure: Structure, streams: int) -> None:
     )
     group = (f"group_{number}/{key}" for number in range(streams) for key in GROUP)
     refuse_undeclared(
-        arrays, MOTION_ARRAYS, POSES, PAIRS, chain, visual, group, (f"around/{key}" for key in REGRESSION_INPUTS)
+        arrays,
+        MOTION_ARRAYS,
+        POSES,
+        MODULATION,
+        PAIRS,
+        chain,
+        visual,
+        group,
+        (f"around/{key}" for key in REGRESSION_INPUTS),
     )
 
 

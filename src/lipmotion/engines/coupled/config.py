@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 from lipmotion.engines.coupled.chains.structures import PRESETS, STRUCTURES, UNSEEN_LOSS, Structure, unit_sets
 from lipmotion.engines.coupled.chains.visual_streams import EIGENLIPS
 from lipmotion.engines.coupled.conversion.em_conversion import EXACT, SOFT, STARTS, UPDATES, ConversionSettings
+from lipmotion.motion.modulation_filter import STRENGTH
 from lipmotion.types import Configuration, Rule, option
 from lipmotion.units import UnitSet
 
@@ -45,6 +46,8 @@ class CoupledConfig(Configuration):
     variance_scaling : scale movements to the variance of the recorded ones
     closures   : make the lips meet in every p, b and m
     articulation : lean on the table of English articulation in contexts that training saw little of
+    modulation_filter : how far generated motion is given the modulation spectrum of recorded motion: as of the
+                 trajectory engine (``trajectory`` conversion only; docs/results/jerk.md)
     """
 
     structure: str = option("coupled", Rule(choices=STRUCTURES))
@@ -71,6 +74,7 @@ class CoupledConfig(Configuration):
     articulation: bool = True
     start_asynchrony: int = option(1, Rule(least=0), later=True)
     unseen_loss: float = option(UNSEEN_LOSS, Rule(least=0), later=True)
+    modulation_filter: float = option(0.0, STRENGTH, later=True)
 
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = PRESETS
     preset_visual: ClassVar[Mapping[str, str]] = {"xieliu2007": EIGENLIPS}
@@ -99,6 +103,11 @@ class CoupledConfig(Configuration):
     def dynamic(self) -> bool:
         """Whether slope and curvature are modelled."""
         return self.conversion == TRAJECTORY
+
+    @property
+    def filtered(self) -> bool:
+        """Whether the modulation filter is learned."""
+        return self.dynamic and self.modulation_filter > 0
 
     @property
     def em(self) -> ConversionSettings:

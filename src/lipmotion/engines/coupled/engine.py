@@ -78,6 +78,7 @@ class CoupledEngine(Engine[CoupledModel]):
             return motion_statistics
 
         learned = model.motion if self.config.variance_scaling else replace(model.motion, scaling=None)
+        learned = learned.for_voice(speech.voice)
         motion, variance = learned.generate(statistics, frames, speech.units, constraints, close=self.config.closures)
         states, positions = np.unique(path, return_inverse=True)
         return Generation(

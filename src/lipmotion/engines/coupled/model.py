@@ -18,6 +18,7 @@ from lipmotion.motion.articulation import ArticulationPrior
 from lipmotion.motion.closure import Closure
 from lipmotion.motion.generation import LearnedMotion
 from lipmotion.motion.limits import MotionLimits, limits_of
+from lipmotion.motion.modulation_filter import ModulationFilter
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.variance_scaling import VarianceScaling
 from lipmotion.types import FRAME_RATE_HZ
@@ -43,6 +44,7 @@ class CoupledModel:
     rest_pose  : the pose in silence away from speech [shape=(Q,)]
     closure    : how the lips close; None: the motion has no opening
     prior      : the table of articulation in the speaker's range (None: there is none)
+    modulation : restores fast movement (None: the motion stays as it is)
     """
 
     chains: Chains
@@ -53,6 +55,7 @@ class CoupledModel:
     rest_pose: Array
     closure: Closure | None
     prior: ArticulationPrior | None = None
+    modulation: ModulationFilter | None = None
 
     @cached_property
     def limits(self) -> MotionLimits:
@@ -65,9 +68,9 @@ class CoupledModel:
 
     @cached_property
     def motion(self) -> LearnedMotion:
-        """What turns means and precisions into motion: space, closure, limits and variance scaling."""
+        """What turns means and precisions into motion: space, closure, limits, variance scaling, modulation filter."""
         scaling = VarianceScaling(self.scaling, self.rest_pose)
-        return LearnedMotion(self.space, self.closure, self.limits, scaling, self.prior)
+        return LearnedMotion(self.space, self.closure, self.limits, scaling, self.prior, self.modulation)
 
     @property
     def pose_limits(self) -> MotionLimits:

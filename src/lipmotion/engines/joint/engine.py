@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, final
@@ -12,23 +12,41 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs
-from lipmotion.errors import AlignmentError, CorpusError, InputError
+from lipmotion.engines.joint.config import JointEngineConfig
+from lipmotion.errors import AlignmentError, CorpusError
 from lipmotion.hmm.multistream.align import StatePath, align
 from lipmotion.hmm.multistream.arrays import joint_arrays, joint_from_arrays
 from lipmotion.hmm.multistream.generate import densities_of_path, densities_of_paths, single_gaussians
-from lipmotion.hmm.multistream.model import JointConfig, JointHmm
+from lipmotion.hmm.multistream.model import JointHmm
 from lipmotion.hmm.multistream.multistream_training import TrainingUtterance, growing_joint, train_joint, with_durations
 from lipmotion.hmm.multistream.recognise import RecognisedUnit, joint_recogniser
-from lipmotion.hmm.multistream.streams import MOTION, StreamObservations, StreamWeights, stream_observations
+from lipmotion.hmm.multistream.streams import MOTION, StreamObservations, stream_observations
 from lipmotion.hmm.multistream.unit_frames import units_in_frames, units_in_time
 from lipmotion.hmm.multistream.unit_states import Inventory
-from lipmotion.motion.arrays import MOTION_ARRAYS, motion_arrays, motion_from_arrays
+from lipmotion.kernels.sequences.banded import generate
+from lipmotion.motion.arrays import (
+    MOTION_ARRAYS,
+    SCALING,
+    motion_arrays,
+    motion_from_arrays,
+    scaling_arrays,
+    scaling_from_arrays,
+)
 from lipmotion.motion.articulation import ArticulationPrior, fit_articulation_prior
 from lipmotion.motion.closure import Closure, fit_closure
 from lipmotion.motion.frame_labels import with_unit_names
 from lipmotion.motion.generation import LearnedMotion, Statistics
 from lipmotion.motion.limits import MotionLimits, check_poses, limits_of
+from lipmotion.motion.modulation_filter import (
+    MODULATION,
+    ModulationFilter,
+    filter_arrays,
+    filter_from_arrays,
+    learned_filter,
+    resting_motion,
+)
 from lipmotion.motion.space import MotionSpace, fit_reduced_motion
+from lipmotion.motion.variance_scaling import VarianceScaling, scaling_factors
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.storage.schema import arrays_under, format_errors, refuse_undeclared
 from lipmotion.types import (
@@ -38,115 +56,15 @@ from lipmotion.types import (
     Example,
     Generation,
     Monitor,
-    Rule,
     Speech,
     StateTrace,
     Timeline,
     Unit,
-    option,
 )
 from lipmotion.units import LIP_CLOSING, UnitSet, is_silent, unit_set
 
 PREFIX = "joint_"
 """Prefix of the names of the arrays of the joint model."""
-
-
-COUNT = Rule(least=1)
-WEIGHT = Rule(least=0)
-HOFER_2008: Mapping[str, Any] = {
-    "units": "eVis",
-    "states": 5,
-    "mixtures": 8,
-    "recognise_units": True,
-    "own_alignment": True,
-    "both_neighbours": True,
-    "closures": False,
-    "articulation": False,
-}
-"""The system of Hofer 2008, as printed; docs/papers/hofer2008.md says what the print leaves open."""
-
-
-@dataclass(frozen=True)
-class JointEngineConfig(Configuration):
-    """Options of the joint engine.
-
-    units      : name of a unit set, or path of a table of units (docs/unit-sets.md)
-    states     : states per unit, left to right, without skips
-    mixtures, motion_mixtures : Gaussians per state of speech, and of motion (powers of two)
-    components : principal components that all point channels are reduced to
-    f0         : model the three streams of F0 (False: their weights are 0 everywhere)
-    motion_in_training : the motion stream takes part when states are aligned in training (False: its weight is 0)
-    speech_weight, f0_weight, motion_weight : of the streams when states are aligned in training
-    recognition_speech_weight, recognition_f0_weight : of the streams in recognition and in alignment
-    bigram_weight, insertion : scale of the log bigram, and log insertion penalty of every unit, in recognition
-    both_neighbours : trees of speech and F0 ask about both neighbours in every state (False: states before a unit's
-                 middle about the left one, those after it about the right one, and the middle about none)
-    flat_start : training starts from states of equal length (False: from the phones in time)
-    recognise_units : where neither words nor units are given, recognise the units of the model by its own bigram
-                 (False: use the phones of the shared recogniser)
-    own_alignment : the model itself times the phones of given words (False: they have the times of the shared
-                 aligner). Times that are given with the units stay as they are
-    paths      : number of state sequences, sampled from their posterior, from which motion is generated where units are
-                 recognised; 1: the best sequence. More than 1 needs ``recognise_units``
-    seed       : of the sampling
-    closures   : make the lips meet in every p, b and m, and in every recognised unit that has no other phones
-    articulation : lean on the table of English articulation in contexts that training saw little of
-    """
-
-    units: str = "phone"
-    states: int = option(3, COUNT)
-    mixtures: int = option(4, COUNT)
-    motion_mixtures: int = option(1, COUNT)
-    components: int = option(16, COUNT)
-    f0: bool = True
-    motion_in_training: bool = True
-    recognise_units: bool = False
-    own_alignment: bool = option(False, later=True)
-    paths: int = option(1, COUNT)
-    seed: int = option(0, Rule(least=0))
-    closures: bool = True
-    articulation: bool = True
-    speech_weight: float = option(1.0, WEIGHT, later=True)
-    f0_weight: float = option(1.0, WEIGHT, later=True)
-    motion_weight: float = option(1.0, WEIGHT, later=True)
-    recognition_speech_weight: float = option(1.0, WEIGHT, later=True)
-    recognition_f0_weight: float = option(1.0, WEIGHT, later=True)
-    bigram_weight: float = option(4.0, WEIGHT, later=True)
-    insertion: float = option(-4.0, later=True)
-    both_neighbours: bool = option(False, later=True)
-    flat_start: bool = option(False, later=True)
-
-    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {"hofer2008": HOFER_2008}
-    former: ClassVar[Mapping[str, str]] = {"sees": "motion_in_training", "recognises": "recognise_units"}
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.paths > 1 and not self.recognise_units:
-            raise InputError(
-                f"paths is {self.paths}: several are sampled only where units are recognised (recognise_units)"
-            )
-
-        if not self.hmm.recognition.active:
-            raise InputError("no stream takes part in recognition; give speech or F0 a weight")
-
-    def check_files(self) -> None:  # noqa: D102
-        unit_set(self.units)
-
-    @property
-    def hmm(self) -> JointConfig:
-        """Configuration of the joint model: its states and mixtures, and the stream weights."""
-        training, recognition = (weight if self.f0 else 0.0 for weight in (self.f0_weight, self.recognition_f0_weight))
-        motion = self.motion_weight if self.motion_in_training else 0.0
-        return JointConfig(
-            states=self.states,
-            mixtures=self.mixtures,
-            motion_mixtures=self.motion_mixtures,
-            both_neighbours=self.both_neighbours,
-            bigram_weight=self.bigram_weight,
-            insertion=self.insertion,
-            training=StreamWeights(self.speech_weight, training, training, training, motion),
-            recognition=StreamWeights(self.recognition_speech_weight, recognition, recognition, recognition, 0.0),
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,6 +76,8 @@ class JointModel:
     hmm     : the joint model
     closure : of the lips in p, b and m (None: the motion has no channel ``opening``)
     prior   : the table of articulation in the speaker's range (None: there is none)
+    scaling : variance scaling about the rest pose (None: movements are not scaled)
+    modulation : restores fast movement (None: the motion stays as it is)
     """
 
     units: UnitSet
@@ -165,6 +85,8 @@ class JointModel:
     hmm: JointHmm
     closure: Closure | None
     prior: ArticulationPrior | None
+    scaling: VarianceScaling | None = None
+    modulation: ModulationFilter | None = None
 
     @cached_property
     def limits(self) -> MotionLimits:
@@ -173,8 +95,8 @@ class JointModel:
 
     @cached_property
     def motion(self) -> LearnedMotion:
-        """Motion space, closure and limits, which turn predicted means into motion."""
-        return LearnedMotion(self.space, self.closure, self.limits, prior=self.prior)
+        """What turns predicted means into motion."""
+        return LearnedMotion(self.space, self.closure, self.limits, self.scaling, self.prior, self.modulation)
 
     @property
     def poses(self) -> MotionLimits:
@@ -227,7 +149,8 @@ class JointEngine(Engine[JointModel]):
         hmm = train_joint(learning.utterances, learning.inventory, learning.units.classes(), self.config.hmm, monitor)
         figures = {f"leaves_{name}": float(stream.forest.size) for name, stream in hmm.models.items()}
         frames = sum(int(example.valid.sum()) for example in examples)
-        return Fit(learning.model(hmm), {"frames": frames, **figures})
+        model = learning.model(hmm)
+        return Fit(self._with_filter(model, examples), {"frames": frames, **figures})
 
     def growing_models(self, examples: Sequence[Example], monitor: Monitor) -> Iterator[JointModel]:
         """Yield a model for every number of Gaussians, 1, 2, 4 …, of one training; the last is that of ``fit``.
@@ -252,6 +175,25 @@ class JointEngine(Engine[JointModel]):
         prior = fit_articulation_prior(space, values, examples) if self.config.articulation else None
         return _Learning(units, space, utterances, inventory, closure, prior)
 
+    def _with_filter(self, model: JointModel, examples: Sequence[Example]) -> JointModel:
+        """Return a model with the modulation filter, and the variance scaling before it, if the filter is asked for."""
+        if not self.config.modulation_filter:
+            return model
+        examples = [example for example in examples if example.valid.any()]
+        values = [model.space.reduce(example.motion.values.astype(float)) for example in examples]
+        recorded = [x[example.valid] for x, example in zip(values, examples, strict=True)]
+        generated = [self._generated(model, example.speech)[example.valid] for example in examples]
+        factors = scaling_factors(recorded, generated)
+        rest = np.median(np.concatenate(resting_motion(examples, values) or recorded), axis=0)
+        compared = ((x, factors * made) for x, made in zip(recorded, generated, strict=True))
+        modulation = learned_filter(self.config.modulation_filter, compared, examples, values)
+        return replace(model, scaling=VarianceScaling(factors, rest), modulation=modulation)
+
+    def _generated(self, model: JointModel, speech: Speech) -> NDArray[np.float64]:
+        """Return motion in the motion space for phones in time, as parameter generation makes it [shape=(T, Q)]."""
+        path = _aligned(model, self._observations(speech), speech.units)
+        return generate(*single_gaussians(densities_of_path(model.hmm, path)))[0]
+
     def without_closures(self) -> JointEngine:  # noqa: D102
         return replace(self, config=replace(self.config, closures=False))
 
@@ -273,7 +215,7 @@ class JointEngine(Engine[JointModel]):
         def statistics(frames: slice) -> Statistics:
             return means[frames], precisions[frames]
 
-        motion, variance = model.motion.generate(
+        motion, variance = model.motion.for_voice(speech.voice).generate(
             statistics,
             len(speech.features.values),
             units,
@@ -293,18 +235,22 @@ class JointEngine(Engine[JointModel]):
 
     def to_arrays(self, model: JointModel) -> dict[str, NDArray[Any]]:  # noqa: D102
         joint = {f"{PREFIX}{name}": array for name, array in joint_arrays(model.hmm).items()}
-        return motion_arrays(model.units, model.space, model.closure, model.prior) | joint
+        restoring = scaling_arrays(model.scaling) | filter_arrays(model.modulation)
+        return motion_arrays(model.units, model.space, model.closure, model.prior) | restoring | joint
 
     def from_arrays(self, arrays: Arrays) -> JointModel:  # noqa: D102
         with format_errors("the joint model"):
-            refuse_undeclared(arrays, MOTION_ARRAYS, (name for name in arrays if name.startswith(PREFIX)))
+            joint = (name for name in arrays if name.startswith(PREFIX))
+            refuse_undeclared(arrays, MOTION_ARRAYS, SCALING, MODULATION, joint)
             units, space, closure, prior = motion_from_arrays(arrays, self.config.units)
             hmm = joint_from_arrays(arrays_under(arrays, PREFIX), self.config.hmm)
             if set(hmm.inventory.names) != set(units.units):
                 raise ValueError(f"the units {' '.join(hmm.inventory.names)}, required {' '.join(units.units)}")
             if MOTION not in hmm.models or len(hmm.models[MOTION].scale.mean) != 3 * space.dimensions:
                 raise ValueError(f"motion that is not of {space.dimensions} dimensions")
-            model = JointModel(units, space, hmm, closure, prior)
+            scaling = scaling_from_arrays(arrays, space.dimensions)
+            modulation = filter_from_arrays(arrays, space.dimensions, needed=self.config.modulation_filter > 0)
+            model = JointModel(units, space, hmm, closure, prior, scaling, modulation)
             check_poses(model.poses, space, closure)
             return model
 

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 from lipmotion.engines.selection.lip_reading import OVERLAPS, parsed_invisible
 from lipmotion.errors import InputError
+from lipmotion.motion.modulation_filter import STRENGTH
 from lipmotion.motion.predictors import AUTOMATIC, check_predictor
 from lipmotion.types import Configuration, Rule, option
 
@@ -59,6 +60,8 @@ class SelectionConfig(Configuration):
     joint_recogniser : train the joint model as well, where there is enough speech: it recognises phones of this speaker
     closures   : make the lips meet in every p, b and m
     articulation : lean on the table of English articulation in contexts that training saw little of
+    modulation_filter : how far generated motion is given the modulation spectrum of recorded motion: as of the
+                 trajectory engine (docs/results/jerk.md)
     predictor  : name of the predictor that is the guide (docs/extend/predictor.md); ``auto``: as suits the recordings
     """
 
@@ -88,6 +91,7 @@ class SelectionConfig(Configuration):
     articulation: bool = True
     predictor: str = option(AUTOMATIC, later=True)
     suppressed: bool = option(False, later=True)
+    modulation_filter: float = option(0.0, STRENGTH, later=True)
 
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {"minnis2000": MINNIS_2000}
 

@@ -12,24 +12,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs, SourcePiece
-from lipmotion.engines.selection.concatenation import concatenated, pieces_of, shown_units
+from lipmotion.engines.selection.concatenation import pieces_of, shown_units
 from lipmotion.engines.selection.config import SelectionConfig
 from lipmotion.engines.selection.costs import Costs, Target
 from lipmotion.engines.selection.inventory_text import inventory_text, is_source, source_of, units_by_source
 from lipmotion.engines.selection.model import SelectionModel, model_arrays, model_from_arrays
+from lipmotion.engines.selection.motion_of_units import Chosen, motion_of_units
 from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.selection_training import fit_selection
 from lipmotion.engines.selection.source_recordings import source_pieces, typical_duration_s, with_sources
 from lipmotion.engines.selection.targets import target_of
 from lipmotion.errors import InputError
-from lipmotion.motion.generation import Statistics
-from lipmotion.motion.predictors import needs_conditions
-from lipmotion.motion.rest import away_from_speech, digital_silence, runs, speech_intervals
+from lipmotion.motion.predictors import conditions_of
 from lipmotion.printable import printable
-from lipmotion.stats.delta_windows import with_dynamics
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import (
-    FRAME_RATE_HZ,
     Configuration,
     Constraints,
     Example,
@@ -40,14 +37,11 @@ from lipmotion.types import (
     Timeline,
     Unit,
 )
-from lipmotion.units import SILENCE, is_silent
 
 Array = NDArray[np.float64]
 LOG = logging.getLogger("lipmotion")
 NAMED_UNITS = 3
 """Units that one warning names."""
-SETTLED_S = 0.06
-"""Half of the rest pose is left so long before the first phone, and reached so long after the last one."""
 
 
 @final
@@ -65,8 +59,8 @@ class SelectionEngine(Engine[SelectionModel]):
     Config: ClassVar[type[Configuration]] = SelectionConfig
 
     def inputs(self, motion_s: float = math.inf) -> Inputs:  # noqa: D102
-        guide, has_conditions = self.config.guide > 0, needs_conditions(self.config.predictor, motion_s)
-        conditions = self.config.conditions if guide and has_conditions else 0
+        guide = self.config.guide > 0
+        conditions = conditions_of(self.config.predictor, motion_s, self.config.conditions) if guide else 0
         return Inputs(self.config.joint_recogniser, conditions, prior=guide, posteriors=guide)
 
     def fit(  # noqa: D102
@@ -118,23 +112,8 @@ class SelectionEngine(Engine[SelectionModel]):
         given = _given(costs, target, speech.units)
         units = select(costs, target, given=given).units
         pieces = pieces_of(costs, target, units)
-        track = concatenated(costs.inventory, target, pieces, frames)
-        always = not is_silent(costs.stand_ins.get(SILENCE, SILENCE))
-        resting = _resting(np.asarray(speech.features.values), speech.units, always=always)[:, None]
-        means = with_dynamics(track + resting * (model.rest - track))
-        precisions = np.broadcast_to(1 / model.variances, means.shape)
-
-        def statistics(block: slice) -> Statistics:
-            return means[block].copy(), precisions[block].copy()
-
-        motion, variance = model.motion.generate(
-            statistics,
-            frames,
-            speech.units,
-            constraints,
-            close=self.config.closures,
-            reliability=_substituted(costs, target, units, frames),
-        )
+        chosen = Chosen(target, units, pieces)
+        motion, variance = motion_of_units(model, costs, chosen, speech, constraints, close=self.config.closures)
         sources = [source_of(costs.inventory, unit) for unit in units.tolist()]
         starts_s = target.windows.times_s[:, 0]
         shown, places = np.unique(shown_units(target, pieces, frames), return_inverse=True)
@@ -163,28 +142,7 @@ class SelectionEngine(Engine[SelectionModel]):
         return model_arrays(model)
 
     def from_arrays(self, arrays: Arrays) -> SelectionModel:  # noqa: D102
-        return model_from_arrays(arrays)
-
-
-def _resting(features: NDArray[np.floating], units: Timeline[Unit], *, always: bool) -> Array:
-    """Return the weight of the rest pose in every frame, 0 to 1 [shape=(T,)].
-
-    It is 1 in silence of which some is digital, and falls to 0 before the next phone and after the last one: in digital
-    silence there is no breath, as there may be in the silence that was recorded with the unit.
-    features : acoustic features [shape=(T, D)]
-    always   : whether it is 1 in every silence, for no silence was recorded
-    """
-    silent = np.ones(len(features), bool) if always else digital_silence(features, units)
-    if not silent.any():
-        return np.zeros(len(features))
-    away = away_from_speech(np.arange(len(features)) / FRAME_RATE_HZ, speech_intervals(units), SETTLED_S)
-    resting = np.zeros(len(features))
-    for first, stop in runs(away):
-        resting[first:stop] = float(silent[first:stop].any())
-    width = round(SETTLED_S * FRAME_RATE_HZ)
-    window = np.hanning(2 * width + 1)
-    padded = np.pad(resting, width, mode="edge")
-    return np.convolve(padded, window / window.sum(), "valid")
+        return model_from_arrays(arrays, filtered=self.config.modulation_filter > 0)
 
 
 def _given(costs: Costs, target: Target, units: Timeline[Unit]) -> dict[int, int]:
@@ -212,17 +170,3 @@ def _given(costs: Costs, target: Target, units: Timeline[Unit]) -> dict[int, int
             *(len(useless), len(units), printable("; ".join(useless[:NAMED_UNITS])), more),
         )
     return given
-
-
-def _substituted(costs: Costs, target: Target, units: NDArray[np.intp], frames: int) -> Array:
-    """Return 1 in the frames whose unit was recorded between other phones than are wanted, else 0 [shape=(T,)].
-
-    There the table of articulation says more than the unit; elsewhere the unit is a recording of what is wanted.
-    """
-    middle = costs.config.window // 2
-    around = slice(middle - 1, middle + 2)
-    differs = (costs.index.contexts[units][:, around] != target.contexts[:, around]).any(axis=1) & (not target.by_sound)
-    result = np.zeros(frames)
-    for (start_s, end_s), other in zip(target.windows.times_s.tolist(), differs.tolist(), strict=True):
-        result[int(start_s * FRAME_RATE_HZ) : int(np.ceil(end_s * FRAME_RATE_HZ))] = float(other)
-    return result

@@ -105,15 +105,16 @@ def model_arrays(model: SelectionModel) -> dict[str, NDArray[Any]]:
     return learned_motion_arrays(model.motion) | arrays | recogniser
 
 
-def model_from_arrays(arrays: Arrays) -> SelectionModel:
+def model_from_arrays(arrays: Arrays, *, filtered: bool) -> SelectionModel:
     """Deserialise a model.
 
+    filtered : there must be a modulation filter
     Raises ModelFormatError: an array is missing or undeclared, or has a wrong shape, type or range.
     """
     with format_errors("the model of recorded units"):
         named = (name for name in arrays if name.startswith((JOINT_PREFIX, STORE_PREFIX)))
         refuse_undeclared(arrays, LEARNED_MOTION_ARRAYS, names_of_predictors(arrays), UNITS, GUIDE, named)
-        motion = learned_motion_from_arrays(arrays)
+        motion = learned_motion_from_arrays(arrays, filtered=filtered)
         dimensions = motion.space.dimensions
         stored = checked_arrays(arrays, UNITS, Q=dimensions)
         predictor = predictor_from_arrays(arrays, dimensions)

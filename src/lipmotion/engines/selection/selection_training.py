@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from lipmotion.engines.selection.costs import Costs
 from lipmotion.engines.selection.guide import Guide, at_points, fit_guide
 from lipmotion.engines.selection.inventory import RecordedUnits
 from lipmotion.engines.selection.model import SelectionModel
+from lipmotion.engines.selection.motion_of_units import Chosen, motion_of_units
 from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.targets import target_of
 from lipmotion.engines.selection.windows import covering, phone_windows
@@ -21,6 +22,7 @@ from lipmotion.errors import CorpusError
 from lipmotion.hmm.multistream.phone_recogniser import fit_phone_recogniser
 from lipmotion.motion.closure import OPENING
 from lipmotion.motion.fit import fit_motion
+from lipmotion.motion.modulation_filter import learned_filter
 from lipmotion.motion.motion_store import LIP_WIDTH_SHARE, MotionStore, compress, lip_tolerance
 from lipmotion.motion.predictors import PredictorTraining, predictor_class, suitable_predictor
 from lipmotion.motion.rest import away_from_speech, runs, speech_intervals
@@ -34,7 +36,7 @@ Array = NDArray[np.float64]
 CHANNEL_WEIGHTS = {"opening": 8.0, "width": 3.0}
 """Weights of channels in comparisons of motion; that of any other dimension is 1."""
 LEFT_OUT_RECORDINGS = 24
-"""Recordings that are generated without their own units, to measure the error; spread evenly over all."""
+"""Recordings that are generated without their own units, which come back as they were; spread evenly over all."""
 REST_AWAY_S = 0.3
 """The rest pose is that of silence further than this from speech,"""
 LEAST_REST_FRAMES = 20
@@ -70,7 +72,15 @@ def fit_selection(
     scale = comparison_scale(recorded, motion.space)
     rest, unknown = _rest_pose(examples, values, motion.space), np.ones((3, len(scale)))
     model = SelectionModel(motion, inventory, scale, rest, unknown, guide, recogniser)
-    model = replace(model, variances=_error_variances(model, config, examples, values, recorded))
+    costs, left_out = model.costs(config), _left_out(model, config, examples)
+    model = replace(model, variances=_error_variances(left_out, costs, values, recorded))
+    compared = (
+        (values[out.number][out.frames], motion.space.reduce(made.values.astype(float))[out.frames])
+        for out in left_out
+        for made, _ in [motion_of_units(model, costs, out.chosen, examples[out.number].speech)]
+    )
+    modulation = learned_filter(config.modulation_filter, compared, examples, values)
+    model = replace(model, motion=replace(motion, modulation=modulation))
     monitor(Progress(_STAGE, 3, 3, 0.0))
     return model, np.sqrt(model.variances[0])
 
@@ -156,38 +166,49 @@ def _rest_pose(examples: Sequence[Example], values: Sequence[Array], space: Moti
     return poses.mean(axis=0)
 
 
-def _error_variances(
-    model: SelectionModel,
-    config: SelectionConfig,
-    examples: Sequence[Example],
-    values: Sequence[Array],
-    recorded: Array,
-) -> Array:
-    """Return the variances of the error of static value, Δ and Δ², without a recording's own units [shape=(3, Q)].
+@dataclass(frozen=True, eq=False)
+class _LeftOut:
+    """What was chosen for a recording without its own units.
 
-    recorded : all measured motion in the motion space [shape=(N, Q)]
+    number : of its example
+    frames : whether motion, Δ and Δ² of each frame were measured [shape=(T,)]
     """
-    costs = model.costs(config)
-    spread = with_dynamics(recorded).var(axis=0)
-    floor = 1e-4 * spread + 1e-12
+
+    number: int
+    frames: NDArray[np.bool_]
+    chosen: Chosen
+
+
+def _left_out(model: SelectionModel, config: SelectionConfig, examples: Sequence[Example]) -> list[_LeftOut]:
+    """Return what is chosen for some examples without their own units; nothing for a single example."""
+    costs, found = model.costs(config), list[_LeftOut]()
     if len(examples) < 2:
-        return np.maximum(spread, floor)
-    errors = []
-    for number in np.unique(np.linspace(0, len(examples) - 1, LEFT_OUT_RECORDINGS).astype(int)):
-        example = examples[number]
-        frames = dynamics_known(example.valid)
+        return found
+    for number in np.unique(np.linspace(0, len(examples) - 1, LEFT_OUT_RECORDINGS).astype(int)).tolist():
+        frames = dynamics_known(examples[number].valid)
         if frames.any():
-            generated = generated_motion(model, costs, example, costs.inventory.windows.recording == number)
-            errors.append(with_dynamics(values[number] - generated)[frames])
-    variances: Array = np.square(np.concatenate(errors)).mean(axis=0) if errors else spread
-    return np.maximum(variances, floor)
+            chosen = _chosen(model, costs, examples[number], costs.inventory.windows.recording == number)
+            found.append(_LeftOut(number, frames, chosen))
+    return found
 
 
-def generated_motion(model: SelectionModel, costs: Costs, example: Example, excluded: NDArray[np.bool_]) -> Array:
-    """Return motion of an example from other units than some [shape=(T, Q)].
+def _error_variances(left_out: Sequence[_LeftOut], costs: Costs, values: Sequence[Array], recorded: Array) -> Array:
+    """Return the variances of the error of static value, Δ and Δ² [shape=(3, Q)].
 
-    excluded : the units of ``costs`` that must not be used [shape=(U,)]
+    values   : motion of all examples in the motion space [each shape=(T, Q)]
+    recorded : all measured motion [shape=(N, Q)]
     """
+    errors = []
+    for out in left_out:
+        original, chosen = values[out.number], out.chosen
+        track = concatenated(costs.inventory, chosen.target, chosen.pieces, len(original))
+        errors.append(with_dynamics(original - track)[out.frames])
+    spread = with_dynamics(recorded).var(axis=0)
+    variances: Array = np.square(np.concatenate(errors)).mean(axis=0) if errors else spread
+    return np.maximum(variances, 1e-4 * spread + 1e-12)
+
+
+def _chosen(model: SelectionModel, costs: Costs, example: Example, excluded: NDArray[np.bool_]) -> Chosen:
     target = target_of(model, costs, example.speech)
-    chosen = select(costs, target, excluded)
-    return concatenated(costs.inventory, target, pieces_of(costs, target, chosen.units), len(example.valid))
+    units = select(costs, target, excluded).units
+    return Chosen(target, units, pieces_of(costs, target, units))

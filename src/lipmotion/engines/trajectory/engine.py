@@ -16,7 +16,8 @@ from lipmotion.engines.trajectory.model import TrajectoryModel, model_arrays, mo
 from lipmotion.engines.trajectory.training_data import TrainingOptions
 from lipmotion.engines.trajectory.trajectory_training import fit_trajectory
 from lipmotion.motion.frame_labels import StateLayout, full_context_states, with_unit_names
-from lipmotion.motion.predictors import AUTOMATIC, check_predictor, needs_conditions
+from lipmotion.motion.modulation_filter import STRENGTH
+from lipmotion.motion.predictors import AUTOMATIC, check_predictor, conditions_of
 from lipmotion.motion.rest import digital_silence
 from lipmotion.printable import printable
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
@@ -89,7 +90,7 @@ class TrajectoryConfig(Configuration):
     articulation: bool = True
     units: str = "phone"
     predictor: str = option(AUTOMATIC, later=True)
-    modulation_filter: float = option(0.0, Rule(least=0, most=2), later=True)
+    modulation_filter: float = option(1.0, STRENGTH)
 
     former: ClassVar[Mapping[str, str]] = {
         "parts": "states",
@@ -100,6 +101,7 @@ class TrajectoryConfig(Configuration):
         "joint": "joint_recogniser",
     }
     gone: ClassVar[Mapping[str, Any]] = {"trajectory_steps": 0}
+    absent: ClassVar[Mapping[str, Any]] = {"modulation_filter": 0.0}
 
     def check_files(self) -> None:  # noqa: D102
         unit_set(self.units)
@@ -130,7 +132,7 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
     Config: ClassVar[type[Configuration]] = TrajectoryConfig
 
     def inputs(self, motion_s: float = math.inf) -> Inputs:  # noqa: D102
-        conditions = self.config.conditions if needs_conditions(self.config.predictor, motion_s) else 0
+        conditions = conditions_of(self.config.predictor, motion_s, self.config.conditions)
         return Inputs(self.config.joint_recogniser, conditions, prior=True, posteriors=True)
 
     def fit(  # noqa: D102
@@ -160,11 +162,12 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
         path = np.array([distinct[state] for state in states], np.intp)
         rows = np.array([model.emission.row(state, layout) for state in distinct], np.intp)
         densities = rows[path]
-        densities[digital_silence(np.asarray(speech.features.values), speech.units)] = len(model.emission.means) - 1
-        experts = Experts(model.emission, densities, speech, model.network, model.prior, model.network_share)
+        silent = digital_silence(np.asarray(speech.features.values), speech.units)
+        densities[silent] = len(model.emission.means) - 1
+        experts = Experts(model.emission, densities, speech, model.network, model.prior, model.network_share, silent)
 
         learned = model.motion if self.config.variance_scaling else replace(model.motion, scaling=None)
-        motion, variance = learned.generate(
+        motion, variance = learned.for_voice(speech.voice).generate(
             experts.statistics,
             frames,
             speech.units,
@@ -187,4 +190,5 @@ class TrajectoryEngine(Engine[TrajectoryModel]):
         return model_arrays(model)
 
     def from_arrays(self, arrays: Arrays) -> TrajectoryModel:  # noqa: D102
-        return model_from_arrays(arrays, self.config.layout, self.config.units)
+        filtered = self.config.modulation_filter > 0
+        return model_from_arrays(arrays, self.config.layout, self.config.units, filtered=filtered)

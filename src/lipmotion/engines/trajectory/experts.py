@@ -17,8 +17,11 @@ from lipmotion.motion.speaker_knowledge import strangeness
 from lipmotion.types import Speech
 
 Array = NDArray[np.float64]
-NETWORK_SHARE = 0.5
+NETWORK_SHARE = 0.6
 """Weight of the predictor beside the states, 0 to 1, in models that have no other."""
+RESTING_SHARE = 0.5
+"""Share of its weight that the predictor has where the states rest, with voices that training knows: their mouths open
+before they speak."""
 STRANGER_LOSS = 0.8
 """Share of their weight that states lose with voices that training does not know at all."""
 
@@ -31,6 +34,7 @@ class Experts:
     network        : predicts motion without the states (None: there was too little speech to train it)
     network_share  : weight of that predictor, 0 to 1, in contexts that training knows well
     prior          : says how well training knows a phone in its context (None: taken as well known)
+    silent         : frames of digital silence, in which states count alone [shape=(T,)] (None: there are none)
     """
 
     emission: Emission
@@ -39,6 +43,7 @@ class Experts:
     network: Predictor | None
     prior: ArticulationPrior | None
     network_share: float = NETWORK_SHARE
+    silent: NDArray[np.bool_] | None = None
 
     def statistics(self, frames: slice) -> Statistics:
         """Return means and precisions of a range of N frames [each shape=(N, 3, Q)]: weighted means of both."""
@@ -66,16 +71,21 @@ class Experts:
     def _share(self) -> Array:
         """The share of the predictor in every frame, 0 to 1 [shape=(T,)].
 
-        It is ``network_share`` where training knows the phone in its context, and all where not; in the rest pose the
-        states alone count. Beside a predictor that uses the table of articulation itself, contexts are not asked for.
-        Phones that cannot be relied on leave all to the predictor; voices that training does not know, most.
+        It is ``network_share`` where training knows the phone in its context, and all where not; in the rest pose it is
+        less (``RESTING_SHARE``), and 0 for an unknown voice. Beside a predictor that uses the table of articulation
+        itself, contexts are not asked for. Phones that cannot be relied on leave all to the predictor; voices that
+        training does not know, most.
         """
         familiarity = np.ones(len(self.rows))
         if self.prior is not None and not (self.network is not None and self.network.uses_articulation):
             familiarity = self.prior.familiarity(self.speech.units, len(self.rows))
         resting = self.rows == len(self.emission.means) - 1
         own = self.network is not None and self.network.uses_prior  # states of a person, not of a distant speaker
-        known = 1.0 if own else 1 - STRANGER_LOSS * strangeness(self.speech.voice)
+        strange = strangeness(self.speech.voice)
+        known = 1.0 if own else 1 - STRANGER_LOSS * strange
         states = (1 - self.network_share) * self.reliability * familiarity * known
-        network = self.network_share * np.where(resting, 1 - self.reliability, 1.0)
+        at_rest = np.maximum(1 - self.reliability, 0.0 if own else RESTING_SHARE * (1 - strange))
+        if self.silent is not None:
+            at_rest[self.silent] = 0
+        network = self.network_share * np.where(resting, at_rest, 1.0)
         return network / np.maximum(states + network, 1e-12)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -19,7 +19,7 @@ from lipmotion.hmm.multistream.phone_recogniser import (
     recogniser_from_arrays,
 )
 from lipmotion.motion.arrays import MOTION_ARRAYS, motion_arrays, motion_from_arrays
-from lipmotion.motion.articulation import ArticulationPrior
+from lipmotion.motion.articulation import TABLE_WEIGHT_WITH_PREDICTOR, ArticulationPrior
 from lipmotion.motion.closure import Closure
 from lipmotion.motion.frame_labels import StateLayout
 from lipmotion.motion.generation import LearnedMotion
@@ -74,8 +74,9 @@ class TrajectoryModel:
     def motion(self) -> LearnedMotion:
         """Motion space, closure, limits and variance scaling, which turn predicted means into motion."""
         scaling = VarianceScaling(self.variance_factors, self.emission.means[-1, 0])
-        has_table = self.network is not None and self.network.uses_articulation
-        prior = None if has_table else self.prior
+        prior = self.prior
+        if prior is not None and self.network is not None:
+            prior = None if self.network.uses_articulation else replace(prior, weight=TABLE_WEIGHT_WITH_PREDICTOR)
         return LearnedMotion(self.space, self.closure, self.limits, scaling, prior, self.modulation)
 
     @property
@@ -94,11 +95,14 @@ def model_arrays(model: TrajectoryModel) -> dict[str, NDArray[Any]]:
     return arrays | emission_arrays(model.emission) | network | recogniser | filter_arrays(model.modulation)
 
 
-def model_from_arrays(arrays: Arrays, layout: Callable[[UnitSet], StateLayout], units: str) -> TrajectoryModel:
+def model_from_arrays(
+    arrays: Arrays, layout: Callable[[UnitSet], StateLayout], units: str, *, filtered: bool
+) -> TrajectoryModel:
     """Deserialise a model.
 
     layout : returns the states of phones and silences, for a unit set
     units  : name of the unit set; the set itself is in the arrays
+    filtered : there must be a modulation filter
     Raises ModelFormatError: an array is missing or undeclared, or has a wrong shape, type or range.
     """
     with format_errors("the trajectory model"):
@@ -111,7 +115,7 @@ def model_from_arrays(arrays: Arrays, layout: Callable[[UnitSet], StateLayout], 
         recogniser, network = recogniser_from_arrays(arrays), predictor_from_arrays(arrays, space.dimensions)
         stored = "network_share" in arrays or any(name.startswith(ADDED) for name in others)  # not in former models
         share = float(checked_arrays(arrays, SHARE)["network_share"][0]) if stored else NETWORK_SHARE
-        modulation = filter_from_arrays(arrays, space.dimensions)
+        modulation = filter_from_arrays(arrays, space.dimensions, needed=filtered)
         model = TrajectoryModel(
             unit_set, space, emission, factors, closure, recogniser, network, prior, share, modulation
         )

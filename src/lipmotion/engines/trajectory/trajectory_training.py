@@ -18,15 +18,14 @@ from lipmotion.kernels.sequences.banded import generate
 from lipmotion.motion.articulation import ArticulationPrior, fit_articulation_prior
 from lipmotion.motion.closure import fit_closure
 from lipmotion.motion.frame_labels import FullContextState, StateLayout, full_context_states
-from lipmotion.motion.modulation_filter import RESTING_MARGIN_S, fit_modulation_filter
+from lipmotion.motion.modulation_filter import learned_filter
 from lipmotion.motion.predictors import Predictor, PredictorTraining, folds, suitable_predictor
-from lipmotion.motion.rest import away_from_speech, runs, speech_intervals
 from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.motion.variance_scaling import scaling_factors
 from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
 from lipmotion.stats.trees import Question, Tree, gaussian_log_likelihood, grow_tree
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
-from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Progress, sub_monitor
+from lipmotion.types import Example, Monitor, Progress, sub_monitor
 
 Array = NDArray[np.float64]
 LEAST_VARIANCE_SHARE, LEAST_VARIANCE = 1e-3, 1e-12
@@ -70,11 +69,9 @@ def fit_trajectory(
         if held_out is not None:
             share = _share_of_predictor(held_out, clips, options, direct)
     recorded, generated = _recorded_and_generated(emission, network, prior, share, clips, layout)
-    factors = _scaling_factors(recorded, generated, emission.means.shape[2])
-    modulation = None
-    if options.modulation_filter and recorded:
-        whole = fit_modulation_filter(recorded, [factors * made for made in generated], _resting(clips))
-        modulation = whole.of_strength(options.modulation_filter)
+    factors = scaling_factors(recorded, generated) if recorded else np.ones(emission.means.shape[2])
+    scaled = ((original, factors * made) for original, made in zip(recorded, generated, strict=True))
+    modulation = learned_filter(options.modulation_filter, scaled, examples, values)
     monitor(Progress(_STAGE, 3, 3, 1.0))
     closure = fit_closure(space.direct_names, values, examples)
     return TrajectoryModel(
@@ -133,22 +130,6 @@ def _recorded_and_generated(
         recorded.append(clip.rows[:, 0])
         generated.append(generate(means, precisions)[0][clip.frames])
     return recorded, generated
-
-
-def _scaling_factors(recorded: Sequence[NDArray[np.float32]], generated: Sequence[Array], dimensions: int) -> Array:
-    """Return the factors of variance scaling [shape=(Q,)]; 1 where no example has two valid frames."""
-    if not recorded:
-        return np.ones(dimensions)
-    return scaling_factors([np.std(x, axis=0) for x in recorded], [np.std(x, axis=0) for x in generated])
-
-
-def _resting(clips: Sequence[TrainingClip]) -> list[NDArray[np.float32]]:
-    """Return the recorded motion of every clip in silence, far from speech [each shape=(N, Q)]."""
-    resting: list[NDArray[np.float32]] = []
-    for clip in clips:
-        far = away_from_speech(clip.frames / FRAME_RATE_HZ, speech_intervals(clip.speech.units), RESTING_MARGIN_S)
-        resting += [clip.rows[start:stop, 0] for start, stop in runs(far)]
-    return resting
 
 
 def training_clip(example: Example, values: Array, layout: StateLayout) -> TrainingClip:

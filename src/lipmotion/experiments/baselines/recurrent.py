@@ -22,15 +22,6 @@ LEAST_STEPS = 600
 """Least number of optimiser steps: with few recordings there are more epochs."""
 
 
-def torch_is_installed() -> bool:
-    """Return whether torch can be imported."""
-    try:
-        import_torch()
-    except MissingDependencyError:
-        return False
-    return True
-
-
 @dataclass(frozen=True, eq=False)
 class TrainedNetwork:
     """A network, and the mean and standard deviation of its training targets [each shape=(Q,)]."""

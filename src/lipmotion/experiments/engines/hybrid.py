@@ -46,7 +46,11 @@ class Hybrid(Animator[HybridModel]):
 
     def inputs(self, motion_s: float = math.inf) -> Inputs:  # noqa: D102
         guiding, selecting = self.guiding.inputs(motion_s), self.selecting.inputs(motion_s)
-        return Inputs(guiding.f0 or selecting.f0, max(guiding.conditions, selecting.conditions))
+        return Inputs(
+            guiding.f0 or selecting.f0,
+            max(guiding.conditions, selecting.conditions),
+            posteriors=guiding.posteriors or selecting.posteriors,
+        )
 
     def recognise(self, model: HybridModel, speech: Speech) -> Timeline[Unit] | None:  # noqa: D102
         return self.guiding.recognise(model.guiding, speech)

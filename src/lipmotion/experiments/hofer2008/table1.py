@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus, Selection
-from lipmotion.engines.joint.engine import JointEngine, JointEngineConfig, JointModel
+from lipmotion.engines.joint.config import JointEngineConfig
+from lipmotion.engines.joint.engine import JointEngine, JointModel
 from lipmotion.errors import InputError
 from lipmotion.experiments.comparison import (
     ClipStatistic,

@@ -5,11 +5,15 @@ The paper prints no figures ("initial subjective evaluation suggests …", §7);
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import engine_named
@@ -21,6 +25,7 @@ from lipmotion.experiments.engines.models import EngineModel, engine_models
 from lipmotion.experiments.learning_curve import check_training_names
 from lipmotion.experiments.minnis_breen2000.joins import join_figures
 from lipmotion.experiments.runner import DEFAULT_SETTINGS, ExperimentSettings, channels_with_opening, opening_row
+from lipmotion.hmm.model import HmmConfig
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.evaluation.figures import figures_of
 from lipmotion.pipeline.evaluation.held_out import (
@@ -31,10 +36,14 @@ from lipmotion.pipeline.evaluation.held_out import (
     speech_of_condition,
 )
 from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.training.channels import GEOMETRY
+from lipmotion.pipeline.training.fingerprint import fingerprint
 from lipmotion.pipeline.training.train import Run, train
 from lipmotion.speech.recognition.recogniser import cached_recogniser
+from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.storage.json_text import nan_as_null
-from lipmotion.types import Monitor, Speech, sub_monitor, with_progress
+from lipmotion.types import Speech, sub_monitor, with_progress
+from lipmotion.units import Lexicon
 
 ENGINE = "selection"
 PRINTED, UNGUIDED, EVERYTHING = "as printed", "all additions but the guide", "all additions: the default"
@@ -62,6 +71,8 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
 }
 """Other readings of the print, and what it leaves open."""
 QUICK_TRAINING, QUICK_CLIPS, QUICK_EPOCHS = 40, 8, 20
+_ROW, _SUMS = "row", "correlation"
+"""Names of the arrays of a kept row: its figures, and the sums over clips of its correlation."""
 WHAT_IS_SHOWN = ("acc", "nrmse", "global_variance", "jerk")
 
 
@@ -85,13 +96,15 @@ def minnis2000(
     *,
     models: Path | None = None,
     quick: bool = False,
+    work: Path | None = None,
     settings: ExperimentSettings = DEFAULT_SETTINGS,
 ) -> dict[str, Any]:
     """Return the figures of the paper's system and of its variants on ``val`` and ``test``.
 
     models : folder of the model ``selection.lipmotion`` (``models.engine_models``), so that a second run does not train
              again; None: it is trained and not kept
-    quick  : train on a few utterances, for few epochs, and compare few; nothing is kept
+    quick  : train on a few utterances, for few epochs, and compare few; the model is not kept
+    work   : a folder for finished rows, from which the same call goes on after a stop; None: none
     All rows use one model, with the default's inventory, guide and phone recogniser, of which each takes what it needs:
     the row as printed is what ``train --preset minnis2000`` makes (tests/experiments/minnis_breen2000).
     Raises CorpusError: no utterances to train on, to choose with or to compare, or motion without an opening.
@@ -105,8 +118,9 @@ def minnis2000(
     trained = _quick_model(corpus, training) if quick else engine_models(corpus, models, training, [ENGINE])[ENGINE]
     found = {}
     for number, (split, names) in enumerate(lists.items()):
-        part = sub_monitor(monitor, 0.6 + 0.2 * number, 0.8 + 0.2 * number, f"{split}: ")
-        found[split] = _on_list(corpus, names, trained.model, settings, part)
+        part = replace(settings, monitor=sub_monitor(monitor, 0.6 + 0.2 * number, 0.8 + 0.2 * number, f"{split}: "))
+        kept = _kept_rows(corpus, names, trained.model, work / split, settings) if work else NO_CHECKPOINT
+        found[split] = _on_list(corpus, names, trained.model, kept, part)
     about: dict[str, Any] = {"seed": settings.seed, "quick": quick, "seconds": trained.seconds}
     about |= {key: trained.model.about[key] for key in ("utterances", "minutes")}
     about |= {"rows": {name: _changes(config) for name, config in rows().items()}}
@@ -132,10 +146,21 @@ def _quick_model(corpus: Corpus, settings: ExperimentSettings) -> EngineModel:
     return EngineModel(model, perf_counter() - start_s)
 
 
+def _kept_rows(
+    corpus: Corpus, names: Sequence[str], model: Model, folder: Path, settings: ExperimentSettings
+) -> Checkpoint:
+    """Return what is kept of the rows on some utterances, in a folder that is made if need be."""
+    folder.mkdir(exist_ok=True)
+    config, lexicon = settings.recogniser or HmmConfig(), settings.lexicon or Lexicon()
+    of_input = fingerprint(corpus, names, model.engine, config, lexicon, GEOMETRY, model)
+    return Checkpoint(folder, f"{of_input} {rows()} {settings.seed}")
+
+
 def _on_list(
-    corpus: Corpus, names: Sequence[str], model: Model, settings: ExperimentSettings, monitor: Monitor
+    corpus: Corpus, names: Sequence[str], model: Model, kept: Checkpoint, settings: ExperimentSettings
 ) -> dict[str, Any]:
     """Return the figures of every condition and row on some utterances."""
+    monitor = settings.monitor
     recordings = held_out_recordings(
         corpus,
         cached_recogniser(model.phones),
@@ -146,16 +171,23 @@ def _on_list(
     )
     conditions: dict[str, dict[str, Any]] = {condition: {} for condition in recordings.conditions}
     spoken: dict[tuple[str, bool], list[Speech]] = {}
-    reference: dict[str, ClipStatistic] = {}
+    reference: dict[str, NDArray[np.float64]] = {}
     for name, config in with_progress(list(rows().items()), "comparing", sub_monitor(monitor, 0.4, 1)):
         learned = _of_the_row(model.learned, config)
         for condition, found in conditions.items():
-            key = condition, config.joint_recogniser and condition == AUDIO_ONLY
-            if key not in spoken:
-                spoken[key] = _speech(recordings, condition, model, SelectionConfig(joint_recogniser=key[1]))
-            statistic, row = _row(recordings, spoken[key], SelectionEngine(config), learned, settings.seed)
-            reference.setdefault(condition, statistic)
-            found[name] = row | {"acc_gain_95": statistic.gain(reference[condition], settings.seed)}
+            stage = f"{len(found)} {condition}"
+            arrays = kept.load(stage)
+            if arrays is None:
+                key = condition, config.joint_recogniser and condition == AUDIO_ONLY
+                if key not in spoken:
+                    spoken[key] = _speech(recordings, condition, model, SelectionConfig(joint_recogniser=key[1]))
+                statistic, row = _row(recordings, spoken[key], SelectionEngine(config), learned, settings.seed)
+                printed = replace(statistic, sums=list(reference.get(condition, statistic.sums)))
+                row["acc_gain_95"] = statistic.gain(printed, settings.seed)
+                arrays = {_ROW: np.array(json.dumps(row)), _SUMS: np.stack(statistic.sums)}
+                kept.save(stage, arrays)
+            reference.setdefault(condition, arrays[_SUMS])
+            found[name] = json.loads(str(arrays[_ROW]))
     return {"clips": len(names), "closed_under": recordings.closed_under, "conditions": conditions}
 
 

@@ -31,11 +31,14 @@ from lipmotion.experiments.xie_liu2007.systems import (
     PAPER_FIGURES,
     REFERENCE_SYSTEM,
     TUNED,
+    clips_from_arrays,
     selected_systems,
+    stored_clips,
     stored_system,
     system_from_arrays,
     train_system,
     tuned_options,
+    with_inputs_of,
 )
 from lipmotion.experiments.xie_liu2007.tuning import (
     TUNING,
@@ -102,7 +105,7 @@ DEFAULT_OPTIONS = ComparisonOptions()
 QUICK_SIZE = 20
 QUICK = ComparisonOptions(
     systems=[*PAPER_FIGURES, *(name + TUNED for name in PAPER_FIGURES if "FHMM" not in name), "mean pose"],
-    tuning=TuningOptions(clips=QUICK_SIZE, judges=4, mixtures=2, states=()),
+    tuning=TuningOptions(clips=QUICK_SIZE, judges=4, weights=(1.0, 0.3), mixtures=2, states=()),
     most=6,
 )
 """A small comparison, of systems trained on ``QUICK_SIZE`` recordings; conversion by factorial chains is slow."""
@@ -158,7 +161,8 @@ def xieliu2007(  # noqa: PLR0913
     for count, (start, stop) in zip(steps, pairwise(shares), strict=False):
         part = sub_monitor(settings.monitor, float(start), float(stop), f"{count} clips: ")
         trained = setup.train(names, listed[:count], trials, part)
-        rows.append({"names": count} | _size(trained, options.transcripts, seed))
+        kept = setup.checkpoint(listed[:count], held_out)
+        rows.append({"names": count} | _size(trained, options.transcripts, seed, kept))
     noise_rows = _noise_rows(trained, options.noise or NoiseConditions(), seed, sub_monitor(settings.monitor, 0.9, 1))
     recordings = trained.recordings
     if plots is not None:
@@ -209,7 +213,7 @@ class _TrainingSetup:
         trials = {}
         for number, name in enumerate(systems):
             part = sub_monitor(monitor, 0.2 + 0.8 * number / len(systems), 0.2 + 0.8 * (number + 1) / len(systems))
-            kept, stage = self._checkpoint(names), f"trials-{name}"
+            kept, stage = self.checkpoint(names), f"trials-{name}"
             found = kept.load(stage)
             if found is None:
                 tried = tuned_options(name, examples, recordings["val"], self.options.tuning, part)
@@ -223,7 +227,7 @@ class _TrainingSetup:
     ) -> _TrainedSystems:
         """Return systems, trained on the same phones of the utterances ``names``."""
         examples, recordings = self._prepared(names, self.held_out, sub_monitor(monitor, 0, 0.3))
-        kept, trained = self._checkpoint(names), dict[str, TrainedSystem]()
+        kept, trained = self.checkpoint(names), dict[str, TrainedSystem]()
         for number, name in enumerate(systems):
             start, stop = 0.3 + 0.7 * number / len(systems), 0.3 + 0.7 * (number + 1) / len(systems)
             part, chains = sub_monitor(monitor, start, stop, f"{name}: "), COMPARED_SYSTEMS[name].is_trained_here
@@ -231,7 +235,8 @@ class _TrainingSetup:
             if found is not None:
                 trained[name] = system_from_arrays(found)
                 continue
-            trained[name] = train_system(name, examples, recordings.get("val"), trials, trained, part)
+            known = with_inputs_of(name, examples, self.corpus)
+            trained[name] = train_system(name, known, recordings.get("val"), trials, trained, part)
             if chains:  # their arrays are rounded when they are stored, and so is every model that is used
                 found = stored_system(trained[name])
                 kept.save(f"system-{name}", found)
@@ -252,7 +257,7 @@ class _TrainingSetup:
         utterances = [with_visual_channels(utterance, visual, eigenlips) for utterance in utterances]
         with worker_pool(min(self.settings.workers, len(utterances) // UTTERANCES_PER_WORKER)) as team:
             phones, examples, _ = phones_and_examples(
-                utterances, config, lexicon, sub_monitor(monitor, 0, 0.7), self._checkpoint(names), team.ordered_map
+                utterances, config, lexicon, sub_monitor(monitor, 0, 0.7), self.checkpoint(names), team.ordered_map
             )
         read = partial(held_out_recordings, self.corpus, cached_recogniser(phones), lexicon=lexicon)
         read = partial(read, visual=visual, eigenlips=eigenlips)
@@ -264,8 +269,8 @@ class _TrainingSetup:
             recordings[name] = read(selection=Selection(names=part), channels=channels, monitor=reading)
         return examples, recordings
 
-    def _checkpoint(self, names: Sequence[str]) -> Checkpoint:
-        """Return what is kept of the work on the first recordings of a list."""
+    def checkpoint(self, names: Sequence[str], compared: Sequence[str] = ()) -> Checkpoint:
+        """Return what is kept of the work on the first recordings of a list, and of comparisons on others."""
         if self.work is None:
             return NO_CHECKPOINT
         folder = self.work / str(len(names))
@@ -273,14 +278,14 @@ class _TrainingSetup:
         config, lexicon = self.settings.recogniser or HmmConfig(), self.settings.lexicon or Lexicon()
         everything, engine = (*names, *self.corpus.names("val")), engine_named("coupled")
         of_input = fingerprint(self.corpus, everything, engine, config, lexicon, self.options.visual, None)
-        return Checkpoint(folder, f"{of_input} {self.options.tuning}")
+        return Checkpoint(folder, " ".join((of_input, str(self.options.tuning), *compared)))
 
 
-def _size(trained: _TrainedSystems, transcripts: bool, seed: int) -> dict[str, Any]:
+def _size(trained: _TrainedSystems, transcripts: bool, seed: int, kept: Checkpoint) -> dict[str, Any]:
     """Return the figures of all systems trained on one number of utterances."""
     recordings, systems = trained.recordings, trained.systems
     conditions = list(recordings.conditions) if transcripts else [AUDIO_ONLY]
-    made = {condition: _made(recordings, condition, systems) for condition in conditions}
+    made = {condition: _made(recordings, condition, systems, kept) for condition in conditions}
     return {
         "used": len(trained.used),
         "training": {name: _training_row(system) for name, system in systems.items()},
@@ -290,12 +295,21 @@ def _size(trained: _TrainedSystems, transcripts: bool, seed: int) -> dict[str, A
 
 
 def _made(
-    recordings: HeldOutRecordings, condition: str, systems: Mapping[str, TrainedSystem]
+    recordings: HeldOutRecordings,
+    condition: str,
+    systems: Mapping[str, TrainedSystem],
+    kept: Checkpoint = NO_CHECKPOINT,
 ) -> dict[str, list[ComparedClip]]:
     """Return what all systems generate in one condition."""
-    return {
-        name: compared_clips(recordings, condition, system.engine, system.model) for name, system in systems.items()
-    }
+    made = {}
+    for name, system in systems.items():
+        stage = f"{condition}-{name}"
+        found = kept.load(stage)
+        if found is None:
+            found = stored_clips(compared_clips(recordings, condition, system.engine, system.model))
+            kept.save(stage, found)
+        made[name] = clips_from_arrays(found)
+    return made
 
 
 def _pairs(recordings: HeldOutRecordings, made: Mapping[str, list[ComparedClip]], seed: int) -> list[dict[str, Any]]:

@@ -11,16 +11,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.engines import Animator, engine_named
+from lipmotion.corpora.store import Corpus
+from lipmotion.engines import Animator, Engine, engine_named
 from lipmotion.engines.coupled.arrays import coupled_arrays
 from lipmotion.engines.coupled.chains.structures import SYSTEMS
 from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.errors import InputError
 from lipmotion.experiments.baselines.frame_regression import ContextRidge, LoudnessRegression, MeanPose
-from lipmotion.experiments.baselines.recurrent import BlstmBaseline, import_torch, torch_is_installed
+from lipmotion.experiments.baselines.recurrent import BlstmBaseline, import_torch
 from lipmotion.experiments.xie_liu2007.tuning import (
     CONVERSIONS,
+    FREE,
     TrainedSystem,
     Trial,
     TuningOptions,
@@ -31,8 +33,9 @@ from lipmotion.experiments.xie_liu2007.tuning import (
     trained_on_the_way,
     tuned,
 )
-from lipmotion.pipeline.evaluation.held_out import HeldOutRecordings
-from lipmotion.types import Example, Monitor
+from lipmotion.pipeline.evaluation.held_out import ComparedClip, HeldOutRecordings
+from lipmotion.pipeline.training.sound_inputs import with_sound_inputs
+from lipmotion.types import Example, Monitor, silent_monitor
 
 REFERENCE_SYSTEM = "ph-vi-CHMM"
 """The system that every other one is compared with."""
@@ -48,6 +51,8 @@ PAPER_FIGURES: dict[str, tuple[float, float]] = {
 BEST_PATH = "ph-vi-CHMM, best path"
 BLSTM = "BLSTM"
 TUNED = ", tuned"
+CURVES = ("original", "generated", "time_s")
+"""Fields of ``ComparedClip`` that are curves."""
 ABOUT = "about"
 """Name of the array with settings and figures of a stored system."""
 MATCHED = "ph-MSHMM, as large as ph-vi-FHMM"
@@ -61,12 +66,14 @@ class ComparedSystem:
     options       : of the coupled engine
     same_model_as : the system whose model it takes, so that only the conversion differs, by the ``options``
     tunes         : the system of the paper whose settings are chosen on validation recordings
+    when_named    : it is compared only if it is asked for
     """
 
     make: Callable[[], Animator[Any]] | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
     same_model_as: str = ""
     tunes: str = ""
+    when_named: bool = False
 
     @property
     def is_trained_here(self) -> bool:
@@ -82,12 +89,13 @@ COMPARED_SYSTEMS: dict[str, ComparedSystem] = {
     **{name: ComparedSystem(options=SYSTEMS[name]) for name in PAPER_FIGURES},
     **{name + TUNED: ComparedSystem(options=SYSTEMS[name], tunes=name) for name in PAPER_FIGURES},
     MATCHED: ComparedSystem(options=SYSTEMS["ph-MSHMM"], tunes="ph-MSHMM"),
+    "ph-vi-FHMM, free": ComparedSystem(options=SYSTEMS["ph-vi-FHMM"] | FREE),
     "ph-vi-CHMM, soft start": ComparedSystem(options={"start": "soft"}, same_model_as=REFERENCE_SYSTEM),
     BEST_PATH: ComparedSystem(options={"conversion": "viterbi"}, same_model_as=REFERENCE_SYSTEM),
-    "trajectory CHMM, own means": ComparedSystem(_engine("coupled", acoustic_regression=False)),
-    "trajectory CHMM": ComparedSystem(_engine("coupled")),
-    "trajectory HMM": ComparedSystem(_engine("trajectory")),
-    BLSTM: ComparedSystem(BlstmBaseline),
+    "trajectory CHMM, own means": ComparedSystem(_engine("coupled", acoustic_regression=False), when_named=True),
+    "trajectory CHMM": ComparedSystem(_engine("coupled"), when_named=True),
+    "trajectory HMM": ComparedSystem(_engine("trajectory"), when_named=True),
+    BLSTM: ComparedSystem(BlstmBaseline, when_named=True),
     "ridge, ±150 ms": ComparedSystem(ContextRidge),
     "loudness": ComparedSystem(LoudnessRegression),
     "mean pose": ComparedSystem(MeanPose),
@@ -96,18 +104,19 @@ COMPARED_SYSTEMS: dict[str, ComparedSystem] = {
 
 The paper's six are those of ``train --preset``; ``tuned``: with the settings that were best on validation recordings;
 ``as large as``: with as many Gaussians as bring the number of parameters nearest to that of the tuned ph-vi-FHMM.
-``best path``: means along the best path, no EM. ``own means``: no regression of the visual means on acoustic features.
+``free``: factorial chains as ``tuning.FREE`` has them. ``best path``: means along the best path, no EM.
+``own means``: no regression of the visual means on acoustic features.
 """
 
 
 def selected_systems(names: Sequence[str] | None) -> list[str]:
     """Return the names of the systems to compare, in the table's order; always with ``REFERENCE_SYSTEM``.
 
-    names : None: all systems whose packages are installed
+    names : None: all but those that are compared only ``when_named``
     Raises InputError: no such system. Raises MissingDependencyError: a named system needs a package that is missing.
     """
     if names is None:
-        return [name for name in COMPARED_SYSTEMS if name != BLSTM or torch_is_installed()]
+        return [name for name, system in COMPARED_SYSTEMS.items() if not system.when_named]
     unknown = [name for name in names if name not in COMPARED_SYSTEMS]
     if unknown:
         raise InputError(f"no system {unknown[0]!r}; there are: {', '.join(COMPARED_SYSTEMS)}")
@@ -137,6 +146,16 @@ def tuned_options(
         return [trial for trial, _ in judged(on_the_way, judges, CONVERSIONS)]
 
     return tuned(SYSTEMS[name], alternatives(SYSTEMS[name], tuning), attempt)
+
+
+def with_inputs_of(name: str, examples: Sequence[Example], corpus: Corpus) -> Sequence[Example]:
+    """Return examples with what a system takes from their sound, as ``lipmotion train`` gives it to an engine."""
+    make = COMPARED_SYSTEMS[name].make
+    engine = make() if make is not None else None
+    if not isinstance(engine, Engine):
+        return examples
+    sound = {example.name: corpus.utterance(example.name).audio for example in examples}
+    return with_sound_inputs(engine, examples, sound, silent_monitor, map)
 
 
 def train_system(
@@ -189,3 +208,19 @@ def system_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> TrainedSystem:
     engine = CoupledEngine(CoupledConfig.parsed(about["config"]))
     model = engine.from_arrays({name: array for name, array in arrays.items() if name != ABOUT})
     return TrainedSystem(engine, model, about["seconds"], tuple(Trial(**trial) for trial in about["tried"]))
+
+
+def stored_clips(clips: Sequence[ComparedClip]) -> dict[str, NDArray[Any]]:
+    """Return what a system generated as arrays, from which ``clips_from_arrays`` makes it again."""
+    arrays = {name: np.concatenate([getattr(clip, name) for clip in clips]) for name in CURVES}
+    about = [(len(clip.time_s), clip.spoken) for clip in clips]
+    return {**arrays, ABOUT: np.array(json.dumps(about))}
+
+
+def clips_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> list[ComparedClip]:
+    """Return the clips that ``stored_clips`` stored."""
+    about = json.loads(str(arrays[ABOUT]))
+    edges = np.cumsum([frames for frames, _ in about])[:-1]
+    original, generated, time_s = (np.split(arrays[name], edges) for name in CURVES)
+    spoken = [tuple((start_s, end_s, phone) for start_s, end_s, phone in phones) for _, phones in about]
+    return list(map(ComparedClip, original, generated, time_s, spoken))

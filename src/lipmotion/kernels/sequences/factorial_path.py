@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.kernels.sequences.factorial import kept_frames
 from lipmotion.kernels.sequences.factorial_logs import LogTransitions
 from lipmotion.kernels.sequences.loops import Array, FactorialLogLikelihoods, Index, Loop
 
@@ -18,13 +18,14 @@ def factorial_best_path(
     """Return the most probable states of both loops [shapes=(T,)], and the log probability of path and recording.
 
     logs    : log densities of the recording
-    stretch : frames whose decisions are stored at once; those of the others are computed twice; None: √T
+    stretch : frames whose decisions are stored at once; those of the others are computed twice; None: as
+        ``factorial_posteriors``
     Where there is no path: states 0, and -inf.  Of equally probable paths, any one.
     Source: the Viterbi recursion, along one loop's axis and then along the other's.
     Cost: time O(T·Na·Nv·(Ua + Uv)), memory O(stretch + T/stretch) times Na·Nv.
     """
     frames = len(logs.audio)
-    stretch = stretch or math.isqrt(max(frames - 1, 0)) + 1
+    stretch = stretch or kept_frames(frames, 2 * logs.audio.shape[1] * logs.visual.shape[1])
     search = _FactorialSearch(_ViterbiTransitions.of(audio), _ViterbiTransitions.of(visual), logs)
     with np.errstate(divide="ignore"):
         initial, final = (
@@ -32,10 +33,10 @@ def factorial_best_path(
             for name in ("initial", "final")
         )
     score = initial + logs.joint(0)
-    befores = []
+    befores, decisions = [], list[_Decisions]()
     for start in range(1, frames, stretch):
         befores.append((start, score))
-        score, _ = search.through(start, min(start + stretch, frames), score)
+        score, decisions = search.through(start, min(start + stretch, frames), score)
     path = np.zeros((frames, 2), np.intp)
     score = score + final
     best = float(score.max())
@@ -43,7 +44,8 @@ def factorial_best_path(
         return path[:, 0], path[:, 1], best
     path[-1] = np.unravel_index(int(score.argmax()), score.shape)
     for start, before in reversed(befores):
-        _, decisions = search.through(start, min(start + stretch, frames), before)
+        if start != befores[-1][0]:
+            _, decisions = search.through(start, min(start + stretch, frames), before)
         for t in range(start + len(decisions) - 1, start - 1, -1):
             path[t - 1] = search.previous(decisions[t - start], *path[t])
     return path[:, 0], path[:, 1], best
@@ -65,14 +67,10 @@ class _ViterbiTransitions(LogTransitions):
         after = score + self.stay[:, None]
         decision = np.full(score.shape, units, np.min_scalar_type(units + 1))
         moved = score[: len(self.onward)] + self.onward[:, None]
-        better = moved > after[units:]
-        after[units:][better] = moved[better]
-        decision[units:][better] = units + 1
+        _take_better(after[units:], decision[units:], moved, units + 1)
         for unit, weight in enumerate(self.leaving):
             moved = score[len(score) - units + unit] + weight[:, None]
-            better = moved > after[:units]
-            after[:units][better] = moved[better]
-            decision[:units][better] = unit
+            _take_better(after[:units], decision[:units], moved, unit)
         return after, decision
 
     def previous(self, state: int, decision: int) -> int:
@@ -81,6 +79,12 @@ class _ViterbiTransitions(LogTransitions):
         if decision < units:
             return len(self.stay) - units + decision
         return state - units if decision > units else state
+
+
+def _take_better(score: Array, decision: NDArray[Any], other: Array, number: int) -> None:
+    """Replace scores by greater ones, and their decisions by a number."""
+    np.copyto(decision, number, where=other > score)
+    np.maximum(score, other, out=score)
 
 
 class _FactorialSearch(NamedTuple):

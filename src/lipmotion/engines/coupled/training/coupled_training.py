@@ -44,6 +44,7 @@ from lipmotion.errors import CorpusError
 from lipmotion.kernels.sequences.banded import generate
 from lipmotion.motion.articulation import fit_articulation_prior
 from lipmotion.motion.closure import fit_closure
+from lipmotion.motion.modulation_filter import learned_filter
 from lipmotion.motion.rest import away_from_speech, speech_intervals
 from lipmotion.motion.space import fit_reduced_motion
 from lipmotion.motion.variance_scaling import scaling_factors
@@ -107,8 +108,14 @@ def growing_models(
         if config.dynamic and config.acoustic_regression:
             monitor(Progress("regression of visual means", 1, 1, 0.75))
             model = replace(model, regression=_fitted_regression(model, data))
-        if config.dynamic and config.variance_scaling:
-            model = replace(model, scaling=_fitted_scaling(model, data, values))
+        if config.filtered or (config.dynamic and config.variance_scaling):
+            recorded = [x[mask] for x, mask in zip(values, valid, strict=True)]
+            generated = _generated(model, data)
+            if config.variance_scaling:
+                model = replace(model, scaling=scaling_factors(recorded, generated))
+            scaled = ((x, model.scaling * made) for x, made in zip(recorded, generated, strict=True))
+            modulation = learned_filter(config.modulation_filter, scaled, moving, values)
+            model = replace(model, modulation=modulation)
         monitor(Progress("regression of visual means", 1, 1, 1.0))
         joint_states = model.chains.transitions.product.chain_states.shape[1]
         frames = sum(int(example.valid.sum()) for example in examples)
@@ -246,21 +253,16 @@ def _state_regressions(structure: Structure, chain: int) -> tuple[NDArray[np.int
     return (numbers[:, None] * structure.states + np.arange(structure.states)).ravel().astype(np.intp), family
 
 
-def _fitted_scaling(model: CoupledModel, data: Sequence[AlignedUtterance], values: Sequence[Array]) -> Array:
-    """Return the factors of variance scaling, from generated to recorded motion [shape=(Q,)].
-
-    values : recorded motion in the space [each shape=(T, Q)]
-    """
+def _generated(model: CoupledModel, data: Sequence[AlignedUtterance]) -> list[Array]:
+    """Return what a model generates for utterances, in the frames whose motion was observed [each shape=(N, Q)]."""
     chains = model.chains
 
-    def generated_deviation(utterance: AlignedUtterance) -> Array:
+    def generated(utterance: AlignedUtterance) -> Array:
         speech = without_visual_streams(utterance.observations)
         motion, _ = generate(*model.motion_statistics(chains.infer(speech, chains.full_lattice)))
-        return motion[utterance.observations.observed[1]].std(axis=0)
+        return motion[utterance.observations.observed[1]]
 
-    generated = list(_threaded(generated_deviation, data))
-    original = [x[utterance.observations.observed[1]].std(axis=0) for utterance, x in zip(data, values, strict=True)]
-    return scaling_factors(original, generated)
+    return list(_threaded(generated, data))
 
 
 def _threaded(function: Callable[[AlignedUtterance], ResultT], data: Sequence[AlignedUtterance]) -> Iterator[ResultT]:
