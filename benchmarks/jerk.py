@@ -1,6 +1,7 @@
 """Jerk: what brings back the fast movement that is missing in generated motion, and what it costs in correlation.
 
-    python benchmarks/jerk.py CORPUS MODEL [MODEL ...] [--split val] [--clips 120] [--strangers FOLDER] [-o FILE.json]
+    python benchmarks/jerk.py CORPUS MODEL [MODEL ...] [--split val] [--clips 120] [-o FILE.json]
+                              [--strangers FOLDER [--only NAME ...] [--tracks FOLDER]]
 
 Audio only. The filter and the ratios of the global variance are learned from ``--clips`` clips of ``train``; every
 method has a strength, so that each is a curve of correlation against jerk. Methods:
@@ -11,7 +12,8 @@ dynamic means   : the means of Δ and Δ² times a factor
 variance of Δ²  : the likelihood of the global variance of Δ² inside the generation (Toda & Tokuda 2007), at
                   a large weight: the most probable curve with that variance, utterance by utterance; no closures
 spectrum        : the modulation filter towards the recorded spectrum, the tracker's noise included
-filter          : the modulation filter as it is in the package, freed of that noise
+filter          : the modulation filter as it is in the package, freed of that noise; of models that have one, theirs
+by voice        : the same, weaker for voices that training does not know, as it is in the package
 
 ``jerk`` is against the reference as tracked; ``freed`` against its jerk without the share of its power that it has in
 silence, more than 0.3 s away from speech. ``--strangers``: videos of other people, mean ACC per clip, best lag within
@@ -24,13 +26,14 @@ import argparse
 import json
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 from unittest import mock
 
 import numpy as np
 from anyone import best_lag
+from kept_tracks import kept_track
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, solveh_banded
 from scipy.ndimage import gaussian_filter1d
@@ -55,12 +58,13 @@ from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.types import Audio, Motion, Timeline, Track, Unit
 from lipmotion.types.motion import between_frames
 from lipmotion.units import VISEMES, Lexicon
-from lipmotion.vision.track import track
 
 Array = NDArray[np.float64]
 RATE_HZ = 100.0
 DISTANCES = ("opening", "width", "outer")
 STRENGTHS = (0.5, 0.75, 1.0, 1.25)
+LARGER = (*STRENGTHS, 1.5, 1.75, 2.0)
+"""Strengths of the filter."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +84,7 @@ class Clip:
     seen: NDArray[np.bool_]
     rate_hz: float
     reference: Timeline[Unit]
+    voice: float
 
     @property
     def time_s(self) -> Array:
@@ -91,6 +96,10 @@ class Clip:
         means = self.means * np.array([1.0, dynamics, dynamics])[:, None]
         result = generation._generated(self.motion.closure, (means, self.precisions), {}, self.ranges, modulation)
         return result[0]
+
+    def by_voice(self, modulation: ModulationFilter) -> Array:
+        """Return generated motion as the package filters it, for what training knows of the voice."""
+        return self.generated(replace(self.motion, modulation=modulation).for_voice(self.voice).modulation)
 
     def as_recorded(self, values: Array) -> Array:
         """Return motion at 100 Hz in the measured frames of the camera, the mouth open or closed."""
@@ -131,9 +140,8 @@ def clip_of(model: Model, recording: Audio | Path, track: Track, reference: Time
         model.engine.generate(model.learned, speech)
     original = given["motion"].space.reduce(np.asarray(track.motion.values, float))
     units = reference if reference is not None else speech.units
-    return Clip(
-        given["motion"], *given["statistics"], given["ranges"], original, track.seen, track.motion.rate_hz, units
-    )
+    camera = track.seen, track.motion.rate_hz
+    return Clip(given["motion"], *given["statistics"], given["ranges"], original, *camera, units, speech.voice)
 
 
 def resting(clips: Sequence[Clip], rate_hz: float) -> list[Array]:
@@ -146,6 +154,12 @@ def resting(clips: Sequence[Clip], rate_hz: float) -> list[Array]:
         far = away_from_speech(np.arange(len(values)) / rate_hz, speech_intervals(clip.reference), RESTING_MARGIN_S)
         found += [values[start:stop] for start, stop in runs(far & valid)]
     return found
+
+
+def own_filter(model: Model) -> ModulationFilter | None:
+    """Return the filter that a model has learned, at strength 1; None: it has none."""
+    strength, modulation = getattr(model.engine.config, "modulation_filter", 0), model.learned.motion.modulation
+    return modulation.of_strength(1 / strength) if strength and modulation is not None else None
 
 
 def learned_filters(clips: Sequence[Clip]) -> dict[str, ModulationFilter]:
@@ -203,9 +217,10 @@ def with_variance(clip: Clip, ratios: Array) -> Array:
     return values
 
 
-def methods(clips: Sequence[Clip]) -> dict[str, Method]:
-    """Return all methods by name, with what they learn from training clips."""
+def methods(clips: Sequence[Clip], own: ModulationFilter | None) -> dict[str, Method]:
+    """Return all methods by name, with what they learn from training clips; the filter is the model's own, if any."""
     filters = learned_filters(clips)
+    filters["filter"] = own or filters["filter"]
     deviations = []
     for clip in clips:
         recorded, valid = to_model_frames(clip.original, clip.seen, clip.rate_hz, len(clip.means), RATE_HZ)
@@ -221,9 +236,12 @@ def methods(clips: Sequence[Clip]) -> dict[str, Method]:
         wanted = 1 + strength * (np.maximum(ratios, 1) - 1)
         found[f"variance of Δ² {strength}"] = lambda clip, w=wanted: with_variance(clip, w)  # type: ignore[misc]
     for name, modulation in filters.items():
-        for strength in STRENGTHS:
+        for strength in LARGER:
             part = modulation.of_strength(strength)
             found[f"{name} {strength}"] = lambda clip, p=part: clip.generated(p)  # type: ignore[misc]
+    for strength in LARGER:
+        part = filters["filter"].of_strength(strength)
+        found[f"by voice {strength}"] = lambda clip, p=part: clip.by_voice(p)  # type: ignore[misc]
     return found
 
 
@@ -267,12 +285,15 @@ def line(name: str, row: dict[str, Any], first: dict[str, Any]) -> str:
     return "  ".join(parts)
 
 
-def of_strangers(model: Model, paths: Sequence[Path], found: dict[str, Method]) -> dict[str, Any]:
-    """Print and return the figures of all methods on videos of people whom the model does not know."""
-    tracks = [track(path, crops=False) for path in paths]
+def of_strangers(model: Model, paths: Sequence[Path], kept: Path | None, found: dict[str, Method]) -> dict[str, Any]:
+    """Print and return the figures of all methods on videos of people whom the model does not know.
+
+    kept : folder of their tracks, as of ``kept_tracks.py``; None: they are tracked
+    """
+    tracks = [kept_track(path, kept) for path in paths]
     clips = [clip_of(model, path, each) for path, each in zip(paths, tracks, strict=True)]
     originals = [clip.original[clip.seen][:, :3] for clip in clips]
-    result = {}
+    result: dict[str, Any] = {"voices": [clip.voice for clip in clips]}
     for name, method in found.items():
         made = [method(clip) for clip in clips]
         channels = clips[0].motion.space.channels[:3]
@@ -293,7 +314,9 @@ def of_strangers(model: Model, paths: Sequence[Path], found: dict[str, Method]) 
     return result
 
 
-def experiment(model: Model, corpus: Corpus, split: str, count: int, strangers: Sequence[Path]) -> dict[str, Any]:
+def experiment(
+    model: Model, corpus: Corpus, split: str, count: int, strangers: Sequence[Path], kept: Path | None
+) -> dict[str, Any]:
     """Print and return the figures of all methods with one model."""
     names = list(corpus.names("train"))
     training = clips_of(model, corpus, names[:: max(len(names) // count, 1)][:count])
@@ -307,11 +330,11 @@ def experiment(model: Model, corpus: Corpus, split: str, count: int, strangers: 
     noise = (np.square(quiet).mean(axis=0) / np.square(whole).mean(axis=0))[:3]
     print(f"tracker's noise, share of the power of jerk: {noise.round(3)}")
     result: dict[str, Any] = {"noise": noise.tolist()}
-    found = methods(training)
+    found = methods(training, own_filter(model))
     for name, method in found.items():
         result[name] = figures(clips, [method(clip) for clip in clips], threshold, noise)
         print(line(name, result[name], result["as generated"]), flush=True)
-    return result | ({"strangers": of_strangers(model, strangers, found)} if strangers else {})
+    return result | ({"strangers": of_strangers(model, strangers, kept, found)} if strangers else {})
 
 
 def main() -> None:
@@ -321,14 +344,19 @@ def main() -> None:
     parser.add_argument("models", type=Path, nargs="+", help="trained on its list train, of any engine")
     parser.add_argument("--split", default="val")
     parser.add_argument("--clips", type=int, default=120, help="training clips from which methods learn (default: 120)")
-    parser.add_argument("--strangers", type=Path, help="folder of videos of other people (.mpg)")
+    parser.add_argument("--strangers", type=Path, help="folder of videos of other people (.mpg, .mp4)")
+    parser.add_argument("--only", nargs="+", help="names of those of them that are used (default: all)")
+    parser.add_argument("--tracks", type=Path, help="folder of their kept tracks (default: they are tracked)")
     parser.add_argument("-o", "--output", type=Path)
     options = parser.parse_args()
     corpus, results = Corpus.open(options.corpus), {}
-    strangers = sorted(options.strangers.glob("*.mpg")) if options.strangers else []
+    found = sorted(options.strangers.glob("*.mp[g4]")) if options.strangers else []
+    strangers = [path for path in found if not options.only or path.stem in options.only]
     for path in options.models:
         print(f"{path.name}, {options.split}")
-        results[path.name] = experiment(load_model(path), corpus, options.split, options.clips, strangers)
+        results[path.name] = experiment(
+            load_model(path), corpus, options.split, options.clips, strangers, options.tracks
+        )
     if options.output:
         options.output.write_text(json.dumps({"split": options.split, "models": results}, indent=1) + "\n")
 

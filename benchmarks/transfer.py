@@ -1,150 +1,164 @@
 """Transfer onto another face: how near the rest pose and the range of generated motion come to a person's own.
 
-    python benchmarks/transfer.py MODEL CORPUS [--speaker NAME] [--fit half,all,N] [--recogniser auto]
+    python benchmarks/transfer.py PERSON ... [--model MODEL] [--tracks FOLDER]
 
-The map is fitted on the first half of the person's utterances (or all, or the first N) and judged on the second half,
-or on the same one where there is only one. Every utterance is generated once without and once with the map, of the
-same units. Figures, without and with the map: ``rest``, distance of the rest poses in silence away from speech, the
-sum of opening, width and outer, and of the points the root mean square; ``range``, the 5th to 95th percentile in
-speech relative to the tracked one; ``acc``, mean of per-clip correlations without a lag, of all frames and of speech;
-``distance``, the mean absolute difference, the sum of three channels; ``closed``, the share of p, b and m in which
-the generated opening is not more than 0.01 over the tracked person's own (the median over p, b and m of the smallest
-opening); ``closed_source``: over the generated one's own, before the map.
+A person is a video, which is divided at pauses into pieces of 5 s or more, or a folder of videos, each of them a piece;
+of a video that is one piece, each half is one. Maps are fitted on one piece, each in turn, on two, and on half of them,
+ten times drawn, and judged on all others. One JSON object a line for each person and number of pieces, at last the
+means over people. Figures, each without and with the map: ``rest``, distance of the rest poses in silence away from
+speech, the sum of opening, width and outer; ``distance``, the mean absolute difference, the sum of the three;
+``range``, the 5th to 95th percentile of the opening in speech relative to the tracked one; ``closed``, the share of
+p, b and m in which the opening is not more than 0.01 over the person's own (the median over p, b and m).
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import time
 from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from kept_tracks import kept_track
 from numpy.typing import NDArray
 
-from lipmotion import Corpus, Generation, Model, SpeechRequest, load_model
-from lipmotion.motion.closure import closable_ranges
+from lipmotion import Model, SpeechRequest, load_model
+from lipmotion.motion.closure import OPENING, closable_ranges
 from lipmotion.motion.rest import away_from_speech, speech_intervals
-from lipmotion.motion.speaker_maps import FAR_FROM_SPEECH_S, NEAR_SPEECH_S, SpeakerMap
+from lipmotion.motion.speaker_maps import FAR_FROM_SPEECH_S, RANGE_PERCENTILES, SpeakerMap, restfulness
 from lipmotion.motion.transfer_map import transfer_map
-from lipmotion.pipeline.generate import transfer
-from lipmotion.pipeline.generate.generation_for import generate_for
-from lipmotion.pipeline.understand.understood_speech import understand
-from lipmotion.types import Speech, Utterance
+from lipmotion.pipeline.generate.transfer import measured_pair
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.speech.sound.pauses import levels_db, spoken_spans
+from lipmotion.types import FRAME_RATE_HZ, Audio, Example, Track
 
-CHANNELS = ("opening", "width", "outer")
-TOUCH = 0.01
+CHANNELS = (OPENING, "width", "outer")
+PIECE_S, DRAWS, TOUCH, LEAST_SILENCE = 5.0, 10, 0.01, 8
+Pair = tuple[Example, Example]
 Array = NDArray[np.float64]
 
 
 def main() -> None:
-    """Print one JSON object."""
+    """Print one JSON object for each person and number of pieces."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("model", type=Path)
-    parser.add_argument("corpus", type=Path)
-    parser.add_argument("--speaker", default="")
-    parser.add_argument("--fit", default="half")
-    parser.add_argument("--recogniser", default="auto", help="for the footage that is fitted on")
-    parser.add_argument("--no-transcripts", action="store_true", help="in the footage that is fitted on")
+    parser.add_argument("people", type=Path, nargs="+")
+    parser.add_argument("--model", type=Path, help="default: the one that ships")
+    parser.add_argument("--tracks", type=Path, help="folder in which tracks are kept")
     options = parser.parse_args()
-    corpus, model = Corpus.open(options.corpus), load_model(options.model)
-    names = corpus.names(None, [options.speaker] if options.speaker else [])
-    half = (len(names) + 1) // 2
-    judged = [corpus.utterance(name) for name in names[half:] or names]
-    understood = [understand(model, request_of(utterance)) for utterance in judged]
-    for fit in options.fit.split(","):
-        count = {"half": half, "all": len(names)}.get(fit) or int(fit)
-        start_s = time.perf_counter()
-        person = fitted_map(model, [corpus.utterance(name) for name in names[:count]], options)
-        fit_s = time.perf_counter() - start_s
-        gain = {channel.name: round(float(gain), 3) for channel, gain in zip(person.channels, person.gain, strict=True)}
-        about = {"person": options.speaker or corpus.path.name, "fitted": count, "judged": len(judged), "fit_s": fit_s}
-        figures = judge(model, person, judged, understood)
-        print(json.dumps(about | {"gain": {name: gain[name] for name in CHANNELS}} | figures), flush=True)
+    model = load_model(options.model) if options.model else load_model()
+    means: dict[str, list[Array]] = defaultdict(list)
+    for path in options.people:
+        pairs = [pair for one in recordings(path, options.tracks) for pair in pairs_of(model, *one)]
+        if len(pairs) == 1:
+            pairs = halves(pairs[0])
+        for name, fits in choices(len(pairs)).items():
+            rows = [judged(pairs, fit) for fit in fits]
+            found = np.nanmean([row for each in rows for row in each], axis=0)
+            means[name].append(found)
+            show(path.stem, name, len(pairs), found)
+    for name, each in means.items():
+        show("all", name, len(each), np.nanmean(each, axis=0))
 
 
-def request_of(utterance: Utterance, transcripts: bool = True, recogniser: str = "auto") -> SpeechRequest:
-    """Return an utterance as a request, with its words if it has any."""
-    words = " ".join(utterance.words) if utterance.words and transcripts else None
-    return SpeechRequest(utterance.audio, words, recogniser=recogniser)
+def show(person: str, fitted: str, number: int, figures: Array) -> None:
+    """Print the means of the rows of ``judged``."""
+    names = ("rest", "distance", "range", "closed")
+    named = {name: row.round(3).tolist() for name, row in zip(names, figures, strict=True)}
+    print(json.dumps({"person": person, "pieces": number, "fitted on": fitted} | named), flush=True)
 
 
-def fitted_map(model: Model, utterances: list[Utterance], options: argparse.Namespace) -> SpeakerMap:
-    """Return the map of ``map_onto``, of some utterances of a corpus."""
-    source, target = [], []
-    for utterance in utterances:
-        request = request_of(utterance, not options.no_transcripts, options.recogniser)
-        pair = transfer.measured_pair(model, None, utterance.name, request, utterance.track, "corpus")
-        source.append(pair[0])
-        target.append(pair[1])
-    return transfer_map(source, target)
+def choices(count: int) -> dict[str, list[list[int]]]:
+    """Return the choices of pieces to fit on, by the name of their number."""
+    draw = np.random.default_rng(0)
+    found = {"one": [[number] for number in range(count)]}
+    for name, size in (("two", 2), ("half", count // 2)):
+        if count >= 4:
+            found[name] = [draw.permutation(count)[:size].tolist() for _ in range(DRAWS)]
+    return found
 
 
-def judge(model: Model, person: SpeakerMap, utterances: list[Utterance], understood: list[Speech]) -> dict[str, Any]:
-    """Return the figures, each without and with the map."""
-    rows: dict[str, list[Any]] = defaultdict(list)
-    tracked_closed, closed, spoken = [], defaultdict(list), defaultdict(list)
-    for utterance, speech in zip(utterances, understood, strict=True):
-        before, after = (generate_for(each, model.engine, model.learned, speech) for each in (None, person))
-        seen = utterance.track.seen
-        track = utterance.track.motion
-        time_s = track.time_s[seen]
-        values = {"tracked": track.values[seen]}
-        values |= {kind: shown(each, track.names, time_s) for kind, each in (("before", before), ("after", after))}
-        speech_s = speech_intervals(before.units)
-        quiet = away_from_speech(time_s, speech_s, FAR_FROM_SPEECH_S)
-        if quiet.sum() < 3:
-            quiet = away_from_speech(time_s, speech_s, NEAR_SPEECH_S)
-        loud = ~away_from_speech(time_s, speech_s, 0.0)
-        three = [track.names.index(name) for name in CHANNELS]
-        points = [n for n, name in enumerate(track.names) if name[:2] in ("x_", "y_", "z_")]
-        for kind, curve in values.items():
-            spoken[kind].append(curve[loud][:, three])
-            if kind == "tracked":
-                continue
-            rows[f"acc {kind}"].append([np.corrcoef(curve[:, n], values["tracked"][:, n])[0, 1] for n in three])
-            rows[f"acc in speech {kind}"].append(
-                [np.corrcoef(curve[loud, n], values["tracked"][loud, n])[0, 1] for n in three]
-            )
-            rows[f"distance {kind}"].append(np.abs(curve - values["tracked"])[:, three].sum(axis=1).mean())
-            if quiet.sum() >= 3:
-                apart = np.median(curve[quiet], axis=0) - np.median(values["tracked"][quiet], axis=0)
-                rows[f"rest {kind}"].append(np.abs(apart[three]).sum())
-                rows[f"rest points {kind}"].append(np.sqrt(np.square(apart[points]).mean()) if points else np.nan)
-        ranges = closable_ranges(before.units, len(before.motion.values))
-        for frames in ranges:
-            inside = (time_s >= frames.start / 100 - 0.02) & (time_s <= frames.stop / 100 + 0.01)
-            if inside.any():
-                tracked_closed.append(values["tracked"][inside, three[0]].min())
-                closed["before"].append(before.motion["opening"][frames].min())
-                closed["after"].append(after.motion["opening"][frames].min())
-    out: dict[str, Any] = {key: np.round(np.mean(rows[key], axis=0), 4).tolist() for key in sorted(rows)}
-    wide = {kind: np.ptp(np.percentile(np.concatenate(each), [5, 95], axis=0), axis=0) for kind, each in spoken.items()}
-    out |= {f"range {kind}": np.round(wide[kind] / wide["tracked"], 3).tolist() for kind in ("before", "after")}
-    own = float(np.median(tracked_closed)) if tracked_closed else float("nan")
-    limit = 0.1 * float(np.percentile(np.concatenate(spoken["tracked"])[:, 0], 95))
-    source = float(np.median(closed["before"])) if closed["before"] else float("nan")
-    out["pbm"] = len(tracked_closed)
-    out["tracked_closed"] = round(own, 4)
-    out["tracked_share_closed"] = share(tracked_closed, own + TOUCH)
-    for kind in ("before", "after"):
-        out[f"closed {kind}"] = share(closed[kind], own + TOUCH)
-        out[f"closed 10% {kind}"] = share(closed[kind], limit)
-    out["closed 10% tracked"] = share(tracked_closed, limit)
-    out["closed_source"] = share(closed["before"], source + TOUCH)
-    return out
+def recordings(path: Path, tracks: Path | None) -> Iterator[tuple[Audio, Track]]:
+    """Yield the pieces of a person's recordings."""
+    if path.is_dir():
+        for file in sorted(each for each in path.iterdir() if each.suffix == ".mkv"):
+            yield read_audio(file), kept_track(file, tracks)
+        return
+    audio, track = read_audio(path), kept_track(path, tracks)
+    rate_hz = track.motion.rate_hz
+    for first, last in pairwise(round(cut_s * rate_hz) for cut_s in cuts_at_pauses(audio)):
+        samples = slice(round(first / rate_hz * audio.rate_hz), round(last / rate_hz * audio.rate_hz))
+        motion = replace(track.motion, values=track.motion.values[first:last])
+        yield Audio(audio.samples[samples], audio.rate_hz), Track(motion, np.asarray(track.seen)[first:last])
 
 
-def share(values: list[float], limit: float) -> float:
-    """Return the share of values that are not more than a limit."""
-    return round(float(np.mean(np.array(values) <= limit)), 3) if values else float("nan")
+def cuts_at_pauses(audio: Audio) -> list[float]:
+    """Return where the pieces of a recording begin, and where the last one ends, in seconds."""
+    cuts_s = [0.0]
+    for (_, end_s), (start_s, _) in pairwise(spoken_spans(levels_db(audio))):
+        middle_s = (end_s + start_s) / 2
+        if middle_s - cuts_s[-1] >= PIECE_S and audio.duration_s - middle_s >= PIECE_S:
+            cuts_s.append(middle_s)
+    return [*cuts_s, audio.duration_s]
 
 
-def shown(generation: Generation, names: tuple[str, ...], time_s: Array) -> Array:
-    """Return the generated values of some channels at some times [shape=(len(time_s), len(names))]."""
-    return generation.selected(names).motion.at(time_s)
+def pairs_of(model: Model, audio: Audio, track: Track) -> list[Pair]:
+    """Return what a model generates for a piece, and the person's own motion."""
+    return [measured_pair(model, None, "piece", SpeechRequest(audio), track, "the video")]
+
+
+def halves(pair: Pair) -> list[Pair]:
+    """Return a piece twice, each with another half of the frames valid."""
+    later = np.arange(len(pair[0].valid)) >= len(pair[0].valid) // 2
+    return [
+        (replace(pair[0], valid=pair[0].valid & half), replace(pair[1], valid=pair[1].valid & half))
+        for half in (~later, later)
+    ]
+
+
+def judged(pairs: Sequence[Pair], fit: Sequence[int]) -> list[Array]:
+    """Return the figures, without and with a map fitted on some pieces, of each of the others [each shape=(4, 2)]."""
+    person = transfer_map([pairs[number][0] for number in fit], [pairs[number][1] for number in fit])
+    closed = own_closed([own for _, own in pairs])
+    others = [pair for number, pair in enumerate(pairs) if number not in fit]
+    return [np.stack([figures(pair, None, closed), figures(pair, person, closed)], axis=1) for pair in others]
+
+
+def figures(pair: Pair, person: SpeakerMap | None, closed: float) -> Array:
+    """Return the figures of a piece [shape=(4,)]; NaN where there is no silence, or no p, b or m."""
+    source, own = pair
+    names = source.motion.names
+    values, tracked = np.asarray(source.motion.values, float), np.asarray(own.motion.values, float)
+    if person is not None:
+        values = person.to_person(values, restfulness(source.speech.units, len(values)))
+    three = [names.index(name) for name in CHANNELS]
+    values, tracked = values[:, three], tracked[:, three]
+    values[:, 0] = np.maximum(values[:, 0], 0)
+    time_s, speech_s = np.arange(len(values)) / FRAME_RATE_HZ, speech_intervals(source.speech.units)
+    silent = own.valid & away_from_speech(time_s, speech_s, FAR_FROM_SPEECH_S)
+    rest = np.nan
+    if silent.sum() >= LEAST_SILENCE:
+        rest = float(np.abs(np.median(values[silent], axis=0) - np.median(tracked[silent], axis=0)).sum())
+    spoken = own.valid & ~away_from_speech(time_s, speech_s, 0.0)
+    wide = [np.ptp(np.percentile(each[spoken, 0], RANGE_PERCENTILES)) for each in (values, tracked)]
+    lips = [values[frames, 0].min() for frames in measured_closures(own)]
+    shut = float(np.mean(np.array(lips) <= closed + TOUCH)) if lips else np.nan
+    return np.array([rest, np.abs(values - tracked)[own.valid].sum(axis=1).mean(), wide[0] / wide[1], shut])
+
+
+def measured_closures(own: Example) -> list[slice]:
+    """Return the frames of each p, b and m that were measured."""
+    ranges = closable_ranges(own.speech.units, len(own.valid))
+    return [frames for frames in ranges if own.valid[frames].all()]
+
+
+def own_closed(measured: Sequence[Example]) -> float:
+    """Return a person's opening in p, b and m: the median of the smallest."""
+    return float(
+        np.median([own.motion[OPENING][frames].min() for own in measured for frames in measured_closures(own)])
+    )
 
 
 if __name__ == "__main__":

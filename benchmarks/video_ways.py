@@ -15,11 +15,10 @@ from lipmotion.appearance.candidates import squared_distances
 from lipmotion.appearance.eigenlips import Eigenlips, fit_eigenlips
 from lipmotion.appearance.mouth_region import HEIGHT, WIDTH
 from lipmotion.appearance.placing import inverse_map, place
-from lipmotion.appearance.refinement import PAPER
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
 from lipmotion.faces.filmed.face import FilmedFace
-from lipmotion.faces.filmed.renderer import STITCHING
+from lipmotion.faces.filmed.renderer import AS_PRINTED, STITCHING
 from lipmotion.faces.registry import face_named
 from lipmotion.pipeline.film import filmed_video
 from lipmotion.pipeline.film.background import open_background, placed_maps
@@ -308,7 +307,8 @@ def filmed_ways(face: FilmedFace, mouths: RecordedMouths, engines: Sequence[str]
         "no jaw": FilmOptions(jaw="none"),
         "jaw by energy": FilmOptions(jaw="energy"),
         "no refinement": FilmOptions(stitching=replace(STITCHING, mouth=None)),
-        "refinement of the paper": FilmOptions(stitching=replace(STITCHING, mouth=PAPER)),
+        "refinement of the paper": FilmOptions(stitching=AS_PRINTED),
+        "refinement of the paper, no mean": FilmOptions(stitching=replace(AS_PRINTED, average=1)),
         "no noise": FilmOptions(stitching=replace(STITCHING, noise=False)),
     }
     ways += [
