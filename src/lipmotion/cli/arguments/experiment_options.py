@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lipmotion.cli.arguments.figures import add_figures_arguments, report_figures
@@ -38,3 +40,10 @@ def run_experiment(
         return experiment(Corpus.open(options.corpus), settings)
 
     report_figures(options, compute, table)
+
+
+def unfinished_parts(options: argparse.Namespace) -> AbstractContextManager[Path | None]:
+    """Return the folder of finished parts, from which a second run of an experiment goes on; None without an output."""
+    from lipmotion.storage.files import unfinished_work
+
+    return unfinished_work(options.output) if options.output else nullcontext()

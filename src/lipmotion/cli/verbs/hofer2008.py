@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
 
-from lipmotion.cli.arguments.experiment_options import add_experiment_arguments, run_experiment
+from lipmotion.cli.arguments.experiment_options import add_experiment_arguments, run_experiment, unfinished_parts
 from lipmotion.cli.arguments.options import list_or_all
 
 if TYPE_CHECKING:
@@ -29,10 +28,9 @@ def run(options: argparse.Namespace) -> None:
     """Call ``experiment.hofer2008`` and print its tables; with ``--output``, a second run goes on where one stopped."""
     from lipmotion.experiments.hofer2008.table1 import FULL, QUICK, hofer2008
     from lipmotion.experiments.hofer2008.table1_text import table
-    from lipmotion.storage.files import unfinished_work
 
     def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
-        with unfinished_work(options.output) if options.output else nullcontext() as work:
+        with unfinished_parts(options) as work:
             chosen = QUICK if options.quick else FULL
             return hofer2008(corpus, chosen, split=list_or_all(options.split), work=work, settings=settings)
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
 
-from lipmotion.cli.arguments.experiment_options import add_experiment_arguments, run_experiment
+from lipmotion.cli.arguments.experiment_options import add_experiment_arguments, run_experiment, unfinished_parts
 from lipmotion.cli.arguments.paths import add_output
 
 if TYPE_CHECKING:
@@ -28,10 +27,9 @@ def run(options: argparse.Namespace) -> None:
     """Call ``experiment.minnis2000`` and print its table; with ``--output``, a second run goes on where one stopped."""
     from lipmotion.experiments.minnis_breen2000.minnis2000 import minnis2000
     from lipmotion.experiments.minnis_breen2000.text import table
-    from lipmotion.storage.files import unfinished_work
 
     def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
-        with unfinished_work(options.output) if options.output else nullcontext() as work:
+        with unfinished_parts(options) as work:
             return minnis2000(corpus, models=options.models, quick=options.quick, work=work, settings=settings)
 
     run_experiment(options, experiment, table)

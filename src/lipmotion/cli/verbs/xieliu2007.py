@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from contextlib import nullcontext
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from lipmotion.cli.arguments.experiment_options import add_experiment_arguments, run_experiment
+from lipmotion.cli.arguments.experiment_options import add_experiment_arguments, run_experiment, unfinished_parts
 from lipmotion.cli.arguments.options import list_or_all, numbers
 from lipmotion.cli.arguments.paths import add_input, add_output
 
@@ -60,7 +59,6 @@ def run(options: argparse.Namespace) -> None:
         xieliu2007,
     )
     from lipmotion.experiments.xie_liu2007.text import table
-    from lipmotion.storage.files import unfinished_work
 
     def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
         kinds = tuple(kind for kind in options.noise.split(",") if kind)
@@ -73,7 +71,7 @@ def run(options: argparse.Namespace) -> None:
             transcripts=options.transcripts,
             noise=NoiseConditions(kinds, tuple(map(float, options.snr)), talkers),
         )
-        with unfinished_work(options.output) if options.output else nullcontext() as work:
+        with unfinished_parts(options) as work:
             return xieliu2007(
                 corpus,
                 compared,

@@ -65,9 +65,9 @@ def fit_selection(
         direct, of_guide = len(motion.space.direct), sub_monitor(monitor, 0.3, 0.9)
         training = PredictorTraining(examples, values, direct, config.epochs, of_guide, checkpoint)
         guide = fit_guide(kind.fit(training).predictor, examples, values)
-    monitor(Progress(_STAGE, 1, 3, 0.0))
+    monitor(Progress(_STAGE, 1, 3, 0.9))
     inventory = inventory_of(examples, values, motion.space, guide)
-    monitor(Progress(_STAGE, 2, 3, 0.0))
+    monitor(Progress(_STAGE, 2, 3, 0.92))
     recorded = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
     scale = comparison_scale(recorded, motion.space)
     rest, unknown = _rest_pose(examples, values, motion.space), np.ones((3, len(scale)))
@@ -81,7 +81,7 @@ def fit_selection(
     )
     modulation = learned_filter(config.modulation_filter, compared, examples, values)
     model = replace(model, motion=replace(motion, modulation=modulation))
-    monitor(Progress(_STAGE, 3, 3, 0.0))
+    monitor(Progress(_STAGE, 3, 3, 1.0))
     return model, np.sqrt(model.variances[0])
 
 
