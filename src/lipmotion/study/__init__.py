@@ -1,0 +1,1 @@
+"""Studies: people watch talking faces and say what they see; their answers are collected and analysed."""

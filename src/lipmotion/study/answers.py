@@ -1,0 +1,123 @@
+"""Answers of raters, as a table that spreadsheets and statistics programs read: one row for each judgement."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+
+from lipmotion.errors import InputError, shortened
+from lipmotion.storage.files import read_text_file, whole_file
+
+PAIRED, MOS, RANKING = "paired", "mos", "ranking"
+KINDS = (PAIRED, MOS, RANKING)
+FIRST, SECOND = "first", "second"
+"""Values of a paired comparison: which of the two videos was preferred."""
+RECORDING = "recording"
+"""The condition that is the real recording, hidden among the others."""
+ANCHOR = "anchor"
+"""The condition whose lips are out of step with the sound on purpose: who does not see that does not watch."""
+HIGHEST_MOS, HIGHEST_RANK = 5, 100
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One judgement of a rater.
+
+    rater      : name of the rater in this study, which says nothing of the person
+    kind       : ``paired``, ``mos`` or ``ranking``
+    trial      : number of the trial in the order in which this rater saw them, from 0
+    sentence   : what is said in the videos
+    question   : what was asked: ``preference``, or a scale such as ``smoothness``
+    condition  : what was judged; in a pair, what was shown first
+    other      : in a pair, what was shown second; otherwise empty
+    value      : ``first`` or ``second`` of a pair; 1 to 5 for ``mos``; 0 to 100 for ``ranking``
+    seconds    : from the start of the trial to the answer
+    plays      : how often the videos of the trial were played to their ends
+    practice   : whether it was a trial for practice, which does not count
+    expected   : the value that an attentive rater gives, in a trial that checks attention; otherwise empty
+    """
+
+    rater: str
+    kind: str
+    trial: int
+    sentence: str
+    question: str
+    condition: str
+    other: str
+    value: str
+    seconds: float
+    plays: int
+    practice: bool
+    expected: str
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise InputError(f"an answer of the kind {shortened(self.kind)!r}, required one of {', '.join(KINDS)}")
+        if not is_possible(self.kind, self.value):
+            raise InputError(f"the answer {shortened(self.value)!r}, required {POSSIBLE[self.kind]}")
+
+
+POSSIBLE = {
+    PAIRED: f"{FIRST!r} or {SECOND!r}",
+    MOS: f"a whole number from 1 to {HIGHEST_MOS}",
+    RANKING: f"a whole number from 0 to {HIGHEST_RANK}",
+}
+"""The values of each kind, in words."""
+
+
+def is_possible(kind: str, value: str) -> bool:
+    """Return whether a value can be the answer to a question of a kind."""
+    if kind == PAIRED:
+        return value in (FIRST, SECOND)
+    least, most = (1, HIGHEST_MOS) if kind == MOS else (0, HIGHEST_RANK)
+    return value.isascii() and value.isdecimal() and len(value) <= 3 and least <= int(value) <= most
+
+
+COLUMNS = tuple(field.name for field in fields(Answer))
+
+
+def answers_text(answers: Iterable[Answer]) -> str:
+    """Return a table of answers in CSV (RFC 4180), with a line of column names."""
+    file = io.StringIO()
+    table = csv.DictWriter(file, COLUMNS)
+    table.writeheader()
+    table.writerows(asdict(answer) | {"practice": int(answer.practice)} for answer in answers)
+    return file.getvalue()
+
+
+def write_answers(path: Path, answers: Iterable[Answer]) -> None:
+    """Write a table of answers. Raises ExportError: it cannot be written."""
+    with whole_file(path) as temporary:
+        temporary.write_text(answers_text(answers), encoding="utf-8", newline="")
+
+
+def read_answers(path: Path) -> list[Answer]:
+    """Return the answers of a table.
+
+    Raises InputError: the file cannot be read, lacks a column, or has a value that no answer can have.
+    """
+    table = csv.DictReader(io.StringIO(read_text_file(path, "answers")))
+    missing = [name for name in COLUMNS if name not in (table.fieldnames or ())]
+    if missing:
+        raise InputError(f"{path}: no column {missing[0]!r}; required {', '.join(COLUMNS)}")
+    answers = []
+    for row in table:
+        try:
+            answers.append(_answer(row))
+        except (ValueError, TypeError) as error:  # InputError among them; TypeError: the line is too short
+            raise InputError(f"{path}: line {table.line_num}: {error}") from None
+    return answers
+
+
+def _answer(row: dict[str, str]) -> Answer:
+    return Answer(
+        **{name: row[name] for name in ("rater", "kind", "sentence", "question", "condition", "other", "value")},
+        trial=int(row["trial"]),
+        seconds=float(row["seconds"]),
+        plays=int(row["plays"]),
+        practice=bool(int(row["practice"])),
+        expected=row["expected"],
+    )

@@ -1,0 +1,62 @@
+"""Tables of answers."""
+
+from pathlib import Path
+
+import pytest
+
+from lipmotion.errors import InputError
+from lipmotion.study.answers import COLUMNS, Answer, is_possible, read_answers, write_answers
+
+ANSWERS = [
+    Answer("r1", "paired", 0, 'say "b", now', "preference", "recording", "trajectory", "first", 12.5, 2, False, ""),
+    Answer("r1", "mos", 1, "bin blue", "smoothness", "anchor", "", "1", 8.25, 1, True, "1"),
+    Answer("r2", "ranking", 0, "bin blue", "overall", "coupled", "", "100", 30.0, 3, False, ""),
+]
+
+
+def test_a_table_is_read_as_it_was_written(tmp_path: Path) -> None:
+    write_answers(tmp_path / "answers.csv", ANSWERS)
+    assert read_answers(tmp_path / "answers.csv") == ANSWERS
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "wanted"),
+    [
+        ("paired", "first", True),
+        ("paired", "both", False),
+        ("mos", "5", True),
+        ("mos", "0", False),
+        ("mos", "6", False),
+        ("mos", "3.5", False),
+        ("mos", "٣", False),
+        ("ranking", "0", True),
+        ("ranking", "101", False),
+        ("ranking", "-1", False),
+        ("ranking", "", False),
+    ],
+)
+def test_possible_values(kind: str, value: str, wanted: bool) -> None:
+    assert is_possible(kind, value) == wanted
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("rater,", "person,", "no column 'rater'; required rater"),
+        (",first,", ",neither,", "line 2: the answer 'neither', required 'first' or 'second'"),
+        (",12.5,2,0,", ",12.5,two,0,", "line 2: invalid literal"),
+        ("ranking", "guess", "line 4: an answer of the kind 'guess', required one of paired, mos, ranking"),
+    ],
+)
+def test_wrong_tables_are_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
+    path = tmp_path / "answers.csv"
+    write_answers(path, ANSWERS)
+    path.write_text(path.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
+    with pytest.raises(InputError, match=message):
+        read_answers(path)
+
+
+def test_a_short_line_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "answers.csv").write_text(",".join(COLUMNS) + "\nr1,mos\n", encoding="utf-8")
+    with pytest.raises(InputError, match="line 2"):
+        read_answers(tmp_path / "answers.csv")
