@@ -224,7 +224,7 @@ def test_what_is_no_person(toy_model: Model, toy_sentence: ToySentence, tmp_path
 @pytest.mark.recordings
 @pytest.mark.video
 def test_onto_a_real_person(recordings: Path) -> None:
-    """A face that rests with parted lips: the rest pose of the result is the tracked one."""
+    """A face that rests with parted lips: the third of a second of it counts for nearly half of the way."""
     pytest.importorskip("mediapipe")
     from lipmotion.vision.track import track
 
@@ -233,4 +233,4 @@ def test_onto_a_real_person(recordings: Path) -> None:
     own, mapped = (
         lipmotion.animate(SpeechRequest(video, onto=onto, pauses="natural")).motion["opening"] for onto in (None, video)
     )
-    assert abs(np.median(mapped[:20]) - rest) < 0.5 * abs(np.median(own[:20]) - rest)
+    assert abs(np.median(mapped[:20]) - rest) < 0.7 * abs(np.median(own[:20]) - rest)

@@ -23,7 +23,13 @@ from lipmotion.types import Audio, Generation
 
 RATE_HZ = 16_000
 WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
-ENGINES = {"trajectory": {}, "joint": {"mixtures": 1}, "coupled": {"chains": "sVis 2vis", "mixtures": 1}}
+TRAINED = {
+    "trajectory": ("trajectory", {"predictor": "prior"}),
+    "network": ("trajectory", {}),
+    "joint": ("joint", {"mixtures": 1}),
+    "coupled": ("coupled", {"chains": "sVis 2vis", "mixtures": 1}),
+}
+"""Engines and options of the models that are trained."""
 Results = Iterator[tuple[str, NDArray[np.generic]]]
 
 
@@ -61,8 +67,8 @@ def trained() -> Results:
         corpus = Corpus.create(Path(folder) / "toy")
         for utterance in toy_utterances(8):
             corpus.add(utterance)
-        for name, options in ENGINES.items():
-            engine = engine_named(name, options)
+        for name, (engine_name, options) in TRAINED.items():
+            engine = engine_named(engine_name, options)
             model, _ = train(
                 corpus, engine=engine, recogniser=HmmConfig(mixtures=1, iterations=2), selection=Selection(None)
             )
