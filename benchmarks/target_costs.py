@@ -82,7 +82,7 @@ def main() -> None:
             made = compare_with_recorded(judged, spoken, engine, model.learned)
             acc = correlations([clip.generated for clip in made], [clip.original for clip in made])
             show(options.split, condition, name, acc, weights)
-        engine = SelectionEngine().without_closures()
+        engine = SelectionEngine(SelectionConfig()).without_closures()
         guided = [
             oracle(engine, model.learned, spoken, judged, number)
             for number, spoken in enumerate(speech_of_condition(judged, condition, engine, model.learned))
