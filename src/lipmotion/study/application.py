@@ -230,5 +230,3 @@ async def _failed(status: int, _: Request, error: Exception) -> Response:
 
 def _packaged(name: str, kind: str) -> tuple[bytes, str]:
     return (files("lipmotion.study") / "page" / name).read_bytes(), kind
-
-

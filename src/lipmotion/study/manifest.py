@@ -168,11 +168,11 @@ def _study(content: Mapping[str, Any]) -> Study:
 
 def _text(value: Any) -> str:
     if not isinstance(value, str):
-        raise ValueError(f"{value!r}, required a text")  # noqa: TRY004
+        raise ValueError(f"{value!r}, required a text")
     return value
 
 
 def _list(value: Any) -> Sequence[Any]:
     if not isinstance(value, list):
-        raise ValueError(f"{value!r}, required a list")  # noqa: TRY004
+        raise ValueError(f"{value!r}, required a list")
     return value

@@ -18,7 +18,7 @@ IDLE_S = 20
 
 
 def serve_study(
-    folder: Path, *, host: str = HOST, port: int = PORT, started: Callable[[str], None] = lambda address: None
+    folder: Path, *, host: str = HOST, port: int = PORT, started: Callable[[str], object] | None = None
 ) -> None:
     """Let raters take part in a study, until the process is stopped.
 
@@ -53,7 +53,8 @@ def serve_study(
             ws="none",
         )
         shown = f"[{host}]" if ":" in host else host
-        started(f"http://{shown}:{place.getsockname()[1]}/")
+        if started:
+            started(f"http://{shown}:{place.getsockname()[1]}/")
         uvicorn.Server(config).run([place])
 
 

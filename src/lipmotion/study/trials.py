@@ -28,7 +28,6 @@ def shuffled(items: Iterable[PlaceT], *key: object) -> list[PlaceT]:
     (['d', 'a', 'b', 'c'], ['b', 'd', 'c', 'a'])
     """
 
-
     def place(pair: tuple[int, PlaceT]) -> bytes:
         return sha256("/".join(map(str, (*key, pair[0]))).encode()).digest()
 
