@@ -38,7 +38,7 @@ def ask(
     sent |= headers or {}
     scope = {
         "type": "http",
-        "asgi": {"version": "3.0"},
+        "asgi": {"version": "3.0", "spec_version": "2.4"},
         "http_version": "1.1",
         "method": method or ("GET" if content is None else "POST"),
         "scheme": "http",

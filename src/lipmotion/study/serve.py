@@ -60,9 +60,10 @@ def serve_study(
 
 def _listening(host: str, port: int) -> socket.socket:
     """Return a socket that connections can come to. Raises InputError: the address is taken, or not of this machine."""
+    if not 0 <= port <= 65_535:
+        raise InputError(f"the port is {port}, required 0 to 65535; give another --port")
     try:
         place = socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET)
-    except (OSError, OverflowError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{host}:{port} cannot be listened at ({reason}); give another --port or --host") from error
+    except (OSError, UnicodeError) as error:
+        raise InputError(f"{host}:{port} cannot be listened at ({error}); give another --port or --host") from error
     return place

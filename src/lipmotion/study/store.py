@@ -90,7 +90,7 @@ class StudyStore:
         self._thread.start()
 
     def close(self) -> None:
-        """Commit what waits, and close the database."""
+        """Commit what waits, and close the database; a second time does nothing."""
         self._waiting.put(None)
         self._thread.join()
         self._writer.close()

@@ -21,4 +21,4 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.study.collected import forget_rater
 
     count = forget_rater(options.study, options.rater)
-    print_line(f"{options.rater}: {count} pages of answers deleted; files that were exported before still have them")
+    print_line(f"{options.rater}: {count} answers deleted; files that were exported before still have them")
