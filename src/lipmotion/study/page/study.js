@@ -31,6 +31,7 @@ function tell(text, warning = false) {
 }
 
 function show(name) {
+  performance.mark("interactive");
   for (const other of PARTS) part(other).hidden = other !== name;
   part(`${name}-heading`).focus({ preventScroll: true });
   scrollTo(0, 0);
