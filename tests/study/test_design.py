@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import ExportError, InputError
+from lipmotion.export.synthetic_mark import SOURCE_TYPE, STATEMENT, mark_metadata
 from lipmotion.export.video import write_mp4
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.files import sha256_of
@@ -115,6 +116,17 @@ def test_the_sound_of_an_anchor_is_late_and_its_length_stays(here: Path) -> None
     assert begins[1] - begins[0] == pytest.approx(0.2, abs=0.03)
     with pytest.raises(InputError, match="longer sentences"):
         encode_shown(source, here / "late.mp4", source, Region(), 5000.0)
+
+
+def test_the_mark_of_a_synthetic_video_stays(here: Path) -> None:
+    source, mark = here / "said" / "one.mp4", mark_metadata()
+    picture = np.zeros((48, 64, 3), np.uint8)
+    write_mp4(here / "a.mp4", [picture] * 10, fps=25, audio=read_audio(source), tags=mark.tags, xmp=mark.xmp)
+    for name, is_marked in (("a.mp4", True), ("said/one.mp4", False)):
+        encode_shown(here / name, here / "shown.mp4", source, Region())
+        with av.open(str(here / "shown.mp4")) as container:
+            assert (container.metadata.get("comment") == STATEMENT) == is_marked
+        assert (SOURCE_TYPE.encode() in (here / "shown.mp4").read_bytes()) == is_marked
 
 
 def test_only_the_region_is_shown(here: Path) -> None:

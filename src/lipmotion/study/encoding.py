@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
+from lipmotion.export.synthetic_mark import LABEL, SOURCE_TYPE, mark_metadata
 from lipmotion.export.video import SOUND_HZ, write_mp4
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.media import open_media
@@ -24,12 +26,15 @@ def encode_shown(source: Path, target: Path, sound: Path, region: Region, late_m
 
     sound   : the recording whose sound a video without sound gets
     late_ms : how much later than it was the sound comes; the video keeps its length
+    The mark of a synthetic video stays: raters do not see it, whoever gets the file can.
     Raises InputError: it cannot be read, or the region is too small. Raises ExportError: it cannot be written.
     """
     frames, rate_hz = untracked_frames(source)
     played = read_audio(source if _has_sound(source) else sound, SOUND_HZ, warn=False)
     counted = _Counted(region.cut(frame) for frame in frames)
-    write_mp4(target, counted, fps=rate_hz, audio=_later(played, late_ms))
+    mark = mark_metadata() if _is_marked(source) else None
+    marked: dict[str, Any] = {"tags": mark.tags, "xmp": mark.xmp} if mark else {}
+    write_mp4(target, counted, fps=rate_hz, audio=_later(played, late_ms), **marked)
     return max(counted.count / rate_hz, played.duration_s)
 
 
@@ -54,6 +59,12 @@ def _later(audio: Audio, late_ms: float) -> Audio:
     return Audio(
         np.concatenate([np.zeros(shift, np.float32), audio.samples[: len(audio.samples) - shift]]), audio.rate_hz
     )
+
+
+def _is_marked(path: Path) -> bool:
+    """Return whether the metadata of a video say that it is synthetic."""
+    with open_media(path) as container:
+        return any(SOURCE_TYPE in text or text.startswith(LABEL) for text in container.metadata.values())
 
 
 def _has_sound(path: Path) -> bool:
