@@ -43,7 +43,7 @@ Taking part is voluntary. You may stop at any time by closing the page, without 
 Stored are your judgements, how often you played each video, and how long each judgement took; under a number, without your name, address or anything about your device.
 You may have your judgements deleted later: tell the researcher your number, which the page shows."""  # noqa: E501
 INSTRUCTIONS = {
-    PAIRED: """You will see pairs of videos in which the same sentence is said. Play both to the end, with sound, as often as you like. Then choose the one in which the lips match the sound better. If you are not sure, choose the one that you would rather pick.""",  # noqa: E501
+    PAIRED: """You will see pairs of videos in which the same sentence is said. Play both to the end, with sound, as often as you like. Then choose the one in which the lips match the sound better. If you are not sure, guess.""",  # noqa: E501
     MOS: """You will see one video at a time. Play it to the end, with sound, as often as you like. Then judge the mouth on every scale, from 1 (bad) to 5 (excellent).""",  # noqa: E501
     RANKING: """You will see several videos of one sentence on a page. Play each to the end, with sound, as often as you like. Then set the slider of each between 0 (the lips do not match the sound at all) and 100 (they match it perfectly).""",  # noqa: E501
 }
