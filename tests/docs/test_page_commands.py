@@ -9,7 +9,7 @@ from pathlib import Path
 from lipmotion.cli.command_line import parser
 
 DOCS = Path(__file__).parents[2] / "docs"
-PAGES = sorted([*DOCS.glob("for/*.md"), *DOCS.glob("recipes/*.md"), DOCS / "batch.md"])
+PAGES = sorted([*DOCS.glob("for/*.md"), *DOCS.glob("recipes/*.md"), DOCS / "batch.md", DOCS / "study.md"])
 
 
 def commands(page: Path) -> list[list[str]]:

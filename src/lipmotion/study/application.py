@@ -1,0 +1,232 @@
+"""The study as a web application: a page, its videos, and the answers; an ASGI application of Starlette.
+
+A rater is known by a token, which the page keeps in the part of its address that browsers do not send, and gives with
+every request. No part of an address is ever used as a path of a file: names are looked up among those of the study.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Mapping
+from functools import lru_cache, partial
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.routing import Route
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from lipmotion.errors import ExportError, InputError
+from lipmotion.storage.json_text import from_json
+from lipmotion.study.answers import HIGHEST_MOS, HIGHEST_RANK, MOS, PAIRED
+from lipmotion.study.limits import RateLimit
+from lipmotion.study.manifest import VIDEOS, Study, StudyTrial
+from lipmotion.study.questions import ASKED, POINTS, SCALES
+from lipmotion.study.store import StudyStore, rater_name
+from lipmotion.study.submission import submitted_sheet
+from lipmotion.study.trials import questions_of, trials_of
+
+LOG = logging.getLogger("lipmotion")
+LARGEST_BODY_BYTES = 1 << 14
+BODY_S = 10.0
+"""How long the body of a request may take to arrive."""
+PAGE = {
+    "": ("study.html", "text/html; charset=utf-8"),
+    "study.css": ("study.css", "text/css; charset=utf-8"),
+    "study.js": ("study.js", "text/javascript; charset=utf-8"),
+    "media.js": ("media.js", "text/javascript; charset=utf-8"),
+    "icon.svg": ("icon.svg", "image/svg+xml"),
+}
+"""Files of the page, which are in the package, by their addresses."""
+HEADERS = {
+    "content-security-policy": "default-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'; "
+    "object-src 'none'",
+    "x-content-type-options": "nosniff",
+    "referrer-policy": "no-referrer",
+    "x-frame-options": "DENY",
+    "cross-origin-resource-policy": "same-origin",
+    "cross-origin-opener-policy": "same-origin",
+    "permissions-policy": "camera=(), microphone=(), geolocation=()",
+}
+ANSWER_HZ, ANSWER_BURST = 5.0, 60
+"""Requests a second of one rater: nobody judges videos faster."""
+JOIN_HZ, JOIN_BURST = 5.0, 200
+"""New raters a second, of all addresses together: a class that begins at once fits in."""
+WELL_KEPT = {"cache-control": "private, max-age=86400, immutable"}
+FRESH = {"cache-control": "no-store"}
+
+
+def study_application(study: Study, videos: Mapping[str, Path], store: StudyStore) -> Starlette:
+    """Return the application.
+
+    videos : paths of the videos by their names, of ``check_videos``
+    """
+    desk = _Desk(study, store)
+    page = {name: _packaged(*each) for name, each in PAGE.items()}
+
+    async def packaged(request: Request) -> Response:
+        content, kind = page[request.url.path.removeprefix("/")]
+        return Response(content, headers=FRESH | {"content-type": kind})
+
+    async def video(request: Request) -> Response:
+        path = videos.get(request.path_params["name"])
+        if path is None:
+            raise HTTPException(404, "no such video")
+        return FileResponse(path, media_type="video/mp4", headers=WELL_KEPT)
+
+    routes = [Route(f"/{name}", packaged) for name in page]
+    routes += [
+        Route(f"/{VIDEOS}/{{name}}", video),
+        Route("/api/study", desk.described),
+        Route("/api/raters", desk.joined, methods=["POST"]),
+        Route("/api/state", desk.state),
+        Route("/api/answers", desk.answered, methods=["POST"]),
+    ]
+    application = Starlette(
+        routes=routes,
+        exception_handlers={
+            HTTPException: _refused,
+            InputError: partial(_failed, 422),
+            ExportError: partial(_failed, 503),
+        },
+    )
+    application.add_middleware(_SecurityHeaders)
+    return application
+
+
+class _Desk:
+    """Where raters join, get their trials, and hand in answers."""
+
+    def __init__(self, study: Study, store: StudyStore) -> None:
+        self._study, self._store = study, store
+        self._answers = RateLimit(ANSWER_HZ, ANSWER_BURST)
+        self._joins = RateLimit(JOIN_HZ, JOIN_BURST)
+        self._trials = lru_cache(maxsize=1000)(partial(trials_of, study))
+
+    async def described(self, _: Request) -> Response:
+        """What raters read before they begin; nothing of conditions."""
+        study = self._study
+        told = {"kind": study.kind, "title": study.title, "consent": study.consent.split("\n")}
+        told |= {"instructions": study.instructions.split("\n"), "asks": ASKED[study.kind]}
+        return JSONResponse(told, headers=FRESH)
+
+    async def joined(self, request: Request) -> Response:
+        """A new rater, who has agreed to take part."""
+        if await _content(request) != {"agrees": True}:
+            raise InputError('required {"agrees": true}')
+        if not self._joins.allows():
+            raise HTTPException(429, "too many raters join at the same time; try again", {"retry-after": "2"})
+        number, token = await asyncio.wrap_future(self._store.add_rater())
+        return JSONResponse({"token": token, **self._place(number, 0)}, 201, headers=FRESH)
+
+    async def state(self, request: Request) -> Response:
+        """The trial that a rater is at."""
+        rater = self._rater(request)
+        return JSONResponse(self._place(rater, self._store.next_trial(rater)), headers=FRESH)
+
+    async def answered(self, request: Request) -> Response:
+        """The answers to the next trial, or again those to one that was answered; replied to once they are stored."""
+        rater = self._rater(request)
+        sheet = submitted_sheet(self._study, self._trials(rater), rater, await _content(request))
+        following = self._store.next_trial(rater)
+        if sheet.trial > following:
+            raise HTTPException(409, f"trial {sheet.trial} comes after trial {following}")
+        if sheet.trial == following:
+            if not await asyncio.wrap_future(self._store.record(sheet)):
+                raise HTTPException(401, "the rater has been forgotten")
+            following += 1
+        return JSONResponse({"stored": sheet.trial, **self._place(rater, following)}, headers=FRESH)
+
+    def _rater(self, request: Request) -> int:
+        """Return the rater of a request. Raises HTTPException: unknown, or too many requests."""
+        scheme, _, token = request.headers.get("authorization", "").partition(" ")
+        rater = self._store.rater_of(token) if scheme.lower() == "bearer" else None
+        if rater is None:
+            raise HTTPException(401, "this link is not known", {"www-authenticate": "Bearer"})
+        if not self._answers.allows(rater):
+            raise HTTPException(429, "too many requests; try again", {"retry-after": "2"})
+        return rater
+
+    def _place(self, rater: int, number: int) -> dict[str, Any]:
+        """Return what the page shows: a trial of a rater, and the videos of the one after it."""
+        trials = self._trials(rater)
+        place = {"rater": rater_name(rater), "trial": number, "trials": len(trials)}
+        if number >= len(trials):
+            return place
+        ahead = self._addresses(trials[number + 1]) if number + 1 < len(trials) else []
+        return place | self._page(trials[number]) | {"ahead": ahead}
+
+    def _page(self, trial: StudyTrial) -> dict[str, Any]:
+        study = self._study
+        asked: dict[str, Any] = {"practice": trial.practice, "note": trial.note, "videos": self._addresses(trial)}
+        if study.kind == MOS:
+            scales = [SCALES[question] for question, _, _ in questions_of(study, trial)]
+            asked["scales"] = [{"title": scale.title, "asks": scale.asks} for scale in scales]
+            asked["points"] = POINTS[:HIGHEST_MOS]
+        elif study.kind != PAIRED:
+            asked["highest"] = HIGHEST_RANK
+        return asked
+
+    def _addresses(self, trial: StudyTrial) -> list[str]:
+        return [f"/{VIDEOS}/{video.file}" for video in self._study.shown(trial)]
+
+
+class _SecurityHeaders:
+    """Adds headers to every reply, of errors too."""
+
+    def __init__(self, application: ASGIApp) -> None:
+        self._application = application
+        self._headers = [(name.encode(), value.encode()) for name, value in HEADERS.items()]
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        async def secured(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                message = {**message, "headers": [*message.get("headers", ()), *self._headers]}
+            await send(message)
+
+        await self._application(scope, receive, secured)
+
+
+async def _content(request: Request) -> Any:
+    """Return the JSON that a request brings. Raises HTTPException: something else, too much, or too slowly."""
+    if request.headers.get("content-type", "").partition(";")[0].strip().lower() != "application/json":
+        raise HTTPException(415, "required application/json")  # which no other site's page can send unasked
+    try:
+        body = await asyncio.wait_for(_body(request), BODY_S)
+        return from_json(body.decode("utf-8"))
+    except (TimeoutError, asyncio.TimeoutError) as error:
+        raise HTTPException(408, "the request came too slowly") from error
+    except ClientDisconnect as error:
+        raise HTTPException(400, "the request broke off") from error
+    except ValueError as error:
+        raise HTTPException(400, "not JSON in UTF-8") from error
+
+
+async def _body(request: Request) -> bytes:
+    body = b""
+    async for part in request.stream():
+        body += part
+        if len(body) > LARGEST_BODY_BYTES:
+            raise HTTPException(413, f"required at most {LARGEST_BODY_BYTES} bytes", {"connection": "close"})
+    return body
+
+
+async def _refused(_: Request, error: Exception) -> Response:
+    status, headers = getattr(error, "status_code", 400), getattr(error, "headers", None)
+    return JSONResponse({"error": str(getattr(error, "detail", ""))}, status, {**FRESH, **(headers or {})})
+
+
+async def _failed(status: int, _: Request, error: Exception) -> Response:
+    if isinstance(error, ExportError):
+        LOG.warning("%s", error)
+        return JSONResponse({"error": "cannot be stored now; try again"}, status, FRESH)
+    return JSONResponse({"error": str(error)}, status, FRESH)
+
+
+def _packaged(name: str, kind: str) -> tuple[bytes, str]:
+    return (files("lipmotion.study") / "page" / name).read_bytes(), kind

@@ -1,0 +1,113 @@
+"""A study that a process of its own serves, and raters written as programs, who speak HTTP to it."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from children import LIPMOTION, Child, child
+from lipmotion.study.manifest import Study
+from study.small_study import scripted_answer
+
+NO_REPLY = (ConnectionError, http.client.HTTPException, TimeoutError)
+PATIENCE_S = 60.0
+
+
+@dataclass(frozen=True)
+class Server:
+    """A server: its process, its port, and a file of all that it printed on standard error."""
+
+    process: Child
+    port: int
+    errors: Path
+
+    def kill(self) -> None:
+        """End it as ``kill -9`` does."""
+        self.process.kill()
+        self.process.wait()
+
+
+@contextmanager
+def served(folder: Path, errors: Path, port: int = 0) -> Iterator[Server]:
+    """Give a server of a study; ``port`` 0: any that is free."""
+    command = [*LIPMOTION, "study", "serve", folder, "--port", port]
+    with errors.open("a", encoding="utf-8") as file, child(command, stderr=file) as process:
+        line = process.stdout.readline() if process.stdout else ""
+        yield Server(process, int(line.split("http://127.0.0.1:")[1].split("/")[0]), errors)
+
+
+class Connection:
+    """Requests to a server, one after another, over one connection as long as it lasts."""
+
+    def __init__(self, port: int, token: str = "") -> None:
+        self.port, self.token = port, token
+        self._connection = http.client.HTTPConnection("127.0.0.1", port, timeout=30)
+
+    def ask(self, path: str, content: Any = None) -> tuple[int, Any]:
+        """Return status and content of a reply. Raises an error of ``NO_REPLY``: none came."""
+        headers = {"authorization": f"Bearer {self.token}"} if self.token else {}
+        body = None if content is None else json.dumps(content)
+        if body is not None:
+            headers["content-type"] = "application/json"
+        try:
+            self._connection.request("GET" if body is None else "POST", path, body, headers)
+            reply = self._connection.getresponse()
+            return reply.status, json.loads(reply.read())
+        except BaseException:
+            self._connection.close()
+            raise
+
+    def ask_until_answered(self, path: str, content: Any = None) -> Any:
+        """Return the content of a reply, as the page does: again after no reply, and after one that says so."""
+        ends_s = time.monotonic() + PATIENCE_S
+        while time.monotonic() < ends_s:
+            with suppress(*NO_REPLY):
+                status, reply = self.ask(path, content)
+                if status < 300:
+                    return reply
+                if status != 429 and status < 500:
+                    raise AssertionError(f"{path}: {status} {reply}")
+            time.sleep(0.05)
+        raise AssertionError(f"{path}: no answer within {PATIENCE_S} s")
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._connection.close()
+
+
+class ScriptedRater(threading.Thread):
+    """A rater that is a program: answers as fast as it can, and keeps what was acknowledged.
+
+    acknowledged : value of the answer to each trial, by its number, for which the server said that it is stored
+    pause_s      : before each answer
+    """
+
+    def __init__(self, study: Study, port: int, number: int, pause_s: float = 0.0) -> None:
+        super().__init__(name=f"scripted rater {number}", daemon=True)
+        self.acknowledged: dict[int, str] = {}
+        self.token = ""
+        self.failure: BaseException | None = None
+        self._study, self._port, self._number, self._pause_s = study, port, number, pause_s
+
+    def run(self) -> None:
+        """Take part from the first trial to the last."""
+        connection = Connection(self._port)
+        try:
+            now = connection.ask_until_answered("/api/raters", {"agrees": True})
+            self.token = connection.token = now["token"]
+            while now["trial"] < now["trials"]:
+                time.sleep(self._pause_s)
+                value = ("first", "second")[(self._number + now["trial"]) % 2]
+                now = connection.ask_until_answered("/api/answers", scripted_answer(self._study, now, value))
+                self.acknowledged[now["stored"]] = value
+        except BaseException as failure:
+            self.failure = failure
+        finally:
+            connection.close()

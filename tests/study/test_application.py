@@ -1,0 +1,178 @@
+"""The application: a rater from the first page to the last, and whoever asks for something else."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+
+from lipmotion.study.answers import KINDS, PAIRED, read_answers
+from lipmotion.study.collected import export_answers, forget_rater
+from lipmotion.study.manifest import Study, check_videos
+from lipmotion.study.store import StudyStore
+from study.asgi import Application, ask
+from study.small_study import scripted_answer, small_study
+
+starlette = pytest.importorskip("starlette", reason="the extra 'study' is not installed")
+
+from lipmotion.study.application import ANSWER_BURST, HEADERS, JOIN_BURST, PAGE, study_application  # noqa: E402
+
+
+class Open(NamedTuple):
+    """A study that raters can come to."""
+
+    study: Study
+    folder: Path
+    application: Application
+    store: StudyStore
+
+    def join(self) -> dict[str, Any]:
+        return ask(self.application, "/api/raters", {"agrees": True}).content
+
+    def send(self, token: str, answer: object) -> Any:
+        return ask(self.application, "/api/answers", answer, token=token)
+
+
+@pytest.fixture(params=[PAIRED])
+def place(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Open]:
+    folder = tmp_path / "study"
+    study = small_study(folder, request.param)
+    with closing(StudyStore(folder)) as store:
+        yield Open(study, folder, study_application(study, check_videos(study, folder), store), store)
+
+
+@pytest.mark.parametrize("place", KINDS, indirect=True)
+def test_a_rater_from_the_first_page_to_the_last(place: Open, tmp_path: Path) -> None:
+    now = place.join()
+    token, rater = now["token"], now["rater"]
+    assert "token" not in ask(place.application, "/api/state", token=token).content
+    while now["trial"] < now["trials"]:
+        if not now["trial"] % 10:  # as after a reload of the page
+            assert ask(place.application, "/api/state", token=token).content["videos"] == now["videos"]
+        reply = place.send(token, scripted_answer(place.study, now))
+        assert (reply.status, reply.content["stored"]) == (200, now["trial"])
+        ahead, now = now["ahead"], reply.content
+        assert now.get("videos", []) == ahead
+    place.store.close()
+    export_answers(place.folder, tmp_path / "answers.csv")
+    rows = read_answers(tmp_path / "answers.csv")
+    assert {row.rater for row in rows} == {rater}
+    assert sorted({row.trial for row in rows}) == list(range(len(place.study.trials)))
+    assert {row.kind for row in rows} == {place.study.kind}
+    assert sum(row.practice for row in rows if row.trial == 0) == sum(row.practice for row in rows) > 0
+    expected = {row.expected for row in rows if row.expected}
+    assert expected == {trial.expected for trial in place.study.trials if trial.expected}
+    assert forget_rater(place.folder, rater) == len({(row.trial, row.question, row.condition) for row in rows})
+
+
+def test_nothing_that_raters_get_names_a_condition(place: Open) -> None:
+    now = place.join()
+    texts = [ask(place.application, "/api/study").body, ask(place.application, "/api/state", token=now["token"]).body]
+    texts += [ask(place.application, f"/{name}").body for name in PAGE]
+    for text in texts:
+        assert not [name for name in ("visemes", "phones", "recording by", "anchor") if name.encode() in text]
+
+
+def test_the_first_answer_stands_however_often_it_is_sent(place: Open) -> None:
+    now = place.join()
+    for value in ("first", "second", "first"):
+        assert place.send(now["token"], scripted_answer(place.study, now, value)).content["trial"] == 1
+    assert [sheet.values for sheet in place.store.sheets()] == [("first",)]
+
+
+def test_no_trial_is_skipped(place: Open) -> None:
+    now = place.join()
+    reply = place.send(now["token"], scripted_answer(place.study, now) | {"trial": 1})
+    assert (reply.status, place.store.sheets()) == (409, [])
+
+
+def test_a_link_that_is_not_known_and_a_rater_who_was_forgotten(place: Open) -> None:
+    now = place.join()
+    for token in ("", "x", now["token"][:-1], now["token"] + "é"):
+        assert ask(place.application, "/api/state", token=token).status == 401
+    place.store.forget(1)
+    assert place.send(now["token"], scripted_answer(place.study, now)).status == 401
+
+
+@pytest.mark.parametrize(
+    ("content", "headers", "status"),
+    [
+        (b"{", {}, 400),
+        (b"\xff", {}, 400),
+        (b"[" * 10_000, {}, 400),
+        (b" " * 20_000, {}, 413),
+        ({"trial": 0}, {}, 422),
+        ({"trial": 0}, {"content-type": "text/plain"}, 415),
+    ],
+)
+def test_bodies_that_are_refused(place: Open, content: object, headers: dict[str, str], status: int) -> None:
+    token = place.join()["token"]
+    reply = ask(place.application, "/api/answers", content, token=token, headers=headers)
+    assert (reply.status, list(reply.content)) == (status, ["error"])
+    assert place.store.sheets() == []
+
+
+def test_nobody_joins_without_agreeing(place: Open) -> None:
+    assert ask(place.application, "/api/raters", {"agrees": False}).status == 422
+    assert place.join()["rater"] == "r001"
+
+
+def test_too_many_requests_of_one_rater_do_not_stop_another(place: Open) -> None:
+    first, second = place.join()["token"], place.join()["token"]
+    found = [ask(place.application, "/api/state", token=first).status for _ in range(ANSWER_BURST + 30)]
+    assert 429 in found
+    assert ask(place.application, "/api/state", token=second).status == 200
+
+
+def test_too_many_raters_at_once_have_to_wait(place: Open, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("lipmotion.study.application.JOIN_BURST", 3)
+    assert JOIN_BURST >= 20
+    application = study_application(place.study, {}, place.store)
+    found = [ask(application, "/api/raters", {"agrees": True}).status for _ in range(8)]
+    assert found[:3] == [201] * 3
+    assert 429 in found
+
+
+def test_a_disk_that_is_full_is_a_reason_to_try_again(place: Open, caplog: pytest.LogCaptureFixture) -> None:
+    now = place.join()
+    place.store._writer.execute("PRAGMA query_only = ON")
+    assert place.send(now["token"], scripted_answer(place.study, now)).status == 503
+    place.store._writer.execute("PRAGMA query_only = OFF")
+    assert place.send(now["token"], scripted_answer(place.study, now)).status == 200
+    assert "cannot be written" in caplog.text
+
+
+def test_videos_are_served_whole_and_in_parts_and_nothing_else_is(place: Open) -> None:
+    video = place.study.videos[0]
+    data = (place.folder / "videos" / video.file).read_bytes()
+    whole = ask(place.application, f"/videos/{video.file}")
+    assert (whole.status, whole.body, whole.headers["content-type"]) == (200, data, "video/mp4")
+    part = ask(place.application, f"/videos/{video.file}", headers={"range": "bytes=2-5"})
+    assert (part.status, part.body) == (206, data[2:6])
+    for path in (
+        "/videos/study.json",
+        "/videos/../study.json",
+        "/study.json",
+        "/answers.sqlite",
+        "/videos/" + "0" * 32,
+    ):
+        assert ask(place.application, path).status == 404
+
+
+def test_every_reply_has_the_headers_that_keep_others_out(place: Open) -> None:
+    paths = ["/", "/study.js", "/api/study", "/api/state", "/nothing", f"/videos/{place.study.videos[0].file}"]
+    for path in paths:
+        headers = ask(place.application, path).headers
+        assert {name: headers.get(name) for name in HEADERS} == HEADERS
+    assert "default-src 'self'" in HEADERS["content-security-policy"]
+
+
+def test_the_page_has_no_resource_from_elsewhere(place: Open) -> None:
+    for name in PAGE:
+        text = ask(place.application, f"/{name}").body.decode()
+        assert [word for word in text.split() if "://" in word and "www.w3.org/2000/svg" not in word] == []
+        assert "innerHTML" not in text
+        assert "<style" not in text

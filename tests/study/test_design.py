@@ -1,0 +1,212 @@
+"""Studies from conditions and sentences: which videos are made, of what, and how they are named."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+from lipmotion.errors import ExportError, InputError
+from lipmotion.export.synthetic_mark import SOURCE_TYPE, STATEMENT, mark_metadata
+from lipmotion.export.video import write_mp4
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.storage.files import sha256_of
+from lipmotion.study.answers import ANCHOR, MOS, PAIRED, RANKING
+from lipmotion.study.design import design_study
+from lipmotion.study.encoding import encode_shown
+from lipmotion.study.manifest import VIDEO_NAME, VIDEOS, check_videos, read_study
+from lipmotion.study.region import Region
+from lipmotion.study.settings import StudySettings
+from lipmotion.study.sources import condition_of, drawn_job, named_conditions, sentences_of
+from lipmotion.types import Audio
+
+PLAIN = StudySettings(practice=1, anchors=1, anchor_ms=100, checks=1)
+
+
+def write_video(path: Path, shade: int, seconds: float = 0.4) -> None:
+    """Write a video that gets brighter from left to right, with a tone that begins at once."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    picture = np.zeros((48, 64, 3), np.uint8) + np.linspace(0, 200, 64).astype(np.uint8)[:, None]
+    picture[..., 2] = shade
+    sound = np.sin(np.arange(round(16_000 * seconds)) * 0.4).astype(np.float32) * 0.5
+    write_mp4(path, [picture] * round(25 * seconds), fps=25, audio=Audio(sound, 16_000))
+
+
+@pytest.fixture
+def here(tmp_path: Path) -> Path:
+    """A folder with recordings of two sentences, and with finished videos of them."""
+    for n, name in enumerate(("one", "two")):
+        write_video(tmp_path / "said" / f"{name}.mp4", 10 + n)
+        write_video(tmp_path / "ours" / f"{name}.mp4", 100 + n)
+    return tmp_path
+
+
+def test_a_paired_study_of_recordings_and_finished_videos(here: Path) -> None:
+    folder = here / "study"
+    study = design_study(folder, PAIRED, ["recording", f"ours={here / 'ours'}"], [here / "said"], PLAIN)
+    assert read_study(folder) == study
+    assert sorted(path.name for path in folder.iterdir()) == ["study.json", "videos"]
+    assert set(check_videos(study, folder)) == {path.name for path in (folder / VIDEOS).iterdir()}
+    shown = {(video.sentence, video.condition) for video in study.videos}
+    assert {pair for pair in shown if pair[1] != ANCHOR} == {
+        (s, c) for s in ("one", "two") for c in ("recording", "ours")
+    }
+    assert len(study.trials) == 1 + 4 + 1 + 1  # practice, both orders of two sentences, anchor, check of attention
+    (late,) = (video for video in study.videos if video.condition == ANCHOR)
+    assert late.made == {"made": "recording", "sound_late_ms": "100"}
+    ours = next(video for video in study.videos if (video.sentence, video.condition) == ("two", "ours"))
+    assert ours.made["file_sha256"] == sha256_of(here / "ours" / "two.mp4")
+    assert study.sentences["one"] == {"file": "one.mp4", "sha256": sha256_of(here / "said" / "one.mp4")}
+    assert study.made_by["anchor_ms"] == "100"
+
+
+def test_videos_are_what_browsers_play_and_their_names_say_nothing(here: Path) -> None:
+    study = design_study(here / "study", MOS, ["recording", f"ours={here / 'ours'}"], [here / "said"], PLAIN)
+    assert len({video.file for video in study.videos}) == len(study.videos) == 5
+    for video in study.videos:
+        assert VIDEO_NAME.fullmatch(video.file)
+        with av.open(str(here / "study" / VIDEOS / video.file)) as container:
+            (picture,), (sound,) = container.streams.video, container.streams.audio
+            assert (picture.codec_context.name, picture.codec_context.pix_fmt) == ("h264", "yuv420p")
+            assert sound.codec_context.name == "aac"
+        assert video.seconds == pytest.approx(0.4, abs=0.05)
+
+
+def test_every_page_of_a_ranking_has_the_anchor(here: Path) -> None:
+    conditions = ["recording", f"ours={here / 'ours'}"]
+    study = design_study(here / "study", RANKING, conditions, [here / "said"], PLAIN)
+    assert {len(trial.videos) for trial in study.trials} == {3}
+    without = design_study(here / "other", RANKING, conditions, [here / "said"], replace(PLAIN, anchors=0))
+    assert {len(trial.videos) for trial in without.trials} == {2}
+
+
+def test_a_study_is_the_same_when_it_is_designed_again(here: Path) -> None:
+    conditions = ["recording", f"ours={here / 'ours'}"]
+    first, second = (design_study(here / name, PAIRED, conditions, [here / "said"], PLAIN) for name in ("a", "b"))
+    assert first == second
+    other = design_study(here / "c", PAIRED, conditions, [here / "said"], replace(PLAIN, seed=5))
+    assert other.trials != first.trials
+
+
+@pytest.mark.long
+def test_motion_is_drawn_with_the_sound_of_the_sentence(here: Path) -> None:
+    for name in ("one", "two"):
+        (here / "motion").mkdir(exist_ok=True)
+        rows = "".join(f"{n / 25},{0.1 * (n % 3)},0.5\n" for n in range(11))
+        (here / "motion" / f"{name}.csv").write_text(f"time_s,opening,width\n{rows}", encoding="utf-8")
+    study = design_study(here / "study", MOS, ["recording", f"drawn={here / 'motion'}"], [here / "said"], PLAIN)
+    drawn = [video for video in study.videos if video.condition == "drawn"]
+    assert [video.made["made"] for video in drawn] == ["drawn", "drawn"]
+    assert [video.made["face"] for video in drawn] == ["portrait", "portrait"]
+    assert read_audio(here / "study" / VIDEOS / drawn[0].file).duration_s == pytest.approx(0.4, abs=0.1)
+
+
+def test_the_sound_of_an_anchor_is_late_and_its_length_stays(here: Path) -> None:
+    source = here / "said" / "one.mp4"
+    seconds = [encode_shown(source, here / f"{ms}.mp4", source, Region(), ms) for ms in (0.0, 200.0)]
+    assert seconds[0] == seconds[1]
+    begins = []
+    for ms in (0, 200):
+        audio = read_audio(here / f"{float(ms)}.mp4")
+        begins.append(int(np.argmax(np.abs(audio.samples) > 0.2)) / audio.rate_hz)
+    assert begins[1] - begins[0] == pytest.approx(0.2, abs=0.03)
+    with pytest.raises(InputError, match="longer sentences"):
+        encode_shown(source, here / "late.mp4", source, Region(), 5000.0)
+
+
+def test_the_mark_of_a_synthetic_video_stays(here: Path) -> None:
+    source, mark = here / "said" / "one.mp4", mark_metadata()
+    picture = np.zeros((48, 64, 3), np.uint8)
+    write_mp4(here / "a.mp4", [picture] * 10, fps=25, audio=read_audio(source), tags=mark.tags, xmp=mark.xmp)
+    for name, is_marked in (("a.mp4", True), ("said/one.mp4", False)):
+        encode_shown(here / name, here / "shown.mp4", source, Region())
+        with av.open(str(here / "shown.mp4")) as container:
+            assert (container.metadata.get("comment") == STATEMENT) == is_marked
+        assert (SOURCE_TYPE.encode() in (here / "shown.mp4").read_bytes()) == is_marked
+
+
+def test_only_the_region_is_shown(here: Path) -> None:
+    picture = np.arange(48 * 64 * 3, dtype=np.uint32).astype(np.uint8).reshape(48, 64, 3)
+    np.testing.assert_array_equal(Region(0.25, 0.5, 0.5, 0.5).cut(picture), picture[24:48, 16:48])
+    settings = replace(PLAIN, region="0,0,0.5,0.5")
+    study = design_study(here / "study", MOS, ["recording", f"ours={here / 'ours'}"], [here / "said"], settings)
+    with av.open(str(here / "study" / VIDEOS / study.videos[0].file)) as container:
+        assert (container.streams.video[0].width, container.streams.video[0].height) == (32, 24)
+    for text in ("0,0,1", "a,b,c,d", "0.5,0,0.6,1", "0,0,0,1", "-0.1,0,1,1", "nan,0,1,1"):
+        with pytest.raises(InputError, match="LEFT,TOP,WIDTH,HEIGHT"):
+            StudySettings(region=text)
+
+
+@pytest.mark.parametrize(
+    ("conditions", "says"),
+    [
+        (["recording"], "at least 2"),
+        (["recording", "recording"], "two conditions are called"),
+        (["recording", "ours"], "required NAME=SOURCE"),
+        (["recording", "=ours"], "required NAME=SOURCE"),
+        (["anchor=x", "recording"], "no other"),
+        (["real=recording", "recording"], "no other"),
+    ],
+)
+def test_conditions_that_are_refused(conditions: list[str], says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        named_conditions(conditions)
+
+
+@pytest.mark.parametrize(
+    ("prepare", "source", "says"),
+    [
+        (Path.exists, "nowhere", "no such model"),
+        (lambda here: (here / "model.bin").touch(), "model.bin", "required a model"),
+        (lambda here: (here / "empty").mkdir(), "empty", "add one.mp4 or one.json"),
+        (lambda here: write_video(here / "ours" / "one.mov.mp4", 1), "ours", ""),
+        (lambda here: (here / "ours" / "one.mkv").touch(), "ours", "move one away"),
+    ],
+)
+def test_sources_that_lack_something(here: Path, prepare: Callable[[Path], object], source: str, says: str) -> None:
+    prepare(here)
+    said = sentences_of([here / "said"])
+    if not says:
+        assert callable(condition_of(str(here / source), said, drawn_job("portrait", None, "auto")))
+        return
+    with pytest.raises(InputError, match=says):
+        condition_of(str(here / source), said, drawn_job("portrait", None, "auto"))
+
+
+def test_recordings_without_pictures_cannot_be_shown() -> None:
+    said = sentences_of([Path("examples/welcome.flac")])
+    with pytest.raises(InputError, match="has no pictures"):
+        condition_of("recording", said, drawn_job("portrait", None, "auto"))
+
+
+def test_what_is_there_is_not_replaced_and_a_failure_leaves_nothing(here: Path) -> None:
+    (here / "study").mkdir()
+    with pytest.raises(ExportError, match="exists"):
+        design_study(here / "study", PAIRED, ["recording", f"ours={here / 'ours'}"], [here / "said"])
+    (here / "ours" / "two.mp4").write_bytes(b"no video")
+    before = set(here.iterdir())
+    with pytest.raises(InputError):
+        design_study(here / "new", PAIRED, ["recording", f"ours={here / 'ours'}"], [here / "said"])
+    assert set(here.iterdir()) == before
+
+
+def test_two_sentences_of_one_name_are_refused(here: Path) -> None:
+    with pytest.raises(InputError, match="two sentences are called 'one'"):
+        sentences_of([here / "said", here / "ours" / "one.mp4"])
+
+
+@pytest.mark.long
+def test_models_and_job_files_speak_the_sentences(tmp_path: Path) -> None:
+    (tmp_path / "still.toml").write_text('[request]\nrecogniser = "fast"\n[delivery]\nintensity = 0.2\n', "utf-8")
+    conditions = ["full=shipped", f"weak={tmp_path / 'still.toml'}"]
+    settings = replace(PLAIN, recogniser="fast", fps=10.0)
+    study = design_study(tmp_path / "study", PAIRED, conditions, [Path("examples/welcome.flac")], settings)
+    assert study.conditions["anchor"] == "full, sound 100 ms late"
+    full, late, weak = (study.videos[n].made for n in range(3))
+    assert full["model_sha256"] == weak["model_sha256"] == late["model_sha256"]
+    assert weak["job_sha256"] == sha256_of(tmp_path / "still.toml")
+    assert {video.sentence for video in study.videos} == {"welcome"}

@@ -1,0 +1,189 @@
+"""The page in a real browser: videos play, keys work, answers land, nobody is kept out."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from children import wait_until
+from lipmotion.export.video import write_mp4
+from lipmotion.study.answers import MOS, PAIRED, RANKING, Answer
+from lipmotion.study.collected import collected_answers
+from lipmotion.study.manifest import VIDEOS, Study, StudyVideo
+from lipmotion.types import Audio
+from study.browser import BROWSER, DRIVER, ENTER, LEFT, MISSING, RIGHT, SPACE, Browser, axe_script, browser
+from study.served import Server, served
+from study.small_study import CONDITIONS, planned
+
+pytest.importorskip("uvicorn", reason="the extra 'study' is not installed")
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(BROWSER is None or DRIVER is None, reason=MISSING),
+]
+SCREENS = ((1200, 900, "light"), (1200, 900, "dark"), (320, 640, "light"), (320, 640, "dark"))
+LIMIT_S = 60.0
+
+
+def shown_study(folder: Path, kind: str) -> Study:
+    """Write a study of one sentence, whose videos are real and short."""
+    (folder / VIDEOS).mkdir(parents=True)
+    sound = Audio(np.sin(np.arange(8000) * 0.17).astype(np.float32) * 0.2, 16_000)
+    videos = []
+    for n, condition in enumerate((*CONDITIONS, "anchor")):
+        frames = [np.full((120, 160, 3), (60 * n, 16 * step, 128), np.uint8) for step in range(12)]
+        path = folder / VIDEOS / "made.mp4"
+        write_mp4(path, frames, fps=25, audio=sound)
+        digest = sha256(path.read_bytes()).hexdigest()
+        path.rename(path.with_name(f"{digest[:32]}.mp4"))
+        videos.append(StudyVideo(f"{digest[:32]}.mp4", "one", condition, 0.5, digest, {"made": "test"}))
+    return planned(folder, kind, ("one",), videos)
+
+
+@contextmanager
+def at_work(tmp_path: Path, kind: str) -> Iterator[tuple[Browser, Server, Study]]:
+    """Give a browser, and the server of a study."""
+    study = shown_study(tmp_path / "study", kind)
+    (tmp_path / "home").mkdir()
+    with served(tmp_path / "study", tmp_path / "errors.txt") as server, browser(tmp_path / "home") as window:
+        window.open(f"http://127.0.0.1:{server.port}/")
+        wait_for(window, "welcome")
+        yield window, server, study
+
+
+def wait_for(window: Browser, part: str) -> None:
+    wait_until(lambda: window.run("return document.getElementById(arguments[0])?.hidden === false", part), LIMIT_S)
+
+
+def is_open(window: Browser) -> bool:
+    return window.text("#status") == "You can answer now."
+
+
+def done(window: Browser) -> int:
+    return int(window.run("return document.getElementById('thanks').hidden ? progress.value : 99"))
+
+
+def join(window: Browser) -> None:
+    window.click("#agree")
+    wait_for(window, "guide")
+    window.click("#begin")
+    wait_for(window, "trial")
+
+
+def answer(window: Browser, act: Callable[[], object]) -> None:
+    """Play what is shown by the space bar, answer it, and wait for the next page."""
+    before = done(window)
+    assert window.run("return document.getElementById('next').disabled")
+    window.press(SPACE)
+    wait_until(lambda: is_open(window), LIMIT_S)
+    act()
+    wait_until(lambda: not window.run("return document.getElementById('next').disabled"), LIMIT_S)
+    window.press(ENTER)
+    wait_until(lambda: done(window) > before, LIMIT_S)
+
+
+def take_part(window: Browser, study: Study, act: Callable[[], object]) -> None:
+    for _ in study.trials:
+        answer(window, act)
+    wait_for(window, "thanks")
+
+
+def answers(tmp_path: Path) -> list[Answer]:
+    return [row for row in collected_answers(tmp_path / "study") if not row.practice]
+
+
+def look(window: Browser, name: str) -> None:
+    """Check a page on every screen: no scrolling to the side, and nothing that axe-core finds.
+
+    The pictures are kept in the folder of the environment variable ``LIPMOTION_SCREENS``, if there is one.
+    """
+    axe, folder = axe_script(), os.environ.get("LIPMOTION_SCREENS")
+    for width, height, scheme in SCREENS:
+        window.show_as(width, height, scheme, mobile=width < 600)
+        if folder:
+            window.picture(Path(folder) / f"{name}-{width}-{scheme}.png")
+        assert window.run("return document.documentElement.scrollWidth") <= width, (name, width)
+        if axe:
+            window.run(axe)
+            found = window.run_until_done("axe.run().then(arguments[0])")["violations"]
+            assert [(each["id"], each["nodes"][0]["html"]) for each in found] == [], (name, width, scheme)
+    window.show_as(1200, 900)
+
+
+def test_pairs_by_keys(tmp_path: Path) -> None:
+    with at_work(tmp_path, PAIRED) as (window, _, study):
+        look(window, "welcome")
+        window.click("#agree")
+        wait_for(window, "guide")
+        look(window, "guide")
+        window.click("#begin")
+        wait_for(window, "trial")
+        look(window, "pair")
+        keys = iter("12" + LEFT + RIGHT + "12" * len(study.trials))
+        answer(window, lambda: window.press(next(keys)))
+        for _ in study.trials[1:]:
+            window.press("2")  # before the videos were played: nothing is chosen
+            answer(window, lambda: window.press(next(keys)))
+        wait_for(window, "thanks")
+        look(window, "thanks")
+        assert [each for each in window.problems() if "favicon" not in each] == []
+    rows = answers(tmp_path)
+    assert [row.value for row in sorted(rows, key=lambda row: row.trial)][:4] == ["second", "first", "second", "first"]
+    assert len(rows) == len(study.trials) - 1
+    assert all(row.plays == 2 and row.seconds >= 0.9 for row in rows)
+
+
+def test_opinions_by_keys(tmp_path: Path) -> None:
+    with at_work(tmp_path, MOS) as (window, _, study):
+        join(window)
+        look(window, "opinions")
+        take_part(window, study, lambda: window.press("1", "2", "3", "4", "5"))
+    values = {row.question: row.value for row in answers(tmp_path)}
+    assert values == {"smoothness": "1", "closure": "2", "protrusion": "3", "turning": "4", "overall": "5"}
+
+
+def test_a_ranking_by_sliders(tmp_path: Path) -> None:
+    moves = """for (const [n, input] of [...document.querySelectorAll('input[type=range]')].entries()) {
+        input.value = 20 * n; input.dispatchEvent(new Event('input', { bubbles: true })); }"""
+    with at_work(tmp_path, RANKING) as (window, _, study):
+        join(window)
+        look(window, "ranking")
+        window.press(SPACE)
+        wait_until(lambda: is_open(window), LIMIT_S)
+        window.run("document.querySelector('input[type=range]').focus()")
+        window.press(RIGHT, RIGHT)
+        assert window.text("output") == "52"
+        take_part(window, study, lambda: window.run(moves))
+    counted = [row for row in answers(tmp_path) if not row.expected]
+    assert sorted(row.value for row in counted) == ["0", "20", "40", "60"]
+    assert {row.condition for row in counted} == {*CONDITIONS, "anchor"}
+
+
+def test_an_answer_outlives_the_server_and_the_page(tmp_path: Path) -> None:
+    """The server is killed before an answer comes; the page keeps it, sends it again, and also after a reload."""
+    with ExitStack() as stack:
+        window, server, _ = stack.enter_context(at_work(tmp_path, PAIRED))
+        join(window)
+        answer(window, lambda: window.press("1"))
+        link = window.run("return location.href")
+        for reloads in (False, True):
+            before = done(window)
+            window.press(SPACE)
+            wait_until(lambda: is_open(window), LIMIT_S)
+            server.kill()
+            window.press("2", ENTER)
+            wait_until(lambda: "Nothing is lost" in window.text("#status"), LIMIT_S)
+            if reloads:
+                window.open("about:blank")
+            server = stack.enter_context(served(tmp_path / "study", tmp_path / "errors.txt", server.port))
+            if reloads:
+                window.open(link)
+                wait_for(window, "trial")
+            wait_until(lambda before=before: done(window) == before + 1, LIMIT_S)  # type: ignore[misc]
+            assert [row.value for row in answers(tmp_path)] == ["second"] * before
+    assert "Traceback" not in (tmp_path / "errors.txt").read_text(encoding="utf-8")
