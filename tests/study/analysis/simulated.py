@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lipmotion.study.analysis.paired import PairTable
 from lipmotion.study.analysis.ratings import RANKS, SCALES, RatingTable
-from lipmotion.study.answers import FIRST, MOS, PAIRED, SECOND, Answer
+from lipmotion.study.answers import FIRST, MOS, PAIRED, RANKING, SECOND, Answer
 
 Array = NDArray[np.float64]
 NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(61)
@@ -87,26 +87,38 @@ def expected_preference(odds: Array, effects: Effects) -> Array:
 
 def paired_answers(table: PairTable, seconds: float = 9.0) -> list[Answer]:
     """Return a table of comparisons as answers."""
-    rows = zip(table.rater, table.sentence, table.shown, table.is_first, strict=True)
+    rows = zip(table.rater.tolist(), table.sentence.tolist(), table.shown.tolist(), table.is_first, strict=True)
     return [
-        Answer(
-            *(table.raters[rater], PAIRED, trial, table.sentences[sentence], "preference"),
-            *(table.conditions[first], table.conditions[second], FIRST if is_first else SECOND),
-            *(seconds, 2, False, ""),
+        pair_answer(
+            (table.raters[rater], table.sentences[sentence]),
+            (table.conditions[first], table.conditions[second]),
+            bool(is_first),
+            trial=trial,
+            seconds=seconds,
         )
         for trial, (rater, sentence, (first, second), is_first) in enumerate(rows)
     ]
 
 
-def rated_answers(table: RatingTable, question: str = "overall", seconds: float = 6.0) -> list[Answer]:
+def pair_answer(
+    who: tuple[str, str], shown: tuple[str, str], is_first: bool, *, trial: int = 0, seconds: float = 9.0
+) -> Answer:
+    """Return one answer of a rater on a sentence."""
+    value = FIRST if is_first else SECOND
+    return Answer(who[0], PAIRED, trial, who[1], "preference", *shown, value, seconds, 2, False, "")
+
+
+def rating(who: tuple[str, str], condition: str, value: int, *, kind: str = MOS, seconds: float = 6.0) -> Answer:
+    """Return one judgement of a rater on a sentence."""
+    return Answer(who[0], kind, 0, who[1], "overall", condition, "", str(value), seconds, 1, False, "")
+
+
+def rated_answers(table: RatingTable) -> list[Answer]:
     """Return a table of judgements as answers; the scale of 100 is a ranking."""
-    kind = "ranking" if table.scale == RANKS else MOS
+    kind = RANKING if table.scale == RANKS else MOS
     return [
-        Answer(
-            *(f"r{rater}", kind, trial, f"s{sentence}", question, table.conditions[condition], ""),
-            *(str(int(value)), seconds, 1, False, ""),
-        )
-        for trial, ((condition, rater, sentence), value) in enumerate(np.ndenumerate(table.values))
+        rating((f"r{rater}", f"s{sentence}"), table.conditions[condition], int(value), kind=kind)
+        for (condition, rater, sentence), value in np.ndenumerate(table.values)
         if np.isfinite(value)
     ]
 

@@ -51,9 +51,7 @@ def analyse_study(
     }
 
 
-def _check(
-    counted: Sequence[Answer], given: int, baseline: str | None, power: float, sentences: int | None
-) -> None:
+def _check(counted: Sequence[Answer], given: int, baseline: str | None, power: float, sentences: int | None) -> None:
     """Raise InputError for what cannot be analysed."""
     if not counted:
         raise InputError(f"{given} answers, none of which counts: required some that are neither practice nor checks")

@@ -128,7 +128,10 @@ def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
         return []
     sizes = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return [
-        "  " + "  ".join([f"{row[0]:{sizes[0]}}", *(f"{cell:>{size}}" for cell, size in zip(row[1:], sizes[1:], strict=True))])
+        "  "
+        + "  ".join(
+            [f"{row[0]:{sizes[0]}}", *(f"{cell:>{size}}" for cell, size in zip(row[1:], sizes[1:], strict=True))]
+        )
         for row in rows
     ]
 

@@ -13,7 +13,7 @@ MOST_STEPS = 20_000
 SMALLEST_STEP = 1e-12
 """Iteration ends when no strength changes by a larger share."""
 HALF_WIN = 0.5
-"""Given to both sides of every comparison that was made, in the order in which it was, where a strength were infinite."""
+"""Given to both sides of every comparison that was made, in its order, where a strength were infinite."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ def fit_strengths(first_wins: Array, second_wins: Array) -> Strengths:
     strengths, order = _maximised(first_wins, second_wins, has_order)
     probability = _logistic(strengths[:, None] - strengths + order)
     weights = (first_wins + second_wins) * probability * (1 - probability)
-    covariance = np.linalg.pinv(_information(weights, has_order), hermitian=True, rcond=1e-10)
+    covariance: Array = np.linalg.pinv(_information(weights, has_order), hermitian=True, rcond=1e-10).astype(float)
     return Strengths(strengths, order, covariance, is_shrunk)
 
 

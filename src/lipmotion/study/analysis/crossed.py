@@ -119,26 +119,27 @@ def crossed_mean(values: Array, width: float) -> CrossedMean:
         by_rater = sentences == 1 or (raters > 1 and cells == sentences)
         return _one_way(mean, rest.sum(axis=int(by_rater)), cells, RATERS if by_rater else SENTENCES, width)
     components = _components(rest, seen)
-    variance, degrees = variance_of_mean(components, seen.sum(axis=1) / cells, seen.sum(axis=0) / cells, cells)
-    return CrossedMean(mean, _error(variance, width), degrees, BOTH, components)
+    shares = [float(np.square(seen.sum(axis=axis) / cells).sum()) for axis in (1, 0)]  # 1 / R and 1 / S without gaps
+    rater, sentence, residual = np.array(components)[:, None] * np.array([*shares, 1 / cells])[:, None]
+    free = 1 / shares[0] - 1, 1 / shares[1] - 1, max(cells - raters - sentences + 1.0, 1.0)
+    variance, degrees = variance_of_mean(rater, sentence, residual, free)
+    return CrossedMean(mean, _error(variance[0], width), float(degrees[0]), BOTH, components)
 
 
 def variance_of_mean(
-    components: Components, rater_share: Array, sentence_share: Array, cells: int
-) -> tuple[float, float]:
-    """Return the variance of a mean over cells, and its degrees of freedom.
+    rater: Array, sentence: Array, rest: Array, free: tuple[float, float, float]
+) -> tuple[Array, Array]:
+    """Return the variance of a mean, and its degrees of freedom, from its parts.
 
-    rater_share, sentence_share : share of the cells that each rater, each sentence has [shape=(R,), (S,)]
+    rater, sentence, rest : what each effect adds to the variance, in one or several studies [each shape=(N,)]
+    free : degrees of freedom of raters, of sentences, and of the rest
     """
-    by_rater, by_sentence = float(np.square(rater_share).sum()), float(np.square(sentence_share).sum())
-    rater, sentence, rest = components.rater * by_rater, components.sentence * by_sentence, components.residual / cells
-    free_raters, free_sentences = 1 / by_rater - 1, 1 / by_sentence - 1
-    free_rest = max(cells - len(rater_share) - len(sentence_share) + 1, 1)
-    doubt = (rater + rest) ** 2 / free_raters if rater else 0.0
-    doubt += (sentence + rest) ** 2 / free_sentences if sentence else 0.0
-    doubt += rest**2 / free_rest if bool(rater) == bool(sentence) else 0.0
     variance = rater + sentence + rest
-    return variance, variance**2 / doubt if doubt else np.inf
+    doubt = np.where(rater > 0, (rater + rest) ** 2 / free[0], 0) + np.where(
+        sentence > 0, (sentence + rest) ** 2 / free[1], 0
+    )
+    doubt = doubt + np.where((rater > 0) == (sentence > 0), rest**2 / free[2], 0)
+    return variance, np.divide(variance**2, doubt, out=np.full_like(variance, np.inf), where=doubt > 0)
 
 
 def _components(rest: Array, seen: NDArray[np.bool_]) -> Components:

@@ -166,11 +166,10 @@ def consistency(table: PairTable) -> Figures:
 def order_agreement(table: PairTable) -> Indices:
     """Return for each rater how many pairs were preferred alike in both orders, and of how many [shape=(R, 2)]."""
     found = np.zeros((len(table.raters), 2), np.intp)
-    preferred: dict[tuple[int, ...], bool] = {}
-    for rater, sentence, shown, is_first in zip(
-        table.rater.tolist(), table.sentence.tolist(), table.shown.tolist(), table.is_first.tolist(), strict=True
-    ):
-        preferred[rater, sentence, *shown] = is_first
+    preferred: dict[tuple[int, int, int, int], bool] = {}
+    columns = table.rater, table.sentence, *table.shown.T, table.is_first
+    for rater, sentence, first, second, is_first in zip(*(column.tolist() for column in columns), strict=True):
+        preferred[rater, sentence, first, second] = is_first
     for (rater, sentence, first, second), is_first in preferred.items():
         turned = preferred.get((rater, sentence, second, first))
         if first < second and turned is not None:

@@ -21,10 +21,8 @@ LEAST_ALIKE = 8
 """From so many judgements on, one who always gives the same value does not judge."""
 LEAST_PANEL = 5
 """With fewer raters nobody is said to be faster than the others."""
-FASTEST = 0.5
-"""A rater is too fast below this share of the usual time, and ..."""
-DEVIATIONS = 3.0
-"""... so many deviations below it (in logarithms, by the median absolute deviation)."""
+FASTEST, DEVIATIONS = 0.5, 3.0
+"""A rater is too fast who is below this share of the usual time, and so many deviations of its logarithm below it."""
 LEAST_ANSWERS = 0.5
 """Share of the usual number of answers below which a rater gave too few."""
 NORMAL = 1.4826
@@ -119,7 +117,8 @@ def _anchor(mine: Sequence[Answer]) -> str:
         values = [value for name, value in rated if name in standard]
         low = [value for name, value in rated if name == ANCHOR]
         if low and values and np.mean(low) >= np.mean(values):
-            return f"rated {np.mean(low):.2f}, {'recording' if standard == {RECORDING} else 'others'} {np.mean(values):.2f}"
+            better = RECORDING if standard == {RECORDING} else "others"
+            return f"rated {np.mean(low):.2f}, {better} {np.mean(values):.2f}"
     return ""
 
 
