@@ -35,6 +35,7 @@ SEE = {
     "evaluate": "measures",
     "compare": "compare",
     "experiment": "measures",
+    "study": "study-analysis",
     "info": "start",
     "cite": "glossary",
 }

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 CONFIDENCE = 0.95
-"""Of all intervals."""
+"""Share of studies whose intervals shall cover the truth."""
 ROUNDING = 1e-9
 """A standard error below this share of the scale is rounding: all judgements are equal."""
 BOTH, RATERS, SENTENCES, NOTHING = "raters and sentences", "raters", "sentences", "nothing"

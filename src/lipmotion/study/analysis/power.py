@@ -21,7 +21,7 @@ USUAL_POWER = 0.8
 DRAWS, SEED = 1000, 0
 """Simulated studies of a size."""
 MOST_DEGREES = 1e6
-"""Of freedom: with more, Student's t is normal."""
+"""Degrees of freedom from which on Student's t is normal."""
 Figures = dict[str, Any]
 
 
