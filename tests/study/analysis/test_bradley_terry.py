@@ -57,6 +57,19 @@ def test_baseball_with_the_advantage_of_the_place_as_published() -> None:
     assert not model.is_shrunk
 
 
+def test_errors_are_those_of_a_statistics_package() -> None:
+    """Source: statsmodels 0.15.0, GLM with family Binomial, on the same games; without Baltimore, and at home."""
+    model = fit_strengths(HOME, AWAY)
+    contrast = np.eye(7, 8)
+    contrast[:6, 6], contrast[6] = -1, np.eye(8)[7]
+    found = contrast @ np.append(model.strengths, model.order)
+    expected = [1.619555, 1.475357, 1.32711, 1.28134, 1.143803, 0.704694, 0.302261]
+    assert found == pytest.approx(np.array(expected), abs=2e-6)
+    errors = np.sqrt(np.diag(contrast @ model.covariance @ contrast.T))
+    expected = [0.347366, 0.344552, 0.340322, 0.340404, 0.337842, 0.335002, 0.130944]
+    assert errors == pytest.approx(np.array(expected), abs=2e-6)
+
+
 def log_likelihood(values: np.ndarray) -> float:
     odds = values[:-1, None] - values[:-1] + values[-1]
     return float((HOME * -np.log1p(np.exp(-odds)) + AWAY * -np.log1p(np.exp(odds))).sum())

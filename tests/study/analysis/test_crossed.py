@@ -20,6 +20,24 @@ def mean_squares(table: np.ndarray) -> tuple[float, float, float]:
     return by_rater, by_sentence, np.square(rest).sum() / ((R - 1) * (S - 1))
 
 
+SCORES = [
+    [1.55, 3.02, 5.86, 5.86, 4.56],
+    [1.67, 2.05, 3.82, 3.07, 5.92],
+    [2.99, 5.33, 5.07, 6.26, 5.26],
+    [5.67, 2.50, 6.52, 6.09, 6.54],
+    [3.48, 4.46, 6.52, 7.03, 9.62],
+    [1.28, 4.11, 4.22, 6.89, 4.99],
+    [2.10, 3.66, 2.96, 6.43, 6.63],
+]
+
+
+def test_components_are_those_of_a_mixed_model() -> None:
+    """Source: statsmodels 0.15.0, MixedLM by REML, with variance components of rows and columns."""
+    found = crossed_mean(np.array(SCORES), 9.0)
+    assert found.components == pytest.approx((0.629217, 2.113677, 1.422465), abs=2e-4)
+    assert found.error == pytest.approx(0.743818, abs=1e-5)
+
+
 def test_components_are_those_of_the_analysis_of_variance() -> None:
     found = crossed_mean(TABLE, 4.0)
     by_rater, by_sentence, rest = mean_squares(TABLE)
