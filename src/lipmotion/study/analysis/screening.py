@@ -81,17 +81,20 @@ def screen(answers: Sequence[Answer]) -> Screening:
     """Return which raters of a study are left out."""
     real = [answer for answer in answers if not answer.practice]
     raters = sorted({answer.rater for answer in real})
-    judged = {rater: [answer for answer in counts(real) if answer.rater == rater] for rater in raters}
-    slow_logs = _times(counts(real))
+    judged: dict[str, list[Answer]] = {rater: [] for rater in raters}
+    checks: dict[str, list[Answer]] = {rater: [] for rater in raters}
+    for answer in real:
+        (checks if answer.expected else judged)[answer.rater].append(answer)
+    times = _times(counts(real))
     usual = float(np.median([len(mine) for mine in judged.values()])) if raters else 0.0
     found: dict[str, dict[str, str]] = {}
     for rater, mine in judged.items():
         texts = {
-            "attention": _attention([each for each in real if each.rater == rater and each.expected]),
+            "attention": _attention(checks[rater]),
             "anchor": _anchor(mine),
             "sides": _sides([each for each in mine if each.kind == PAIRED]),
             "same value": _same_value(mine),
-            "time": _time(rater, slow_logs),
+            "time": _time(rater, times),
             "answers": f"{len(mine)} of usually {usual:g}" if len(mine) < LEAST_ANSWERS * usual else "",
         }
         if any(texts.values()):
