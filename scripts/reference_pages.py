@@ -35,7 +35,7 @@ SEE = {
     "evaluate": "measures",
     "compare": "compare",
     "experiment": "measures",
-    "study": "study consent",
+    "study": "study study-analysis",
     "info": "start",
     "cite": "glossary",
 }

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from lipmotion.pipeline.training.adapt import adapt
     from lipmotion.pipeline.training.train import Run, train
     from lipmotion.pipeline.understand.request import SpeechRequest
+    from lipmotion.study.analysis.analyse import analyse_study
     from lipmotion.types import (
         Audio,
         Constraints,
@@ -82,6 +83,7 @@ __all__ = [
     "Timeline",
     "Unit",
     "adapt",
+    "analyse_study",
     "animate",
     "build_face",
     "compare",
@@ -118,6 +120,7 @@ _HOMES = {
     "Lexicon": "lipmotion.units",
     "Model": "lipmotion.pipeline.model",
     "adapt": "lipmotion.pipeline.training.adapt",
+    "analyse_study": "lipmotion.study.analysis.analyse",
     "FilmOptions": "lipmotion.pipeline.film.filmed_video",
     "FilmedFace": "lipmotion.faces.filmed.face",
     "animate": "lipmotion.pipeline.generate.animate",

@@ -45,3 +45,10 @@ def test_what_cannot_be_used(run: RunCommand, here: Path) -> None:
         assert words in done.err[0]
     assert is_one_error(run("compare", "a.csv", "a.csv", "-o", "a.csv"), 7)
     assert not (here / "figures.json").exists()
+
+
+def test_programs_read_lines_of_json(run: RunCommand, here: Path) -> None:
+    (here / "a.csv").write_text(WAVE)
+    done = run("compare", "a.csv", "a.csv", "--machine-readable")
+    assert (done.code, done.err) == (0, [])
+    assert json.loads(done.out[-1])["figures"]["reference"] == "a.csv"

@@ -16,7 +16,10 @@ if TYPE_CHECKING:
 OPTIONS = ("--machine-readable", "--machineReadable")
 STATUS_VERBS, LINES_VERBS = (
     ("cues",),
-    ("animate", "batch", "render", "edit", "face", "speak", "words", "corpus", "train", "evaluate", "experiment"),
+    (
+        *("animate", "batch", "render", "edit", "face", "speak", "words", "corpus", "train"),
+        *("evaluate", "compare", "experiment", "study"),
+    ),
 )
 
 STANDARD_OUTPUT = "-"

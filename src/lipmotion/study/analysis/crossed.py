@@ -1,0 +1,182 @@
+"""The mean of judgements by several raters of several sentences, with an interval that holds for other raters and
+other sentences.
+
+A judgement is the sum of a mean, an effect of the rater, one of the sentence and a rest (two-way random effects). What
+one rater says of six sentences are not six independent judgements, nor are forty raters' words on one sentence forty.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+CONFIDENCE = 0.95
+"""Share of studies whose intervals shall cover the truth."""
+ROUNDING = 1e-9
+"""A standard error below this share of the scale is rounding: all judgements are equal."""
+BOTH, RATERS, SENTENCES, NOTHING = "raters and sentences", "raters", "sentences", "nothing"
+"""What an interval generalises over."""
+
+
+class Components(NamedTuple):
+    """Variances of the effects of raters and sentences, and of the rest (of a rater on a sentence)."""
+
+    rater: float
+    sentence: float
+    residual: float
+
+
+class Interval(NamedTuple):
+    """Limits of an interval; not finite where it is unknown."""
+
+    low: float
+    high: float
+
+
+UNKNOWN = Interval(np.nan, np.nan)
+
+
+@dataclass(frozen=True)
+class CrossedMean:
+    """A mean over raters and sentences.
+
+    mean       : of all cells of the table
+    error      : standard error; 0 where all judgements are equal, which says nothing of those of other raters
+    degrees    : of freedom of the error
+    over       : what the error generalises over
+    components : variances of the effects; None where they cannot be told apart
+    """
+
+    mean: float
+    error: float
+    degrees: float
+    over: str
+    components: Components | None
+
+    @property
+    def interval(self) -> Interval:
+        """The interval of the mean by Student's t; unknown where all judgements are equal, or there is one."""
+        from scipy.special import stdtrit
+
+        if not self.is_known:
+            return UNKNOWN
+        half = float(stdtrit(self.degrees, (1 + CONFIDENCE) / 2)) * self.error
+        return Interval(self.mean - half, self.mean + half)
+
+    @property
+    def is_known(self) -> bool:
+        """Whether there is an error to judge the mean by."""
+        return self.over != NOTHING and self.error > 0
+
+    @property
+    def p_value(self) -> float:
+        """The two-sided probability of a mean so far from 0, were the truth 0; NaN: unknown."""
+        from scipy.special import stdtr
+
+        return float(2 * stdtr(self.degrees, -abs(self.mean) / self.error)) if self.is_known else float("nan")
+
+    def log_odds(self, low: float, high: float) -> CrossedMean:
+        """Return the logarithm of (mean - low) / (high - mean), with its error to first order; low < mean < high."""
+        slope = (high - low) / ((self.mean - low) * (high - self.mean))
+        odds = float(np.log((self.mean - low) / (high - self.mean)))
+        return CrossedMean(odds, self.error * slope, self.degrees, self.over, None)
+
+    def interval_within(self, low: float, high: float) -> Interval:
+        """Return the interval that is symmetric in log odds: it leaves no scale, and is right near its ends, too."""
+        if not low < self.mean < high:
+            return UNKNOWN
+        shares = 1 / (1 + np.exp(-np.array(self.log_odds(low, high).interval)))
+        return Interval(*(low + (high - low) * shares).tolist())
+
+
+def crossed_mean(values: Array, width: float) -> CrossedMean:
+    """Return the mean of a table of judgements, and its standard error for other raters and other sentences.
+
+    values : a row for each rater, a column for each sentence; NaN where there is no judgement [shape=(R, S)]
+    width  : of the scale, by which differences are told from rounding
+    The variance of the mean is the sum of those of the effects, each estimated by moments and at least 0; degrees of
+    freedom by Satterthwaite's approximation, to which an effect that is estimated as 0 does not add. Coverage:
+    docs/study-analysis.md. With one rater, or one sentence, or none that share one, the error is that over sentences,
+    or raters, alone.
+    Source: Searle, Casella & McCulloch 1992, §4.3 and 5.2 (moments); Gao & Owen 2017 (tables with gaps).
+    Deviation: an effect of 0 leaves the degrees of freedom.
+    """
+    table = values[np.isfinite(values).any(axis=1)][:, np.isfinite(values).any(axis=0)]
+    seen = np.isfinite(table)
+    cells = int(seen.sum())
+    if not cells:
+        return CrossedMean(np.nan, np.nan, np.nan, NOTHING, None)
+    mean = float(table[seen].mean())
+    rest = np.where(seen, table - mean, 0.0)
+    raters, sentences = table.shape
+    if cells == 1:
+        return CrossedMean(mean, np.nan, np.nan, NOTHING, None)
+    if cells in (raters, sentences):  # a cell for each of one kind: grouped by the other, unless there is one group
+        by_rater = sentences == 1 or (raters > 1 and cells == sentences)
+        return _one_way(mean, rest.sum(axis=int(by_rater)), cells, RATERS if by_rater else SENTENCES, width)
+    components = _components(rest, seen)
+    shares = [float(np.square(seen.sum(axis=axis) / cells).sum()) for axis in (1, 0)]  # 1 / R and 1 / S without gaps
+    rater, sentence, residual = np.array(components)[:, None] * np.array([*shares, 1 / cells])[:, None]
+    free = 1 / shares[0] - 1, 1 / shares[1] - 1, max(cells - raters - sentences + 1.0, 1.0)
+    variance, degrees = variance_of_mean(rater, sentence, residual, free)
+    return CrossedMean(mean, _error(variance[0], width), float(degrees[0]), BOTH, components)
+
+
+def variance_of_mean(
+    rater: Array, sentence: Array, rest: Array, free: tuple[float, float, float]
+) -> tuple[Array, Array]:
+    """Return the variance of a mean, and its degrees of freedom, from its parts.
+
+    rater, sentence, rest : what each effect adds to the variance, in one or several studies [each shape=(N,)]
+    free : degrees of freedom of raters, of sentences, and of the rest
+    """
+    variance = rater + sentence + rest
+    doubt = np.where(rater > 0, (rater + rest) ** 2 / free[0], 0) + np.where(
+        sentence > 0, (sentence + rest) ** 2 / free[1], 0
+    )
+    doubt = doubt + np.where((rater > 0) == (sentence > 0), rest**2 / free[2], 0)
+    return variance, np.divide(variance**2, doubt, out=np.full_like(variance, np.inf), where=doubt > 0)
+
+
+def _components(rest: Array, seen: NDArray[np.bool_]) -> Components:
+    """Return the variances of the effects in a table with gaps, by three sums of squares.
+
+    rest : differences from the mean, 0 where there is no judgement [shape=(R, S)]
+    """
+    of_rater, of_sentence, cells = seen.sum(axis=1), seen.sum(axis=0), int(seen.sum())
+    squares = float(np.square(rest).sum())
+    within_raters = squares - float((rest.sum(axis=1) ** 2 / of_rater).sum())
+    within_sentences = squares - float((rest.sum(axis=0) ** 2 / of_sentence).sum())
+    without_rater = within_raters / (cells - len(of_rater))  # of sentence and rest
+    without_sentence = within_sentences / (cells - len(of_sentence))  # of rater and rest
+    raters = cells - float(np.square(of_rater).sum()) / cells
+    sentences = cells - float(np.square(of_sentence).sum()) / cells
+    excess = raters * without_sentence + sentences * without_rater - squares
+    residual = max(excess / (raters + sentences - cells + 1), 0.0) if raters + sentences > cells - 1 else 0.0
+    return Components(max(without_sentence - residual, 0.0), max(without_rater - residual, 0.0), residual)
+
+
+def _one_way(mean: float, sums: Array, cells: int, over: str, width: float) -> CrossedMean:
+    """Return a mean with the error over groups of cells; ``sums``: of the differences from it in each group."""
+    groups = len(sums)
+    variance = groups / (groups - 1) * float(np.square(sums).sum()) / cells**2
+    return CrossedMean(mean, _error(variance, width), groups - 1, over, None)
+
+
+def _error(variance: float, width: float) -> float:
+    error = float(np.sqrt(variance))
+    return error if error > ROUNDING * width else 0.0
+
+
+def holm(p_values: list[float]) -> list[float]:
+    """Return p-values corrected for their number (Holm 1979); NaN ones stay so, and do not count."""
+    found = sorted((value, place) for place, value in enumerate(p_values) if not np.isnan(value))
+    corrected, least = list(p_values), 0.0
+    for rank, (value, place) in enumerate(found):
+        least = max(least, min(1.0, (len(found) - rank) * value))
+        corrected[place] = least
+    return corrected

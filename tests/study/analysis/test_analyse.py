@@ -1,0 +1,121 @@
+"""The whole analysis: with and without screening, its tables, and what it refuses."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.errors import InputError
+from lipmotion.storage.json_text import as_json, nan_as_null
+from lipmotion.study.analysis.analyse import analyse_study
+from lipmotion.study.analysis.analysis_table import analysis_table
+from lipmotion.study.answers import Answer, write_answers
+from study.analysis.simulated import Effects, comparisons, pair_answer, paired_answers, rated_answers, rating, ratings
+
+NAMES = {"c0": "ph-HMM", "c1": "ph-vi-CHMM", "c2": "recording", "c3": "anchor", "": ""}
+
+
+def study() -> list[Answer]:
+    """Return a study of twelve raters, of whom one always prefers the first."""
+    draw = np.random.default_rng(3)
+    answers = rated_answers(ratings(draw, np.array([3.1, 3.9, 4.7, 1.5]), (12, 6), Effects()))
+    answers += paired_answers(comparisons(draw, np.array([-0.5, 0, 0.8]), (12, 6), Effects()))
+    answers = [replace(each, condition=NAMES[each.condition], other=NAMES[each.other]) for each in answers]
+    return [replace(each, value="first") if each.rater == "r3" and each.other else each for each in answers]
+
+
+def test_figures_come_with_and_without_screening(tmp_path: Path) -> None:
+    write_answers(tmp_path / "answers.csv", study())
+    figures = analyse_study(tmp_path / "answers.csv", baseline="ph-HMM")
+    assert [row["rater"] for row in figures["screening"]["left_out"]] == ["r3"]
+    assert [(part["kind"], part["raters"]) for part in figures["all"]] == [("mos", 12), ("paired", 12)]
+    assert [(part["kind"], part["raters"]) for part in figures["screened"]] == [("mos", 11), ("paired", 11)]
+    assert figures["screened"] == analyse_study([each for each in study() if each.rater != "r3"])["all"]
+    as_json(nan_as_null(figures))
+
+
+def test_the_table_has_all_figures() -> None:
+    figures = analyse_study(study(), baseline="ph-HMM")
+    text = analysis_table(figures)
+    assert "left out: r3 (sides: 0 of 18 pairs answered alike in both orders)" in text
+    for words in ("11 of 12 raters kept", "mos, overall: 264 answers, 11 raters, 6 sentences", "% over ph-HMM"):
+        assert words in text
+    for words in ("recording - anchor", "anchor over"):
+        assert words not in text
+    for part in figures["screened"]:
+        for row in part["conditions"]:
+            number = f"{row['share']:.1%}" if "share" in row else f"{row['mean']:.2f}"
+            assert any(row["condition"] in line and number in line for line in text.splitlines())
+    assert "raters to tell a preference (6 sentences, power 80%): 55%:" in text
+    assert "all raters" in text
+    assert "all raters" not in analysis_table(analyse_study([each for each in study() if each.rater != "r3"]))
+
+
+def test_more_sentences_need_fewer_raters() -> None:
+    few, many = (
+        {row["difference"]: row["raters"] for row in analyse_study(study(), sentences=count)["all"][0]["raters_needed"]}
+        for count in (6, 40)
+    )
+    assert many[0.5] < few[0.5]
+    assert few[0.1] is None
+
+
+@pytest.mark.parametrize(
+    ("options", "error"),
+    [
+        ({"baseline": "a"}, "the baseline 'a', required one of: anchor, ph-HMM, ph-vi-CHMM, recording"),
+        ({"power": 1.0}, "a power of 1, required between"),
+        ({"power": float("nan")}, "a power of nan, required between"),
+        ({"sentences": 1}, "1 sentences of planned studies, required at least 2"),
+    ],
+)
+def test_options_that_are_refused(options: dict[str, object], error: str) -> None:
+    with pytest.raises(InputError, match=error):
+        analyse_study(study(), **options)  # type: ignore[arg-type]
+
+
+def test_a_study_without_answers_is_refused() -> None:
+    with pytest.raises(InputError, match="1 answers, none of which counts"):
+        analyse_study([replace(rating(("r", "s"), "a", 3), practice=True)])
+
+
+def test_no_rater_left() -> None:
+    answers = [replace(rating(("r", "s"), "a", 3), expected="4"), rating(("r", "s"), "a", 3)]
+    figures = analyse_study(answers)
+    assert figures["screened"] is None
+    assert "no rater is left after screening: figures of all raters" in analysis_table(figures)
+
+
+DEGENERATE = {
+    "one answer": [rating(("r", "s"), "a", 3)],
+    "one rater": [rating(("r", f"s{s}"), name, 1 + (s + len(name)) % 5) for s in range(6) for name in ("a", "bb")],
+    "one sentence": [rating((f"r{r}", "s"), name, 1 + (r + len(name)) % 5) for r in range(6) for name in ("a", "bb")],
+    "all equal": [rating((f"r{r}", f"s{s}"), name, 5) for r in range(3) for s in range(2) for name in "ab"],
+    "one pair": [pair_answer(("r", "s"), ("a", "b"), True)],
+    "one always wins": [pair_answer((f"r{r}", f"s{s}"), ("a", "b"), True) for r in range(4) for s in range(4)],
+    "nothing links": [pair_answer((f"r{r}", "s"), p, r > 1) for r in range(4) for p in (("a", "b"), ("c", "d"))],
+    "anchor alone": [pair_answer((f"r{r}", "s"), ("a", "anchor"), True) for r in range(4)],
+    "anchor alone rated": [rating(("r", "s"), "anchor", 3)],
+}
+
+
+@pytest.mark.parametrize("name", DEGENERATE)
+def test_degenerate_studies_have_figures_without_numbers_that_are_none(name: str) -> None:
+    """No division warns, and what is unknown is a dash and null."""
+    figures = analyse_study(DEGENERATE[name])
+    text = analysis_table(figures)
+    assert not re.search(r"\b(nan|inf)\b", text)
+    as_json(nan_as_null(figures))
+
+
+def test_degenerate_studies_say_what_their_intervals_are_over() -> None:
+    assert "intervals over sentences only" in analysis_table(analyse_study(DEGENERATE["one rater"]))
+    assert "intervals over raters only" in analysis_table(analyse_study(DEGENERATE["one sentence"]))
+    assert "raters, all agree only" in analysis_table(analyse_study(DEGENERATE["one always wins"]))
+    assert "half a win was given" in analysis_table(analyse_study(DEGENERATE["one always wins"]))
+    assert "no comparison links the groups a, b; c, d" in analysis_table(analyse_study(DEGENERATE["nothing links"]))
+    assert "all comparisons are with the anchor" in analysis_table(analyse_study(DEGENERATE["anchor alone"]))

@@ -1,0 +1,136 @@
+"""Opinion scores and rankings: means, differences, improvement as the paper prints it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from lipmotion.study.analysis.ratings import (
+    RANKS,
+    SCALES,
+    RatingTable,
+    difference_components,
+    rating_figures,
+    rating_table,
+    relative_improvement,
+)
+from lipmotion.study.answers import MOS
+from study.analysis.simulated import Effects, expected_rating, rated_answers, rating, ratings
+
+MEANS = np.array([3.1, 3.9, 4.7])
+XIE_LIU = {"ph-HMM": 3.16, "ph-MSHMM": 3.18, "ph-FHMM": 3.31, "ph-vi-FHMM": 3.39, "ph-CHMM": 3.67}
+XIE_LIU |= {"ph-vi-CHMM": 3.87, "recording": 4.71}
+"""Overall scores of Xie & Liu 2007, Table 4."""
+IMPROVEMENT = {"ph-MSHMM": 0.63, "ph-FHMM": 4.75, "ph-vi-FHMM": 7.28, "ph-CHMM": 16.14, "ph-vi-CHMM": 22.47}
+IMPROVEMENT |= {"recording": 49.05}
+"""What the same table prints as %RI."""
+
+
+def simulated(size: tuple[int, int], seed: int = 1, means: np.ndarray = MEANS) -> RatingTable:
+    return ratings(np.random.default_rng(seed), means, size, Effects())
+
+
+def test_improvement_is_that_of_the_paper() -> None:
+    values = np.tile(np.array(list(XIE_LIU.values()))[:, None, None], (1, 4, 3))
+    table = RatingTable(tuple(XIE_LIU), values, np.ones(values.shape, np.intp), SCALES[MOS])
+    for name, percent in IMPROVEMENT.items():
+        assert round(relative_improvement(table, name, "ph-HMM")["percent"], 2) == percent
+
+
+def test_improvement_has_an_interval_around_it() -> None:
+    table = simulated((30, 12))
+    row = relative_improvement(table, "c2", "c0")
+    c0, c2 = (table.of(name).mean() for name in ("c0", "c2"))
+    assert row["percent"] == pytest.approx(100 * (c2 - c0) / c0)
+    assert row["low"] < row["percent"] < row["high"]
+    expected = [expected_rating(mean, Effects()) for mean in MEANS]
+    assert row["low"] < 100 * (expected[2] / expected[0] - 1) < row["high"]
+
+
+def test_answers_survive_the_table() -> None:
+    table = simulated((3, 4))
+    again = rating_table(rated_answers(table))
+    assert again.conditions == table.conditions
+    assert np.array_equal(again.values, table.values)
+    assert (
+        rating_table(rated_answers(ratings(np.random.default_rng(1), MEANS, (2, 2), Effects(), RANKS))).scale == RANKS
+    )
+
+
+def test_known_means_are_found() -> None:
+    figures = rating_figures(simulated((60, 40)), None)
+    assert figures["baseline"] == "c0"
+    assert [row["condition"] for row in figures["conditions"]] == ["c2", "c1", "c0"]
+    for row, mean in zip(figures["conditions"], MEANS[::-1], strict=True):
+        assert row["low"] < expected_rating(mean, Effects()) < row["high"]
+        assert (row["answers"], row["raters"], row["sentences"]) == (2400, 60, 40)
+
+
+def test_a_difference_of_few_raters_on_one_sentence_is_the_paired_t_test() -> None:
+    table = simulated((12, 1))
+    usual = stats.ttest_rel(table.of("c1")[:, 0], table.of("c0")[:, 0])
+    row = next(row for row in rating_figures(table, None)["pairs"] if row["other"] == "c1")
+    assert row["p"] == pytest.approx(usual.pvalue)
+    assert (-row["high"], -row["low"]) == pytest.approx(tuple(usual.confidence_interval()))
+    assert row["over"] == "raters"
+
+
+def test_what_raters_add_to_all_conditions_leaves_differences() -> None:
+    """Nothing is normalised: a rater who is strict throughout changes no difference."""
+    table = simulated((10, 6), means=np.array([2.5, 3.0]))
+    strict = table.values + np.linspace(-1, 1, 10)[:, None]
+    moved = RatingTable(table.conditions, strict, table.count, table.scale)
+    assert moved.difference("c1", "c0").interval == pytest.approx(table.difference("c1", "c0").interval)
+
+
+def test_the_anchor_is_shown_but_not_tested() -> None:
+    table = simulated((8, 6))
+    figures = rating_figures(RatingTable(("a", "anchor", "recording"), table.values, table.count, table.scale), None)
+    assert len(figures["conditions"]) == 3
+    assert [(row["condition"], row["other"]) for row in figures["pairs"]] == [("a", "recording")]
+    assert figures["baseline"] == "a"
+    assert [row["condition"] for row in figures["relative_improvement"]] == ["recording"]
+
+
+def test_conditions_never_compared_by_one_rater_have_no_difference() -> None:
+    answers = [rating((f"r{r}", f"s{s}"), "ab"[r % 2], 1 + (r + s) % 5) for r in range(6) for s in range(4)]
+    figures = rating_figures(rating_table(answers), "a")
+    (pair,) = figures["pairs"]
+    assert np.isnan([pair["difference"], pair["low"], pair["p"], pair["p_holm"]]).all()
+    assert pair["over"] == "nothing"
+    assert np.isnan(figures["relative_improvement"][0]["percent"])
+    assert not np.isnan(figures["conditions"][0]["low"])
+
+
+def test_equal_scores_have_means_and_no_intervals() -> None:
+    answers = [rating((f"r{r}", f"s{s}"), name, 4) for r in range(5) for s in range(3) for name in "ab"]
+    table = rating_table(answers)
+    figures = rating_figures(table, None)
+    assert [row["mean"] for row in figures["conditions"]] == [4, 4]
+    assert np.isnan([row["low"] for row in figures["conditions"]]).all()
+    (pair,) = figures["pairs"]
+    assert pair["difference"] == 0
+    assert np.isnan(pair["p"])
+    assert difference_components(table) is not None
+
+
+def test_a_baseline_of_nothing_has_no_improvement_over_it() -> None:
+    ranks = [
+        rating((f"r{r}", f"s{s}"), name, 50 * (name == "b"), kind="ranking")
+        for r in "xy"
+        for s in "xy"
+        for name in "ab"
+    ]
+    (row,) = rating_figures(rating_table(ranks), "a")["relative_improvement"]
+    assert np.isnan(row["percent"])
+
+
+@pytest.mark.long
+def test_intervals_cover_known_means_near_the_end_of_the_scale() -> None:
+    draw, truth = np.random.default_rng(3), [expected_rating(mean, Effects()) for mean in MEANS]
+    hits = []
+    for _ in range(400):
+        rows = rating_figures(ratings(draw, MEANS, (20, 6), Effects()), None)["conditions"]
+        hits += [row["low"] <= truth[int(row["condition"][1])] <= row["high"] for row in rows]
+    assert 0.93 < np.mean(hits) < 0.97
