@@ -32,6 +32,18 @@ def analyse_study(
     Returns ``screening``; ``screened``, a list of parts without the raters that are left out; and ``all``, with all
     raters. A part is what was asked in one question of one kind. ``screened`` is None if no rater is left.
     Raises InputError: no answer counts; the baseline is not a condition; a value that is not allowed.
+
+    >>> import lipmotion
+    >>> from lipmotion.study.answers import Answer
+    >>> answers = [
+    ...     Answer(rater, "mos", 0, sentence, "overall", condition, "", value, 9.0, 1, False, "")
+    ...     for rater in ("r001", "r002")
+    ...     for sentence in ("bin blue", "place red")
+    ...     for condition, value in (("trajectory", "4"), ("coupled", "2"))
+    ... ]
+    >>> (part,) = lipmotion.analyse_study(answers)["all"]
+    >>> [(row["condition"], row["mean"]) for row in part["conditions"]]
+    [('trajectory', 4.0), ('coupled', 2.0)]
     """
     given = read_answers(Path(answers)) if isinstance(answers, str | Path) else list(answers)
     counted = counts(given)
