@@ -67,9 +67,9 @@ def ordinary_signals() -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def short_training() -> Iterator[None]:
-    """The toy's motion follows so simply from its sound that a network needs half of the steps."""
+    """The toy's motion follows so simply from its sound that a network needs a third of the steps."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(posterior_network, "STEPS", posterior_network.STEPS / 2)
+        patched.setattr(posterior_network, "STEPS", posterior_network.STEPS / 3)
         yield
 
 

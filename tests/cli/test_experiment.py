@@ -36,6 +36,7 @@ def test_the_table_is_that_of_the_figures(run: RunCommand, toy_corpus: Corpus, h
     assert [path.name for path in here.iterdir()] == ["a.json"]
 
 
+@pytest.mark.long
 def test_the_learning_curve_of_a_list(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
     (here / "order.txt").write_text("\n".join(toy_corpus.names("train")) + "\n\n")
     chosen = ("--order", "order.txt", "--sizes", "8,3", "--split", "val")
