@@ -1,17 +1,22 @@
 """The pages of the papers: what they say of equations, functions and tests is there."""
 
 import re
+from dataclasses import fields
 from functools import cache
 from pathlib import Path
 
 import pytest
 
 from docs.test_links import DOCS
+from lipmotion.engines.coupled.config import CoupledConfig
+from lipmotion.engines.joint.config import JointEngineConfig
+from lipmotion.engines.selection.config import SelectionConfig
 
 ROOT = DOCS.parent
 SOURCE, TESTS = ROOT / "src" / "lipmotion", ROOT / "tests"
 PAGES = {"hofer2008": 12, "xieliu2007": 21, "minnis2000": 0}
 """The pages, and how many equations each paper numbers, besides those of appendices."""
+CONFIGURATIONS = (JointEngineConfig, CoupledConfig, SelectionConfig)
 NAMED = re.compile(r"`((?:\w+/)+\w+\.py)::(\w+)`")
 DEFINED = re.compile(r"^ *(?:(?:def|class) (\w+)|(\w+)(?:: [^=\n]+)? = )", re.MULTILINE)
 FENCES = re.compile(r"```.*?```", re.DOTALL)
@@ -45,6 +50,14 @@ def test_names_without_a_path_exist() -> None:
     assert min(len(tests), len(functions)) > 20
     assert [name for name in tests if name not in defined(TESTS)] == []
     assert [name for name in functions if not defined(SOURCE).issuperset(name.split("."))] == []
+
+
+def test_options_exist() -> None:
+    options = {each.name for config in CONFIGURATIONS for each in fields(config)}
+    pages = [(DOCS / "papers" / f"{page}.md").read_text("utf-8") for page in PAGES]
+    named = [name for page in pages for name in re.findall(r"(?:`|--set \"?)(\w+)=", page)]
+    assert len(named) > 10
+    assert [name for name in named if name not in options] == []
 
 
 @pytest.mark.parametrize("page", [page for page, count in PAGES.items() if count])
