@@ -189,8 +189,9 @@ def test_the_text_names_every_system(figures: dict[str, Any]) -> None:
 @LONG
 @pytest.mark.parametrize("visual", ["both"])
 def test_eigenlips(visual: str, toy_corpus: Corpus) -> None:
-    options = ComparisonOptions(systems=["trajectory HMM"], visual=visual)
+    options = ComparisonOptions(systems=["trajectory HMM"], visual=visual, train_on=20)  # more than there are
     made = xieliu2007(toy_corpus, options, settings=SMALL)
+    assert made["rows"][0]["names"] == 8
     model = train(toy_corpus, recogniser=PHONE_MODELS, visual=visual)[0]
     expected_figures = evaluate(model, toy_corpus)["conditions"]["audio only"]
     row = made["rows"][0]["conditions"]["audio only"]["trajectory HMM"]

@@ -18,8 +18,14 @@ from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.pipeline.evaluation.evaluate import _was_trained_on
 from lipmotion.pipeline.evaluation.evaluate import evaluate as evaluated
 from lipmotion.pipeline.evaluation.figures import figures_of
-from lipmotion.pipeline.evaluation.held_out import ComparedClip
+from lipmotion.pipeline.evaluation.held_out import (
+    AUDIO_ONLY,
+    ComparedClip,
+    held_out_recordings,
+    speech_of_condition,
+)
 from lipmotion.pipeline.model import Model
+from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.testing.toy import toy_motion, toy_sentences
 from lipmotion.types import Channel, Generation, Motion, Speech, StateTrace, Timeline, Unit, Utterance
 from lipmotion.units import Lexicon
@@ -62,6 +68,16 @@ class Shut(Medium):
 def known() -> dict[float, Motion]:
     """The true motion of the toy sentences at 100 Hz."""
     return {sentence.audio.duration_s: toy_motion(sentence.units, 100.0) for sentence in toy_sentences(12)}
+
+
+def test_a_voice_is_as_well_known_as_in_animation(toy_model: Model, toy_corpus: Corpus) -> None:
+    """Whatever engine recognises nothing itself generates the motion of strangers as such."""
+    phones = cached_recogniser(toy_model.phones, "own")
+    recordings = held_out_recordings(toy_corpus, phones, selection=Selection(split="val"), lexicon=Lexicon())
+    for score, voice in ((-9.0, 0.0), (-6.0, 0.5), (0.0, 1.0)):
+        found = [replace(each, similarity=score) for each in recordings.recognitions]
+        speeches = speech_of_condition(replace(recordings, recognitions=found), AUDIO_ONLY, Medium(None), {})
+        assert [speech.voice for speech in speeches] == pytest.approx([voice] * len(found))
 
 
 @pytest.fixture(scope="module")

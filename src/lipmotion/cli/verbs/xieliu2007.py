@@ -52,12 +52,7 @@ def run(options: argparse.Namespace) -> None:
     """Call ``experiment.xieliu2007`` and print its table."""
     from lipmotion.corpora.splits import read_names
     from lipmotion.experiments.noise import NoiseConditions, read_talkers
-    from lipmotion.experiments.xie_liu2007.six_systems import (
-        DEFAULT_OPTIONS,
-        QUICK,
-        QUICK_SIZE,
-        xieliu2007,
-    )
+    from lipmotion.experiments.xie_liu2007.six_systems import DEFAULT_OPTIONS, QUICK, xieliu2007
     from lipmotion.experiments.xie_liu2007.text import table
 
     def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
@@ -77,7 +72,7 @@ def run(options: argparse.Namespace) -> None:
                 compared,
                 split=list_or_all(options.split),
                 order=read_names(options.order) if options.order else None,
-                sizes=options.sizes or ([QUICK_SIZE] if options.quick else None),
+                sizes=options.sizes,
                 plots=options.plots,
                 work=work,
                 settings=settings,

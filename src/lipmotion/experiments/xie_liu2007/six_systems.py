@@ -91,6 +91,7 @@ class ComparisonOptions:
     transcripts : compare also with known transcripts
     noise       : noise in which the systems trained on the largest size are compared as well
     most        : choose and compare with no more recordings
+    train_on    : train on no more recordings where no sizes are given
     """
 
     systems: Sequence[str] | None = None
@@ -99,6 +100,7 @@ class ComparisonOptions:
     transcripts: bool = False
     noise: NoiseConditions | None = None
     most: int | None = None
+    train_on: int | None = None
 
 
 DEFAULT_OPTIONS = ComparisonOptions()
@@ -107,6 +109,7 @@ QUICK = ComparisonOptions(
     systems=[*PAPER_FIGURES, *(name + TUNED for name in PAPER_FIGURES if "FHMM" not in name), "mean pose"],
     tuning=TuningOptions(clips=QUICK_SIZE, judges=4, weights=(1.0, 0.3), mixtures=2, states=()),
     most=6,
+    train_on=QUICK_SIZE,
 )
 """A small comparison, of systems trained on ``QUICK_SIZE`` recordings; conversion by factorial chains is slow."""
 
@@ -146,7 +149,7 @@ def xieliu2007(  # noqa: PLR0913
         corpus.required("val")[: options.most] if tunes else (),
     )
     check_training_names(corpus, listed, (*held_out, *validation))
-    steps = training_sizes(sizes if sizes is not None else [len(listed)], len(listed))
+    steps = training_sizes(sizes if sizes is not None else [len(listed[: options.train_on])], len(listed))
     setup = _TrainingSetup(corpus, held_out, validation, options, settings, work)
     if options.visual != EIGENLIPS:
         channels_with_opening(corpus, held_out)  # before the long work

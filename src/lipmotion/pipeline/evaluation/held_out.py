@@ -226,22 +226,33 @@ def speech_of_condition(
     """Return the speech of all utterances under a condition, as ``animate`` gives it to the engine."""
     phones, prior = recordings.phones, recordings.prior
     if condition == AUDIO_ONLY:
-        speeches = [
-            recognised_speech(engine, learned, u.audio, u.features, phones, lambda found=found: found)  # type: ignore[misc]
-            for u, found in zip(recordings.utterances, recordings.recognitions, strict=True)
+        pairs = [
+            _recognised(engine, learned, utterance, phones, found)
+            for utterance, found in zip(recordings.utterances, recordings.recognitions, strict=True)
         ]
     else:
-        speeches = [
-            speech_of(engine, u.audio, u.features, units, phones.kind)
+        pairs = [
+            (speech_of(engine, u.audio, u.features, units, phones.kind), None)
             for u, units in zip(recordings.utterances, recordings.conditions[condition], strict=True)
         ]
     return [
-        replace(
-            with_prior(prior, speech),
-            voice=known_voice(phones.own, u.audio, speech, found if speech.units is found.units else None),
-        )
-        for u, speech, found in zip(recordings.utterances, speeches, recordings.recognitions, strict=True)
+        replace(with_prior(prior, speech), voice=known_voice(phones.own, utterance.audio, speech, found))
+        for utterance, (speech, found) in zip(recordings.utterances, pairs, strict=True)
     ]
+
+
+def _recognised(
+    engine: Animator[ModelT], learned: ModelT, utterance: Utterance, phones: Recogniser, found: Recognition
+) -> tuple[Speech, Recognition | None]:
+    """Return the speech of an utterance whose words are not known, and what was found in it if that was needed."""
+    asked: list[Recognition] = []
+
+    def recognise() -> Recognition:
+        asked.append(found)
+        return found
+
+    speech = recognised_speech(engine, learned, utterance.audio, utterance.features, phones, recognise)
+    return speech, found if asked else None
 
 
 def compare_with_recorded(

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from engines.coupled.tiny import THREE, TWO, chains, observations, structure
-from lipmotion.engines.coupled.chains.densities import AudioVisualObservations
+from lipmotion.engines.coupled.chains.densities import AudioVisualObservations, reestimated_group
 from lipmotion.engines.coupled.chains.structures import COUPLED, FACTORIAL, HMM, MULTISTREAM
 from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.engine import CoupledEngine
@@ -79,6 +79,37 @@ def test_statistics_of_utterances_are_those_of_all_paths():
             first = first + posterior @ one.streams[0]
         np.testing.assert_allclose(statistics.products[0][:, density, :2].sum(axis=0), first, atol=1e-3)
     assert result.frames == 7
+
+
+def test_densities_are_weighted_means_and_variances():
+    """Eqs. A.12 to A.15 of Xie & Liu 2007, by enumeration of paths and components."""
+    model = chains()
+    data = [observations(4, seed=1), observations(4, seed=2)]
+    statistics = e_step(model, [LatticeUtterance(one, model.full_lattice) for one in data])
+    joints = [oracle.posteriors(model, one)[0] for one in data]
+    compared = 0
+    for stream, (group, own) in enumerate(zip(model.groups, statistics.emissions, strict=True)):
+        better = reestimated_group(group, own, [np.float32([1e-6])], 0.0, (0, 1)).mixtures
+        values = np.concatenate([one.streams[stream] for one in data]).astype(float)
+        for density in range(group.mixtures.size[0]):
+            gamma = np.concatenate(
+                [
+                    joint[frame, group.tie == density].sum() * np.exp(terms - total)[None]
+                    for one, joint in zip(data, joints, strict=True)
+                    for frame in range(one.frames)
+                    for total, terms in [oracle.log_density(group, density, one, frame)]
+                ]
+            )
+            occupancy = gamma.sum(axis=0)
+            np.testing.assert_allclose(np.exp(better.log_weights[density]), occupancy / occupancy.sum(), atol=1e-3)
+            for component in np.flatnonzero(occupancy > 0.2):
+                share = gamma[:, component] / occupancy[component]
+                mean = share @ values
+                np.testing.assert_allclose(better.means[density, component], mean, atol=1e-3)
+                variance = share @ (values - mean) ** 2
+                np.testing.assert_allclose(better.variances[density, component], variance, atol=2e-3)
+                compared += 1
+    assert compared > 10
 
 
 def test_a_stream_that_was_not_observed_is_not_reestimated():
