@@ -118,7 +118,7 @@ class LearnedMotion:
                 column, reach_s = self.closure.column, closing_reach_s(voice)
                 statistics = with_contrast(statistics, self.prior, units, frames, reliability, voice)
                 statistics = with_open_vowels(statistics, self.prior, column, units, frames, reliability, voice)
-                statistics = with_breath(statistics, self.prior, units, frames, voice)
+                statistics = with_breath(statistics, self.prior, units, frames, reliability, voice)
                 gain = typical_range(self.prior, self.space, voice, float(np.mean(reliability)))
                 scaling = scaling._replace(factors=scaling.factors * gain)
         ranges = closable_ranges(units, frames, closing_units, reach_s) if close else []

@@ -36,6 +36,7 @@ from lipmotion.speech.recognition.network.posteriors import (
     posterior_stretches,
 )
 from lipmotion.speech.recognition.recognised_speech import (
+    WORD_POSTERIORS,
     LabelledFrames,
     RecognisedWord,
     Recognition,
@@ -56,9 +57,6 @@ OWN_VOICE_SCORE, SMALL_PERPLEXITY = -3.0, 9.0
 """A voice with the first speaker similarity score or more is that of the own models; if the perplexity of their bigram
 is less than the second one, their corpus has few words, which no language model of English expects. Then the phones
 alone decide. The perplexity is 5.3 for GRID's 51 words, 18.6 for English."""
-LEAST_POSTERIOR = 0.7
-"""A phone recogniser decides from this mean posterior of its phones on. Clear English of strangers has 0.77 to 0.98,
-in noise of 20 dB 0.80 to 0.98, of 10 dB 0.50 to 0.97; other languages have 0.58 to 0.64."""
 NO_WEIGHT_SCORE, FULL_WEIGHT_SCORE = -9.0, -5.0
 """Own models have no weight for recordings with the first speaker similarity score or less, and the weight of the
 general models from the second one on. The score of another speaker in the same studio is -4 to -6 for GRID's models, of
@@ -124,7 +122,7 @@ class Recogniser:
         network = None if known else network_of(self.kind)
         if network is not None:
             found = posterior_stretches(network, audio, each)
-            if mean_posterior(found) >= LEAST_POSTERIOR or not english:
+            if mean_posterior(found) >= WORD_POSTERIORS[0] or not english:
                 return self._network_recognition(audio, similarity, found, english=english)
         with_words = self.kind in USING_WORDS and not known
         spoken = begun_decoding(audio, each) if with_words else None
