@@ -15,7 +15,7 @@ Index = NDArray[np.intp]
 Scores = NDArray[np.float32]
 LogEmission = Callable[[int, int], NDArray[np.float32]]
 """Function of a first frame and an end: returns the log densities of these frames [shape=(end - first, G)]."""
-BLOCK, BLOCK_SCORES = 2048, 1 << 20
+BLOCK, BLOCK_SCORES = 2048, 1 << 22
 """Frames whose scores are in memory at a time, and scores, whichever are more; earlier scores are computed again from
 checkpoints."""
 FRAME_S, ARC_S = 10e-6, 15e-9
