@@ -132,7 +132,7 @@ def with_breath(
     time_s = np.arange(frames) / FRAME_RATE_HZ
     before = (time_s >= first_s - BREATH_S) & (time_s < first_s)
     half_known = 2 * np.sqrt(voice) * strangeness(voice)
-    share = half_known * np.broadcast_to(reliability, frames)[:, None] * smoothed(before[:, None])
+    share = half_known * np.broadcast_to(reliability, frames)[:, None] * smoothed(before[:, None].astype(float))
     pose = np.stack([prior.centre, *np.zeros((2, len(prior.centre)))])
 
     def parted(chosen: slice) -> Statistics:
