@@ -15,9 +15,10 @@ from pathlib import Path
 from hama.inference import G2PModel
 
 from lipmotion.speech.recognition.network.hama import Hama
-from lipmotion.speech.recognition.network.word_tree import FORM_OF, english_words
+from lipmotion.speech.recognition.network.word_tree import english_words
 from lipmotion.units import Lexicon
 from lipmotion.units.ipa_phones import token_phones
+from lipmotion.units.phones import FULL_FORMS
 
 MOST_WORDS = 4000
 TARGET = Path(__file__).parents[1] / "src" / "lipmotion" / "speech" / "recognition" / "network" / "written_words.txt"
@@ -29,7 +30,7 @@ def main() -> None:
     tokens = sorted((token for token in Hama().tokens if not token.startswith("<")), key=len, reverse=True)
     lines = []
     for word in english_words().language.words[:MOST_WORDS]:
-        known = {tuple(FORM_OF.get(phone, phone) for phone in each) for each in Lexicon().pronunciations(word)}
+        known = {tuple(FULL_FORMS.get(phone, phone) for phone in each) for each in Lexicon().pronunciations(word)}
         phones = spelt(unicodedata.normalize("NFC", network.predict(word).ipa), tokens)
         if word.replace("'", "").isalpha() and phones and phones not in known:
             lines.append(f"{word} {' '.join(phones)}\n")
@@ -46,7 +47,7 @@ def spelt(ipa: str, tokens: list[str]) -> tuple[str, ...]:
         token = next((token for token in tokens if ipa.startswith(token, at)), "")
         found.append(token)
         at += len(token) or 1
-    return tuple(FORM_OF.get(phone, phone) for phone, _ in token_phones(list(filter(None, found))))
+    return tuple(FULL_FORMS.get(phone, phone) for phone, _ in token_phones(list(filter(None, found))))
 
 
 if __name__ == "__main__":

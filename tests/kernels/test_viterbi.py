@@ -20,7 +20,8 @@ def asked(log_emission: np.ndarray):
 
 @pytest.fixture(params=["numpy", "compiled"], autouse=True)
 def form(request, monkeypatch) -> None:
-    """Every test runs with both forms, NumPy and compiled."""
+    """Every test runs with both forms, NumPy and compiled, and with blocks of ``BLOCK`` frames."""
+    monkeypatch.setattr(viterbi, "BLOCK_SCORES", 0)
     if request.param == "compiled":
         pytest.importorskip("numba")
     monkeypatch.setattr(viterbi, "compiled_pays", lambda _: request.param == "compiled")

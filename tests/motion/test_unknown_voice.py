@@ -19,6 +19,7 @@ from lipmotion.motion.unknown_voice import (
     VOWEL_S,
     closing_reach_s,
     typical_range,
+    with_breath,
     with_contrast,
 )
 from lipmotion.pipeline.model import load_model
@@ -76,6 +77,19 @@ def test_long_vowels_are_more_open_short_ones_and_consonants_less(voice: float, 
     shortest = OPENING_BY_DURATION * np.log(0.04 / VOWEL_S)
     assert change * shortest <= opening[152 - 20] <= -change * CONSONANT_CLOSING
     np.testing.assert_array_equal(kept, precisions[20:240])
+
+
+@pytest.mark.parametrize(("voice", "share"), [(0.0, 0.0), (0.5, 0.5), (1.0, 0.0)])
+def test_half_known_voices_open_before_they_speak(voice: float, share: float) -> None:
+    prior = load_model().learned.motion.prior
+    units = Timeline((Span(0.0, 1.5, Unit("sil")), Span(1.5, 1.8, Unit("aa")), Span(1.8, 2.5, Unit("sil"))))
+    means, precisions = np.zeros((250, 3, prior.matrix.shape[1])), np.ones((250, 3, prior.matrix.shape[1]))
+    statistics = with_breath(lambda frames: (means[frames], precisions[frames]), prior, units, 250, 0.5, voice)
+    changed, kept = statistics(slice(10, 250))
+    assert changed[130 - 10, 0] == pytest.approx(share * prior.centre, rel=1e-3)
+    assert np.abs(changed[[10, 60, 170, 230], 0]).max() < 1e-3
+    assert not changed[:, 1:].any()
+    np.testing.assert_array_equal(kept, precisions[10:250])
 
 
 @pytest.mark.parametrize("confidence", CONFIDENCES)

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -108,3 +110,7 @@ def test_what_was_recognised() -> None:
     assert found.reliability == pytest.approx(1)
     doubtful = recognition_of(units, labels, [RecognisedWord("bee", 0.3)], -7.0)
     assert doubtful.reliability == pytest.approx(0)
+    shares = [replace(found, posterior=posterior).reliability for posterior in (0.6, 0.8, 0.95)]
+    assert shares == pytest.approx([0, 0.5, 1])
+    wordless = recognition_of(units, [LabelledFrames(0, "sil")], [], -7.0)
+    assert replace(wordless, posterior=0.575).reliability == pytest.approx(0.5)

@@ -50,9 +50,9 @@ def test_constant_energy_holds_no_stretch() -> None:
 
 def test_a_long_stretch_is_cut_where_it_is_quietest() -> None:
     values = energy(5000, (400, 4600))
-    values[1900:1930] = -1.0
+    values[1000:1030] = -1.0
     first, second, *_ = stretches_of_sound(values)
-    assert 1900 <= first.end <= 1930
+    assert 1000 <= first.end <= 1030
     assert second.first == first.end
 
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 
 from lipmotion.cli.terminal.events import Events, events_of
 from lipmotion.cli.terminal.stop import MESSAGE, Stopper
 
+NEW_OBJECTS = 50_000
+"""Unreachable cycles are searched after so many new objects: Python's 700 cost a twentieth of a short command."""
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,6 +23,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     if arguments is None:
         _occupy_closed_streams()
+        gc.set_threshold(NEW_OBJECTS)
     stopper, events = Stopper(), events_of(sys.argv[1:] if arguments is None else arguments)
     try:
         try:

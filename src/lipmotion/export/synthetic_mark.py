@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from html import escape
 from importlib.metadata import version
 from typing import Any
-from xml.sax.saxutils import escape
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,7 +55,7 @@ def mark_metadata(statement: str = STATEMENT) -> MarkMetadata:
     statement : what the comment says, for people; in the packet without line ends and control characters
     Source: IPTC Digital Source Type NewsCodes; IPTC Video Metadata Hub; Adobe, XMP Specification Part 1.
     """
-    text = escape(printable(statement))
+    text = escape(printable(statement), quote=False)
     xmp = _PACKET.format(statement=text, source_type=SOURCE_TYPE, tool=f"lipmotion {version('lipmotion')}")
     return MarkMetadata({"comment": statement, "keywords": f"{LABEL}, {SOURCE_TYPE}"}, xmp)
 

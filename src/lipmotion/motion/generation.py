@@ -17,7 +17,13 @@ from lipmotion.motion.limits import MotionLimits
 from lipmotion.motion.modulation_filter import ModulationFilter
 from lipmotion.motion.space import MotionSpace
 from lipmotion.motion.speaker_knowledge import strangeness
-from lipmotion.motion.unknown_voice import closing_reach_s, typical_range, with_contrast, with_open_vowels
+from lipmotion.motion.unknown_voice import (
+    closing_reach_s,
+    typical_range,
+    with_breath,
+    with_contrast,
+    with_open_vowels,
+)
 from lipmotion.motion.variance_scaling import VarianceScaling
 from lipmotion.types import (
     FRAME_RATE_HZ,
@@ -91,7 +97,8 @@ class LearnedMotion:
 
         The steps are blending with the table of articulation, variance scaling, parameter generation with pins,
         closures in p, b and m, the modulation filter, the check of the limits, and the restoration of all channels.
-        Voices that training does not know have open vowels, and typical talkers' range (``motion.unknown_voice``).
+        Voices that training does not know part their lips to speak, have open vowels, and typical talkers' range
+        (``motion.unknown_voice``).
         statistics    : returns the predicted means and precisions of a range of frames [each shape=(N, 3, Q)]
         frames        : length of the whole recording, T
         units         : phones in time
@@ -111,6 +118,7 @@ class LearnedMotion:
                 column, reach_s = self.closure.column, closing_reach_s(voice)
                 statistics = with_contrast(statistics, self.prior, units, frames, reliability, voice)
                 statistics = with_open_vowels(statistics, self.prior, column, units, frames, reliability, voice)
+                statistics = with_breath(statistics, self.prior, units, frames, reliability, voice)
                 gain = typical_range(self.prior, self.space, voice, float(np.mean(reliability)))
                 scaling = scaling._replace(factors=scaling.factors * gain)
         ranges = closable_ranges(units, frames, closing_units, reach_s) if close else []

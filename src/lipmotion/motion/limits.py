@@ -122,6 +122,6 @@ def check_spread(poses: NDArray[np.floating], variances: NDArray[np.floating]) -
     poses, variances : means and variances of densities [each shape=(N, Q)]
     """
     deviation = np.sqrt(variances.mean(axis=0, dtype=float))
-    spread = float(np.median(np.ptp(poses, axis=0) / deviation))
+    spread = float(np.quantile(np.ptp(poses, axis=0) / deviation, 0.5))
     if spread > LARGEST_SPREAD:
         raise ValueError(f"means that span {spread:.0f} of their deviations, required at most {LARGEST_SPREAD:.0f}")

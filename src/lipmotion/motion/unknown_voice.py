@@ -1,4 +1,5 @@
-"""Motion for voices that training does not know: vowels open by their duration, and movements as large as people's."""
+"""Motion for voices that training does not know: mouths that open before speech begins, vowels that open by their
+duration, and movements as large as people's."""
 
 from __future__ import annotations
 
@@ -32,6 +33,9 @@ standard deviations of the speaker, and a shorter one less (docs/results/voices.
 CONSONANT_CLOSING = 0.25
 """Consonants are less open than the table says, by so many standard deviations of the speaker: a fifth to a third of
 the phones that it was measured on are wrong, so that it has vowels too closed and consonants too open."""
+BREATH_S = 0.6
+"""So long before the first phone the mouth of a voice that is half known is as open as in speech: people part their
+lips and breathe in."""
 INSET_S = 0.03
 """The lips of such a voice close in p, b and m further than this from both ends of the phone, or in its middle, so that
 short vowels beside it stay open."""
@@ -107,6 +111,35 @@ def with_contrast(
         return means + dynamics_of(change, chosen), precisions
 
     return changed
+
+
+def with_breath(
+    statistics: Callable[[slice], Statistics],
+    prior: ArticulationPrior,
+    units: Timeline[Unit],
+    frames: int,
+    reliability: Array | float,
+    voice: float,
+) -> Callable[[slice], Statistics]:
+    """Return means and precisions of ranges of frames, with the mouth open before speech begins.
+
+    The arguments are those of ``with_open_vowels``; at ``voice`` 1 and 0 nothing changes. All dimensions are drawn
+    towards their median in speech. Precisions stay those of the model. A voice of which nothing is known may be a known
+    one in noise, and its recording may begin anywhere.
+    Source: Scobbie, Schaeffler & Mennen 2011 (lips part and breath is taken before the first sound).
+    """
+    first_s = next((span.start_s for span in units if not is_silent(span.label.phone)), 0.0)
+    time_s = np.arange(frames) / FRAME_RATE_HZ
+    before = (time_s >= first_s - BREATH_S) & (time_s < first_s)
+    half_known = 2 * np.sqrt(voice) * strangeness(voice)
+    share = half_known * np.broadcast_to(reliability, frames)[:, None] * smoothed(before[:, None].astype(float))
+    pose = np.stack([prior.centre, *np.zeros((2, len(prior.centre)))])
+
+    def parted(chosen: slice) -> Statistics:
+        means, precisions = statistics(chosen)
+        return means + share[chosen, :, None] * (pose - means), precisions
+
+    return parted
 
 
 def closing_reach_s(voice: float) -> float:

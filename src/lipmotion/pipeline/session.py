@@ -56,6 +56,7 @@ from lipmotion.pipeline.understand.understood_speech import (
     UnderstoodSpeech,
     aligned_within,
     audio_of,
+    prepare_search,
     understood_speech,
     with_units,
 )
@@ -153,6 +154,7 @@ class Session:
         self.model = model if isinstance(model, Model) else load_model(model)
         self._work = map_in_processes(workers, meanwhile)
         self._monitor, self._curves, self._outlook = monitor, frozenset(curves), outlook
+        self._meanwhile = meanwhile
         self._understood: _Kept[UnderstoodSpeech] = _Kept()
         self._units: _Kept[Timeline[Unit]] = _Kept()
         self._moved: _Kept[Generation] = _Kept()
@@ -219,6 +221,12 @@ class Session:
         """Return the speech as input of the engine, with the phones of ``units``."""
         with self._one_at_a_time, one_thread():
             return self._edited_speech(edits.steps)
+
+    def _prepare(self) -> None:
+        """Prepare what comes next, while processes work on the recording."""
+        prepare_search(self.request)
+        if self._meanwhile is not None:
+            self._meanwhile()
 
     @cached_property
     def _recording(self) -> UnderstoodSpeech:

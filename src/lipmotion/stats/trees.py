@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -59,18 +60,25 @@ class Tree:
 
     def path(self, context: Context) -> list[int]:
         """Return the nodes from the root to the leaf of a context, whether or not it occurred in training."""
-        nodes = [0]
-        while self.asked[nodes[-1]] >= 0:
-            node = nodes[-1]
-            nodes.append(node + 1 if self.questions[self.asked[node]].answer(context) else int(self.no[node]))
+        asked, no = self._lists
+        nodes, node = [0], 0
+        while asked[node] >= 0:
+            node = node + 1 if self.questions[asked[node]].answer(context) else no[node]
+            nodes.append(node)
         return nodes
+
+    @cached_property
+    def _lists(self) -> tuple[list[int], list[int]]:
+        """``asked`` and ``no`` as lists, which are faster to look up."""
+        return self.asked.tolist(), self.no.tolist()
 
     def path_to(self, node: int) -> list[int]:
         """Return the nodes from the root to a node."""
+        _, no = self._lists
         nodes = [0]
         while nodes[-1] != node:
             at = nodes[-1]
-            nodes.append(at + 1 if node < self.no[at] else int(self.no[at]))
+            nodes.append(at + 1 if node < no[at] else no[at])
         return nodes
 
     @property

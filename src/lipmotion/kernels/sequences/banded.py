@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,8 @@ from lipmotion.kernels.choice import compiled_pays
 Array = NDArray[np.float64]
 Bands = tuple[Array, Array, Array, Array]
 """Main, first and second diagonal of the symmetric system of each channel, and its right-hand side [shapes=(T, P)]."""
+Rows = list[Any]
+"""A row of each frame: an array of the channels [shape=(P,)], or a number."""
 FRAME_S = 12e-6
 """Time that NumPy takes for a frame, with up to some 90 channels (docs/results/kernels.md)."""
 
@@ -86,36 +89,42 @@ def _solved(bands: Bands, fast: bool) -> tuple[Array, Array]:
         from lipmotion.kernels.compiled import banded
 
         return banded.solve(*bands)
-    return _substitute(*_eliminate(*bands))
+    if bands[0].shape[1] > 1:
+        return _substituted(*_eliminated(*map(list, bands)))
+    values, variance = _substituted(*_eliminated(*(diagonal[:, 0].tolist() for diagonal in bands)))
+    return values[:, None], variance[:, None]
 
 
-def _eliminate(main: Array, first: Array, second: Array, right: Array) -> tuple[Array, Array, Array, Array]:
-    """Return 1 / D and both diagonals of L of the factorisation LDLᵀ, and L⁻¹ times the right-hand side."""
-    frames, channels = main.shape
-    inverse = np.empty_like(main)
-    lower1, lower2, x, coupling, far = (np.zeros((frames + 2, channels)) for _ in range(5))  # row t lies at t + 2
-    far[2:] = second
-    for t in range(frames):
-        pivot = main[t] - coupling[t + 1] * lower1[t + 1] - far[t] * lower2[t]
-        coupling[t + 2] = first[t] - coupling[t + 1] * lower2[t + 1]
-        x[t + 2] = right[t] - lower1[t + 1] * x[t + 1] - lower2[t] * x[t]
-        np.divide(1, pivot, out=inverse[t])
-        np.multiply(coupling[t + 2], inverse[t], out=lower1[t + 2])
-        np.multiply(second[t], inverse[t], out=lower2[t + 2])
-    return inverse, lower1[2:], lower2[2:], x[2:]
+def _eliminated(main: Rows, first: Rows, second: Rows, right: Rows) -> tuple[Rows, Rows, Rows, Rows]:
+    """Return 1 / D and both diagonals of L of the factorisation LDLᵀ, and L⁻¹ times the right-hand side.
+
+    Rows are arrays of all channels, or the numbers of a single one: these cost a twentieth.
+    """
+    inverse, lower1, lower2, x = Rows(), Rows(), Rows(), Rows()
+    near = far = next_far = l1 = l2 = earlier_l2 = x1 = x2 = 0.0
+    for diagonal, below, two_below, wanted in zip(main, first, second, right, strict=True):
+        inverse.append(1 / (diagonal - near * l1 - far * earlier_l2))
+        near = below - near * l2
+        x.append(wanted - l1 * x1 - earlier_l2 * x2)
+        x1, x2 = x[-1], x1
+        l1, l2, earlier_l2 = near * inverse[-1], two_below * inverse[-1], l2
+        far, next_far = next_far, two_below
+        lower1.append(l1)
+        lower2.append(l2)
+    return inverse, lower1, lower2, x
 
 
-def _substitute(inverse: Array, lower1: Array, lower2: Array, x: Array) -> tuple[Array, Array]:
+def _substituted(inverse: Rows, lower1: Rows, lower2: Rows, x: Rows) -> tuple[Array, Array]:
     """Return the solution and the diagonal of the inverse from the factors."""
-    frames, channels = inverse.shape
-    values, variance = np.zeros((frames + 2, channels)), np.zeros((frames + 2, channels))
-    np.multiply(x, inverse, out=values[:frames])
-    beside = np.zeros(channels)  # of the inverse, between the next row and the one after it
-    for t in range(frames - 1, -1, -1):
-        l1, l2 = lower1[t], lower2[t]
-        values[t] = values[t] - l1 * values[t + 1] - l2 * values[t + 2]
-        across = -(l1 * variance[t + 1]) - l2 * beside
-        far = -(l1 * beside) - l2 * variance[t + 2]
-        variance[t] = inverse[t] - l1 * across - l2 * far
+    values, variances = Rows(), Rows()
+    value = next_value = variance = next_variance = 0.0
+    beside = 0.0  # of the inverse, between the next row and the one after it
+    for one, l1, l2, wanted in zip(*map(reversed, (inverse, lower1, lower2, x)), strict=True):
+        value, next_value = wanted * one - l1 * value - l2 * next_value, value
+        across = -(l1 * variance) - l2 * beside
+        far = -(l1 * beside) - l2 * next_variance
+        variance, next_variance = one - l1 * across - l2 * far, variance
         beside = across
-    return values[:frames], variance[:frames]
+        values.append(value)
+        variances.append(variance)
+    return np.array(values[::-1]), np.array(variances[::-1])

@@ -15,8 +15,9 @@ Index = NDArray[np.intp]
 Scores = NDArray[np.float32]
 LogEmission = Callable[[int, int], NDArray[np.float32]]
 """Function of a first frame and an end: returns the log densities of these frames [shape=(end - first, G)]."""
-BLOCK = 2048
-"""Frames whose scores are in memory at a time; earlier scores are computed again from checkpoints."""
+BLOCK, BLOCK_SCORES = 2048, 1 << 22
+"""Frames whose scores are in memory at a time, and scores, whichever are more; earlier scores are computed again from
+checkpoints."""
 FRAME_S, ARC_S = 10e-6, 15e-9
 """Time that NumPy takes for a frame, and for every arc in it (docs/results/kernels.md)."""
 LEAST_RUN_ARCS = 20.0
@@ -32,8 +33,8 @@ def best_path(
 ) -> tuple[NDArray[np.intp], float]:
     """Return the most probable path and its log probability (-inf: no path).
 
-    log_emission : of G emission densities; called for at most ``BLOCK`` + 1 frames, and for each frame at most twice,
-                   with the same result
+    log_emission : of G emission densities; called for at most the frames of a block and one, and for each frame at most
+                   twice, with the same result
     count        : frames, T
     network      : logarithms in single precision
     beam         : states with a score lower than the best of the frame by more than this are dropped: that is faster,
@@ -41,7 +42,7 @@ def best_path(
     layout       : returns the layout of the arcs, where it is kept from search to search
     Returns the states of the path [shape=(T,)], and its score. Scores are relative to the best of their frame and in
     single precision: no path is lost, but one may be preferred to another that is better by less than their rounding.
-    Cost: O(T·E) time, O((T / BLOCK + BLOCK)·(S + G)) memory.
+    Cost: O(T·E) time, O((T / B + B)·(S + G)) memory, with B frames in a block.
     """
     emission, widest = network.emission, np.inf if beam is None else beam
     if compiled_pays(count * (FRAME_S + ARC_S * len(network.arc_from))):
@@ -50,17 +51,18 @@ def best_path(
         )
     else:
         search = _plain_search(network, widest)
-    starts = range(0, count, BLOCK)
+    block = max(BLOCK, BLOCK_SCORES // len(emission))
+    starts = range(0, count, block)
     first = (network.log_initial + log_emission(0, 1)[0, emission])[None]
     checkpoints, score = [first[0, search.order]], 0.0
     for start in starts[1:]:
-        delta, shift = search.scores(checkpoints[-1], log_emission(start - BLOCK, start + 1))
+        delta, shift = search.scores(checkpoints[-1], log_emission(start - block, start + 1))
         checkpoints.append(delta[-1].copy())  # a view would keep the whole block
         score += shift
     path = np.empty(count, np.intp)
     state = -1
     for start, checkpoint in zip(reversed(starts), reversed(checkpoints), strict=True):
-        stop = min(start + BLOCK + 1, count)
+        stop = min(start + block + 1, count)
         delta, shift = search.scores(checkpoint, log_emission(start, stop))
         if state < 0:
             last = delta[-1, search.place] + network.log_final

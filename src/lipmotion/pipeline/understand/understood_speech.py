@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -12,7 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from lipmotion.engines import Animator
-from lipmotion.errors import AlignmentError, InputError
+from lipmotion.errors import AlignmentError, InputError, MissingDependencyError
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.pipeline.generate.prior import with_prior
 from lipmotion.pipeline.model import Model
@@ -25,6 +26,7 @@ from lipmotion.speech.features.speaker_similarity import speaker_similarity
 from lipmotion.speech.recognition.agreement import TranscriptFit
 from lipmotion.speech.recognition.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
 from lipmotion.speech.recognition.network.posteriors import token_posteriors
+from lipmotion.speech.recognition.network.word_tree import english_words
 from lipmotion.speech.recognition.recognised_speech import Recognition, level_range_db
 from lipmotion.speech.recognition.recogniser import (
     RECOGNISER_KINDS,
@@ -119,6 +121,14 @@ def understood_speech(
     voice = known_voice(model.phones, audio, speech, found, given=request.units is not None)
     speech = replace(with_prior(model.prior, speech), voice=voice)
     return replace(understood, speech=speech)
+
+
+def prepare_search(request: SpeechRequest) -> None:
+    """Load the words that are searched where a phone recogniser decides; they are then there when it is done."""
+    is_searched = request.transcript is None and request.units is None and request.language == ENGLISH
+    if is_searched and network_of(request.recogniser) is not None:
+        with suppress(MissingDependencyError):  # whoever needs them says so
+            english_words()
 
 
 def known_voice(

@@ -36,10 +36,10 @@ from lipmotion.speech.recognition.network.posteriors import (
     posterior_stretches,
 )
 from lipmotion.speech.recognition.recognised_speech import (
+    WORD_POSTERIORS,
     LabelledFrames,
     RecognisedWord,
     Recognition,
-    level_range_db,
     recognition_of,
     spliced,
 )
@@ -57,10 +57,6 @@ OWN_VOICE_SCORE, SMALL_PERPLEXITY = -3.0, 9.0
 """A voice with the first speaker similarity score or more is that of the own models; if the perplexity of their bigram
 is less than the second one, their corpus has few words, which no language model of English expects. Then the phones
 alone decide. The perplexity is 5.3 for GRID's 51 words, 18.6 for English."""
-LEAST_POSTERIOR, LEAST_IN_NOISE, NOISE_RANGE_DB = 0.8, 0.9, 28.0
-"""A phone recogniser decides from the first mean posterior of its phones on, in recordings with a smaller range of
-levels from the second one on. Clear English of strangers has 0.84 to 0.98, other languages 0.58 to 0.63; in noise, in
-rooms and of voices that it hardly knows it leaves phones out. Noise of 20 dB leaves a range of 22 to 29 dB."""
 NO_WEIGHT_SCORE, FULL_WEIGHT_SCORE = -9.0, -5.0
 """Own models have no weight for recordings with the first speaker similarity score or less, and the weight of the
 general models from the second one on. The score of another speaker in the same studio is -4 to -6 for GRID's models, of
@@ -126,8 +122,7 @@ class Recogniser:
         network = None if known else network_of(self.kind)
         if network is not None:
             found = posterior_stretches(network, audio, each)
-            least = LEAST_IN_NOISE if level_range_db(audio.log_energy) < NOISE_RANGE_DB else LEAST_POSTERIOR
-            if mean_posterior(found) >= least or not english:
+            if mean_posterior(found) >= WORD_POSTERIORS[0] or not english:
                 return self._network_recognition(audio, similarity, found, english=english)
         with_words = self.kind in USING_WORDS and not known
         spoken = begun_decoding(audio, each) if with_words else None

@@ -22,8 +22,8 @@ MARGIN_FRAMES = 30
 """Frames before and after the sound that belong to its stretch: recognisers expect a little silence."""
 JOINED_FRAMES = 60
 """Stretches nearer than this, with their margins, are joined: words say more of one another than of nothing."""
-LONGEST_FRAMES = 2000
-"""Longer stretches are cut where they are quietest: the memory and the delay of recognition stay bounded."""
+LONGEST_FRAMES = 1000
+"""Longer stretches are cut where they are quietest: the time of phone networks grows faster than the length."""
 
 
 class Stretch(NamedTuple):

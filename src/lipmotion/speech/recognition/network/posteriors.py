@@ -56,7 +56,7 @@ class PhoneRecogniser(ABC):
     def log_posteriors(self, samples: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return natural logarithms of the posteriors of all tokens, every 20 ms [shape=(N, K)].
 
-        samples : at 16 kHz, at most 20 s of them
+        samples : at 16 kHz, at most 10 s of them
         """
 
 

@@ -17,7 +17,7 @@ from lipmotion.units.phones import FULL_FORMS
 
 SOUNDS = tuple(phone for phone in PHONES if not is_silent(phone) and phone not in FULL_FORMS)
 """The phones of the dictionary."""
-NUMBER = {phone: number for number, phone in enumerate(SOUNDS)}
+NUMBER = {spelling: number for number, phone in enumerate(SOUNDS) for spelling in (phone, phone.upper())}
 MOST_WORDS = 40_000
 """So many words are searched, the most probable ones."""
 LONGEST_WORD = 20
@@ -115,14 +115,19 @@ def _pronunciations() -> dict[str, list[str]]:
     lines = (english_data() / "cmudict-en-us.dict").read_text(encoding="utf-8")
     for line in (lines + written).splitlines():
         word, _, phones = line.partition(" ")
-        found.setdefault(word[:-3] if word.endswith(")") else word, []).append(phones)
+        if word[-1] == ")":
+            word = word[:-3]
+        if word in found:
+            found[word].append(phones)
+        else:
+            found[word] = [phones]
     return found
 
 
 def _numbers(pronunciations: list[str]) -> list[bytes]:
     """Return the numbers of the phones in ``SOUNDS``, a byte a phone, of all pronunciations that are short enough."""
-    each = (pronunciation.lower().split() for pronunciation in pronunciations)
-    return [bytes([NUMBER[phone] for phone in phones]) for phones in each if len(phones) <= LONGEST_WORD]
+    each = (bytes(map(NUMBER.__getitem__, pronunciation.split())) for pronunciation in pronunciations)
+    return [phones for phones in each if len(phones) <= LONGEST_WORD]
 
 
 def word_tree(pronunciations: list[list[bytes]], scores: NDArray[np.float64]) -> WordTree:
