@@ -65,9 +65,9 @@ def dots(title: str, unit: str, rows: Sequence[Dot]) -> Html:
     unit : below the axis
     """
     values = [v for row in rows for v in (row.value, row.paper, *(row.interval or ())) if v is not None]
-    scale, height = _Scale.of(values, LEFT, WIDTH - RIGHT), ROW * len(rows) + AXIS + 8
-    parts = [_vertical(scale(tick), f"{tick:g}", height - AXIS) for tick in scale.ticks()]
-    parts.append(_text(WIDTH - RIGHT, height - 2, unit, "end"))
+    scale, height = _Scale.of(values, LEFT, WIDTH - RIGHT), ROW * len(rows) + AXIS + 10
+    parts = [_vertical(scale(tick), f"{tick:g}", height - AXIS - 2) for tick in scale.ticks()]
+    parts.append(_text(WIDTH - RIGHT, height - 4, unit, "end"))
     for number, row in enumerate(rows):
         y = ROW * number + 26
         parts.append(_text(LEFT, y - 11, row.name, class_="name"))

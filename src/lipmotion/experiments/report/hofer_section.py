@@ -76,7 +76,7 @@ def _order(block: Mapping[str, Any]) -> PaperOrder:
         for pair in block["paper_order"]
     ]
     paper = {name: PAPER_SCORES[name] for name in rows}
-    return PaperOrder("score of closings", paper, {name: row["score"] for name, row in rows.items()}, pairs, "+.1f")
+    return PaperOrder("Score of closings", paper, {name: row["score"] for name, row in rows.items()}, pairs, "+.1f")
 
 
 def _difference(better: float | None, worse: float | None) -> float | None:
@@ -85,7 +85,7 @@ def _difference(better: float | None, worse: float | None) -> float | None:
 
 def _table(block: Mapping[str, Any]) -> Table:
     name = f"hofer2008-{block['states']}-states-{block['condition']}-{block['pins']}".replace(" ", "-")
-    return Table(name, _case(block), COLUMNS, block["rows"], REFERENCE_SET, "unit set")
+    return Table(name, f"Unit sets, {_case(block)}", COLUMNS, block["rows"], REFERENCE_SET, "unit set")
 
 
 def _case(block: Mapping[str, Any]) -> str:

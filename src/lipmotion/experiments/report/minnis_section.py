@@ -29,13 +29,17 @@ def section(figures: Mapping[str, Any]) -> Section:
     """Return what the figures of ``minnis2000`` say, on the last of its lists, which is ``test``."""
     tables = [
         Table(
-            f"minnis2000-{split}-{condition}".replace(" ", "-"), f"{split}, {condition}", COLUMNS, _rows(rows), PRINTED
+            f"minnis2000-{split}-{condition}".replace(" ", "-"),
+            f"Unit selection, {split}, {condition}",
+            COLUMNS,
+            _rows(rows),
+            PRINTED,
         )
         for split, found in figures["lists"].items()
         for condition, rows in found["conditions"].items()
     ]
     split, last = list(figures["lists"].items())[-1]
-    main = next(table for table in tables if table.caption == f"{split}, {AUDIO_ONLY}")
+    main = next(table for table in tables if table.caption == f"Unit selection, {split}, {AUDIO_ONLY}")
     rows, everything = main.rows, main.rows[EVERYTHING]
     gained = everything["acc"] - rows[PRINTED]["acc"]
     sign = sign_of_difference(everything["acc_gain_95"])
@@ -59,7 +63,7 @@ def section(figures: Mapping[str, Any]) -> Section:
     )
     shown = [Dot(name, row["acc"], row["acc_95"]) for name, row in rows.items()]
     charts = [dots("ACC of the opening", "ACC", shown)]
-    more = [(f"{table.caption}:", table) for table in tables if table is not main]
+    more = [(table.caption, table) for table in tables if table is not main]
     title, compared = "Minnis & Breen 2000: unit selection", (PRINTED, UNGUIDED, EVERYTHING)
     return Section(title, about, verdict, words, charts, main, more, compared)
 

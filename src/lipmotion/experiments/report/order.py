@@ -50,35 +50,33 @@ class PaperOrder:
     is_error: bool = False
 
     def verdict(self) -> str:
-        """Return one sentence: whether the paper's order held."""
-        held, reverse, left_open = (self._with(sign) for sign in (1, -1, 0))
-        counts = f"{len(held)} of {len(self.pairs)} pairs hold, {len(reverse)} are reversed, {len(left_open)} open"
-        if not held and not reverse:
-            return f"Open: these recordings cannot tell any two systems apart by {self.figure} ({counts})."
-        if not reverse:
-            whole = "the paper's order by" if not left_open else "as far as can be told, the paper's order by"
-            return f"Held: {whole} {self.figure} ({counts})."
-        if not held:
-            return f"Did not hold: the paper's order by {self.figure} ({counts})."
-        most = (
-            "mostly held" if len(held) > 2 * len(reverse) else "mostly reversed" if len(reverse) > 2 * len(held) else ""
+        """Return in two sentences whether the paper's order held, and which system is best."""
+        held, reverse, left_open = (len(self._with(sign)) for sign in (1, -1, 0))
+        told = (
+            f"{self.figure}: of the paper's {len(self.pairs)} pairs {held} held, {reverse} reversed, {left_open} open"
         )
-        return f"{most.capitalize() or 'Mixed'}: the paper's order by {self.figure} ({counts})."
+        if held or reverse:
+            outcomes = ("as many held as reversed", "more held than reversed", "more reversed than held")
+            outcome = outcomes[(held > reverse) - (held < reverse)]
+            told += f": {'all held' if held == len(self.pairs) else outcome}"
+        else:
+            told += ": these recordings say nothing of its order"
+        here = ", ".join(_best(self.here, self.is_error)) or "none"
+        return f"{told}. Best in print: {_best(self.paper, self.is_error)[0]}; here: {here}."
 
     def sentences(self) -> list[str]:
         """Return what held and what did not, sentence by sentence."""
-        held, reverse, left_open = (self._with(sign) for sign in (1, -1, 0))
         found = [
-            f"By {self.figure}, the paper: {_listed(self.paper, self.is_error)}. Here: "
-            f"{_listed(self.here, self.is_error)}.",
-            self._of_the_best(),
+            f"In print: {self._listed(self.paper)}.",
+            f"Here: {self._listed(self.here)}.",
+            *self._of_the_best(),
         ]
-        for pairs, what in (
-            (held, "Held: the interval of the difference is on the paper's side of 0"),
-            (reverse, "Reversed: it is on the other side"),
-            (left_open, "Open: it contains 0"),
+        for sign, what in (
+            (1, "Held: the interval of the difference is on the paper's side of 0"),
+            (-1, "Reversed: it is on the other side"),
+            (0, "Open: it contains 0"),
         ):
-            if pairs:
+            if pairs := self._with(sign):
                 found.append(f"{what} ({len(pairs)} of {len(self.pairs)} pairs): {self._named(pairs)}.")
         agreeing = sum((pair.difference or 0) > 0 for pair in self.pairs)
         found.append(
@@ -99,23 +97,25 @@ class PaperOrder:
         joint = "and" if not pairs[0].sign else "over"
         return "; ".join(f"{first} {joint} {', '.join(others)}" for first, others in grouped.items())
 
-    def _of_the_best(self) -> str:
-        best = _best(self.paper, self.is_error)[0]
-        here = _best(self.here, self.is_error)
-        if not here:
-            return f"Best in the paper: {best}. Here no figure is defined."
-        if here == [best]:
-            return f"{best}, the paper's best, is the best here, too."
-        if best in here:
-            others = ", ".join(name for name in here if name != best)
-            return f"{best}, the paper's best, has the best figure here, too, as have {others}."
-        pair = next((each for each in self.pairs if {each.better, each.worse} == {best, here[0]}), None)
-        by = ""
-        if pair is not None and pair.difference is not None:
-            low, high = pair.interval
-            lies = "" if low is None or high is None else f" (95 % interval {low:{self.form}} to {high:{self.form}})"
-            by = f"; {pair.better} minus {pair.worse}: {pair.difference:{self.form}}{lies}, above 0 as in print"
-        return f"Best in the paper: {best}; here: {', '.join(here)}{by}."
+    def _of_the_best(self) -> list[str]:
+        """Return how far the paper's best system is from the best one here; nothing where it is the best."""
+        best, here = _best(self.paper, self.is_error)[0], _best(self.here, self.is_error)
+        pair = next((each for each in self.pairs if here and {each.better, each.worse} == {best, here[0]}), None)
+        if best in here or pair is None or pair.difference is None:
+            return []
+        low, high = pair.interval
+        lies = "" if low is None or high is None else f", 95 % interval {low:{self.form}} to {high:{self.form}}"
+        return [
+            f"The paper's best is {-pair.difference:{self.form.replace('+', '')}} behind the best here: {best} against "
+            f"{here[0]} {pair.difference:{self.form}}{lies}, where print has it above 0."
+        ]
+
+    def _listed(self, values: Mapping[str, float | None]) -> str:
+        """Return names with their values, from the best to the worst; those without a value are left out."""
+        known = [(name, value) for name, value in values.items() if value is not None]
+        form = self.form.replace("+", "")
+        known.sort(key=lambda pair: pair[1], reverse=not self.is_error)
+        return ", ".join(f"{name} {value:{form}}" for name, value in known)
 
 
 def _best(values: Mapping[str, float | None], is_error: bool) -> list[str]:
@@ -123,12 +123,3 @@ def _best(values: Mapping[str, float | None], is_error: bool) -> list[str]:
     known = {name: value for name, value in values.items() if value is not None}
     best = (min if is_error else max)(known.values(), default=None)
     return [name for name, value in known.items() if value == best]
-
-
-def _listed(values: Mapping[str, float | None], is_error: bool) -> str:
-    """Return names from the best to the worst; equal ones with ``=``; those without a value are left out."""
-    remaining, groups = dict(values), list[str]()
-    while group := _best(remaining, is_error):
-        groups.append(" = ".join(group))
-        remaining = {name: value for name, value in remaining.items() if name not in group}
-    return ", then ".join(groups)

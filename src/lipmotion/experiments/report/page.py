@@ -22,6 +22,8 @@ for (const button of document.querySelectorAll("button.together")) {
   }));
 }
 """
+FOLDED = 3
+"""More tables than these are folded together."""
 QUICK_WARNING = (
     "A quick run: few recordings, small models. It shows that everything runs; what it finds about the papers is worth "
     "little. Run it without --quick for figures."
@@ -102,13 +104,14 @@ def _section(part: FinishedPart) -> Html:
     more = [
         element("details", element("summary", sentence), table.as_html(part.name)) for sentence, table in section.more
     ]
+    if len(more) > FOLDED:
+        more = [element("details", element("summary", f"{len(more)} more tables"), *more)]
     return element(
         "section",
         element("h2", section.title, id=heading),
         element("p", section.about, class_="quiet"),
         element("p", section.verdict, class_="verdict"),
-        *words,
-        *section.charts,
+        element("div", element("div", *words), element("div", *section.charts), class_="beside"),
         section.table.as_html(part.name),
         *more,
         *_clip(part),
@@ -146,7 +149,7 @@ def _clip(part: FinishedPart) -> list[Html]:
         element(
             "p",
             f"{name}{said}: of the compared recordings the one with most p, b and m, whatever the systems make of it. "
-            "Sound alone was given. Only the mouth of the drawn face moves.",
+            "Sound alone was given.",
             class_="quiet",
         ),
         element("div", together, element("div", *videos, class_="videos"), class_="clip"),

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from lipmotion.appearance.mouth_region import HEIGHT, WIDTH
 from lipmotion.corpora.store import Corpus
 from lipmotion.experiments.report.charts import curve
 from lipmotion.export.video import SOUND_HZ, write_mp4
@@ -29,10 +30,12 @@ from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types import Audio, Channel, Monitor, Motion, Span, Timeline, Unit, with_progress
 
 FPS = 25.0
-STAGING = Staging(size=320, blinks=False, gaze=False, brows=False, head=False)
-"""Only the mouth moves, so that nothing else differs between systems."""
 MOUTH_SCALE = 4
-"""Mouth pictures of a corpus are 72 × 56 pixels: they are shown so many times as large."""
+"""Mouth pictures of a corpus are shown so many times as large."""
+STAGING = Staging(size=640, blinks=False, gaze=False, brows=False, head=False)
+"""Only the mouth moves, so that nothing else differs between systems."""
+LOWER_FACE = (slice(340, 340 + MOUTH_SCALE * HEIGHT), slice(176, 176 + MOUTH_SCALE * WIDTH))
+"""The part of the drawn picture that is shown, as large as a filmed mouth."""
 DECIMALS = 5
 RECORDED = "recorded"
 
@@ -114,7 +117,7 @@ def write_videos(
     for number, name in enumerate(with_progress(list(shown), "videos", monitor)):
         motion = _motion(content, np.array(shown[name]), utterance.audio.duration_s)
         file = f"{number}.mp4"
-        frames = staged_face("portrait", STAGING).render(motion, silence, fps=FPS)
+        frames = (picture[LOWER_FACE] for picture in staged_face("woman", STAGING).render(motion, silence, fps=FPS))
         write_mp4(folder / file, frames, fps=FPS, audio=sound)
         found.append({"file": file, "caption": "a drawn face, recorded motion" if name == RECORDED else name})
     return found

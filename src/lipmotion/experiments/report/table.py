@@ -87,7 +87,7 @@ class Table:
             element("tbody", *lines),
         )
         scrolls = element("div", table, class_="scroll", tabindex="0", role="region", aria_label=self.caption)
-        return joined(scrolls, element("p", *self._notes(folder), class_="note"))
+        return joined(scrolls, element("div", *self._notes(folder), class_="note"))
 
     def _record(self, row: Row) -> dict[str, Any]:
         found: dict[str, Any] = {}
@@ -99,15 +99,15 @@ class Table:
                     found |= {f"{column.key}{name}_low": low, f"{column.key}{name}_high": high}
         return found
 
-    def _notes(self, folder: str) -> list[str]:
-        said = [f"{column.title}: {column.note}." for column in self.columns if column.note]
-        if self.reference:
-            said.append(
-                f"*: differs from {self.reference}: the 95 % interval of the difference on the same recordings leaves "
-                "out 0."
-            )
+    def _notes(self, folder: str) -> list[Html]:
+        """Return the star, the files, and what the columns are."""
         files = [element("a", kind.upper(), href=f"{folder}/tables/{self.name}.{kind}") for kind in ("csv", "json")]
-        return [" ".join(said), " This table as ", files[0], " and ", files[1], "."]
+        star = f"*: the 95 % interval of the difference from {self.reference} leaves out 0. " if self.reference else ""
+        notes = [joined(element("dt", each.title), element("dd", each.note)) for each in self.columns if each.note]
+        return [
+            element("p", star, "This table as ", files[0], " and ", files[1], "."),
+            element("details", element("summary", "What the columns are"), element("dl", *notes)),
+        ]
 
 
 def _head(column: Column) -> Html:

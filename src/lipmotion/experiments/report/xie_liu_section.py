@@ -33,7 +33,11 @@ def section(figures: Mapping[str, Any]) -> Section:
     size = figures["rows"][-1]
     tables = {
         condition: Table(
-            f"xieliu2007-{condition}".replace(" ", "-"), condition, COLUMNS, _rows(size, rows), REFERENCE_SYSTEM
+            f"xieliu2007-{condition}".replace(" ", "-"),
+            f"Structures of chains, {condition}",
+            COLUMNS,
+            _rows(size, rows),
+            REFERENCE_SYSTEM,
         )
         for condition, rows in size["conditions"].items()
     }
@@ -43,7 +47,7 @@ def section(figures: Mapping[str, Any]) -> Section:
         pairs = [pair for pair in size["pairs"] if pair["better"].endswith(TUNED) == bool(ending)]
         if pairs:
             acc, amse = (_order(main.rows, pairs, ending, measure) for measure in MEASURES)
-            words[f"Systems {called}, by ACC"] = [acc.verdict(), *acc.sentences()]
+            words[f"Systems {called}, by ACC"] = [*([acc.verdict()] if verdict else []), *acc.sentences()]
             by_amse.append(f"Systems {called}: {amse.verdict()}")
             verdict = verdict or acc.verdict()
     words["By AMSE"] = by_amse
@@ -58,7 +62,7 @@ def section(figures: Mapping[str, Any]) -> Section:
     shown = [Dot(name, row["acc"], row["acc_95"], row["paper_acc"]) for name, row in main.rows.items()]
     charts = [dots("ACC of every system", "ACC", shown)]
     title = "Xie & Liu 2007, Table 3: structures of chains"
-    more = [(f"{condition}:", table) for condition, table in tables.items()]
+    more = [(table.caption, table) for table in tables.values()]
     return Section(
         title, about, verdict, words, charts, main, more, [name for name in PAPER_FIGURES if name in main.rows]
     )
