@@ -17,8 +17,8 @@ from experiments.report.test_sections import figures_of
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.experiments.report import parts, report
-from lipmotion.experiments.report.parts import PARTS, PartRun
-from lipmotion.experiments.report.report import PAGE, Report, experiment_report
+from lipmotion.experiments.report.parts import PARTS, PartRun, ReportPart
+from lipmotion.experiments.report.report import PAGE, WrittenReport, experiment_report
 from lipmotion.experiments.runner import ExperimentSettings
 from lipmotion.hmm.model import HmmConfig
 from study.browser import BROWSER, DRIVER, MISSING, axe_script, browser
@@ -94,15 +94,16 @@ def test_a_run_that_was_stopped_goes_on(
         (given.work / "half").write_text("finished")
         raise KeyboardInterrupt
 
-    whole = report.PARTS["folds"]
-    monkeypatch.setitem(report.PARTS, "folds", replace(whole, run=stopped))
+    stand_ins: dict[str, ReportPart] = vars(report)["PARTS"]
+    whole = stand_ins["folds"]
+    monkeypatch.setitem(stand_ins, "folds", replace(whole, run=stopped))
     with pytest.raises(KeyboardInterrupt):
         experiment_report(toy_corpus, tmp_path / "r", only=TWO)
     text = Links(tmp_path / "r" / PAGE).text
     assert "the same command goes on with it" in text
     assert "Hofer, Yamagishi" in text
     assert (tmp_path / "r" / "folds.json.unfinished" / "half").is_file()
-    monkeypatch.setitem(report.PARTS, "folds", whole)
+    monkeypatch.setitem(stand_ins, "folds", whole)
     assert experiment_report(toy_corpus, tmp_path / "r", only=TWO).made == ["folds"]
     assert ran == ["hofer2008", "folds"]
     assert not list((tmp_path / "r").glob("*.unfinished"))
@@ -110,7 +111,7 @@ def test_a_run_that_was_stopped_goes_on(
 
 
 def test_other_recordings_or_settings_are_run_again(ran: list[str], toy_corpus: Corpus, tmp_path: Path) -> None:
-    run: Callable[..., Report] = partial(experiment_report, folder=tmp_path / "r", only=["folds"])
+    run: Callable[..., WrittenReport] = partial(experiment_report, folder=tmp_path / "r", only=["folds"])
     run(toy_corpus)
     assert run(toy_corpus, quick=True).made == ["folds"]
     assert "quick run" in Links(tmp_path / "r" / PAGE).text
@@ -155,7 +156,7 @@ def test_what_cannot_be_used_is_refused_before_the_work(ran: list[str], toy_corp
 
 
 @pytest.fixture(scope="module")
-def written(toy_corpus: Corpus, tmp_path_factory: pytest.TempPathFactory) -> Report:
+def written(toy_corpus: Corpus, tmp_path_factory: pytest.TempPathFactory) -> WrittenReport:
     """A report of one real experiment, on recordings without pictures of the mouth."""
     folder = tmp_path_factory.mktemp("real")
     bare = copied(toy_corpus, folder, lambda each: replace(each, track=replace(each.track, crops=None)))
@@ -163,7 +164,7 @@ def written(toy_corpus: Corpus, tmp_path_factory: pytest.TempPathFactory) -> Rep
 
 
 @pytest.mark.long
-def test_a_real_experiment_has_videos_and_curves(written: Report) -> None:
+def test_a_real_experiment_has_videos_and_curves(written: WrittenReport) -> None:
     folder = written.page.parent
     record = json.loads((folder / "learning-curve" / "figures.json").read_text())
     assert [row["names"] for row in record["figures"]["rows"]] == [4, 8]
@@ -182,7 +183,7 @@ def test_a_real_experiment_has_videos_and_curves(written: Report) -> None:
 
 @pytest.mark.long
 @pytest.mark.skipif(BROWSER is None or DRIVER is None, reason=MISSING)
-def test_a_browser_plays_it_and_nobody_is_kept_out(written: Report, tmp_path: Path) -> None:
+def test_a_browser_plays_it_and_nobody_is_kept_out(written: WrittenReport, tmp_path: Path) -> None:
     axe = axe_script()
     if axe is None:
         pytest.skip("axe-core is not installed")

@@ -43,10 +43,10 @@ def section(figures: Mapping[str, Any]) -> Section:
     rows, everything = main.rows, main.rows[EVERYTHING]
     gained = everything["acc"] - rows[PRINTED]["acc"]
     sign = sign_of_difference(everything["acc_gain_95"])
-    all_of_them = "All additions together " + ("raise", "do not change for sure", "lower")[1 - (sign or 0)]
+    effect = ("leave open whether they change", "raise", "lower")[sign]
     verdict = (
-        f"The paper prints no figures. {all_of_them} the correlation of the opening: {rows[PRINTED]['acc']:.3f} as "
-        f"printed, {everything['acc']:.3f} with them ({_interval(gained, everything)})."
+        f"The paper prints no figures. All additions together {effect} the correlation of the opening: "
+        f"{rows[PRINTED]['acc']:.3f} as printed, {everything['acc']:.3f} with them ({_interval(gained, everything)})."
     )
     words = warning_of(last["clips"]) | {
         "Each addition alone": _effects(rows, ADDITIONS),

@@ -168,7 +168,9 @@ def _pictures(part: FinishedPart) -> list[Html]:
         )
         for picture in part.record["pictures"]
     ]
-    return [element("h3", "Pictures like the paper's"), *pictures] if pictures else []
+    return (
+        [element("h3", "Pictures like the paper's"), element("div", *pictures, class_="pictures")] if pictures else []
+    )
 
 
 def _made(part: FinishedPart) -> Html:

@@ -42,7 +42,7 @@ class PartRun:
 
 
 @dataclass(frozen=True)
-class Part:
+class ReportPart:
     """An experiment of a report.
 
     lists    : that the corpus must have
@@ -99,12 +99,12 @@ def _folds(run: PartRun) -> dict[str, Any]:
     return folds(run.corpus, count=min(most, len(run.corpus.names("train"))), settings=run.settings)
 
 
-PARTS: dict[str, Part] = {
-    "hofer2008": Part(("train", "val", TEST), 4, _hofer, hofer_section.section),
-    "xieliu2007": Part(("train", TEST), 8, _xie_liu, xie_liu_section.section, draws=True),
-    "minnis2000": Part(("train", TEST), 2, _minnis, minnis_section.section),
-    "engines": Part(("train", TEST), 4, _engines, other_sections.engines_section),
-    "learning-curve": Part(("train", TEST), 2, _learning_curve, other_sections.learning_section),
-    "folds": Part(("train",), 4, _folds, other_sections.folds_section),
+PARTS: dict[str, ReportPart] = {
+    "hofer2008": ReportPart(("train", "val", TEST), 4, _hofer, hofer_section.section),
+    "xieliu2007": ReportPart(("train", TEST), 8, _xie_liu, xie_liu_section.section, draws=True),
+    "minnis2000": ReportPart(("train", TEST), 2, _minnis, minnis_section.section),
+    "engines": ReportPart(("train", TEST), 4, _engines, other_sections.engines_section),
+    "learning-curve": ReportPart(("train", TEST), 2, _learning_curve, other_sections.learning_section),
+    "folds": ReportPart(("train",), 4, _folds, other_sections.folds_section),
 }
 """All experiments by name, in the order of the report: the papers' first."""

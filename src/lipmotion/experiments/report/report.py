@@ -42,7 +42,7 @@ NOT_CHOSEN = "not chosen"
 
 
 @dataclass(frozen=True)
-class Report:
+class WrittenReport:
     """A report that was written.
 
     page     : its path
@@ -64,7 +64,7 @@ def experiment_report(
     only: Sequence[str] | None = None,
     quick: bool = False,
     settings: ExperimentSettings = DEFAULT_SETTINGS,
-) -> Report:
+) -> WrittenReport:
     """Run experiments on a corpus, and write a page of what they found, with its tables, pictures and videos.
 
     folder   : of the report, made if need be. What is finished in it is not computed again; a call after a stop goes on
@@ -98,7 +98,7 @@ def experiment_report(
             done += share
         finished = writer.finished()
     verdicts = {part.name: part.section.verdict for part in finished}
-    return Report(folder / PAGE, verdicts, lacking, missing)
+    return WrittenReport(folder / PAGE, verdicts, lacking, missing)
 
 
 def _wanted(only: Sequence[str] | None) -> list[str]:

@@ -40,7 +40,7 @@ DECIMALS = 5
 RECORDED = "recorded"
 
 
-@dataclass
+@dataclass(frozen=True)
 class ClipKeeper:
     """Receives what systems generate for held-out recordings, sound alone, and keeps that of one recording in a file.
 

@@ -10,18 +10,20 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-import lipmotion
 from lipmotion.kernels.threads import blas_kernels
 
 PACKAGES = ("lipmotion", "numpy", "scipy", "numba", "av", "pocketsphinx", "hama", "matplotlib")
 """Packages on which figures, or pictures, depend."""
+ROOT = Path(__file__).parents[4]
+"""The root of a checkout of the source, where the package is in one."""
 CPU_INFO = Path("/proc/cpuinfo")
+"""Where Linux names the processor."""
 
 
 def machine_stamp() -> dict[str, Any]:
     """Return commit, machine and versions, by name; None for what is not known or not installed."""
     return {
-        "commit": commit(Path(lipmotion.__file__).parents[2]),
+        "commit": commit(ROOT),
         "machine": {
             "cores": os.cpu_count(),
             "processor": _processor(),
