@@ -16,6 +16,8 @@ from experiments.copies import copied, renamed
 from experiments.report.test_sections import figures_of
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError, ExportError, InputError
+from lipmotion.experiments.hofer2008 import table1
+from lipmotion.experiments.hofer2008.table1 import PAPER_SCORES, Table1Options
 from lipmotion.experiments.report import parts, report
 from lipmotion.experiments.report.parts import PARTS, PartRun, ReportPart
 from lipmotion.experiments.report.report import PAGE, WrittenReport, experiment_report
@@ -24,7 +26,7 @@ from lipmotion.hmm.model import HmmConfig
 from study.browser import BROWSER, DRIVER, MISSING, axe_script, browser
 
 SMALL = ExperimentSettings(recogniser=HmmConfig(mixtures=1, iterations=2))
-TWO = ("hofer2008", "folds")
+TWO, SETS = ("hofer2008", "folds"), ("eVis", "phone")
 SCREENS = ((1280, 900, "light"), (1280, 900, "dark"), (320, 640, "light"), (320, 640, "dark"))
 
 
@@ -160,21 +162,20 @@ def written(toy_corpus: Corpus, tmp_path_factory: pytest.TempPathFactory) -> Wri
     """A report of one real experiment, on recordings without pictures of the mouth."""
     folder = tmp_path_factory.mktemp("real")
     bare = copied(toy_corpus, folder, lambda each: replace(each, track=replace(each.track, crops=None)))
-    return experiment_report(bare, folder / "r", only=["learning-curve"], quick=True, settings=SMALL)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(table1, "PAPER_SCORES", {name: PAPER_SCORES[name] for name in SETS})
+        patch.setattr(table1, "QUICK", Table1Options(states=(3,), mixtures=(1,)))
+        return experiment_report(bare, folder / "r", only=["hofer2008"], quick=True, settings=SMALL)
 
 
 @pytest.mark.long
 def test_a_real_experiment_has_videos_and_curves(written: WrittenReport) -> None:
     folder = written.page.parent
-    record = json.loads((folder / "learning-curve" / "figures.json").read_text())
-    assert [row["names"] for row in record["figures"]["rows"]] == [4, 8]
-    assert [each["caption"] for each in record["videos"]] == [
-        "a drawn face, recorded motion",
-        "4 recordings",
-        "8 recordings",
-    ]
-    motion = json.loads((folder / "learning-curve" / "motion.json").read_text())
-    assert set(motion["systems"]) == {"4 recordings", "8 recordings"}
+    record = json.loads((folder / "hofer2008" / "figures.json").read_text())
+    systems = [f"{name}, 3 states" for name in SETS]
+    assert [each["caption"] for each in record["videos"]] == ["a drawn face, recorded motion", *systems]
+    motion = json.loads((folder / "hofer2008" / "motion.json").read_text())
+    assert sorted(motion["systems"]) == sorted(systems)
     assert {len(curve) for curve in motion["systems"].values()} == {len(motion["time_s"])}
     links = Links(written.page)
     assert all((folder / file).stat().st_size for file in links.files)
