@@ -37,6 +37,8 @@ PAGE, FIGURES, MOTION = "index.html", "figures.json", "motion.json"
 """The page; and in the folder of an experiment its figures with their stamp, and the motion of one clip."""
 QUICK_CLIPS = {"train": 20, "val": 4, "test": 6}
 """Most recordings of each list in a quick run."""
+KEY_DIGITS = 8
+"""Digits of a key in the name of a folder."""
 NOT_YET = "not finished; the same command goes on with it"
 NOT_CHOSEN = "not chosen"
 
@@ -203,8 +205,8 @@ class _Writer:
 
         settings : with the monitor of this experiment
         """
-        models = self.folder / ("models-quick" if self.quick else "models")
         part, target = PARTS[name], self.folder / name
+        models = self.folder / "models" / self.key("models")[:KEY_DIGITS]  # of other recordings, other models
         with unfinished_work(self.folder / f"{name}.json") as work:
             begun, clock = datetime.now(timezone.utc), _Clock()
             keeper = ClipKeeper(work / MOTION, self.key(name))
