@@ -130,7 +130,7 @@ def rising(title: str, unit: str, lines: Mapping[str, Sequence[tuple[float, Dot]
         parts.append(_text(CURVE_LEFT - 4, up(tick) + 4, f"{tick:g}", "end"))
     numbers = sorted({number for number, _ in points})
     parts += [_text(across(float(np.log(n))), bottom + 16, f"{n:g}", "middle") for n in numbers]
-    parts.append(_text(WIDTH - RIGHT, height - 2, unit, "end"))
+    parts.append(_text(WIDTH - RIGHT, height - 5, unit, "end"))
     for order, line in enumerate(lines.values()):
         kind = ("generated", "second")[order % 2]
         known = [(across(float(np.log(n))), dot) for n, dot in line if dot.value is not None]
