@@ -34,7 +34,7 @@ SEE = {
     "addon": "formats",
     "evaluate": "measures",
     "compare": "compare",
-    "experiment": "measures",
+    "experiment": "report measures",
     "study": "study study-analysis",
     "info": "start",
     "cite": "glossary",

@@ -111,6 +111,9 @@ UNUSABLE = [
     ("xieliu2007 CORPUS --plots missing/a", 7, "the folder missing does not exist"),
     ("engines CORPUS --models CORPUS", 7, "is the corpus itself; give another name"),
     ("engines CORPUS --models empty.txt", 7, "empty.txt: cannot be a folder for models: File exists"),
+    ("all CORPUS -o empty.txt", 7, "empty.txt: cannot be used: Not a directory; give another folder"),
+    ("all CORPUS -o CORPUS/r", 7, "lies in the corpus"),
+    ("all CORPUS -o r --only hofer", 3, "no experiment 'hofer'; there are: hofer2008, xieliu2007"),
     ("hofer2008 CORPUS --split tset", 4, "no utterances of split 'tset'"),
     ("hofer2008 CORPUS --lexicon missing", 3, "missing: no such lexicon file"),
 ]

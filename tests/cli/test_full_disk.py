@@ -72,3 +72,11 @@ def test_train_says_what_is_kept_and_goes_on(run_outside: RunCommand, toy_corpus
     assert run_outside("train", toy_corpus.path, "-o", "m.lipmotion").code == 0
     run_outside("train", toy_corpus.path, "-o", "whole.lipmotion")
     assert (here / "m.lipmotion").read_bytes() == (here / "whole.lipmotion").read_bytes()
+
+
+@pytest.mark.long
+def test_a_report_says_so_before_the_work(toy_corpus: Corpus, here: Path) -> None:
+    code, line = run_limited("experiment", "all", toy_corpus.path, "-o", "r", "--quick")
+    assert (code, line.startswith("lipmotion: error: r/index.html: cannot be written: ")) == (7, True)
+    assert line.endswith("; make room, then run it again")
+    assert list((here / "r").iterdir()) == []

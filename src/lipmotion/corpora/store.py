@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -113,6 +113,16 @@ class Corpus:
                 if split in (None, entry["split"]) and (not speakers or entry.get("speaker", "") in speakers)
             )
         )
+
+    def part(self, names: Collection[str]) -> Corpus:
+        """Return the same corpus with some of its utterances alone. Raises CorpusError: a name that it does not have.
+
+        Nothing may be added to what is returned: the manifest on disk is that of the whole.
+        """
+        for name in names:
+            if name not in self._index:
+                raise CorpusError(f"{self.path}: no utterance {name!r} among {len(self)}")
+        return Corpus(self.path, {name: self._index[name] for name in names})
 
     def required(self, split: str | None, speakers: Sequence[str] = ()) -> tuple[str, ...]:
         """Return the same names as ``names``, at least one.

@@ -82,10 +82,17 @@ def opening_curves(recordings: HeldOutRecordings, made: Sequence[ComparedClip]) 
     return [clip.generated[:, column] for clip in made], [clip.original[:, column] for clip in made]
 
 
+def sign_of_difference(interval: Sequence[float | None]) -> int:
+    """Return 1 or -1 for a difference whose interval does not contain 0, else 0."""
+    low, high = interval
+    if low is None or high is None:
+        return 0
+    return int(low > 0) - int(high < 0)
+
+
 def significance_mark(gain: Sequence[float | None]) -> str:
     """Return ``*`` if the interval of a difference does not contain 0, else an empty text."""
-    low, high = gain
-    return "*" if low is not None and high is not None and (low > 0 or high < 0) else ""
+    return "*" if sign_of_difference(gain) else ""
 
 
 def _mean_correlation(total: Array) -> float:

@@ -63,6 +63,8 @@ def learning_curve(
         monitor = sub_monitor(settings.monitor, float(start), float(stop), f"{count} clips: ")
         result = train_and_generate(corpus, listed[:count], held_out, channels, replace(settings, monitor=monitor))
         rows.append({"names": count} | _row(corpus, result, settings.seed))
+        for condition, clips in result.clips.items():
+            settings.receive(f"{count} recordings", condition, result.recordings, clips)
     about = {"split": split or "all", "clips": len(held_out), "seed": settings.seed, "workers": settings.workers}
     about |= {"order": "given" if order is not None else "shuffled", "closed_under": result.recordings.closed_under}
     return nan_as_null(about | {"rows": rows})

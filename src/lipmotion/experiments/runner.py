@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any, TypeVar
@@ -26,6 +26,12 @@ from lipmotion.types import Monitor, silent_monitor, sub_monitor, with_progress
 from lipmotion.units import Lexicon
 
 ItemT = TypeVar("ItemT")
+MotionReceiver = Callable[[str, str, HeldOutRecordings, Sequence[ComparedClip]], None]
+"""Called with the name of a system, a condition, the recordings, and what the system generates for each of them."""
+
+
+def ignore_motion(system: str, condition: str, recordings: HeldOutRecordings, clips: Sequence[ComparedClip]) -> None:
+    """Do nothing with what a system generates."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +43,7 @@ class ExperimentSettings:
     seed       : of the shuffled training list, and of the bootstrap intervals
     workers    : number of processes, as in ``train``
     monitor    : receives the progress
+    receive    : receives the motion that every system generates, once, before its figures are kept
     """
 
     recogniser: HmmConfig | None = None
@@ -44,6 +51,7 @@ class ExperimentSettings:
     seed: int = 0
     workers: int = 1
     monitor: Monitor = silent_monitor
+    receive: MotionReceiver = ignore_motion
 
 
 DEFAULT_SETTINGS = ExperimentSettings()

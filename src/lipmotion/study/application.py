@@ -22,6 +22,7 @@ from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from lipmotion.errors import ExportError, InputError
+from lipmotion.export.web_page import coloured
 from lipmotion.storage.json_text import from_json
 from lipmotion.study.answers import HIGHEST_MOS, HIGHEST_RANK, MOS, PAIRED
 from lipmotion.study.limits import RateLimit
@@ -229,4 +230,4 @@ async def _failed(status: int, _: Request, error: Exception) -> Response:
 
 
 def _packaged(name: str, kind: str) -> tuple[bytes, str]:
-    return (files("lipmotion.study") / "page" / name).read_bytes(), kind
+    return coloured((files("lipmotion.study") / "page" / name).read_text("utf-8")).encode(), kind

@@ -95,6 +95,7 @@ def engines(
     made: dict[str, dict[str, _MadeClips]] = {condition: {} for condition in recordings.conditions}
     for condition, name in with_progress(steps, "comparing", sub_monitor(monitor, 0.7, 1)):
         made[condition][name] = _made(recordings, condition, systems[name])
+        settings.receive(name, condition, recordings, made[condition][name].pinned)
     about = {"split": split or "all", "clips": len(held_out), "seed": settings.seed}
     about |= {"closed_under": recordings.closed_under, "reference": REFERENCE_ENGINE}
     about |= {"models": {name: _about(each) for name, each in trained.items()}}

@@ -151,6 +151,9 @@ def hofer2008(
         engine = _engine(units=units, states=states, mixtures=max(options.mixtures))
         system = _trained(engine, options.mixtures, examples, choosing, checkpoint, part)
         made[states, units] = _made(recordings, system)
+        for (condition, pins), clips in made[states, units].clips.items():
+            if not PINS[pins]:
+                settings.receive(f"{units}, {states} states", condition, recordings, clips)
     about = {"split": split or "all", "clips": len(recordings.utterances), "trained_on": len(examples)}
     about |= {"closed_under": recordings.closed_under, "mixtures": list(options.mixtures), "seed": settings.seed}
     tables = [

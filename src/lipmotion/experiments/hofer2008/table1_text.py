@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from lipmotion.experiments.comparison import significance_mark
+from lipmotion.experiments.comparison import sign_of_difference, significance_mark
 from lipmotion.experiments.hofer2008.table1 import REFERENCE_SET
 from lipmotion.measures.evaluation_table import figure_text
 
@@ -46,7 +46,7 @@ def _line(units: str, row: Mapping[str, Any]) -> str:
 
 def what_held(block: Mapping[str, Any]) -> str:
     """Return how many of the pairs of sets that the paper orders by score are ordered so here, and which is best."""
-    signs = [_sign(pair["score_gain_95"]) for pair in block["paper_order"]]
+    signs = [sign_of_difference(pair["score_gain_95"]) for pair in block["paper_order"]]
     against = [
         f"{pair['worse']} over {pair['better']}"
         for pair, sign in zip(block["paper_order"], signs, strict=True)
@@ -58,11 +58,3 @@ def what_held(block: Mapping[str, Any]) -> str:
         f"best: {best}; of the paper's {len(signs)} pairs hold {signs.count(1)}, reversed {len(against)}"
         f"{reversed_pairs}, open {signs.count(0)}"
     )
-
-
-def _sign(gain: tuple[float | None, float | None]) -> int:
-    """Return 1 or -1 for a difference whose interval leaves out 0, else 0."""
-    low, high = gain
-    if low is None or high is None:
-        return 0
-    return int(low > 0) - int(high < 0)

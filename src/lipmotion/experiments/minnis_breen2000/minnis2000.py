@@ -20,7 +20,7 @@ from lipmotion.engines import engine_named
 from lipmotion.engines.selection.config import MINNIS_2000, SelectionConfig
 from lipmotion.engines.selection.engine import SelectionEngine
 from lipmotion.engines.selection.model import SelectionModel
-from lipmotion.experiments.comparison import ClipStatistic, correlation_statistic, opening_curves
+from lipmotion.experiments.comparison import correlation_statistic, opening_curves
 from lipmotion.experiments.engines.models import EngineModel, engine_models
 from lipmotion.experiments.learning_curve import check_training_names
 from lipmotion.experiments.minnis_breen2000.joins import join_figures
@@ -30,6 +30,7 @@ from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.evaluation.figures import figures_of
 from lipmotion.pipeline.evaluation.held_out import (
     AUDIO_ONLY,
+    ComparedClip,
     HeldOutRecordings,
     compare_with_recorded,
     held_out_recordings,
@@ -99,7 +100,7 @@ def minnis2000(
     work: Path | None = None,
     settings: ExperimentSettings = DEFAULT_SETTINGS,
 ) -> dict[str, Any]:
-    """Return the figures of the paper's system and of its variants on ``val`` and ``test``.
+    """Return the figures of the paper's system and of its variants on ``val``, if the corpus has it, and ``test``.
 
     models : folder of the model ``selection.lipmotion`` (``models.engine_models``), so that a second run does not train
              again; None: it is trained and not kept
@@ -107,10 +108,11 @@ def minnis2000(
     work   : a folder for finished rows, from which the same call goes on after a stop; None: none
     All rows use one model, with the default's inventory, guide and phone recogniser, of which each takes what it needs:
     the row as printed is what ``train --preset minnis2000`` makes (tests/experiments/minnis_breen2000).
-    Raises CorpusError: no utterances to train on, to choose with or to compare, or motion without an opening.
+    Raises CorpusError: no utterances to train on or of ``test``, or motion without an opening.
     Raises InputError, ModelFormatError, ExportError: as ``engine_models``.
     """
-    lists = {split: corpus.required(split)[: QUICK_CLIPS if quick else None] for split in ("val", "test")}
+    splits = [split for split in ("val", "test") if split == "test" or corpus.names(split)]
+    lists = {split: corpus.required(split)[: QUICK_CLIPS if quick else None] for split in splits}
     for held_out in lists.values():
         check_training_names(corpus, corpus.required("train"), held_out)
     monitor = settings.monitor
@@ -118,7 +120,8 @@ def minnis2000(
     trained = _quick_model(corpus, training) if quick else engine_models(corpus, models, training, [ENGINE])[ENGINE]
     found = {}
     for number, (split, names) in enumerate(lists.items()):
-        part = replace(settings, monitor=sub_monitor(monitor, 0.6 + 0.2 * number, 0.8 + 0.2 * number, f"{split}: "))
+        start, stop = (0.6 + 0.4 * (number + step) / len(lists) for step in (0, 1))
+        part = replace(settings, monitor=sub_monitor(monitor, start, stop, f"{split}: "))
         kept = _kept_rows(corpus, names, trained.model, work / split, settings) if work else NO_CHECKPOINT
         found[split] = _on_list(corpus, names, trained.model, kept, part)
     about: dict[str, Any] = {"seed": settings.seed, "quick": quick, "seconds": trained.seconds}
@@ -181,7 +184,12 @@ def _on_list(
                 key = condition, config.joint_recogniser and condition == AUDIO_ONLY
                 if key not in spoken:
                     spoken[key] = _speech(recordings, condition, model, SelectionConfig(joint_recogniser=key[1]))
-                statistic, row = _row(recordings, spoken[key], SelectionEngine(config), learned, settings.seed)
+                engine = SelectionEngine(config)
+                clips = compare_with_recorded(recordings, spoken[key], engine, learned)
+                settings.receive(name, condition, recordings, clips)
+                row = _row(recordings, clips, settings.seed)
+                row["joins"] = join_figures(engine, learned, spoken[key], recordings.utterances)
+                statistic = correlation_statistic(*opening_curves(recordings, clips))
                 printed = replace(statistic, sums=list(reference.get(condition, statistic.sums)))
                 row["acc_gain_95"] = statistic.gain(printed, settings.seed)
                 arrays = {_ROW: np.array(json.dumps(row)), _SUMS: np.stack(statistic.sums)}
@@ -203,16 +211,12 @@ def _of_the_row(learned: SelectionModel, config: SelectionConfig) -> SelectionMo
     return learned if config.joint_recogniser else replace(learned, phone_recogniser=None)
 
 
-def _row(
-    recordings: HeldOutRecordings, speech: Sequence[Speech], engine: SelectionEngine, learned: SelectionModel, seed: int
-) -> tuple[ClipStatistic, dict[str, Any]]:
-    """Return the correlation of one row, and its figures."""
-    clips = compare_with_recorded(recordings, speech, engine, learned)
+def _row(recordings: HeldOutRecordings, clips: Sequence[ComparedClip], seed: int) -> dict[str, Any]:
+    """Return the figures of one row, but for its joins."""
     figures = figures_of(clips, recordings, seed)
     lips = figures["closures_p_b_m"]
     row = opening_row(figures) | {key: lips[key] for key in ("false_per_minute", "original_per_minute")}
     row["channels"] = {
         channel: {figure: values[figure] for figure in WHAT_IS_SHOWN} for channel, values in figures["channels"].items()
     }
-    row["joins"] = join_figures(engine, learned, speech, recordings.utterances)
-    return correlation_statistic(*opening_curves(recordings, clips)), row
+    return row

@@ -21,6 +21,18 @@ CONVERGENCE_RECORDINGS, PREDICTED_RECORDINGS = 8, 6
 DOTS_PER_INCH = 110
 PLOT_FILES = {"start": "conversion.png", "steps": "convergence.png", "clips": "predicted.png"}
 """File names of the pictures like Figs. 7, 10 and 11."""
+PLOT_CAPTIONS = dict(
+    zip(
+        PLOT_FILES.values(),
+        (
+            "As Fig. 7: conversion by ph-vi-CHMM of one recording, from means along the best path by EM",
+            "As Fig. 10: convergence of the conversion, by steps of EM",
+            "As Fig. 11: predicted beside recorded motion, ph-vi-CHMM",
+        ),
+        strict=True,
+    )
+)
+"""What the pictures show, by their file names."""
 
 
 def import_figure() -> Any:

@@ -165,7 +165,7 @@ def xieliu2007(  # noqa: PLR0913
         part = sub_monitor(settings.monitor, float(start), float(stop), f"{count} clips: ")
         trained = setup.train(names, listed[:count], trials, part)
         kept = setup.checkpoint(listed[:count], held_out)
-        rows.append({"names": count} | _size(trained, options.transcripts, seed, kept))
+        rows.append({"names": count} | _size(trained, options.transcripts, settings, kept))
     noise_rows = _noise_rows(trained, options.noise or NoiseConditions(), seed, sub_monitor(settings.monitor, 0.9, 1))
     recordings = trained.recordings
     if plots is not None:
@@ -284,11 +284,16 @@ class _TrainingSetup:
         return Checkpoint(folder, " ".join((of_input, str(self.options.tuning), *compared)))
 
 
-def _size(trained: _TrainedSystems, transcripts: bool, seed: int, kept: Checkpoint) -> dict[str, Any]:
+def _size(
+    trained: _TrainedSystems, transcripts: bool, settings: ExperimentSettings, kept: Checkpoint
+) -> dict[str, Any]:
     """Return the figures of all systems trained on one number of utterances."""
-    recordings, systems = trained.recordings, trained.systems
+    recordings, systems, seed = trained.recordings, trained.systems, settings.seed
     conditions = list(recordings.conditions) if transcripts else [AUDIO_ONLY]
     made = {condition: _made(recordings, condition, systems, kept) for condition in conditions}
+    for condition, of_systems in made.items():
+        for name, clips in of_systems.items():
+            settings.receive(name, condition, recordings, clips)
     return {
         "used": len(trained.used),
         "training": {name: _training_row(system) for name, system in systems.items()},

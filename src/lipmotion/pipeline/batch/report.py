@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+from lipmotion.export.web_page import coloured
 from lipmotion.pipeline.batch.ledger import Ledger
 from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.batch.record import FAILED, Record
@@ -40,7 +41,8 @@ def write_reports(lines: Sequence[BatchLine], ledger: Ledger, out: Path) -> tupl
     doubts = [doubt_of(ledger.record_of(line.name) or {}) for line in lines]
     order = sorted(range(len(lines)), key=lambda number: (-doubts[number], lines[number].name))
     table, page = out / CSV_REPORT, out / HTML_REPORT
-    before, _, after = resources.files(__package__).joinpath("report_page.html").read_text("utf-8").partition(ROWS)
+    page_text = coloured(resources.files(__package__).joinpath("report_page.html").read_text("utf-8"))
+    before, _, after = page_text.partition(ROWS)
     with ExitStack() as stack:
         paths = [stack.enter_context(whole_file(path)) for path in (table, page)]
         table_file = stack.enter_context(paths[0].open("w", encoding="utf-8", newline=""))

@@ -53,10 +53,21 @@ def fingerprint(
             digest.update(f"{name} {array.dtype} {array.shape}\n".encode())
             digest.update(np.ascontiguousarray(array).tobytes())
     digest.update(json.dumps(job, sort_keys=True).encode())
+    _add_utterances(digest, corpus, names, visual)
+    return digest.hexdigest()
+
+
+def corpus_digest(corpus: Corpus) -> str:
+    """Return a digest of all utterances of a corpus, without their mouth pictures."""
+    digest = hashlib.sha256()
+    _add_utterances(digest, corpus, corpus.names(), GEOMETRY)
+    return digest.hexdigest()
+
+
+def _add_utterances(digest: hashlib._Hash, corpus: Corpus, names: Sequence[str], visual: str) -> None:
     for name in names:
         digest.update(f"\n{name}\n".encode())
         for path in sorted(corpus.folder(name).iterdir()):
             if path.name != PICTURES or visual != GEOMETRY:
                 digest.update(f"{path.name}\n".encode())
                 digest.update(bytes.fromhex(sha256_of(path)))
-    return digest.hexdigest()

@@ -1,0 +1,1 @@
+"""All experiments on a corpus, and one page of what they found."""

@@ -1,0 +1,179 @@
+"""Charts of a report as drawings inside the page (SVG), in its colours: light and dark."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.export.web_page import Html, element, joined
+
+WIDTH, LEFT, RIGHT = 360, 8, 12
+"""Width of a drawing, and its margins: on a telephone a unit is about a pixel."""
+ROW, AXIS = 34, 30
+CURVE_HEIGHT, CURVE_LEFT, CURVE_TOP = 120, 34, 14
+STEPS = (1.0, 2.0, 5.0)
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Dot:
+    """A figure with its interval, and the paper's own.
+
+    value, interval, paper : None: there is none
+    """
+
+    name: str
+    value: float | None
+    interval: tuple[float | None, float | None] | None = None
+    paper: float | None = None
+
+
+@dataclass(frozen=True)
+class _Scale:
+    """Where values stand on an axis: ``low`` at ``start``, ``high`` at ``stop``."""
+
+    low: float
+    high: float
+    start: float
+    stop: float
+
+    @classmethod
+    def of(cls, values: Iterable[float], start: float, stop: float) -> _Scale:
+        known = list(values) or [0.0, 1.0]
+        low, high = min(known), max(known)
+        margin = 0.06 * (high - low) or 0.5 * abs(high) or 1.0
+        return cls(low - margin, high + margin, start, stop)
+
+    def __call__(self, value: float) -> float:
+        return self.start + (value - self.low) / (self.high - self.low) * (self.stop - self.start)
+
+    def ticks(self, most: int = 5) -> list[float]:
+        """Return round values on the axis, at most so many."""
+        least = (self.high - self.low) / most
+        power = 10.0 ** np.floor(np.log10(least))
+        step = next(power * step for step in (*STEPS, 10.0) if power * step >= least)
+        first = int(np.ceil(self.low / step))
+        return [float(step * n) for n in range(first, int(np.floor(self.high / step)) + 1)]
+
+
+def dots(title: str, unit: str, rows: Sequence[Dot]) -> Html:
+    """Return a chart with a line for each row: the figure, its interval, and the paper's own as a diamond.
+
+    unit : below the axis
+    """
+    values = [v for row in rows for v in (row.value, row.paper, *(row.interval or ())) if v is not None]
+    scale, height = _Scale.of(values, LEFT, WIDTH - RIGHT), ROW * len(rows) + AXIS + 10
+    parts = [_vertical(scale(tick), f"{tick:g}", height - AXIS - 2) for tick in scale.ticks()]
+    parts.append(_text(WIDTH - RIGHT, height - 4, unit, "end"))
+    for number, row in enumerate(rows):
+        y = ROW * number + 26
+        parts.append(_text(LEFT, y - 11, row.name, class_="name"))
+        low, high = row.interval or (None, None)
+        if low is not None and high is not None:
+            parts.append(_line(scale(low), y, scale(high), y, "interval"))
+        if row.value is not None:
+            parts.append(element("circle", cx=f"{scale(row.value):.1f}", cy=str(y), r="4.5", class_="here"))
+        if row.paper is not None:
+            x = scale(row.paper)
+            diamond = f"M{x:.1f} {y - 6}l6 6l-6 6l-6 -6z"
+            parts.append(element("path", d=diamond, class_="paper"))
+    said = "; ".join(f"{row.name} {_said(row.value)}" for row in rows)
+    legend = "Dot and line: here, with its 95 % interval."
+    if any(row.paper is not None for row in rows):
+        legend += " Diamond: the paper's own figure, of another speaker and other recordings."
+    return _figure(title, f"{title}: {said}", height, parts, legend)
+
+
+def curve(
+    title: str, time_s: Array, recorded: Array, generated: Array, marked: Sequence[tuple[float, float, str]]
+) -> Html:
+    """Return recorded (dashed) and generated motion over time, of one clip.
+
+    recorded, generated : of one channel [each shape=(N,)]
+    marked              : start and end in seconds, and name, of what is shaded
+    """
+    bottom = CURVE_HEIGHT - 18
+    across = _Scale(float(time_s[0]), float(time_s[-1]), CURVE_LEFT, WIDTH - 4)
+    up = _Scale.of([*recorded, *generated], bottom, CURVE_TOP)
+    parts = []
+    for start_s, end_s, name in marked:
+        left, right = (across(min(max(time, across.low), across.high)) for time in (start_s, end_s))
+        shade = {"x": f"{left:.1f}", "width": f"{max(right - left, 1):.1f}"}
+        parts.append(element("rect", y=str(CURVE_TOP), height=str(bottom - CURVE_TOP), class_="marked", **shade))
+        parts.append(_text((left + right) / 2, CURVE_TOP - 3, name, "middle"))
+    for tick in up.ticks(3):
+        parts.append(_line(CURVE_LEFT, up(tick), WIDTH - 4, up(tick), "level"))
+        parts.append(_text(CURVE_LEFT - 4, up(tick) + 4, f"{tick:g}", "end"))
+    parts += [_text(across(tick), CURVE_HEIGHT - 4, f"{tick:g} s", "middle") for tick in across.ticks(4)]
+    for values, kind in ((recorded, "recorded"), (generated, "generated")):
+        points = " ".join(f"{across(t):.1f},{up(v):.1f}" for t, v in zip(time_s, values, strict=True))
+        parts.append(element("polyline", points=points, class_=kind))
+    said = f"{title}: recorded and generated opening of the mouth over {time_s[-1] - time_s[0]:.1f} s"
+    return _figure(title, said, CURVE_HEIGHT, parts, title)
+
+
+def rising(title: str, unit: str, lines: Mapping[str, Sequence[tuple[float, Dot]]]) -> Html:
+    """Return figures with intervals over a number, on a logarithmic axis: a line for each name.
+
+    lines : numbers, and their figures
+    """
+    height, bottom = 220, 186
+    points = [point for line in lines.values() for point in line if point[1].value is not None]
+    up = _Scale.of([v for _, dot in points for v in (dot.value, *(dot.interval or ())) if v is not None], bottom, 10)
+    across = _Scale.of([float(np.log(n)) for n, _ in points], CURVE_LEFT + 4, WIDTH - RIGHT)
+    parts = []
+    for tick in up.ticks():
+        parts.append(_line(CURVE_LEFT, up(tick), WIDTH - RIGHT, up(tick), "level"))
+        parts.append(_text(CURVE_LEFT - 4, up(tick) + 4, f"{tick:g}", "end"))
+    numbers = sorted({number for number, _ in points})
+    parts += [_text(across(float(np.log(n))), bottom + 16, f"{n:g}", "middle") for n in numbers]
+    parts.append(_text(WIDTH - RIGHT, height - 5, unit, "end"))
+    for order, line in enumerate(lines.values()):
+        kind = ("generated", "second")[order % 2]
+        known = [(across(float(np.log(n))), dot) for n, dot in line if dot.value is not None]
+        places = " ".join(f"{x:.1f},{up(dot.value or 0):.1f}" for x, dot in known)
+        parts.append(element("polyline", points=places, class_=kind))
+        for x, dot in known:
+            low, high = dot.interval or (None, None)
+            if low is not None and high is not None:
+                parts.append(_line(x + 2 * order, up(low), x + 2 * order, up(high), kind))
+            parts.append(element("circle", cx=f"{x:.1f}", cy=f"{up(dot.value or 0):.1f}", r="3", class_=kind))
+    looks = ("line", "dashed line")
+    legend = "; ".join(f"{looks[order % 2]}: {name}" for order, name in enumerate(lines))
+    said = "; ".join(
+        f"{name}: {', '.join(f'{n:g} {_said(dot.value)}' for n, dot in line)}" for name, line in lines.items()
+    )
+    return _figure(title, f"{title}: {said}", height, parts, f"{title}. {legend.capitalize()}. Bars: 95 % intervals.")
+
+
+def _figure(title: str, said: str, height: int, parts: Sequence[Html], caption: str) -> Html:
+    drawing = element(
+        "svg",
+        element("title", title),
+        *parts,
+        viewBox=f"0 0 {WIDTH} {height}",
+        role="img",
+        aria_label=said,
+        class_="chart",
+    )
+    return element("figure", drawing, element("figcaption", caption))
+
+
+def _vertical(x: float, name: str, bottom: float) -> Html:
+    return joined(_line(x, 0, x, bottom, "level"), _text(x, bottom + 13, name, "middle"))
+
+
+def _line(x1: float, y1: float, x2: float, y2: float, kind: str) -> Html:
+    ends = {"x1": x1, "y1": y1, "x2": x2, "y2": y2}
+    return element("line", class_=kind, **{name: f"{value:.1f}" for name, value in ends.items()})
+
+
+def _text(x: float, y: float, text: str, anchor: str = "start", class_: str | None = None) -> Html:
+    return element("text", text, x=f"{x:.1f}", y=f"{y:.1f}", text_anchor=anchor, class_=class_)
+
+
+def _said(value: float | None) -> str:
+    return "not defined" if value is None else f"{value:.3g}"

@@ -1,0 +1,129 @@
+"""What a report says of the experiments that no paper printed: all engines, learning curve, folds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from lipmotion.experiments.comparison import sign_of_difference
+from lipmotion.experiments.report.charts import Dot, dots, rising
+from lipmotion.experiments.report.section import Section, named, warning_of
+from lipmotion.experiments.report.table import Column, Table
+from lipmotion.pipeline.evaluation.held_out import AUDIO_ONLY
+
+OPENING = (
+    Column("acc", "ACC", ".3f", "correlation of the opening with the recording"),
+    Column("nrmse", "nRMSE", ".3f"),
+    Column("score", "score", ".1f", "closings of the recording that the motion makes, in %"),
+    Column("precision", "precision", ".1f", "generated closings that are of the recording, in %"),
+    Column("recall_p_b_m", "p b m", ".1f", "p, b and m in which the lips close, in %"),
+    Column("global_variance", "variance", ".2f", "of the opening, by that of the recording"),
+)
+ELSEWHERE = Column("false_per_minute", "elsewhere", ".1f", "closings outside p b m, a minute of speech")
+
+
+def engines_section(figures: Mapping[str, Any]) -> Section:
+    """Return what the figures of ``engines`` say."""
+    reference, tables = figures["reference"], {}
+    for condition, found in figures["conditions"].items():
+        rows = {
+            name: {**row, "acc_gain_95": row["acc_gain_95"].get(reference)} for name, row in found["systems"].items()
+        }
+        columns = (*OPENING, ELSEWHERE, Column("jerk", "jerk", ".2f", "the same of the jerk"))
+        tables[condition] = Table(
+            f"engines-{condition}".replace(" ", "-"), f"Engines, {condition}", columns, rows, reference
+        )
+    main = tables.pop(AUDIO_ONLY)
+    signs = {name: sign_of_difference(row["acc_gain_95"]) for name, row in main.rows.items() if name != reference}
+    best = max(main.rows, key=lambda name: main.rows[name]["acc"] or 0.0)
+    verdict = (
+        f"Most alike to the recordings: {best} (ACC {main.rows[best]['acc']:.3f}); nothing is in print to compare."
+    )
+    said = ((1, "higher than that"), (-1, "lower than that"), (0, "not different for sure from that"))
+    words = warning_of(figures["clips"]) | {
+        "ACC of the opening": [
+            f"{what.capitalize()} of the engine {reference}: {named([n for n, each in signs.items() if each == sign])}."
+            for sign, what in said
+        ]
+    }
+    minutes = ", ".join(sorted({f"{row['minutes']}" for row in figures["models"].values()}))
+    about = (
+        f"All engines with their defaults, trained on {minutes} minutes, and what combines them, on {figures['clips']} "
+        f"recordings of {figures['split']}, with closed lips forced in p, b and m."
+    )
+    charts = [dots("ACC of the opening", "ACC", [Dot(n, r["acc"], r["acc_95"]) for n, r in main.rows.items()])]
+    more = [(table.caption, table) for table in tables.values()]
+    return Section("The engines of this project", about, verdict, words, charts, main, more, list(main.rows))
+
+
+def learning_section(figures: Mapping[str, Any]) -> Section:
+    """Return what the figures of ``learning_curve`` say."""
+    sizes = {str(row["names"]): row for row in figures["rows"]}
+    trained = (
+        Column("used", "used", ".0f", "recordings that could be used"),
+        Column("minutes", "minutes", ".1f", "of training"),
+        Column("seconds", "seconds", ".0f", "that training took"),
+    )
+    conditions = list(figures["rows"][0]["conditions"])
+    tables = {
+        condition: Table(
+            f"learning-curve-{condition}".replace(" ", "-"),
+            f"Learning curve, {condition}",
+            (*trained, *OPENING),
+            {size: {**row, **row["conditions"][condition]} for size, row in sizes.items()},
+            head="recordings",
+        )
+        for condition in conditions
+    }
+    main = tables.pop(AUDIO_ONLY)
+    first, last = next(iter(main.rows)), list(main.rows)[-1]
+    low, high = (main.rows[size]["acc"] for size in (first, last))
+    steps = [size for size, before in zip(list(main.rows)[1:], main.rows, strict=False) if _fell(main, before, size)]
+    words = warning_of(figures["clips"]) | {
+        "More recordings": [
+            f"From {first} to {last} recordings the correlation of the opening goes from {low:.3f} to {high:.3f}.",
+            f"It falls at: {', '.join(steps)}." if steps else "It falls at no step.",
+        ]
+    }
+    lines = {
+        condition: [
+            (float(size), Dot(size, row["conditions"][condition]["acc"], row["conditions"][condition]["acc_95"]))
+            for size, row in sizes.items()
+        ]
+        for condition in conditions
+    }
+    about = (
+        f"The default engine trained on the first recordings of the training list alone, in a random order, "
+        f"compared on {figures['clips']} of {figures['split']}."
+    )
+    verdict = f"ACC {low:.3f} with {first} recordings, {high:.3f} with {last}."
+    charts = [rising("ACC of the opening over recordings", "recordings", lines)] if len(sizes) > 1 else []
+    more = [(table.caption, table) for table in tables.values()]
+    shown = [f"{size} recordings" for size in dict.fromkeys((first, last))]
+    return Section("Learning curve", about, verdict, words, charts, main, more, shown)
+
+
+def _fell(table: Table, before: str, after: str) -> bool:
+    return bool(table.rows[after]["acc"] < table.rows[before]["acc"])
+
+
+def folds_section(figures: Mapping[str, Any]) -> Section:
+    """Return what the figures of ``folds`` say."""
+    rows = figures["conditions"]
+    original = Column("original_per_minute", "recorded elsewhere", ".1f", "the same of the recordings")
+    table = Table(
+        "folds", f"Cross-validation, {figures['folds']} folds", (*OPENING, ELSEWHERE, original), rows, head="condition"
+    )
+    row = rows[AUDIO_ONLY]
+    verdict = f"ACC {row['acc']:.3f} on {figures['clips']} recordings, each generated by a model of the others."
+    about = (
+        f"The training list in {figures['folds']} parts: each is generated by a model of the others, "
+        f"{min(figures['trained_on'])} to {max(figures['trained_on'])} recordings."
+    )
+    words = warning_of(figures["clips"]) | {
+        "More closings than a test list has": [
+            f"Of {row['p_b_m']} p, b and m the lips close in {row['recall_p_b_m'] or 0:.1f} %; of {row['closings']} "
+            f"closings {row['score'] or 0:.1f} % are made in time."
+        ]
+    }
+    return Section("Cross-validation", about, verdict, words, [], table)

@@ -1,0 +1,82 @@
+"""Pages of HTML that need no network: elements that escape what they hold, and the look that all pages share."""
+
+from __future__ import annotations
+
+import re
+from html import escape
+from importlib import resources
+
+from lipmotion.printable import printable
+
+VOID = frozenset({"br", "img", "link", "meta"})
+"""Elements that hold nothing and have no end."""
+SIMPLE_NAME = re.compile(r"[A-Za-z][A-Za-z0-9-]*")
+GENERATOR = '<meta name="generator" content="lipmotion">'
+"""What pages of this program hold."""
+SHARED_COLOURS = "/*COLOURS*/"
+"""Where a style has the colours of all pages."""
+
+
+class Html(str):
+    """Text that is HTML already. Every other text is escaped where it becomes part of an element."""
+
+    __slots__ = ()
+
+
+def element(name: str, *content: str, **attributes: str | bool | None) -> Html:
+    """Return an element.
+
+    content    : ``Html`` as it is; other texts are escaped, and what is invisible in them is shown (``printable``)
+    attributes : ``class_`` is ``class``, ``aria_label`` is ``aria-label``; True: the name alone; False, None: left out
+    Raises ValueError: no name of an element or an attribute.
+    """
+    words = [_simple(name)]
+    for key, value in attributes.items():
+        if value is not None and value is not False:
+            attribute = _simple(key.rstrip("_").replace("_", "-"))
+            words.append(attribute if value is True else f'{attribute}="{escaped(value)}"')
+    start = f"<{' '.join(words)}>"
+    return Html(start if name in VOID else f"{start}{joined(*content)}</{name}>")
+
+
+def joined(*content: str) -> Html:
+    """Return some content one after another, escaped as in ``element``."""
+    return Html("".join(text if isinstance(text, Html) else escaped(text) for text in content))
+
+
+def escaped(text: str) -> str:
+    """Return a text as it stands in an element or an attribute, in one line, without anything invisible."""
+    return escape(printable(text))
+
+
+def whole_page(title: str, style: str, *content: str, script: str = "") -> str:
+    """Return a page that loads nothing but the pictures and videos in its own folder.
+
+    style  : CSS, with ``SHARED_COLOURS`` in the place of the colours of all pages
+    script : JavaScript of the page
+    Neither may hold the end of its element: both are the caller's own, nothing of a user's.
+    """
+    policy = "default-src 'none'; style-src 'unsafe-inline'; img-src 'self' file:; media-src 'self' file:"
+    policy += "; script-src 'unsafe-inline'" if script else ""
+    head = joined(
+        element("meta", charset="utf-8"),
+        element("meta", http_equiv="Content-Security-Policy", content_=policy),
+        element("meta", name_="viewport", content_="width=device-width, initial-scale=1"),
+        Html(GENERATOR),
+        element("title", title),
+        Html(f"<style>\n{coloured(style)}</style>"),
+    )
+    scripts = Html(f"<script>\n{script}</script>" if script else "")
+    body = element("body", *content, scripts)
+    return f'<!DOCTYPE html>\n<html lang="en">\n{element("head", head)}\n{body}\n</html>\n'
+
+
+def coloured(style: str) -> str:
+    """Return a style with the colours of all pages, light and dark."""
+    return style.replace(SHARED_COLOURS, resources.files(__package__).joinpath("colours.css").read_text("utf-8"))
+
+
+def _simple(name: str) -> str:
+    if not SIMPLE_NAME.fullmatch(name):
+        raise ValueError(f"{name!r} is no name of an element or an attribute")
+    return name
