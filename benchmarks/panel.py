@@ -56,9 +56,10 @@ from lipmotion.vision.footage import untracked_frames
 
 Pictures = NDArray[np.uint8]
 Spoken = tuple[float, float, str]
-FILMED, ELSEWHERE, HEAD = "filmed", "elsewhere", "head"
+FILMED, HEAD = "filmed", "head"
 SOURCES = (RECORDING, FILMED, HEAD)
-"""Whose mouths are shown alone."""
+OWN, ELSEWHERE = "own footage", "other footage"
+"""Into which footage a filmed face is stitched: the recording itself, or another one."""
 PAIRS, CLOSURES, SOUNDS_SHEET = "pairs", "closures", "sounds"
 SOUNDS = {"pbm": "p b m", "fv": "f v", "th": "th dh", "oo": "uw w", "ah": "aa ae ay", "ee": "iy"}
 SOUND_OF = {phone: sound for sound, names in SOUNDS.items() for phone in names.split()}
@@ -77,7 +78,7 @@ class Item:
     """What a reader is asked at once.
 
     sheet, number : its place
-    source : what made the mouth, or, in a pair, the one that is not the recording
+    source : what made the mouth; of a pair, into which footage the filmed face was stitched
     video  : file in the study; of a pair, none
     trial  : of a pair, in the order of the reader; otherwise -1
     start  : first frame
@@ -110,14 +111,14 @@ def make(options: argparse.Namespace) -> None:
     options.output.mkdir(parents=True)
     with tempfile.TemporaryDirectory(dir=options.output) as folder:
         made = Path(folder)
-        make_videos(made, corpus, names, model, options)
-        conditions = [RECORDING, *(f"{name}={made / name}" for name in (FILMED, ELSEWHERE, HEAD))]
+        footage = make_videos(made, corpus, names, model, options)
+        conditions = [RECORDING, *(f"{name}={made / name}" for name in (FILMED, HEAD))]
         settings = StudySettings(practice=0, anchors=0, checks=0, region=REGION, seed=options.seed)
         study = design_study(options.output / "study", PAIRED, conditions, [made / RECORDING], settings)
     spoken = dict(zip(names, phones(corpus, names, model), strict=True))
     draw = np.random.default_rng(options.seed)
     items = [
-        *pairs(study, spoken, draw),
+        *pairs(study, spoken, footage, draw),
         *numbered(CLOSURES, study, closure_strips(spoken, draw, options.each), draw),
         *numbered(SOUNDS_SHEET, study, sound_strips(spoken, draw, options.each), draw),
     ]
@@ -128,11 +129,15 @@ def make(options: argparse.Namespace) -> None:
 
 def make_videos(
     folder: Path, corpus: Corpus, names: Sequence[str], model: lipmotion.Model, options: argparse.Namespace
-) -> None:
-    """Write a video of every sentence by every condition; all are encoded once, also the recordings."""
-    face = lipmotion.load_face(options.face)
-    others = np.random.default_rng(options.seed).choice(corpus.names("train"), len(names), replace=False)
-    for name in (RECORDING, FILMED, ELSEWHERE, HEAD):
+) -> dict[str, str]:
+    """Write a video of every sentence by every condition, and return into which footage the filmed face was stitched.
+
+    All are encoded once, also the recordings.
+    """
+    face, draw = lipmotion.load_face(options.face), np.random.default_rng(options.seed)
+    others = draw.choice(corpus.names("train"), len(names), replace=False)
+    footage = dict(zip(draw.permutation(names).tolist(), [OWN, ELSEWHERE] * len(names), strict=False))
+    for name in SOURCES:
         (folder / name).mkdir()
     for name, other in zip(names, others, strict=True):
         clip, recording = options.clips / f"{name}.mkv", folder / RECORDING / f"{name}.mp4"
@@ -141,13 +146,14 @@ def make_videos(
         write_mp4(recording, frames, fps=rate_hz, audio=sound)
         request = lipmotion.SpeechRequest(corpus.utterance(name).audio, onto=face)
         result = lipmotion.animate(request, model=model)
-        for condition, footage in ((FILMED, clip), (ELSEWHERE, options.clips / f"{other}.mkv")):
-            target, film = folder / condition / f"{name}.mp4", lipmotion.FilmOptions(background=footage)
-            lipmotion.write(result, target, speech=recording, model=model, face=face, film=film)
+        film = lipmotion.FilmOptions(background=clip if footage[name] == OWN else options.clips / f"{other}.mkv")
+        target = folder / FILMED / f"{name}.mp4"
+        lipmotion.write(result, target, speech=recording, model=model, face=face, film=film)
         size = next(iter(untracked_frames(clip)[0])).shape[:2]
         heads = head_frames(result, size)
         write_mp4(folder / HEAD / f"{name}.mp4", heads, fps=FPS, audio=sound)
-        print(name, flush=True)
+        print(f"{len(list(target.parent.iterdir()))} of {len(names)}", flush=True)
+    return footage
 
 
 def head_frames(result: lipmotion.Generation, size: tuple[int, int]) -> Iterator[Pictures]:
@@ -167,22 +173,22 @@ def head_frames(result: lipmotion.Generation, size: tuple[int, int]) -> Iterator
         yield placed
 
 
-def pairs(study: Study, spoken: Mapping[str, Sequence[Spoken]], draw: np.random.Generator) -> list[Item]:
+def pairs(
+    study: Study, spoken: Mapping[str, Sequence[Spoken]], footage: Mapping[str, str], draw: np.random.Generator
+) -> list[Item]:
     """Return a pair of each sentence, in the order in which the study shows them to the reader."""
-    names = list(spoken)
-    beside = dict(zip(draw.permutation(names).tolist(), [FILMED, ELSEWHERE] * len(names), strict=False))
     items: list[Item] = []
     seen: set[str] = set()
     for number, trial in enumerate(trials_of(study, READER)):
         shown = study.shown(trial)
         name, conditions = shown[0].sentence, [video.condition for video in shown]
-        if name in seen or set(conditions) != {RECORDING, beside[name]}:
+        if name in seen or set(conditions) != {RECORDING, FILMED}:
             continue
         seen.add(name)
         first, last = spoken_frames(spoken[name])[[0, -1]]
         start = int(draw.integers(first, max(first, last - PAIR_FRAMES + 1) + 1))
         truth = "AB"[conditions.index(RECORDING)]
-        items.append(Item(PAIRS, len(items) + 1, beside[name], "", number, start, (truth,)))
+        items.append(Item(PAIRS, len(items) + 1, footage[name], "", number, start, (truth,)))
     return items
 
 
@@ -302,7 +308,7 @@ def score(options: argparse.Namespace) -> None:
     write_answers(options.panel / "answers.csv", rows)
     figures: dict[str, Any] = {
         PAIRS: {"all": share([right[i.sheet, i.number] for i in items if i.sheet == PAIRS])}
-        | {source: of_source(items, right, PAIRS, source) for source in (FILMED, ELSEWHERE)},
+        | {source: of_source(items, right, PAIRS, source) for source in (OWN, ELSEWHERE)},
         CLOSURES: {
             source: of_source(items, right, CLOSURES, source)
             | {"with": closures(items, right, source, True), "without": closures(items, right, source, False)}
