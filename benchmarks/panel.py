@@ -10,8 +10,8 @@ sound. What is behind which strip is in ``PANEL/key.json`` and ``PANEL/study/stu
 *pairs*    : eight frames of a recording and the same moment of the filmed face, above and below in random order, with
              the phone of each frame. Each sentence comes once. In every second pair the filmed face is in the
              recording's own footage, in the others in that of another recording of ``train``.
-*closures* : seven frames of one mouth. In which do the lips meet? Half of them have one p, b or m; the others none.
-*sounds*   : five frames about the middle of a sound. Which of the six is it?
+*closures* : seven frames of one mouth. In which do the lips meet? About half have one p, b or m; the others none.
+*sounds*   : five frames about the middle of a sound, each a random one of six. Which is it?
 
 ANSWERS.csv has the columns sheet, item, answer, note: A or B; a number of a frame, or none; a name of ``SOUNDS``.
 ``score`` counts the right ones, and writes ``answers.csv`` of the pairs beside the study, as ``lipmotion study export``
@@ -205,7 +205,7 @@ def numbered(sheet: str, study: Study, strips: Mapping[str, Sequence[Strip]], dr
 def closure_strips(
     spoken: Mapping[str, Sequence[Spoken]], draw: np.random.Generator, each: int
 ) -> dict[str, list[Strip]]:
-    """Return strips for each source, half of them with one closure, other moments for each."""
+    """Return strips for each source, about half of them with one closure, other moments for each."""
     with_closure, without = list[Strip](), list[Strip]()
     for name, units in spoken.items():
         said = set(spoken_frames(units).tolist())
@@ -221,14 +221,15 @@ def closure_strips(
             elif len(near) == 1 and set(near[0]) <= set(window[1:-1]):
                 right = range(near[0][0] - NEAR_FRAMES, near[0][-1] + NEAR_FRAMES + 1)
                 with_closure.append(Strip(name, start, tuple(str(n - start + 1) for n in right)))
-    halves = shared(with_closure, draw, each // 2), shared(without, draw, each - each // 2)
-    return {source: [*halves[0][source], *halves[1][source]] for source in SOURCES}
+    count = int(draw.binomial(each, 0.5))
+    parts = shared(with_closure, draw, count), shared(without, draw, each - count)
+    return {source: [*parts[0][source], *parts[1][source]] for source in SOURCES}
 
 
 def sound_strips(
     spoken: Mapping[str, Sequence[Spoken]], draw: np.random.Generator, each: int
 ) -> dict[str, list[Strip]]:
-    """Return strips for each source, as many of each sound, other moments for each as far as there are enough."""
+    """Return strips for each source, each of a random sound, other moments for each as far as there are enough."""
     found: dict[str, list[Strip]] = {sound: [] for sound in SOUNDS}
     for name, units in spoken.items():
         for start_s, end_s, phone in units:
@@ -236,8 +237,8 @@ def sound_strips(
                 start = int((start_s + end_s) / 2 * FPS) - SOUND_FRAMES // 2
                 found[SOUND_OF[phone]].append(Strip(name, start, (SOUND_OF[phone],)))
     strips: dict[str, list[Strip]] = {source: [] for source in SOURCES}
-    for mine in found.values():
-        for source, part in shared(mine, draw, each // len(SOUNDS)).items():
+    for mine, count in zip(found.values(), draw.multinomial(each, [1 / len(SOUNDS)] * len(SOUNDS)), strict=True):
+        for source, part in shared(mine, draw, int(count)).items():
             strips[source] += part
     return strips
 

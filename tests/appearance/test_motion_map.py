@@ -115,14 +115,6 @@ def test_short_footage_is_trusted_less(fitted: MotionMap) -> None:
     assert sizes[0] < 0.6 < sizes[1] < sizes[2] < 1.01
 
 
-def test_values_are_spread_from_a_centre(fitted: MotionMap) -> None:
-    before = fitted.predict(motion(poses(50)))
-    centre = np.linspace(-1, 1, before.shape[1], dtype=np.float32)
-    gains = np.linspace(1, 2, before.shape[1], dtype=np.float32)
-    after = fitted.spread(centre, gains).predict(motion(poses(50)))
-    assert after == pytest.approx(centre + gains * (before - centre), abs=1e-3)
-
-
 def test_the_fewest_frames_give_about_the_mean() -> None:
     for frames in (FRAMES_PER_CENTRE, 10):
         values = poses(frames)

@@ -65,12 +65,6 @@ class MotionMap:
         """
         return self._regressors(channel_values(motion, self.names)) @ self.coefficients
 
-    def spread(self, centre: Floats, gains: Floats) -> MotionMap:
-        """Return the regression whose values differ more from a centre, each by its gain [both shape=(V,)]."""
-        coefficients = self.coefficients * gains
-        coefficients[0] += centre * (1 - gains)
-        return replace(self, coefficients=coefficients)
-
     def _regressors(self, values: Array) -> Floats:
         components = np.clip((values - self.mean) / self.scale @ self.basis, *self.limits).astype(np.float32)
         near = np.ascontiguousarray(components[:, : self.centres.shape[1]])

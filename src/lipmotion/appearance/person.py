@@ -51,8 +51,6 @@ JAW_CANDIDATES = 120
 JAW_OPTIONS = RefinementOptions(steadiness=0.3)
 PICTURES_PER_BLOCK = 256
 """Pictures that are projected at a time."""
-LARGEST_GAIN, LEAST_DEVIATION = 2.0, 1e-3
-"""Most by which predicted eigenlips are spread, and the deviation, in grey levels, below which they are constant."""
 EDGE_PX = 3
 """The jaw's pictures are its own so far beyond the part that is replaced: cloning reads its edge."""
 MOUTH_RIDGE = 1e-3
@@ -208,7 +206,6 @@ def learn_appearance(footage: FootagePictures) -> Appearance:
 
     chosen_faces = recorded(chosen_jaws)
     jaw_and_chin = np.concatenate([jaw_codes, footage.chin_px[:, None]], axis=1)
-    from_motion = fit_motion_map(footage.motion, footage.channels, np.concatenate([codes, jaw_and_chin], axis=1))
     ends = np.cumsum([len(clip) for clip in footage.clips])[:-1]
     return Appearance(
         footage.shape,
@@ -220,28 +217,11 @@ def learn_appearance(footage: FootagePictures) -> Appearance:
         jaw,
         _jaw_alone(chosen_faces, chosen_faces.mean(axis=0, dtype=np.float32), footage.shape),
         jaw_codes[chosen_jaws],
-        _as_varied(from_motion, footage, codes, chosen),
+        fit_motion_map(footage.motion, footage.channels, np.concatenate([codes, jaw_and_chin], axis=1)),
         _regression(codes, jaw_and_chin),
         _regression(footage.levels_db[:, None], jaw_and_chin),
         estimate_noise(np.split(mouths, ends)),
     )
-
-
-def _as_varied(from_motion: MotionMap, footage: FootagePictures, codes: Floats, chosen: Index) -> MotionMap:
-    """Return the regression with eigenlips that vary as much as recorded ones, once they are drawn to recorded mouths.
-
-    A regression predicts means: without this, teeth and the line between the lips are pale.
-    codes  : eigenlips of the footage [shape=(N, 90)]
-    chosen : frames of the recorded mouths to which eigenlips are drawn
-    """
-    frames, count = evenly_spaced(TRAINING_PICTURES, len(codes)), codes.shape[1]
-    predicted = from_motion.predict(Motion(footage.motion[frames], 1.0, footage.channels))[:, :count]
-    deviation = drawn_to_recorded(predicted, codes[chosen]).std(axis=0)
-    gains = np.ones(from_motion.coefficients.shape[1], np.float32)
-    gains[:count] = np.clip(codes.std(axis=0) / np.maximum(deviation, LEAST_DEVIATION), 1, LARGEST_GAIN)
-    centre = np.zeros_like(gains)
-    centre[:count] = codes.mean(axis=0)
-    return from_motion.spread(centre, gains)
 
 
 def _in_one_light(footage: FootagePictures) -> tuple[Pictures, Array, Array]:
