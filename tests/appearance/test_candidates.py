@@ -143,4 +143,4 @@ def test_mouths_are_drawn_smoothly_over_time() -> None:
     recorded = mouths(1)[::3]
     path = np.linspace(recorded[0], recorded[50], 400)
     steps = np.linalg.norm(np.diff(drawn_to_recorded(path.astype(np.float32), recorded), axis=0), axis=1)
-    assert steps.max() < 0.05 * np.linalg.norm(path[-1] - path[0])  # where the nearest ones change
+    assert steps.max() < 0.02 * np.linalg.norm(path[-1] - path[0])  # where the nearest ones change

@@ -35,6 +35,11 @@ def test_export_and_forget(here: Path, run: RunCommand) -> None:
     done = run("study", "export", "study", "-o", "answers.csv")
     assert (done.code, done.out) == (0, ["answers.csv: 2 answers"])
     assert [row.rater for row in read_answers(here / "answers.csv")] == ["r001", "r002"]
+    done = run("study", "export", "study", "--rater", "r2", "-o", "one.csv")
+    assert (done.code, done.out) == (0, ["one.csv: 1 answers"])
+    assert [row.rater for row in read_answers(here / "one.csv")] == ["r002"]
+    for nobody in ("r003", "anna"):
+        assert is_one_error(run("study", "export", "study", "--rater", nobody, "-o", "none.csv"), 3)
     done = run("study", "forget", "study", "r001")
     assert (done.code, done.out[0].split(";")[0]) == (0, "r001: 1 answers deleted")
     assert is_one_error(run("study", "forget", "study", "r001"), 3)

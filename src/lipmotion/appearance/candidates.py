@@ -20,8 +20,10 @@ CANDIDATES = 500
 """Number of candidate mouths. Source: Xie & Liu 2007, §6.1."""
 ROUNDS = 8
 """Rounds in which the centres of the groups are moved: more did not lower the error on GRID."""
-MIXED_CANDIDATES, MIXTURE_SHARE = 20, 0.75
+MIXED_CANDIDATES, MIXTURE_SHARE = 20, 0.95
 """Recorded mouths of which a predicted one is mixed, and the share of the mixture."""
+LEAST_NEARNESS = 1e-3
+"""The furthest of them is penalised as if it were nearer than the next one by this share of its squared distance."""
 PICTURES_AT_ONCE = 16
 """Pictures that are restored at a time."""
 BLOCK = 2048
@@ -148,9 +150,10 @@ def drawn_to_recorded(wanted: Values, recorded: Values) -> Values:
     recorded : of recorded mouths [shape=(N, D)]
     Each is replaced by ``MIXTURE_SHARE`` of the nearest mixture of its ``MIXED_CANDIDATES`` nearest recorded
     ones, and the rest of itself.
-    Mixtures have weights ≥ 0 whose sum is 1, and prefer what is near, so they change smoothly over time.
-    Source: Wang et al. 2010, "Locality-constrained linear coding", Eq. 7 (here with squared distances as penalty);
-    what it gains: docs/results/video.md.
+    Mixtures have weights ≥ 0 whose sum is 1, and prefer what is near. The weight of the furthest one is almost 0, so
+    they change smoothly over time.
+    Source: Wang et al. 2010, "Locality-constrained linear coding", Eq. 7. Deviation: the penalty is d / (1 - d / D)
+    of squared distances d, of which D is the largest. What it gains: docs/results/panel.md.
     Cost: O(T·N·D) for distances, O(T·MIXED³).
     """
     count = min(MIXED_CANDIDATES, len(recorded))
@@ -162,6 +165,7 @@ def drawn_to_recorded(wanted: Values, recorded: Values) -> Values:
         steps = recorded[near] - some[:, None]
         products = (steps @ steps.swapaxes(1, 2)).astype(np.float64)
         penalty = np.take_along_axis(distances, near, axis=1).astype(np.float64)
+        penalty /= 1 + LEAST_NEARNESS - penalty / np.maximum(penalty.max(axis=1, keepdims=True), np.finfo(float).tiny)
         least = NO_DISTANCE * np.trace(products, axis1=1, axis2=2)[:, None] + np.finfo(float).tiny
         products[:, np.arange(count), np.arange(count)] += penalty + least
         weights = np.maximum(np.linalg.solve(products, np.ones((len(some), count, 1)))[:, :, 0], 0)

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
+from lipmotion.errors import InputError
 from lipmotion.study.answers import Answer, write_answers
 from lipmotion.study.manifest import Study, read_study
 from lipmotion.study.store import AnswerSheet, StudyStore, rater_name, rater_number
@@ -22,12 +23,19 @@ def collected_answers(folder: Path) -> list[Answer]:
         return list(answers_of(study, store.sheets()))
 
 
-def export_answers(folder: Path, output: Path) -> int:
+def export_answers(folder: Path, output: Path, rater: str | None = None) -> int:
     """Write the answers of a study as CSV (``write_answers``); return how many there are.
 
-    Raises InputError: as ``collected_answers``. Raises ExportError: the file cannot be written.
+    rater : name of the only rater whose answers are written, as the page shows it; None: all raters
+    Raises InputError: as ``collected_answers``, or no answers of this rater. Raises ExportError: the file cannot be
+    written.
     """
     answers = collected_answers(folder)
+    if rater is not None:
+        name = rater_name(rater_number(rater))
+        answers = [answer for answer in answers if answer.rater == name]
+        if not answers:
+            raise InputError(f"{folder}: no answers of the rater {name}; the names are in the exported answers")
     write_answers(output, answers)
     return len(answers)
 
