@@ -61,6 +61,7 @@ def test_frames_at_the_steps_have_the_values_of_the_steps() -> None:
     steps = np.random.default_rng(0).standard_normal((6, 2))
     curve = between_steps(steps, 23)
     np.testing.assert_allclose(curve[::STEP], steps, atol=1e-12)
+    np.testing.assert_allclose(between_steps(steps, 23, first=2), np.concatenate([steps[[0, 0]], curve[:21]]))
 
 
 def test_a_straight_line_stays_straight_inside() -> None:

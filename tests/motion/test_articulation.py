@@ -88,6 +88,12 @@ def test_unknown_contexts_follow_the_table_and_unreliable_phones_do_not(prior: A
     np.testing.assert_allclose(precisions, own)
     ignored, _ = prior.blended(statistics, units, frames, 0.0)(slice(0, frames))
     np.testing.assert_allclose(ignored, own)
+    beside = replace(prior, known_voice_share=0.3)
+    unknown_voice, _ = beside.blended(statistics, units, frames, 1.0, voice=0.0)(slice(0, frames))
+    np.testing.assert_allclose(unknown_voice, followed)
+    known_voice, _ = beside.blended(statistics, units, frames, 1.0)(slice(0, frames))
+    less = (known_voice - own)[100, 0] / (table - own)[100, 0]
+    np.testing.assert_allclose(less / (1 - less), 0.3 * share / (1 - share))
 
 
 def test_ranges_of_frames_have_the_dynamics_of_the_whole() -> None:

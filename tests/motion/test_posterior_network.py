@@ -8,6 +8,7 @@ import pytest
 from lipmotion.errors import CorpusError, InputError, ModelFormatError
 from lipmotion.motion import posterior_network
 from lipmotion.motion.acoustic_network import POSTERIOR_SHARES, AcousticNetwork
+from lipmotion.motion.network_steps import STEP
 from lipmotion.motion.posterior_network import PosteriorNetwork
 from lipmotion.motion.predictors import PredictorTraining, predictor_arrays, predictor_from_arrays
 from lipmotion.pipeline.model import load_model
@@ -112,6 +113,19 @@ def test_it_is_stored_and_restored(network: PosteriorNetwork) -> None:
     with pytest.raises(ModelFormatError, match="train again"):
         predictor_from_arrays(earlier, 2)
     assert restored.predict(speech(99))[0] == pytest.approx(network.predict(speech(99))[0], abs=0.02)
+
+
+def test_motion_comes_as_much_later_as_the_speech(network: PosteriorNetwork) -> None:
+    spoken, rows = speech(99), posteriors(99)
+    cut = replace(spoken.features, values=spoken.features.values[2:])
+    later = replace(spoken, features=cut, spectrum=spectrum(99)[2:], posteriors=replace(rows, values=rows.values[1:]))
+    whole, shifted = network.predict(spoken)[0], network.predict(later)[0]
+    margin = STEP * (network.network.reach + 2)
+    inner = slice(margin, FRAMES - 2 - margin)
+    assert shifted[inner] == pytest.approx(whole[2:][inner], abs=1e-4)
+    assert np.abs(shifted[inner] - whole[inner]).max() > 1e-3
+    one = replace(later, posteriors=replace(rows, values=rows.values[:1]), spectrum=spectrum(99)[:2])
+    assert np.isfinite(network.predict(one)[0]).all()
 
 
 def test_posteriors_of_another_version_are_refused(network: PosteriorNetwork) -> None:

@@ -18,7 +18,7 @@ from lipmotion.engines.trajectory.experts import NETWORK_SHARE
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.extensions import GROUPS
 from lipmotion.motion.acoustic_network import AcousticNetwork
-from lipmotion.motion.articulation import TABLE_WEIGHT_WITH_PREDICTOR
+from lipmotion.motion.articulation import KNOWN_VOICE_SHARE, TABLE_WEIGHT_WITH_PREDICTOR
 from lipmotion.motion.posterior_network import PosteriorNetwork
 from lipmotion.motion.predictors import (
     AUTOMATIC,
@@ -87,6 +87,7 @@ def test_the_trajectory_engine_relies_on_a_predictor_as_far_as_it_is_right(
     assert plain.network_share == NETWORK_SHARE
     assert plain.motion.prior.contexts is plain.prior.contexts
     assert plain.motion.prior.weight == TABLE_WEIGHT_WITH_PREDICTOR < plain.prior.weight
+    assert plain.motion.prior.known_voice_share == KNOWN_VOICE_SHARE < plain.prior.known_voice_share
     fit = installed.fit
     monkeypatch.setattr(installed, "fit", lambda training: PredictorFit(fit(training).predictor, training.values))
     assert engine("trajectory", "frames").fit(examples(4), silent_monitor).model.network_share == pytest.approx(1)

@@ -37,7 +37,7 @@ LEAST_STEPS = 600
 """Least number of optimiser steps: with few recordings, each is used more often."""
 LEAST_MOTION_S = 120.0
 """Seconds of measured motion from which on a network is trained."""
-POSTERIOR_SHARES = (0.7, 1.0)
+POSTERIOR_SHARES = (0.85, 1.0)
 """Share of the network that knows posteriors, for a voice that training knows and for one that it does not. It is
 trained on clean speech, the other one in noise and rooms."""
 SURE_POSTERIORS = (0.75, 0.9)

@@ -18,6 +18,7 @@ from lipmotion.motion.closure import OPENING
 from lipmotion.motion.frame_labels import with_neighbours
 from lipmotion.motion.rest import away_from_speech, speech_intervals
 from lipmotion.motion.space import MotionSpace
+from lipmotion.motion.speaker_knowledge import strangeness
 from lipmotion.stats.delta_windows import with_dynamics
 from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays
 from lipmotion.types import EYE_DISTANCE, FRAME_RATE_HZ, Example, Timeline, Unit, frames_of
@@ -47,6 +48,8 @@ TABLE_WEIGHT = 4.0
 """Weight of the table beside the means of states, in a context that training never saw."""
 TABLE_WEIGHT_WITH_PREDICTOR = 1.0
 """The same where a predictor that asks for no context stands beside the states."""
+KNOWN_VOICE_SHARE = 0.3
+"""Share of that weight for a voice that training knows: of its speaker the predictor knows more than the table."""
 POWER = 3
 """The weight of the table grows with this power of the reliability, for phones that are wrong make contexts unknown,
 and of how unknown a context is: the table has a third of the weight where training saw the context once, an eighth
@@ -63,12 +66,14 @@ class ArticulationPrior:
     matrix   : change of the motion space with each articulator, per standard deviation of the speaker [shape=(8, Q)]
     contexts : occurrences in training of each phone between its neighbours; pauses count as silence
     weight   : of the table beside a model's own means, in a context that training never saw
+    known_voice_share : share of that weight for a voice that training knows
     """
 
     centre: Array
     matrix: Array
     contexts: Mapping[Context, int]
     weight: float = TABLE_WEIGHT
+    known_voice_share: float = 1.0
 
     def trajectory(self, units: Timeline[Unit], frames: int, reliability: Array | float = 1.0) -> Array:
         """Return the motion of phones in time, in the motion space [shape=(frames, Q)].
@@ -94,17 +99,24 @@ class ArticulationPrior:
         return smoothed(steps)[:, 0]
 
     def blended(
-        self, statistics: Callable[[slice], Statistics], units: Timeline[Unit], frames: int, reliability: Array | float
+        self,
+        statistics: Callable[[slice], Statistics],
+        units: Timeline[Unit],
+        frames: int,
+        reliability: Array | float,
+        voice: float = 1.0,
     ) -> Callable[[slice], Statistics]:
         """Return means and precisions of ranges of frames, drawn towards the table where training saw little.
 
         statistics  : returns those of a model
         reliability : of the phones in time, 0 to 1 [shape=(frames,)]
+        voice       : how well training knows the voice, 0 to 1
         Precisions stay those of the model.
         """
         values = self.trajectory(units, frames)
         unknown = 1 - self.familiarity(units, frames)
-        weight = self.weight * (np.asarray(reliability) * unknown) ** POWER
+        of_voice = self.known_voice_share + strangeness(voice) * (1 - self.known_voice_share)
+        weight = of_voice * self.weight * (np.asarray(reliability) * unknown) ** POWER
         share = (weight / (1 + weight))[:, None, None]
 
         def drawn(chosen: slice) -> Statistics:

@@ -113,7 +113,7 @@ class LearnedMotion:
         pins = resolved_pins(constraints, self.space, frames)
         scaling, reach_s = self.scaling, REACH_S
         if self.prior is not None:
-            statistics = self.prior.blended(statistics, units, frames, reliability)
+            statistics = self.prior.blended(statistics, units, frames, reliability, voice)
             if voice < 1 and scaling is not None and self.closure is not None:
                 column, reach_s = self.closure.column, closing_reach_s(voice)
                 statistics = with_contrast(statistics, self.prior, units, frames, reliability, voice)

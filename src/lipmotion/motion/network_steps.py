@@ -36,13 +36,14 @@ LONGEST_STEPS = 250
 """Longer recordings are cut into pieces of so many time steps, 10 s, for training."""
 
 
-def between_steps(steps: Array, frames: int) -> Array:
+def between_steps(steps: Array, frames: int, first: int = 0) -> Array:
     """Return values at time steps of 40 ms [shape=(N, C)] interpolated to frames of 10 ms [shape=(frames, C)].
 
+    first : frame of the first time step; those before it have the same values
     Source: Catmull & Rom 1974; the curve has no corners, and passes through the values.
     """
     padded = np.concatenate([steps[:1], steps, steps[-1:], steps[-1:]])
-    position, u = np.divmod(np.arange(frames), STEP)
+    position, u = np.divmod(np.maximum(np.arange(frames) - first, 0), STEP)
     u = (u / STEP)[:, None]
     before, here, after, last = (padded[np.minimum(position + k, len(padded) - 1)] for k in range(4))
     return here + u / 2 * (

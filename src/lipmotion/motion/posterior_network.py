@@ -36,6 +36,7 @@ from lipmotion.types import FRAME_RATE_HZ, SPECTRUM_BANDS, Example, Speech, Toke
 Array = NDArray[np.float64]
 ROWS = 2
 """Rows of posteriors, of 20 ms each, in a time step of the network."""
+ROW_FRAMES = STEP // ROWS
 COMPONENTS = 120
 """Principal components of the logarithms of the posteriors: what the network says of phones that are not there tells
 more than the phone that is."""
@@ -49,6 +50,8 @@ SPECTRUM_OFF = 0.3
 """Share of the training in which the spectrum is switched off (0)."""
 SHAPE = NetworkShape("posterior", "posterior-network", SPECTRUM + ROWS * COMPONENTS, 128, (1, 2, 4, 8, 1, 2, 4))
 """Its input is 0.88 s before and after a frame."""
+SHIFTS = 2
+"""Time steps begin at so many rows of posteriors: training draws one of them, the motion is the mean over all."""
 BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED = 16, 2e-3, 0.4, 0
 STEPS = 50.0
 """Optimiser steps by the square root of the seconds of motion: 390 for a minute, 1,800 for 22 minutes."""
@@ -111,11 +114,11 @@ class PosteriorNetwork(Predictor):
         rows = [_limited(posteriors) for posteriors in found]
         mean, basis = _principal_components(rows)
         spectra = _spectra_of(training.examples)
-        inputs = [_inputs(row, x, mean, basis) for row, x in zip(rows, spectra, strict=True)]
+        inputs = [_inputs((row - mean) @ basis, x) for row, x in zip(rows, spectra, strict=True)]
         network = _trained(training, inputs, centre, scale)
         predicted = (
-            between_steps(network(x).astype(float), len(values)) * scale + centre
-            for x, values in zip(inputs, training.values, strict=True)
+            _outputs(network, shifted, len(values)) * scale + centre
+            for shifted, values in zip(inputs, training.values, strict=True)
         )
         variances = error_variances(training, predicted, scale)
         return cls(network, mean, basis, centre, scale, variances, found[0].source)
@@ -144,14 +147,18 @@ class PosteriorNetwork(Predictor):
 
         Raises InputError: posteriors of another phone recogniser than in training.
         """
-        inputs = _inputs(_limited(self._checked(posteriors)), None, self.mean, self.basis)
-        rows = self.network.hidden(inputs)
+        rows = self.network.hidden(_inputs(self._components(self._checked(posteriors)), None)[0])
         return rows[np.minimum(np.arange(steps), len(rows) - 1)]
 
     def _predict(self, posteriors: TokenPosteriors, spectrum: NDArray[np.floating] | None, frames: int) -> Array:
         """Return motion in the motion space [shape=(frames, Q)], with the spectrum or without."""
-        steps = self.network(_inputs(_limited(posteriors), spectrum, self.mean, self.basis)).astype(float)
-        return between_steps(steps, frames) * self.scale + self.centre
+        shifted = _inputs(self._components(posteriors), spectrum)
+        return _outputs(self.network, shifted, frames) * self.scale + self.centre
+
+    def _components(self, posteriors: TokenPosteriors) -> NDArray[np.float32]:
+        """Return the principal components of the logarithms of posteriors [shape=(N, 120)]."""
+        components: NDArray[np.float32] = (_limited(posteriors) - self.mean) @ self.basis
+        return components
 
     def _checked(self, posteriors: TokenPosteriors | None) -> TokenPosteriors:
         """Return the posteriors; raise InputError where there are none, or those of another phone recogniser."""
@@ -213,20 +220,20 @@ def _spectra_of(examples: Sequence[Example]) -> list[NDArray[np.floating] | None
 
 
 def _trained(
-    training: PredictorTraining, inputs: Sequence[NDArray[np.float32]], centre: Array, scale: Array
+    training: PredictorTraining, inputs: Sequence[Sequence[NDArray[np.float32]]], centre: Array, scale: Array
 ) -> ConvolutionalNetwork:
     """Return the trained network.
 
-    inputs : of each example in its time steps [each shape=(N, 400)]
+    inputs : of each example in its time steps, by shift [each shape=(N, 400)]
     """
-    pieces = []
-    for rows, x, example in zip(inputs, training.values, training.examples, strict=True):
-        frames = np.minimum(np.arange(len(rows)) * STEP, len(x) - 1)
-        targets = ((x - centre) / scale)[frames].astype(np.float32)
-        pieces.append(TrainingSequence(rows, targets, example.valid[frames]))
+    sequences = [
+        [_sequence(rows, (x - centre) / scale, example.valid, shift) for shift, rows in enumerate(shifted)]
+        for shifted, x, example in zip(inputs, training.values, training.examples, strict=True)
+    ]
 
     def draw(rng: np.random.Generator, number: int) -> TrainingSequence:
-        piece = random_piece(pieces[number], rng)
+        shifted = sequences[number]
+        piece = random_piece(shifted[int(rng.integers(len(shifted)))], rng)
         if rng.random() >= SPECTRUM_OFF:
             return piece
         rows = piece.inputs.copy()
@@ -235,8 +242,21 @@ def _trained(
 
     motion_s = sum(int(example.valid.sum()) for example in training.examples) / FRAME_RATE_HZ
     steps = max(round(STEPS * math.sqrt(motion_s)), 1)
-    plan = TrainingPlan(steps, min(BATCH_SIZE, len(pieces)), LEARNING_RATE, DROPOUT, SEED)
+    plan = TrainingPlan(steps, min(BATCH_SIZE, len(sequences)), LEARNING_RATE, DROPOUT, SEED)
     return SHAPE.trained(training, len(centre), draw, plan)
+
+
+def _sequence(rows: NDArray[np.float32], targets: Array, valid: NDArray[np.bool_], shift: int) -> TrainingSequence:
+    """Return inputs of time steps [shape=(N, 400)] with their targets, which are given by frame [shape=(T, Q)]."""
+    frames = np.minimum(np.arange(len(rows)) * STEP + shift * ROW_FRAMES, len(targets) - 1)
+    return TrainingSequence(rows, targets[frames].astype(np.float32), valid[frames])
+
+
+def _outputs(network: ConvolutionalNetwork, shifted: Sequence[NDArray[np.float32]], frames: int) -> Array:
+    """Return the outputs of a network, the mean over all shifts of its inputs [shape=(frames, Q)]."""
+    outputs = [between_steps(network(x).astype(float), frames, s * ROW_FRAMES) for s, x in enumerate(shifted)]
+    mean: Array = np.mean(outputs, axis=0)
+    return mean
 
 
 def _principal_components(rows: Sequence[NDArray[np.float32]]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -256,23 +276,25 @@ def _limited(posteriors: TokenPosteriors) -> NDArray[np.float32]:
     return limited
 
 
-def _inputs(
-    rows: NDArray[np.float32],
-    spectrum: NDArray[np.floating] | None,
-    mean: NDArray[np.float32],
-    basis: NDArray[np.float32],
-) -> NDArray[np.float32]:
-    """Return the inputs in every time step [shape=(ceil(N / 2), 400)].
+def _inputs(components: NDArray[np.float32], spectrum: NDArray[np.floating] | None) -> list[NDArray[np.float32]]:
+    """Return the inputs in every time step, by shift [each shape=(ceil((N - shift) / 2), 400)].
 
-    rows     : logarithms of posteriors [shape=(N, K)]
-    spectrum : normalised log mel spectrum [shape=(T, 40)]; None: switched off
-    The spectrum of each time step stands before the components of the posteriors of its two rows.
+    components : of posteriors [shape=(N, 120)]
+    spectrum   : normalised log mel spectrum [shape=(T, 40)]; None: switched off
+    The spectrum of each time step stands before the components of its two rows. A single row is not shifted.
     """
-    components = (rows - mean) @ basis
-    filled = np.concatenate([components, np.repeat(components[-1:], len(rows) % ROWS, axis=0)])
+    return [_shifted_inputs(components, spectrum, shift) for shift in range(min(SHIFTS, len(components)))]
+
+
+def _shifted_inputs(
+    components: NDArray[np.float32], spectrum: NDArray[np.floating] | None, shift: int
+) -> NDArray[np.float32]:
+    """Return the inputs in every time step, of which the first begins at a row of posteriors."""
+    rows = components[shift:]
+    filled = np.concatenate([rows, np.repeat(rows[-1:], len(rows) % ROWS, axis=0)])
     result = np.zeros((len(filled) // ROWS, SHAPE.inputs), np.float32)
     result[:, SPECTRUM:] = filled.reshape(len(result), -1)
     if spectrum is not None:
-        steps = spectrum_steps(spectrum)
+        steps = spectrum_steps(spectrum[min(shift * ROW_FRAMES, len(spectrum) - 1) :])
         result[:, :SPECTRUM] = steps[np.minimum(np.arange(len(result)), len(steps) - 1)]
     return result

@@ -19,7 +19,7 @@ from lipmotion.hmm.multistream.phone_recogniser import (
     recogniser_from_arrays,
 )
 from lipmotion.motion.arrays import MOTION_ARRAYS, motion_arrays, motion_from_arrays
-from lipmotion.motion.articulation import TABLE_WEIGHT_WITH_PREDICTOR, ArticulationPrior
+from lipmotion.motion.articulation import KNOWN_VOICE_SHARE, TABLE_WEIGHT_WITH_PREDICTOR, ArticulationPrior
 from lipmotion.motion.closure import Closure
 from lipmotion.motion.frame_labels import StateLayout
 from lipmotion.motion.generation import LearnedMotion
@@ -76,7 +76,8 @@ class TrajectoryModel:
         scaling = VarianceScaling(self.variance_factors, self.emission.means[-1, 0])
         prior = self.prior
         if prior is not None and self.network is not None:
-            prior = None if self.network.uses_articulation else replace(prior, weight=TABLE_WEIGHT_WITH_PREDICTOR)
+            beside = replace(prior, weight=TABLE_WEIGHT_WITH_PREDICTOR, known_voice_share=KNOWN_VOICE_SHARE)
+            prior = None if self.network.uses_articulation else beside
         return LearnedMotion(self.space, self.closure, self.limits, scaling, prior, self.modulation)
 
     @property
