@@ -12,7 +12,7 @@ SENTENCE = ("t", "aa", "p", "iy", "m", "uw", "s", "aa")
 
 
 def test_it_leans_on_recognised_phones_as_far_as_the_voice_is_unknown_or_words_confirm_them():
-    engine = engine_named("coupled", {"mixtures": 1, "closures": False})
+    engine = engine_named("coupled", {"states": 1, "asynchrony": 0, "mixtures": 1, "closures": False})
     model = engine.fit(examples(4), silent_monitor).model
     recognised = replace(speech(timeline(SENTENCE)), units_known=False)
 
