@@ -45,7 +45,8 @@ class CoupledConfig(Configuration):
     components : principal components that all point channels are reduced to
     variance_scaling : scale movements to the variance of the recorded ones
     closures   : make the lips meet in every p, b and m
-    articulation : lean on the table of English articulation in contexts that training saw little of
+    articulation : lean on the table of English articulation in contexts that training saw little of; less where the
+                 phones are recognised, words do not confirm them, and training knows the voice
     modulation_filter : how far generated motion is given the modulation spectrum of recorded motion: as of the
                  trajectory engine (``trajectory`` conversion only; docs/results/jerk.md)
     """

@@ -79,7 +79,14 @@ class CoupledEngine(Engine[CoupledModel]):
 
         learned = model.motion if self.config.variance_scaling else replace(model.motion, scaling=None)
         learned = learned.for_voice(speech.voice)
-        motion, variance = learned.generate(statistics, frames, speech.units, constraints, close=self.config.closures)
+        motion, variance = learned.generate(
+            statistics,
+            frames,
+            speech.units,
+            constraints,
+            close=self.config.closures,
+            reliability=np.maximum(speech.confidence, 1 - speech.voice),  # the chains know their own voice better
+        )
         states, positions = np.unique(path, return_inverse=True)
         return Generation(
             motion,
