@@ -120,7 +120,10 @@ def test_the_figures_are_those_of_the_verb_evaluate(
 @LONG
 def test_a_second_run_trains_nothing(figures: dict[str, Any], toy_corpus: Corpus, folder: Path) -> None:
     before = {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
-    again = engines(toy_corpus, split="test", models=folder, settings=SMALL)
+    received: set[tuple[str, str]] = set()
+    settings = replace(SMALL, receive=lambda system, condition, *_: received.add((condition, system)))
+    again = engines(toy_corpus, split="test", models=folder, settings=settings)
+    assert received == {(c, s) for c, found in again["conditions"].items() for s in found["systems"] if s != MEAN}
     assert {path.name: path.stat().st_mtime_ns for path in folder.iterdir()} == before
     assert sorted(before) == sorted(f"{name}.lipmotion" for name in ENGINES_COMPARED)
     assert [row["seconds"] for row in again["models"].values()] == [None] * 3

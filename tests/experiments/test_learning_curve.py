@@ -90,12 +90,15 @@ def test_by_default_the_training_list_is_shuffled(toy_corpus: Corpus, monkeypatc
     def result(_: object, names: Sequence[str], held_out: Sequence[str], *__: object) -> SimpleNamespace:
         trained.append(list(names))
         assert tuple(held_out) == toy_corpus.names("test")
-        return SimpleNamespace(recordings=SimpleNamespace(closed_under=0.1))
+        return SimpleNamespace(recordings=SimpleNamespace(closed_under=0.1), clips={"audio only": []})
 
     monkeypatch.setattr(module, "SIZES", (3, 9))
     monkeypatch.setattr(module, "train_and_generate", result)
     monkeypatch.setattr(module, "_row", lambda *_: {})
-    figures = learning_curve(toy_corpus, settings=ExperimentSettings(seed=1))
+    received: list[tuple[str, str]] = []
+    settings = ExperimentSettings(seed=1, receive=lambda *given: received.append(given[:2]))
+    figures = learning_curve(toy_corpus, settings=settings)
+    assert received == [("3 recordings", "audio only"), ("8 recordings", "audio only")]
     names = toy_corpus.names("train")
     mixed = [names[i] for i in np.random.default_rng(1).permutation(8)]
     assert sorted(mixed[:3]) != list(names[:3])

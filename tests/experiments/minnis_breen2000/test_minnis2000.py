@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from lipmotion.experiments.minnis_breen2000.text import table
 from lipmotion.experiments.runner import ExperimentSettings
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.evaluation.evaluate import evaluate
+from lipmotion.pipeline.evaluation.held_out import ComparedClip, HeldOutRecordings
 from lipmotion.pipeline.training.train import train
 
 LONG = pytest.mark.long
@@ -60,7 +62,15 @@ def test_the_row_as_printed_is_the_preset(figures: dict[str, Any], toy_corpus: C
 
 @LONG
 def test_a_second_run_does_not_train(figures: dict[str, Any], toy_corpus: Corpus, folder: Path) -> None:
-    again = minnis2000(toy_corpus, models=folder, settings=ExperimentSettings(recogniser=PHONE_MODELS))
+    received: list[tuple[str, str, str, int]] = []
+
+    def receive(system: str, condition: str, recordings: HeldOutRecordings, clips: Sequence[ComparedClip]) -> None:
+        received.append((recordings.utterances[0].split, condition, system, len(clips)))
+
+    settings = ExperimentSettings(recogniser=PHONE_MODELS, receive=receive)
+    again = minnis2000(toy_corpus, models=folder, settings=settings)
+    conditions = {(split, c, 2) for split, found in again["lists"].items() for c in found["conditions"]}
+    assert sorted(received) == sorted((split, c, row, n) for split, c, n in conditions for row in rows())
     assert (figures["seconds"] > 0, again["seconds"]) == (True, None)
     assert again["lists"] == figures["lists"]
 

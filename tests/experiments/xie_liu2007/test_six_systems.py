@@ -190,8 +190,11 @@ def test_the_text_names_every_system(figures: dict[str, Any]) -> None:
 @pytest.mark.parametrize("visual", ["both"])
 def test_eigenlips(visual: str, toy_corpus: Corpus) -> None:
     options = ComparisonOptions(systems=["trajectory HMM"], visual=visual, train_on=20)  # more than there are
-    made = xieliu2007(toy_corpus, options, settings=SMALL)
+    received: list[tuple[str, str]] = []
+    settings = replace(SMALL, receive=lambda *given: received.append(given[:2]))
+    made = xieliu2007(toy_corpus, options, settings=settings)
     assert made["rows"][0]["names"] == 8
+    assert received == [(name, "audio only") for name in made["rows"][0]["training"]]
     model = train(toy_corpus, recogniser=PHONE_MODELS, visual=visual)[0]
     expected_figures = evaluate(model, toy_corpus)["conditions"]["audio only"]
     row = made["rows"][0]["conditions"]["audio only"]["trajectory HMM"]

@@ -165,6 +165,11 @@ class _Writer:
     lacking: Mapping[str, str]
     digest: str
 
+    @property
+    def name(self) -> str:
+        """The name of the corpus: that of its folder."""
+        return self.corpus.path.resolve().name
+
     def key(self, name: str) -> str:
         """Return a digest of all that the figures of an experiment depend on."""
         return hashlib.sha256(f"{name} {self.digest}".encode()).hexdigest()
@@ -192,9 +197,9 @@ class _Writer:
             for name in PARTS
             if name not in there
         }
-        summary = self.corpus.summary() | {"corpus": self.corpus.path.name}
+        summary = self.corpus.summary() | {"corpus": self.name}
         about = summary | {"made with": self._command(wanted)}
-        text = ReportPage(f"Experiments on {self.corpus.path.name}", about, finished, left_open, self.quick).as_html()
+        text = ReportPage(f"Experiments on {self.name}", about, finished, left_open, self.quick).as_html()
         page = self.folder / PAGE
         if not page.is_file() or page.read_text("utf-8", errors="replace") != text:
             with whole_file(page) as unfinished:
@@ -232,11 +237,11 @@ class _Writer:
         options = {"quick": "yes" if self.quick else "no", "workers": self.settings.workers}
         options |= {"lexicon": "the user's" if self.settings.lexicon else "none but the dictionary"}
         lists = {split: len(self.corpus.names(split)) for split in SPLITS}
-        about = {"name": self.corpus.path.name, "SHA-256": corpus_digest(self.corpus), **lists}
+        about = {"name": self.name, "SHA-256": corpus_digest(self.corpus), **lists}
         return {"corpus": about, "seed": self.settings.seed, "options": options, **machine_stamp()}
 
     def _command(self, wanted: Sequence[str]) -> str:
-        words = ["lipmotion experiment all", self.corpus.path.name, "-o", self.folder.name]
+        words = ["lipmotion experiment all", self.name, "-o", self.folder.resolve().name]
         words += ["--only", ",".join(wanted)] if len(wanted) < len(PARTS) else []
         return " ".join([*words, *(["--quick"] if self.quick else [])])
 
