@@ -14,11 +14,13 @@ H. P. Graf et al., "Visual prosody: facial movements accompanying speech", FG 20
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.expression import action_units
 from lipmotion.types import FRAME_RATE_HZ, Motion, Prosody, Timeline, Unit
 from lipmotion.units import is_silent
 
@@ -42,6 +44,14 @@ NOD_RAD, PHRASE_FALL_RAD = 0.045, 0.03
 """How far the head nods with a strong accent, and how much lower a phrase ends than it begins, in radians."""
 STILL_SHARE = 0.35
 """Share of the turning of the head that is left in silence."""
+MOOD_TURNS = {53: (0, 0.1, 0), 54: (0, -0.12, 0), 55: (0, 0, 0.1), 56: (0, 0, -0.1), 57: (0, -0.09, 0), 58: (0, 0.07, 0)}
+"""How far the head turns to its left, upwards and to its left shoulder for an action unit, in radians."""
+MOOD_GAZE_RAD = 0.22
+"""How far the eyes look down for the action unit 64, in radians."""
+DROOPING_LIDS = 0.75
+"""How far the eyes are closed by the action unit 43."""
+UPPER_FACE = (1, 2, 4, 5, 6, 7, 9)
+"""Action units of brows, lids, cheeks and nose."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,12 +62,19 @@ class Liveliness:
     brows : how far the brows are raised, in eye distances [shape=(F,)]
     gaze  : of the eyes against the head, to the character's left and upwards, in radians [shape=(F, 2)]
     turn  : of the head to its left, upwards and to its left shoulder, in radians [shape=(F, 3)]
+    units : what a mood does to brows, lids, cheeks and nose: the action units of ``UPPER_FACE`` that it asks for, 0 to
+            1 [each shape=(F,)]
     """
 
     lids: Curve
     brows: Curve
     gaze: Curve
     turn: Curve
+    units: Mapping[int, Curve] = field(default_factory=dict)
+
+    def unit(self, number: int) -> Curve:
+        """Return an action unit of a mood, 0 to 1 [shape=(F,)]; 0 where no mood asks for it."""
+        return self.units.get(number, np.zeros(len(self.lids)))
 
 
 def liveliness(  # noqa: PLR0913
@@ -90,7 +107,25 @@ def liveliness(  # noqa: PLR0913
     lids = lid_closure(time_s, blink_times(end_s, spoken, _generator(seed, 2))) if blinks else still
     aim = _gaze(time_s, end_s, spoken, _generator(seed, 3)) if gaze else np.zeros((len(time_s), 2))
     raised = _brows(time_s, accent, spoken, _generator(seed, 4)) if brows else still
-    return Liveliness(lids, raised, aim - GAZE_COUNTER_SHARE * turn[:, :2], turn)
+    return _in_mood(
+        Liveliness(lids, raised, aim - GAZE_COUNTER_SHARE * turn[:, :2], turn), action_units(motion, time_s), head=head
+    )
+
+
+def _in_mood(moved: Liveliness, mood: Mapping[int, Curve], *, head: bool) -> Liveliness:
+    """Return movements with those of a mood; the eyes hold their target while the head is turned by it."""
+    if not mood:
+        return moved
+    turn, gaze, lids = moved.turn, moved.gaze.copy(), moved.lids
+    for unit, angles in MOOD_TURNS.items():
+        if head and unit in mood:
+            turned = mood[unit][:, None] * np.array(angles, float)
+            turn, gaze = turn + turned, gaze - GAZE_COUNTER_SHARE * turned[:, :2]
+    if 64 in mood:
+        gaze[:, 1] -= MOOD_GAZE_RAD * mood[64]
+    if 43 in mood:
+        lids = np.maximum(lids, DROOPING_LIDS * mood[43])
+    return Liveliness(lids, moved.brows, gaze, turn, {unit: mood[unit] for unit in UPPER_FACE if unit in mood})
 
 
 def phrases(units: Timeline[Unit]) -> list[tuple[float, float]]:

@@ -1,0 +1,81 @@
+"""Moods over time: what a face expresses beside what it says."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+from lipmotion.errors import InputError, shortened
+
+NEUTRAL = "neutral"
+MOODS = ("happy", "sad", "angry", "afraid", "disgusted", "surprised", "tense", "tired")
+"""The moods that a face shows beside none, ``NEUTRAL``."""
+_KEY = re.compile(r"([a-z]+)(?::([-+]?(?:\d+\.?\d*|\.\d+)))?(?:\s+at\s+([-+]?(?:\d+\.?\d*|\.\d+)))?", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class MoodKey:
+    """A mood that a face goes over to at a time, and keeps until the next one.
+
+    time_s   : seconds in the recording
+    mood     : one of ``MOODS``, or ``NEUTRAL``
+    strength : 0 to 1
+    Raises InputError: no such mood, or a value out of its range.
+
+    >>> str(MoodKey(1.2, "happy", 0.7))
+    'happy:0.7 at 1.2'
+    """
+
+    time_s: float
+    mood: str
+    strength: float = 1.0
+
+    def __post_init__(self) -> None:
+        if self.mood not in (NEUTRAL, *MOODS):
+            near = get_close_matches(self.mood, (NEUTRAL, *MOODS), 1)
+            hint = f" (is it {near[0]}?)" if near else ""
+            raise InputError(
+                f"the mood is {shortened(repr(self.mood))}{hint}, required one of: {NEUTRAL}, {', '.join(MOODS)}"
+            )
+        if not 0 <= self.strength <= 1:
+            raise InputError(f"the strength of the mood {self.mood} is {self.strength:g}, required 0 to 1")
+        if not 0 <= self.time_s < float("inf"):
+            raise InputError(f"the mood {self.mood} begins at {self.time_s:g} s, required 0 or more")
+
+    def __str__(self) -> str:
+        strength = "" if self.strength == 1 else f":{self.strength:g}"
+        return f"{self.mood}{strength} at {self.time_s:g}"
+
+
+def moods_of(text: str) -> tuple[MoodKey, ...]:
+    """Return the moods that a text states, in the order of their times; none for an empty text.
+
+    text : ``MOOD``, ``MOOD:STRENGTH``, or several with their times in seconds: ``happy:0.7, sad at 2.5``
+    Raises InputError: another form, or as ``MoodKey``.
+
+    >>> moods_of("sad at 2.5, happy:0.7")
+    (MoodKey(time_s=0.0, mood='happy', strength=0.7), MoodKey(time_s=2.5, mood='sad', strength=1.0))
+    """
+    found = []
+    for part in filter(None, map(str.strip, text.split(","))):
+        key = _KEY.fullmatch(part)
+        if key is None:
+            raise InputError(
+                f"the mood is {shortened(repr(part))}, required MOOD, MOOD:STRENGTH or MOOD:STRENGTH at SECONDS, "
+                "as happy:0.7 at 2.5; several with commas"
+            )
+        found.append(MoodKey(float(key[3] or 0.0), key[1].lower(), float(key[2] or 1.0)))
+    return in_time(found)
+
+
+def text_of(keys: Iterable[MoodKey]) -> str:
+    """Return moods as the text that ``moods_of`` reads."""
+    return ", ".join(map(str, keys))
+
+
+def in_time(keys: Sequence[MoodKey]) -> tuple[MoodKey, ...]:
+    """Return moods in the order of their times; of several at one time the last."""
+    latest = {key.time_s: key for key in keys}
+    return tuple(latest[time_s] for time_s in sorted(latest))
