@@ -44,7 +44,14 @@ NOD_RAD, PHRASE_FALL_RAD = 0.045, 0.03
 """How far the head nods with a strong accent, and how much lower a phrase ends than it begins, in radians."""
 STILL_SHARE = 0.35
 """Share of the turning of the head that is left in silence."""
-MOOD_TURNS = {53: (0, 0.1, 0), 54: (0, -0.12, 0), 55: (0, 0, 0.1), 56: (0, 0, -0.1), 57: (0, -0.09, 0), 58: (0, 0.07, 0)}
+MOOD_TURNS = {
+    53: (0, 0.1, 0),
+    54: (0, -0.12, 0),
+    55: (0, 0, 0.1),
+    56: (0, 0, -0.1),
+    57: (0, -0.09, 0),
+    58: (0, 0.07, 0),
+}
 """How far the head turns to its left, upwards and to its left shoulder for an action unit, in radians."""
 MOOD_GAZE_RAD = 0.22
 """How far the eyes look down for the action unit 64, in radians."""

@@ -222,9 +222,9 @@ def _parted(gap: Curve, said: dict[str, Curve], mood: dict[int, Curve]) -> Curve
 
 
 def _expressed(mood: dict[int, Curve], said: dict[str, Curve]) -> dict[str, Curve]:
-    """Return what a mood does to the mouth, as far as protruded, tucked and parted lips leave it free [each shape=(T,)].
+    """Return what a mood does to the mouth, as far as protruded and tucked lips leave it free [each shape=(T,)].
 
-    Rounding and teeth on the lip are seen in any mood: they take their share of what pulls at the corners.
+    Rounding, and teeth on the lip, are seen in any mood.
     """
     none = np.zeros(len(said["protrusion"]))
     free = 1 - (1 - ROUND_SHARE) * np.clip(said["protrusion"], 0, 1)

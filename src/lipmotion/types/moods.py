@@ -44,9 +44,26 @@ class MoodKey:
         if not 0 <= self.time_s < float("inf"):
             raise InputError(f"the mood {self.mood} begins at {self.time_s:g} s, required 0 or more")
 
+    @property
+    def label(self) -> str:
+        """The mood with its strength, as ``happy:0.7``."""
+        return self.mood if self.strength == 1 else f"{self.mood}:{self.strength:g}"
+
     def __str__(self) -> str:
-        strength = "" if self.strength == 1 else f":{self.strength:g}"
-        return f"{self.mood}{strength} at {self.time_s:g}"
+        return f"{self.label} at {self.time_s:g}"
+
+
+@dataclass(frozen=True)
+class MoodTag:
+    """A mood that a tag in a text asks for.
+
+    share    : of the words of the text that stand before it, 0 to 1
+    mood, strength : as of ``MoodKey``
+    """
+
+    share: float
+    mood: str
+    strength: float = 1.0
 
 
 def moods_of(text: str) -> tuple[MoodKey, ...]:

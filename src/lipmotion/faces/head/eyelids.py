@@ -38,8 +38,8 @@ LOWER_LID = _curve(
     [(-1, -0.022), (-0.75, -0.053), (-0.3, -0.072), (0.15, -0.074), (0.6, -0.053), (0.85, -0.018), (1, 0.018)]
 )
 WIDE_RISE, SQUINT_RISE, SQUINT_FALL, SLANT = 0.034, 0.044, 0.018, 0.042
-"""How far a mood raises the upper lid, raises the lower one and lowers the upper one, and how far lowered brows lower the
-inner half of the upper lid, brows raised at their inner ends the outer half."""
+"""How far a mood raises the upper lid, raises the lower one and lowers the upper one, and how far lowered brows lower
+the inner half of the upper lid, brows raised at their inner ends the outer half."""
 LOWER_LID_RISE = 0.028
 """How far the middle of the lower lid rises to meet the upper one."""
 

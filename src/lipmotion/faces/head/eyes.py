@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from lipmotion.faces.head import palette
 from lipmotion.faces.head.forms import EYE, EYEBALL_RADIUS, head, seen_from_front
 from lipmotion.faces.head.part import Part, grid_triangles, joined_parts, part, tube
+from lipmotion.faces.head.pose import CharacterPose
 
 Real = NDArray[np.float64]
 
@@ -130,8 +131,8 @@ def brow() -> Part:
 
 
 INNER_RISE, OUTER_RISE, LOWERED, TOGETHER = 0.12, 0.1, (0.1, 0.03), 0.055
-"""How far a mood raises the inner and the outer ends of the brows, lowers the inner ends, and outer ones, and draws them
-together."""
+"""How far a mood raises the inner and the outer ends of the brows, lowers the inner ends, and outer ones, and draws
+them together."""
 
 
 def brow_shift(places: Real, pose: CharacterPose) -> Real:

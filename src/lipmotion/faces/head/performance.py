@@ -76,7 +76,13 @@ def posed(mouth: SpokenMouth, moved: Liveliness) -> list[CharacterPose]:
         + (MOOD_SMILE * mouth.smile - MOOD_FROWN * mouth.frown - MOOD_TIGHT * serious) * (1 - roundness),
         "shut": moved.lids,
         "brows": moved.brows,
-        **dict(zip(("inner", "outer", "lowered", "wide", "cheek", "squint", "sneer"), map(moved.unit, UPPER_FACE), strict=True)),
+        **dict(
+            zip(
+                ("inner", "outer", "lowered", "wide", "cheek", "squint", "sneer"),
+                map(moved.unit, UPPER_FACE),
+                strict=True,
+            )
+        ),
     }
     rows = np.stack(list(curves.values()), axis=1).tolist()
     return [

@@ -20,7 +20,7 @@ LID_POSITIONS = 16
 MOOD_LIDS = 8
 """Positions of the lids on the way to a mood."""
 WIDE_RISE, SQUINT_RISE, SQUINT_FALL, LID_SLANT = 0.045, 0.055, 0.025, 0.045
-"""How far a mood raises the upper lids, and the lower ones, and how far it then lowers the upper ones; and how far lowered
+"""How far a mood raises the upper lids, and the lower ones, and how far it then lowers the upper ones; how far lowered
 brows take the inner half of the upper lids with them, and brows raised at their inner ends leave the outer half."""
 GAZE_STEPS = 8
 """Positions of the gaze in a pixel."""
@@ -119,7 +119,10 @@ def _lids(design: Design, lids: LidPose) -> tuple[Knots, Knots]:
     if lids[1:] != (0,) * len(lids[1:]):  # the corners stay
         bow = (0.0, 0.8, 1.0, 0.8, 0.0)
         half = (0.0, 1.0, 0.6, 0.15, 0.0) if slant > 0 else (0.0, 0.15, 0.6, 1.0, 0.0)
-        moved = [(SQUINT_FALL * squint - WIDE_RISE * wide) * a + LID_SLANT * abs(slant) * b for a, b in zip(bow, half, strict=True)]
+        moved = [
+            (SQUINT_FALL * squint - WIDE_RISE * wide) * a + LID_SLANT * abs(slant) * b
+            for a, b in zip(bow, half, strict=True)
+        ]
         upper = tuple((x, y + by) for (x, y), by in zip(upper, moved, strict=True))
         lower = tuple((x, y - SQUINT_RISE * squint * share) for (x, y), share in zip(lower, bow, strict=True))
     return tuple((x, y + shut * (low - y)) for (x, y), (_, low) in zip(upper, lower, strict=True)), lower

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +28,7 @@ from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.storage.files import read_text_file
 from lipmotion.types import Audio, Constraints, Span, SpokenText, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent
+from lipmotion.units.mood_tags import moods_in_time, tagged_text
 from lipmotion.units.sentences import MOST_CHARACTERS, sentences_of
 
 CORPUS_VOICE = "corpus"
@@ -98,6 +100,7 @@ def speak(  # noqa: PLR0913
             pauses=pauses,
             asymmetry=asymmetry,
         )
+    text, tags = tagged_text(text)
     sentences = sentences_of(text)
     chosen = voice_named(voice) if isinstance(voice, str) else voice or default_voice()
     loaded = model if isinstance(model, Model) else load_model(model)
@@ -113,7 +116,8 @@ def speak(  # noqa: PLR0913
         pauses=pauses,
         asymmetry=asymmetry,
     )
-    return SpokenText(sound, animate(request, model=loaded, constraints=constraints))
+    generation = animate(request, model=loaded, constraints=constraints)
+    return SpokenText(sound, replace(generation, moods=moods_in_time(tags, units)))
 
 
 def read_text(path: Path) -> str:
