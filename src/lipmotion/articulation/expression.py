@@ -100,8 +100,8 @@ def _curves(keys: Sequence[MoodKey], time_s: Curve) -> dict[str, Curve]:
         begin_s = key.time_s - CHANGE_S[0]
         share = np.clip((time_s - begin_s) / sum(CHANGE_S), 0, 1) if key.time_s > 0 else np.ones(len(time_s))
         share = share * share * (3 - 2 * share)
-        for mood in curves:
-            curves[mood] = curves[mood] + share * ((key.strength if mood == key.mood else 0.0) - curves[mood])
+        wanted = dict.fromkeys(curves, 0.0) | {key.mood: key.strength}
+        curves = {mood: curve + share * (wanted[mood] - curve) for mood, curve in curves.items()}
     return curves
 
 

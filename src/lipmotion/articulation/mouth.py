@@ -48,6 +48,8 @@ LEAST_CHIN_DROP_SHARE = 0.75
 """Least drop of the chin, as a share of the usual one: trackers of small jaws, and models of them, show less."""
 ROUND_SHARE = 0.15
 """Share of a smile, of corners pulled down or apart, and of a raised lip that is left on wholly protruded lips."""
+PARTED_ROUND_SHARE = 0.75
+"""Share by which a mood parts protruded lips less than others."""
 SMILE_WIDTH, STRETCH_WIDTH, DROPPED_WIDTH = 0.16, 0.16, -0.14
 """A full smile, lips stretched in fear, and lips over a dropped jaw are so much wider than at rest."""
 PARTED_GAP, DROPPED_GAP, RAISED_GAP = 0.05, 0.19, 0.05
@@ -218,7 +220,8 @@ def _parted(gap: Curve, said: dict[str, Curve], mood: dict[int, Curve]) -> Curve
     )
     if isinstance(wanted, int):
         return gap
-    return gap + (1 - said["lip_press"]) * wanted * np.clip(1 - gap / (2 * DROPPED_GAP), 0, 1)
+    free = np.clip(1 - 2 * said["lip_press"], 0, 1) * (1 - PARTED_ROUND_SHARE * said["protrusion"])
+    return gap + free * wanted * np.clip(1 - gap / (2 * DROPPED_GAP), 0, 1)
 
 
 def _expressed(mood: dict[int, Curve], said: dict[str, Curve]) -> dict[str, Curve]:

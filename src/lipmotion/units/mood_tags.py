@@ -52,7 +52,7 @@ def tagged_text(text: str, words: Callable[[str], Sequence[str]] = words_in) -> 
 
     >>> tagged_text("[sad:0.5] I know. <smile>But</smile> so what")
     TaggedText(text='  I know.  But  so what', tags=(MoodTag(share=0.0, mood='sad', strength=0.5), \
-MoodTag(share=0.333..., mood='happy', strength=0.6), MoodTag(share=0.5, mood='neutral', strength=1.0)))
+MoodTag(share=0.4, mood='happy', strength=0.6), MoodTag(share=0.6, mood='neutral', strength=1.0)))
     """
     parts, found, unknown, last = [], [], [], 0
     for tag in TAG.finditer(text):

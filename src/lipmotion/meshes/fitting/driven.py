@@ -34,8 +34,6 @@ Array = NDArray[np.float64]
 
 METRIC = (".glb", ".gltf", ".vrm")
 """Suffixes of characters whose unit is the metre."""
-FREE_GAP = 0.05
-"""Expressions that part the lips are whole from this gap on, in eye distances."""
 EYES_AND_BROWS = tuple(name for name in ARKIT_OTHERS if name != "cheekPuff")
 
 
@@ -107,13 +105,12 @@ class DrivenCharacter:
     def expressions(self, motion: Motion, mouth: SpokenMouth) -> dict[str, Array]:
         """Return the weights of whole expressions that stand for moods, by the mesh's names [each shape=(T,)].
 
-        None, where the character has finer shapes, or no expressions. Those that part the lips are weaker where these
-        are nearly closed, and 0 where they touch.
+        None, where the character has finer shapes, or no expressions. Those that part the lips vanish in p, b and m.
         """
         found = expression_weights(moods_shown(motion)) if self._expressions else {}
-        near = np.clip(mouth.gap / FREE_GAP, 0, 1)
+        free = np.clip(1 - 2 * mouth.press, 0, 1)
         curves = {own: found[name] for name, own in self._expressions.items() if name in found}
-        return {own: curve * near if self._parted_by(own) > LEAST_GAP / 2 else curve for own, curve in curves.items()}
+        return {own: curve * free if self._parted_by(own) > LEAST_GAP / 2 else curve for own, curve in curves.items()}
 
     def _parted_by(self, name: str) -> float:
         """Return how far a blendshape parts the middle of the lips, in eye distances."""
