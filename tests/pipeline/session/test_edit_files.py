@@ -14,7 +14,7 @@ from lipmotion.errors import InputError
 from lipmotion.export.sound import write_sound
 from lipmotion.faces.base import Staging
 from lipmotion.pipeline.edit_files import EditFile, begun, read_edits, write_edits
-from lipmotion.pipeline.edits import STEPS, Edits, step_of
+from lipmotion.pipeline.edits import STEPS, Edits, MoodStep, step_of
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.job import Request
 from lipmotion.pipeline.model import load_model
@@ -125,9 +125,9 @@ def test_a_file_holds_the_moods_of_tags(toy_sentence: ToySentence, toy_model_fil
     write_sound(recording, toy_sentence.audio)
     tagged = f"[happy:0.5] {words[0]} [angry] {' '.join(words[1:])}"
     file = begun(Request(recording, tagged, model=toy_model_file))
-    first, second = file.edits.steps
+    first, second = (step for step in file.edits.steps if isinstance(step, MoodStep))
     assert (str(first), second.mood) == ("mood happy:0.5 at 0.0", "angry")
-    spoken = [span for span in words_in_time(file.units) if span.label]
+    spoken = [span for span in words_in_time(file.units or Timeline(())) if span.label]
     assert second.time_s == pytest.approx(spoken[1].start_s)
 
 

@@ -68,8 +68,7 @@ def shape_weights(
     points = point_motion(motion, units)
     given, mood = given_weights(motion, shapes), mood_weights(points.mouth, shapes)
     if given is not None:
-        weights = _with_mood(given.values.astype(np.float64), mood)
-        weights = _closed_as_spoken(weights, with_mouth(motion), points.mouth, shapes)
+        weights = _closed_as_spoken(given.values.astype(np.float64), with_mouth(motion), points.mouth, shapes, mood)
     else:
         if shapes.style == "visemes":
             weights = _spoken_weights(points, units, shapes, options)
@@ -93,10 +92,13 @@ def _with_mood(weights: Array, mood: Array | None) -> Array:
     return weights if mood is None else np.clip(weights + mood * (1 - weights), 0.0, 1.0)
 
 
-def _closed_as_spoken(weights: Array, motion: Motion, mouth: SpokenMouth, shapes: FaceShapes) -> Array:
+def _closed_as_spoken(
+    weights: Array, motion: Motion, mouth: SpokenMouth, shapes: FaceShapes, mood: Array | None
+) -> Array:
     """Return given weights with the lips of the mesh in contact where the spoken mouth has it [shape=(T, S)].
 
     motion : with the channels of ``with_mouth``
+    mood   : weights that a mood adds [shape=(T, S)], by which the lips are no further apart than it parts them
     Frames in which the lips of the mesh touch as they should, and that no closure is near, stay as they are.
     """
     own, said = weights @ shapes.gap, gap_in(motion)
@@ -104,6 +106,10 @@ def _closed_as_spoken(weights: Array, motion: Motion, mouth: SpokenMouth, shapes
     wanted = np.where(said > LEAST_GAP, share * own, own)
     touching, contact = own < LEAST_GAP / 2, mouth.contact
     wanted = np.where(contact, np.where(touching, own, 0.0), np.where(touching, LEAST_GAP, wanted))
+    if mood is not None:
+        wanted = np.where(contact, wanted, wanted + np.maximum(mouth.gap - np.maximum(said, LEAST_GAP), 0))
+        weights = _with_mood(weights, mood)
+        own = weights @ shapes.gap
     changed = np.abs(wanted - own) > 1e-9
     result = weights.copy()
     result[changed] = with_gap(weights[changed], shapes, wanted[changed])
