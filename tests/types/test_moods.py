@@ -35,3 +35,7 @@ def test_of_two_moods_at_one_time_the_last_holds():
         MoodKey(0.0, "happy"),
         MoodKey(1.0, "angry"),
     )
+
+
+def test_a_manner_and_a_mood_may_begin_together():
+    assert [key.label for key in moods_of("whisper, sad:0.5, mumble")] == ["sad:0.5", "mumble"]

@@ -1,7 +1,7 @@
 import pytest
 
 from lipmotion.types import Span, Timeline, Unit
-from lipmotion.types.moods import MOODS, NEUTRAL, MoodTag
+from lipmotion.types.moods import NEUTRAL, MoodKey, MoodTag
 from lipmotion.units import words_of
 from lipmotion.units.mood_tags import SYNONYMS, moods_in_time, tagged_text, without_known_tags
 
@@ -33,10 +33,15 @@ def test_known_tags_alone_can_be_taken_out():
     assert without_known_tags("<html> [happy] hello").split() == ["<html>", "hello"]
 
 
+def test_manners_are_tags_too():
+    tags = tagged_text("[whispers] one </whispers> two")[1]
+    assert [tag.mood for tag in tags] == ["whisper", "plain"]
+
+
 def test_every_synonym_means_a_mood():
     for mood, strength in SYNONYMS.values():
-        assert mood in (NEUTRAL, *MOODS)
-        assert 0 < strength <= 1
+        MoodKey(0.0, mood, strength)
+        assert strength > 0
 
 
 @pytest.mark.parametrize("words", [True, False])

@@ -36,6 +36,8 @@ LARGEST_GLANCE = (0.2, 0.08)
 """The furthest that the eyes turn to the side, and up or down, in radians."""
 BROW_RAISE = 0.03
 """For a strong accent, in eye distances."""
+BROW_LEAD_S = 0.2
+"""Brows rise so long before an accent, as those of tracked talkers do (docs/expression.md)."""
 GAZE_COUNTER_SHARE = 0.85
 """The eyes turn against the head by this part of its way, and so hold their target."""
 SWAY = (0.034, 0.016, 0.018)
@@ -247,7 +249,7 @@ def _turn(
 
 
 def _brows(time_s: Curve, accent: Curve, spoken: list[tuple[float, float]], rng: np.random.Generator) -> Curve:
-    raised = BROW_RAISE * _at(_smoothed(accent, 0.1), time_s + 0.06)
+    raised = BROW_RAISE * _at(_smoothed(accent, 0.1), time_s + BROW_LEAD_S)
     raised += 0.003 * (1 + np.tanh(_sway(time_s, rng, 0.05, 0.3)))
     for begin, _ in spoken:  # some phrases begin with raised brows
         strength = float(rng.uniform(-0.6, 1.0))

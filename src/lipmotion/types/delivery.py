@@ -26,8 +26,9 @@ class Delivery(Configuration):
     offset_ms       : the sound begins so many milliseconds after time 0 of the timeline; negative: before it, and what
                       would be before time 0 is left out. For files that are put beside a sound; videos have their own
     min_hold_ms     : 0: the curves are smooth; more: poses are held, each for at least so many milliseconds
-    mood            : what the face expresses, over time (``types.moods.moods_of``): ``happy``, ``sad:0.6``,
-                      ``happy:0.7, neutral at 2.5``; empty: what the words or the motion say, else nothing
+    mood            : what the face expresses, and the manner of speaking, over time (``types.moods.moods_of``):
+                      ``happy``, ``sad:0.6, whisper``, ``happy:0.7, neutral at 2.5``; empty: what the words or the
+                      motion say, else nothing
     stepped         : poses are held; with ``min_hold_ms`` 0, each for at least two frames at 24 frames a second
     Raises InputError: a value out of its range, or no such mood.
 
@@ -63,8 +64,8 @@ class Delivery(Configuration):
     mood: str = option(
         "",
         metavar="MOOD[:STRENGTH]",
-        help="neutral, happy, sad, angry, afraid, disgusted, surprised, tense or tired, strength 0 to 1; over time: "
-        "'happy:0.7, sad at 2.5' (docs/expression.md)",
+        help="neutral, happy, sad, angry, afraid, disgusted, surprised, tense, tired; plain, whisper, shout, mumble; "
+        "strength 0 to 1; over time: 'happy:0.7, sad at 2.5' (docs/expression.md)",
     )
 
     def __post_init__(self) -> None:

@@ -1,4 +1,4 @@
-"""Moods over time: what a face expresses beside what it says."""
+"""Moods and manners over time: what a face expresses beside what it says, and how it says it."""
 
 from __future__ import annotations
 
@@ -12,15 +12,19 @@ from lipmotion.errors import InputError, shortened
 NEUTRAL = "neutral"
 MOODS = ("happy", "sad", "angry", "afraid", "disgusted", "surprised", "tense", "tired")
 """The moods that a face shows beside none, ``NEUTRAL``."""
+PLAIN = "plain"
+MANNERS = ("whisper", "shout", "mumble")
+"""The manners of speaking beside the usual one, ``PLAIN``."""
+_NAMES = (NEUTRAL, *MOODS, PLAIN, *MANNERS)
 _KEY = re.compile(r"([a-z]+)(?::([-+]?(?:\d+\.?\d*|\.\d+)))?(?:\s+at\s+([-+]?(?:\d+\.?\d*|\.\d+)))?", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
 class MoodKey:
-    """A mood that a face goes over to at a time, and keeps until the next one.
+    """A mood that a face goes over to at a time, or a manner of speaking, and keeps until the next one of its kind.
 
     time_s   : seconds in the recording
-    mood     : one of ``MOODS``, or ``NEUTRAL``
+    mood     : one of ``MOODS``, or ``NEUTRAL``; or one of ``MANNERS``, or ``PLAIN``
     strength : 0 to 1
     Raises InputError: no such mood, or a value out of its range.
 
@@ -33,16 +37,19 @@ class MoodKey:
     strength: float = 1.0
 
     def __post_init__(self) -> None:
-        if self.mood not in (NEUTRAL, *MOODS):
-            near = get_close_matches(self.mood, (NEUTRAL, *MOODS), 1)
+        if self.mood not in _NAMES:
+            near = get_close_matches(self.mood, _NAMES, 1)
             hint = f" (is it {near[0]}?)" if near else ""
-            raise InputError(
-                f"the mood is {shortened(repr(self.mood))}{hint}, required one of: {NEUTRAL}, {', '.join(MOODS)}"
-            )
+            raise InputError(f"the mood is {shortened(repr(self.mood))}{hint}, required one of: {', '.join(_NAMES)}")
         if not 0 <= self.strength <= 1:
             raise InputError(f"the strength of the mood {self.mood} is {self.strength:g}, required 0 to 1")
         if not 0 <= self.time_s < float("inf"):
             raise InputError(f"the mood {self.mood} begins at {self.time_s:g} s, required 0 or more")
+
+    @property
+    def is_manner(self) -> bool:
+        """Whether it is a manner of speaking."""
+        return self.mood in (PLAIN, *MANNERS)
 
     @property
     def label(self) -> str:
@@ -93,6 +100,6 @@ def text_of(keys: Iterable[MoodKey]) -> str:
 
 
 def in_time(keys: Sequence[MoodKey]) -> tuple[MoodKey, ...]:
-    """Return moods in the order of their times; of several at one time the last."""
-    latest = {key.time_s: key for key in keys}
-    return tuple(latest[time_s] for time_s in sorted(latest))
+    """Return moods and manners in the order of their times; of several of a kind at one time the last."""
+    latest = {(key.time_s, key.is_manner): key for key in keys}
+    return tuple(latest[place] for place in sorted(latest))

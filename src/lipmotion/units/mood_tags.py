@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from lipmotion.errors import shortened
 from lipmotion.types import Timeline, Unit
-from lipmotion.types.moods import MOODS, NEUTRAL, MoodKey, MoodTag, in_time
+from lipmotion.types.moods import MANNERS, MOODS, NEUTRAL, PLAIN, MoodKey, MoodTag, in_time
 from lipmotion.units.text_normalisation import words_in
 from lipmotion.units.word_spans import words_in_time
 
@@ -31,7 +31,10 @@ SYNONYMS: dict[str, tuple[str, float]] = {
     **dict.fromkeys("nervous nervously anxious anxiously stressed worried".split(), ("tense", 1.0)),
     **dict.fromkeys("tiredly exhausted sleepy yawns bored".split(), ("tired", 1.0)),
     **dict.fromkeys("calm calmly normal normally relaxed".split(), (NEUTRAL, 1.0)),
-    **{mood: (mood, 1.0) for mood in (NEUTRAL, *MOODS)},
+    **dict.fromkeys("whispers whispering whispered softly".split(), ("whisper", 1.0)),
+    **dict.fromkeys("shouts shouting shouted yells yelling screams loudly".split(), ("shout", 1.0)),
+    **dict.fromkeys("mumbles mumbling muttering mutters".split(), ("mumble", 1.0)),
+    **{name: (name, 1.0) for name in (NEUTRAL, *MOODS, PLAIN, *MANNERS)},
 }
 """The words of tags that are understood, and what they mean."""
 
@@ -47,8 +50,8 @@ def tagged_text(text: str, words: Callable[[str], Sequence[str]] = words_in) -> 
     """Return what is spoken of a text, and its tags; a text without tags is returned as it is.
 
     words : returns the words of a text
-    A tag holds until the next one; ``</smile>`` and ``[/angry]`` end in a neutral face. A tag that is not known is not
-    spoken, and named in a warning.
+    A tag holds until the next one of its kind, mood or manner; ``</smile>`` ends in a neutral face. A tag that is not
+    known is not spoken, and named in a warning.
 
     >>> tagged_text("[sad:0.5] I know. <smile>But</smile> so what")
     TaggedText(text='  I know.  But  so what', tags=(MoodTag(share=0.0, mood='sad', strength=0.5), \
@@ -102,5 +105,5 @@ def _meaning(tag: re.Match[str]) -> tuple[str, float] | None:
     if name is None or known is None:
         return None
     if tag[1] or tag[3]:
-        return NEUTRAL, 1.0
+        return PLAIN if known[0] in MANNERS else NEUTRAL, 1.0
     return known[0], min(float(name[2]), 1.0) if name[2] else known[1]
