@@ -35,6 +35,7 @@ ALL = (NEUTRAL, *MOODS)
 FPS = 25.0
 REST_S, VOWEL_S = 0.2, 1.04
 LABEL = 14
+COLOURS = 200
 Picture = NDArray[np.uint8]
 
 
@@ -72,7 +73,7 @@ def sheet(path: Path, size: int) -> None:
     rows = [(face, time_s) for face in FACES for time_s in (REST_S, VOWEL_S)]
     pictures = [(mood if face == FACES[0] and time_s == REST_S else "", still(face, mood, time_s, size))
                 for face, time_s in rows for mood in ALL]  # fmt: skip
-    pasted(pictures, len(ALL)).save(path, optimize=True)
+    pasted(pictures, len(ALL)).quantize(COLOURS).save(path, optimize=True)
 
 
 def blind(path: Path, key: Path, seed: int, count: int, size: int) -> None:

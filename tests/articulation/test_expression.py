@@ -1,8 +1,5 @@
 """Moods: a table of facts, curves over time, and a mouth that still says what it says."""
 
-import csv
-from importlib import resources
-
 import numpy as np
 import pytest
 
@@ -11,6 +8,7 @@ from lipmotion.articulation.expression import (
     PREFIX,
     action_units,
     is_mood,
+    mood_rows,
     mood_table,
     moods_shown,
     with_moods,
@@ -33,18 +31,16 @@ PROTOTYPES = {
 
 
 def test_every_mood_has_known_action_units_with_intensities_and_sources():
-    text = resources.files("lipmotion.articulation").joinpath("moods.csv").read_text(encoding="ascii")
-    rows = list(csv.DictReader(text.splitlines()))
-    assert {row["mood"] for row in rows} == {*MOODS}
-    assert len({(row["mood"], row["action_unit"]) for row in rows}) == len(rows)
-    assert {row["source"] for row in rows} == SOURCES
+    rows = mood_rows()
+    assert {row.mood for row in rows} == {*MOODS}
+    assert len({(row.mood, row.unit) for row in rows}) == len(rows)
+    assert {row.source for row in rows} == SOURCES
     for row in rows:
-        assert int(row["action_unit"]) in ACTION_UNITS
-        assert 0 < float(row["intensity"]) <= 1
+        assert row.unit in ACTION_UNITS
+        assert 0 < row.intensity <= 1
     for mood, asked in PROTOTYPES.items():
         assert asked <= {*mood_table()[mood]}
-        found = {int(row["action_unit"]) for row in rows if row["mood"] == mood and row["source"] == "EMFACS"}
-        assert asked <= found
+        assert asked <= {row.unit for row in rows if row.mood == mood and row.source == "EMFACS"}
 
 
 def test_a_mood_comes_and_goes_smoothly_around_its_time():

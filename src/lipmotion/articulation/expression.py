@@ -18,7 +18,7 @@ import csv
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib import resources
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,14 +62,29 @@ ACTION_UNITS: Final = {
 """The action units that faces show."""
 
 
+class MoodRow(NamedTuple):
+    """An action unit of a mood: its intensity, 0 to 1, and where it is from."""
+
+    mood: str
+    unit: int
+    intensity: float
+    source: str
+
+
+@cache
+def mood_rows() -> tuple[MoodRow, ...]:
+    """Return the rows of the table ``moods.csv``."""
+    text = resources.files("lipmotion.articulation").joinpath("moods.csv").read_text(encoding="ascii")
+    return tuple(
+        MoodRow(row["mood"], int(row["action_unit"]), float(row["intensity"]), row["source"])
+        for row in csv.DictReader(text.splitlines())
+    )
+
+
 @cache
 def mood_table() -> Mapping[str, Mapping[int, float]]:
-    """Return the intensity of the action units of each mood, 0 to 1, of the table ``moods.csv``."""
-    text = resources.files("lipmotion.articulation").joinpath("moods.csv").read_text(encoding="ascii")
-    table: dict[str, dict[int, float]] = {mood: {} for mood in MOODS}
-    for row in csv.DictReader(text.splitlines()):
-        table[row["mood"]][int(row["action_unit"])] = float(row["intensity"])
-    return table
+    """Return the intensity of the action units of each mood, 0 to 1."""
+    return {mood: {row.unit: row.intensity for row in mood_rows() if row.mood == mood} for mood in MOODS}
 
 
 def is_mood(channel: str) -> bool:
