@@ -19,7 +19,7 @@ from lipmotion.errors import InputError
 from lipmotion.meshes.files.binding_files import BINDING_SUFFIX, load_binding, read_points, read_weights
 from lipmotion.meshes.files.character_files import read_character
 from lipmotion.meshes.fitting.lip_placement import LipPlacement, placed_by_points, placed_by_shape, surface_of_named
-from lipmotion.meshes.fitting.mood_weights import EXPRESSIONS, corner_displacements, expression_weights
+from lipmotion.meshes.fitting.mood_weights import EXPRESSIONS, expression_weights
 from lipmotion.meshes.fitting.point_motion import point_motion
 from lipmotion.meshes.fitting.shape_weights import shape_weights
 from lipmotion.meshes.model.binding import ControlBinding, bind, painted
@@ -91,8 +91,7 @@ class DrivenCharacter:
         """
         points = point_motion(motion, units)
         beside, contact = self._beside(others or {}, len(time_s)), points.mouth.contact
-        moved = points.displacements.copy()
-        moved[..., 1] += corner_displacements(points.mouth)
+        moved = points.expressed
         if self.shapes is not None:
             moved = shape_weights(motion, units, self.shapes).values.astype(np.float64)
         rows = in_pictures(moved, contact, motion.rate_hz, time_s)

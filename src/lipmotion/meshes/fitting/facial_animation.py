@@ -8,7 +8,6 @@ from __future__ import annotations
 import numpy as np
 
 from lipmotion.articulation.lip_points import mouth_template
-from lipmotion.meshes.fitting.mood_weights import corner_displacements
 from lipmotion.meshes.fitting.point_motion import point_motion
 from lipmotion.types import Channel, Motion, Timeline, Unit
 
@@ -55,9 +54,7 @@ def fap_motion(motion: Motion, units: Timeline[Unit]) -> Motion:
     Where the lips touch, ``lower_t_midlip`` and ``raise_b_midlip`` add up to 0.
     Raises InputError: as ``point_motion``.
     """
-    points = point_motion(motion, units)
-    moved = points.displacements.copy()
-    moved[..., 1] += corner_displacements(points.mouth)
+    moved = point_motion(motion, units).expressed
     template = mouth_template()
     lengths = {"N": MOUTH_TO_NOSE, "W": template.width}
     columns = [

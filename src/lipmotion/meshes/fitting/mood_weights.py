@@ -1,4 +1,4 @@
-"""What moods do to the mouth of a character: weights of ARKit's blendshapes or of whole expressions, and lip points."""
+"""What moods do to the mouth of a character: weights of ARKit's blendshapes, or of whole expressions."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.articulation.mouth import SpokenMouth
 from lipmotion.meshes.model.face_shapes import FaceShapes
 
@@ -24,8 +23,6 @@ SIDED_SHAPES = {
 MIDDLE_SHAPES = {"mouthShrugLower": ("chin_raise", 0.5), "mouthRollUpper": ("tight", 0.15)}
 """The same of blendshapes that have no sides."""
 MOOD_SHAPES = {f"{name}{side}": row for name, row in SIDED_SHAPES.items() for side in ("Left", "Right")} | MIDDLE_SHAPES
-CORNER_RISE, CORNER_FALL = 0.1, 0.07
-"""How far points of the corners rise in a full smile, and fall where a mood pulls them down, in eye distances."""
 EXPRESSIONS: Mapping[str, tuple[tuple[str, float], ...]] = {
     "happy": (("happy", 1.0),),
     "sad": (("sad", 1.0),),
@@ -53,13 +50,6 @@ def mood_weights(mouth: SpokenMouth, shapes: FaceShapes) -> Array | None:
     for row, curve in moving:
         weights[:, row] = curve
     return weights
-
-
-def corner_displacements(mouth: SpokenMouth) -> Array:
-    """Return how far a mood moves the lip points up [shape=(T, 52)]: those of the corners, and less beside them."""
-    template = mouth_template()
-    across = np.clip(np.abs(template.places[:, 0]) / (template.width / 2), 0, 1)
-    return np.outer(CORNER_RISE * mouth.smile - CORNER_FALL * mouth.frown, across**3 * ~template.jaw)
 
 
 def expression_weights(moods: Mapping[str, Array]) -> dict[str, Array]:
