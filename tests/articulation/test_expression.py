@@ -15,6 +15,7 @@ from lipmotion.articulation.expression import (
 )
 from lipmotion.articulation.liveliness import liveliness
 from lipmotion.articulation.mouth import EXPRESSED, ROUND_WIDTH, spoken_mouth
+from lipmotion.types import Channel, Motion, Prosody
 from lipmotion.types.moods import MOODS, NEUTRAL, MoodKey, moods_of
 from meshes.speech import motion, units
 
@@ -102,7 +103,18 @@ def test_the_head_sinks_in_sadness_unless_it_is_still():
     assert (moved.turn[:, 1] < plain.turn[:, 1] - 0.05).all()
     assert not still.turn.any()
     assert (moved.lids >= 0.15).all()
-    assert moved.unit(1) == pytest.approx(np.full(51, mood_table()["sad"][1]))
+
+
+def test_a_mood_comes_and_goes_in_the_upper_face_and_grows_with_accents():
+    time_s = np.arange(0, 60, 0.04)
+    sad = with_moods(Motion(np.full((6001, 1), 0.05), 100.0, (Channel("opening"),)), moods_of("sad"))
+    accent = np.arange(6001) % 300 > 200
+    voice = Prosody(-40 + 25.0 * accent, 5.0 + 0.3 * accent)
+    still, lively = (liveliness(time_s, sad, units(), voice, brows=brows).unit(1) for brows in (False, True))
+    usual = mood_table()["sad"][1]
+    assert still == pytest.approx(np.full(len(time_s), usual))
+    assert 0.03 < lively.std() < 0.2
+    assert lively.min() > 0.6 * usual
 
 
 def test_channels_are_named_by_mood():

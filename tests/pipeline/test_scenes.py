@@ -92,7 +92,7 @@ def test_what_moves_on_its_own_can_be_switched_off(generation: Generation) -> No
 
 def test_shapes_of_moods_are_in_the_head_where_a_mood_is(generation: Generation, own_head: Scene) -> None:
     moody = replace(generation, motion=with_moods(generation.motion, moods_of("angry:0.8, surprised at 1.0")))
-    scene = head_scene(moody)
+    scene = head_scene(moody, staging=Staging(brows=False))
     added = {*scene.mesh.shape_names} - {*own_head.mesh.shape_names}
     assert "browDownLeft" in added
     assert scene.weights is not None

@@ -55,6 +55,8 @@ MOOD_TURNS = {
     58: (0, 0.07, 0),
 }
 """How far the head turns to its left, upwards and to its left shoulder for an action unit, in radians."""
+MOOD_WANDER, MOOD_ACCENT = 0.13, 0.3
+"""How far a mood comes and goes in the upper face, and how much stronger it is in a strong accent."""
 MOOD_GAZE_RAD = 0.22
 """How far the eyes look down for the action unit 64, in radians."""
 DROOPING_LIDS = 0.75
@@ -116,9 +118,17 @@ def liveliness(  # noqa: PLR0913
     lids = lid_closure(time_s, blink_times(end_s, spoken, _generator(seed, 2))) if blinks else still
     aim = _gaze(time_s, end_s, spoken, _generator(seed, 3)) if gaze else np.zeros((len(time_s), 2))
     raised = _brows(time_s, accent, spoken, _generator(seed, 4)) if brows else still
-    return _in_mood(
-        Liveliness(lids, raised, aim - GAZE_COUNTER_SHARE * turn[:, :2], turn), action_units(motion, time_s), head=head
-    )
+    mood = action_units(motion, time_s)
+    if mood and brows:
+        lively = _mood_strength(time_s, accent, _generator(seed, 5))
+        mood = {unit: np.clip(curve * lively, 0, 1) if unit in UPPER_FACE else curve for unit, curve in mood.items()}
+    return _in_mood(Liveliness(lids, raised, aim - GAZE_COUNTER_SHARE * turn[:, :2], turn), mood, head=head)
+
+
+def _mood_strength(time_s: Curve, accent: Curve, rng: np.random.Generator) -> Curve:
+    """Return how strong a mood is in the upper face, about 1: it comes and goes, and grows with accents [shape=(F,)]."""
+    slow = np.tanh(_sway(time_s, rng, 0.06, 0.3))
+    return 1 + MOOD_WANDER * slow + MOOD_ACCENT * (_at(_smoothed(accent, 0.2), time_s + BROW_LEAD_S) - 0.4)
 
 
 def _in_mood(moved: Liveliness, mood: Mapping[int, Curve], *, head: bool) -> Liveliness:
