@@ -104,7 +104,8 @@ def with_moods(motion: Motion, keys: Sequence[MoodKey]) -> Motion:
         return motion
     kept = [number for number, name in enumerate(motion.names) if not is_mood(name)]
     curves = _curves(keys, motion.time_s)
-    values = np.concatenate([motion.values[:, kept], *(curve[:, None] for curve in curves.values())], axis=1)
+    added = [curve[:, None].astype(motion.values.dtype) for curve in curves.values()]
+    values = np.concatenate([motion.values[:, kept], *added], axis=1)
     channels = (*(motion.channels[number] for number in kept), *(Channel(PREFIX + mood, WEIGHT) for mood in curves))
     return Motion(values, motion.rate_hz, channels)
 

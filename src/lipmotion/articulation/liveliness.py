@@ -126,7 +126,7 @@ def liveliness(  # noqa: PLR0913
 
 
 def _mood_strength(time_s: Curve, accent: Curve, rng: np.random.Generator) -> Curve:
-    """Return how strong a mood is in the upper face, about 1: it comes and goes, and grows with accents [shape=(F,)]."""
+    """Return how strong a mood is in the upper face, about 1: it comes and goes, and grows with accents."""
     slow = np.tanh(_sway(time_s, rng, 0.06, 0.3))
     return 1 + MOOD_WANDER * slow + MOOD_ACCENT * (_at(_smoothed(accent, 0.2), time_s + BROW_LEAD_S) - 0.4)
 
