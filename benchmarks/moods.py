@@ -5,7 +5,7 @@
     python benchmarks/moods.py --score "sad happy ..." --key key.json
     python benchmarks/moods.py --closures
 
-The sheet shows every mood on four faces, at rest and in a vowel. The test shows stills of random faces, moods (the
+The sheet shows every mood on four faces, on two of them at rest, on two in a vowel. The test shows stills of random faces, moods (the
 neutral one among them, each may come several times) and moments of a sentence; the reader names one mood for every
 number before the key is read. The closures are those of p, b and m: in how many the lips touch, in each mood.
 """
@@ -69,10 +69,11 @@ def pasted(pictures: list[tuple[str, Picture]], columns: int) -> Image.Image:
 
 
 def sheet(path: Path, size: int) -> None:
-    """Write every mood on every face, at rest and in a vowel."""
-    rows = [(face, time_s) for face in FACES for time_s in (REST_S, VOWEL_S)]
-    pictures = [(mood if face == FACES[0] and time_s == REST_S else "", still(face, mood, time_s, size))
-                for face, time_s in rows for mood in ALL]  # fmt: skip
+    """Write every mood on every face, at rest or in a vowel."""
+    rows = list(zip(FACES, (REST_S, VOWEL_S) * 2, strict=True))
+    pictures = [
+        (mood if face == FACES[0] else "", still(face, mood, time_s, size)) for face, time_s in rows for mood in ALL
+    ]
     pasted(pictures, len(ALL)).quantize(COLOURS).save(path, optimize=True)
 
 
