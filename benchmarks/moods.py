@@ -1,13 +1,13 @@
 """Moods of the faces: a sheet of all, a test for a reader who does not know which mood is which, and closures in each.
 
-    python benchmarks/moods.py --sheet docs/images/moods.png
+    python benchmarks/moods.py --sheet docs/images/moods.jpg
     python benchmarks/moods.py --blind blind.png --key key.json --seed 1
     python benchmarks/moods.py --score "sad happy ..." --key key.json
     python benchmarks/moods.py --closures
 
-The sheet shows every mood on four faces, on two of them at rest, on two in a vowel. The test shows stills of random faces, moods (the
-neutral one among them, each may come several times) and moments of a sentence; the reader names one mood for every
-number before the key is read. The closures are those of p, b and m: in how many the lips touch, in each mood.
+The sheet shows every mood on four faces, on two of them at rest, on two in a vowel. The test shows stills of random
+faces, moods (the neutral one among them, each may come several times) and moments of a sentence; the reader names one
+mood for every number before the key is read. The closures are those of p, b and m: in how many the lips touch.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ ALL = (NEUTRAL, *MOODS)
 FPS = 25.0
 REST_S, VOWEL_S = 0.2, 1.04
 LABEL = 14
-COLOURS = 200
+QUALITY = 88
 Picture = NDArray[np.uint8]
 
 
@@ -74,7 +74,7 @@ def sheet(path: Path, size: int) -> None:
     pictures = [
         (mood if face == FACES[0] else "", still(face, mood, time_s, size)) for face, time_s in rows for mood in ALL
     ]
-    pasted(pictures, len(ALL)).quantize(COLOURS).save(path, optimize=True)
+    pasted(pictures, len(ALL)).save(path, quality=QUALITY, optimize=True)
 
 
 def blind(path: Path, key: Path, seed: int, count: int, size: int) -> None:
