@@ -63,6 +63,7 @@ class Delivery(Configuration):
     stepped: bool = option(False, help="hold poses instead of moving smoothly, each for at least 83 ms")
     mood: str = option(
         "",
+        later=True,
         metavar="MOOD[:STRENGTH]",
         help="neutral, happy, sad, angry, afraid, disgusted, surprised, tense, tired; plain, whisper, shout, mumble; "
         "strength 0 to 1; over time: 'happy:0.7, sad at 2.5' (docs/expression.md)",
