@@ -152,6 +152,17 @@ def bad_input() -> str:
     return "; ".join(f"{name.lower()} {rows.count(chr(10) + '| ') - 1}" for name, _, rows in groups) + "."
 
 
+def moods() -> str:
+    """Return the action units of every mood."""
+    from lipmotion.articulation.expression import ACTION_UNITS, mood_rows
+
+    rows: dict[str, list[str]] = {}
+    for row in mood_rows():
+        ours = "*" if row.source == "ours" else ""
+        rows.setdefault(row.mood, []).append(f"{row.unit} {ACTION_UNITS[row.unit]} {row.intensity:g}{ours}")
+    return table(["mood", "action units, and how strong"], ([mood, ", ".join(units)] for mood, units in rows.items()))
+
+
 TABLES: dict[str, Callable[[], str]] = {
     "verbs": verb_table,
     "options": option_table,
@@ -160,6 +171,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "cue-formats": cue_formats,
     "character-limits": character_limits,
     "bad-input": bad_input,
+    "moods": moods,
 }
 
 

@@ -89,9 +89,9 @@ def test_loud_and_high_moments_raise_the_brows_and_nod_the_head():
     voice = Prosody(-30 + 20.0 * accent, 4.94 + 0.45 * accent)
     moved = liveliness(time_s, MINUTE, SAID, voice)
     flat = liveliness(time_s, MINUTE, SAID, Prosody(np.full(6001, -30.0), np.full(6001, 4.94)))
-    soon = np.roll(accent, 5)
-    for one, other in ((moved.brows, flat.brows), (-moved.turn[:, 1], -flat.turn[:, 1])):
-        difference = one - other
+    brows, nods = (moved.brows, flat.brows, -15), (-moved.turn[:, 1], -flat.turn[:, 1], 5)
+    for one, other, later in (brows, nods):
+        difference, soon = one - other, np.roll(accent, later)
         assert difference[soon].mean() > difference[~soon].mean() + 0.005
 
 

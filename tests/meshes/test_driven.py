@@ -5,9 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from lipmotion.articulation.expression import with_moods
+from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.errors import InputError
 from lipmotion.meshes.files.binding_files import save_binding, write_weights
 from lipmotion.meshes.fitting.driven import driven_character
+from lipmotion.meshes.model.mesh import Blendshape, Mesh
+from lipmotion.types.moods import moods_of
 from meshes.heads import head, lip_points, write_glb
 from meshes.obj_writing import write_obj
 from meshes.speech import motion, units
@@ -86,3 +90,57 @@ def test_control_points_have_no_weights(files):
     character = driven_character(files / "head.glb", by_points=True)
     with pytest.raises(InputError, match="moved by control points"):
         character.weights(motion(), units())
+
+
+def _expressive(*names):
+    """A head with five visemes, and some whole expressions: those whose name begins with ``s`` part the lips."""
+    mesh = head()
+    spoken = {
+        "jawOpen": "viseme_aa",
+        "mouthPucker": "viseme_U",
+        "mouthFunnel": "viseme_O",
+        "mouthSmileLeft": "viseme_E",
+    }
+    spoken |= {"mouthStretchLeft": "viseme_I", "mouthRollLower": "viseme_FF", "mouthPressLeft": "viseme_PP"}
+    spoken |= {"mouthLowerDownLeft": "viseme_DD"}
+    shapes = {shape.name: shape for shape in mesh.shapes}
+    kept = [Blendshape(name, shapes[own].rows, shapes[own].displacements) for own, name in spoken.items()]
+    for name in names:
+        like = shapes["mouthUpperUpLeft" if name.lower().startswith("s") else "eyeBlinkLeft"]
+        kept.append(Blendshape(name, like.rows, like.displacements))
+    return Mesh(mesh.vertices, mesh.triangles, mesh.parts, tuple(kept))
+
+
+def test_whole_expressions_stand_for_moods_where_there_are_no_finer_shapes(tmp_path):
+    write_glb(tmp_path / "head.glb", _expressive("Happy", "surprised"))
+    character = driven_character(tmp_path / "head.glb")
+    moved = with_moods(motion(), moods_of("happy:0.5, afraid at 1.5"))
+    mouth = spoken_mouth(moved, units())
+    weights = character.expressions(moved, mouth)
+    assert {*weights} == {"Happy", "surprised"}
+    assert weights["Happy"][:100] == pytest.approx(0.5)
+    assert weights["surprised"][-1] == pytest.approx(0.5)
+    shut = with_moods(motion(), moods_of("afraid"))
+    surprised = character.expressions(shut, spoken_mouth(shut, units()))["surprised"]
+    assert surprised[[20, 75]] == pytest.approx(0.5, abs=0.05)
+    assert surprised[[55, 95]] == pytest.approx(0, abs=0.01)  # m, p
+    plain, happy = (next(character.vertices(of, units(), TIME_S)) for of in (motion(), moved))
+    assert np.abs(happy - plain).max() > 0.01
+
+
+def test_characters_with_finer_shapes_do_not_show_whole_expressions(files):
+    character = driven_character(files / "head.glb")
+    moved = with_moods(motion(), moods_of("happy"))
+    assert not character.expressions(moved, spoken_mouth(moved, units()))
+    weights, plain = (character.weights(of, units()) for of in (moved, motion()))
+    assert weights["mouthSmileLeft"][20] > plain["mouthSmileLeft"][20] + 0.5
+
+
+def test_control_points_raise_the_corners_in_a_smile(files):
+    character = driven_character(files / "head.obj", points=files / "points.csv")
+    placement = character.placement
+    corner = placement.vertices[placement.row(61)]
+    plain, happy = (
+        next(character.vertices(of, units(), TIME_S)) for of in (motion(), with_moods(motion(), moods_of("happy")))
+    )
+    assert happy[corner, 1] > plain[corner, 1] + 0.05 * placement.scale

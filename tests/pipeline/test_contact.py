@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import LEAST_GAP
 from lipmotion.articulation.delivery import Delivery
+from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.lip_points import FACING
 from lipmotion.articulation.mouth import frame_times, spoken_mouth
 from lipmotion.faces.base import Staging
@@ -30,6 +31,8 @@ from lipmotion.pipeline.outputs.delivered import delivered
 from lipmotion.pipeline.outputs.motion_files import in_format, resampled_curves
 from lipmotion.pipeline.outputs.scenes import character_scene, head_scene
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
+from lipmotion.types.moods import MOODS
+from lipmotion.units import closing_phones
 from meshes.heads import head, lip_points, write_glb
 from meshes.obj_writing import write_obj
 from meshes.speech import motion, units
@@ -165,7 +168,7 @@ def _of_head_scene(generation: Generation, fps: float) -> Mask:
     weights = head_scene(moved, fps).weights
     assert weights is not None
     character = figure()
-    mesh = head_mesh(character)
+    mesh = head_mesh(character, moods=any(map(is_mood, generation.motion.names)))
     moved = mesh.displacements(np.arange(len(character.skin.rest)))
     parting = {name: lip_gap(character, moved[number]) for number, name in enumerate(mesh.shape_names)}
     return np.asarray(sum(parting[name] * weights[name] for name in weights.names) < TOUCHING_GAP)
@@ -231,3 +234,27 @@ def test_at_all_rates(kind: str, characters: dict[str, DrivenCharacter]) -> None
     generation = delivered(KINDS[kind](), Delivery())
     for fps in RATES:
         _check(generation, fps, _readers(characters))
+
+
+def _closures_kept(kind: str, mood: str) -> Generation:
+    """Return motion in a mood; every p, b and m closes the lips in it for as long as in none."""
+    generation, moody = (delivered(KINDS[kind](), Delivery(mood=name)) for name in ("", mood))
+    plain, mouth = (spoken_mouth(with_mouth(each.motion), each.units).contact for each in (generation, moody))
+    time_s = generation.motion.time_s
+    for span, closing in zip(generation.units, closing_phones(generation.units), strict=True):
+        within = (span.start_s <= time_s) & (time_s < span.end_s)
+        assert not closing or (mouth[within].sum() >= 1 and plain[within].sum() - mouth[within].sum() <= 2)
+    return moody
+
+
+@pytest.mark.parametrize("mood", MOODS)
+def test_lips_touch_in_the_same_frames_in_every_mood(mood: str, characters: dict[str, DrivenCharacter]) -> None:
+    readers = {name: read for name, read in _readers(characters).items() if name in ("drawn faces", "head", ARKIT, FAP)}
+    _check(_closures_kept("imported at 25 Hz", mood), 25.0, readers | {"take": _of_take})
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("mood", MOODS)
+def test_everywhere_in_every_mood(mood: str, characters: dict[str, DrivenCharacter]) -> None:
+    for kind in ("generated", "captured weights"):
+        _check(_closures_kept(kind, mood), 30.0, _readers(characters))

@@ -15,13 +15,14 @@ from lipmotion.export.base import read_motion
 from lipmotion.faces import Face, Staging
 from lipmotion.meshes.fitting.driven import driven_character
 from lipmotion.pipeline.outputs.curve_sets import with_curves
-from lipmotion.pipeline.outputs.delivered import held_mouth, shown
+from lipmotion.pipeline.outputs.delivered import delivered, held_mouth, shown
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance
 from lipmotion.pipeline.outputs.prosody import moved_prosody
 from lipmotion.pipeline.outputs.scenes import delivered_scene
 from lipmotion.pipeline.outputs.shown_faces import shown_face
 from lipmotion.pipeline.outputs.write import write
 from lipmotion.types import Generation, Prosody, StateTrace
+from lipmotion.types.moods import MoodKey
 from meshes.heads import head, write_glb
 from meshes.speech import motion, units
 
@@ -120,3 +121,31 @@ def test_eyes_and_head_move_on_while_the_mouth_is_held(generation: Generation, t
     write(smooth, tmp_path / "a.livelink.csv", delivery=delivery, rate_hz=100)
     assert read_motion(tmp_path / "a.livelink.csv")[0]["headYaw"] == pytest.approx(smooth.motion["headYaw"], abs=1e-5)
     assert {"jawOpen", "opening"} <= set(steps.stepped)
+
+
+def test_moods_are_channels_that_the_intensity_leaves_and_the_offset_moves(generation: Generation) -> None:
+    found = delivered(generation, Delivery(mood="happy:0.5, neutral at 1.0", intensity=2.0, offset_ms=500)).motion
+    assert found.names == (*generation.motion.names, "mood_happy")
+    assert found["mood_happy"][[0, 100, -1]] == pytest.approx([0.5, 0.5, 0.0])
+    again = delivered(replace(generation, motion=found), Delivery())
+    assert np.array_equal(again.motion.values, found.values)
+
+
+def test_words_say_the_mood_after_the_one_that_is_asked_for(generation: Generation) -> None:
+    tagged = replace(generation, moods=(MoodKey(1.0, "sad"),))
+    assert delivered(tagged, Delivery()).motion["mood_sad"][[0, -1]] == pytest.approx([0, 1])
+    both = delivered(tagged, Delivery(mood="happy")).motion
+    assert (both["mood_happy"][0], both["mood_sad"][-1]) == (1, 1)
+    assert both["mood_happy"][-1] == pytest.approx(0)
+
+
+def test_neutral_is_what_no_mood_is(generation: Generation) -> None:
+    plain, neutral = (delivered(generation, Delivery(mood=mood)).motion for mood in ("", "neutral"))
+    assert neutral.names == plain.names
+    assert np.array_equal(neutral.values, plain.values)
+
+
+def test_moods_move_on_while_the_mouth_is_held(generation: Generation) -> None:
+    found = shown(generation, Delivery(mood="happy, sad at 1.0", stepped=True), 25.0)
+    assert "mood_sad" not in found.stepped
+    assert len(np.unique(found.motion["mood_sad"])) > 6

@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 
 from lipmotion.articulation.delivery import Delivery
+from lipmotion.articulation.expression import with_moods
 from lipmotion.articulation.liveliness import Liveliness
+from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.errors import ExportError
 from lipmotion.faces import Staging
 from lipmotion.meshes.fitting.eyes_and_brows import FULL_LOOK_RAD, eye_and_brow_weights
@@ -20,10 +22,12 @@ from lipmotion.meshes.model.shape_names import ARKIT_MOUTH
 from lipmotion.pipeline.outputs.curve_sets import curves_of
 from lipmotion.pipeline.outputs.living_curves import HEAD, living_curves
 from lipmotion.pipeline.outputs.motion_files import in_format
+from lipmotion.pipeline.outputs.motion_input import read_generation
 from lipmotion.pipeline.outputs.output import OutputSettings, checked_outputs
 from lipmotion.pipeline.outputs.shown_faces import shown_face
 from lipmotion.pipeline.outputs.write import write
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
+from lipmotion.types.moods import moods_of
 from meshes.speech import motion, units
 
 TAKE = Path("a.livelink.csv")
@@ -158,3 +162,23 @@ def test_a_recording_that_is_too_long_is_refused_before_the_work(
         checked_outputs([tmp_path / name], OutputSettings(face, tmp_path / "a.wav", rate_hz=rate_hz))
     earlier = Delivery(offset_ms=-60_000)
     checked_outputs([tmp_path / name], OutputSettings(face, tmp_path / "a.wav", rate_hz=rate_hz, delivery=earlier))
+
+
+def test_controls_of_a_rig_follow_brows_in_every_mood(generation: Generation, tmp_path: Path) -> None:
+    table = tmp_path / "rig.csv"
+    table.write_text("control,source\nfrown,browDownLeft\ncheek,cheekSquintRight\n")
+    plain, angry = (
+        curves_of(with_moods(generation.motion, moods_of(mood)), generation.units, table) for mood in ("", "angry")
+    )
+    assert not plain["frown"].any()
+    assert angry["frown"].min() > 0.5
+    assert not angry["cheek"].any()
+
+
+@pytest.mark.parametrize("suffix", [".json", ".csv", ".npz"])
+def test_files_of_motion_hold_moods(generation: Generation, tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"a{suffix}"
+    write(generation, path, delivery=Delivery(mood="sad:0.5"))
+    found = read_generation(path).motion
+    assert found.channels[-1] == Channel("mood_sad", WEIGHT)
+    assert spoken_mouth(found, generation.units).frown.max() > 0.2

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion.articulation.expression import mood_table, with_moods
 from lipmotion.errors import InputError
 from lipmotion.faces import Staging
 from lipmotion.faces.head.head_blendshapes import head_mesh
@@ -21,6 +22,7 @@ from lipmotion.pipeline.outputs.output import OutputSettings
 from lipmotion.pipeline.outputs.scenes import SceneOutput, character_scene, head_scene, sound_reference, write_scene
 from lipmotion.pipeline.outputs.shown_faces import shown_face
 from lipmotion.types import Channel, Generation, Motion, StateTrace
+from lipmotion.types.moods import moods_of
 from meshes.heads import head, write_glb
 from meshes.speech import motion, units
 from programs import gltf_report, gltf_validator, python_with, run_with
@@ -86,6 +88,19 @@ def test_what_moves_on_its_own_can_be_switched_off(generation: Generation) -> No
     assert max(float(np.abs(moving.weights[name]).max()) for name in eyes) > 0.01
     assert still.turn is not None
     assert np.abs(still.turn.rotations - [0, 0, 0, 1]).max() < 1e-9
+
+
+def test_shapes_of_moods_are_in_the_head_where_a_mood_is(generation: Generation, own_head: Scene) -> None:
+    moody = replace(generation, motion=with_moods(generation.motion, moods_of("angry:0.8, surprised at 1.0")))
+    scene = head_scene(moody, staging=Staging(brows=False))
+    added = {*scene.mesh.shape_names} - {*own_head.mesh.shape_names}
+    assert "browDownLeft" in added
+    assert scene.weights is not None
+    weights = {name: scene.weights[name] for name in scene.weights.names}
+    assert weights["browDownLeft"][50] == pytest.approx(0.8)
+    assert weights["browDownLeft"][-1] == 0
+    assert weights["eyeWideRight"][-1] == pytest.approx(mood_table()["surprised"][5])
+    assert weights["browInnerUp"][-1] == 1
 
 
 def test_the_rate_is_that_of_the_keys(generation: Generation) -> None:

@@ -48,6 +48,14 @@ def test_sound_and_motion_are_of_the_same_length(spoken: SpokenText) -> None:
     assert generation.outlook.words == "given units"
 
 
+def test_tags_in_the_text_are_moods_and_not_spoken(stand_in: None, toy_model: Model) -> None:  # noqa: ARG001
+    sound, generation = speak("<smile> Papa, see Bob. [sad] Mama!", model=toy_model)
+    assert sound.duration_s == speak(TEXT, model=toy_model).sound.duration_s
+    first, second = generation.moods
+    assert (first.time_s, first.mood, second.mood) == (0.0, "happy", "sad")
+    assert second.time_s == pytest.approx(next(s.start_s for s in generation.units if s.label.phone == "m"))
+
+
 def test_the_units_cover_all_with_rest_at_both_ends(spoken: SpokenText) -> None:
     units = spoken.generation.units
     assert units[0].start_s == 0

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import CLOSED_OPENING, closures
+from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.rest import rest_frames
 from lipmotion.errors import InputError
 from lipmotion.kernels.sequences.holds import best_holds
@@ -118,7 +119,7 @@ def intensified(generation: Generation, intensity: float, opening: Curve | None 
     for column, channel in enumerate(motion.channels):
         if channel.unit == WEIGHT:
             larger[:, column] = np.clip(larger[:, column], 0, 1)
-        if channel.name in ARTICULATORY:
+        if channel.name in ARTICULATORY or is_mood(channel.name):
             larger[:, column] = values[:, column]
         if channel.name in GROWING:
             larger[:, column] = 1 - np.clip(1 - values[:, column], 0, 1) ** np.sqrt(intensity)

@@ -14,11 +14,13 @@ H. P. Graf et al., "Visual prosody: facial movements accompanying speech", FG 20
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.expression import action_units
 from lipmotion.types import FRAME_RATE_HZ, Motion, Prosody, Timeline, Unit
 from lipmotion.units import is_silent
 
@@ -34,6 +36,8 @@ LARGEST_GLANCE = (0.2, 0.08)
 """The furthest that the eyes turn to the side, and up or down, in radians."""
 BROW_RAISE = 0.03
 """For a strong accent, in eye distances."""
+BROW_LEAD_S = 0.2
+"""Brows rise so long before an accent, as those of tracked talkers do (docs/expression.md)."""
 GAZE_COUNTER_SHARE = 0.85
 """The eyes turn against the head by this part of its way, and so hold their target."""
 SWAY = (0.034, 0.016, 0.018)
@@ -42,6 +46,23 @@ NOD_RAD, PHRASE_FALL_RAD = 0.045, 0.03
 """How far the head nods with a strong accent, and how much lower a phrase ends than it begins, in radians."""
 STILL_SHARE = 0.35
 """Share of the turning of the head that is left in silence."""
+MOOD_TURNS = {
+    53: (0, 0.1, 0),
+    54: (0, -0.12, 0),
+    55: (0, 0, 0.1),
+    56: (0, 0, -0.1),
+    57: (0, -0.09, 0),
+    58: (0, 0.07, 0),
+}
+"""How far the head turns to its left, upwards and to its left shoulder for an action unit, in radians."""
+MOOD_WANDER, MOOD_ACCENT = 0.13, 0.3
+"""How far a mood comes and goes in the upper face, and how much stronger it is in a strong accent."""
+MOOD_GAZE_RAD = 0.22
+"""How far the eyes look down for the action unit 64, in radians."""
+DROOPING_LIDS = 0.75
+"""How far the eyes are closed by the action unit 43."""
+UPPER_FACE = (1, 2, 4, 5, 6, 7, 9)
+"""Action units of brows, lids, cheeks and nose."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,12 +73,19 @@ class Liveliness:
     brows : how far the brows are raised, in eye distances [shape=(F,)]
     gaze  : of the eyes against the head, to the character's left and upwards, in radians [shape=(F, 2)]
     turn  : of the head to its left, upwards and to its left shoulder, in radians [shape=(F, 3)]
+    units : what a mood does to brows, lids, cheeks and nose: the action units of ``UPPER_FACE`` that it asks for, 0 to
+            1 [each shape=(F,)]
     """
 
     lids: Curve
     brows: Curve
     gaze: Curve
     turn: Curve
+    units: Mapping[int, Curve] = field(default_factory=dict)
+
+    def unit(self, number: int) -> Curve:
+        """Return an action unit of a mood, 0 to 1 [shape=(F,)]; 0 where no mood asks for it."""
+        return self.units.get(number, np.zeros(len(self.lids)))
 
 
 def liveliness(  # noqa: PLR0913
@@ -90,7 +118,33 @@ def liveliness(  # noqa: PLR0913
     lids = lid_closure(time_s, blink_times(end_s, spoken, _generator(seed, 2))) if blinks else still
     aim = _gaze(time_s, end_s, spoken, _generator(seed, 3)) if gaze else np.zeros((len(time_s), 2))
     raised = _brows(time_s, accent, spoken, _generator(seed, 4)) if brows else still
-    return Liveliness(lids, raised, aim - GAZE_COUNTER_SHARE * turn[:, :2], turn)
+    mood = action_units(motion, time_s)
+    if mood and brows:
+        lively = _mood_strength(time_s, accent, _generator(seed, 5))
+        mood = {unit: np.clip(curve * lively, 0, 1) if unit in UPPER_FACE else curve for unit, curve in mood.items()}
+    return _in_mood(Liveliness(lids, raised, aim - GAZE_COUNTER_SHARE * turn[:, :2], turn), mood, head=head)
+
+
+def _mood_strength(time_s: Curve, accent: Curve, rng: np.random.Generator) -> Curve:
+    """Return how strong a mood is in the upper face, about 1: it comes and goes, and grows with accents."""
+    slow = np.tanh(_sway(time_s, rng, 0.06, 0.3))
+    return 1 + MOOD_WANDER * slow + MOOD_ACCENT * (_at(_smoothed(accent, 0.2), time_s + BROW_LEAD_S) - 0.4)
+
+
+def _in_mood(moved: Liveliness, mood: Mapping[int, Curve], *, head: bool) -> Liveliness:
+    """Return movements with those of a mood; the eyes hold their target while the head is turned by it."""
+    if not mood:
+        return moved
+    turn, gaze, lids = moved.turn, moved.gaze.copy(), moved.lids
+    for unit, angles in MOOD_TURNS.items():
+        if head and unit in mood:
+            turned = mood[unit][:, None] * np.array(angles, float)
+            turn, gaze = turn + turned, gaze - GAZE_COUNTER_SHARE * turned[:, :2]
+    if 64 in mood:
+        gaze[:, 1] -= MOOD_GAZE_RAD * mood[64]
+    if 43 in mood:
+        lids = np.maximum(lids, DROOPING_LIDS * mood[43])
+    return Liveliness(lids, moved.brows, gaze, turn, {unit: mood[unit] for unit in UPPER_FACE if unit in mood})
 
 
 def phrases(units: Timeline[Unit]) -> list[tuple[float, float]]:
@@ -205,7 +259,7 @@ def _turn(
 
 
 def _brows(time_s: Curve, accent: Curve, spoken: list[tuple[float, float]], rng: np.random.Generator) -> Curve:
-    raised = BROW_RAISE * _at(_smoothed(accent, 0.1), time_s + 0.06)
+    raised = BROW_RAISE * _at(_smoothed(accent, 0.1), time_s + BROW_LEAD_S)
     raised += 0.003 * (1 + np.tanh(_sway(time_s, rng, 0.05, 0.3)))
     for begin, _ in spoken:  # some phrases begin with raised brows
         strength = float(rng.uniform(-0.6, 1.0))

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import GAP, closed_lips, gap_in, in_pictures
+from lipmotion.articulation.expression import action_units
 from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER
 from lipmotion.articulation.phone_targets import GESTURES, OVAL, PURSED_PRESS, TIP_OUT, TIP_UP, gesture_curves
 from lipmotion.articulation.rest import against_rest, rest_frames
@@ -45,6 +46,18 @@ JAW_SHARE = 0.85
 """Share of the lower lip's way that the chin goes: the lip also turns outwards."""
 LEAST_CHIN_DROP_SHARE = 0.75
 """Least drop of the chin, as a share of the usual one: trackers of small jaws, and models of them, show less."""
+ROUND_SHARE = 0.15
+"""Share of a smile, of corners pulled down or apart, and of a raised lip that is left on wholly protruded lips."""
+PARTED_ROUND_SHARE = 0.75
+"""Share by which a mood parts protruded lips less than others."""
+SMILE_WIDTH, STRETCH_WIDTH, DROPPED_WIDTH = 0.16, 0.16, -0.14
+"""A full smile, lips stretched in fear, and lips over a dropped jaw are so much wider than at rest."""
+PARTED_GAP, DROPPED_GAP, RAISED_GAP = 0.05, 0.19, 0.05
+"""Gaps of a mouth at rest that a mood parts, whose jaw it drops, and whose upper lip it raises."""
+TIGHT_FULLNESS = 0.3
+"""Tightened and pressed lips are thinner by this share."""
+EXPRESSED = ("smile", "frown", "stretched", "upper_raise", "chin_raise", "tight")
+"""What a mood does to the mouth beside its gap and its width."""
 CORNERS = (f"x_{RIGHT_CORNER}", f"x_{LEFT_CORNER}")
 """Where the lip corners are across, in motion that has points."""
 DRAWN = ("opening", "width", "outer", "y_152", *GESTURES)
@@ -63,6 +76,8 @@ class SpokenMouth:
     tongue, tuck, protrusion, spread, press, teeth : the articulatory channels, 0 to 1 (docs/articulation.md)
     pursed     : how far protruded lips leave only a small hole, as in w, 0 to 1
     oval       : how far the opening is tall and narrow, as in aa, 0 to 1
+    smile, frown, stretched, upper_raise, chin_raise, tight : what a mood does to corners, lips and chin, 0 to 1, as
+                 far as the phones leave it free (``articulation.expression``)
     """
 
     rate_hz: float
@@ -78,6 +93,12 @@ class SpokenMouth:
     teeth: Curve
     pursed: Curve
     oval: Curve
+    smile: Curve
+    frown: Curve
+    stretched: Curve
+    upper_raise: Curve
+    chin_raise: Curve
+    tight: Curve
 
     @property
     def contact(self) -> NDArray[np.bool_]:
@@ -137,16 +158,18 @@ def spoken_mouth(motion: Motion, units: Timeline[Unit], fps: float | None = None
     # w has half the press of p, with protruded lips: a hole that is almost closed
     said["pursed"] = np.clip(said["lip_press"] / (0.8 * PURSED_PRESS), 0, 1) * said["protrusion"]
     said["pursed"] *= np.clip((0.75 - said["lip_press"]) / 0.15, 0, 1)
-    gap = gap_in(motion)
+    mood = action_units(motion)
+    gap = _parted(gap_in(motion), said, mood)
     if GAP not in motion.names:
         gap = _articulated(gap, said, time_s)
     gap = closed_lips(gap, motion, units)
+    expressed = _expressed(mood, said)
     oval = said[OVAL] * np.clip((gap - OVAL_GAPS[0]) / (OVAL_GAPS[1] - OVAL_GAPS[0]), 0, 1)
     mouth = SpokenMouth(
         motion.rate_hz,
         gap,
-        _width(motion, rest, said, oval),
-        _fullness(motion, rest),
+        _width(motion, rest, said | expressed, oval),
+        _fullness(motion, rest) * (1 - TIGHT_FULLNESS * expressed["tight"]),
         _jaw(motion, rest, gap) * (1 - TUCKED_CHIN_SHARE * said["lip_tuck"]),
         said["tongue"],
         said["lip_tuck"],
@@ -156,6 +179,7 @@ def spoken_mouth(motion: Motion, units: Timeline[Unit], fps: float | None = None
         said["teeth"],
         said["pursed"],
         oval,
+        **{name: expressed[name] for name in EXPRESSED},
     )
     return mouth if fps is None else mouth.at(fps)
 
@@ -187,6 +211,36 @@ def upper_share(gap: Any) -> Any:
 def jaw_drop(gap: Any) -> Any:
     """Return how far the chin drops for a gap."""
     return JAW_SHARE * (np.asarray(gap) - upper_share(gap))
+
+
+def _parted(gap: Curve, said: dict[str, Curve], mood: dict[int, Curve]) -> Curve:
+    """Return a gap that is parted by a mood where the lips are free, hardly where they are far apart [shape=(T,)]."""
+    wanted = sum(
+        length * mood[unit] for unit, length in ((25, PARTED_GAP), (26, DROPPED_GAP), (10, RAISED_GAP)) if unit in mood
+    )
+    if isinstance(wanted, int):
+        return gap
+    free = np.clip(1 - 2 * said["lip_press"], 0, 1) * (1 - PARTED_ROUND_SHARE * said["protrusion"])
+    return gap + free * wanted * np.clip(1 - gap / (2 * DROPPED_GAP), 0, 1)
+
+
+def _expressed(mood: dict[int, Curve], said: dict[str, Curve]) -> dict[str, Curve]:
+    """Return what a mood does to the mouth, as far as protruded and tucked lips leave it free [each shape=(T,)].
+
+    Rounding, and teeth on the lip, are seen in any mood.
+    """
+    none = np.zeros(len(said["protrusion"]))
+    free = 1 - (1 - ROUND_SHARE) * np.clip(said["protrusion"], 0, 1)
+    lifted = free * (1 - 0.5 * said["lip_tuck"])
+    return {
+        "smile": mood.get(12, none) * free,
+        "frown": mood.get(15, none) * free,
+        "stretched": np.maximum(mood.get(20, none), 0.5 * mood.get(14, none)) * free,
+        "upper_raise": np.maximum(mood.get(10, none), 0.5 * mood.get(9, none)) * lifted,
+        "chin_raise": mood.get(17, none) * lifted,
+        "tight": np.maximum(mood.get(23, none), mood.get(24, none)) * free,
+        "dropped": mood.get(26, none) * free,
+    }
 
 
 def _articulated(gap: Curve, said: dict[str, Curve], time_s: Curve) -> Curve:
@@ -223,6 +277,8 @@ def _width(motion: Motion, rest: NDArray[np.bool_], said: dict[str, Curve], oval
     else:
         change = -0.25 * np.clip(motion["opening"].astype(np.float64), 0, 0.4)
     width = 1 + WIDTH_REACH * np.tanh(change / WIDTH_REACH)
+    for name, wider in (("smile", SMILE_WIDTH), ("stretched", STRETCH_WIDTH), ("dropped", DROPPED_WIDTH)):
+        width = width + wider * said[name]
     for weight, most in ((said["protrusion"], ROUND_WIDTH), (said["pursed"], PURSED_WIDTH), (oval, OVAL_WIDTH)):
         width = width + weight * (np.minimum(width, most) - width)
     spread = said["spread"] * (1 - said["protrusion"])

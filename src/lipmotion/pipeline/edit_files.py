@@ -10,7 +10,7 @@ from typing import Any
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.export.motion.document import parse_units, unit_rows
-from lipmotion.pipeline.edits import FORMS, Edits
+from lipmotion.pipeline.edits import FORMS, Edits, MoodStep
 from lipmotion.pipeline.job import Request, located
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.outputs.scenes import sound_reference
@@ -66,10 +66,15 @@ class EditFile:
 
 
 def begun(asked: Request) -> EditFile:
-    """Return a file without edits of a recording, whose phones are recognised or aligned now. Raises as ``animate``."""
+    """Return a file without edits of a recording, but for the moods that tags in its words ask for.
+
+    Its phones are recognised or aligned now. Raises as ``animate``.
+    """
     session = Session(read_request(asked), model=load_model(asked.model))
     named = Request(**{name: getattr(asked, name) for name in HELD})
-    return EditFile(Edits(), named, session.units(), session.generated().outlook)
+    generation = session.generated()
+    moods = (MoodStep(key.label, key.time_s) for key in generation.moods)  # of tags in the words, which are not held
+    return EditFile(Edits(tuple(moods)), named, session.units(), generation.outlook)
 
 
 def edit_file(edits: EditFile | Edits | str | Path | None) -> EditFile:

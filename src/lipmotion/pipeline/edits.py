@@ -11,6 +11,7 @@ from typing import Any, ClassVar, get_type_hints
 from lipmotion.errors import InputError, shortened
 from lipmotion.types import Gain, Pin, Span, Timeline, Unit
 from lipmotion.types.delivery import Delivery
+from lipmotion.types.moods import MoodKey, in_time, moods_of, text_of
 from lipmotion.types.staging import Staging
 from lipmotion.units import PHONES, unknown_phone_message
 
@@ -325,6 +326,26 @@ class SetStep(Step):
         return value
 
 
+@dataclass(frozen=True)
+class MoodStep(Step):
+    """The face goes over to a mood, and keeps it until the next one (docs/expression.md)."""
+
+    form: ClassVar[str] = "mood {mood} at {time_s}"
+    mood: str
+    time_s: float
+
+    def __post_init__(self) -> None:
+        self.key  # noqa: B018 # checks the values
+
+    @property
+    def key(self) -> MoodKey:
+        """The mood, its strength, and its time. Raises InputError: as ``moods_of``."""
+        keys = moods_of(f"{self.mood} at {self.time_s!r}")
+        if len(keys) != 1:
+            raise InputError(f"{str(self)!r}: required one mood, as happy:0.7")
+        return keys[0]
+
+
 _TRUTH = {"true": True, "false": False, "yes": True, "no": False}
 
 
@@ -334,7 +355,7 @@ def _names(kind: type[Any]) -> tuple[str, ...]:
 
 STEPS: tuple[type[Step], ...] = (
     WordIs, PhoneIs, PhoneBegins, PhoneEnds, PhoneRemoved, PhoneInserted,
-    PinStep, GainStep, CurveGainStep, LockStep, UnlockStep, SetStep,
+    PinStep, GainStep, CurveGainStep, LockStep, UnlockStep, MoodStep, SetStep,
 )  # fmt: skip
 """All edits that a sentence can state."""
 FORMS = tuple(re.sub(r"{(\w+?)(?:_s)?}", lambda name: name[1].upper(), step.form) for step in STEPS)
@@ -370,7 +391,7 @@ class Edits:
     >>> Edits().then("phone 2 is p", "pin opening 0.02 at 1.2").sentences
     ('phone 2 is p', 'pin opening 0.02 at 1.2')
     >>> Edits().then("set intensity 1.3").delivery(Delivery(anticipation_ms=40))
-    Delivery(intensity=1.3, anticipation_ms=40, offset_ms=0.0, min_hold_ms=0.0, stepped=False)
+    Delivery(intensity=1.3, anticipation_ms=40, offset_ms=0.0, min_hold_ms=0.0, stepped=False, mood='')
     """
 
     steps: tuple[Step, ...] = ()
@@ -391,7 +412,9 @@ class Edits:
 
     def delivery(self, asked: Delivery = Delivery()) -> Delivery:  # noqa: B008 # a frozen value
         """Return how the motion is delivered: as is asked for, and where nothing is, as these edits set it."""
-        return replace(asked, **self._set(asked, Delivery()))
+        found = replace(asked, **self._set(asked, Delivery()))
+        keys = in_time([*found.moods, *(step.key for step in self.steps if isinstance(step, MoodStep))])
+        return replace(found, mood=text_of(keys)) if keys != found.moods else found
 
     def staging(self, asked: Staging = Staging()) -> Staging:  # noqa: B008 # a frozen value
         """Return how a drawn face is shown: as is asked for, and where nothing is, as these edits set it."""

@@ -81,6 +81,7 @@ from lipmotion.types import (
     silent_monitor,
 )
 from lipmotion.units import words_in_time
+from lipmotion.units.mood_tags import moods_in_time
 
 KeptT = TypeVar("KeptT")
 
@@ -396,4 +397,5 @@ def generation_of(
     paused = with_pauses(generation, request.pauses, pinned_s)
     speech, fit = understood.speech, understood.fit
     knowledge = SpeechKnowledge(speech.voice, float(np.mean(speech.confidence)), fit.share if fit else 1.0)
-    return replace(paused, outlook=outlook_of(request, understood), about=model.about, knowledge=knowledge)
+    moods = moods_in_time(understood.tags, speech.units)
+    return replace(paused, moods=moods, outlook=outlook_of(request, understood), about=model.about, knowledge=knowledge)

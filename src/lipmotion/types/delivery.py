@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from lipmotion.types.configuration import Configuration, Rule, option
+from lipmotion.types.moods import MoodKey, moods_of
 
 MOST_INTENSITY = 3.0
 MOST_ANTICIPATION_MS = 1000.0
@@ -25,8 +26,11 @@ class Delivery(Configuration):
     offset_ms       : the sound begins so many milliseconds after time 0 of the timeline; negative: before it, and what
                       would be before time 0 is left out. For files that are put beside a sound; videos have their own
     min_hold_ms     : 0: the curves are smooth; more: poses are held, each for at least so many milliseconds
+    mood            : what the face expresses, and the manner of speaking, over time (``types.moods.moods_of``):
+                      ``happy``, ``sad:0.6, whisper``, ``happy:0.7, neutral at 2.5``; empty: what the words or the
+                      motion say, else nothing
     stepped         : poses are held; with ``min_hold_ms`` 0, each for at least two frames at 24 frames a second
-    Raises InputError: a value out of its range.
+    Raises InputError: a value out of its range, or no such mood.
 
     >>> Delivery(anticipation_ms=40).hold_ms, Delivery(stepped=True).hold_ms > 80, Delivery(min_hold_ms=120).hold_ms
     (0.0, True, 120)
@@ -57,6 +61,22 @@ class Delivery(Configuration):
         help="hold every pose for at least N ms",
     )
     stepped: bool = option(False, help="hold poses instead of moving smoothly, each for at least 83 ms")
+    mood: str = option(
+        "",
+        later=True,
+        metavar="MOOD[:STRENGTH]",
+        help="neutral, happy, sad, angry, afraid, disgusted, surprised, tense, tired; plain, whisper, shout, mumble; "
+        "strength 0 to 1; over time: 'happy:0.7, sad at 2.5' (docs/expression.md)",
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.moods  # noqa: B018 # checks them
+
+    @property
+    def moods(self) -> tuple[MoodKey, ...]:
+        """The moods over time. Raises InputError: as ``moods_of``."""
+        return moods_of(self.mood)
 
     @property
     def hold_ms(self) -> float:

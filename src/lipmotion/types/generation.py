@@ -14,6 +14,7 @@ from lipmotion.errors import InputError, shortened
 from lipmotion.types.audio import Audio
 from lipmotion.types.confidence import SpeechKnowledge
 from lipmotion.types.features import Features, TokenPosteriors
+from lipmotion.types.moods import MoodKey
 from lipmotion.types.motion import Motion, between_frames
 from lipmotion.types.timeline import Timeline, Unit
 
@@ -280,6 +281,7 @@ class Generation:
     outlook : how well the model knew words and voice (None: not from ``animate``)
     stepped : channels of held poses, which change at once: formats that can say so do
     curve_edits : pins and gains of curves that follow from the motion, as ``jawOpen``, wherever these are made
+    moods  : what the words say of the mood, over time, in the order of their times
     about  : corpus, licence and attribution of the model, by name, as ``Model.about``; empty: not from ``animate``
     knowledge : of voice and phones, from which ``confidence`` follows (None: not from ``animate``)
 
@@ -298,6 +300,7 @@ class Generation:
     outlook: Outlook | None = None
     stepped: tuple[str, ...] = ()
     curve_edits: tuple[Pin | Gain, ...] = ()
+    moods: tuple[MoodKey, ...] = ()
     about: Mapping[str, Any] = field(default_factory=dict)
     knowledge: SpeechKnowledge | None = None
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from lipmotion.types.moods import MoodTag
+
 
 @dataclass(frozen=True, slots=True)
 class TimedWord:
@@ -27,12 +29,15 @@ class TranscriptLine:
 class TimedTranscript:
     """What is said, in order. Times are as people and recognisers write them: late, early, rounded, overlapping.
 
+    tags : the moods that tags in the text ask for
+
     >>> line = TranscriptLine((TimedWord("hello"), TimedWord("you")), 1.5, 2.5)
     >>> TimedTranscript((line,)).words, TimedTranscript((line,)).has_times
     (('hello', 'you'), True)
     """
 
     lines: tuple[TranscriptLine, ...]
+    tags: tuple[MoodTag, ...] = ()
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -53,7 +58,8 @@ class TimedTranscript:
                     moved(line.end_s),
                 )
                 for line in self.lines
-            )
+            ),
+            self.tags,
         )
 
     @property

@@ -85,4 +85,4 @@ def test_a_loud_high_voice_raises_the_brows():
     with_voice, without = (
         head_poses(motion, said("aa", duration_s=3), 25.0, prosody=p) for p in (Prosody(level, pitch), flat)
     )
-    assert with_voice[40].brows > without[40].brows + 0.005
+    assert with_voice[35].brows > without[35].brows + 0.005

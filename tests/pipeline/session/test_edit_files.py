@@ -11,14 +11,17 @@ import pytest
 
 from lipmotion.articulation.delivery import Delivery
 from lipmotion.errors import InputError
+from lipmotion.export.sound import write_sound
 from lipmotion.faces.base import Staging
 from lipmotion.pipeline.edit_files import EditFile, begun, read_edits, write_edits
-from lipmotion.pipeline.edits import STEPS, Edits, step_of
+from lipmotion.pipeline.edits import STEPS, Edits, MoodStep, step_of
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.job import Request
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Outlook, Span, Timeline, Unit
+from lipmotion.units import words_in_time
 
 SENTENCES = (
     "word 3 is blue",
@@ -32,6 +35,7 @@ SENTENCES = (
     "gain jawOpen 0.8 from 1.0 to 2.0",
     "lock from 1.0 to 1.5",
     "unlock from 1.0 to 1.5",
+    "mood happy:0.7 at 1.2",
     "set intensity 1.2",
 )
 
@@ -52,6 +56,8 @@ def test_every_kind_of_edit_is_a_sentence() -> None:
         ("pin opening nan at 1", "is no edit"),
         ("gain 9 from 0 to 1", "the gain is 9, required 0 to 3"),
         ("lock from 2 to 1", "required an end after the start"),
+        ("mood gloomy at 1", "the mood is 'gloomy', required one of: neutral, happy"),
+        ("mood happy,sad at 1", "required one mood"),
         ("set loudness 2", "nothing is called 'loudness'; required one of: intensity"),
         ("set intensity loud", "required a number"),
         ("set intensity 9", "required 0 to 3"),
@@ -68,6 +74,13 @@ def test_delivery_and_staging_are_set_where_nothing_else_is_asked_for() -> None:
     assert edits.delivery() == Delivery(intensity=1.3, stepped=True)
     assert edits.delivery(Delivery(intensity=2.0)).intensity == 2.0
     assert edits.staging() == Staging(size=360)
+
+
+def test_moods_are_added_to_those_that_are_asked_for() -> None:
+    edits = Edits().then("mood sad at 2.0", "mood happy:0.7 at 1.0", "mood angry at 2.0")
+    assert edits.delivery().mood == "happy:0.7 at 1, angry at 2"
+    assert edits.delivery(Delivery(mood="tired")).mood == "tired at 0, happy:0.7 at 1, angry at 2"
+    assert Edits().then("set mood tense:0.5").delivery().mood == "tense:0.5"
 
 
 @pytest.mark.parametrize("suffix", [".json", ".toml"])
@@ -105,6 +118,17 @@ def test_files_that_are_refused(tmp_path: Path, text: str, message: str) -> None
     path.write_text(text)
     with pytest.raises(InputError, match=message):
         read_edits(path)
+
+
+def test_a_file_holds_the_moods_of_tags(toy_sentence: ToySentence, toy_model_file: Path, tmp_path: Path) -> None:
+    words, recording = toy_sentence.words, tmp_path / "a.wav"
+    write_sound(recording, toy_sentence.audio)
+    tagged = f"[happy:0.5] {words[0]} [angry] {' '.join(words[1:])}"
+    file = begun(Request(recording, tagged, model=toy_model_file))
+    first, second = (step for step in file.edits.steps if isinstance(step, MoodStep))
+    assert (str(first), second.mood) == ("mood happy:0.5 at 0.0", "angry")
+    spoken = [span for span in words_in_time(file.units or Timeline(())) if span.label]
+    assert second.time_s == pytest.approx(spoken[1].start_s)
 
 
 def test_a_file_replays_what_was_recognised(toy_speech: Path, toy_model_file: Path, tmp_path: Path) -> None:

@@ -31,6 +31,7 @@ from lipmotion.storage.files import check_regular
 from lipmotion.types import TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
 from lipmotion.units import phone_named, words_of
 from lipmotion.units.length_limits import LARGEST_TRANSCRIPT_BYTES
+from lipmotion.units.mood_tags import tagged_text, without_known_tags
 
 LOG = logging.getLogger("lipmotion")
 RECOGNISED = (".srt", ".vtt", ".ass", ".ssa", ".json", ".ctm", ".tsv")
@@ -131,7 +132,7 @@ def read_transcript(path: Path) -> str | TimedTranscript:
     labels = _timed(text, path)
     if labels is None:
         check_size(path, text)
-        check_no_labels(text, str(path))
+        check_no_labels(without_known_tags(text), str(path))
         return text
     if labels.transcript is None:
         what = "phones in time, but no words; give them as units" if labels.phones else "no word"
@@ -189,7 +190,8 @@ def _read(path: Path, *, unknown_json: bool) -> RecordingLabels | None:
     if labels is not None:
         return labels
     check_size(path, text)
-    check_no_labels(text, str(path))
+    check_no_labels(without_known_tags(text), str(path))
+    text, tags = tagged_text(text)
     tokens = text.split()
     one_a_line = len(tokens) == sum(bool(line.strip()) for line in text.splitlines())
     if len(tokens) > 1 and one_a_line and all(map(phone_named, tokens)):
@@ -197,7 +199,7 @@ def _read(path: Path, *, unknown_json: bool) -> RecordingLabels | None:
     if not tokens:
         LOG.warning("%s: is empty: it counts as no transcript; write the words that are said, or remove it", path)
         return RecordingLabels()
-    return RecordingLabels(TimedTranscript((TranscriptLine(tuple(map(TimedWord, words_of(text)))),)))
+    return RecordingLabels(TimedTranscript((TranscriptLine(tuple(map(TimedWord, words_of(text)))),), tags))
 
 
 def _timed(text: str, path: Path) -> RecordingLabels | None:

@@ -38,7 +38,7 @@ def check(motion: Motion) -> None:
 def write(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
     """Write the points; of motion with distances alone, they move as mouths usually do (``fitting.point_motion``)."""
     motion, template = generation.motion, mouth_template()
-    moved = point_motion(motion, generation.units).displacements
+    moved = point_motion(motion, generation.units).expressed
     offsets = [_point(place) for place in template.places]
     lines = ["HIERARCHY", "ROOT head", "{", "  OFFSET 0 0 0", f"  CHANNELS 6 {ROOT_CHANNELS}"]
     for point, jaw, offset in zip(template.points, template.jaw, offsets, strict=True):

@@ -37,6 +37,9 @@ UPPER_LID = _curve(
 LOWER_LID = _curve(
     [(-1, -0.022), (-0.75, -0.053), (-0.3, -0.072), (0.15, -0.074), (0.6, -0.053), (0.85, -0.018), (1, 0.018)]
 )
+WIDE_RISE, SQUINT_RISE, SQUINT_FALL, SLANT = 0.034, 0.044, 0.018, 0.042
+"""How far a mood raises the upper lid, raises the lower one and lowers the upper one, and how far lowered brows lower
+the inner half of the upper lid, brows raised at their inner ends the outer half."""
 LOWER_LID_RISE = 0.028
 """How far the middle of the lower lid rises to meet the upper one."""
 
@@ -63,6 +66,11 @@ class Eyelids:
         squint = 0.6 * max(pose.smile, 0.0)
         upper = UPPER_LID + gaze * (1 - LID_ACROSS**2) + 0.15 * pose.brows * (1 - LID_ACROSS**2)
         lower = LOWER_LID + (0.5 * gaze * (1 - pose.shut) + squint + LOWER_LID_RISE * pose.shut) * (1 - LID_ACROSS**2)
+        bow = 1 - LID_ACROSS**2
+        slant = pose.lowered * (1 - pose.inner) * np.clip(0.6 - LID_ACROSS, 0, 1)
+        slant = slant + 0.7 * pose.inner * (1 - pose.outer) * (1 - pose.wide) * np.clip(0.6 + LID_ACROSS, 0, 1)
+        upper = upper + (WIDE_RISE * pose.wide - SQUINT_FALL * pose.squint - SLANT * slant) * bow
+        lower = lower + SQUINT_RISE * max(pose.squint, 0.7 * pose.cheek) * (1 - pose.shut) * bow
         upper = np.maximum(upper + min(1.12 * pose.shut, 1.0) * (lower - upper), lower)
         return EYE[0] + HALF_WIDTH * LID_ACROSS, np.where(LID_SIDE > 0, upper, lower)
 

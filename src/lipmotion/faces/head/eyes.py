@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from lipmotion.faces.head import palette
 from lipmotion.faces.head.forms import EYE, EYEBALL_RADIUS, head, seen_from_front
 from lipmotion.faces.head.part import Part, grid_triangles, joined_parts, part, tube
+from lipmotion.faces.head.pose import CharacterPose
 
 Real = NDArray[np.float64]
 
@@ -127,3 +128,19 @@ def brow() -> Part:
     upward = np.broadcast_to([0.25, 0.1, 1.0], path.shape)
     places, triangles, strands = tube(path, wide, 0.45 * wide + 0.006, upward, sides=12)
     return part("brow", places, triangles, palette.BROW, palette.BROW_FINISH, strands)
+
+
+INNER_RISE, OUTER_RISE, LOWERED, TOGETHER = 0.12, 0.1, (0.1, 0.03), 0.055
+"""How far a mood raises the inner and the outer ends of the brows, lowers the inner ends, and outer ones, and draws
+them together."""
+
+
+def brow_shift(places: Real, pose: CharacterPose) -> Real:
+    """Return how a mood moves places of a brow at rest [shape=(N, 3)]."""
+    outwards = np.clip((np.abs(places[:, 0]) - 0.135) / 0.4, 0, 1)
+    inner = (1 - outwards) ** 1.5
+    moved = np.zeros_like(places)
+    moved[:, 1] = INNER_RISE * pose.inner * inner + OUTER_RISE * pose.outer * np.sin(0.72 * np.pi * outwards**1.3)
+    moved[:, 1] -= pose.lowered * (LOWERED[0] * inner + LOWERED[1] * (1 - inner))
+    moved[:, 0] = -TOGETHER * pose.lowered * np.sign(places[:, 0]) * (1 - outwards)
+    return moved

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lipmotion.faces.head import palette
 from lipmotion.faces.head.body import clothing, collar, ear, earring, neck
-from lipmotion.faces.head.eyes import LASHES, brow, catchlights, eyeball, lash_triangles, lashes
+from lipmotion.faces.head.eyes import LASHES, brow, brow_shift, catchlights, eyeball, lash_triangles, lashes
 from lipmotion.faces.head.forms import EYE
 from lipmotion.faces.head.hair import hair
 from lipmotion.faces.head.inside import lower_drop, lower_teeth, tongue, tongue_triangles, upper_teeth
@@ -110,6 +110,7 @@ class Figure:
         places[self.rows["tongue"]], normals[self.rows["tongue"]] = licked, normals_of(licked, tongue_triangles())
         places[self.rows["teeth"]] = jaw_moved(places[self.rows["teeth"]], lower_drop(pose))
         for name in ("brow", "right brow"):
+            places[self.rows[name]] += brow_shift(places[self.rows[name]], pose)
             places[self.rows[name], 1] += pose.brows
         self._look(pose, places, normals)
         return places, normals

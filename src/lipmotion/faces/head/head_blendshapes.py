@@ -37,6 +37,17 @@ SIDED_POSES = {
     "eyeBlink": CharacterPose(shut=1),
 }
 """The poses of the shapes that are one each for the left and the right side."""
+MOOD_POSES = {"browInnerUp": CharacterPose(inner=1)}
+SIDED_MOOD_POSES = {
+    "browDown": CharacterPose(lowered=1),
+    "browOuterUp": CharacterPose(outer=1),
+    "eyeSquint": CharacterPose(squint=1),
+    "eyeWide": CharacterPose(wide=1),
+    "cheekSquint": CharacterPose(cheek=1),
+    "noseSneer": CharacterPose(sneer=1),
+    "mouthFrown": CharacterPose(smile=-0.05),
+}
+"""The poses of the shapes that moods need, instead of those above and beside them; other files do not have these."""
 _GAZES = {
     "Out": (FULL_LOOK_RAD, 0.0),
     "In": (-FULL_LOOK_RAD, 0.0),
@@ -49,19 +60,20 @@ _HALF_WIDTH = 0.12
 """Half the width of the strip in the middle in which both sides move."""
 
 
-def head_mesh(figure: Figure) -> Mesh:
+def head_mesh(figure: Figure, *, moods: bool = False) -> Mesh:
     """Return the character at rest, its parts named, with a blendshape for each of ``POSES`` and ``SIDED_POSES``, and
     those that turn the eyes.
 
+    moods : whether it has the shapes of moods, too
     ``mouthClose`` brings the lips together while the jaw is open: it is the difference from ``jawOpen``.
     """
     rest = figure.placed(REST)[0]
     shapes = []
-    for name, pose in POSES.items():
+    for name, pose in (POSES | MOOD_POSES if moods else POSES).items():
         start = figure.placed(POSES["jawOpen"])[0] if name == "mouthClose" else rest
         shapes.append(Blendshape.between(name, start, figure.placed(pose)[0], least=LEAST_DISPLACEMENT))
     left = np.clip(0.5 + rest[:, :1] / (2 * _HALF_WIDTH), 0, 1)
-    for name, pose in SIDED_POSES.items():
+    for name, pose in (SIDED_POSES | SIDED_MOOD_POSES if moods else SIDED_POSES).items():
         moved = figure.placed(pose)[0] - rest
         for side, share in (("Left", left), ("Right", 1 - left)):
             shapes.append(Blendshape.between(name + side, rest, rest + share * moved, least=LEAST_DISPLACEMENT))

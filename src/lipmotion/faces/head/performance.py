@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.liveliness import Liveliness
+from lipmotion.articulation.liveliness import UPPER_FACE, Liveliness
 from lipmotion.articulation.mouth import SpokenMouth, spoken_mouth, upper_share
 from lipmotion.articulation.phone_targets import TIP_UP
 from lipmotion.faces.base import Staging, alive
@@ -22,6 +22,9 @@ BITTEN = (0.8, 0.95)
 """Teeth are apart up to the first value of ``teeth``, and together from the second on."""
 OO_ROUNDNESS = 0.8
 """How round the lips of oo are; those of w are a ring."""
+MOOD_SMILE, MOOD_FROWN, MOOD_TIGHT, RAISED_LIP = 0.065, 0.07, 0.025, 0.06
+"""How far a mood raises the corners, lowers them, lowers those of tight, stretched or raised lips, and raises the upper
+lip."""
 FULL_NARROWING, FULL_WIDENING = 0.16, 0.12
 """Changes of width at which lips are round, and spread, whatever the phones ask for."""
 
@@ -53,9 +56,10 @@ def posed(mouth: SpokenMouth, moved: Liveliness) -> list[CharacterPose]:
     teeth = np.clip((mouth.teeth - BITTEN[0]) / (BITTEN[1] - BITTEN[0]), 0, 1)
     bite = np.maximum(teeth, 0.5 * spread) * together
     closing, out = mouth.closing, mouth.between_teeth * (1 - mouth.closing)
+    serious = np.maximum(np.maximum(mouth.tight, mouth.stretched), mouth.upper_raise)
     curves = {
         "gap": gap,
-        "upper_rise": _rise(gap, roundness, np.maximum(wide, 0.9 * teeth), mouth.tuck),
+        "upper_rise": _rise(gap, roundness, np.maximum(wide, 0.9 * teeth), mouth.tuck, mouth.upper_raise),
         "jaw": mouth.jaw * (1 - 0.85 * bite),
         "bite": np.maximum(bite, closing),
         "width": mouth.width,
@@ -68,9 +72,17 @@ def posed(mouth: SpokenMouth, moved: Liveliness) -> list[CharacterPose]:
         "tuck": mouth.tuck * (1 - closing),
         "tongue_out": out,
         "tongue_up": np.minimum(mouth.tongue / TIP_UP, 1) * (1 - out) * (1 - teeth),
-        "smile": 0.004 * wide,
+        "smile": 0.004 * wide
+        + (MOOD_SMILE * mouth.smile - MOOD_FROWN * mouth.frown - MOOD_TIGHT * serious) * (1 - roundness),
         "shut": moved.lids,
         "brows": moved.brows,
+        **dict(
+            zip(
+                ("inner", "outer", "lowered", "wide", "cheek", "squint", "sneer"),
+                map(moved.unit, UPPER_FACE),
+                strict=True,
+            )
+        ),
     }
     rows = np.stack(list(curves.values()), axis=1).tolist()
     return [
@@ -79,9 +91,13 @@ def posed(mouth: SpokenMouth, moved: Liveliness) -> list[CharacterPose]:
     ]
 
 
-def _rise(gap: Curve, roundness: Curve, wide: Curve, tuck: Curve) -> Curve:
-    """Return how far the upper lip rises [shape=(F,)]: little in round lips; spread lips and F bare the teeth."""
+def _rise(gap: Curve, roundness: Curve, wide: Curve, tuck: Curve, raised: Curve) -> Curve:
+    """Return how far the upper lip rises [shape=(F,)]: little in round lips; spread lips and F bare the teeth.
+
+    raised : how far a mood raises it
+    """
     rise = upper_share(gap)
+    rise = rise + raised * np.maximum(np.minimum(0.8 * gap, RAISED_LIP) - rise, 0)
     rise = rise + wide * np.maximum(np.minimum(SPREAD_RISE * gap, 0.07) - rise, 0)
     rise = rise + roundness * (0.48 * gap - rise)
     return np.minimum(rise + tuck * np.maximum(gap - rise, 0), gap)

@@ -20,7 +20,7 @@ Real = NDArray[np.float64]
 
 FROM_POSE = {"tongueOut": "tongue_out", "tongueUp": "tongue_up", "mouthPressLeft": "press", "mouthPressRight": "press"}
 """Shapes whose weight is a number of the pose."""
-_NOT_OF_LIPS = ("eye", "brow", *FROM_POSE)
+_NOT_OF_LIPS = ("eye", "brow", "cheek", "nose", *FROM_POSE)
 PARTING = ("jawOpen", "mouthClose", "mouthLowerDown", "mouthUpperUp")
 """Shapes that are changed first so that the lips are apart as in the pose; the others where that is not enough."""
 GAP_WEIGHT = 12.0

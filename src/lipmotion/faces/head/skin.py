@@ -33,6 +33,8 @@ HINGE = np.array([0.0, -0.32, -0.82])
 REST = CharacterPose()
 CHEEKS_SPREAD, CHEEKS_ROUND = 0.035, 0.025
 """How far cheeks come forward beside spread lips, and sink beside round ones."""
+CHEEKS_RAISED, NOSE_LIFT = 0.05, 0.07
+"""How far a mood raises the cheeks, and the wings of a wrinkled nose."""
 _LEFT_CORNER = 40
 _OPPOSITE = -np.arange(COLUMNS) % COLUMNS
 """For every column of the lips the one of the other lip that it meets."""
@@ -79,7 +81,7 @@ class Skin:
             "lids": len(grids[1]) + len(grids[2]),
         }
         self._bind(contour)
-        self._cheeks = _cheeks(fill, len(self.face))
+        self._cheeks, self._nose = _cheeks(fill, len(self.face)), _nose(self.face)
         self.rest = self.places(REST)
         meshed = normals_of(self.rest, self.triangles)
         self.normals = meshed.copy()
@@ -161,6 +163,7 @@ class Skin:
         face = self.face + by_jaw
         face[self._bound] += self._shares @ own
         face += (CHEEKS_SPREAD * pose.spread - CHEEKS_ROUND * pose.roundness) * self._cheeks
+        face += CHEEKS_RAISED * pose.cheek * self._cheeks + NOSE_LIFT * pose.sneer * self._nose
         face[:COLUMNS] = lips[0]
         left = self.lids_of_eye.rings(pose).reshape(-1, 3)
         return np.concatenate([face, lips[1:].reshape(-1, 3), left, left * [-1, 1, 1]])
@@ -172,6 +175,14 @@ def _cheeks(fill: Real, count: int) -> Real:
     share = np.exp(-np.sum(away**2, axis=1)) * (fill[:, 2] > -0.75)
     moved = np.zeros((count, 3))
     moved[count - len(fill) :] = share[:, None] * (outward(head, fill) + np.array([0.0, 0.4, 0.0]))
+    return moved
+
+
+def _nose(face: Real) -> Real:
+    """Return how the nose moves when it is wrinkled, for all vertices of the face [shape=(N, 3)]."""
+    away = (np.abs(face[:, 0]) / 0.2) ** 4 + ((face[:, 1] + 0.4) / 0.14) ** 4
+    moved = np.zeros_like(face)
+    moved[:, 1] = np.exp(-away) * (face[:, 2] > -0.5)
     return moved
 
 

@@ -13,7 +13,7 @@ from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.faces.base import Picture, Staging, alive
 from lipmotion.faces.portrait.movement import HeadPlacement
 from lipmotion.faces.portrait.portrait_rasteriser import FacePose
-from lipmotion.faces.portrait.pose import mouth_poses
+from lipmotion.faces.portrait.pose import mood_poses, mouth_poses
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 
 CanvasT = TypeVar("CanvasT")
@@ -36,9 +36,15 @@ def face_poses(
     heads = np.stack([SWAY_X * yaw, -SWAY_Y * pitch, roll, YAW * yaw, -PITCH * pitch], axis=1)
     lids = np.maximum(moved.lids, RESTING_LIDS)
     return [
-        FacePose(pose, shut, look[0], -look[1], brows, HeadPlacement(*head))
-        for pose, shut, look, brows, head in zip(
-            mouth_poses(mouth), lids.tolist(), gaze.tolist(), moved.brows.tolist(), heads.tolist(), strict=True
+        FacePose(pose, shut, look[0], -look[1], brows, HeadPlacement(*head), mood)
+        for pose, shut, look, brows, head, mood in zip(
+            mouth_poses(mouth),
+            lids.tolist(),
+            gaze.tolist(),
+            moved.brows.tolist(),
+            heads.tolist(),
+            mood_poses(moved),
+            strict=True,
         )
     ]
 

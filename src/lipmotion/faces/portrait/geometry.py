@@ -26,6 +26,8 @@ LARGEST_RING_SHARE, LIP_RING_SHARE = 0.9, 0.8
 """Protruded lips are a ring round a hole, this part of both lips thick; they are at most so much of their own width."""
 ROUND_HOLE = (0.012, 0.85)
 """Half the width of the hole of protruded lips: a length, and so much of the gap."""
+SMILE_RISE, FROWN_FALL, RAISED_LIP, CHIN_RISE = 0.11, 0.1, 0.055, 0.03
+"""How far a mood raises the corners, lowers them, raises the upper lip, and the middle of both lips by the chin."""
 TUCKED_LIP = 0.05
 """Least thickness of a lower lip under the upper teeth: thin lips are drawn thicker there, to be seen."""
 _LINE = [(0, 0.006), (0.16, 0.005), (0.4, -0.005), (0.72, -0.004), (1, 0.004)]
@@ -74,13 +76,16 @@ def lip_outlines(lips: LipDesign, pose: MouthPose, x: Heights) -> LipOutlines:
     rise = float(upper_share(pose.gap))
     rise += wide * max(min(SPREAD_RISE[0] * pose.gap, SPREAD_RISE[1]) - rise, 0)
     rise += pose.tuck * (1 - out) * max(min(0.9 * pose.gap, 0.045) - rise, 0) + out * (0.47 * pose.gap - rise)
+    rise += pose.upper_raise * max(min(0.8 * pose.gap, RAISED_LIP) - rise, 0)
     drop = pose.gap - rise
-    middle = lips.line_y + pose.tuck * max(TEETH_EDGE - 0.018 - drop, -0.03) - 0.008 * out
+    middle = lips.line_y - CHIN_RISE * pose.chin_raise + pose.tuck * max(TEETH_EDGE - 0.018 - drop, -0.03) - 0.008 * out
     sag = (0.5 - 0.3 * wide) * drop * (1 - pose.tuck) - 0.012 * wide * (1 - pose.press)
     sag += out * (0.5 * (drop - rise) + 0.004 - sag)
     sag += pose.oval * (0.5 * (drop - rise) - sag) + 0.014 * pose.tuck
     bend = sag * u * u
     smile = lips.smile * (1 - out) * (1 - pose.oval) * (1 - pose.tuck) * calm_share(pose)
+    smile *= 1 - max(pose.frown, pose.stretched, pose.upper_raise, 0.8 * pose.tight)
+    smile += (FROWN_FALL * pose.frown + 0.3 * FROWN_FALL * pose.stretched - SMILE_RISE * pose.smile) * (1 - 0.7 * out)
     line = middle + (1 - 0.7 * out) * _on("line", u) + smile * u * u + bend
     inner_share = _inner_share(pose, half_width)
     inner = u / inner_share

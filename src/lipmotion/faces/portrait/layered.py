@@ -41,6 +41,8 @@ class _Key(NamedTuple):
     teeth: float = 0.5
 
 
+MOOD_RISE, MOOD_FALL = 0.1, 0.08
+"""How far a mood raises and lowers the brows, which are one layer."""
 MOUTHS = {
     "rest": _Key(0.0, teeth=0.0),
     "mbp": _Key(0.0),
@@ -147,7 +149,9 @@ class _LayeredPicture:
         """Return one frame [shape=(H, W, 3 or 4)]."""
         unit = EYE_DISTANCE * self._size
         eyes = "closed" if pose.lids > 0.5 else "open"
-        look = (round(pose.gaze_x * unit), round(pose.gaze_y * unit), round(pose.brows * unit))
+        mood = pose.mood
+        brows = pose.brows + MOOD_RISE * (mood.inner + mood.outer) / 2 - MOOD_FALL * mood.lowered
+        look = (round(pose.gaze_x * unit), round(pose.gaze_y * unit), round(brows * unit))
         head = self._heads(mouth, eyes, *look)
         moved = np.empty(head.shape, np.uint8)
         warp_bytes(head, *self._shifts(pose.head), 16, moved)

@@ -24,6 +24,9 @@ from lipmotion.kernels.pixels.painting import paint_band
 
 COLUMNS = 4
 """Places in each column of pixels at which heights are computed."""
+FOLD, FOLD_TOP = (0.19, 0.1), -0.235
+"""A fold between nose and mouth begins so far from the middle, and ends so far beside the corner; its upper end lies so
+far below the line of the lips."""
 CORNER_REACH = 1.28
 """The shadows beside the corners are painted up to this multiple of the mouth's half width."""
 
@@ -60,8 +63,21 @@ class MouthPainter:
         depth = 0.085 + 0.03 * pose.protrusion
         on.paint(shape.lower_outer, shape.lower_outer + depth, on_lips, art.under_lip)
         on.paint(shape.lower_outer, shape.lower_outer + 0.7 * depth, on_lips, art.under_lip, pose.tuck)
+        self._folds(on, shape, pose)
         corner = np.full_like(x, shape.corner_y)
         on.paint(corner - 0.06, corner + 0.06, _place(x, shape.half_width * CORNER_REACH), art.corners)
+
+    def _folds(self, on: _Columns, shape: LipOutlines, pose: MouthPose) -> None:
+        """Paint the folds between nose and corners that a raised upper lip draws."""
+        if pose.upper_raise <= 0:
+            return
+        line_y, inner, outer = self._lips.line_y, FOLD[0], shape.half_width + FOLD[1]
+        chosen = np.flatnonzero(np.abs(self._x).max(axis=0) < outer + 0.02)
+        wide = on._replace(first=int(chosen[0]), last=int(chosen[-1]) + 1)
+        share = np.clip((np.abs(self._x[:, wide.first : wide.last]) - inner) / (outer - inner), 0, 1)
+        top = line_y + FOLD_TOP - 0.03 * pose.upper_raise
+        middle = top + (shape.corner_y - 0.01 - top) * share**1.25
+        wide.paint(middle - 0.03, middle + 0.03, share.mean(axis=0), self._textures.fold, pose.upper_raise)
 
     def _lips_around(self, on: _Columns, shape: LipOutlines, pose: MouthPose, on_lips: Heights) -> None:
         art = self._textures

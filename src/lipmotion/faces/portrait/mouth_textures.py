@@ -38,6 +38,7 @@ class MouthTextures:
     lip_shadow: Texture
     under_lip: Texture
     corners: Texture
+    fold: Texture
     outline: Texture
 
 
@@ -59,6 +60,7 @@ def mouth_textures(design: Design) -> MouthTextures:
             lip_shadow=clear,
             under_lip=_under_lip(colours.skin_shade, 0.5),
             corners=clear,
+            fold=_flat_fold(colours.line),
             outline=_flat(colours.line),
         )
     return MouthTextures(
@@ -74,6 +76,7 @@ def mouth_textures(design: Design) -> MouthTextures:
         lip_shadow=_lip_shadow(colours.cavity),
         under_lip=_under_lip(colours.mouth_shadow, 0.42),
         corners=_corners(colours.mouth_shadow),
+        fold=_fold(colours.mouth_shadow),
         outline=_flat(colours.line, 0.0),
     )
 
@@ -205,3 +208,16 @@ def _corners(colour: Colour) -> Texture:
     depth, x = _grid(15, 65)
     spot = np.exp(-(((depth - 0.5) / 0.2) ** 2) - ((np.abs(x) - 0.78) / 0.055) ** 2)
     return _texture(np.array(colour, dtype=np.float64)[None, None], 0.34 * spot)
+
+
+def _fold(colour: Colour) -> Texture:
+    """Return the fold from the nose to the corner of the mouth, from its upper end across to its lower end."""
+    depth, x = _grid(15, 65)
+    line = np.exp(-(((depth - 0.5) / 0.2) ** 2)) * np.clip((1 - np.abs(x)) / 0.5, 0, 1)
+    return _texture(np.array(colour, dtype=np.float64)[None, None], 0.5 * line)
+
+
+def _flat_fold(colour: Colour) -> Texture:
+    depth, x = _grid(15, 65)
+    line = (np.abs(depth - 0.5) < 0.17 * np.clip((1 - np.abs(x)) / 0.4, 0, 1)).astype(np.float64)
+    return _texture(np.array(colour, dtype=np.float64)[None, None], 0.8 * line)

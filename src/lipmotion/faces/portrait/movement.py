@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.faces.portrait.design import LipDesign
-from lipmotion.faces.portrait.pose import MouthPose
+from lipmotion.faces.portrait.pose import CALM, MoodPose, MouthPose
 from lipmotion.faces.portrait.view import Window
 
 Floats = NDArray[np.float64]
@@ -22,6 +22,15 @@ JAW_TOP, CHIN = -0.24, 0.4
 """Between these heights, from the line of the lips, skin is stretched when the jaw drops; below, it moves with it."""
 PIVOT_Y = 1.35
 """The head rolls about this point of the neck."""
+BROW_STEPS = 8
+"""Positions of raised brows in a pixel."""
+MOOD_STEPS = 24
+"""Positions of the brows on the way to a mood."""
+INNER_RISE, OUTER_RISE, LOWERED, TOGETHER = 0.13, 0.1, (0.115, 0.05), 0.06
+"""How far a mood raises the inner and the outer ends of the brows, lowers the inner ends, and outer ones, and draws
+them together."""
+NOSE_LIFT, CHEEK_LIFT = 0.05, 0.06
+"""How far wrinkling lifts the wings of the nose, and a smile the cheeks."""
 NECK_TOP, NECK_END = 1.15, 1.85
 """Between these heights the movement of the head fades."""
 
@@ -55,15 +64,37 @@ class SkinField:
         self._narrow = -x * np.clip((low - 0.1) / 0.3, 0, 1) * (1 - 0.5 * np.clip(side / 0.7, 0, 1))
         self._lift = np.exp(-(((side - 0.42) / 0.22) ** 2) - ((low + 0.2) / 0.18) ** 2)
         self._lift *= np.clip((low + 0.5) / 0.2, 0, 1)
+        self._nose = np.exp(-((side / 0.26) ** 4) - ((low + 0.29) / 0.17) ** 4) * np.clip((low + 0.5) / 0.08, 0, 1)
         self._half_width = lips.half_width
 
-    def shifts(self, pose: MouthPose) -> tuple[Floats, Floats]:
+    def shifts(self, pose: MouthPose, mood: MoodPose = CALM) -> tuple[Floats, Floats]:
         """Return the shifts to the right and down, in pixels: to the place that is shown."""
         pulled = np.clip(pose.width - 1, -0.5, 0.3) * self._half_width
         jaw = np.clip(pose.jaw, 0, 0.5)
         x = 0.55 * pulled * self._cheek - 0.1 * jaw * self._narrow
         y = -jaw * self._jaw + 0.05 * np.clip(pose.spread, 0, 1) * self._lift * 0.5
+        if mood is not CALM:
+            y = y + CHEEK_LIFT * mood.cheek * self._lift + NOSE_LIFT * mood.sneer * self._nose
         return x * self._scale, y * self._scale
+
+
+class BrowPose(NamedTuple):
+    """The brows in whole steps, so that pictures of them can be kept.
+
+    raised : both of them, ``BROW_STEPS`` a pixel
+    inner, outer, lowered : of a mood, ``MOOD_STEPS`` each
+    """
+
+    raised: int
+    inner: int = 0
+    outer: int = 0
+    lowered: int = 0
+
+
+def brow_pose(raised: float, mood: MoodPose, scale: float) -> BrowPose:
+    """Return the nearest pose of brows that are raised by a length in eye distances; ``scale``: pixels in one."""
+    of_mood = (round(share * MOOD_STEPS) for share in (mood.inner, mood.outer, mood.lowered))
+    return BrowPose(round(raised * BROW_STEPS * scale), *of_mood)
 
 
 class BrowField:
@@ -75,14 +106,19 @@ class BrowField:
         fade = np.clip((-0.1 - y) / 0.07, 0, 1) * np.clip((y + 0.62) / 0.2, 0, 1)
         bump = fade * np.exp(-(((np.abs(x) - 0.36) / 0.34) ** 4))
         self._both = bump
+        outwards = np.clip((np.abs(x) - 0.13) / 0.45, 0, 1)
+        self._inner, self._outer = (1 - outwards) ** 1.5, np.sin(np.pi * outwards**1.3 * 0.72)
+        self._inwards = np.sign(x) * (1 - outwards) * fade * np.clip(np.abs(x) / 0.1, 0, 1)
 
-    def shifts(self, raised: float) -> tuple[Floats, Floats]:
-        """Return the shifts in pixels.
-
-        raised : how far both brows are raised, in eye distances
-        """
-        y = raised * self._both * self._scale
-        return np.zeros_like(y), y
+    def shifts(self, brows: BrowPose) -> tuple[Floats, Floats]:
+        """Return the shifts to the right and down, in pixels: to the place that is shown."""
+        y = brows.raised / (BROW_STEPS * self._scale) * self._both * self._scale
+        if brows == (brows.raised, 0, 0, 0):
+            return np.zeros_like(y), y
+        inner, outer, lowered = (steps / MOOD_STEPS for steps in brows[1:])
+        rise = INNER_RISE * inner * self._inner + OUTER_RISE * outer * self._outer
+        rise = rise - lowered * (LOWERED[0] * self._inner + LOWERED[1] * (1 - self._inner))
+        return TOGETHER * lowered * self._inwards * self._scale, y + rise * self._both * self._scale
 
 
 class HeadField:

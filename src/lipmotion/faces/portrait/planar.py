@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.faces.portrait.design import Design
-from lipmotion.faces.portrait.eyes import GAZE_STEPS, LID_POSITIONS, EyePainter
+from lipmotion.faces.portrait.eyes import GAZE_STEPS, LID_POSITIONS, EyePainter, LidPose, lid_pose
 from lipmotion.faces.portrait.mouth_painting import MouthPainter
 from lipmotion.faces.portrait.mouth_textures import MouthTextures, mouth_textures
-from lipmotion.faces.portrait.movement import BrowField, HeadField, SkinField
+from lipmotion.faces.portrait.movement import BrowField, HeadField, SkinField, brow_pose
 from lipmotion.faces.portrait.palette import Colour
-from lipmotion.faces.portrait.portrait_rasteriser import BROW_STEPS, SCENE, FacePose, moving_parts, still_layers
+from lipmotion.faces.portrait.portrait_rasteriser import SCENE, FacePose, moving_parts, still_layers
 from lipmotion.faces.portrait.view import View, Window
 from lipmotion.kernels.pixels.planes import (
     Box,
@@ -58,7 +58,7 @@ class PlanarCanvas:
     def __init__(self, planes: Bytes, mouth: Window) -> None:
         self.planes, self.packed = planes, np.zeros(planes.shape, np.uint32)
         self.mouth = np.empty((mouth.y1 - mouth.y0, mouth.x1 - mouth.x0, 4), np.float32)
-        self.upper: tuple[int, ...] = ()
+        self.upper: tuple[object, ...] = ()
         _pack(self, Box(0, 0, *planes.shape[1:]))
 
 
@@ -97,7 +97,7 @@ class PlanarRasteriser:
         """
         jaw, mouth = self._parts.jaw, self._parts.mouth
         skin, still = self._jaw_layers
-        lay_skin(skin, *self._skin_field.shifts(pose.mouth), still, jaw.y0, jaw.x0, canvas.planes)
+        lay_skin(skin, *self._skin_field.shifts(pose.mouth, pose.mood), still, jaw.y0, jaw.x0, canvas.planes)
         to_layer(canvas.planes, mouth.y0, mouth.x0, canvas.mouth)
         self._mouth_painter.paint(canvas.mouth, pose.mouth)
         from_layer(canvas.mouth, mouth.y0, mouth.x0, canvas.planes)
@@ -109,15 +109,15 @@ class PlanarRasteriser:
 
     def _paint_upper_half(self, pose: FacePose, canvas: PlanarCanvas) -> None:
         """Paint brows and eyes where they are not those of the last frame."""
-        steps, gaze = BROW_STEPS * self._parts.brow.view.scale, GAZE_STEPS * self._parts.eyes.view.scale
-        lids, x, y = round(pose.lids * LID_POSITIONS), round(pose.gaze_x * gaze), round(pose.gaze_y * gaze)
-        raised = round(pose.brows * steps)
-        if canvas.upper == (lids, x, y, raised):
+        gaze, lids = GAZE_STEPS * self._parts.eyes.view.scale, lid_pose(pose.lids, pose.mood)
+        x, y = round(pose.gaze_x * gaze), round(pose.gaze_y * gaze)
+        brows = brow_pose(pose.brows, pose.mood, self._parts.brow.view.scale)
+        if canvas.upper == (lids, x, y, brows):
             return
-        canvas.upper = (lids, x, y, raised)
+        canvas.upper = (lids, x, y, brows)
         brow, eyes, below = self._parts.brow, self._parts.eyes, self._parts.below_brows
         skin, still = self._brow_layers
-        shifts = self._brow_field.shifts(raised / steps)
+        shifts = self._brow_field.shifts(brows)
         lay_skin(skin, *shifts, still, brow.y0, brow.x0, canvas.planes)
         rows, columns = below.area
         canvas.planes[:, rows, columns] = self._still[:, rows, columns]
@@ -131,8 +131,8 @@ class PlanarRasteriser:
         around = StillLayers(*(part[:, rows, columns].copy() for part in self._around))
         return self._skin[:, rows, columns].copy(), around
 
-    def _eye_layers(self, position: int) -> EyeLayers:
-        under, opening, over = self._eye_painter.lids(position)
+    def _eye_layers(self, lids: LidPose) -> EyeLayers:
+        under, opening, over = self._eye_painter.lids(lids)
         return EyeLayers(_yuv(under), np.ascontiguousarray(opening), _yuv(over), self._iris)
 
 

@@ -14,9 +14,9 @@ from lipmotion.faces.portrait.eyes import EyePainter
 from lipmotion.faces.portrait.head import paint_head
 from lipmotion.faces.portrait.layer import Layer
 from lipmotion.faces.portrait.mouth_painting import MouthPainter
-from lipmotion.faces.portrait.movement import STEP, BrowField, HeadField, HeadPlacement, SkinField
+from lipmotion.faces.portrait.movement import STEP, BrowField, BrowPose, HeadField, HeadPlacement, SkinField, brow_pose
 from lipmotion.faces.portrait.palette import Colour
-from lipmotion.faces.portrait.pose import MouthPose
+from lipmotion.faces.portrait.pose import CALM, MoodPose, MouthPose
 from lipmotion.faces.portrait.view import View, Window
 from lipmotion.kernels.pixels.painting import stack, warp, warp_bytes
 
@@ -24,8 +24,6 @@ Pixels = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
 Canvas = NDArray[np.uint16]
 SCENE = "scene"
-BROW_STEPS = 8
-"""Positions of the brows in a pixel."""
 
 
 class FacePose(NamedTuple):
@@ -34,6 +32,7 @@ class FacePose(NamedTuple):
     lids           : how far the eyes are closed, 0..1
     gaze_x, gaze_y : how far the irises are to the right and down, in eye distances
     brows          : how far the brows are raised, in eye distances
+    mood           : what a mood does beside the mouth
     """
 
     mouth: MouthPose
@@ -42,6 +41,7 @@ class FacePose(NamedTuple):
     gaze_y: float = 0.0
     brows: float = 0.0
     head: HeadPlacement = HeadPlacement()
+    mood: MoodPose = CALM
 
 
 class Rasteriser:
@@ -73,22 +73,20 @@ class Rasteriser:
 
         canvas : from ``canvas``; changed
         """
-        skin = self._moved(self._jaw, self._skin_field.shifts(pose.mouth))
+        skin = self._moved(self._jaw, self._skin_field.shifts(pose.mouth, pose.mood))
         self._mouth_painter.paint(skin[self._mouth.area_in(self._jaw)][..., :4], pose.mouth)
         self._lay(skin, self._jaw, canvas[self._jaw.area])
-        steps = BROW_STEPS * self._brow.view.scale
-        canvas[self._brow.area] = self._brows(round(pose.brows * steps))
+        canvas[self._brow.area] = self._brows(brow_pose(pose.brows, pose.mood, self._brow.view.scale))
         canvas[self._below_brows.area] = self._still[self._below_brows.area]
-        _put(self._eye_painter.painted(pose.lids, pose.gaze_x, pose.gaze_y), canvas[self._eyes.area])
+        _put(self._eye_painter.painted(pose.lids, pose.gaze_x, pose.gaze_y, pose.mood), canvas[self._eyes.area])
         frame = self._frame.copy()
         area = self._head.area
         warp_bytes(canvas[area], *self._head_field.shifts(pose.head), STEP, frame[area])
         return frame if self._opaque else _straight(frame)
 
-    def _painted_brows(self, raised: int) -> Canvas:
-        steps = BROW_STEPS * self._brow.view.scale
+    def _painted_brows(self, brows: BrowPose) -> Canvas:
         picture = np.empty_like(self._still[self._brow.area])
-        self._lay(self._moved(self._brow, self._brow_field.shifts(raised / steps)), self._brow, picture)
+        self._lay(self._moved(self._brow, self._brow_field.shifts(brows)), self._brow, picture)
         return picture
 
     def _moved(self, window: Window, shifts: tuple[NDArray[np.float64], NDArray[np.float64]]) -> Pixels:

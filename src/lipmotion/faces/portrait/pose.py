@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
+from lipmotion.articulation.liveliness import UPPER_FACE, Liveliness
 from lipmotion.articulation.mouth import SpokenMouth
 
 
@@ -16,6 +19,7 @@ class MouthPose(NamedTuple):
     jaw      : drop of the chin, in eye distances
     tongue, tuck, protrusion, spread, press, teeth : the articulatory channels, 0..1 (docs/articulation.md)
     oval     : how far the opening is an oval: corners halfway down, round above and below, 0..1
+    smile, frown, stretched, upper_raise, chin_raise, tight : of a mood, 0..1
     """
 
     gap: float
@@ -29,6 +33,44 @@ class MouthPose(NamedTuple):
     press: float = 0.0
     teeth: float = 0.5
     oval: float = 0.0
+    smile: float = 0.0
+    frown: float = 0.0
+    stretched: float = 0.0
+    upper_raise: float = 0.0
+    chin_raise: float = 0.0
+    tight: float = 0.0
+
+
+class MoodPose(NamedTuple):
+    """What a mood does to brows, lids, cheeks and nose in one frame, each 0..1.
+
+    inner, outer : the inner and the outer ends of the brows are raised
+    lowered      : the brows are lowered and drawn together
+    wide         : the upper lids are raised
+    squint       : the lower lids are raised, the upper ones lowered a little
+    cheek        : the cheeks are raised
+    sneer        : the nose is wrinkled
+    """
+
+    inner: float = 0.0
+    outer: float = 0.0
+    lowered: float = 0.0
+    wide: float = 0.0
+    squint: float = 0.0
+    cheek: float = 0.0
+    sneer: float = 0.0
+
+
+CALM = MoodPose()
+
+
+def mood_poses(moved: Liveliness) -> list[MoodPose]:
+    """Return the pose of every frame of what a mood does beside the mouth."""
+    if not moved.units:
+        return [CALM] * len(moved.lids)
+    inner, outer, lowered, wide, cheek, tight, sneer = map(moved.unit, UPPER_FACE)
+    curves = (inner, outer, lowered, wide, np.maximum(tight, 0.8 * cheek), cheek, sneer)
+    return [MoodPose(*row) for row in np.stack(curves, axis=1).tolist()]
 
 
 def mouth_poses(mouth: SpokenMouth) -> list[MouthPose]:

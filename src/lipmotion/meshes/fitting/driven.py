@@ -11,11 +11,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.contact import in_pictures
+from lipmotion.articulation.contact import LEAST_GAP, in_pictures
+from lipmotion.articulation.expression import moods_shown
+from lipmotion.articulation.lip_points import LOWER_MIDDLE, UPPER_MIDDLE
+from lipmotion.articulation.mouth import SpokenMouth
 from lipmotion.errors import InputError
 from lipmotion.meshes.files.binding_files import BINDING_SUFFIX, load_binding, read_points, read_weights
 from lipmotion.meshes.files.character_files import read_character
 from lipmotion.meshes.fitting.lip_placement import LipPlacement, placed_by_points, placed_by_shape, surface_of_named
+from lipmotion.meshes.fitting.mood_weights import EXPRESSIONS, expression_weights
 from lipmotion.meshes.fitting.point_motion import point_motion
 from lipmotion.meshes.fitting.shape_weights import shape_weights
 from lipmotion.meshes.model.binding import ControlBinding, bind, painted
@@ -30,7 +34,7 @@ Array = NDArray[np.float64]
 
 METRIC = (".glb", ".gltf", ".vrm")
 """Suffixes of characters whose unit is the metre."""
-EYES_AND_BROWS = tuple(name for name in ARKIT_OTHERS if name.startswith(("eyeBlink", "eyeLook", "brow")))
+EYES_AND_BROWS = tuple(name for name in ARKIT_OTHERS if name != "cheekPuff")
 
 
 class DrivenPose(NamedTuple):
@@ -87,11 +91,39 @@ class DrivenCharacter:
         """
         points = point_motion(motion, units)
         beside, contact = self._beside(others or {}, len(time_s)), points.mouth.contact
-        moved = points.displacements
+        moved = points.expressed
         if self.shapes is not None:
             moved = shape_weights(motion, units, self.shapes).values.astype(np.float64)
         rows = in_pictures(moved, contact, motion.rate_hz, time_s)
+        moods = self.expressions(motion, points.mouth)
+        if moods:
+            table = np.stack([moods.get(name, np.zeros(len(contact))) for name in self._expressions.values()], axis=1)
+            beside[:, len(self._other_names) :] = in_pictures(table, contact, motion.rate_hz, time_s)
         return list(map(DrivenPose, rows, beside))
+
+    def expressions(self, motion: Motion, mouth: SpokenMouth) -> dict[str, Array]:
+        """Return the weights of whole expressions that stand for moods, by the mesh's names [each shape=(T,)].
+
+        None, where the character has finer shapes, or no expressions. Those that part the lips vanish in p, b and m.
+        """
+        found = expression_weights(moods_shown(motion)) if self._expressions else {}
+        free = np.clip(1 - 2 * mouth.press, 0, 1)
+        curves = {own: found[name] for name, own in self._expressions.items() if name in found}
+        return {own: curve * free if self._parted_by(own) > LEAST_GAP / 2 else curve for own, curve in curves.items()}
+
+    def _parted_by(self, name: str) -> float:
+        """Return how far a blendshape parts the middle of the lips, in eye distances."""
+        moved = self.placement.to_motion(self.mesh.displacements(self.placement.vertices, (name,)))[0]
+        return float(moved[self.placement.row(UPPER_MIDDLE), 1] - moved[self.placement.row(LOWER_MIDDLE), 1])
+
+    @cached_property
+    def _expressions(self) -> dict[str, str]:
+        """The mesh's names of VRM's expressions, by VRM's; none where it has ARKit's blendshapes of brows."""
+        if {"browDownLeft", "browInnerUp", "browDownRight"} & {*self._other_names}:
+            return {}
+        own = {shape.name.lower(): shape.name for shape in self.mesh.shapes if len(shape.rows)}
+        wanted = {name for each in EXPRESSIONS.values() for name, _ in each}
+        return {name: own[name] for name in sorted(wanted) if name in own}
 
     def vertices(
         self, motion: Motion, units: Timeline[Unit], time_s: Array, others: Mapping[str, Array] | None = None
@@ -117,7 +149,7 @@ class DrivenCharacter:
     @cached_property
     def moving(self) -> NDArray[np.int64]:
         """The vertices that ever move, but for the turning of the head, ascending [shape=(N,)]."""
-        names = {*(self.shapes.names if self.shapes else ()), *self._other_names.values()}
+        names = {*(self.shapes.names if self.shapes else ()), *self._other_names.values(), *self._expressions.values()}
         rows = [shape.rows for shape in self.mesh.shapes if shape.name in names]
         if self.binding is not None:
             rows.append(self.binding.rows)
@@ -141,14 +173,14 @@ class DrivenCharacter:
     @cached_property
     def _others(self) -> Array:
         """What the blendshapes of eyes and brows do to the moving vertices [shape=(S, N · 3)]."""
-        return self._moved(tuple(self._other_names.values()))
+        return self._moved((*self._other_names.values(), *self._expressions.values()))
 
     def _moved(self, names: Sequence[str]) -> Array:
         return self.mesh.displacements(self.moving, names).reshape(len(names), 3 * len(self.moving))
 
     def _beside(self, others: Mapping[str, Array], count: int) -> Array:
         """Return the weights of the blendshapes of eyes and brows over time [shape=(T, S)]."""
-        columns = [others.get(known, np.zeros(count)) for known in self._other_names]
+        columns = [others.get(known, np.zeros(count)) for known in (*self._other_names, *self._expressions)]
         return np.stack(columns, axis=1) if columns else np.zeros((count, 0))
 
     def _shaped(self, moved: Array, other: Array) -> Array:

@@ -54,7 +54,7 @@ def fap_motion(motion: Motion, units: Timeline[Unit]) -> Motion:
     Where the lips touch, ``lower_t_midlip`` and ``raise_b_midlip`` add up to 0.
     Raises InputError: as ``point_motion``.
     """
-    moved = point_motion(motion, units).displacements
+    moved = point_motion(motion, units).expressed
     template = mouth_template()
     lengths = {"N": MOUTH_TO_NOSE, "W": template.width}
     columns = [

@@ -18,8 +18,8 @@ Array = NDArray[np.float64]
 
 LEAST_PROTRUSION = 0.03
 """Protruded lips are at least so far in front of their rest pose, in eye distances."""
-
-
+CORNER_RISE, CORNER_FALL = 0.1, 0.07
+"""How far points of the corners rise in a full smile, and fall where a mood pulls them down, in eye distances."""
 KNOWN_GAP = 0.02
 """From this distance of the measured points on, the opening has the shape that they show, in eye distances."""
 
@@ -35,6 +35,15 @@ class PointMotion:
 
     displacements: Array
     mouth: SpokenMouth
+
+    @property
+    def expressed(self) -> Array:
+        """The displacements with those of a mood: corners that rise, or fall, and less beside them."""
+        template, mouth = mouth_template(), self.mouth
+        across = np.clip(np.abs(template.places[:, 0]) / (template.width / 2), 0, 1)
+        moved = self.displacements.copy()
+        moved[..., 1] += np.outer(CORNER_RISE * mouth.smile - CORNER_FALL * mouth.frown, across**3 * ~template.jaw)
+        return moved
 
 
 def point_motion(motion: Motion, units: Timeline[Unit]) -> PointMotion:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from lipmotion.articulation.mouth import SpokenMouth
 from lipmotion.meshes.fitting.blendshape_motion import given_weights, with_mouth
 from lipmotion.meshes.fitting.bounded_curves import CurveCosts, bounded_curves
 from lipmotion.meshes.fitting.lip_rounding import rounded_weights
+from lipmotion.meshes.fitting.mood_weights import mood_weights
 from lipmotion.meshes.fitting.oculus_visemes import NEAREST_VOWEL, viseme_curves
 from lipmotion.meshes.fitting.point_motion import PointMotion, point_motion
 from lipmotion.meshes.model.face_shapes import NOT_FROM_POINTS, FaceShapes
@@ -65,22 +66,39 @@ def shape_weights(
     """
     options = options or SolverOptions()
     points = point_motion(motion, units)
-    given = given_weights(motion, shapes)
+    given, mood = given_weights(motion, shapes), mood_weights(points.mouth, shapes)
     if given is not None:
-        weights = _closed_as_spoken(given.values.astype(np.float64), with_mouth(motion), points.mouth, shapes)
+        weights = _closed_as_spoken(given.values.astype(np.float64), with_mouth(motion), points.mouth, shapes, mood)
     else:
         if shapes.style == "visemes":
             weights = _spoken_weights(points, units, shapes, options)
         else:
-            weights = _free_weights(points, shapes, options)
+            weights = _with_mood(_free_weights(_without_mood(points, mood, shapes), shapes, options), mood)
         weights = with_gap(weights, shapes, points.mouth.gap - PRESS_DEPTH * points.mouth.closing)
     return Motion(weights, motion.rate_hz, tuple(Channel(name, WEIGHT) for name in shapes.names))
 
 
-def _closed_as_spoken(weights: Array, motion: Motion, mouth: SpokenMouth, shapes: FaceShapes) -> Array:
+def _without_mood(points: PointMotion, mood: Array | None, shapes: FaceShapes) -> PointMotion:
+    """Return points without what the shapes of a mood do to the width of the mouth."""
+    if mood is None:
+        return points
+    displacements = points.displacements.copy()
+    displacements[..., 0] -= mood @ shapes.moved[..., 0]
+    return replace(points, displacements=displacements)
+
+
+def _with_mood(weights: Array, mood: Array | None) -> Array:
+    """Return weights with those of a mood: what a shape has already is not added again [shape=(T, S)]."""
+    return weights if mood is None else np.clip(weights + mood * (1 - weights), 0.0, 1.0)
+
+
+def _closed_as_spoken(
+    weights: Array, motion: Motion, mouth: SpokenMouth, shapes: FaceShapes, mood: Array | None
+) -> Array:
     """Return given weights with the lips of the mesh in contact where the spoken mouth has it [shape=(T, S)].
 
     motion : with the channels of ``with_mouth``
+    mood   : weights that a mood adds [shape=(T, S)], by which the lips are no further apart than it parts them
     Frames in which the lips of the mesh touch as they should, and that no closure is near, stay as they are.
     """
     own, said = weights @ shapes.gap, gap_in(motion)
@@ -88,6 +106,10 @@ def _closed_as_spoken(weights: Array, motion: Motion, mouth: SpokenMouth, shapes
     wanted = np.where(said > LEAST_GAP, share * own, own)
     touching, contact = own < LEAST_GAP / 2, mouth.contact
     wanted = np.where(contact, np.where(touching, own, 0.0), np.where(touching, LEAST_GAP, wanted))
+    if mood is not None:
+        wanted = np.where(contact, wanted, wanted + np.maximum(mouth.gap - np.maximum(said, LEAST_GAP), 0))
+        weights = _with_mood(weights, mood)
+        own = weights @ shapes.gap
     changed = np.abs(wanted - own) > 1e-9
     result = weights.copy()
     result[changed] = with_gap(weights[changed], shapes, wanted[changed])

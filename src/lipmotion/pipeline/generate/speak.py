@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,8 +26,10 @@ from lipmotion.speech.sound.resampling import at_speech_rate
 from lipmotion.speech.voices.installed import default_voice, voice_named, voiced_sentences
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.storage.files import read_text_file
-from lipmotion.types import Audio, Constraints, Span, SpokenText, Timeline, Unit
+from lipmotion.types import Audio, Constraints, Generation, Span, SpokenText, Timeline, Unit
+from lipmotion.types.moods import MoodTag
 from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent
+from lipmotion.units.mood_tags import moods_in_time, tagged_text
 from lipmotion.units.sentences import MOST_CHARACTERS, sentences_of
 
 CORPUS_VOICE = "corpus"
@@ -63,7 +66,8 @@ def speak(  # noqa: PLR0913
 ) -> SpokenText:
     """Return a text as sound of a synthetic voice, and the lip motion for it, with 0.25 s of rest at both ends.
 
-    text        : one sentence or many, at most 50,000 characters; the synthesiser reads numbers and abbreviations
+    text        : one sentence or many, at most 50,000 characters; the synthesiser reads numbers and abbreviations. Tags
+                  in it (``[sad]``, ``<smile>``) are moods, and not spoken (docs/expression.md)
     voice       : ``flite:slt``, ``espeak-ng:de``, or a name alone where only one synthesiser has it; None: the first of
                   ``DEFAULT_VOICES`` that is installed; ``corpus``: the recordings of ``corpus``
     corpus      : the corpus that a model of unit selection was trained on, for the voice ``corpus``
@@ -82,13 +86,14 @@ def speak(  # noqa: PLR0913
     >>> sound, result = lipmotion.speak("Please speak.")  # doctest: +SKIP
     >>> lipmotion.write(result, ["hello.mp4", "hello.wav"], speech=sound)  # doctest: +SKIP
     """
+    text, tags = tagged_text(text)
     if voice == CORPUS_VOICE or corpus is not None:
         if voice != CORPUS_VOICE or corpus is None:
             raise InputError("a corpus that speaks needs both: the voice 'corpus', and the corpus (--corpus FOLDER)")
         if onto is not None:
             raise InputError("a corpus speaks with the motion that was recorded; it is not mapped onto another person")
         loaded = model if isinstance(model, Model) else load_model(model)
-        return speak_from_corpus(
+        spoken = speak_from_corpus(
             text,
             corpus,
             loaded,
@@ -98,6 +103,7 @@ def speak(  # noqa: PLR0913
             pauses=pauses,
             asymmetry=asymmetry,
         )
+        return spoken._replace(generation=_tagged(spoken.generation, tags))
     sentences = sentences_of(text)
     chosen = voice_named(voice) if isinstance(voice, str) else voice or default_voice()
     loaded = model if isinstance(model, Model) else load_model(model)
@@ -113,7 +119,12 @@ def speak(  # noqa: PLR0913
         pauses=pauses,
         asymmetry=asymmetry,
     )
-    return SpokenText(sound, animate(request, model=loaded, constraints=constraints))
+    return SpokenText(sound, _tagged(animate(request, model=loaded, constraints=constraints), tags))
+
+
+def _tagged(generation: Generation, tags: Sequence[MoodTag]) -> Generation:
+    """Return a generation with the moods of tags in its text."""
+    return replace(generation, moods=moods_in_time(tags, generation.units))
 
 
 def read_text(path: Path) -> str:

@@ -19,7 +19,7 @@ from lipmotion.meshes.fitting.facial_animation import fap_motion
 from lipmotion.meshes.fitting.oculus_visemes import viseme_motion
 from lipmotion.meshes.fitting.reference_mouth import arkit_mouth
 from lipmotion.meshes.fitting.shape_weights import shape_weights
-from lipmotion.meshes.model.shape_names import arkit_name
+from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, arkit_name
 from lipmotion.pipeline.outputs.living_curves import living_curves
 from lipmotion.storage.files import whole_file
 from lipmotion.types import Gain, Generation, Motion, Pin, Prosody, Timeline, Unit
@@ -78,6 +78,7 @@ def curves_of(
     if not all(row.source in {"", *(name for each in sets for name in each.names)} for row in rows):
         sets.append(living_curves(with_mouth(motion), units, staging, prosody))
     sources = {name: each[name].astype(np.float64) for each in sets for name in each.names}
+    sources = {name: np.zeros(len(motion.values)) for name in ARKIT_OTHERS} | sources
     own = [edit for edit in edits if edit.channel not in sources]
     return with_edited_curves(rig_motion(rows, sources, motion.rate_hz), units, own)
 

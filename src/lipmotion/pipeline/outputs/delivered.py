@@ -15,6 +15,8 @@ from lipmotion.articulation.delivery import (
     intensified,
     moved_in_time,
 )
+from lipmotion.articulation.expression import is_mood, with_moods
+from lipmotion.articulation.manner import with_manners
 from lipmotion.articulation.phone_targets import with_gestures
 from lipmotion.meshes.fitting.blendshape_motion import is_of_blendshapes, with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
@@ -22,14 +24,22 @@ from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, arkit_name
 from lipmotion.pipeline.outputs.curve_sets import with_curves
 from lipmotion.pipeline.outputs.living_curves import RADIAN
 from lipmotion.types import Generation, Motion
+from lipmotion.types.moods import in_time
 
 
 def delivered(generation: Generation, delivery: Delivery) -> Generation:
-    """Return generated motion with its intensity, anticipation and offset; held poses are made of it last (``held``).
+    """Return generated motion with its mood, intensity, anticipation and offset; held poses come last (``held``).
 
+    Moods of the delivery at time 0 are those before the first one of the generation, and later ones are added to these;
+    without any, motion keeps the moods that it has. So do manners of speaking.
     Raises InputError: the offset leaves nothing.
     """
-    return moved_in_time(_larger(generation, delivery.intensity), delivery)
+    keys = in_time((*delivery.moods, *generation.moods))
+    larger = _larger(with_manners(generation, keys), delivery.intensity)
+    if not all(key.is_manner for key in keys):
+        moods = with_moods(larger.motion, keys)
+        larger = with_motion(larger.selected(tuple(n for n in larger.motion.names if not is_mood(n))), moods)
+    return moved_in_time(larger, delivery)
 
 
 def shown(
@@ -71,7 +81,7 @@ def held_mouth(generation: Generation, frames: int, closed_s: Sequence[float]) -
     names = tuple(
         channel.name
         for channel in motion.channels
-        if channel.unit != RADIAN and arkit_name(channel.name) not in ARKIT_OTHERS
+        if channel.unit != RADIAN and arkit_name(channel.name) not in ARKIT_OTHERS and not is_mood(channel.name)
     )
     if not frames or not names:
         return generation

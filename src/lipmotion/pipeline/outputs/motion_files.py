@@ -13,6 +13,7 @@ import numpy as np
 from lipmotion.articulation.contact import in_pictures
 from lipmotion.articulation.curve_edits import with_edited_curves
 from lipmotion.articulation.delivery import closed_on_grid, closed_times
+from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
 from lipmotion.errors import ExportError
@@ -215,7 +216,8 @@ def _curves(generation: Generation, name: str, staging: Staging | None, prosody:
     if own is None:
         return curves_of(motion, units, name, staging=staging, prosody=prosody)
     if name in (ARKIT, WHOLE_FACE):
-        own = _closed(own, curves_of(own, units, ARKIT))
+        moods = [channel.name for channel in motion.channels if is_mood(channel.name)]
+        own = _closed(own, curves_of(beside(own, generation.selected(moods).motion) if moods else own, units, ARKIT))
     if name != WHOLE_FACE:
         return own
     living = living_curves(with_mouth(motion), units, staging, prosody)

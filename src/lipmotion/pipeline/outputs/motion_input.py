@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lipmotion.articulation.expression import is_mood
 from lipmotion.errors import InputError
 from lipmotion.export.base import read_motion
 from lipmotion.meshes.model.shape_names import is_known
@@ -30,7 +31,7 @@ def read_generation(path: str | Path, units: str | Path | None = None) -> Genera
 
     path  : ``.json``, ``.csv``, ``.npz``, or another motion file that can be read
     units : a file with phones in time (``read_units``), for motion files that have none; None: those of the motion file
-    Blendshapes, visemes and vowels count as weights, whatever unit the file gives them.
+    Blendshapes, visemes, vowels and moods count as weights, whatever unit the file gives them.
     Raises InputError: a file that cannot be read, motion without frames, of an unlikely rate, or of more than a day.
     """
     motion, found = read_motion(path)
@@ -44,12 +45,19 @@ def read_generation(path: str | Path, units: str | Path | None = None) -> Genera
         raise InputError(f"{path}: the motion lasts {lasts_s:.0f} s, required at most {LONGEST_S:.0f}; cut it")
     phones = found if units is None else read_units(units)
     channels = tuple(
-        Channel(each.name, WEIGHT) if each.unit == EYE_DISTANCE and is_known(each.name) else each
+        Channel(each.name, WEIGHT)
+        if each.unit == EYE_DISTANCE and (is_known(each.name) or is_mood(each.name))
+        else each
         for each in motion.channels
     )
     states = np.zeros(len(motion.values), np.intp)
     nothing = np.broadcast_to(0.0, motion.values.shape)
     return Generation(replace(motion, channels=channels), nothing, phones, StateTrace((STATE,), states))
+
+
+def _is_weight(name: str) -> bool:
+    """Return whether a channel of that name is a weight: a blendshape, a viseme, a vowel, or a mood."""
+    return is_known(name) or is_mood(name)
 
 
 def as_long_as(generation: Generation, duration_s: float) -> Generation:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import in_pictures
 from lipmotion.articulation.delivery import closed_times
+from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.mouth import frame_times, spoken_mouth
 from lipmotion.faces.base import Staging
 from lipmotion.meshes.files.gltf_animator import write_animated_gltf
@@ -122,7 +123,7 @@ def head_scene(
     motion, hertz = generation.motion, rate_hz or generation.motion.rate_hz
     poses = head_poses(motion, generation.units, hertz, staging, prosody)
     character = figure()
-    mesh = head_mesh(character)
+    mesh = head_mesh(character, moods=any(map(is_mood, motion.names)))
     living = living_curves(motion, generation.units, staging, prosody, len(poses), hertz)
     curves = mouth_weights(character, mesh, poses) | {name: living[name].astype(np.float64) for name in living.names}
     names = [name for name in mesh.shape_names if name in curves]
@@ -156,11 +157,13 @@ def character_scene(
     known = by_arkit_name(character.mesh.shape_names)
     living = living_curves(with_mouth(motion), units, staging, prosody)
     added = [name for name in living.names if name in known and known[name] not in weights.names]
-    table = np.concatenate([weights.values, *(living[name][:, None] for name in added)], axis=1)
-    channels = weights.channels + tuple(Channel(known[name], WEIGHT) for name in added)
+    mouth = spoken_mouth(with_mouth(motion), units)
+    moods = character.expressions(motion, mouth)
+    beside = [living[name] for name in added] + list(moods.values())
+    table = np.concatenate([weights.values, *(curve[:, None] for curve in beside)], axis=1)
+    channels = weights.channels + tuple(Channel(name, WEIGHT) for name in (*(known[name] for name in added), *moods))
     hertz = rate_hz or motion.rate_hz
-    contact = spoken_mouth(with_mouth(motion), units).contact
-    rows = in_pictures(table, contact, motion.rate_hz, frame_times(len(table), motion.rate_hz, hertz))
+    rows = in_pictures(table, mouth.contact, motion.rate_hz, frame_times(len(table), motion.rate_hz, hertz))
     return Scene(character.mesh, Motion(rows, hertz, channels), original=character.file)
 
 

@@ -30,6 +30,7 @@ from lipmotion.pipeline.outputs.prosody import moved_prosody, prosody_of_speech
 from lipmotion.pipeline.outputs.scenes import character_scene, head_scene
 from lipmotion.storage.sources import is_file
 from lipmotion.types import Generation, Motion, Prosody
+from lipmotion.types.moods import MOODS
 
 if TYPE_CHECKING:
     from lipmotion.pipeline.model import Model
@@ -132,6 +133,10 @@ class ShownPerson(ShownFace):
         if settings.delivery.hold_ms:
             raise InputError(
                 "the poses of a filmed face cannot be held; hold those of a drawn face, or of motion files"
+            )
+        if any(key.mood in MOODS for key in settings.delivery.moods):
+            raise InputError(
+                "a filmed face has the mood of its footage; leave the mood out, or show a drawn face or a character"
             )
         if path.suffix.lower() != OPAQUE_SUFFIX:
             raise ExportError(f"{path}: filmed faces are written as {OPAQUE_SUFFIX}; name the output so")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from lipmotion.speech.voices.pronunciations import LanguageLexicon
 from lipmotion.types import TimedTranscript, TimedWord, TranscriptLine
 from lipmotion.types.languages import AUTO, ENGLISH, LANGUAGES
 from lipmotion.units.languages_told import language_of_text
+from lipmotion.units.mood_tags import tagged_text
 from lipmotion.units.text_normalisation import written_words
 
 LOG = logging.getLogger("lipmotion")
@@ -32,7 +32,7 @@ def in_language(request: SpeechRequest) -> SpeechRequest:
         return request
     given = request.transcript
     text = read_transcript(given) if isinstance(given, Path) else given
-    transcript = _plain_transcript(written_words(text)) if isinstance(text, str) else text
+    transcript = _plain_transcript(text) if isinstance(text, str) else text
     language = request.language if request.language != AUTO else _told(request, transcript)
     if language in (ENGLISH, AUTO):
         return replace(request, language=language)
@@ -65,6 +65,7 @@ def _told(request: SpeechRequest, transcript: TimedTranscript | None) -> str:
     return AUTO if english is False else ENGLISH
 
 
-def _plain_transcript(words: Sequence[str]) -> TimedTranscript:
-    """Return words without times as a transcript."""
-    return TimedTranscript((TranscriptLine(tuple(map(TimedWord, words))),))
+def _plain_transcript(text: str) -> TimedTranscript:
+    """Return the words of a text, without times, as a transcript. Raises InputError: there is no word in it."""
+    plain, tags = tagged_text(text, lambda part: written_words(part) if part.strip() else ())
+    return TimedTranscript((TranscriptLine(tuple(map(TimedWord, written_words(plain)))),), tags)

@@ -47,13 +47,17 @@ from lipmotion.types import (
     Span,
     Speech,
     TimedTranscript,
+    TimedWord,
     Timeline,
+    TranscriptLine,
     Unit,
     frames_of,
     silent_monitor,
 )
 from lipmotion.types.languages import ENGLISH
+from lipmotion.types.moods import MoodTag
 from lipmotion.units import Lexicon, check_phones, check_text, is_silent, without_gaps, words_of
+from lipmotion.units.mood_tags import tagged_text
 
 ItemT = TypeVar("ItemT")
 ResultT = TypeVar("ResultT")
@@ -76,12 +80,14 @@ class UnderstoodSpeech:
     recognition : None where words or phones were given, or the engine's own model recognised the speaker
     range_db    : decibels between the loud and the quiet moments of the recording
     fit         : of the transcript; None where there was none, or it was not compared with the sound
+    tags        : the moods that tags in the transcript ask for
     """
 
     speech: Speech
     recognition: Recognition | None
     range_db: float
     fit: TranscriptFit | None = None
+    tags: tuple[MoodTag, ...] = ()
 
     @property
     def speech_s(self) -> float:
@@ -219,7 +225,9 @@ def _understood(model: Model, request: SpeechRequest, audio: AnalysedAudio, each
     features = audio.mfcc()
     if words is not None:
         units, fit = transcribe(phones, audio, features, words, request.lexicon or Lexicon())
-        return UnderstoodSpeech(speech_of(model.engine, audio, features, units, phones.kind, each), None, range_db, fit)
+        speech = speech_of(model.engine, audio, features, units, phones.kind, each)
+        tags = words.tags if isinstance(words, TimedTranscript) else ()
+        return UnderstoodSpeech(speech, None, range_db, fit, tags)
     found: list[Recognition] = []
 
     def recognise() -> Recognition:
@@ -324,7 +332,9 @@ def _words(
     if text is transcript and "." in text and not any(map(str.isspace, text)) and is_file(Path(text)):
         raise InputError(f"the transcript {text!r} is the name of a file; give Path({text!r}), or the words themselves")
     check_text(text, duration_s)
-    return words_of(text)
+    plain, tags = tagged_text(text)
+    words = words_of(plain)
+    return TimedTranscript((TranscriptLine(tuple(map(TimedWord, words))),), tags) if tags else words
 
 
 def _check_units(units: Timeline[Unit], duration_s: float) -> None:

@@ -1,0 +1,145 @@
+"""Expression: what a mood does to a face, beside what is said; the one owner of brows, lids, cheeks and corners of it.
+
+A mood is a set of facial action units with intensities, 0 to 1 (``moods.csv``); motion carries moods as channels, so
+that files hold them. What the action units do to the mouth is limited by what the phones ask of it
+(``articulation.mouth``); what they do elsewhere is beside blinks and accents (``articulation.liveliness``).
+
+Sources (the column ``source``): EMFACS, P. Ekman and W. V. Friesen, "EMFACS-7: Emotional Facial Action Coding System",
+1983, and P. Ekman, W. V. Friesen and J. C. Hager, "Facial Action Coding System: Investigator's Guide", 2002, of the
+prototypes of emotions; Ekman2003, P. Ekman, "Emotions Revealed", 2003; Harrigan1996, J. A. Harrigan and D. M.
+O'Connell, "How do you look when feeling anxious? Facial displays of anxiety", Personality and Individual Differences
+21, 1996; Sundelin2013, T. Sundelin et al., "Cues of fatigue: effects of sleep deprivation on facial appearance", Sleep
+36, 2013. Deviations: the intensities are ours, set by eye on our faces; so are the action units of the source ``ours``.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from functools import cache
+from importlib import resources
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.types import WEIGHT, Channel, Motion
+from lipmotion.types.moods import MOODS, MoodKey
+
+Curve = NDArray[np.float64]
+
+PREFIX: Final = "mood_"
+"""The channels of moods are called so, and the mood: ``mood_happy``, a weight."""
+CHANGE_S: Final = (0.25, 0.2)
+"""A mood begins to change so long before its time, and has changed so long after it."""
+ACTION_UNITS: Final = {
+    1: "inner ends of the brows raised",
+    2: "outer ends of the brows raised",
+    4: "brows lowered and drawn together",
+    5: "upper lids raised",
+    6: "cheeks raised",
+    7: "lids tightened",
+    9: "nose wrinkled",
+    10: "upper lip raised",
+    12: "corners of the lips pulled up",
+    14: "corners of the lips tightened",
+    15: "corners of the lips pulled down",
+    17: "chin raised",
+    20: "lips stretched",
+    23: "lips tightened",
+    24: "lips pressed",
+    25: "lips parted",
+    26: "jaw dropped",
+    43: "eyes half closed",
+    53: "head up",
+    54: "head down",
+    55: "head tilted to the left",
+    56: "head tilted to the right",
+    57: "head forward, and down",
+    58: "head back",
+    64: "eyes down",
+}
+"""The action units that faces show."""
+
+
+class MoodRow(NamedTuple):
+    """An action unit of a mood: its intensity, 0 to 1, and where it is from."""
+
+    mood: str
+    unit: int
+    intensity: float
+    source: str
+
+
+@cache
+def mood_rows() -> tuple[MoodRow, ...]:
+    """Return the rows of the table ``moods.csv``."""
+    text = resources.files("lipmotion.articulation").joinpath("moods.csv").read_text(encoding="ascii")
+    return tuple(
+        MoodRow(row["mood"], int(row["action_unit"]), float(row["intensity"]), row["source"])
+        for row in csv.DictReader(text.splitlines())
+    )
+
+
+@cache
+def mood_table() -> Mapping[str, Mapping[int, float]]:
+    """Return the intensity of the action units of each mood, 0 to 1."""
+    return {mood: {row.unit: row.intensity for row in mood_rows() if row.mood == mood} for mood in MOODS}
+
+
+def is_mood(channel: str) -> bool:
+    """Return whether a channel of motion holds a mood."""
+    return channel.startswith(PREFIX) and channel[len(PREFIX) :] in MOODS
+
+
+def with_moods(motion: Motion, keys: Sequence[MoodKey]) -> Motion:
+    """Return motion with the channels of moods over time after its own, instead of those that it had.
+
+    keys : in the order of their times; before the first one the face is neutral, unless it is at 0. Without any mood
+           the motion is as it is; manners do not count (``articulation.manner``)
+    The sum of all moods is at most 1 in every frame; each change is a smooth step around its time (``CHANGE_S``).
+    """
+    keys = [key for key in keys if not key.is_manner]
+    if not keys:
+        return motion
+    kept = [number for number, name in enumerate(motion.names) if not is_mood(name)]
+    curves = _curves(keys, motion.time_s)
+    added = [curve[:, None].astype(motion.values.dtype) for curve in curves.values()]
+    values = np.concatenate([motion.values[:, kept], *added], axis=1)
+    channels = (*(motion.channels[number] for number in kept), *(Channel(PREFIX + mood, WEIGHT) for mood in curves))
+    return Motion(values, motion.rate_hz, channels)
+
+
+def _curves(keys: Sequence[MoodKey], time_s: Curve) -> dict[str, Curve]:
+    """Return the strength of each mood of the keys but of the neutral one [each shape=(T,)]."""
+    curves = {key.mood: np.zeros(len(time_s)) for key in keys if key.mood in MOODS}
+    for key in keys:
+        begin_s = key.time_s - CHANGE_S[0]
+        share = np.clip((time_s - begin_s) / sum(CHANGE_S), 0, 1) if key.time_s > 0 else np.ones(len(time_s))
+        share = share * share * (3 - 2 * share)
+        wanted = dict.fromkeys(curves, 0.0) | {key.mood: key.strength}
+        curves = {mood: curve + share * (wanted[mood] - curve) for mood, curve in curves.items()}
+    return curves
+
+
+def action_units(motion: Motion, time_s: Curve | None = None) -> dict[int, Curve]:
+    """Return the action units that the moods of a motion ask for, 0 to 1 [each shape=(N,)]; none for a neutral face.
+
+    time_s : in seconds; None: the frames of the motion
+    """
+    found: dict[int, Curve] = {}
+    for name in motion.names:
+        if is_mood(name) and motion[name].any():
+            strength = np.clip(motion[name].astype(np.float64), 0, 1)
+            if time_s is not None:
+                strength = np.interp(time_s, motion.time_s, strength)
+            for unit, intensity in mood_table()[name[len(PREFIX) :]].items():
+                found[unit] = found.get(unit, 0.0) + intensity * strength
+    return {unit: np.clip(curve, 0, 1) for unit, curve in found.items()}
+
+
+def moods_shown(motion: Motion) -> dict[str, Curve]:
+    """Return how strong each mood of a motion is, 0 to 1, by its name [each shape=(T,)]."""
+    return {
+        name[len(PREFIX) :]: np.clip(motion[name].astype(np.float64), 0, 1) for name in motion.names if is_mood(name)
+    }

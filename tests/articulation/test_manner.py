@@ -1,0 +1,42 @@
+"""Manners of speaking: larger and smaller movements, closures that stay."""
+
+import numpy as np
+import pytest
+
+from lipmotion.articulation.manner import FACTORS, with_manners
+from lipmotion.articulation.mouth import spoken_mouth
+from lipmotion.types import Generation, StateTrace
+from lipmotion.types.moods import MANNERS, PLAIN, moods_of
+from meshes.speech import motion, units
+
+
+@pytest.fixture(scope="module")
+def generation() -> Generation:
+    moved = motion()
+    return Generation(
+        moved, np.zeros(moved.values.shape), units(), StateTrace(("a",), np.zeros(len(moved.values), int))
+    )
+
+
+def test_every_manner_has_a_factor() -> None:
+    assert {*FACTORS} == {PLAIN, *MANNERS}
+
+
+def test_shouted_vowels_are_more_open_and_mumbled_ones_less(generation: Generation) -> None:
+    gaps = {}
+    for manner in (PLAIN, *MANNERS):
+        found = with_manners(generation, moods_of(manner))
+        mouth = spoken_mouth(found.motion, found.units)
+        assert mouth.contact[55]  # m
+        assert mouth.contact[95]  # p
+        gaps[manner] = float(mouth.gap[75])
+    assert gaps["mumble"] < 0.7 * gaps[PLAIN] < gaps["whisper"] < gaps[PLAIN] < 0.8 * gaps["shout"]
+
+
+def test_a_manner_holds_until_the_next_and_moods_do_not_count(generation: Generation) -> None:
+    found = with_manners(generation, moods_of("shout at 1.05, sad at 1.1, plain at 1.2"))
+    change = np.abs(found.motion.values - generation.motion.values).max(axis=1)
+    assert change[:90].max() == 0
+    assert change[115] > 0
+    assert change[-20:].max() == 0
+    assert with_manners(generation, moods_of("happy")) is generation
