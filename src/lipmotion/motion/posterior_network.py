@@ -155,10 +155,9 @@ class PosteriorNetwork(Predictor):
         shifted = _inputs(self._components(posteriors), spectrum)
         return _outputs(self.network, shifted, frames) * self.scale + self.centre
 
-    def _components(self, posteriors: TokenPosteriors) -> NDArray[np.float32]:
+    def _components(self, posteriors: TokenPosteriors) -> NDArray[np.floating]:
         """Return the principal components of the logarithms of posteriors [shape=(N, 120)]."""
-        components: NDArray[np.float32] = (_limited(posteriors) - self.mean) @ self.basis
-        return components
+        return (_limited(posteriors) - self.mean) @ self.basis
 
     def _checked(self, posteriors: TokenPosteriors | None) -> TokenPosteriors:
         """Return the posteriors; raise InputError where there are none, or those of another phone recogniser."""
@@ -276,7 +275,7 @@ def _limited(posteriors: TokenPosteriors) -> NDArray[np.float32]:
     return limited
 
 
-def _inputs(components: NDArray[np.float32], spectrum: NDArray[np.floating] | None) -> list[NDArray[np.float32]]:
+def _inputs(components: NDArray[np.floating], spectrum: NDArray[np.floating] | None) -> list[NDArray[np.float32]]:
     """Return the inputs in every time step, by shift [each shape=(ceil((N - shift) / 2), 400)].
 
     components : of posteriors [shape=(N, 120)]
@@ -287,7 +286,7 @@ def _inputs(components: NDArray[np.float32], spectrum: NDArray[np.floating] | No
 
 
 def _shifted_inputs(
-    components: NDArray[np.float32], spectrum: NDArray[np.floating] | None, shift: int
+    components: NDArray[np.floating], spectrum: NDArray[np.floating] | None, shift: int
 ) -> NDArray[np.float32]:
     """Return the inputs in every time step, of which the first begins at a row of posteriors."""
     rows = components[shift:]
