@@ -14,7 +14,7 @@ DECIMALS = 5
 """A hundred-thousandth of the distance between the eyes is about a micrometre."""
 BLOCK = 2000
 """Rows that are formatted at a time: the text of an hour of all channels would not fit in memory."""
-LARGEST = 1e9
+LARGEST_VALUE = 1e9
 """Blocks with larger values are formatted number by number: their digits do not fit in 64 bits."""
 
 
@@ -29,7 +29,7 @@ def formatted_rows(values: NDArray[np.floating[Any]]) -> Iterator[str]:
             rounded = np.round(values[start : start + BLOCK].astype(float), DECIMALS) + 0.0
         if not np.isfinite(rounded).all():
             raise ExportError("the motion has values that are not finite, or too large to be rounded")
-        if rounded.shape[1] and np.abs(rounded).max() < LARGEST:
+        if rounded.shape[1] and np.abs(rounded).max() < LARGEST_VALUE:
             yield from _rows_of_digits(np.rint(rounded * 10**DECIMALS).astype(np.int64))
         else:
             form = ",".join([f"%.{DECIMALS}f"] * values.shape[1])
