@@ -1,0 +1,112 @@
+"""Settings of the documentation site, which ``make site`` builds (docs/decisions/0024-documentation-site.md).
+
+Sphinx reads the repository as it lies, so that links between pages are the same here, on the web and on GitHub. What
+the sidebar shows, and in which order, is said by docs/index.md alone. Nothing of this file needs Sphinx but ``setup``.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
+
+ROOT = Path(__file__).parents[1]
+INDEX, NAMES = "docs/index", "docs/api"
+INDEXES = (INDEX, "recipes/README")
+"""The pages whose links make the sidebar; the second one is inside the first."""
+FIELD, RAISED = re.compile(r"(\w+(?:, \w+)*) *: (.*)"), re.compile(r"Raises (\w+): (.*)")
+
+project, author, copyright = "lipmotion", "", ""  # noqa: A001
+root_doc = INDEX
+include_patterns = ["docs/**.md", "recipes/*.md", "tests/robustness/table.md", "*.md"]
+exclude_patterns = ["README.md", "build", ".*"]
+extensions = ["myst_parser", "sphinx.ext.autodoc"]
+myst_heading_anchors = 6
+suppress_warnings = ["myst.header", "misc.highlighting_failure"]
+autodoc_member_order = "bysource"
+maximum_signature_line_length = 80
+html_theme = "furo"
+html_title = "lipmotion"
+html_copy_source = False
+html_show_sphinx = False
+html_show_copyright = False
+html_static_path: list[str] = []
+
+
+def sections(index: str) -> dict[str, list[str]]:
+    """Return the pages that an index links, without suffix, by the headings they stand under; each page once.
+
+    index : path of the page in the repository, without suffix
+    """
+    page = ROOT / f"{index}.md"
+    found: dict[str, list[str]] = {}
+    seen = {index}
+    for part in re.split(r"^## ", page.read_text(encoding="utf-8"), flags=re.MULTILINE):
+        title, text = part.split("\n", 1)
+        targets = [os.path.normpath(page.parent / target) for target in re.findall(r"\]\(([^():#]+)\.md[)#]", text)]
+        names = [Path(target).relative_to(ROOT).as_posix() for target in targets]
+        found[title] = [name for name in dict.fromkeys(names) if name not in seen]
+        seen.update(names)
+    return found
+
+
+def sidebar(index: str) -> str:
+    """Return the sections of an index as tables of contents that only the sidebar shows."""
+    return "".join(
+        f"\n```{{toctree}}\n:hidden:\n:caption: {title}\n\n" + "".join(f"/{page}\n" for page in pages) + "```\n"
+        for title, pages in sections(index).items()
+        if pages
+    )
+
+
+def public_names() -> str:
+    """Return a section with the signature and the docstring of every name in ``lipmotion.__all__``."""
+    import lipmotion
+
+    kinds = [(name, "class" if isinstance(getattr(lipmotion, name), type) else "function") for name in lipmotion.__all__]
+    directives = "\n".join(
+        f".. auto{kind}:: lipmotion.{name}\n" + "   :members:\n" * (kind == "class") for name, kind in kinds
+    )
+    return f"\n## Every public name\n\n```{{eval-rst}}\n{directives}\n```\n"
+
+
+def restructured(lines: list[str]) -> list[str]:
+    """Return a docstring with its lists of arguments and errors as field lists."""
+    made: list[str] = []
+    in_field = False
+    for line in lines:
+        field, raised = FIELD.fullmatch(line), RAISED.fullmatch(line)
+        if field or raised:
+            made += [] if in_field else [""]
+            made.append(f":param {field[1]}: {field[2]}" if field else f":raises {raised[1]}: {raised[2]}")
+        else:
+            made += [""] if in_field and line and not line.startswith(" ") else []
+            made.append(line)
+        in_field = bool(field or raised) or (in_field and line.startswith(" "))
+    return made
+
+
+def setup(app: Sphinx) -> None:
+    """Let Sphinx add the sidebar, the public names, and an address for the site as a whole."""
+
+    def add_made_parts(_: Sphinx, page: str, source: list[str]) -> None:
+        source[0] += sidebar(page) if page in INDEXES else ""
+        source[0] += public_names() if page == NAMES else ""
+
+    def rewrite(_app: Sphinx, _what: str, _name: str, _value: object, _options: object, lines: list[str]) -> None:
+        lines[:] = restructured(lines)
+
+    def lead_to_index(_: Sphinx, failed: Exception | None) -> None:
+        if failed is None:
+            head = f'<!doctype html><meta charset="utf-8"><meta http-equiv="refresh" content="0; url={INDEX}.html">'
+            (Path(app.outdir) / "index.html").write_text(
+                f'{head}<title>lipmotion</title><a href="{INDEX}.html">lipmotion</a>\n', encoding="utf-8"
+            )
+
+    app.connect("source-read", add_made_parts)
+    app.connect("autodoc-process-docstring", rewrite)
+    app.connect("build-finished", lead_to_index)
