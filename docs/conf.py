@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[1]
 INDEX, NAMES = "docs/index", "docs/api"
 INDEXES = (INDEX, "recipes/README")
 """The pages whose links make the sidebar; the second one is inside the first."""
-FIELD, RAISED = re.compile(r"(\w+(?:, \w+)*) *: (.*)"), re.compile(r"Raises (\w+): (.*)")
+FIELD, RAISED = re.compile(r"([a-z]\w*(?:, [a-z]\w*)*) *: (.*)"), re.compile(r"Raises ([\w, ]+): (.*)")
 
 project, author, copyright = "lipmotion", "", ""  # noqa: A001
 root_doc = INDEX
@@ -28,6 +28,8 @@ extensions = ["myst_parser", "sphinx.ext.autodoc"]
 myst_heading_anchors = 6
 suppress_warnings = ["myst.header", "misc.highlighting_failure"]
 autodoc_member_order = "bysource"
+autodoc_preserve_defaults = True
+autodoc_default_options = {"members": True}
 maximum_signature_line_length = 80
 html_theme = "furo"
 html_title = "lipmotion"
@@ -45,8 +47,9 @@ def sections(index: str) -> dict[str, list[str]]:
     page = ROOT / f"{index}.md"
     found: dict[str, list[str]] = {}
     seen = {index}
-    for part in re.split(r"^## ", page.read_text(encoding="utf-8"), flags=re.MULTILINE):
-        title, text = part.split("\n", 1)
+    parts = re.split(r"^## ", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    for part in parts[1:] or parts:
+        title, text = part.removeprefix("# ").split("\n", 1)
         targets = [os.path.normpath(page.parent / target) for target in re.findall(r"\]\(([^():#]+)\.md[)#]", text)]
         names = [Path(target).relative_to(ROOT).as_posix() for target in targets]
         found[title] = [name for name in dict.fromkeys(names) if name not in seen]
@@ -63,15 +66,19 @@ def sidebar(index: str) -> str:
     )
 
 
-def public_names() -> str:
-    """Return a section with the signature and the docstring of every name in ``lipmotion.__all__``."""
+def from_docstrings() -> str:
+    """Return sections with every name in ``lipmotion.__all__``, and with the options of every engine."""
     import lipmotion
+    from lipmotion.engines import ENGINES
 
-    kinds = [(name, "class" if isinstance(getattr(lipmotion, name), type) else "function") for name in lipmotion.__all__]
-    directives = "\n".join(
-        f".. auto{kind}:: lipmotion.{name}\n" + "   :members:\n" * (kind == "class") for name, kind in kinds
+    public = {name: isinstance(getattr(lipmotion, name), type) for name in lipmotion.__all__}
+    names = [f".. auto{'class' if is_class else 'function'}:: lipmotion.{name}" for name, is_class in public.items()]
+    options = [ENGINES.load(name).Config for name in ENGINES.built_in]
+    configurations = [f".. autoclass:: {each.__module__}.{each.__name__}" for each in options]
+    return "".join(
+        f"\n## {title}\n\n```{{eval-rst}}\n{chr(10).join(directives)}\n```\n"
+        for title, directives in (("Every public name", names), ("Options of the engines", configurations))
     )
-    return f"\n## Every public name\n\n```{{eval-rst}}\n{directives}\n```\n"
 
 
 def restructured(lines: list[str]) -> list[str]:
@@ -79,23 +86,25 @@ def restructured(lines: list[str]) -> list[str]:
     made: list[str] = []
     in_field = False
     for line in lines:
-        field, raised = FIELD.fullmatch(line), RAISED.fullmatch(line)
-        if field or raised:
+        raised = RAISED.fullmatch(line)
+        found = raised or FIELD.fullmatch(line)
+        if found:
             made += [] if in_field else [""]
-            made.append(f":param {field[1]}: {field[2]}" if field else f":raises {raised[1]}: {raised[2]}")
+            kind = "raises" if raised else "param"
+            made.append(f":{kind} {re.sub(r'(,| and) ', ',', found[1])}: {found[2]}")
         else:
             made += [""] if in_field and line and not line.startswith(" ") else []
             made.append(line)
-        in_field = bool(field or raised) or (in_field and line.startswith(" "))
+        in_field = bool(found) or (in_field and line.startswith(" "))
     return made
 
 
 def setup(app: Sphinx) -> None:
-    """Let Sphinx add the sidebar, the public names, and an address for the site as a whole."""
+    """Let Sphinx add the sidebar, the docstrings, and an address for the site as a whole."""
 
     def add_made_parts(_: Sphinx, page: str, source: list[str]) -> None:
         source[0] += sidebar(page) if page in INDEXES else ""
-        source[0] += public_names() if page == NAMES else ""
+        source[0] += from_docstrings() if page == NAMES else ""
 
     def rewrite(_app: Sphinx, _what: str, _name: str, _value: object, _options: object, lines: list[str]) -> None:
         lines[:] = restructured(lines)
