@@ -20,7 +20,7 @@ INDEXES = (INDEX, "recipes/README")
 """The pages whose links make the sidebar; the second one is inside the first."""
 FIELD, RAISED = re.compile(r"([a-z]\w*(?:, [a-z]\w*)*) *: (.*)"), re.compile(r"Raises ([\w, ]+): (.*)")
 
-project, author, copyright = "lipmotion", "", ""  # noqa: A001
+project, author, copyright = "lipmotion", "", ""
 root_doc = INDEX
 include_patterns = ["docs/**.md", "recipes/*.md", "tests/robustness/table.md", "*.md"]
 exclude_patterns = ["README.md", "build", ".*"]
@@ -42,17 +42,17 @@ html_static_path: list[str] = []
 def sections(index: str) -> dict[str, list[str]]:
     """Return the pages that an index links, without suffix, by the headings they stand under; each page once.
 
-    index : path of the page in the repository, without suffix
+    index : path of the page in the repository, without suffix; the one inside the first has the pages of its folder
     """
     page = ROOT / f"{index}.md"
     found: dict[str, list[str]] = {}
-    seen = {index}
+    seen, folder = {index}, "" if index == INDEX else f"{Path(index).parent.as_posix()}/"
     parts = re.split(r"^## ", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
     for part in parts[1:] or parts:
         title, text = part.removeprefix("# ").split("\n", 1)
         targets = [os.path.normpath(page.parent / target) for target in re.findall(r"\]\(([^():#]+)\.md[)#]", text)]
         names = [Path(target).relative_to(ROOT).as_posix() for target in targets]
-        found[title] = [name for name in dict.fromkeys(names) if name not in seen]
+        found[title] = [name for name in dict.fromkeys(names) if name not in seen and name.startswith(folder)]
         seen.update(names)
     return found
 

@@ -42,7 +42,13 @@ def main() -> None:
         halves = [pictures(footage) for footage in (recorded, drawn)]
     frames = [Image.fromarray(np.hstack(pair)) for pair in zip(*halves, strict=False)]
     frames[0].save(
-        STRIP, save_all=True, append_images=frames[1:], loop=0, duration=round(1000 / recorded.rate_hz), quality=QUALITY, method=6
+        STRIP,
+        save_all=True,
+        append_images=frames[1:],
+        loop=0,
+        duration=round(1000 / recorded.rate_hz),
+        quality=QUALITY,
+        method=6,
     )
     print(f"{len(frames)} frames, {STRIP.stat().st_size / 1e6:.2f} MB")
 

@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import dedent
 from types import ModuleType
 
 ROOT = Path(__file__).parents[2]
@@ -14,7 +15,10 @@ FENCED = re.compile(
     r"(?:^ *<!-- long: (?P<last>[^>]*?) -->\n)?^(?P<indent> *)```(?P<language>\w*)\n(?P<text>.*?)^(?P=indent)```$",
     re.MULTILINE | re.DOTALL,
 )
-INDENTED = re.compile(r"(?:^<!-- long: (?P<last>[^>]*?) -->\n)?(?<=\n\n)(?P<text>(?:    \S.*\n(?:     .*\n)*)+)", re.MULTILINE)
+INDENTED = re.compile(
+    r"(?:^<!-- long: (?P<last>[^>]*?) -->\n|(?<=\n\n))(?P<text>(?:    \S.*\n(?:     .*\n)*)+)", re.MULTILINE
+)
+LANGUAGES = {"sh": "sh", "py": "python", "python": "python"}
 COMMAND = re.compile(r"(?:lipmotion|python|make|pip|ffmpeg|dask|export) ")
 
 
@@ -59,6 +63,6 @@ def blocks(page: str) -> Iterator[Block]:
     found += [match for match in INDENTED.finditer(bare) if COMMAND.match(match["text"].strip())]
     for match in sorted(found, key=lambda match: match.start()):
         given = match.groupdict()
-        language = {"py": "python"}.get(given.get("language", "sh"), given.get("language", "sh"))
-        if language in ("sh", "python"):
-            yield Block(page, language, re.sub(r"^ {%d}" % len(re.match(" *", match["text"])[0]), "", match["text"], flags=re.MULTILINE), match["last"] or "")
+        language = LANGUAGES.get(given.get("language", "sh"))
+        if language:
+            yield Block(page, language, dedent(match["text"]), match["last"] or "")

@@ -1,91 +1,96 @@
-"""What the site says to type is run: here, by the test of its page, or by hand, as a marker says, with the last output."""
+"""What pages say to type is run: here, by the test of the page, or by hand, as a marker says, with the last output."""
 
 from __future__ import annotations
 
 import re
 import shlex
-import shutil
-from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
 
+import lipmotion
+from docs.desk import copied, set_desk
 from docs.site_pages import ROOT, Block, blocks, pages
 from lipmotion.cli.command_line import parser
 from lipmotion.cli.main import main
+from lipmotion.corpora.store import Corpus
+from lipmotion.hmm.model import HmmConfig
+from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.training import train as train_module
 
 TESTED = {
+    "README": "test_readme.py",
     "docs/start": "test_readme.py",
+    "docs/your-face": "docs/test_your_face.py",
     "docs/api": "docs/test_api_page.py",
     "docs/extend/": "docs/test_extend.py",
-    "docs/results/": "docs/test_made_pages.py",
     "recipes/": "docs/test_corpus_recipes.py",
 }
-ALL = {page: list(blocks(page)) for page in pages()}
+"""Pages, or folders of pages, with a test of their own."""
+RESULTS = "docs/results/"
+"""Pages that are the output of the commands on them: their sheets have commit and date."""
+ALL = [block for page in ("README", *pages()) for block in blocks(page)]
+HERE = [block for block in ALL if not block.last and not block.page.startswith((*TESTED, RESULTS))]
 
 
-def commands(text):
-    lines = re.sub(r"\\\n", " ", text).splitlines()
-    return [shlex.split(line.split(" > ")[0].rpartition("| ")[2], comments=True) for line in lines]
+def commands(block: Block) -> list[list[str]]:
+    """Return the words of the commands of a block; of a pipe those of its last part."""
+    lines = re.sub(r"\\\n", " ", block.text).splitlines()
+    words = [shlex.split(re.split(r" > ", line)[0].rpartition(" | ")[2], comments=True) for line in lines]
+    return [each for each in words if each]
 
 
-HERE = {page: [b for b in found if not b.last] for page, found in ALL.items() if not page.startswith(tuple(TESTED))}
-HERE = {page: found for page, found in HERE.items() if found}
+def test_every_command_is_understood() -> None:
+    understood = parser()
+    found = [words for block in ALL if block.language == "sh" for words in commands(block)]
+    assert len(found) > 100
+    for words in found:
+        if words[0] == "lipmotion":
+            assert understood.parse_args(words[1:]).verb == words[1]
 
 
-@pytest.mark.parametrize("page", HERE)
-def test_run(page, tmp_path, monkeypatch, desk, toy_model):
-    import time
-    import lipmotion
-    shutil.copytree(desk, tmp_path / "desk")
-    monkeypatch.chdir(tmp_path / "desk")
-    names = {"lipmotion": lipmotion, "result": lipmotion.animate("speech.wav", transcript=Path("speech.txt"), model=toy_model), "Path": Path}
-    for b in HERE[page]:
-        if b.language == "python":
-            t=time.process_time()
-            try:
-                exec(compile(b.text, page, "exec"), names)
-                r = 0
-            except BaseException as e:
-                r = repr(e)
-            print("RUN", page, "python", r, round(time.process_time()-t,2))
-        else:
-            for words in commands(b.text):
-                t=time.process_time()
-                r = None
-                if words and words[0] == "lipmotion":
-                    try:
-                        r = main(words[1:])
-                    except BaseException as e:
-                        r = repr(e)
-                print("RUN", page, " ".join(words), "->", r, round(time.process_time()-t,2))
+def test_what_runs_here_is_ours_and_markers_say_when_and_what() -> None:
+    foreign = [
+        words for block in HERE if block.language == "sh" for words in commands(block) if words[0] != "lipmotion"
+    ]
+    assert foreign == []
+    for block in ALL:
+        assert not block.last or re.match(r"(20\d\d-\d\d-\d\d[^:]*|not run): .", block.last), block
+    for test in TESTED.values():
+        assert (ROOT / "tests" / test).is_file()
 
 
 @pytest.fixture(scope="module")
-def desk(tmp_path_factory, toy_corpus, toy_model_file, toy_speech, toy_sentence, coupled_model_file, filmed_face_file, pictured_model_file):
-    import lipmotion
-    from meshes.heads import head, lip_points, write_glb
-    from meshes.obj_writing import write_obj
-    d = tmp_path_factory.mktemp("d") / "desk"
-    shutil.copytree(ROOT / "examples", d / "examples")
-    for name in ("speech.wav", "talk.wav", "a.wav", "b.wav", "one.wav", "three.flac", "recordings/one.wav", "recordings/two.wav", "takes/a.wav", "perro.wav"):
-        (d / name).parent.mkdir(exist_ok=True)
-        shutil.copy(toy_speech, d / name)
-    words = " ".join(toy_sentence.words)
-    for name in ("speech.txt", "story.txt", "sentences.txt", "script.txt"):
-        (d / name).write_text(words)
-    (d / "names.txt").write_text("anna AE N AH\n")
-    shutil.copy(d / "examples" / "welcome.flac", d)
-    for name in ("me", "her", "ridge", "evis", "phones", "other"):
-        shutil.copy(toy_model_file, d / f"{name}.lipmotion")
-    shutil.copy(coupled_model_file, d / "coupled.lipmotion")
-    shutil.copy(pictured_model_file, d / "mine.lipmotion")
-    shutil.copy(filmed_face_file, d / "anna.face")
-    for name in ("CORPUS", "my-corpus", "build/grid-s1"):
-        shutil.copytree(toy_corpus.path, d / name)
-    write_glb(d / "head.glb", head())
-    plain = head(shapes=False)
-    write_obj(d / "head.obj", plain)
-    (d / "points.csv").write_text("point,vertex\n" + "".join(f"{p},{v}\n" for p, v in lip_points(plain).items()))
-    (d / "lines.csv").write_text("recording\nspeech.wav\n")
-    return d
+def desk(tmp_path_factory: pytest.TempPathFactory, toy_model_file: Path, coupled_model_file: Path) -> Path:
+    folder = tmp_path_factory.mktemp("pages") / "desk"
+    folder.mkdir()
+    models = dict.fromkeys(("me.lipmotion", "her.lipmotion"), toy_model_file)
+    set_desk(folder, models | {"coupled.lipmotion": coupled_model_file})
+    return folder
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("recognised_once")
+@pytest.mark.parametrize("page", dict.fromkeys(block.page for block in HERE))
+def test_blocks_of_a_page_run(
+    page: str, desk: Path, toy_model: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(train_module, "HmmConfig", partial(HmmConfig, mixtures=1, iterations=1))
+    monkeypatch.chdir(copied(desk, tmp_path / "desk"))
+    names: dict[str, object] = {"lipmotion": lipmotion, "corpus": Corpus.open(Path("my-corpus"))}
+    names["result"] = lipmotion.animate("speech.wav", transcript=Path("speech.txt"), model=toy_model)
+    with Path("speech.wav").open(encoding="latin-1") as piped:
+        monkeypatch.setattr("sys.stdin", piped)
+        for block in HERE:
+            if block.page == page:
+                perform(block, names)
+
+
+def perform(block: Block, names: dict[str, object]) -> None:
+    """Run a block in the current folder."""
+    if block.language == "python":
+        exec(compile(block.text, block.page, "exec"), names)  # noqa: S102
+        return
+    for words in commands(block):
+        assert main(words[1:]) in (0, None), words
