@@ -19,7 +19,7 @@ from lipmotion.testing.toy import ToySentence, toy_sentences, toy_utterances
 from lipmotion.types import Audio
 from meshes.heads import head, lip_points, write_glb
 from meshes.obj_writing import write_obj
-from study.analysis.simulated import Effects, comparisons, paired_answers
+from study.analysis.simulated import Effects, rated_answers, ratings
 
 SAID = ("speech", "talk", "a", "b", "one", "lines/one", "perro")
 CORPORA = ("CORPUS", "my-corpus", "build/grid-s1")
@@ -51,8 +51,8 @@ def set_desk(folder: Path, models: dict[str, Path]) -> None:
     _motion(folder, words)
     _characters(folder)
     draw = np.random.default_rng(2)
-    judged = comparisons(draw, np.array([-0.5, 0.5]), (8, 6), Effects())
-    write_answers(folder / "answers.csv", paired_answers(replace(judged, conditions=("ph-HMM", "ph-CHMM"))))
+    judged = ratings(draw, np.array([3.0, 4.0]), (8, 6), Effects())
+    write_answers(folder / "answers.csv", rated_answers(replace(judged, conditions=("ph-HMM", "ph-CHMM"))))
 
 
 def copied(desk: Path, folder: Path) -> Path:
