@@ -34,7 +34,7 @@ def set_desk(folder: Path, models: dict[str, Path]) -> None:
         shutil.copy(file, folder / name)
     for name in CORPORA:
         corpus = Corpus.create(folder / name)
-        for utterance in toy_utterances(4):
+        for utterance in toy_utterances(3):
             corpus.add(utterance)
     words = _speech(folder, toy_sentences(3)[0])
     for name in ("speech", "sentences", "script", "story"):
@@ -46,8 +46,8 @@ def set_desk(folder: Path, models: dict[str, Path]) -> None:
     (folder / "talk.json").write_text(
         json.dumps({"segments": [{"start": 0.1, "end": 1.0, "text": words}]}), encoding="utf-8"
     )
-    for speaker in ("RECORDINGS", "takes", "anna-and-ben/anna", "anna-and-ben/ben"):
-        _takes(folder / speaker)
+    for name in ("RECORDINGS", "takes"):
+        _takes(folder / name)
     _motion(folder, words)
     _characters(folder)
     draw = np.random.default_rng(2)
