@@ -9,6 +9,7 @@
 # make fuzz   mutated input for every reader, MINUTES=10 in all; READER=name: that one only; SEED=1: other input
 # make bench  the speed figures of docs/results/figures.md
 # make model  trains and measures the model that ships with the package (needs GRID speaker s1)
+# make site   the documentation as build/site/index.html: with a search, offline
 # make requirements  renews the pinned requirements (needs uv)
 
 PYTHON ?= python3
@@ -24,7 +25,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 SOURCES := $(shell find src -type f -not -name '*.pyc') pyproject.toml README.md
 TIMED := $(BIN)/python scripts/processor_time.py
 PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
-.PHONY: demo test test-all test-long test-portable test-explore check coverage fuzz bench model requirements clean
+.PHONY: demo test test-all test-long test-portable test-explore check coverage fuzz bench model site requirements clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/core
@@ -74,8 +75,13 @@ model: $(VENV)/dev
 	  $(BIN)/lipmotion evaluate $(BUILD)/grid-s1-train.lipmotion $(BUILD)/grid-s1 --split $$split -o docs/results/grid-s1-$$split.json; done
 	$(BIN)/lipmotion train $(BUILD)/grid-s1 --from none --split all -o src/lipmotion/models/grid-s1.lipmotion
 
+# The tools lie beside the environment of the tests, which stays as it is.
+site: $(VENV)/site
+	PYTHONPATH=src:$(VENV)/site-tools $(BIN)/python -m sphinx --fail-on-warning --keep-going --fresh-env --write-all --quiet \
+	  -c docs -d $(BUILD)/site-cache . $(BUILD)/site
+
 requirements:
-	for list in core dev; do uv pip compile --universal --python-version 3.10 --generate-hashes --no-emit-index-url \
+	for list in core dev site; do uv pip compile --universal --python-version 3.10 --generate-hashes --no-emit-index-url \
 	  --no-annotate --no-header --override requirements/overrides.txt requirements/$$list.in -o requirements/$$list.txt; done
 
 clean:
@@ -88,6 +94,10 @@ $(BIN)/python:
 $(VENV)/core: $(BIN)/python requirements/core.txt $(SOURCES)
 	$(PIP) --no-deps --require-hashes -r requirements/core.txt
 	$(PIP) --no-deps --no-build-isolation --force-reinstall .
+	touch $@
+
+$(VENV)/site: $(VENV)/dev requirements/site.txt
+	$(PIP) --no-deps --require-hashes --upgrade --target $(VENV)/site-tools -r requirements/site.txt
 	touch $@
 
 $(VENV)/dev: $(BIN)/python requirements/dev.txt $(SOURCES)

@@ -11,9 +11,6 @@ from pathlib import Path
 import pytest
 
 import lipmotion
-from lipmotion.speech.recognition.recognised_speech import Recognition
-from lipmotion.speech.recognition.recogniser import Recogniser
-from lipmotion.types import Audio, Features, ParallelMap
 
 ROOT = Path(__file__).parents[2]
 
@@ -38,27 +35,7 @@ def documented() -> dict[str, doctest.DocTest]:
 EXAMPLES = documented()
 
 
-@pytest.fixture(scope="module", autouse=True)
-def recognised_once() -> Iterator[None]:
-    """Most docstrings recognise examples/welcome.flac by the shipped model: it is done once."""
-    known: dict[tuple[int, str, bytes], Recognition] = {}
-    plain = Recogniser.recognition
-
-    def recognition(
-        self: Recogniser, audio: Audio, features: Features, each: ParallelMap = map, *, english: bool = True
-    ) -> Recognition:
-        key = id(self.own), self.kind, audio.samples.tobytes()
-        if self.adaptation is not None:
-            return plain(self, audio, features, each, english=english)
-        if key not in known:
-            known[key] = plain(self, audio, features, each, english=english)
-        return known[key]
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Recogniser, "recognition", recognition)
-        yield
-
-
+@pytest.mark.usefixtures("recognised_once")
 @pytest.mark.parametrize("name", sorted(EXAMPLES))
 def test_the_examples_of_a_docstring_run(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)

@@ -100,8 +100,11 @@ def test_an_installed_predictor_is_chosen_by_name(toy_corpus: Corpus, toy_speech
 
 
 @pytest.mark.long
-def test_an_installed_face_and_format_work_from_the_command_line(toy_speech: Path, tmp_path: Path) -> None:
+def test_an_installed_face_format_and_output_work_from_the_command_line(toy_speech: Path, tmp_path: Path) -> None:
     face, table = Package("face.md", tmp_path / "face"), Package("exporter.md", tmp_path / "table")
+    words = Package("output.md", tmp_path / "words")
+    words.lipmotion("animate", toy_speech, "--transcript", "see bob papa mama", "-o", tmp_path / "a.words.csv")
+    assert (tmp_path / "a.words.csv").read_text(encoding="utf-8").endswith(",mama\n")
     face.lipmotion("animate", toy_speech, "-o", tmp_path / "a.mp4", "--face", "bar")
     assert (tmp_path / "a.mp4").stat().st_size > 1000
     table.lipmotion("animate", toy_speech, "-o", tmp_path / "a.tab", "--channels", "opening,width")

@@ -1,15 +1,12 @@
-"""The pages for other programs: short, and with tables and commands that exist."""
+"""The pages for other programs: short, and with tables that exist."""
 
 from __future__ import annotations
 
-import re
-import shlex
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from lipmotion.cli.command_line import parser
 from lipmotion.meshes.files.rig_tables import read_rig_table
 from lipmotion.pipeline.outputs.curve_sets import curves_of
 from meshes.speech import motion, units
@@ -26,17 +23,8 @@ def test_a_jaw_opens_and_closes() -> None:
     assert jaw[[20, 55, 95]] == pytest.approx(0.0)
 
 
-def test_pages_are_short_and_their_commands_are_understood() -> None:
-    understood = parser()
-    for page in [*PAGES, ROOT / "docs" / "controls.md"]:
-        text = page.read_text(encoding="utf-8")
-        assert len(text.splitlines()) <= MOST_LINES or page not in PAGES
-        commands = re.findall(
-            r"^(?: {4})?(?:ffmpeg [^|]*\| )?lipmotion ((?!batch).*?)(?:\s+#.*|\s+> \S+)?$", text, re.MULTILINE
-        )
-        assert commands, page
-        for command in commands:
-            understood.parse_args(shlex.split(command))
+def test_pages_are_short() -> None:
+    assert [page for page in PAGES if len(page.read_text(encoding="utf-8").splitlines()) > MOST_LINES] == []
 
 
 def test_every_table_moves_its_rig_and_is_in_a_recipe() -> None:

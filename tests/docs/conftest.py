@@ -1,0 +1,30 @@
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from lipmotion.speech.recognition.recognised_speech import Recognition
+from lipmotion.speech.recognition.recogniser import Recogniser
+from lipmotion.types import Audio, Features, ParallelMap
+
+
+@pytest.fixture(scope="module")
+def recognised_once() -> Iterator[None]:
+    """Most examples recognise the same recordings by the same models: each is done once."""
+    known: dict[tuple[int, str, bytes], Recognition] = {}
+    plain = Recogniser.recognition
+
+    def recognition(
+        self: Recogniser, audio: Audio, features: Features, each: ParallelMap = map, *, english: bool = True
+    ) -> Recognition:
+        key = id(self.own), self.kind, audio.samples.tobytes()
+        if self.adaptation is not None:
+            return plain(self, audio, features, each, english=english)
+        if key not in known:
+            known[key] = plain(self, audio, features, each, english=english)
+        return known[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Recogniser, "recognition", recognition)
+        yield

@@ -1,0 +1,99 @@
+"""A folder with all that commands on pages name: speech, words, motion, corpora, models, characters, answers."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+import lipmotion
+from docs.site_pages import ROOT
+from lipmotion.corpora.store import Corpus
+from lipmotion.export.sound import write_sound
+from lipmotion.study.answers import write_answers
+from lipmotion.testing.toy import ToySentence, toy_sentences, toy_utterances
+from lipmotion.types import Audio
+from meshes.heads import head, lip_points, write_glb
+from meshes.obj_writing import write_obj
+from study.analysis.simulated import Effects, rated_answers, ratings
+
+SAID = ("speech", "talk", "a", "b", "one", "lines/one", "perro")
+CORPORA = ("CORPUS", "my-corpus", "build/grid-s1")
+
+
+def set_desk(folder: Path, models: dict[str, Path]) -> None:
+    """Fill a folder; ``models``: files by the names that pages give them."""
+    shutil.copytree(ROOT / "examples", folder / "examples")
+    for name in ("welcome.flac", "three.flac"):
+        shutil.copy(ROOT / "examples" / "welcome.flac", folder / name)
+    for name, file in models.items():
+        shutil.copy(file, folder / name)
+    for name in CORPORA:
+        corpus = Corpus.create(folder / name)
+        for utterance in toy_utterances(3):
+            corpus.add(utterance)
+    words = _speech(folder, toy_sentences(3)[0])
+    for name in ("speech", "sentences", "script", "story"):
+        (folder / f"{name}.txt").write_text(words, encoding="utf-8")
+    units = (ROOT / "docs" / "unit-sets.md").read_text("utf-8").partition("```text\n")[2].partition("```")[0]
+    (folder / "my-units.txt").write_text(units, encoding="utf-8")
+    (folder / "names.txt").write_text("anna AE N AH\n", encoding="utf-8")
+    (folder / "lines.csv").write_text("file\nspeech.wav\n", encoding="utf-8")
+    (folder / "talk.json").write_text(
+        json.dumps({"segments": [{"start": 0.1, "end": 1.0, "text": words}]}), encoding="utf-8"
+    )
+    for name in ("RECORDINGS", "takes"):
+        _takes(folder / name)
+    _motion(folder, words)
+    _characters(folder)
+    draw = np.random.default_rng(2)
+    judged = ratings(draw, np.array([3.0, 4.0]), (8, 6), Effects())
+    write_answers(folder / "answers.csv", rated_answers(replace(judged, conditions=("ph-HMM", "ph-CHMM"))))
+
+
+def copied(desk: Path, folder: Path) -> Path:
+    """Return a copy of the folder whose files are the same until they are replaced."""
+    return Path(shutil.copytree(desk, folder, copy_function=os.link))
+
+
+def _speech(folder: Path, sentence: ToySentence) -> str:
+    """Write the first word of a sentence as several recordings; return it."""
+    word = sentence.words[0]
+    end_s = [span.end_s for span in sentence.units if span.label.word == word][-1] + 0.2
+    sound = Audio(sentence.audio.samples[: round(end_s * sentence.audio.rate_hz)], sentence.audio.rate_hz)
+    for name in SAID:
+        (folder / name).parent.mkdir(exist_ok=True)
+        write_sound(folder / f"{name}.wav", sound)
+    return word
+
+
+def _takes(folder: Path) -> None:
+    """Write recordings with motion and words beside them."""
+    folder.mkdir(parents=True)
+    for utterance in toy_utterances(3):
+        write_sound(folder / f"{utterance.name}.wav", utterance.audio)
+        (folder / f"{utterance.name}.txt").write_text(" ".join(utterance.words or ()), encoding="utf-8")
+        motion = utterance.track.motion
+        table = np.column_stack([motion.time_s, motion.values])
+        head_line = ",".join(("time_s", *motion.names))
+        np.savetxt(folder / f"{utterance.name}.csv", table, "%.4f", ",", header=head_line, comments="")
+
+
+def _motion(folder: Path, words: str) -> None:
+    """Write motion of the speech, also as others name it, and a video."""
+    said = lipmotion.animate(folder / "speech.wav", transcript=words)
+    names = ("speech.json", "mine.json", "reference.json", "theirs.csv", "film.mp4", "two.mp4")
+    lipmotion.write(said, [folder / name for name in names], speech=folder / "speech.wav", fps=10.0)
+    (folder / "film.srt").write_text(f"1\n00:00:00,100 --> 00:00:01,000\n{words}\n", encoding="utf-8")
+
+
+def _characters(folder: Path) -> None:
+    plain = head(shapes=False)
+    write_glb(folder / "head.glb", head())
+    write_obj(folder / "head.obj", plain)
+    rows = "".join(f"{point},{vertex}\n" for point, vertex in lip_points(plain).items())
+    (folder / "points.csv").write_text("point,vertex\n" + rows, encoding="utf-8")
