@@ -319,10 +319,13 @@ def score(options: argparse.Namespace) -> None:
             source: of_source(items, right, SOUNDS_SHEET, source) | {"named": named(items, given, source)}
             for source in SOURCES
         },
-        "analysis": analyse_study(rows)["all"],
-        "items": [asdict(item) | {"answer": given[item.sheet, item.number]} for item in items],
+        "first_preferred": analyse_study(rows)["all"][0]["first_preferred"],
+        "items": [
+            [item.sheet, item.number, item.source, " ".join(item.truth), given[item.sheet, item.number]]
+            for item in items
+        ],
     }
-    options.output.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+    options.output.write_text(json.dumps(figures) + "\n", encoding="utf-8")
     print(json.dumps({name: figures[name] for name in (PAIRS, CLOSURES, SOUNDS_SHEET)}, indent=1))
 
 
