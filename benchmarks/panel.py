@@ -13,7 +13,8 @@ sound. What is behind which strip is in ``PANEL/key.json`` and ``PANEL/study/stu
 *closures* : seven frames of one mouth. In which do the lips meet? About half have one p, b or m; the others none.
 *sounds*   : five frames about the middle of a sound, each a random one of six. Which is it?
 
-ANSWERS.csv has the columns sheet, item, answer, note: A or B; a number of a frame, or none; a name of ``SOUNDS``.
+ANSWERS.csv has the columns sheet, item, answer, note: A or B; a number of a frame, or none; a name of ``SOUNDS``. It
+needs pairs, and may leave closures or sounds out.
 ``score`` counts the right ones, and writes ``answers.csv`` of the pairs beside the study, as ``lipmotion study export``
 does, for ``lipmotion study analyse``. Intervals are exact (Clopper & Pearson), for other moments and the same reader.
 """
@@ -301,6 +302,8 @@ def score(options: argparse.Namespace) -> None:
     ]
     with options.answers.open(encoding="utf-8", newline="") as file:
         given = {(row["sheet"], int(row["item"])): row["answer"].strip() for row in csv.DictReader(file)}
+    answered = {sheet for sheet, _ in given}
+    items = [item for item in items if item.sheet in answered]
     missing = [(item.sheet, item.number) for item in items if (item.sheet, item.number) not in given]
     if missing or len(given) != len(items):
         raise SystemExit(f"{options.answers}: {len(given)} answers to {len(items)} items; missing {missing[:5]}")
@@ -319,11 +322,14 @@ def score(options: argparse.Namespace) -> None:
             source: of_source(items, right, SOUNDS_SHEET, source) | {"named": named(items, given, source)}
             for source in SOURCES
         },
-        "analysis": analyse_study(rows)["all"],
-        "items": [asdict(item) | {"answer": given[item.sheet, item.number]} for item in items],
+        "first_preferred": analyse_study(rows)["all"][0]["first_preferred"],
+        "items": [
+            [item.sheet, item.number, item.source, " ".join(item.truth), given[item.sheet, item.number]]
+            for item in items
+        ],
     }
-    options.output.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
-    print(json.dumps({name: figures[name] for name in (PAIRS, CLOSURES, SOUNDS_SHEET)}, indent=1))
+    options.output.write_text(json.dumps(figures) + "\n", encoding="utf-8")
+    print(json.dumps({sheet: figures[sheet] for sheet in (PAIRS, CLOSURES, SOUNDS_SHEET)}, indent=1))
 
 
 def exported(study: Study, items: Sequence[Item], given: Mapping[tuple[str, int], str]) -> list[Answer]:
@@ -362,6 +368,8 @@ def named(items: Sequence[Item], given: Mapping[tuple[str, int], str], source: s
 def share(right: Sequence[bool]) -> dict[str, float]:
     """Return how many are right, of how many, the share, its exact interval, and the p-value against one half."""
     wins, count = sum(right), len(right)
+    if not count:
+        return {"right": 0, "of": 0}
     interval = exact_interval(wins, count)
     figures = {"right": wins, "of": count, "share": round(wins / count, 3), "p_half": round(binomial_p(wins, count), 4)}
     return figures | {"low": round(interval.low, 3), "high": round(interval.high, 3)}

@@ -8,7 +8,7 @@ import pytest
 from appearance.test_eigenlips import pictures
 from lipmotion.appearance.candidates import choose_candidates, make_candidates
 from lipmotion.appearance.eigenlips import Eigenlips, fit_eigenlips
-from lipmotion.appearance.refinement import PAPER, RefinementOptions, Refiner, best_sequence
+from lipmotion.appearance.refinement import PAPER, RefinementOptions, Refiner, best_sequence, sharpened
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
 from lipmotion.stats.pca import fit_pca
@@ -157,3 +157,14 @@ def test_what_cannot_be_refined(refiner: Refiner) -> None:
     for options in ({"steadiness": -1.0}, {"steadiness": np.nan}, {"neighbours": 0}):
         with pytest.raises(InputError, match="required"):
             RefinementOptions(**options)  # type: ignore[arg-type]
+
+
+def test_edges_become_steeper_in_lightness_alone() -> None:
+    edge = np.zeros((2, 20, 20, 3), np.uint8)
+    edge[:, :, :10], edge[:, :, 10:] = (60, 80, 100), (110, 130, 150)
+    sharp = sharpened(edge, 0.5, 1).astype(int)
+    assert (sharp[:, :, 10] - sharp[:, :, 9] > 55).all()  # 50 before
+    assert (np.ptp(sharp - edge, axis=3) <= 1).all()  # no colour gets more than another
+    assert np.abs(sharp - edge)[:, :, [0, -1]].max() == 0
+    assert np.abs(sharpened(edge, 0.5, 2).astype(int) - edge)[:, :, 6].max() > np.abs(sharp - edge)[:, :, 6].max()
+    assert sharpened(edge, 0, 1) is edge

@@ -45,6 +45,28 @@ PAPER = RefinementOptions(together=False, steadiness=0.0, neighbours=1)
 """The refinement of the paper: the nearest candidate of every colour and frame."""
 
 
+SHARPENING, RADIUS_PX = 0.5, 1.0
+"""Share of the difference from a blurred picture that is added, and the blur, px of the face: what the regression and
+resampling take away (docs/results/panel.md)."""
+
+
+def sharpened(pictures: Pictures, share: float, scale: int) -> Pictures:
+    """Return pictures [shape=(T, H, W, 3)] that are sharper in lightness; colours would have fringes.
+
+    share : of the difference between the lightness and its blurred picture that is added to all colours
+    scale : samples a pixel of the face
+    """
+    from scipy.ndimage import gaussian_filter
+
+    if not share:
+        return pictures
+    lightness = pictures.mean(axis=3, dtype=np.float32)
+    detail = lightness - gaussian_filter(lightness, (0, RADIUS_PX * scale, RADIUS_PX * scale))
+    levels = pictures + share * detail[..., None]
+    np.rint(levels, out=levels)
+    return np.clip(levels, 0, 255, out=levels).astype(np.uint8)
+
+
 def moving_average(coefficients: Values, frames: int = 3) -> NDArray[np.float64]:
     """Return curves [shape=(T, C)] smoothed by a moving average of an odd width, narrower at the ends.
 

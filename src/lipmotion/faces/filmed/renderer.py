@@ -25,7 +25,15 @@ from lipmotion.appearance.lower_face import (
 from lipmotion.appearance.person import JAW_OPTIONS, Appearance, FaceCodes
 from lipmotion.appearance.placing import cut, feather, place
 from lipmotion.appearance.poisson import CloningSystem, cloning_system
-from lipmotion.appearance.refinement import PAPER, STEADY, RefinementOptions, Refiner, moving_average
+from lipmotion.appearance.refinement import (
+    PAPER,
+    SHARPENING,
+    STEADY,
+    RefinementOptions,
+    Refiner,
+    moving_average,
+    sharpened,
+)
 from lipmotion.errors import InputError
 
 Array = NDArray[np.float64]
@@ -64,6 +72,7 @@ class StitchingOptions:
 
     jaw       : whether the jaw is replaced, too; False: the background's jaw stays, the mouth alone is replaced
     mouth     : how the detail of the mouth is chosen; None: eigenlips alone, blurred
+    sharpening : by how much the mouth is sharpened (``sharpened``); 0: not
     average   : number of pictures over which the mouth is averaged before, odd; 1: none
     jaw_detail : how the detail of the jaw is chosen
     noise     : whether the noise of the camera is added
@@ -72,6 +81,7 @@ class StitchingOptions:
 
     jaw: bool = True
     mouth: RefinementOptions | None = STEADY
+    sharpening: float = SHARPENING
     average: int = 1
     jaw_detail: RefinementOptions = JAW_OPTIONS
     noise: bool = True
@@ -79,7 +89,7 @@ class StitchingOptions:
 
 
 STITCHING = StitchingOptions()
-AS_PRINTED = StitchingOptions(mouth=PAPER, average=3)
+AS_PRINTED = StitchingOptions(mouth=PAPER, sharpening=0, average=3)
 """The mean of three pictures, then the nearest of 500 candidates for every colour and picture: Xie & Liu 2007, §6.1 and
 Eqs. 14–16.
 """
@@ -164,7 +174,8 @@ class Stitcher:
     def _stitched(self, mouths: Pictures, behind: Pictures, batch: Sequence[Background]) -> Iterator[Picture]:
         """Yield the frames of a batch with mouths in lower faces, and these in the frames."""
         source = behind.copy()
-        source[(slice(None), *mouth_part(self.appearance.scale))] = relit(mouths, self._gains(behind))
+        sharp = sharpened(relit(mouths, self._gains(behind)), self.options.sharpening, self.appearance.scale)
+        source[(slice(None), *mouth_part(self.appearance.scale))] = sharp
         patches = self._mouth_alone.clone(source, behind)
         for each, patch, to in zip(batch, patches, self._maps(batch), strict=True):
             frame = each.frame.copy()
