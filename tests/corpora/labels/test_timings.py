@@ -142,6 +142,7 @@ ERRORS = {
         lines(*[{"alignment": {"chars": ["a"], "charStartTimesMs": [0], "charDurationsMs": [1]}}] * 2),
         "holds 2 pieces whose times each begin at 0",
     ),
+    "a symbol without end": (CARTESIA.replace('"aɪ"', f'"{"a" * 41}"'), "has 41 letters, required a phone: 40 at most"),
     "nothing in time": ({"timepoints": []}, "holds no word and no phone in time; ask the service for them"),
 }  # fmt: skip
 

@@ -155,11 +155,11 @@ def phone_timeline(tier: LabelTier, words: LabelTier | None, where: str, *, with
     marked = any(re.search(r"\d$", label.text) for label in labels) or set(REDUCED_VOWELS.values()) & set(phones)
     if words is not None and not marked:
         phones = _reduced(labels, phones, words)
-    starts_s = [label.start_s for label in labels]
+    starts_s = [max(label.start_s, 0.0) for label in labels]
     ends_s = [
         label.end_s if following_s > label.end_s + ROUNDING_S else following_s
         for label, following_s in zip(labels, starts_s[1:], strict=False)
-    ] + [labels[-1].end_s]
+    ] + [max(labels[-1].end_s, 0.0)]
     return Timeline(tuple(Span(*row) for row in zip(starts_s, ends_s, map(Unit, phones), strict=True)))
 
 

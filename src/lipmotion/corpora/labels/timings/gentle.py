@@ -44,7 +44,8 @@ def tiers(documents: Documents, where: str) -> list[LabelTier] | None:
 def _phones(word: Mapping[str, Any], start_s: float, place: str, where: str) -> list[TimedLabel]:
     """Return the phones of a word: ``hh_B`` is hh, at the beginning of it."""
     phones = []
-    for number, item in enumerate(word.get("phones") or [], 1):
+    items = word.get("phones")
+    for number, item in enumerate(items if isinstance(items, list) else [], 1):
         fields = item if isinstance(item, dict) else {}
         name = required_text(fields.get("phone"), where, f"{place}, phone {number}").partition("_")[0]
         end_s = start_s + required_seconds(fields.get("duration"), where, f"{place}, phone {number}")

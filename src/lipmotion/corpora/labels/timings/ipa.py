@@ -13,6 +13,8 @@ from lipmotion.units.ipa_phones import ipa_phones, token_phones
 
 PAUSES = frozenset((" ", *SILENCES, *' ^ $ . , ; : ! ? — – … ( ) “ ” " « » ¡ ¿'.split(" ")))
 """Symbols of voices for silence: padding, blanks and punctuation, which last as long as the pause."""
+LONGEST_SYMBOL = 40
+"""Most letters of a phone with all its marks."""
 WITH_GLIDES = {"aj": "aɪ", "ej": "eɪ", "ɔj": "ɔɪ", "ow": "oʊ", "əw": "əʊ", "aw": "aʊ"}
 """Diphthongs as the Montreal Forced Aligner writes them."""
 NO_SOUND = "<sil>"
@@ -27,6 +29,11 @@ def inventory_labels(labels: Sequence[TimedLabel], where: str) -> list[TimedLabe
     Raises InputError: a symbol that is none of IPA, with its place.
     """
     for label in labels:
+        if len(label.text) > LONGEST_SYMBOL:
+            length = len(label.text)
+            raise InputError(
+                f"{where}: {label.position} has {length} letters, required a phone: {LONGEST_SYMBOL} at most"
+            )
         unknown = "" if label.text in PAUSES else ipa_phones(label.text)[1]
         if unknown:
             raise InputError(
