@@ -67,6 +67,7 @@ MOTION_FORMATS: Registry[MotionFormat] = Registry(
         "c3d": "lipmotion.export.motion.motion_c3d:MOTION_FORMAT",
         "fap": "lipmotion.export.motion.motion_fap:MOTION_FORMAT",
         "bvh": "lipmotion.export.motion.motion_bvh:MOTION_FORMAT",
+        "a2f.json": "lipmotion.export.motion.audio2face:MOTION_FORMAT",
         "motion3.json": "lipmotion.export.motion.live2d:MOTION_FORMAT",
     },
 )

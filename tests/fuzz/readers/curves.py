@@ -63,6 +63,7 @@ def _captures() -> list[Files]:
         write_motion(folder / "a.c3d", moving, source={}, model={})
         write_c3d(folder / "b.c3d", markers)
         write_motion(folder / "a.fap", parameters, source={}, model={})
+        write_motion(folder / "a.a2f.json", _generation(values[:, :1], weights.channels), source={}, model={})
         rows = [f"{1000 * n / RATE_HZ:.1f},{row[0]}" for n, row in enumerate(values)]
         (folder / "c.csv").write_text("\n".join(["time_ms,jawOpen", *rows]))
         return [{path.name: path.read_bytes()} for path in sorted(folder.iterdir())]
