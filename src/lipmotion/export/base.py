@@ -35,6 +35,7 @@ class MotionFormat:
     mouth   : whether the file shows how the mouth itself moves: the pipeline keeps the channel ``opening`` for it,
               whatever channels or curves the user asks for
     most_frames : number of frames that such a file can hold; None: any number
+    fixed_rate : whether a file can have no other rate than ``rate_hz``
     other_curves : whether weights and controls that the user asks for take the place of ``curves``
     names_sound  : whether the file names the recording: the description of the speech then has ``path``, the path from
                    the folder of the file
@@ -49,6 +50,7 @@ class MotionFormat:
     units: Callable[[Path], Timeline[Unit] | None] | None = None
     curves: str = ""
     rate_hz: float | None = None
+    fixed_rate: bool = False
     other_curves: bool = False
     names_sound: bool = False
     mouth: bool = False
@@ -66,6 +68,7 @@ MOTION_FORMATS: Registry[MotionFormat] = Registry(
         "blender.py": "lipmotion.export.motion.blender_script:MOTION_FORMAT",
         "c3d": "lipmotion.export.motion.motion_c3d:MOTION_FORMAT",
         "fap": "lipmotion.export.motion.motion_fap:MOTION_FORMAT",
+        "vmd": "lipmotion.export.motion.motion_vmd:MOTION_FORMAT",
         "bvh": "lipmotion.export.motion.motion_bvh:MOTION_FORMAT",
         "a2f.json": "lipmotion.export.motion.audio2face:MOTION_FORMAT",
         "motion3.json": "lipmotion.export.motion.live2d:MOTION_FORMAT",

@@ -63,6 +63,8 @@ def _captures() -> list[Files]:
         write_motion(folder / "a.c3d", moving, source={}, model={})
         write_c3d(folder / "b.c3d", markers)
         write_motion(folder / "a.fap", parameters, source={}, model={})
+        vowels = (Channel("aa", WEIGHT), Channel("eyeBlinkLeft", WEIGHT), Channel("eyeBlinkRight", WEIGHT))
+        write_motion(folder / "a.vmd", _generation(values, vowels), source={}, model={})
         write_motion(folder / "a.a2f.json", _generation(values[:, :1], weights.channels), source={}, model={})
         rows = [f"{1000 * n / RATE_HZ:.1f},{row[0]}" for n, row in enumerate(values)]
         (folder / "c.csv").write_text("\n".join(["time_ms,jawOpen", *rows]))
