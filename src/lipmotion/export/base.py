@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -75,6 +75,11 @@ MOTION_FORMATS: Registry[MotionFormat] = Registry(
     },
 )
 """Motion formats by suffix, without the first dot; a suffix may have several parts, as ``livelink.csv``."""
+_GLTF = "lipmotion.meshes.files.gltf_weights:read_gltf_motion"
+MOTION_READERS: Registry[Callable[[Path], tuple[Motion, Timeline[Unit]]]] = Registry(
+    "motion reader", "lipmotion.motion_readers", {"glb": _GLTF, "gltf": _GLTF, "vrma": _GLTF}
+)
+"""Readers of files that hold motion, but are not written as motion formats, by suffix as ``MOTION_FORMATS``."""
 
 
 def motion_suffixes() -> tuple[str, ...]:
@@ -83,8 +88,9 @@ def motion_suffixes() -> tuple[str, ...]:
 
 
 def readable_suffixes() -> tuple[str, ...]:
-    """Return the suffixes of the motion formats that ``read_motion`` reads, with the dot."""
-    return tuple(suffix for suffix in motion_suffixes() if _can_be_read(suffix))
+    """Return the suffixes of all files that ``read_motion`` reads, with the dot."""
+    formats = tuple(suffix for suffix in motion_suffixes() if _can_be_read(suffix))
+    return formats + tuple(f".{name}" for name in MOTION_READERS.names)
 
 
 def motion_suffix(path: Path) -> str:
@@ -96,7 +102,12 @@ def motion_suffix(path: Path) -> str:
     >>> motion_suffix(Path("take.1.CSV")), motion_suffix(Path("take.fbx"))
     ('.csv', '')
     """
-    known, suffixes = motion_suffixes(), [suffix.lower() for suffix in path.suffixes]
+    return _longest(path, motion_suffixes())
+
+
+def _longest(path: Path, known: Collection[str]) -> str:
+    """Return the longest ending of a file's name that is known, in lower case, with the dot; empty: there is none."""
+    suffixes = [suffix.lower() for suffix in path.suffixes]
     endings = ("".join(suffixes[first:]) for first in range(len(suffixes)))
     return next((ending for ending in endings if ending in known), "")
 
@@ -145,7 +156,7 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
     (100.0, 'sil')
     """
     path = Path(path)
-    read = _format_of(path).read if motion_suffix(path) else None
+    read = _reader_of(path)
     if read is None:
         raise InputError(
             f"{path}: cannot read motion from {_suffix(path)}; use one of {', '.join(readable_suffixes())}"
@@ -162,7 +173,8 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
     except InputError as error:
-        raise InputError(f"{path}: {error}") from error
+        text = str(error)
+        raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from error
 
 
 def read_units(path: Path) -> Timeline[Unit]:
@@ -181,6 +193,14 @@ def read_units(path: Path) -> Timeline[Unit]:
         if units is not None:
             return units
     return read_motion(path)[1]
+
+
+def _reader_of(path: Path) -> Callable[[Path], tuple[Motion, Timeline[Unit]]] | None:
+    """Return what reads a file of that name; None: nothing does."""
+    if motion_suffix(path):
+        return _format_of(path).read
+    other = _longest(path, [f".{name}" for name in MOTION_READERS.names])
+    return MOTION_READERS.load(other.removeprefix(".")) if other else None
 
 
 def _format_of(path: Path) -> MotionFormat:

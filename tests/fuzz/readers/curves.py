@@ -21,6 +21,7 @@ from lipmotion.export.motion.c3d_file import C3dFile
 from lipmotion.export.motion.c3d_writing import write_c3d
 from lipmotion.pipeline.corpus.supplied_motion import supplied_track
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
+from meshes import gltf
 from meshes.flame import head
 from meshes.live_link_app import write_take
 from robustness.case import npy
@@ -57,8 +58,12 @@ def _captures() -> list[Files]:
     weights = Motion(values[:, :1], RATE_HZ, (Channel("jawOpen", WEIGHT),))
     parameters = _generation(np.rint(900 * values[:, :2]), (Channel("fap3_open_jaw", "fap"), Channel("fap4", "fap")))
     markers = C3dFile(("EYE_L", "EYE_R", "chin"), np.stack([values + 45, values - 45, 2 * values], axis=1), RATE_HZ)
+    frames_s = [n / RATE_HZ for n in range(FRAMES)]
     with tempfile.TemporaryDirectory() as made:
         folder = Path(made)
+        (folder / "a.glb").write_bytes(gltf.glb(*gltf.animated_document(frames_s, values[:, :2])))
+        expression = {"node": 1, "path": "translation"}
+        (folder / "a.vrma").write_bytes(gltf.glb(*gltf.animated_document(frames_s, values, target=expression)))
         write_take(folder / "a.csv", weights)
         write_motion(folder / "a.c3d", moving, source={}, model={})
         write_c3d(folder / "b.c3d", markers)
