@@ -76,10 +76,17 @@ MOTION_FORMATS: Registry[MotionFormat] = Registry(
 )
 """Motion formats by suffix, without the first dot; a suffix may have several parts, as ``livelink.csv``."""
 _GLTF = "lipmotion.meshes.files.gltf_weights:read_gltf_motion"
+_CUES = "lipmotion.export.cues.cue_motion:read_cue_motion"
 MOTION_READERS: Registry[Callable[[Path], tuple[Motion, Timeline[Unit]]]] = Registry(
-    "motion reader", "lipmotion.motion_readers", {"glb": _GLTF, "gltf": _GLTF, "vrma": _GLTF}
+    "motion reader",
+    "lipmotion.motion_readers",
+    {"glb": _GLTF, "gltf": _GLTF, "vrma": _GLTF, "tsv": _CUES, "xml": _CUES, "dat": _CUES, "pgo": _CUES},
 )
 """Readers of files that hold motion, but are not written as motion formats, by suffix as ``MOTION_FORMATS``."""
+OTHER_JSON = {b'"mouthCues"': ".tsv", b'"facsNames"': ".a2f.json"}
+"""Members at the beginning of ``.json`` files of other programs, and the suffix of files that are read alike."""
+JSON_HEAD = 1 << 16
+"""How many bytes of a ``.json`` are searched for them."""
 
 
 def motion_suffixes() -> tuple[str, ...]:
@@ -196,11 +203,24 @@ def read_units(path: Path) -> Timeline[Unit]:
 
 
 def _reader_of(path: Path) -> Callable[[Path], tuple[Motion, Timeline[Unit]]] | None:
-    """Return what reads a file of that name; None: nothing does."""
-    if motion_suffix(path):
-        return _format_of(path).read
-    other = _longest(path, [f".{name}" for name in MOTION_READERS.names])
+    """Return what reads a file, by its name and, of ``.json``, its beginning; None: nothing does."""
+    named = _named_by_content(path)
+    if motion_suffix(named):
+        return _format_of(named).read
+    other = _longest(named, [f".{name}" for name in MOTION_READERS.names])
     return MOTION_READERS.load(other.removeprefix(".")) if other else None
+
+
+def _named_by_content(path: Path) -> Path:
+    """Return a path, or for ``.json`` of another program the name that such a file would have otherwise."""
+    if motion_suffix(path) != ".json" or not path.is_file():
+        return path
+    try:
+        with path.open("rb") as file:
+            head = file.read(JSON_HEAD)
+    except OSError:  # reported when it is read
+        return path
+    return next((Path(f"a{suffix}") for mark, suffix in OTHER_JSON.items() if mark in head), path)
 
 
 def _format_of(path: Path) -> MotionFormat:

@@ -10,6 +10,9 @@ import numpy as np
 from lipmotion.export.cues.cue_shapes import REST, SHAPES, drawn_shape
 from lipmotion.types import Span, Timeline
 
+CUES_FPS = 24.0
+"""Frame rate of cues where none is given."""
+
 
 @dataclass(frozen=True)
 class CueSheet:

@@ -8,7 +8,6 @@ from pathlib import Path
 
 from lipmotion.errors import InputError
 from lipmotion.export.base import MotionFormat
-from lipmotion.export.motion.audio2face_document import audio2face_motion, is_audio2face
 from lipmotion.export.motion.document import FORMAT, header, parse, parse_units, units_and_origin
 from lipmotion.export.motion.json_stream import read_members
 from lipmotion.export.motion.rounded import formatted_rows
@@ -32,16 +31,11 @@ def write(path: Path, generation: Generation, source: Mapping[str, str], model: 
 
 
 def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
-    """Return motion and units of a file, also of one of Audio2Face.
-
-    Raises InputError: not JSON, or not a motion document.
-    """
+    """Return motion and units of a file. Raises InputError: not JSON, or not a motion document."""
     try:
         text = path.read_text(encoding="utf-8")
         if text.lstrip().startswith("["):
             raise InputError(f"not a motion document: its 'format' must be {FORMAT!r}")
-        if is_audio2face(text):
-            return audio2face_motion(text)
         document = read_members(text, "values", "confidence")
     except InputError:
         raise

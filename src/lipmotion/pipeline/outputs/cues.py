@@ -12,6 +12,7 @@ import numpy as np
 from lipmotion.articulation.delivery import Delivery, moved_in_time
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.cues import CUE_FORMATS, OPTIONAL, CueSheet, choose_cues, format_of, write_cue_file
+from lipmotion.export.cues.sheet import CUES_FPS
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
 from lipmotion.storage.files import as_text, check_distinct, check_target
@@ -19,8 +20,6 @@ from lipmotion.types import Generation
 
 SHEET = ".cues."
 """What the name of a cue sheet among other outputs has before its format."""
-CUES_FPS = 24.0
-"""Frame rate of cues where none is given."""
 FASTEST_FPS = 60.0
 """Largest frame rate: times in cue files are in hundredths of a second, and two frames must not share one."""
 
