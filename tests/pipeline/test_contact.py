@@ -38,8 +38,8 @@ from meshes.speech import motion, units
 Mask = NDArray[np.bool_]
 Reader = Callable[[Generation, float], Mask]
 RATES = (24.0, 25.0, 30.0, 60.0, 100.0)
-FIXED_RATES = ("a.vmd",)
-"""Files that have one frame rate only."""
+FILES = ("a.vmd", "a.vrma")
+"""Files of vowels that can be read, of one frame rate or any."""
 TOUCHING_GAP = LEAST_GAP / 2
 
 
@@ -228,9 +228,9 @@ def test_lips_touch_in_the_same_frames_everywhere(
     _check(delivered(KINDS[kind](), Delivery()), fps, readers)
 
 
-@pytest.mark.parametrize("name", FIXED_RATES)
+@pytest.mark.parametrize("name", FILES)
 @pytest.mark.parametrize("kind", KINDS)
-def test_files_of_one_rate_have_the_same_contact(kind: str, name: str, tmp_path: Path) -> None:
+def test_files_of_vowels_have_the_same_contact(kind: str, name: str, tmp_path: Path) -> None:
     generation = delivered(KINDS[kind](), Delivery())
     write_motion(tmp_path / name, in_format(Path(name), generation, generation, None), source={}, model={})
     read, _ = read_motion(tmp_path / name)

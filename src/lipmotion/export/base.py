@@ -68,6 +68,9 @@ MOTION_FORMATS: Registry[MotionFormat] = Registry(
         "blender.py": "lipmotion.export.motion.blender_script:MOTION_FORMAT",
         "c3d": "lipmotion.export.motion.motion_c3d:MOTION_FORMAT",
         "fap": "lipmotion.export.motion.motion_fap:MOTION_FORMAT",
+        "vrma": "lipmotion.export.motion.vrm_animation:MOTION_FORMAT",
+        "anim": "lipmotion.export.motion.unity_anim:MOTION_FORMAT",
+        "tres": "lipmotion.export.motion.godot_tres:MOTION_FORMAT",
         "vmd": "lipmotion.export.motion.motion_vmd:MOTION_FORMAT",
         "bvh": "lipmotion.export.motion.motion_bvh:MOTION_FORMAT",
         "a2f.json": "lipmotion.export.motion.audio2face:MOTION_FORMAT",
@@ -80,7 +83,7 @@ _CUES = "lipmotion.export.cues.cue_motion:read_cue_motion"
 MOTION_READERS: Registry[Callable[[Path], tuple[Motion, Timeline[Unit]]]] = Registry(
     "motion reader",
     "lipmotion.motion_readers",
-    {"glb": _GLTF, "gltf": _GLTF, "vrma": _GLTF, "tsv": _CUES, "xml": _CUES, "dat": _CUES, "pgo": _CUES},
+    {"glb": _GLTF, "gltf": _GLTF, "tsv": _CUES, "xml": _CUES, "dat": _CUES, "pgo": _CUES},
 )
 """Readers of files that hold motion, but are not written as motion formats, by suffix as ``MOTION_FORMATS``."""
 OTHER_JSON = {b'"mouthCues"': ".tsv", b'"facsNames"': ".a2f.json"}

@@ -82,8 +82,8 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
         angles = head_angles(np.array(turns) * MIRRORED)
         for name, column in zip(ANGLES, np.unwrap(angles, axis=0).T, strict=True):
             curves[name] = (np.interp(frames, at, column), RADIAN)
-    values = np.stack([curve for curve, _ in curves.values()], axis=1)
-    return Motion(values, RATE_HZ, tuple(Channel(name, unit) for name, (_, unit) in curves.items())), Timeline(())
+    table = np.stack([curve for curve, _ in curves.values()], axis=1)
+    return Motion(table, RATE_HZ, tuple(Channel(name, unit) for name, (_, unit) in curves.items())), Timeline(())
 
 
 MOTION_FORMAT = MotionFormat(write, read, curves="vowels", rate_hz=RATE_HZ, fixed_rate=True)

@@ -88,10 +88,10 @@ def read_vmd(path: Path) -> VmdFile:
     bones: dict[str, dict[int, tuple[float, float, float, float]]] = {}
     morphs: dict[str, dict[int, float]] = {}
     try:
-        for name, frame, _, _, _, *turn, _ in _keys(content, at, BONE_KEY):
-            bones.setdefault(name, {})[frame] = (turn[0], turn[1], turn[2], turn[3])
+        for name, frame, (_, _, _, x, y, z, w) in _keys(content, at, BONE_KEY):
+            bones.setdefault(name, {})[frame] = (x, y, z, w)
         at += COUNT.size + COUNT.unpack_from(content, at)[0] * BONE_KEY.size
-        for name, frame, value in _keys(content, at, MORPH_KEY) if at < len(content) else ():
+        for name, frame, (value,) in _keys(content, at, MORPH_KEY) if at < len(content) else ():
             morphs.setdefault(name, {})[frame] = value
     except struct.error as error:
         raise InputError("the motion of MikuMikuDance is cut short; save it again") from error
@@ -101,8 +101,8 @@ def read_vmd(path: Path) -> VmdFile:
     )
 
 
-def _keys(content: bytes, at: int, form: struct.Struct) -> Iterator[tuple[object, ...]]:
-    """Yield the fields of each key of a counted list, its name as text.
+def _keys(content: bytes, at: int, form: struct.Struct) -> Iterator[tuple[str, int, list[float]]]:
+    """Yield the name of each key of a counted list, its frame and its numbers.
 
     Raises struct.error: it is cut short. Raises InputError: a frame of another day, or a value that is not finite.
     """
@@ -114,4 +114,4 @@ def _keys(content: bytes, at: int, form: struct.Struct) -> Iterator[tuple[object
         numbers = [value for value in values if isinstance(value, float)]
         if frame > LAST_FRAME or not np.isfinite(numbers).all():
             raise InputError(f"a key of {name!r} at frame {frame} is none; save the motion again in MikuMikuDance")
-        yield name, frame, *values
+        yield name, frame, numbers

@@ -161,8 +161,8 @@ def in_format(
         held = held.selected(own) if own else held
     elif form.mouth and OPENING not in held.motion.names:
         held = generation
-    own = form.fixed_rate or abs(generation.motion.rate_hz - MODEL_HZ) < SAME_HZ
-    hertz = rate_hz or (form.rate_hz if own else None)
+    of_format = form.fixed_rate or abs(generation.motion.rate_hz - MODEL_HZ) < SAME_HZ
+    hertz = rate_hz or (form.rate_hz if of_format else None)
     if hertz is None or abs(hertz - held.motion.rate_hz) < SAME_HZ:
         return held
     if held is chosen or held is generation:
