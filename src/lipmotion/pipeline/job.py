@@ -156,9 +156,9 @@ class Outputs(Configuration):
     face: str = option(
         "portrait",
         reads="face",
-        metavar="NAME|FILE.svg|FILE.face",
-        help="face that videos show: woman, man, head, cartoon, a drawing, or a filmed face (default: portrait, the "
-        "woman)",
+        metavar="NAME|FILE.svg|FILE.face|FOLDER",
+        help="face that videos show: woman, man, head, cartoon, a drawing, a filmed face, or a folder of one drawing a "
+        "mouth shape (default: portrait, the woman)",
     )
     background: str | None = option(
         None,
@@ -204,7 +204,8 @@ class Outputs(Configuration):
     curves: str = option(
         "",
         metavar="SET",
-        help="what motion files hold: arkit, face, visemes, fap, or the controls of a rig (FILE.csv; docs/meshes.md)",
+        help="what motion files hold: arkit, face, visemes, vowels, fap, or the controls of a rig (FILE.csv; "
+        "docs/meshes.md)",
     )
     posteriors: Path | None = option(
         None, kind=Path, writes=True, metavar="FILE.png", help="draw the posteriors of units over time (coupled)"

@@ -14,7 +14,7 @@ from itertools import islice, takewhile
 from lipmotion.errors import InputError, shortened
 from lipmotion.export.cues.cue_lines import BLAIR, cue_time, shape_of, sheet_of
 from lipmotion.export.cues.cue_shapes import REST, SHAPES
-from lipmotion.export.cues.sheet import CueSheet
+from lipmotion.export.cues.sheet import CueSheet, shown_shapes
 from lipmotion.printable import is_line, printable
 from lipmotion.types import Span, Timeline
 
@@ -52,16 +52,6 @@ def text(sheet: CueSheet, sound_file: str) -> str:
             lines.append(f"\t\t\t{word} {first} {last} {len(starts)}")
             lines += [f"\t\t\t\t{frame} {SHAPES[shown[frame]].blair}" for frame in starts]
     return "\n".join(lines) + "\n"
-
-
-def shown_shapes(sheet: CueSheet) -> list[str]:
-    """Return the shape of every frame."""
-    frames = max(1, int(sheet.fps * sheet.duration_s + 1 - 1e-9))
-    starts = [min(int(sheet.fps * cue.start_s), frames) for cue in sheet.cues] + [frames]
-    shown: list[str] = []
-    for cue, end in zip(sheet.cues, starts[1:], strict=True):
-        shown += [cue.label] * (end - len(shown))
-    return shown
 
 
 def words_of_run(sheet: CueSheet, first: int, last: int) -> list[Part]:
