@@ -70,7 +70,7 @@ def read_cut_out(folder: Path) -> CutOut:
         raise InputError(f"{folder}: no picture of the mouth shapes {' '.join(missing)}; required: {names}")
     base = next((path for path in files if path.stem.lower() == BASE), None)
     below = None if base is None else _read(base)
-    pictures = {}
+    pictures: dict[str, Picture] = {}
     for name in (name for name in LETTERS.values() if name in chosen):
         picture = _read(chosen[name])
         first = next(iter(pictures.values()), picture if below is None else below)

@@ -30,7 +30,7 @@ def sheet() -> CueSheet:
     return CueSheet(Timeline(tuple(cues)), 24.0, "".join(SHAPES), words)
 
 
-@pytest.mark.parametrize("form", CUE_FORMATS)
+@pytest.mark.parametrize("form", [form for form in CUE_FORMATS if f".{form}" in PARSERS])
 def test_what_is_written_is_read(form: str, sheet: CueSheet, tmp_path: Path) -> None:
     write_cue_file(tmp_path / f"a.{form}", sheet, "a.wav", form)
     again = read_cues(tmp_path / f"a.{form}")

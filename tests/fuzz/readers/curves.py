@@ -18,6 +18,7 @@ from lipmotion.corpora.source_recordings import MotionFile
 from lipmotion.corpora.store import Corpus
 from lipmotion.export.base import write_motion
 from lipmotion.export.cues.base import CUE_FORMATS
+from lipmotion.export.cues.cue_motion import PARSERS
 from lipmotion.export.cues.cue_shapes import SHAPES
 from lipmotion.export.cues.sheet import CueSheet
 from lipmotion.export.motion.c3d_file import C3dFile
@@ -67,7 +68,8 @@ def _captures() -> list[Files]:
         folder = Path(made)
         for form, text in CUE_FORMATS.items():
             sheet = CueSheet(cues, 24.0, "".join(SHAPES), Timeline((Span(0.3, 0.7, "moth"),)))
-            (folder / f"c.{form}").write_text(text(sheet, "c.wav"), encoding="utf-8")
+            if f".{form}" in PARSERS:
+                (folder / f"c.{form}").write_text(text(sheet, "c.wav"), encoding="utf-8")
         (folder / "a.glb").write_bytes(gltf.glb(*gltf.animated_document(frames_s, values[:, :2])))
         expression = {"node": 1, "path": "translation"}
         (folder / "a.vrma").write_bytes(gltf.glb(*gltf.animated_document(frames_s, values, target=expression)))

@@ -50,7 +50,7 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
     ]
     names = [channel.name for channel in motion.channels if channel.unit == WEIGHT]
     for number, name in enumerate(names):
-        values = np.round(motion[name].astype(np.float64), DECIMALS) + 0.0
+        values = np.asarray(np.round(motion[name].astype(np.float64), DECIMALS) + 0.0, np.float64)
         steps = name in generation.stepped
         kept = changes(values) if steps else kept_keys(motion.time_s, values, TOLERANCE)
         keys = ", ".join(f"{motion.time_s[frame]:.6g}, 1, {values[frame]:.{DECIMALS}g}" for frame in kept)

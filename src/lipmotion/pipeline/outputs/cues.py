@@ -66,9 +66,11 @@ def write_cues(
     """Write a cue sheet to one or several files, each in the format of its suffix.
 
     sheet   : from ``cues``
-    outputs : paths of files: ``.tsv``, ``.xml``, ``.json`` (formats of Rhubarb), ``.dat`` (Moho) or ``.pgo`` (Papagayo)
+    outputs : paths of files: ``.tsv``, ``.xml``, ``.json`` (formats of Rhubarb), ``.dat`` (Moho), ``.pgo`` (Papagayo),
+              ``.spine.json`` (Spine)
     speech  : the recording that was animated; ``.xml`` and ``.json`` files name it
-    form    : ``tsv``, ``xml``, ``json``, ``dat`` or ``pgo``: the format of all files; None: that of the suffix
+    form    : ``tsv``, ``xml``, ``json``, ``dat``, ``pgo`` or ``spine.json``: the format of all files; None: that of
+              their suffix
     Raises ExportError: unknown format, no such folder, or a file that cannot be written.
     Formats and folders are checked before the first file is written.
 
@@ -89,7 +91,7 @@ def write_cues(
 def cue_text(sheet: CueSheet, *, speech: str | Path = "", form: str = "tsv") -> str:
     """Return the text of the file that ``write_cues`` would write.
 
-    speech : the recording that was animated;  form : ``tsv``, ``xml``, ``json``, ``dat`` or ``pgo``
+    speech : the recording that was animated;  form : as of ``write_cues``
     """
     return CUE_FORMATS[form](sheet, as_text(speech))
 
@@ -129,7 +131,7 @@ class CueOutput(Output):
         sheet = cues(performance.generation, fps=self._fps, delivery=self.settings.delivery)
         recording = self.settings.recording
         said = "" if recording is None else as_text(recording)
-        return partial(write_cue_file, self.path, sheet, said, self.path.suffix.lower().removeprefix("."))
+        return partial(write_cue_file, self.path, sheet, said, format_of(self.path))
 
     @property
     def _fps(self) -> float:
