@@ -7,6 +7,7 @@ Preston Blair's names (``MBP.png``, ``AI.png``, …); what stands before the nam
 
 from __future__ import annotations
 
+import io
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -25,7 +26,9 @@ REQUIRED = "ABCDEF"
 LETTERS = {name.lower(): name for name in "ABCDEFGHX"}
 BLAIR = {"mbp": "A", "etc": "B", "e": "C", "ai": "D", "o": "E", "u": "F", "wq": "F", "fv": "G", "l": "H", "rest": "X"}
 """Preston Blair's names of the shapes."""
-LARGEST_PX = 4096
+LARGEST_PX, MOST_PIXELS = 4096, 1 << 26
+"""Largest side of a picture, and most pixels of all together."""
+LARGEST_BYTES = 1 << 26
 MOST_FILES = 1000
 WHITE = (255, 255, 255)
 _NAME = re.compile(r"(?:^|[^A-Za-z])([A-Za-z]{1,4})$")
@@ -79,6 +82,10 @@ def read_cut_out(folder: Path) -> CutOut:
             raise InputError(
                 f"{chosen[name]}: the pictures are {sizes} pixels large, required one size; export them alike"
             )
+        if (len(pictures) + 1) * picture.shape[0] * picture.shape[1] > MOST_PIXELS:
+            raise InputError(
+                f"{folder}: the pictures have more than {MOST_PIXELS} pixels together; export them smaller"
+            )
         pictures[name] = picture if below is None else _over(picture, below)
     return CutOut(pictures)
 
@@ -103,13 +110,24 @@ def _read(path: Path) -> Picture:
     from PIL import Image, UnidentifiedImageError
 
     try:
-        with Image.open(path, formats=("PNG", "WEBP", "JPEG")) as picture:
+        if path.stat().st_size > LARGEST_BYTES:
+            raise InputError(
+                f"{path}: {path.stat().st_size} bytes, required at most {LARGEST_BYTES}; export it smaller"
+            )
+        with Image.open(io.BytesIO(path.read_bytes()), formats=("PNG", "WEBP", "JPEG")) as picture:
             if max(picture.size) > LARGEST_PX:
                 raise InputError(f"{path}: {picture.width} × {picture.height} pixels, required at most {LARGEST_PX}")
             return np.array(picture.convert("RGBA"))
     except InputError:
         raise
-    except (OSError, UnidentifiedImageError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+    except (
+        OSError,
+        UnidentifiedImageError,
+        ValueError,
+        SyntaxError,
+        MemoryError,
+        Image.DecompressionBombError,
+    ) as error:
         raise InputError(f"{path}: no picture that can be read ({error}); export it as PNG") from error
 
 
