@@ -275,12 +275,14 @@ class Job(Configuration):
 
 
 def located(part: PartT, folder: Path) -> PartT:
-    """Return a part with paths that begin at a folder; a text that is no file there is left as it is."""
+    """Return a part with paths that begin at a folder; a text that is no file there, or folder of drawings, stays."""
     found: dict[str, Any] = {}
     for each in fields(part):
         value = getattr(part, each.name)
         if isinstance(value, Path) and str(value) != "-":
             found[each.name] = folder / value
-        elif isinstance(value, str) and ("reads" in each.metadata or each.name == "curves") and is_file(folder / value):
-            found[each.name] = str(folder / value)
+        elif isinstance(value, str) and ("reads" in each.metadata or each.name == "curves"):
+            drawings = each.name == "face" and "/" in value and (folder / value).is_dir()
+            if drawings or is_file(folder / value):
+                found[each.name] = str(folder / value)
     return replace(part, **found)

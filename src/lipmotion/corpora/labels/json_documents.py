@@ -16,6 +16,10 @@ LATEST_S = 1e6
 """Times beyond eleven days are an error, or in another unit."""
 
 
+class DamagedJsonError(InputError):
+    """A text that begins as JSON is none."""
+
+
 def is_json(text: str) -> bool:
     """Return whether a text begins as an object or a list of objects does."""
     return re.match(r'\s*(?:\{\s*["}]|\[\s*[\[{\]])', text) is not None
@@ -25,7 +29,7 @@ def json_documents(text: str, where: str) -> Iterator[tuple[int, Any]]:
     """Yield the values of a text, one after another, each with the number of its first line.
 
     where : the file's name, for messages
-    Raises InputError: damaged JSON (with its line).
+    Raises DamagedJsonError: with the line.
     """
     at, line, counted = _next(text, 0), 1, 0
     while at < len(text):
@@ -33,9 +37,11 @@ def json_documents(text: str, where: str) -> Iterator[tuple[int, Any]]:
         try:
             value, at = DECODER.raw_decode(text, at)
         except json.JSONDecodeError as error:
-            raise InputError(f"{where}: line {error.lineno}: damaged JSON ({error.msg}); write it again") from error
+            raise DamagedJsonError(
+                f"{where}: line {error.lineno}: damaged JSON ({error.msg}); write it again"
+            ) from error
         except (ValueError, RecursionError) as error:
-            raise InputError(f"{where}: damaged JSON: nested too deeply, or a number too long") from error
+            raise DamagedJsonError(f"{where}: damaged JSON: nested too deeply, or a number too long") from error
         yield line, value
         at = _next(text, at)
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from lipmotion.corpora.labels.json_documents import is_json
+from lipmotion.corpora.labels.json_documents import DamagedJsonError, is_json
 from lipmotion.corpora.labels.plain_text import check_no_labels
 from lipmotion.corpora.labels.recognised_words import parse_recognised
 from lipmotion.corpora.labels.subtitles import is_subtitles, parse_subtitles
@@ -179,14 +179,17 @@ def read_phones(path: Path) -> Timeline[Unit]:
 def holds_timings(path: Path) -> bool:
     """Return whether a file has the timings of a voice or an aligner; False: it is another file, or no file at all.
 
-    Raises InputError: it has, and is damaged.
+    Raises InputError: it has, and a symbol or a time in it is none.
     """
     if not path.is_file() or not 0 < path.stat().st_size <= LARGEST_LABELS:
         return False
     with path.open("rb") as file:
         if MOTION.search(file.read(MOTION_HEAD)):
             return False
-    return timing_tiers(_text(path), str(path)) is not None
+    try:
+        return timing_tiers(_text(path), str(path)) is not None
+    except DamagedJsonError:  # said by the reader of motion
+        return False
 
 
 def _tiers_of_phones(tiers: list[LabelTier], where: str) -> list[LabelTier]:

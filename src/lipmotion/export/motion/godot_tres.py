@@ -15,7 +15,7 @@ import numpy as np
 
 from lipmotion.errors import ExportError
 from lipmotion.export.base import MotionFormat
-from lipmotion.export.motion.keys import changes, kept_keys
+from lipmotion.export.motion.keys import key_frames
 from lipmotion.types import WEIGHT, Generation, Motion
 
 TOLERANCE = 1e-4
@@ -52,7 +52,7 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
     for number, name in enumerate(names):
         values = np.asarray(np.round(motion[name].astype(np.float64), DECIMALS) + 0.0, np.float64)
         steps = name in generation.stepped
-        kept = changes(values) if steps else kept_keys(motion.time_s, values, TOLERANCE)
+        kept = key_frames(motion.time_s, values, TOLERANCE, stepped=steps)
         keys = ", ".join(f"{motion.time_s[frame]:.6g}, 1, {values[frame]:.{DECIMALS}g}" for frame in kept)
         track = f"tracks/{number}"
         lines += [

@@ -8,6 +8,11 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
+def key_frames(time_s: Array, values: Array, tolerance: float, *, stepped: bool) -> list[int]:
+    """Return the frames that are keys: where held values change, or else those of ``kept_keys``."""
+    return changes(values) if stepped else kept_keys(time_s, values, tolerance)
+
+
 def kept_keys(time_s: Array, values: Array, tolerance: float) -> list[int]:
     """Return frames between which straight lines stay within a tolerance of all values, the first and last among them.
 

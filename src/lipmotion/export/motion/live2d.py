@@ -16,7 +16,7 @@ from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER, mouth_t
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.errors import ExportError
 from lipmotion.export.base import MotionFormat
-from lipmotion.export.motion.keys import changes, kept_keys
+from lipmotion.export.motion.keys import key_frames
 from lipmotion.meshes.fitting.reference_mouth import arkit_mouth
 from lipmotion.storage.json_text import as_json
 from lipmotion.types import Generation, Motion
@@ -52,7 +52,7 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
     curves, steps = [], bool(SHOWING & set(generation.stepped))
     for name, values in ((OPEN, mouth_open(generation)), (FORM, mouth_form(generation))):
         rounded = np.round(values, DECIMALS) + 0.0
-        kept = changes(rounded) if steps else kept_keys(motion.time_s, rounded, TOLERANCE)
+        kept = key_frames(motion.time_s, rounded, TOLERANCE, stepped=steps)
         keys = [(round(float(motion.time_s[frame]), 6), float(rounded[frame])) for frame in kept]
         segments: list[float] = [*keys[0]]
         for time_s, value in keys[1:]:

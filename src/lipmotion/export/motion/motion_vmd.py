@@ -9,7 +9,7 @@ import numpy as np
 
 from lipmotion.errors import InputError
 from lipmotion.export.base import MotionFormat
-from lipmotion.export.motion.keys import changes, kept_keys
+from lipmotion.export.motion.keys import key_frames
 from lipmotion.export.motion.vmd_file import RATE_HZ, Turns, VmdFile, read_vmd, write_vmd
 from lipmotion.meshes.model.head_angles import ANGLES, head_angles, head_quaternions
 from lipmotion.meshes.model.other_shapes import CLOSED
@@ -44,11 +44,10 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
     for morph, sources in MORPHS.items():
         if all(name in motion.names for name in sources):
             values = np.mean([motion[name] for name in sources], axis=0)
-            if {*sources} & {*generation.stepped}:
-                starts = changes(values)
-                kept = sorted({*starts, *(frame - 1 for frame in starts if frame)})
-            else:
-                kept = kept_keys(time_s, values, TOLERANCE)
+            stepped = bool({*sources} & {*generation.stepped})
+            kept = key_frames(time_s, values, TOLERANCE, stepped=stepped)
+            if stepped:  # between keys everything is linear
+                kept = sorted({*kept, *(frame - 1 for frame in kept if frame)})
             morphs[morph] = [(frames[frame], float(values[frame])) for frame in kept]
     bones = {}
     if all(name in motion.names for name in ANGLES):

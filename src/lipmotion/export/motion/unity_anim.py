@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError
 from lipmotion.export.base import MotionFormat
-from lipmotion.export.motion.keys import changes, kept_keys
+from lipmotion.export.motion.keys import key_frames
 from lipmotion.types import WEIGHT, Generation, Motion
 
 Array = NDArray[np.float64]
@@ -82,7 +82,7 @@ def _curve(generation: Generation, name: str) -> Iterator[str]:
     motion = generation.motion
     values = np.round(FULL * motion[name].astype(np.float64), DECIMALS) + 0.0
     steps = name in generation.stepped
-    kept = changes(values) if steps else kept_keys(motion.time_s, values, TOLERANCE)
+    kept = key_frames(motion.time_s, values, TOLERANCE, stepped=steps)
     times_s, keys = motion.time_s[kept], values[kept]
     slopes = np.diff(keys) / np.diff(times_s)
     yield from ("  - curve:", "      serializedVersion: 2", "      m_Curve:")
