@@ -150,6 +150,10 @@ def _of_take(generation: Generation, fps: float) -> Mask:
     return _closed(in_format(Path("a.livelink.csv"), generation, generation, fps).motion)
 
 
+def _of_clip(generation: Generation, fps: float) -> Mask:
+    return _closed(in_format(Path("a.tres"), generation, generation, fps).motion)
+
+
 def _of_scene(character: DrivenCharacter) -> Reader:
     assert character.shapes is not None
     gap = dict(zip(character.shapes.names, character.shapes.gap.tolist(), strict=True))
@@ -205,7 +209,10 @@ def _of_head(generation: Generation, fps: float) -> Mask:
 
 def _readers(characters: dict[str, DrivenCharacter]) -> dict[str, Reader]:
     readers: dict[str, Reader] = {"drawn faces": _drawn, "head": _of_head, "head scene": _of_head_scene}
-    readers |= {name: _of_curves(name) for name in (ARKIT, WHOLE_FACE, VOWELS, "visemes", FAP)} | {"take": _of_take}
+    readers |= {name: _of_curves(name) for name in (ARKIT, WHOLE_FACE, VOWELS, "visemes", FAP)} | {
+        "take": _of_take,
+        "clip": _of_clip,
+    }
     readers |= {f"character {name}": _of_character(each) for name, each in characters.items()}
     return readers | {f"scene {name}": _of_scene(each) for name, each in characters.items() if each.shapes is not None}
 

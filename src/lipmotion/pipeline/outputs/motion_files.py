@@ -152,7 +152,8 @@ def in_format(
     """
     form = motion_format(path)
     held = chosen
-    others = form.other_curves and all(channel.unit in CURVES for channel in held.motion.channels)
+    whole = held.motion.names == generation.motion.names and _blendshapes(generation.motion) is not None
+    others = form.other_curves and not whole and all(channel.unit in CURVES for channel in held.motion.channels)
     if form.curves and not others:
         curves = _curves(generation, form.curves, staging, prosody)
         curves = with_edited_curves(curves, generation.units, generation.curve_edits)
