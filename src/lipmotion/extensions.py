@@ -22,6 +22,7 @@ ExtensionT = TypeVar("ExtensionT")
 GROUPS = (
     *("lipmotion.engines", "lipmotion.faces", "lipmotion.exporters", "lipmotion.corpus_readers"),
     *("lipmotion.outputs", "lipmotion.predictors", "lipmotion.trackers", "lipmotion.phone_recognisers"),
+    "lipmotion.motion_readers",
 )
 """Every group of entry points that is read."""
 OWN = {"lipmotion", "argparse"}

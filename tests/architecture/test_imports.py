@@ -31,9 +31,19 @@ FORBIDDEN = [
     (FACES, "faces/portrait/mouth_painting.py", "from lipmotion.faces import registry"),
     ("Exporters never import one another", "export/cues/sheet.py", "from lipmotion.export.motion import rounded"),
     (
-        "Formats of one kind never import one another",
+        "Formats of motion never import one another",
         "export/motion/motion_csv.py",
         "import lipmotion.export.motion.motion_npz",
+    ),
+    (
+        "Formats of cues never import one another",
+        "export/cues/moho_dat.py",
+        "import lipmotion.export.cues.rhubarb_tsv",
+    ),
+    (
+        "Timings of services never import one another",
+        "corpora/labels/timings/gentle.py",
+        "import lipmotion.corpora.labels.timings.mfa",
     ),
     (
         "Engines know predictors by their interface alone",

@@ -74,6 +74,31 @@ def with_colours(content: dict, binary: bytes, colours: np.ndarray, *, normalise
     return content, binary + padded.tobytes()
 
 
+def animated_document(time_s: list[float], values, kind: str = "LINEAR", target=None) -> tuple[dict, bytes]:
+    """The square with two animations: one of a rotation, and one of its targets, or of what ``target`` says."""
+    content, binary = document()
+    keys, rows = np.array(time_s, "<f4"), np.array(values, "<f4")
+    width = rows.shape[-1] if target else 1
+    for array, form, count in (
+        (keys, "SCALAR", len(keys)),
+        (rows, f"VEC{width}" if width > 1 else "SCALAR", rows.size // width),
+    ):
+        content["bufferViews"].append({"buffer": 0, "byteOffset": len(binary), "byteLength": array.nbytes})
+        number = len(content["bufferViews"]) - 1
+        content["accessors"].append({"bufferView": number, "componentType": 5126, "count": count, "type": form})
+        binary += array.tobytes()
+    sampler = {"input": 4, "output": 5, "interpolation": kind}
+    channels = [{"sampler": 0, "target": target or {"node": 0, "path": "weights"}}]
+    ignored = {"channels": [{"sampler": 0, "target": {"node": 0, "path": "rotation"}}], "samplers": [sampler]}
+    content["animations"] = [ignored, {"name": "talk", "channels": channels, "samplers": [sampler]}]
+    content["buffers"] = [{"byteLength": len(binary)}]
+    if target:
+        content["nodes"].append({"name": "aa"})
+        expressions = {"preset": {"blink": {"node": 1}}, "custom": {"none": {}}}
+        content["extensions"] = {"VRMC_vrm_animation": {"specVersion": "1.0", "expressions": expressions}}
+    return content, binary
+
+
 def glb(content: dict, binary: bytes) -> bytes:
     """A document and its bytes as GLB."""
     text = json.dumps(content).encode()

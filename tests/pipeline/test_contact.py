@@ -15,6 +15,7 @@ from lipmotion.articulation.delivery import Delivery
 from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.lip_points import FACING
 from lipmotion.articulation.mouth import frame_times, spoken_mouth
+from lipmotion.export.base import read_motion, write_motion
 from lipmotion.faces.base import Staging
 from lipmotion.faces.head.head_blendshapes import head_mesh
 from lipmotion.faces.head.performance import head_poses
@@ -24,9 +25,9 @@ from lipmotion.faces.portrait.drawn_frames import face_poses
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter, driven_character
 from lipmotion.meshes.fitting.facial_animation import FAP
-from lipmotion.meshes.fitting.reference_mouth import arkit_mouth
+from lipmotion.meshes.fitting.reference_mouth import arkit_mouth, vowel_mouth
 from lipmotion.meshes.model.mesh import Mesh
-from lipmotion.pipeline.outputs.curve_sets import ARKIT, WHOLE_FACE, curves_of
+from lipmotion.pipeline.outputs.curve_sets import ARKIT, VOWELS, WHOLE_FACE, curves_of
 from lipmotion.pipeline.outputs.delivered import delivered
 from lipmotion.pipeline.outputs.motion_files import in_format, resampled_curves
 from lipmotion.pipeline.outputs.scenes import character_scene, head_scene
@@ -40,6 +41,8 @@ from meshes.speech import motion, units
 Mask = NDArray[np.bool_]
 Reader = Callable[[Generation, float], Mask]
 RATES = (24.0, 25.0, 30.0, 60.0, 100.0)
+FILES = ("a.vmd", "a.vrma")
+"""Files of vowels that can be read, of one frame rate or any."""
 TOUCHING_GAP = LEAST_GAP / 2
 
 
@@ -150,6 +153,10 @@ def _of_take(generation: Generation, fps: float) -> Mask:
     return _closed(in_format(Path("a.livelink.csv"), generation, generation, fps).motion)
 
 
+def _of_clip(generation: Generation, fps: float) -> Mask:
+    return _closed(in_format(Path("a.tres"), generation, generation, fps).motion)
+
+
 def _of_scene(character: DrivenCharacter) -> Reader:
     assert character.shapes is not None
     gap = dict(zip(character.shapes.names, character.shapes.gap.tolist(), strict=True))
@@ -186,7 +193,7 @@ def _closed(curves: Motion) -> Mask:
         return np.asarray(curves["viseme_sil"] + curves["viseme_PP"] > 0.99)
     if "fap4_lower_t_midlip" in curves.names:
         return np.asarray(np.abs(curves["fap4_lower_t_midlip"] + curves["fap5_raise_b_midlip"]) < 5)
-    mouth = arkit_mouth()
+    mouth = vowel_mouth() if "aa" in curves.names else arkit_mouth()
     return np.asarray(
         sum(gap * curves[name] for name, gap in zip(mouth.names, mouth.gap, strict=True) if name in curves.names)
         < TOUCHING_GAP
@@ -205,7 +212,10 @@ def _of_head(generation: Generation, fps: float) -> Mask:
 
 def _readers(characters: dict[str, DrivenCharacter]) -> dict[str, Reader]:
     readers: dict[str, Reader] = {"drawn faces": _drawn, "head": _of_head, "head scene": _of_head_scene}
-    readers |= {name: _of_curves(name) for name in (ARKIT, WHOLE_FACE, "visemes", FAP)} | {"take": _of_take}
+    readers |= {name: _of_curves(name) for name in (ARKIT, WHOLE_FACE, VOWELS, "visemes", FAP)} | {
+        "take": _of_take,
+        "clip": _of_clip,
+    }
     readers |= {f"character {name}": _of_character(each) for name, each in characters.items()}
     return readers | {f"scene {name}": _of_scene(each) for name, each in characters.items() if each.shapes is not None}
 
@@ -226,6 +236,16 @@ def test_lips_touch_in_the_same_frames_everywhere(
     if kind != "generated":
         del readers["head scene"]  # takes longer
     _check(delivered(KINDS[kind](), Delivery()), fps, readers)
+
+
+@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("kind", KINDS)
+def test_files_of_vowels_have_the_same_contact(kind: str, name: str, tmp_path: Path) -> None:
+    generation = delivered(KINDS[kind](), Delivery())
+    write_motion(tmp_path / name, in_format(Path(name), generation, generation, None), source={}, model={})
+    read, _ = read_motion(tmp_path / name)
+    contact = spoken_mouth(with_mouth(generation.motion), generation.units, read.rate_hz).contact
+    assert np.flatnonzero(_closed(read)[: len(contact)] != contact).tolist() == []
 
 
 @pytest.mark.long

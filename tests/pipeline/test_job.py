@@ -12,6 +12,7 @@ import pytest
 import lipmotion
 from lipmotion import Delivery, Job, Outputs, Request, SpeechRequest, Staging, animate, load_model, write
 from lipmotion.errors import InputError
+from lipmotion.pipeline.job import located
 from lipmotion.pipeline.understand.read_request import read_request
 
 ROOT = Path(__file__).parents[2]
@@ -44,6 +45,9 @@ def test_paths_begin_at_the_folder_of_the_file(tmp_path: Path) -> None:
         "[request]\nrecording = 'takes'\ntranscript = 'my words'\nmodel = '/else/m.lipmotion'\n"
         "[outputs]\nfiles = ['out/', '{name}.vtt', '-']\nface = 'my.svg'\ncurves = 'arkit'\n"
     )
+    (tmp_path / "head").mkdir()
+    assert located(Outputs(face="head/"), tmp_path).face == f"{tmp_path}/head"
+    assert located(Outputs(face="head"), tmp_path).face == "head"
     assert Job.from_file(file) == Job(
         Request(tmp_path / "takes", "my words", model=Path("/else/m.lipmotion")),
         Outputs((f"{tmp_path}/out/", f"{tmp_path}/{{name}}.vtt", "-"), face=str(tmp_path / "my.svg"), curves="arkit"),

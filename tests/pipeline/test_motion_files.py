@@ -18,9 +18,10 @@ from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.errors import ExportError
 from lipmotion.faces import Staging
 from lipmotion.meshes.fitting.eyes_and_brows import FULL_LOOK_RAD, eye_and_brow_weights
+from lipmotion.meshes.model.head_angles import ANGLES as HEAD
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH
 from lipmotion.pipeline.outputs.curve_sets import curves_of
-from lipmotion.pipeline.outputs.living_curves import HEAD, living_curves
+from lipmotion.pipeline.outputs.living_curves import living_curves
 from lipmotion.pipeline.outputs.motion_files import in_format
 from lipmotion.pipeline.outputs.motion_input import read_generation
 from lipmotion.pipeline.outputs.output import OutputSettings, checked_outputs

@@ -25,7 +25,7 @@ from lipmotion.types import Channel, Generation, Motion, StateTrace
 from lipmotion.types.moods import moods_of
 from meshes.heads import head, write_glb
 from meshes.speech import motion, units
-from programs import gltf_report, gltf_validator, python_with, run_with
+from programs import convert_to_fbx, gltf_report, gltf_validator, python_with, run_with
 
 TIMES_S = (0.0, 0.31, 0.555, 0.75, 0.95, 1.15, 1.62, 2.0)
 """Times at which other programs are asked for values; most lie between two keys."""
@@ -222,6 +222,19 @@ def test_blender_plays_the_same_values(scene: Scene, suffix: str, tmp_path: Path
         angles = 2 * np.arccos(np.clip(np.abs(rotations[:, 3]), 0, 1))
         turned = 2 * np.arccos(np.clip(np.abs(np.array(found["turns"])[:, 0]), 0, 1))
         assert turned == pytest.approx(angles, abs=2e-3)
+
+
+@pytest.mark.skipif(python_with("bpy") is None, reason="needs bpy (tests/programs)")
+@pytest.mark.long
+def test_blender_makes_fbx_of_it(scene: Scene, tmp_path: Path) -> None:
+    write_scene(tmp_path / "a.glb", scene)
+    convert_to_fbx(tmp_path / "a.glb", tmp_path / "a.fbx")
+    times_s = [frame / 60 for frame in (0, 18, 45, 97)]
+    found = run_with("bpy", "blender_scene.py", tmp_path / "a.fbx", *times_s)
+    assert scene.weights is not None
+    for wanted, values in zip(scene.weights.at(np.array(times_s)), found["values"], strict=True):
+        held = dict(zip(scene.weights.names, wanted, strict=True))
+        assert max(abs(values[name] - held[name]) for name in values if name in held) < 2e-3
 
 
 def largest_error(scene: Scene, values: list[dict[str, float]]) -> float:

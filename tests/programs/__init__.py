@@ -1,7 +1,9 @@
 """Programs that files are made for, as oracles: Blender, OpenUSD, Khronos' validator. Absent ones are None.
 
 They are found in this Python, or in the one that LIPMOTION_BPY_PYTHON (Blender as the package ``bpy``) and
-LIPMOTION_PXR_PYTHON (``usd-core``) name; ``gltf-validator`` of npm in the folder LIPMOTION_NODE_MODULES.
+LIPMOTION_PXR_PYTHON (``usd-core``) name; packages of npm in the folder LIPMOTION_NODE_MODULES: ``gltf-validator``,
+``mmd-parser`` (with which three.js reads MikuMikuDance's files), ``@pixiv/three-vrm-animation`` beside ``three``,
+``@esotericsoftware/spine-core`` of version 4.2.
 """
 
 from __future__ import annotations
@@ -40,16 +42,38 @@ def run_with(module: str, script: str, *arguments: object, folder: Path | None =
         return _json_of([python, str(FOLDER / script), *map(str, arguments)], own)
 
 
+def convert_to_fbx(source: Path, target: Path) -> None:
+    """Run ``examples/glb_to_fbx.py`` in Blender."""
+    python, script = python_with("bpy"), FOLDER.parents[1] / "examples" / "glb_to_fbx.py"
+    assert python is not None, "no Python with bpy"
+    run_child(
+        [python, str(script), str(source), str(target)],
+        variables=environment(PYTHONPATH=""),
+        limit_s=LONGEST_S,
+        check=True,
+    )
+
+
 @cache
+def node_package(name: str) -> str | None:
+    """Return the folder of a package of npm, where Node is installed."""
+    folder = Path(os.environ.get("LIPMOTION_NODE_MODULES", "node_modules")) / name
+    return str(folder) if folder.is_dir() and shutil.which("node") else None
+
+
 def gltf_validator() -> str | None:
     """Return the folder of Khronos' validator for Node."""
-    folder = Path(os.environ.get("LIPMOTION_NODE_MODULES", "node_modules")) / "gltf-validator"
-    return str(folder) if folder.is_dir() and shutil.which("node") else None
+    return node_package("gltf-validator")
+
+
+def run_node(script: str, package: str, path: Path) -> Any:
+    """Run a script of this folder with a package of npm and a file; return the JSON of its last line."""
+    return _json_of(["node", str(FOLDER / script), str(node_package(package)), str(path)], environment())
 
 
 def gltf_report(path: Path) -> Any:
     """Return the validator's report of a glTF file."""
-    return _json_of(["node", str(FOLDER / "gltf_issues.cjs"), str(gltf_validator()), str(path)], environment())
+    return run_node("gltf_issues.cjs", "gltf-validator", path)
 
 
 def _json_of(command: list[str], variables: dict[str, str]) -> Any:

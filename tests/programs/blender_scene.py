@@ -1,4 +1,4 @@
-"""Run in Blender: imports a .glb or .usda; prints the values of its shape keys, and the head's turn, at some times."""
+"""Run in Blender: imports a .glb, .fbx or .usda; prints its shape keys, and the head's turn, at some times."""
 
 from __future__ import annotations
 
@@ -12,6 +12,9 @@ path, times_s = sys.argv[1], list(map(float, sys.argv[2:]))
 bpy.ops.wm.read_factory_settings(use_empty=True)
 if path.endswith(".glb"):
     bpy.ops.import_scene.gltf(filepath=path)
+elif path.endswith(".fbx"):
+    bpy.context.scene.render.fps = 60
+    bpy.ops.import_scene.fbx(filepath=path, anim_offset=0)
 else:
     bpy.ops.wm.usd_import(filepath=path)
 scene = bpy.context.scene

@@ -19,7 +19,6 @@ from lipmotion.speech.recognition.combined_phones import combined_log_likelihood
 from lipmotion.speech.recognition.recogniser import (
     FULL_WEIGHT_SCORE,
     NO_WEIGHT_SCORE,
-    SHORT_PAUSE_S,
     Recogniser,
 )
 from lipmotion.speech.sound.audio_files import read_audio
@@ -27,6 +26,7 @@ from lipmotion.testing.formant_synthesiser import synthesise
 from lipmotion.testing.toy import WORDS, ToySentence, toy_sentences
 from lipmotion.types import Audio, Timeline, Unit
 from lipmotion.units import PAUSE, PHONES, SILENCE, Lexicon, words_of
+from lipmotion.units.phones import SHORT_PAUSE_S
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -35,6 +35,7 @@ class MotionFormat:
     mouth   : whether the file shows how the mouth itself moves: the pipeline keeps the channel ``opening`` for it,
               whatever channels or curves the user asks for
     most_frames : number of frames that such a file can hold; None: any number
+    fixed_rate : whether a file can have no other rate than ``rate_hz``
     other_curves : whether weights and controls that the user asks for take the place of ``curves``
     names_sound  : whether the file names the recording: the description of the speech then has ``path``, the path from
                    the folder of the file
@@ -49,6 +50,7 @@ class MotionFormat:
     units: Callable[[Path], Timeline[Unit] | None] | None = None
     curves: str = ""
     rate_hz: float | None = None
+    fixed_rate: bool = False
     other_curves: bool = False
     names_sound: bool = False
     mouth: bool = False
@@ -66,11 +68,28 @@ MOTION_FORMATS: Registry[MotionFormat] = Registry(
         "blender.py": "lipmotion.export.motion.blender_script:MOTION_FORMAT",
         "c3d": "lipmotion.export.motion.motion_c3d:MOTION_FORMAT",
         "fap": "lipmotion.export.motion.motion_fap:MOTION_FORMAT",
+        "vrma": "lipmotion.export.motion.vrm_animation:MOTION_FORMAT",
+        "anim": "lipmotion.export.motion.unity_anim:MOTION_FORMAT",
+        "tres": "lipmotion.export.motion.godot_tres:MOTION_FORMAT",
+        "vmd": "lipmotion.export.motion.motion_vmd:MOTION_FORMAT",
         "bvh": "lipmotion.export.motion.motion_bvh:MOTION_FORMAT",
+        "a2f.json": "lipmotion.export.motion.audio2face:MOTION_FORMAT",
         "motion3.json": "lipmotion.export.motion.live2d:MOTION_FORMAT",
     },
 )
 """Motion formats by suffix, without the first dot; a suffix may have several parts, as ``livelink.csv``."""
+_GLTF = "lipmotion.meshes.files.gltf_weights:read_gltf_motion"
+_CUES = "lipmotion.export.cues.cue_motion:read_cue_motion"
+MOTION_READERS: Registry[Callable[[Path], tuple[Motion, Timeline[Unit]]]] = Registry(
+    "motion reader",
+    "lipmotion.motion_readers",
+    {"glb": _GLTF, "gltf": _GLTF, "tsv": _CUES, "xml": _CUES, "dat": _CUES, "pgo": _CUES},
+)
+"""Readers of files that hold motion, but are not written as motion formats, by suffix as ``MOTION_FORMATS``."""
+OTHER_JSON = {b'"mouthCues"': ".tsv", b'"facsNames"': ".a2f.json"}
+"""Members at the beginning of ``.json`` files of other programs, and the suffix of files that are read alike."""
+JSON_HEAD = 1 << 16
+"""How many bytes of a ``.json`` are searched for them."""
 
 
 def motion_suffixes() -> tuple[str, ...]:
@@ -79,8 +98,9 @@ def motion_suffixes() -> tuple[str, ...]:
 
 
 def readable_suffixes() -> tuple[str, ...]:
-    """Return the suffixes of the motion formats that ``read_motion`` reads, with the dot."""
-    return tuple(suffix for suffix in motion_suffixes() if _can_be_read(suffix))
+    """Return the suffixes of all files that ``read_motion`` reads, with the dot."""
+    formats = tuple(suffix for suffix in motion_suffixes() if _can_be_read(suffix))
+    return formats + tuple(f".{name}" for name in MOTION_READERS.names)
 
 
 def motion_suffix(path: Path) -> str:
@@ -92,7 +112,12 @@ def motion_suffix(path: Path) -> str:
     >>> motion_suffix(Path("take.1.CSV")), motion_suffix(Path("take.fbx"))
     ('.csv', '')
     """
-    known, suffixes = motion_suffixes(), [suffix.lower() for suffix in path.suffixes]
+    return _longest(path, motion_suffixes())
+
+
+def _longest(path: Path, known: Collection[str]) -> str:
+    """Return the longest ending of a file's name that is known, in lower case, with the dot; empty: there is none."""
+    suffixes = [suffix.lower() for suffix in path.suffixes]
     endings = ("".join(suffixes[first:]) for first in range(len(suffixes)))
     return next((ending for ending in endings if ending in known), "")
 
@@ -141,7 +166,7 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
     (100.0, 'sil')
     """
     path = Path(path)
-    read = _format_of(path).read if motion_suffix(path) else None
+    read = _reader_of(path)
     if read is None:
         raise InputError(
             f"{path}: cannot read motion from {_suffix(path)}; use one of {', '.join(readable_suffixes())}"
@@ -158,7 +183,8 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
     except InputError as error:
-        raise InputError(f"{path}: {error}") from error
+        text = str(error)
+        raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from error
 
 
 def read_units(path: Path) -> Timeline[Unit]:
@@ -177,6 +203,27 @@ def read_units(path: Path) -> Timeline[Unit]:
         if units is not None:
             return units
     return read_motion(path)[1]
+
+
+def _reader_of(path: Path) -> Callable[[Path], tuple[Motion, Timeline[Unit]]] | None:
+    """Return what reads a file, by its name and, of ``.json``, its beginning; None: nothing does."""
+    named = _named_by_content(path)
+    if motion_suffix(named):
+        return _format_of(named).read
+    other = _longest(named, [f".{name}" for name in MOTION_READERS.names])
+    return MOTION_READERS.load(other.removeprefix(".")) if other else None
+
+
+def _named_by_content(path: Path) -> Path:
+    """Return a path, or for ``.json`` of another program the name that such a file would have otherwise."""
+    if motion_suffix(path) != ".json" or not path.is_file():
+        return path
+    try:
+        with path.open("rb") as file:
+            head = file.read(JSON_HEAD)
+    except OSError:  # reported when it is read
+        return path
+    return next((Path(f"a{suffix}") for mark, suffix in OTHER_JSON.items() if mark in head), path)
 
 
 def _format_of(path: Path) -> MotionFormat:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from lipmotion.errors import ExportError, shortened
+from lipmotion.export.subrip import SRT_SUFFIX, write_subrip
 from lipmotion.export.textgrid import TEXTGRID_SUFFIX, write_textgrid
 from lipmotion.export.webvtt import VTT_SUFFIX, write_webvtt
 from lipmotion.printable import is_line
@@ -14,6 +15,7 @@ from lipmotion.types import Timeline, Unit
 _WRITERS: dict[str, Callable[[Path, Timeline[Unit]], None]] = {
     TEXTGRID_SUFFIX: write_textgrid,
     VTT_SUFFIX: write_webvtt,
+    SRT_SUFFIX: write_subrip,
 }
 LABEL_SUFFIXES = tuple(_WRITERS)
 """Suffixes of label files, as programs write them; capitals do not matter."""

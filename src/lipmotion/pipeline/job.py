@@ -156,9 +156,9 @@ class Outputs(Configuration):
     face: str = option(
         "portrait",
         reads="face",
-        metavar="NAME|FILE.svg|FILE.face",
-        help="face that videos show: woman, man, head, cartoon, a drawing, or a filmed face (default: portrait, the "
-        "woman)",
+        metavar="NAME|FILE.svg|FILE.face|FOLDER",
+        help="face that videos show: woman, man, head, cartoon, a drawing, a filmed face, or a folder of one drawing a "
+        "mouth shape (default: portrait, the woman)",
     )
     background: str | None = option(
         None,
@@ -204,7 +204,8 @@ class Outputs(Configuration):
     curves: str = option(
         "",
         metavar="SET",
-        help="what motion files hold: arkit, face, visemes, fap, or the controls of a rig (FILE.csv; docs/meshes.md)",
+        help="what motion files hold: arkit, face, visemes, vowels, fap, or the controls of a rig (FILE.csv; "
+        "docs/meshes.md)",
     )
     posteriors: Path | None = option(
         None, kind=Path, writes=True, metavar="FILE.png", help="draw the posteriors of units over time (coupled)"
@@ -274,12 +275,14 @@ class Job(Configuration):
 
 
 def located(part: PartT, folder: Path) -> PartT:
-    """Return a part with paths that begin at a folder; a text that is no file there is left as it is."""
+    """Return a part with paths that begin at a folder; a text that is no file there, or folder of drawings, stays."""
     found: dict[str, Any] = {}
     for each in fields(part):
         value = getattr(part, each.name)
         if isinstance(value, Path) and str(value) != "-":
             found[each.name] = folder / value
-        elif isinstance(value, str) and ("reads" in each.metadata or each.name == "curves") and is_file(folder / value):
-            found[each.name] = str(folder / value)
+        elif isinstance(value, str) and ("reads" in each.metadata or each.name == "curves"):
+            drawings = each.name == "face" and "/" in value and (folder / value).is_dir()
+            if drawings or is_file(folder / value):
+                found[each.name] = str(folder / value)
     return replace(part, **found)

@@ -11,6 +11,8 @@ from lipmotion.units.visemes import VISEME_OF, VISEMES
 SILENCE = "sil"
 PAUSE = "sp"
 """A pause between words that is too short to be silence."""
+SHORT_PAUSE_S = 0.2
+"""Silence shorter than this is a pause between words."""
 
 PHONES: tuple[str, ...] = tuple(sorted(VISEME_OF))
 

@@ -17,10 +17,15 @@ from lipmotion.corpora.facegood import read_channels
 from lipmotion.corpora.source_recordings import MotionFile
 from lipmotion.corpora.store import Corpus
 from lipmotion.export.base import write_motion
+from lipmotion.export.cues.base import CUE_FORMATS
+from lipmotion.export.cues.cue_motion import PARSERS
+from lipmotion.export.cues.cue_shapes import SHAPES
+from lipmotion.export.cues.sheet import CueSheet
 from lipmotion.export.motion.c3d_file import C3dFile
 from lipmotion.export.motion.c3d_writing import write_c3d
 from lipmotion.pipeline.corpus.supplied_motion import supplied_track
-from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
+from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline
+from meshes import gltf
 from meshes.flame import head
 from meshes.live_link_app import write_take
 from robustness.case import npy
@@ -57,12 +62,24 @@ def _captures() -> list[Files]:
     weights = Motion(values[:, :1], RATE_HZ, (Channel("jawOpen", WEIGHT),))
     parameters = _generation(np.rint(900 * values[:, :2]), (Channel("fap3_open_jaw", "fap"), Channel("fap4", "fap")))
     markers = C3dFile(("EYE_L", "EYE_R", "chin"), np.stack([values + 45, values - 45, 2 * values], axis=1), RATE_HZ)
+    cues = Timeline((Span(0.0, 0.3, "X"), Span(0.3, 0.5, "A"), Span(0.5, 0.75, "E")))
+    frames_s = [n / RATE_HZ for n in range(FRAMES)]
     with tempfile.TemporaryDirectory() as made:
         folder = Path(made)
+        for form, text in CUE_FORMATS.items():
+            sheet = CueSheet(cues, 24.0, "".join(SHAPES), Timeline((Span(0.3, 0.7, "moth"),)))
+            if f".{form}" in PARSERS:
+                (folder / f"c.{form}").write_text(text(sheet, "c.wav"), encoding="utf-8")
+        (folder / "a.glb").write_bytes(gltf.glb(*gltf.animated_document(frames_s, values[:, :2])))
+        expression = {"node": 1, "path": "translation"}
+        (folder / "a.vrma").write_bytes(gltf.glb(*gltf.animated_document(frames_s, values, target=expression)))
         write_take(folder / "a.csv", weights)
         write_motion(folder / "a.c3d", moving, source={}, model={})
         write_c3d(folder / "b.c3d", markers)
         write_motion(folder / "a.fap", parameters, source={}, model={})
+        vowels = (Channel("aa", WEIGHT), Channel("eyeBlinkLeft", WEIGHT), Channel("eyeBlinkRight", WEIGHT))
+        write_motion(folder / "a.vmd", _generation(values, vowels), source={}, model={})
+        write_motion(folder / "a.a2f.json", _generation(values[:, :1], weights.channels), source={}, model={})
         rows = [f"{1000 * n / RATE_HZ:.1f},{row[0]}" for n, row in enumerate(values)]
         (folder / "c.csv").write_text("\n".join(["time_ms,jawOpen", *rows]))
         return [{path.name: path.read_bytes()} for path in sorted(folder.iterdir())]

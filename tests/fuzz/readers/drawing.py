@@ -1,14 +1,17 @@
-"""Drawings in layers, as characters of the user's own."""
+"""Drawings in layers, and folders of drawings, as characters of the user's own."""
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
 
 import numpy as np
 
+from faces.test_cut_out import draw
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import require
 from lipmotion.faces import Staging, staged_face
+from lipmotion.faces.cut_out import read_cut_out
 from lipmotion.types import Channel, Motion, Timeline
 
 ROBOT = Path(__file__).parents[3] / "examples" / "robot.svg"
@@ -21,12 +24,19 @@ SMALL = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 40 40"><g id="he
 
 
 def seeds(_: Good) -> list[Files]:
-    """Return the example, and a small drawing with every kind of shape."""
-    return [{"face.svg": ROBOT.read_bytes()}, {"face.svg": SMALL.encode()}]
+    """Return the example, a small drawing with every kind of shape, and a picture of every mouth shape."""
+    with tempfile.TemporaryDirectory() as folder:
+        charts = draw(Path(folder), "A B C D E F G H X")
+        chart = {path.name: path.read_bytes() for path in sorted(charts.iterdir())}
+    return [{"face.svg": ROBOT.read_bytes()}, {"face.svg": SMALL.encode()}, chart]
 
 
 def read(folder: Path, _: Good) -> None:
     """Read a drawing; draw two frames."""
+    if not (folder / "face.svg").exists():
+        for frame in read_cut_out(folder).frames("A", Staging(size=64)):
+            require(frame.shape[0] == 64 and frame.shape[2] == 3, "a frame of another shape")
+        return
     motion = Motion(np.array([[0.0], [0.2]]), 25.0, (Channel("opening"),))
     for frame in staged_face(str(folder / "face.svg"), Staging(size=64)).render(motion, Timeline(()), fps=25.0):
         require(frame.ndim == 3 and frame.shape[0] == 64 and frame.shape[2] == 3, "a frame of another shape")

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 
+from corpora.labels.timing_samples import SAMPLES
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import require
 from lipmotion.corpora.grid import read_aligned_words
@@ -65,6 +67,10 @@ TEXTS = {
     "words.ctm": ";; a\na 1 0.50 0.25 hi 0.9\na 1 0.75 0.5 <eps>\na 1 1.25 0.5 you\n",
     "table.tsv": "start\tend\ttext\n500\t1500\tHi you\n",
     "grid.align": "0 23750 sil\n23750 29500 bin\n29500 34000 blue\n",
+}
+TEXTS |= {
+    f"{name}.json": sample if isinstance(sample, str) else json.dumps(sample, ensure_ascii=False)
+    for name, sample in SAMPLES.items()
 }
 SPLITS = {"train.txt": b"a\nb\n", "val.txt": b"c\n", "test.txt": b"d\n"}
 LENGTH_S = 4.0

@@ -23,11 +23,13 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add_options(parser, Request)
     add = parser.add_argument
     outputs: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
-    add_output(parser, "-o", "--output", force=True, help="FILE.tsv .xml .json .dat .pgo, or several", **outputs)
+    add_output(
+        parser, "-o", "--output", force=True, help="FILE.tsv .xml .json .dat .pgo .spine.json, or several", **outputs
+    )
     add(
         "-f",
         "--format",
-        choices=("tsv", "xml", "json", "dat", "pgo"),
+        choices=("tsv", "xml", "json", "dat", "pgo", "spine.json"),
         help="(default: that of the suffix; tsv on standard output)",
     )
     add("--fps", type=float, default=24.0, help="frames per second of the animation (default: 24)")

@@ -2,6 +2,7 @@
 
 from lipmotion.corpora.labels.label_files import (
     RecordingLabels,
+    holds_timings,
     label_files_beside,
     labels_beside,
     read_labels,
@@ -13,6 +14,7 @@ from lipmotion.corpora.labels.plain_text import check_plain_text
 __all__ = [
     "RecordingLabels",
     "check_plain_text",
+    "holds_timings",
     "label_files_beside",
     "labels_beside",
     "read_labels",

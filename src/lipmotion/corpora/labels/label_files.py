@@ -6,11 +6,12 @@ import codecs
 import logging
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+from lipmotion.corpora.labels.json_documents import DamagedJsonError, is_json
 from lipmotion.corpora.labels.plain_text import check_no_labels
-from lipmotion.corpora.labels.recognised_words import is_json, parse_recognised
+from lipmotion.corpora.labels.recognised_words import parse_recognised
 from lipmotion.corpora.labels.subtitles import is_subtitles, parse_subtitles
 from lipmotion.corpora.labels.textgrid import MARK, is_textgrid, parse_interval_tiers
 from lipmotion.corpora.labels.tier import (
@@ -25,6 +26,8 @@ from lipmotion.corpora.labels.tier import (
     with_words,
 )
 from lipmotion.corpora.labels.timed_lines import parse_timed_lines
+from lipmotion.corpora.labels.timings.ipa import in_inventory
+from lipmotion.corpora.labels.timings.services import timing_tiers
 from lipmotion.corpora.labels.word_lists import is_ctm, is_lrs, parse_ctm, parse_lrs
 from lipmotion.errors import InputError
 from lipmotion.storage.files import check_regular
@@ -45,6 +48,8 @@ CONTROL = re.compile(r"[\x00-\x08\x0e-\x1a\x1c-\x1f]")
 """Characters that no text has."""
 LARGEST_LABELS = 1 << 24
 """Most bytes of a label file: labels of a day."""
+MOTION, MOTION_HEAD = re.compile(rb'"lipmotion\.motion"|time_s,'), 64
+"""How our own motion files begin, and in how many bytes: a quick answer for large ones."""
 
 
 @dataclass(frozen=True)
@@ -152,13 +157,14 @@ def read_phones(path: Path) -> Timeline[Unit]:
     if not path.exists():
         raise InputError(f"{path}: no such units file")
     text, where = _text(path), str(path)
-    if is_textgrid(text):
-        tiers = parse_interval_tiers(text, where)
-    else:
+    tiers = _tiers(text, where)
+    if tiers is None:
         lines = parse_timed_lines(text, where)
-        tiers = [lines] if lines is not None else []
+        tiers = [] if lines is None else [lines]
     silent = [tier for tier in tiers if is_named_as_phones(tier) and tier.labels]
     phones = _tiers_of_phones(tiers, where) or silent
+    if not phones and any(map(is_named_as_words, tiers)):
+        raise InputError(f"{where}: holds words in time, but no phones; give it as a transcript (--transcript)")
     if not phones:
         raise InputError(
             f"{where}: holds no phones in time, required a motion file (.json, .npz), a TextGrid with a tier of "
@@ -169,6 +175,22 @@ def read_phones(path: Path) -> Timeline[Unit]:
     recognised = next(filter(is_named_as_recognised, tiers), None)
     units = units if words is None else with_words(units, words)
     return units if recognised is None else with_recognised(units, recognised)
+
+
+def holds_timings(path: Path) -> bool:
+    """Return whether a file has the timings of a voice or an aligner; False: it is another file, or no file at all.
+
+    Raises InputError: it has, and a symbol or a time in it is none.
+    """
+    if not path.is_file() or not 0 < path.stat().st_size <= LARGEST_LABELS:
+        return False
+    with path.open("rb") as file:
+        if MOTION.search(file.read(MOTION_HEAD)):
+            return False
+    try:
+        return timing_tiers(_text(path), str(path)) is not None
+    except DamagedJsonError:  # said by the reader of motion
+        return False
 
 
 def _tiers_of_phones(tiers: list[LabelTier], where: str) -> list[LabelTier]:
@@ -184,10 +206,8 @@ def _read(path: Path, *, unknown_json: bool) -> RecordingLabels | None:
     if unknown_json and path.stat().st_size > LARGEST_LABELS:
         return None
     text = _text(path)
-    if unknown_json and (not is_json(text) or parse_recognised(text, str(path)) is None):
-        return None
-    labels = _timed(text, path)
-    if labels is not None:
+    labels = _timed(text, path) if is_json(text) or not unknown_json else None
+    if labels is not None or unknown_json:
         return labels
     check_size(path, text)
     check_no_labels(without_known_tags(text), str(path))
@@ -205,8 +225,9 @@ def _read(path: Path, *, unknown_json: bool) -> RecordingLabels | None:
 def _timed(text: str, path: Path) -> RecordingLabels | None:
     """Return the labels of a text whose form has times; None of any other text."""
     where = str(path)
-    if is_textgrid(text):
-        return _chosen(parse_interval_tiers(text, where), where)
+    tiers = _tiers(text, where)
+    if tiers is not None:
+        return _chosen(tiers, where)
     if is_subtitles(text):
         return _spoken(parse_subtitles(text, where))
     if is_lrs(text):
@@ -218,6 +239,19 @@ def _timed(text: str, path: Path) -> RecordingLabels | None:
     if lines is not None:
         return _chosen([lines], where)
     return _spoken(parse_ctm(text, where)) if is_ctm(text) else None
+
+
+def _tiers(text: str, where: str) -> list[LabelTier] | None:
+    """Return the tiers of a TextGrid, or of the timings of a service; None: of another text.
+
+    Phones in IPA are those of the inventory that look like them.
+    """
+    if not is_textgrid(text):
+        return timing_tiers(text, where)
+    return [
+        replace(tier, labels=tuple(in_inventory(tier.labels, where))) if is_named_as_phones(tier) else tier
+        for tier in parse_interval_tiers(text, where)
+    ]
 
 
 def _spoken(transcript: TimedTranscript) -> RecordingLabels:

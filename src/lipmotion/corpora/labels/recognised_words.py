@@ -2,31 +2,19 @@
 
 from __future__ import annotations
 
-import json
-import math
-import re
-from collections.abc import Iterator
 from typing import Any
 
+from lipmotion.corpora.labels.json_documents import json_documents, json_seconds
 from lipmotion.corpora.labels.tier import check_count
 from lipmotion.errors import InputError, shortened
 from lipmotion.types import TimedTranscript, TimedWord, TranscriptLine, in_order
 from lipmotion.units.spoken_text import check_word_count, lines_by_pauses, spoken_text, timed_words
 
-BLANK = re.compile(r"\s*")
-DECODER = json.JSONDecoder()
 MS_PER_S = 1000
-LATEST_S = 1e6
-"""Times beyond eleven days are an error, or in another unit."""
 ROUNDING_S = 1.0
 """An end may be so much before its start; recognisers write that at the edges of their windows."""
 LISTS = ("segments", "transcription", "chunks", "result", "words")
 """The members that hold what was recognised: of Whisper, whisper.cpp, transformers, Vosk, and lists of words alone."""
-
-
-def is_json(text: str) -> bool:
-    """Return whether a text begins as an object or a list of objects does."""
-    return re.match(r'\s*(?:\{\s*["}]|\[\s*[\[{\]])', text) is not None
 
 
 def parse_recognised(text: str, where: str) -> TimedTranscript | None:
@@ -38,7 +26,7 @@ def parse_recognised(text: str, where: str) -> TimedTranscript | None:
     where : the file's name, for messages
     Raises InputError: damaged JSON (with its line), or times that are none (with the number of the segment).
     """
-    documents = list(_documents(text, where))
+    documents = [value for _, value in json_documents(text, where)]
     if len(documents) == 1 and isinstance(documents[0], list):
         documents = documents[0]
     if not all(isinstance(document, dict) and _is_recognised(document) for document in documents):
@@ -53,26 +41,6 @@ def parse_recognised(text: str, where: str) -> TimedTranscript | None:
         check_word_count(count, where)
         lines += line
     return in_order(lines)
-
-
-def _documents(text: str, where: str) -> Iterator[Any]:
-    """Yield the values of a text, one after another."""
-    at = _next(text, 0)
-    while at < len(text):
-        try:
-            value, at = DECODER.raw_decode(text, at)
-        except json.JSONDecodeError as error:
-            raise InputError(f"{where}: line {error.lineno}: damaged JSON ({error.msg}); write it again") from error
-        except (ValueError, RecursionError) as error:
-            raise InputError(f"{where}: damaged JSON: nested too deeply, or a number too long") from error
-        yield value
-        at = _next(text, at)
-
-
-def _next(text: str, at: int) -> int:
-    """Return the position of the next character that is not blank."""
-    found = BLANK.match(text, at)
-    return found.end() if found else at
 
 
 def _is_recognised(document: dict[str, Any]) -> bool:
@@ -138,26 +106,13 @@ def _times(item: dict[str, Any], where: str) -> tuple[float | None, float | None
     """Return the start and the end of a segment or a word in seconds, None where they are not given."""
     offsets, stamp = item.get("offsets"), item.get("timestamp")
     if isinstance(offsets, dict):
-        start_s, end_s = (_seconds(offsets.get(name), where, MS_PER_S) for name in ("from", "to"))
+        start_s, end_s = (json_seconds(offsets.get(name), where, MS_PER_S) for name in ("from", "to"))
     elif isinstance(stamp, list) and len(stamp) == 2:
-        start_s, end_s = (_seconds(value, where) for value in stamp)
+        start_s, end_s = (json_seconds(value, where) for value in stamp)
     else:
-        start_s, end_s = (_seconds(item.get(name), where) for name in ("start", "end"))
+        start_s, end_s = (json_seconds(item.get(name), where) for name in ("start", "end"))
     if start_s is not None and end_s is not None and end_s < start_s:
         if end_s < start_s - ROUNDING_S:
             raise InputError(f"{where} ends at {end_s:g} s, before its start at {start_s:g} s; correct it")
         end_s = start_s
     return start_s, end_s
-
-
-def _seconds(value: Any, where: str, per_s: float = 1.0) -> float | None:
-    """Return a time in seconds, None for null. Raises InputError: not a finite number, or no time."""
-    if value is None:
-        return None
-    try:
-        time_s = float(value) / per_s if not isinstance(value, bool) else math.nan
-    except (TypeError, ValueError, OverflowError):
-        time_s = math.nan
-    if not abs(time_s) <= LATEST_S:
-        raise InputError(f"{where}: a time is {shortened(repr(value)[:200])}, required a number of seconds")
-    return time_s

@@ -73,12 +73,12 @@ def required_time(text: str, place: str, where: str) -> float:
 
 def holds_phones(tier: LabelTier) -> bool:
     """Return whether a tier's name says that it holds phones, or most of its labels other than silence are phones."""
-    spoken = [label for label in tier.labels if not _is_silence(label.text)]
+    spoken = [label for label in tier.labels if not is_silence(label.text)]
     if not spoken or is_named_as_words(tier):
         return False
     if is_named_as_phones(tier):
         return True
-    return sum(_phone(label.text) is not None for label in spoken) >= PHONES_SHARE * len(spoken)
+    return sum(phone_of(label.text) is not None for label in spoken) >= PHONES_SHARE * len(spoken)
 
 
 def is_named_as_phones(tier: LabelTier) -> bool:
@@ -112,7 +112,7 @@ def with_words(units: Timeline[Unit], tier: LabelTier) -> Timeline[Unit]:
         place = bisect_right(starts_s, middle_s) - 1
         inside = place >= 0 and middle_s < tier.labels[place].end_s and not is_silent(span.label.phone)
         word = tier.labels[place].text if inside else ""
-        said = word if is_line(word) and not _is_silence(word) else ""
+        said = word if is_line(word) and not is_silence(word) else ""
         spans.append(replace(span, label=replace(span.label, word=said)))
     return Timeline(tuple(spans))
 
@@ -125,7 +125,7 @@ def tier_transcript(tier: LabelTier, where: str) -> TimedTranscript:
     _check_order(tier, where)
     lines = []
     for label in tier.labels:
-        words = () if _is_silence(label.text) else line_words(label.text, f"{where}: {label.position}")
+        words = () if is_silence(label.text) else line_words(label.text, f"{where}: {label.position}")
         end_s = label.end_s if math.isfinite(label.end_s) else None
         times_s = (label.start_s, end_s) if len(words) == 1 else (None, None)
         if words:
@@ -155,11 +155,11 @@ def phone_timeline(tier: LabelTier, words: LabelTier | None, where: str, *, with
     marked = any(re.search(r"\d$", label.text) for label in labels) or set(REDUCED_VOWELS.values()) & set(phones)
     if words is not None and not marked:
         phones = _reduced(labels, phones, words)
-    starts_s = [label.start_s for label in labels]
+    starts_s = [max(label.start_s, 0.0) for label in labels]
     ends_s = [
         label.end_s if following_s > label.end_s + ROUNDING_S else following_s
         for label, following_s in zip(labels, starts_s[1:], strict=False)
-    ] + [labels[-1].end_s]
+    ] + [max(labels[-1].end_s, 0.0)]
     return Timeline(tuple(Span(*row) for row in zip(starts_s, ends_s, map(Unit, phones), strict=True)))
 
 
@@ -179,7 +179,8 @@ def _check_order(tier: LabelTier, where: str) -> None:
         end_s = label.end_s
 
 
-def _is_silence(text: str) -> bool:
+def is_silence(text: str) -> bool:
+    """Return whether a label of another tool stands for silence."""
     return (_inner(text) or text).lower() in SILENCES
 
 
@@ -189,15 +190,15 @@ def _inner(text: str) -> str | None:
     return match[1] if match else None
 
 
-def _phone(text: str) -> str | None:
+def phone_of(text: str) -> str | None:
     """Return the phone that a label stands for, or None."""
     text = STATE_NUMBER.sub("", text)
     name = phone_named(text) or phone_named(_inner(text) or "")
-    return SILENCE if name is None and _is_silence(text) else name
+    return SILENCE if name is None and is_silence(text) else name
 
 
 def _required_phone(label: TimedLabel, where: str) -> str:
-    phone = _phone(label.text)
+    phone = phone_of(label.text)
     if phone is None:
         raise InputError(
             f"{where}: {label.position} is {label.text[:40]!r}, which is no phone; the phones are: {' '.join(PHONES)}"

@@ -11,10 +11,15 @@ from bisect import bisect_left
 from dataclasses import replace
 from itertools import islice, takewhile
 
+from lipmotion.errors import InputError, shortened
+from lipmotion.export.cues.cue_lines import BLAIR, cue_time, shape_of, sheet_of
 from lipmotion.export.cues.cue_shapes import REST, SHAPES
-from lipmotion.export.cues.sheet import CueSheet
+from lipmotion.export.cues.sheet import CueSheet, shown_shapes
 from lipmotion.printable import is_line, printable
+from lipmotion.types import Span, Timeline
 
+MARK = "lipsync version 1"
+FASTEST_FPS = 1000
 WHOLE_RATE_TOLERANCE = 0.01
 """A rate that is so little over a whole one counts as that."""
 UNKNOWN = "speech"
@@ -34,7 +39,7 @@ def text(sheet: CueSheet, sound_file: str) -> str:
     phrases = [words_of_run(sheet, first, last) for first, last in _runs(shown)]
     said = [" ".join(word for *_, word in phrase) for phrase in phrases]
     lines = [
-        "lipsync version 1",
+        MARK,
         _one_line(" ".join(sound_file.split())) or "sound.wav",
         f"{sheet.fps:.0f}",
         f"{len(shown)}",
@@ -47,16 +52,6 @@ def text(sheet: CueSheet, sound_file: str) -> str:
             lines.append(f"\t\t\t{word} {first} {last} {len(starts)}")
             lines += [f"\t\t\t\t{frame} {SHAPES[shown[frame]].blair}" for frame in starts]
     return "\n".join(lines) + "\n"
-
-
-def shown_shapes(sheet: CueSheet) -> list[str]:
-    """Return the shape of every frame."""
-    frames = max(1, int(sheet.fps * sheet.duration_s + 1 - 1e-9))
-    starts = [min(int(sheet.fps * cue.start_s), frames) for cue in sheet.cues] + [frames]
-    shown: list[str] = []
-    for cue, end in zip(sheet.cues, starts[1:], strict=True):
-        shown += [cue.label] * (end - len(shown))
-    return shown
 
 
 def words_of_run(sheet: CueSheet, first: int, last: int) -> list[Part]:
@@ -92,3 +87,70 @@ def _runs(shown: list[str]) -> list[tuple[int, int]]:
     starts = [frame for frame in range(len(shown)) if moving[frame + 1] and not moving[frame]]
     ends = [frame for frame in range(len(shown)) if moving[frame + 1] and not moving[frame + 2]]
     return list(zip(starts, ends, strict=True))
+
+
+class _Lines:
+    """The lines of a file, one after another, with their numbers."""
+
+    def __init__(self, text: str) -> None:
+        self._lines, self.number = text.splitlines(), 0
+
+    @property
+    def place(self) -> str:
+        return f"line {self.number}"
+
+    def next(self) -> str:
+        """Return the next line. Raises InputError: there is none."""
+        self.number += 1
+        if self.number > len(self._lines):
+            raise InputError(f"the project ends after line {self.number - 1}; save it again in Papagayo")
+        return self._lines[self.number - 1].strip()
+
+    def count(self) -> int:
+        """Return the number on the next line. Raises InputError: it is none."""
+        text = self.next()
+        return int(cue_time(text, self.place))
+
+
+def parse(text: str) -> CueSheet:
+    """Return the cues and the words of a project: those of its first voice.
+
+    Raises InputError: not a project of version 1, cut short, or a shape that is none, with its line.
+    """
+    lines = _Lines(text)
+    if lines.next() != MARK:
+        raise InputError(f"not a project of Papagayo: the first line is no {MARK!r}; save it again")
+    lines.next()
+    fps, frames, voices = (lines.count() for _ in range(3))
+    if not 1 <= fps <= FASTEST_FPS or not voices:
+        raise InputError(
+            f"{voices} voices at {fps} frames a second, required one, at 1 to {FASTEST_FPS}; save it again"
+        )
+    lines.next()
+    lines.next()
+    rows: list[tuple[float, str]] = []
+    words: list[Span[str]] = []
+    for _ in range(lines.count()):
+        for _ in range(3):
+            lines.next()
+        for _ in range(lines.count()):
+            word, first, last, count = _word(lines)
+            words.append(Span(first / fps, (last + 1) / fps, word))
+            for _ in range(count):
+                frame, _, name = lines.next().partition(" ")
+                rows.append((cue_time(frame, lines.place) / fps, shape_of(name, BLAIR, lines.place)))
+            rows.append(((last + 1) / fps, REST))
+    kept = [row for row, after in zip(rows, [*rows[1:], (math.inf, "")], strict=True) if row[0] < after[0]]
+    return sheet_of(kept, frames / fps, float(fps), Timeline(tuple(words)))
+
+
+def _word(lines: _Lines) -> tuple[str, int, int, int]:
+    """Return a word, its first and its last frame, and how many shapes it has. Raises InputError: it is none."""
+    line = lines.next()
+    fields = line.rsplit(maxsplit=3)
+    if len(fields) != 4:
+        raise InputError(
+            f"{lines.place} is {shortened(line)!r}, required a word, its frames and the number of its shapes"
+        )
+    first, last, count = (int(cue_time(field, lines.place)) for field in fields[1:])
+    return fields[0], first, last, count

@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
-from lipmotion.export.cues.sheet import CueSheet
+import json
+from typing import Any
+
+from lipmotion.errors import InputError
+from lipmotion.export.cues.cue_lines import LETTERS, cue_time, shape_of, sheet_of
+from lipmotion.export.cues.sheet import CUES_FPS, CueSheet
 from lipmotion.storage.json_text import as_json
+
+CUES = "mouthCues"
 
 
 def text(sheet: CueSheet, sound_file: str) -> str:
@@ -13,3 +20,24 @@ def text(sheet: CueSheet, sound_file: str) -> str:
     )
     metadata = f'    "soundFile": {as_json(sound_file)},\n    "duration": {sheet.duration_s:.2f}\n'
     return f'{{\n  "metadata": {{\n{metadata}  }},\n  "mouthCues": [\n{cues}\n  ]\n}}\n'
+
+
+def is_rhubarb(text: str) -> bool:
+    """Return whether JSON may be such a file: it has the name of its list of cues."""
+    return f'"{CUES}"' in text
+
+
+def parse(text: str) -> CueSheet:
+    """Return the cues of a file. Raises InputError: it is no JSON, or a cue is none, with its number."""
+    try:
+        document: Any = json.loads(text)
+        cues = document[CUES]
+    except (ValueError, RecursionError, KeyError, TypeError) as error:
+        raise InputError(f"not a file of Rhubarb ({error}); export it again") from error
+    rows, end_s = [], 0.0
+    for number, cue in enumerate(cues if isinstance(cues, list) else [], 1):
+        fields = cue if isinstance(cue, dict) else {}
+        place = f"cue {number}"
+        rows.append((cue_time(str(fields.get("start")), place), shape_of(str(fields.get("value")), LETTERS, place)))
+        end_s = cue_time(str(fields.get("end")), place)
+    return sheet_of(rows, end_s, CUES_FPS)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 from html import escape
 
-from lipmotion.export.cues.sheet import CueSheet
+from lipmotion.export.cues.cue_lines import LETTERS, cue_time, shape_of, sheet_of
+from lipmotion.export.cues.sheet import CUES_FPS, CueSheet
 
 _NOT_XML = re.compile("[^\t\n\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _CONTROL = re.compile("[\t\n\x7f]")
 """Characters that XML 1.0 cannot hold, and those that it would change."""
+_CUE = re.compile(r"<mouthCue\s+start=\"([^\"<]{0,40})\"\s+end=\"([^\"<]{0,40})\"\s*>([^<]{0,40})</mouthCue>")
 
 
 def text(sheet: CueSheet, sound_file: str) -> str:
@@ -25,3 +27,13 @@ def text(sheet: CueSheet, sound_file: str) -> str:
         f"  </metadata>\n  <mouthCues>\n{cues}  </mouthCues>\n</rhubarbResult>\n"
     )
     return document.encode("ascii", "xmlcharrefreplace").decode()
+
+
+def parse(text: str) -> CueSheet:
+    """Return the cues of a file. Raises InputError: there is none, or one is none, with its number."""
+    rows, end_s = [], 0.0
+    for number, found in enumerate(_CUE.finditer(text), 1):
+        place = f"cue {number}"
+        rows.append((cue_time(found[1], place), shape_of(found[3], LETTERS, place)))
+        end_s = cue_time(found[2], place)
+    return sheet_of(rows, end_s, CUES_FPS)

@@ -10,6 +10,9 @@ import numpy as np
 from lipmotion.export.cues.cue_shapes import REST, SHAPES, drawn_shape
 from lipmotion.types import Span, Timeline
 
+CUES_FPS = 24.0
+"""Frame rate of cues where none is given."""
+
 
 @dataclass(frozen=True)
 class CueSheet:
@@ -76,3 +79,13 @@ def cue_sheet(segments: Sequence[tuple[int, str]], duration_s: float, fps: float
     shapes = [shape for _, shape in segments] or [drawn_shape(REST, drawn)]
     ends = [*starts[1:], whole_hundredths(duration_s)]
     return CueSheet(Timeline(tuple(map(Span, starts, ends, shapes))), fps, drawn)
+
+
+def shown_shapes(sheet: CueSheet) -> list[str]:
+    """Return the shape of every frame of the animation, to the end of the sheet."""
+    frames = max(1, int(sheet.fps * sheet.duration_s + 1 - 1e-9))
+    starts = [min(int(sheet.fps * cue.start_s), frames) for cue in sheet.cues] + [frames]
+    shown: list[str] = []
+    for cue, end in zip(sheet.cues, starts[1:], strict=True):
+        shown += [cue.label] * (end - len(shown))
+    return shown

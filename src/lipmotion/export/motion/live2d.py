@@ -16,6 +16,7 @@ from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER, mouth_t
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.errors import ExportError
 from lipmotion.export.base import MotionFormat
+from lipmotion.export.motion.keys import key_frames
 from lipmotion.meshes.fitting.reference_mouth import arkit_mouth
 from lipmotion.storage.json_text import as_json
 from lipmotion.types import Generation, Motion
@@ -51,7 +52,7 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
     curves, steps = [], bool(SHOWING & set(generation.stepped))
     for name, values in ((OPEN, mouth_open(generation)), (FORM, mouth_form(generation))):
         rounded = np.round(values, DECIMALS) + 0.0
-        kept = changes(rounded) if steps else kept_keys(motion.time_s, rounded, TOLERANCE)
+        kept = key_frames(motion.time_s, rounded, TOLERANCE, stepped=steps)
         keys = [(round(float(motion.time_s[frame]), 6), float(rounded[frame])) for frame in kept]
         segments: list[float] = [*keys[0]]
         for time_s, value in keys[1:]:
@@ -101,32 +102,6 @@ def _by_weights(motion: Motion, effects: Array) -> Array:
         if name in motion.names:
             total += effect * motion[name]
     return total
-
-
-def kept_keys(time_s: Array, values: Array, tolerance: float) -> list[int]:
-    """Return frames between which straight lines stay within a tolerance of all values, the first and last among them.
-
-    Source: Douglas and Peucker 1973, with vertical distances.  Cost: O(T log T) for most curves.
-    """
-    kept, spans = {0, len(values) - 1}, [(0, len(values) - 1)]
-    while spans:
-        first, last = spans.pop()
-        if last - first < 2:
-            continue
-        inner = slice(first + 1, last)
-        share = (time_s[inner] - time_s[first]) / (time_s[last] - time_s[first])
-        off = np.abs(values[inner] - values[first] - share * (values[last] - values[first]))
-        worst = int(off.argmax())
-        if off[worst] > tolerance:
-            middle = first + 1 + worst
-            kept.add(middle)
-            spans += [(first, middle), (middle, last)]
-    return sorted(kept)
-
-
-def changes(values: Array) -> list[int]:
-    """Return the frames in which values differ from the frame before, with the first and the last frame."""
-    return sorted({0, *(np.flatnonzero(np.diff(values)) + 1).tolist(), len(values) - 1})
 
 
 MOTION_FORMAT = MotionFormat(write, check=check, mouth=True)

@@ -26,7 +26,7 @@ READABLE = {
     *("KHR_mesh_quantization", "EXT_meshopt_compression", "KHR_meshopt_compression"),
     *("KHR_texture_basisu", "EXT_texture_webp", "EXT_texture_avif", "KHR_texture_transform"),
     *("KHR_materials_unlit", "KHR_lights_punctual", "VRM", "VRMC_vrm", "VRMC_springBone", "VRMC_node_constraint"),
-    *("VRMC_materials_mtoon", "KHR_xmp_json_ld", "KHR_animation_pointer"),
+    *("VRMC_materials_mtoon", "KHR_xmp_json_ld", "KHR_animation_pointer", "VRMC_vrm_animation"),
 }
 """Extensions that a file may require: they are read, or change nothing about the surface. All of the materials'
 extensions are accepted as well."""

@@ -1,8 +1,9 @@
 """What is used of a glTF 2.0 document, as a table: types, ranges, and what refers to what.
 
 Source: glTF 2.0 Specification (Khronos, ISO/IEC 12113), its extensions EXT_meshopt_compression, EXT_texture_webp and
-KHR_texture_transform; VRM 0.x and 1.0 (VRM Consortium). Deviations: names, extras and binds of VRM that do not fit are
-left out, as viewers do; what else is wrong is refused, and what stands in no table is not looked at.
+KHR_texture_transform; VRM 0.x and 1.0, VRMC_vrm_animation 1.0 (VRM Consortium). Deviations: names, extras, animations
+and binds of VRM that do not fit are left out, as viewers do; what else is wrong is refused, and what stands in no table
+is not looked at.
 """
 
 from __future__ import annotations
@@ -72,7 +73,7 @@ def gltf_schema(json: Mapping[str, Any]) -> Schema:
     }
     lists = {
         "accessors": members(_accessor(to("bufferViews")), ["componentType", "count", "type"]),
-        "animations": members({}),
+        "animations": if_fits(members(_animation(to("nodes"), to("accessors")))),
         "buffers": members({"uri": text(_LARGEST_INTEGER), "byteLength": _SIZE}),
         "bufferViews": members(_view(to("buffers")), ["buffer", "byteLength"]),
         "images": members({"uri": text(_LARGEST_INTEGER), "bufferView": to("bufferViews")}),
@@ -88,6 +89,16 @@ def gltf_schema(json: Mapping[str, Any]) -> Schema:
     }
     others = {"scene": to("scenes"), "extensionsRequired": items(_WORD), "extensions": members(_vrm())}
     return members(table | others)
+
+
+def _animation(node: Schema, accessor: Schema) -> dict[str, Schema]:
+    """Return what is used of an animation; channels of other kinds are left out."""
+    target = members({"node": node, "path": _WORD})
+    channel = members({"sampler": _SIZE, "target": target}, ["sampler", "target"])
+    return {
+        "channels": items(if_fits(channel)),
+        "samplers": items(members({"input": accessor, "output": accessor, "interpolation": _WORD})),
+    }
 
 
 def _reference(name: str, count: int) -> Schema:
@@ -153,7 +164,9 @@ def _vrm() -> dict[str, Schema]:
     group = {"name": _NAME, "presetName": _NAME, "binds": items(if_fits(members(old, list(old))))}
     new = {"node": any_number, "index": any_number, "weight": _NUMBER}
     expressions = any_members(members({"morphTargetBinds": items(if_fits(members(new, list(new))))}))
+    moved = any_members(if_fits(members({"node": whole(0, _LARGEST_INTEGER)}, ["node"])))
     return {
+        "VRMC_vrm_animation": if_fits(members({"expressions": members({"preset": moved, "custom": moved})})),
         "VRM": members({"blendShapeMaster": members({"blendShapeGroups": items(members(group))})}),
         "VRMC_vrm": members({"expressions": members({"preset": expressions, "custom": expressions})}),
     }

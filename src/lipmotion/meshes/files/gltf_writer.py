@@ -17,7 +17,7 @@ VERTICES, INDICES = 34962, 34963
 """Uses of buffer views, as viewers want them named."""
 
 
-class _Buffer:
+class GltfBuffer:
     """Arrays so far, and their descriptions."""
 
     def __init__(self) -> None:
@@ -83,12 +83,12 @@ def write_gltf_scene(path: Path, scene: Scene) -> None:
     do not know it pass on: ``{"audio": {"uri": ..., "start_s": ...}}``.
     Raises ExportError: the file cannot be written.
     """
-    buffer = _Buffer()
+    buffer = GltfBuffer()
     document = _document(scene, buffer, shading_normals(scene.mesh, split=scene.split))
     write_container(path, document, b"".join(buffer.chunks))
 
 
-def _document(scene: Scene, buffer: _Buffer, normals: ShadingNormals) -> dict[str, Any]:
+def _document(scene: Scene, buffer: GltfBuffer, normals: ShadingNormals) -> dict[str, Any]:
     """Return the JSON part; its arrays are added to the buffer."""
     mesh = scene.mesh
     moved = np.zeros(len(mesh.vertices), bool)
@@ -128,7 +128,7 @@ def _document(scene: Scene, buffer: _Buffer, normals: ShadingNormals) -> dict[st
 
 
 def _primitive(
-    buffer: _Buffer,
+    buffer: GltfBuffer,
     materials: list[dict[str, Any]],
     scene: Scene,
     part: MeshPart,
@@ -169,7 +169,7 @@ def _primitive(
     return primitive | ({"targets": targets} if targets else {})
 
 
-def _joint_attributes(buffer: _Buffer, share: NDArray[np.float64]) -> dict[str, int]:
+def _joint_attributes(buffer: GltfBuffer, share: NDArray[np.float64]) -> dict[str, int]:
     """Add how far vertices follow the body (joint 0) and the head (joint 1); return the numbers of the accessors."""
     joints = np.zeros((len(share), 4), np.uint8)
     joints[:, 1] = share > 0
@@ -183,7 +183,7 @@ def _joint_attributes(buffer: _Buffer, share: NDArray[np.float64]) -> dict[str, 
     }
 
 
-def _add_joints(document: dict[str, Any], buffer: _Buffer, turn: HeadTurn) -> None:
+def _add_joints(document: dict[str, Any], buffer: GltfBuffer, turn: HeadTurn) -> None:
     """Add the joints of body and head, as the last two nodes, and let all meshes follow them."""
     nodes, pivot = document["nodes"], turn.pivot.astype("<f4").astype(np.float64)
     first = len(nodes)
@@ -200,7 +200,7 @@ def _add_joints(document: dict[str, Any], buffer: _Buffer, turn: HeadTurn) -> No
     document["skins"] = [{"joints": [first, first + 1], "skeleton": first, "inverseBindMatrices": matrices}]
 
 
-def _animation(buffer: _Buffer, scene: Scene, head: int) -> dict[str, Any]:
+def _animation(buffer: GltfBuffer, scene: Scene, head: int) -> dict[str, Any]:
     """Return the animation of the weights of node 0, and of the rotation of the node of the head."""
     time_s, table = scene.keys()
     frames_s = scene.weights.time_s if scene.weights else np.zeros(0)

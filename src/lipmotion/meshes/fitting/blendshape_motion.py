@@ -7,8 +7,6 @@ points that faces draw.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,32 +14,12 @@ from lipmotion.articulation.contact import GAP, LEAST_GAP, opening_of
 from lipmotion.articulation.lip_points import LEFT_CORNER, LOWER_EDGE, RIGHT_CORNER, UPPER_EDGE, mouth_template
 from lipmotion.meshes.fitting.reference_mouth import arkit_mouth
 from lipmotion.meshes.model.face_shapes import FaceShapes
+from lipmotion.meshes.model.other_shapes import OPENS, as_arkit
 from lipmotion.meshes.model.shape_names import arkit_name
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Motion
 
 Array = NDArray[np.float64]
 
-OPENS = "jawOpen"
-FACEGOOD: Mapping[str, tuple[tuple[str, float], ...]] = {
-    "jawOpen": (("mouth_stretch_c", 1.0), ("mouth_oh_c", 0.25)),
-    "mouthFunnel": (*((f"mouth_funnel_{side}", 0.25) for side in ("dl", "dr", "ul", "ur")), ("mouth_oh_c", 0.5)),
-    "mouthPucker": (("mouth_pucker_l", 0.5), ("mouth_pucker_r", 0.5), ("mouth_oo_c", 0.8)),
-    "mouthRollLower": (("mouth_suck_dl", 0.5), ("mouth_suck_dr", 0.5)),
-    "mouthRollUpper": (("mouth_suck_ul", 0.5), ("mouth_suck_ur", 0.5)),
-    **{
-        f"{known}{side}": ((f"mouth_{name}_{side[0].lower()}", 1.0),)
-        for known, name in (
-            ("mouthSmile", "lipCornerPull"),
-            ("mouthFrown", "lipCornerDepress"),
-            ("mouthStretch", "lipStretch"),
-            ("mouthLowerDown", "lowerLipDepress"),
-            ("mouthUpperUp", "upperLipRaise"),
-            ("mouthPress", "press"),
-        )
-        for side in ("Left", "Right")
-    },
-}
-"""The blendshapes of FACEGOOD-Audio2Face as ARKit's: their weights, times these, added up. Set by eye."""
 LEAST_OPENING = 0.05
 """A blendshape that parts the lips by more, in eye distances, opens the mouth."""
 ARTICULATORY = {
@@ -106,18 +84,16 @@ def with_mouth(motion: Motion) -> Motion:
 def arkit_weights(motion: Motion) -> dict[str, Array]:
     """Return the curves of a motion that are blendshapes, by ARKit's names, 0 to 1 [each shape=(T,)].
 
-    Names are understood as files spell them; of two spellings of one, the first. Blendshapes of FACEGOOD are converted.
+    Names are understood as files spell them; of two spellings of one, the first. Blendshapes of other sets are
+    converted (``other_shapes``).
     """
     found: dict[str, Array] = {}
     for name in motion.names:
         known = arkit_name(name)
         if known is not None:
             found.setdefault(known, np.clip(motion[name].astype(np.float64), 0, 1))
-    if OPENS not in found and FACEGOOD[OPENS][0][0] in motion.names:
-        for known, sources in FACEGOOD.items():
-            curves = [gain * motion[name].astype(np.float64) for name, gain in sources if name in motion.names]
-            if curves:
-                found[known] = np.clip(np.sum(curves, axis=0), 0, 1)
+    if OPENS not in found:
+        found |= {name: np.clip(curve, 0, 1) for name, curve in as_arkit(motion).items()}
     return found
 
 

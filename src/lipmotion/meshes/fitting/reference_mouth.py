@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.lip_points import FACING, mouth_template
 from lipmotion.meshes.model.face_shapes import FaceShapes
-from lipmotion.meshes.model.shape_names import ARKIT_MOUTH
+from lipmotion.meshes.model.other_shapes import VOWELS
+from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VRM_VOWELS
 
 Array = NDArray[np.float64]
 Real = NDArray[np.floating[Any]] | float
@@ -36,6 +37,19 @@ def arkit_mouth() -> FaceShapes:
     facing = [(template.row(upper), template.row(lower)) for upper, lower in FACING[:3]]
     gap = np.mean([moved[:, upper, 1] - moved[:, lower, 1] for upper, lower in facing], axis=0)
     return FaceShapes(ARKIT_MOUTH, ARKIT_MOUTH, moved, gap, "arkit")
+
+
+@cache
+def vowel_mouth() -> FaceShapes:
+    """Return the vowels of VRM, made of ARKit's blendshapes (``other_shapes.VOWELS``), as displacements of points."""
+    mouth = arkit_mouth()
+    gains = np.zeros((len(VRM_VOWELS), len(mouth.known)))
+    for known, sources in VOWELS.items():
+        for vowel, gain in sources:
+            if vowel in VRM_VOWELS:
+                gains[VRM_VOWELS.index(vowel), mouth.known.index(known)] = gain
+    moved = np.einsum("vs,spd->vpd", gains, mouth.moved)
+    return FaceShapes(VRM_VOWELS, tuple(f"vowel_{name}" for name in VRM_VOWELS), moved, gains @ mouth.gap, "visemes")
 
 
 class _Regions:

@@ -21,6 +21,8 @@ ARKIT_OTHERS = (
     *("browOuterUpRight", "cheekPuff", "cheekSquintLeft", "cheekSquintRight", "noseSneerLeft", "noseSneerRight"),
 )
 """The other 24 of ARKit's 52."""
+ARKIT_52 = (*ARKIT_OTHERS[:14], *ARKIT_MOUTH[:-1], *ARKIT_OTHERS[14:], ARKIT_MOUTH[-1])
+"""All of them, in the order of ARKit's documentation: eyes, jaw and mouth, brows, cheeks, nose, tongue."""
 VISEMES_15 = ("sil", "PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa", "E", "ih", "oh", "ou")
 """The visemes of Oculus and OpenXR, in their order."""
 VRM_VOWELS = ("aa", "ih", "ou", "ee", "oh")

@@ -15,10 +15,10 @@ from lipmotion.errors import InputError
 from lipmotion.export.base import read_motion
 from lipmotion.meshes.files.live_link_table import is_live_link_file, speech_curves
 from lipmotion.pipeline.corpus.mesh_motion import SUFFIX, mesh_files, read_mesh_motion
-from lipmotion.speech.recognition.recogniser import SHORT_PAUSE_S
 from lipmotion.storage.files import sha256_of
 from lipmotion.types import Span, Timeline, Track, Unit
 from lipmotion.units import PAUSE, SILENCE, check_phones, is_silent
+from lipmotion.units.phones import SHORT_PAUSE_S
 
 DIGESTS = ("sha256", "motion_sha256", "phones_sha256", "recorder_sha256")
 """Keys of the digests in the source of an utterance; if a digest changes, the recording is prepared again."""

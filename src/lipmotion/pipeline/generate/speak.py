@@ -20,7 +20,6 @@ from lipmotion.pipeline.generate.corpus_voice import speak_from_corpus
 from lipmotion.pipeline.generate.generation_for import speaker_map
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.understand.request import Onto, SpeechRequest
-from lipmotion.speech.recognition.recogniser import SHORT_PAUSE_S
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.speech.sound.resampling import at_speech_rate
 from lipmotion.speech.voices.installed import default_voice, voice_named, voiced_sentences
@@ -30,6 +29,7 @@ from lipmotion.types import Audio, Constraints, Generation, Span, SpokenText, Ti
 from lipmotion.types.moods import MoodTag
 from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent
 from lipmotion.units.mood_tags import moods_in_time, tagged_text
+from lipmotion.units.phones import SHORT_PAUSE_S
 from lipmotion.units.sentences import MOST_CHARACTERS, sentences_of
 
 CORPUS_VOICE = "corpus"

@@ -12,6 +12,7 @@ import numpy as np
 from lipmotion.articulation.delivery import Delivery, moved_in_time
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.cues import CUE_FORMATS, OPTIONAL, CueSheet, choose_cues, format_of, write_cue_file
+from lipmotion.export.cues.sheet import CUES_FPS
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
 from lipmotion.storage.files import as_text, check_distinct, check_target
@@ -19,8 +20,6 @@ from lipmotion.types import Generation
 
 SHEET = ".cues."
 """What the name of a cue sheet among other outputs has before its format."""
-CUES_FPS = 24.0
-"""Frame rate of cues where none is given."""
 FASTEST_FPS = 60.0
 """Largest frame rate: times in cue files are in hundredths of a second, and two frames must not share one."""
 
@@ -67,9 +66,11 @@ def write_cues(
     """Write a cue sheet to one or several files, each in the format of its suffix.
 
     sheet   : from ``cues``
-    outputs : paths of files: ``.tsv``, ``.xml``, ``.json`` (formats of Rhubarb), ``.dat`` (Moho) or ``.pgo`` (Papagayo)
+    outputs : paths of files: ``.tsv``, ``.xml``, ``.json`` (formats of Rhubarb), ``.dat`` (Moho), ``.pgo`` (Papagayo),
+              ``.spine.json`` (Spine)
     speech  : the recording that was animated; ``.xml`` and ``.json`` files name it
-    form    : ``tsv``, ``xml``, ``json``, ``dat`` or ``pgo``: the format of all files; None: that of the suffix
+    form    : ``tsv``, ``xml``, ``json``, ``dat``, ``pgo`` or ``spine.json``: the format of all files; None: that of
+              their suffix
     Raises ExportError: unknown format, no such folder, or a file that cannot be written.
     Formats and folders are checked before the first file is written.
 
@@ -90,7 +91,7 @@ def write_cues(
 def cue_text(sheet: CueSheet, *, speech: str | Path = "", form: str = "tsv") -> str:
     """Return the text of the file that ``write_cues`` would write.
 
-    speech : the recording that was animated;  form : ``tsv``, ``xml``, ``json``, ``dat`` or ``pgo``
+    speech : the recording that was animated;  form : as of ``write_cues``
     """
     return CUE_FORMATS[form](sheet, as_text(speech))
 
@@ -130,7 +131,7 @@ class CueOutput(Output):
         sheet = cues(performance.generation, fps=self._fps, delivery=self.settings.delivery)
         recording = self.settings.recording
         said = "" if recording is None else as_text(recording)
-        return partial(write_cue_file, self.path, sheet, said, self.path.suffix.lower().removeprefix("."))
+        return partial(write_cue_file, self.path, sheet, said, format_of(self.path))
 
     @property
     def _fps(self) -> float:

@@ -17,17 +17,21 @@ from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.facial_animation import fap_motion
 from lipmotion.meshes.fitting.oculus_visemes import viseme_motion
-from lipmotion.meshes.fitting.reference_mouth import arkit_mouth
+from lipmotion.meshes.fitting.reference_mouth import arkit_mouth, vowel_mouth
 from lipmotion.meshes.fitting.shape_weights import shape_weights
+from lipmotion.meshes.model.other_shapes import CLOSED
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, arkit_name
 from lipmotion.pipeline.outputs.living_curves import living_curves
 from lipmotion.storage.files import whole_file
-from lipmotion.types import Gain, Generation, Motion, Pin, Prosody, Timeline, Unit
+from lipmotion.types import WEIGHT, Channel, Gain, Generation, Motion, Pin, Prosody, Timeline, Unit
 
-ARKIT, WHOLE_FACE = "arkit", "face"
-SHAPE_SETS = (ARKIT, WHOLE_FACE, "visemes", "fap")
+ARKIT, WHOLE_FACE, VOWELS = "arkit", "face", "vowels"
+LIVING_SETS = (WHOLE_FACE, VOWELS)
+"""Sets of curves with eyes, brows and head, which move on their own."""
+SHAPE_SETS = (ARKIT, WHOLE_FACE, "visemes", VOWELS, "fap")
 """Sets of curves that need no mesh: ARKit's blendshapes of the mouth, the same with eyes, brows and head (which move on
-their own), the 15 visemes of Oculus and OpenXR, and MPEG-4's facial animation parameters of lips and jaw."""
+their own), the 15 visemes of Oculus and OpenXR, the five vowels of VRM with pressed lips, eyes, brows and head, and
+MPEG-4's facial animation parameters of lips and jaw."""
 
 
 def check_curve_set(curves: str | Path) -> None:
@@ -58,9 +62,9 @@ def curves_of(
     """Return motion as curves that drive a character.
 
     Motion of blendshapes keeps its weights.
-    curves : ``arkit``, ``face``, ``visemes``, ``fap``, a table of a rig's controls (``.csv``), or a character with
-             blendshapes
-    staging, prosody : of the eyes, brows and head of ``face``, as of ``living_curves``
+    curves : ``arkit``, ``face``, ``visemes``, ``vowels``, ``fap``, a table of a rig's controls (``.csv``), or a
+             character with blendshapes
+    staging, prosody : of the eyes, brows and head of ``face`` and ``vowels``, as of ``living_curves``
     edits  : pins and gains of curves; controls of a rig also follow those of the curves that they are made of
     Raises InputError: no such set or file, the character has no blendshapes, or the motion has no channel ``opening``.
     """
@@ -100,7 +104,16 @@ def _curves_of(
     if name == WHOLE_FACE:
         mouth = shape_weights(motion, units, arkit_mouth())
         return beside(mouth, living_curves(motion, units, staging, prosody))
+    if name == VOWELS:
+        return beside(_vowel_motion(motion, units), living_curves(motion, units, staging, prosody))
     return viseme_motion(units, spoken_mouth(motion, units)) if name == "visemes" else fap_motion(motion, units)
+
+
+def _vowel_motion(motion: Motion, units: Timeline[Unit]) -> Motion:
+    """Return the weights of the vowels of VRM, and how far the lips are pressed together."""
+    pressed = spoken_mouth(motion, units).closing if CLOSED not in motion.names else motion[CLOSED]
+    closed = Motion(np.asarray(pressed)[:, None], motion.rate_hz, (Channel(CLOSED, WEIGHT),))
+    return beside(shape_weights(motion, units, vowel_mouth()), closed)
 
 
 def beside(first: Motion, second: Motion) -> Motion:

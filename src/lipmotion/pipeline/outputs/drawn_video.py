@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError
 from lipmotion.faces.base import SMALLEST_PX, TRANSPARENT, DrawsPlanes, Face, Staging
@@ -52,7 +53,7 @@ class VideoOutput(Output):
 
     def prepared(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
         face = self.settings.face
-        face.check_drawable(self.path, performance.generation.motion)
+        face.check_drawable(self.path, performance.generation)
         return partial(face.write_video, self.path, performance)
 
 
@@ -120,15 +121,24 @@ def write_drawn_face(  # noqa: PLR0913
     monitor : receives reports of the progress
     Raises ExportError: the file cannot be written.  Raises InputError: no such face, or it cannot be staged so.
     """
-    from lipmotion.export.transparent import write_pictures, write_with_alpha
-    from lipmotion.export.video import write_mp4
-
     staged, drawn = staged_face(face, staging, prosody or prosody_of_speech(sound)), None
     if path.suffix.lower() == OPAQUE_SUFFIX and isinstance(staged, DrawsPlanes):
         drawn = staged.render_planes(generation.motion, generation.units, fps=fps)
     if drawn is None:
         drawn = staged.render(generation.motion, generation.units, fps=fps)
-    frames = with_reports(drawn, int(generation.motion.time_s[-1] * fps + 1e-9) + 1, RENDERING, monitor)
+    write_frames(path, with_reports(drawn, frame_count(generation, fps), RENDERING, monitor), fps, sound)
+
+
+def frame_count(generation: Generation, fps: float) -> int:
+    """Return the number of pictures of a motion."""
+    return int(generation.motion.time_s[-1] * fps + 1e-9) + 1
+
+
+def write_frames(path: Path, frames: Iterable[NDArray[np.uint8]], fps: float, sound: Audio) -> None:
+    """Write pictures with their sound in the format of the suffix. Raises ExportError: the file cannot be written."""
+    from lipmotion.export.transparent import write_pictures, write_with_alpha
+    from lipmotion.export.video import write_mp4
+
     if is_picture_sequence(path):
         write_pictures(path, frames)
     elif path.suffix.lower() == OPAQUE_SUFFIX:

@@ -11,7 +11,7 @@ from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performanc
 
 
 class LabelOutput(Output):
-    """``.TextGrid``, ``.vtt``: phones and words, in the time of the sound."""
+    """``.TextGrid``, ``.vtt``, ``.srt``: phones and words, in the time of the sound."""
 
     @classmethod
     def suffixes(cls, settings: OutputSettings) -> tuple[str, ...]:  # noqa: D102, ARG003

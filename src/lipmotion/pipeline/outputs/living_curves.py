@@ -6,13 +6,12 @@ import numpy as np
 
 from lipmotion.faces.base import Staging, alive
 from lipmotion.meshes.fitting.eyes_and_brows import eye_and_brow_weights
+from lipmotion.meshes.model.head_angles import ANGLES
 from lipmotion.types import Channel, Motion, Prosody, Timeline, Unit
 from lipmotion.types.motion import WEIGHT
 
 RADIAN = "radian"
 """The unit of the angles of a head."""
-HEAD = ("headYaw", "headPitch", "headRoll")
-"""Angles of the head in radians: to its left, up, and to its left shoulder."""
 
 
 def living_curves(
@@ -29,11 +28,11 @@ def living_curves(
     staging : seed, and what moves on its own; None: everything moves
     prosody : of the speech, for accents of brows and head; None: they follow the opening
     frames, rate_hz : other frames than those of the motion
-    They are those of all faces with the same seed. Channels are blendshapes (weights), and ``HEAD`` in radians.
+    They are those of all faces with the same seed. Channels are blendshapes (weights), and ``ANGLES`` in radians.
     """
     hertz = rate_hz or motion.rate_hz
     time_s = np.arange(len(motion.values) if frames is None else frames) / hertz
     moved = alive(time_s, motion, units, staging, prosody)
-    curves = eye_and_brow_weights(moved) | dict(zip(HEAD, moved.turn.T, strict=True))
-    channels = tuple(Channel(name, RADIAN if name in HEAD else WEIGHT) for name in curves)
+    curves = eye_and_brow_weights(moved) | dict(zip(ANGLES, moved.turn.T, strict=True))
+    channels = tuple(Channel(name, RADIAN if name in ANGLES else WEIGHT) for name in curves)
     return Motion(np.stack(list(curves.values()), axis=1), hertz, channels)

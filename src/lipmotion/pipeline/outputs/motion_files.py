@@ -23,8 +23,9 @@ from lipmotion.meshes.files.rig_tables import CONTROL
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.facial_animation import FAP
-from lipmotion.meshes.model.shape_names import arkit_name
-from lipmotion.pipeline.outputs.curve_sets import ARKIT, WHOLE_FACE, beside, curves_of, with_curves
+from lipmotion.meshes.model.head_angles import ANGLES
+from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, arkit_name
+from lipmotion.pipeline.outputs.curve_sets import ARKIT, LIVING_SETS, VOWELS, WHOLE_FACE, beside, curves_of, with_curves
 from lipmotion.pipeline.outputs.delivered import delivered, held_mouth, with_motion
 from lipmotion.pipeline.outputs.living_curves import RADIAN, living_curves
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
@@ -56,13 +57,14 @@ class MotionOutput(Output):
 
     def check(self) -> None:  # noqa: D102
         settings = self.settings
+        check_rate(self.path, settings.rate_hz)
         if settings.recording is not None:
             check_length(self.path, settings.recording, settings.rate_hz, settings.delivery.offset_ms / 1000)
 
     def prepared(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
         settings = self.settings
         spoken, chosen, asked = performance.once(_chosen)
-        lives = motion_format(self.path).curves == WHOLE_FACE or settings.curves == WHOLE_FACE
+        lives = motion_format(self.path).curves in LIVING_SETS or settings.curves in LIVING_SETS
         prosody = performance.once(recorded_prosody) if lives else None
         named = settings.channels
         held = in_format(self.path, spoken, chosen, settings.rate_hz, settings.staging, prosody, named)
@@ -107,7 +109,7 @@ def _chosen(performance: Performance) -> tuple[Generation, Generation, Sequence[
     asked: Sequence[str] = channels or ()
     names: Sequence[str] | None = channels
     if curves is not None:
-        prosody = performance.once(recorded_prosody) if curves == WHOLE_FACE else None
+        prosody = performance.once(recorded_prosody) if curves in LIVING_SETS else None
         spoken, found = with_curves(spoken, curves, staging=settings.staging, prosody=prosody)
         asked = asked if channels or isinstance(curves, DrivenCharacter) else found
         names = found if channels is None else channels
@@ -151,7 +153,8 @@ def in_format(
     """
     form = motion_format(path)
     held = chosen
-    others = form.other_curves and all(channel.unit in CURVES for channel in held.motion.channels)
+    whole = held.motion.names == generation.motion.names and _blendshapes(generation.motion) is not None
+    others = form.other_curves and not whole and all(channel.unit in CURVES for channel in held.motion.channels)
     if form.curves and not others:
         curves = _curves(generation, form.curves, staging, prosody)
         curves = with_edited_curves(curves, generation.units, generation.curve_edits)
@@ -160,7 +163,8 @@ def in_format(
         held = held.selected(own) if own else held
     elif form.mouth and OPENING not in held.motion.names:
         held = generation
-    hertz = rate_hz or (form.rate_hz if abs(generation.motion.rate_hz - MODEL_HZ) < SAME_HZ else None)
+    of_format = form.fixed_rate or abs(generation.motion.rate_hz - MODEL_HZ) < SAME_HZ
+    hertz = rate_hz or (form.rate_hz if of_format else None)
     if hertz is None or abs(hertz - held.motion.rate_hz) < SAME_HZ:
         return held
     if held is chosen or held is generation:
@@ -193,6 +197,14 @@ def warn_of_unused(path: Path, held: Generation, asked: Sequence[str]) -> None:
         LOG.warning("%s: %s holds channels of its own, none of those that were asked for", path.name, kind)
 
 
+def check_rate(path: Path, rate_hz: float | None) -> None:
+    """Raise ExportError if a motion file cannot have a rate that the user asks for."""
+    form = motion_format(path)
+    if form.fixed_rate and rate_hz is not None and rate_hz != form.rate_hz:
+        required = f"required {form.rate_hz:g}: leave --rate out"
+        raise ExportError(f"{path}: {rate_hz:g} frames a second in {motion_suffix(path)}, {required}")
+
+
 def check_length(path: Path, speech: Path, rate_hz: float | None, later_s: float = 0.0) -> None:
     """Raise ExportError if a motion file has no room for all frames of a recording, by the length that this states.
 
@@ -214,7 +226,8 @@ def _curves(generation: Generation, name: str, staging: Staging | None, prosody:
     motion, units = generation.motion, generation.units
     own = _held_already(motion, name)
     if own is None:
-        return curves_of(motion, units, name, staging=staging, prosody=prosody)
+        found = curves_of(motion, units, name, staging=staging, prosody=prosody)
+        return _with_captured(found, motion) if name == VOWELS else found
     if name in (ARKIT, WHOLE_FACE):
         moods = [channel.name for channel in motion.channels if is_mood(channel.name)]
         own = _closed(own, curves_of(beside(own, generation.selected(moods).motion) if moods else own, units, ARKIT))
@@ -224,6 +237,16 @@ def _curves(generation: Generation, name: str, staging: Staging | None, prosody:
     added = [column for column, name in enumerate(living.names) if name not in own.names]
     channels = tuple(living.channels[column] for column in added)
     return beside(own, Motion(living.values[:, added], motion.rate_hz, channels))
+
+
+def _with_captured(curves: Motion, motion: Motion) -> Motion:
+    """Return curves in which eyes, brows and head are those of a motion, where it has them."""
+    known = {arkit_name(name) or name: name for name in reversed(motion.names)}
+    values = curves.values.astype(np.float64)
+    for column, name in enumerate(curves.names):
+        if name in known and name in (*ARKIT_OTHERS, *ANGLES):
+            values[:, column] = motion[known[name]]
+    return replace(curves, values=values)
 
 
 def _closed(own: Motion, mouth: Motion) -> Motion:

@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import in_pictures
 from lipmotion.articulation.delivery import closed_times
@@ -21,6 +20,7 @@ from lipmotion.meshes.files.usd_text import asset
 from lipmotion.meshes.files.usd_writer import write_usda
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
+from lipmotion.meshes.model.head_angles import head_quaternions
 from lipmotion.meshes.model.mesh import Blendshape
 from lipmotion.meshes.model.scene import HeadTurn, Scene
 from lipmotion.meshes.model.shape_names import by_arkit_name
@@ -111,14 +111,11 @@ def head_scene(
     staging, prosody : as of videos; size and background do not count
     The mesh is in metres. Raises InputError: the motion has no channel ``opening``.
     """
-    from scipy.spatial.transform import Rotation
-
     from lipmotion.faces.head.figure import PIVOT
     from lipmotion.faces.head.head_blendshapes import head_mesh
     from lipmotion.faces.head.performance import head_poses
     from lipmotion.faces.head.shape_fit import mouth_weights
     from lipmotion.faces.head.stage import figure
-    from lipmotion.faces.turning import turned
 
     motion, hertz = generation.motion, rate_hz or generation.motion.rate_hz
     poses = head_poses(motion, generation.units, hertz, staging, prosody)
@@ -133,8 +130,7 @@ def head_scene(
     weights = edited_weights(weights, generation.units, generation.curve_edits)
     shapes = tuple(Blendshape(each.name, each.rows, METRES * each.displacements) for each in mesh.shapes)
     scaled = replace(mesh, vertices=METRES * mesh.vertices, shapes=shapes)
-    rotations = Rotation.from_matrix(np.stack([turned(*pose.turn) for pose in poses])).as_quat()
-    turn = HeadTurn(METRES * PIVOT, character.turning(), _continued(rotations))
+    turn = HeadTurn(METRES * PIVOT, character.turning(), head_quaternions(np.stack([pose.turn for pose in poses])))
     return Scene(scaled, weights, turn, split=False)
 
 
@@ -165,13 +161,6 @@ def character_scene(
     hertz = rate_hz or motion.rate_hz
     rows = in_pictures(table, mouth.contact, motion.rate_hz, frame_times(len(table), motion.rate_hz, hertz))
     return Scene(character.mesh, Motion(rows, hertz, channels), original=character.file)
-
-
-def _continued(rotations: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return unit quaternions, each with the sign that is nearer to the one before [shape=(T, 4)]."""
-    same = np.einsum("tq,tq->t", rotations[1:], rotations[:-1]) >= 0
-    signs = np.concatenate([[1.0], np.cumprod(np.where(same, 1.0, -1.0))])
-    return rotations * signs[:, None]
 
 
 def check_sound_name(path: Path, sound: Path) -> None:

@@ -8,35 +8,42 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lipmotion.errors import ExportError, InputError
+from lipmotion.export.cues import OPTIONAL
+from lipmotion.export.cues.sheet import shown_shapes
 from lipmotion.faces.base import Face, Staging
+from lipmotion.faces.cut_out import CutOut, read_cut_out
 from lipmotion.faces.filmed.face import SUFFIX, FilmedFace, load_face
 from lipmotion.faces.mesh import MeshFace
 from lipmotion.faces.registry import FACES, face_named, staged_face
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.scene import Scene
-from lipmotion.pipeline.film.filmed_video import check_film, film_of, person_shown, refuse_film, write_film
+from lipmotion.pipeline.film.filmed_video import RENDERING, check_film, film_of, person_shown, refuse_film, write_film
+from lipmotion.pipeline.outputs.cues import check_cue_options, cues
 from lipmotion.pipeline.outputs.delivered import shown
 from lipmotion.pipeline.outputs.drawn_video import (
     DRAWN_HZ,
     OPAQUE_SUFFIX,
     check_background,
     check_drawable,
+    frame_count,
     load_drawing,
     sound_track,
     write_drawn_face,
+    write_frames,
 )
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance
 from lipmotion.pipeline.outputs.prosody import moved_prosody, prosody_of_speech
 from lipmotion.pipeline.outputs.scenes import character_scene, head_scene
 from lipmotion.storage.sources import is_file
-from lipmotion.types import Generation, Motion, Prosody
+from lipmotion.types import Generation, Prosody
 from lipmotion.types.moods import MOODS
+from lipmotion.types.progress import with_reports
 
 if TYPE_CHECKING:
     from lipmotion.pipeline.model import Model
 
 LOG = logging.getLogger("lipmotion")
-AnyFace = str | Path | Face | FilmedFace
+AnyFace = str | Path | Face | FilmedFace | CutOut
 
 
 class ShownFace(ABC):
@@ -55,9 +62,9 @@ class ShownFace(ABC):
     def check_video(self, path: Path, settings: OutputSettings) -> None:
         """Raise ExportError or InputError if a video or pictures of that name cannot show the face so."""
 
-    def check_drawable(self, path: Path, motion: Motion) -> None:
-        """Raise ExportError if motion has no channel from which the face can be drawn."""
-        check_drawable(path, motion)
+    def check_drawable(self, path: Path, generation: Generation) -> None:
+        """Raise ExportError if a generation has nothing from which the face can be drawn."""
+        check_drawable(path, generation.motion)
 
     @abstractmethod
     def write_video(self, path: Path, performance: Performance) -> None:
@@ -116,6 +123,40 @@ class ShownCharacter(ShownDrawing):
         return character_scene(generation, self.character, settings.rate_hz, staging=settings.staging, prosody=prosody)
 
 
+class ShownCutOut(ShownFace):
+    """A character of pictures, one for each mouth shape: they are shown as cues are chosen."""
+
+    def __init__(self, face: CutOut) -> None:
+        self.face = face
+
+    def check(self, settings: OutputSettings) -> None:  # noqa: D102
+        refuse_film(settings.film)
+
+    def check_video(self, path: Path, settings: OutputSettings) -> None:  # noqa: D102
+        check_background(path, settings.staging)
+        check_cue_options(_frame_rate(settings), None, self._optional)
+
+    def check_drawable(self, path: Path, generation: Generation) -> None:
+        """Raise ExportError if a generation has no phones, from which shapes are chosen."""
+        if not len(generation.units):
+            raise ExportError(
+                f"{path}: the motion has no phones, from which drawings are chosen; give them: --units FILE"
+            )
+
+    def write_video(self, path: Path, performance: Performance) -> None:  # noqa: D102
+        settings, generation, fps = performance.settings, performance.generation, _frame_rate(performance.settings)
+        sheet = cues(generation, fps=fps, shapes=self._optional, delivery=settings.delivery)
+        count = frame_count(generation, fps)
+        shown = shown_shapes(sheet)[:count]
+        frames = self.face.frames([*shown, *[shown[-1]] * (count - len(shown))], settings.staging)
+        sound = performance.once(sound_track)
+        write_frames(path, with_reports(frames, count, RENDERING, performance.monitor), fps, sound)
+
+    @property
+    def _optional(self) -> str:
+        return "".join(name for name in OPTIONAL if name in self.face.shapes)
+
+
 class ShownPerson(ShownFace):
     """A filmed face, whose mouth and jaw are stitched into footage."""
 
@@ -141,7 +182,7 @@ class ShownPerson(ShownFace):
         if path.suffix.lower() != OPAQUE_SUFFIX:
             raise ExportError(f"{path}: filmed faces are written as {OPAQUE_SUFFIX}; name the output so")
 
-    def check_drawable(self, path: Path, motion: Motion) -> None:
+    def check_drawable(self, path: Path, generation: Generation) -> None:
         """Do nothing: ``film_of`` names the channels that the face needs."""
 
     def write_video(self, path: Path, performance: Performance) -> None:  # noqa: D102
@@ -162,21 +203,26 @@ class ShownPerson(ShownFace):
 
 
 def shown_face(face: AnyFace | ShownFace) -> ShownFace:
-    """Return a face as outputs show it: of its name, of the path of a ``.face`` file, or of a value.
+    """Return a face as outputs show it: of its name, of the path of a ``.face`` file or of a folder of drawings, or of
+    a value.
 
     Raises InputError: no such face or file. Raises ModelFormatError: the file is damaged, or of another version.
     """
     if isinstance(face, ShownFace):
         return face
     opened = _opened(face)
+    if isinstance(opened, CutOut):
+        return ShownCutOut(opened)
     if isinstance(opened, FilmedFace):
         return ShownPerson(opened)
     return ShownCharacter(opened) if isinstance(opened, MeshFace) else ShownDrawing(opened)
 
 
-def _opened(face: AnyFace) -> Face | FilmedFace:
-    if isinstance(face, Face | FilmedFace):
+def _opened(face: AnyFace) -> Face | FilmedFace | CutOut:
+    if isinstance(face, Face | FilmedFace | CutOut):
         return face
+    if Path(face).is_dir() and str(face) not in FACES.names:
+        return read_cut_out(Path(face))
     if Path(face).suffix.lower() == SUFFIX:
         return load_face(face)
     beside = Path(f"{face}{SUFFIX}")

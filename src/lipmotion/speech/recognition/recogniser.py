@@ -46,6 +46,7 @@ from lipmotion.speech.recognition.recognised_speech import (
 from lipmotion.speech.recognition.word_search import WordSearch, begun_decoding, free_labels
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features, ParallelMap, Span, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, Lexicon, is_silent, most_similar_phone
+from lipmotion.units.phones import SHORT_PAUSE_S
 
 RECOGNISER_KINDS = ("auto", "words", "fast", "own", "general")
 """Phones are recognised by: ``own``: the model's own phone models alone; ``general``: those of many voices alone;
@@ -67,8 +68,6 @@ alone then. With 20 clips of GRID that raises ACC of opening on the validation l
 from 0.806 to 0.841 (transcripts)."""
 ENERGY_SMOOTHING_FRAMES = 11
 """The energy is averaged over so many frames before it rules silence out."""
-SHORT_PAUSE_S = 0.2
-"""Silence shorter than this is a pause between words."""
 
 
 class Recogniser:

@@ -1,0 +1,59 @@
+"""Mouth shapes of cue files in time: what readers of all formats share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from lipmotion.errors import InputError, shortened
+from lipmotion.export.cues.cue_shapes import REST, SHAPES
+from lipmotion.export.cues.sheet import CueSheet
+from lipmotion.types import Span, Timeline
+
+LETTERS = {name.lower(): name for name in SHAPES}
+"""Shapes by Rhubarb's letters."""
+BLAIR = {shape.blair.lower(): name for name, shape in SHAPES.items()} | {"wq": "F"}
+"""Shapes by Preston Blair's names; his E is another shape than the letter."""
+LONGEST_S = 86_400.0
+MOST_CUES = 250_000
+
+
+def shape_of(name: str, names: dict[str, str], place: str) -> str:
+    """Return the shape of a name. Raises InputError: it is none, with its place."""
+    found = names.get(name.strip().lower())
+    if found is None:
+        known = " ".join(dict.fromkeys(names))
+        raise InputError(f"{place}: no mouth shape is {shortened(name)!r}; the shapes are: {known}")
+    return found
+
+
+def cue_time(text: str, place: str) -> float:
+    """Return a time in seconds, or a number of frames. Raises InputError: it is none, with its place."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 <= value <= LONGEST_S * 1000:
+        raise InputError(f"{place}: the time is {shortened(text)!r}, required a number from 0 on")
+    return value
+
+
+def sheet_of(
+    rows: Sequence[tuple[float, str]], end_s: float, fps: float, words: Timeline[str] | None = None
+) -> CueSheet:
+    """Return a sheet of shapes that each last to the next one, with rest before the first.
+
+    rows  : starts in seconds, in order, and shapes;  end_s : of the last one
+    Raises InputError: there are none, or too many, or they are not in order.
+    """
+    if not rows:
+        raise InputError("there is no mouth shape in it; export the cues again")
+    if len(rows) > MOST_CUES or end_s > LONGEST_S:
+        raise InputError(f"{len(rows)} mouth shapes in {end_s:g} s, required at most {MOST_CUES} in {LONGEST_S:g} s")
+    whole = [(0.0, REST), *rows] if rows[0][0] > 0 else list(rows)
+    ends = [*(start_s for start_s, _ in whole[1:]), max(end_s, whole[-1][0])]
+    spans = (Span(start_s, stop_s, shape) for (start_s, shape), stop_s in zip(whole, ends, strict=True))
+    kept = Timeline(tuple(span for span in spans if span.end_s != span.start_s))
+    if not len(kept):
+        raise InputError("its mouth shapes last no time; export the cues again")
+    return CueSheet(kept, fps, "".join(SHAPES), words or Timeline(()))

@@ -1,0 +1,76 @@
+"""Cues as motion: the mouth shapes of a file, as phones in time and as curves that faces draw.
+
+Every shape becomes one phone with its mouth, and an opening and a width, which the lips reach and leave as those of
+phones (``articulation.crossfade``). So p, b and m stay closed, and lips and tongue follow from the phones.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from lipmotion.articulation.contact import opening_of
+from lipmotion.articulation.crossfade import phone_weights
+from lipmotion.articulation.lip_points import mouth_template
+from lipmotion.errors import InputError
+from lipmotion.export.cues import moho_dat, papagayo_pgo, rhubarb_json, rhubarb_tsv, rhubarb_xml
+from lipmotion.export.cues.cue_shapes import REST, SHAPES
+from lipmotion.export.cues.sheet import CueSheet
+from lipmotion.printable import is_line
+from lipmotion.storage.files import read_text_file
+from lipmotion.types import Channel, Motion, Span, Timeline, Unit
+from lipmotion.units import SILENCE
+
+PARSERS: Mapping[str, Callable[[str], CueSheet]] = {
+    ".tsv": rhubarb_tsv.parse,
+    ".xml": rhubarb_xml.parse,
+    ".json": rhubarb_json.parse,
+    ".dat": moho_dat.parse,
+    ".pgo": papagayo_pgo.parse,
+}
+"""Texts of cue files to cues, by suffix."""
+PHONE_OF = {"A": "p", "B": "s", "C": "eh", "D": "aa", "E": "ao", "F": "uw", "G": "f", "H": "l", "X": SILENCE}
+"""A phone with the mouth of each shape."""
+SHAPE_OF = {phone: shape for shape, phone in PHONE_OF.items()}
+RATE_HZ = 100.0
+WIDEST_GAP = 0.25
+"""The gap between the lips of a shape whose opening is 1, in eye distances: that of wide vowels of typical talkers."""
+WIDENING = 0.12
+"""By how much the mouth is wider than at rest where the spread of a shape is 1, as a share."""
+LARGEST_BYTES = 1 << 24
+
+
+def read_cues(path: Path) -> CueSheet:
+    """Return the cues of a file in the form of its suffix. Raises InputError: it cannot be read, or is damaged."""
+    parse = PARSERS.get(path.suffix.lower())
+    if parse is None:
+        raise InputError(f"{path}: no cues are read from {path.suffix!r}; use one of {' '.join(PARSERS)}")
+    return parse(read_text_file(path, "file of cues", LARGEST_BYTES))
+
+
+def read_cue_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
+    """Return the cues of a file as motion and phones in time. Raises InputError: as ``read_cues``."""
+    return cue_motion(read_cues(path))
+
+
+def cue_motion(sheet: CueSheet) -> tuple[Motion, Timeline[Unit]]:
+    """Return the motion of cues: ``opening`` and ``width`` at 100 frames a second, and a phone for every shape."""
+    words = sheet.words.spans
+    starts_s = [span.start_s for span in words]
+    spans = []
+    for cue in sheet.cues:
+        phone, middle_s = PHONE_OF[cue.label], (cue.start_s + cue.end_s) / 2
+        place = bisect_right(starts_s, middle_s) - 1
+        inside = place >= 0 and middle_s < words[place].end_s and phone != SILENCE and is_line(words[place].label)
+        spans.append(Span(cue.start_s, cue.end_s, Unit(phone, word=words[place].label if inside else "")))
+    units = Timeline(tuple(spans))
+    time_s = np.arange(int(sheet.duration_s * RATE_HZ + 1e-6) + 1) / RATE_HZ
+    said = phone_weights(units, time_s, lambda phone: SHAPE_OF.get(phone, REST))
+    gap = np.sum([SHAPES[name].opening * weight for name, weight in said.items()], axis=0) * WIDEST_GAP
+    spread = np.sum([SHAPES[name].spread * weight for name, weight in said.items()], axis=0)
+    width = mouth_template().width * (1 + WIDENING * spread)
+    values = np.stack([opening_of(np.where(gap < 1e-6, 0.0, gap)), width], axis=1)
+    return Motion(values, RATE_HZ, (Channel("opening"), Channel("width"))), units

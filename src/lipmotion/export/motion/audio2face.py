@@ -1,0 +1,78 @@
+"""``.a2f.json``: weights of ARKit's 52 blendshapes as NVIDIA Audio2Face exports them.
+
+``facsNames`` names the columns of ``weightMat``, one row a frame: ARKit's 52 names, or the 46 of Audio2Face's own
+solver, which ``meshes.model.other_shapes`` understands.
+
+Source: NVIDIA, "Audio2Face, Export" and "Blendshape conversion"; files of versions 2022 and 2023.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lipmotion.errors import InputError, shortened
+from lipmotion.export.base import MotionFormat
+from lipmotion.export.motion.json_stream import read_members
+from lipmotion.export.motion.rounded import formatted_rows
+from lipmotion.meshes.model.shape_names import ARKIT_52
+from lipmotion.storage.json_text import as_json
+from lipmotion.types import WEIGHT, Channel, Generation, Motion, Timeline, Unit
+
+NAMES, WEIGHTS, RATE, SOUND, POSES, FRAMES = (
+    *("facsNames", "weightMat", "exportFps", "trackPath", "numPoses", "numFrames"),
+)
+"""The members of a file."""
+RATE_HZ = 60.0
+"""What Audio2Face exports by default."""
+
+
+def write(path: Path, generation: Generation, source: Mapping[str, str], _model: Mapping[str, str]) -> None:
+    """Write one JSON object; blendshapes that the motion does not have are 0."""
+    motion = generation.motion
+    table = np.zeros((len(motion.values), len(ARKIT_52)))
+    for column, name in enumerate(ARKIT_52):
+        if name in motion.names:
+            table[:, column] = motion[name]
+    document = {RATE: motion.rate_hz, SOUND: source.get("path", ""), POSES: len(ARKIT_52), FRAMES: len(table)}
+    before = as_json({**document, NAMES: list(ARKIT_52)}, ensure_ascii=False)
+    with path.open("w", encoding="utf-8") as file:
+        file.write(f'{before[:-1]}, "{WEIGHTS}": [\n')
+        for number, row in enumerate(formatted_rows(table)):
+            file.write(f",\n[{row}]" if number else f"[{row}]")
+        file.write("\n]}\n")
+
+
+def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
+    """Return the weights of a file, and an empty timeline. Joints, where a file has them, are passed over.
+
+    Raises InputError: not such a file, no rate, or rows that do not fit the names.
+    """
+    try:
+        document = read_members(path.read_text(encoding="utf-8-sig"), WEIGHTS)
+        names, rows, rate_hz = document[NAMES], document[WEIGHTS], float(document[RATE])
+    except KeyError as error:
+        raise InputError(f"not a file of Audio2Face: it has no {error}; export it again as JSON") from error
+    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise InputError(f"not JSON ({error}); export it again") from error
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"the file of Audio2Face is damaged ({error}); export it again") from error
+    return Motion(_checked_rows(names, rows), rate_hz, tuple(Channel(name, WEIGHT) for name in names)), Timeline(())
+
+
+def _checked_rows(names: Any, rows: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise InputError(f"the member {NAMES!r} is {shortened(repr(names)[:200])}, required a list of names")
+    if not isinstance(rows, np.ndarray) or rows.ndim != 2 or rows.shape[1] != len(names):
+        shape = rows.shape if isinstance(rows, np.ndarray) else "no"
+        raise InputError(
+            f"the member {WEIGHTS!r} has {shape} rows and columns, required a column for each of {NAMES!r}"
+        )
+    return rows
+
+
+MOTION_FORMAT = MotionFormat(write, read, curves="face", rate_hz=RATE_HZ, names_sound=True)

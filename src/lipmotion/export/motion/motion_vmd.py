@@ -1,0 +1,88 @@
+"""``.vmd``: a motion of MikuMikuDance: the morphs あ い う え お ん, blinks and brows, and the turns of the head."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from lipmotion.errors import InputError
+from lipmotion.export.base import MotionFormat
+from lipmotion.export.motion.keys import key_frames
+from lipmotion.export.motion.vmd_file import RATE_HZ, Turns, VmdFile, read_vmd, write_vmd
+from lipmotion.meshes.model.head_angles import ANGLES, head_angles, head_quaternions
+from lipmotion.meshes.model.other_shapes import CLOSED
+from lipmotion.types import WEIGHT, Channel, Generation, Motion, Timeline, Unit
+
+MORPHS: Mapping[str, tuple[str, ...]] = {
+    "あ": ("aa",),
+    "い": ("ih",),
+    "う": ("ou",),
+    "え": ("ee",),
+    "お": ("oh",),
+    "ん": (CLOSED,),
+    "まばたき": ("eyeBlinkLeft", "eyeBlinkRight"),
+    "上": ("browInnerUp",),
+}
+"""The standard morphs of models, and the channels whose mean each is: vowels, pressed lips, blinks, raised brows."""
+HEAD = "頭"
+"""The bone of the head."""
+MIRRORED = np.array([-1.0, -1.0, 1.0, 1.0])
+"""Signs that turn a rotation of glTF's axes into one of MikuMikuDance's, whose z goes into the face, and back."""
+RADIAN = "radian"
+TOLERANCE = 1e-7
+"""Keys are left out where a straight line is that near."""
+
+
+def write(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
+    """Write keys of the morphs and of the head whose channels the motion has, in 30ths of a second."""
+    motion = generation.motion
+    time_s = motion.time_s
+    frames = np.rint(time_s * RATE_HZ).astype(int).tolist()
+    morphs = {}
+    for morph, sources in MORPHS.items():
+        if all(name in motion.names for name in sources):
+            values = np.mean([motion[name] for name in sources], axis=0)
+            stepped = bool({*sources} & {*generation.stepped})
+            kept = key_frames(time_s, values, TOLERANCE, stepped=stepped)
+            if stepped:  # between keys everything is linear
+                kept = sorted({*kept, *(frame - 1 for frame in kept if frame)})
+            morphs[morph] = [(frames[frame], float(values[frame])) for frame in kept]
+    bones = {}
+    if all(name in motion.names for name in ANGLES):
+        turned = head_quaternions(np.stack([motion[name] for name in ANGLES], axis=1).astype(np.float64)) * MIRRORED
+        turns: Turns = [(frame, (x, y, z, w)) for frame, (x, y, z, w) in zip(frames, turned.tolist(), strict=True)]
+        bones[HEAD] = turns
+    write_vmd(path, VmdFile(morphs, bones), "lipmotion")
+
+
+def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
+    """Return the vowels, blinks, raised brows and head's angles of a file at 30 frames a second; an empty timeline.
+
+    Weights are linear between keys, and constant before the first and after the last one. Raises InputError: no motion
+    of MikuMikuDance, or none of its morphs is one of the mouth.
+    """
+    file = read_vmd(path)
+    if not any(morph in file.morphs for morph in list(MORPHS)[:5]):
+        found = ", ".join([*file.morphs][:8]) or "none"
+        raise InputError(f"the motion has none of the morphs あ い う え お; its morphs are: {found}")
+    last = max(keys[-1][0] for keys in (*file.morphs.values(), *file.bones.values()))
+    frames = np.arange(last + 1)
+    curves: dict[str, tuple[np.ndarray, str]] = {}
+    for morph, sources in MORPHS.items():
+        if morph in file.morphs:
+            at, values = zip(*file.morphs[morph], strict=True)
+            curves |= dict.fromkeys(sources, (np.interp(frames, at, values), WEIGHT))
+    if HEAD in file.bones:
+        at, turns = zip(*file.bones[HEAD], strict=True)
+        if not all(map(any, turns)):
+            raise InputError("a rotation of the head is none (0 0 0 0); save the motion again in MikuMikuDance")
+        angles = head_angles(np.array(turns) * MIRRORED)
+        for name, column in zip(ANGLES, np.unwrap(angles, axis=0).T, strict=True):
+            curves[name] = (np.interp(frames, at, column), RADIAN)
+    table = np.stack([curve for curve, _ in curves.values()], axis=1)
+    return Motion(table, RATE_HZ, tuple(Channel(name, unit) for name, (_, unit) in curves.items())), Timeline(())
+
+
+MOTION_FORMAT = MotionFormat(write, read, curves="vowels", rate_hz=RATE_HZ, fixed_rate=True)

@@ -1,0 +1,104 @@
+"""``.anim``: an animation clip of Unity that moves blendshapes of the object that it is put on.
+
+Source: AnimationClip as Unity 2019 and later serialise it as text (YAML), serializedVersion 6. Weights go to 100.
+Between keys everything is linear; keys that a straight line between others replaces are left out, and held poses
+change at once (constant tangents).
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import ExportError
+from lipmotion.export.base import MotionFormat
+from lipmotion.export.motion.keys import key_frames
+from lipmotion.types import WEIGHT, Generation, Motion
+
+Array = NDArray[np.float64]
+FULL = 100.0
+"""A blendshape's weight where it has its whole effect."""
+TOLERANCE = 0.01
+"""Largest error of a curve through the keys that are kept, of 100."""
+DECIMALS = 4
+RENDERER = 137
+"""The class of SkinnedMeshRenderer."""
+LINEAR, CONSTANT = 69, 103
+"""Modes of the tangents of a key: straight, or held until the next key, on both sides."""
+RATE_HZ = 60.0
+_PLAIN = re.compile(r"[A-Za-z][\w.]*", re.ASCII)
+"""Names that need no quotes."""
+_EMPTY = ("m_RotationCurves", "m_CompressedRotationCurves", "m_EulerCurves", "m_PositionCurves", "m_ScaleCurves")
+
+
+def check(motion: Motion) -> None:
+    """Raise ExportError if motion has no weights, or fewer than two frames."""
+    if not any(channel.unit == WEIGHT for channel in motion.channels) or len(motion.values) < 2:
+        raise ExportError("the motion has no blendshapes, or no two frames; write .json or .csv")
+
+
+def write(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
+    """Write one clip, ``speech``, with a curve for each weight of the motion."""
+    motion = generation.motion
+    end_s = float(motion.time_s[-1])
+    curves = [line for name in _weights(motion) for line in _curve(generation, name)]
+    lines = [
+        *("%YAML 1.1", "%TAG !u! tag:unity3d.com,2011:", "--- !u!74 &7400000", "AnimationClip:"),
+        *("  m_ObjectHideFlags: 0", "  m_CorrespondingSourceObject: {fileID: 0}", "  m_PrefabInstance: {fileID: 0}"),
+        *("  m_PrefabAsset: {fileID: 0}", "  m_Name: speech", "  serializedVersion: 6", "  m_Legacy: 0"),
+        *("  m_Compressed: 0", "  m_UseHighQualityCurve: 1", *(f"  {name}: []" for name in _EMPTY)),
+        *(
+            "  m_FloatCurves:",
+            *curves,
+            "  m_PPtrCurves: []",
+            f"  m_SampleRate: {motion.rate_hz:.9g}",
+            "  m_WrapMode: 0",
+        ),
+        *("  m_Bounds:", "    m_Center: {x: 0, y: 0, z: 0}", "    m_Extent: {x: 0, y: 0, z: 0}"),
+        *("  m_ClipBindingConstant:", "    genericBindings: []", "    pptrCurveMapping: []"),
+        *("  m_AnimationClipSettings:", "    serializedVersion: 2", "    m_AdditiveReferencePoseClip: {fileID: 0}"),
+        *("    m_AdditiveReferencePoseTime: 0", "    m_StartTime: 0", f"    m_StopTime: {end_s:.6f}"),
+        *("    m_OrientationOffsetY: 0", "    m_Level: 0", "    m_CycleOffset: 0", "    m_HasAdditiveReferencePose: 0"),
+        *("    m_LoopTime: 0", "    m_LoopBlend: 0", "    m_LoopBlendOrientation: 0", "    m_LoopBlendPositionY: 0"),
+        *("    m_LoopBlendPositionXZ: 0", "    m_KeepOriginalOrientation: 0", "    m_KeepOriginalPositionY: 1"),
+        *("    m_KeepOriginalPositionXZ: 0", "    m_HeightFromFeet: 0", "    m_Mirror: 0"),
+        *("  m_EditorCurves:", *curves, "  m_EulerEditorCurves: []", "  m_HasGenericRootTransform: 0"),
+        *("  m_HasMotionFloatCurves: 0", "  m_Events: []"),
+    ]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+
+
+def _weights(motion: Motion) -> list[str]:
+    return [channel.name for channel in motion.channels if channel.unit == WEIGHT]
+
+
+def _curve(generation: Generation, name: str) -> Iterator[str]:
+    """Yield the lines of the curve of one blendshape."""
+    motion = generation.motion
+    values = np.round(FULL * motion[name].astype(np.float64), DECIMALS) + 0.0
+    steps = name in generation.stepped
+    kept = key_frames(motion.time_s, values, TOLERANCE, stepped=steps)
+    times_s, keys = motion.time_s[kept], values[kept]
+    slopes = np.diff(keys) / np.diff(times_s)
+    yield from ("  - curve:", "      serializedVersion: 2", "      m_Curve:")
+    for number, (time_s, key) in enumerate(zip(times_s.tolist(), keys.tolist(), strict=True)):
+        before, after = slopes[max(number - 1, 0)], slopes[min(number, len(slopes) - 1)]
+        yield from (
+            *("      - serializedVersion: 3", f"        time: {time_s:.6f}", f"        value: {key:.{DECIMALS}f}"),
+            f"        inSlope: {'Infinity' if steps else f'{before:.6g}'}",
+            f"        outSlope: {'Infinity' if steps else f'{after:.6g}'}",
+            *(f"        tangentMode: {CONSTANT if steps else LINEAR}", "        weightedMode: 0"),
+            *("        inWeight: 0.33333334", "        outWeight: 0.33333334"),
+        )
+    yield from ("      m_PreInfinity: 2", "      m_PostInfinity: 2", "      m_RotationOrder: 4")
+    attribute = f"blendShape.{name}"
+    yield f"    attribute: {attribute if _PLAIN.fullmatch(attribute) else json.dumps(attribute, ensure_ascii=False)}"
+    yield from ("    path: ", f"    classID: {RENDERER}", "    script: {fileID: 0}")
+
+
+MOTION_FORMAT = MotionFormat(write, check=check, curves="face", rate_hz=RATE_HZ, other_curves=True)

@@ -1,0 +1,163 @@
+"""Animations of glTF as motion: the weights of morph targets, and the expressions of a VRM animation.
+
+Source: glTF 2.0 Specification, 3.11 and Appendix C (interpolation); VRMC_vrm_animation 1.0 (VRM Consortium): the
+weight of an expression is the x of the translation of its node.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion.meshes.files.gltf_accessors import GltfArrays
+from lipmotion.meshes.files.gltf_container import GltfDocument, plain_name, read_gltf_document
+from lipmotion.meshes.files.gltf_scene import target_names
+from lipmotion.meshes.files.steady_rate import exact_rate
+from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
+
+Array = NDArray[np.float64]
+STEP, CUBIC = "STEP", "CUBICSPLINE"
+SAMPLED_HZ = 60.0
+"""Frames a second where the keys are not even."""
+EVEN_SHARE = 0.02
+"""Keys are even where steps differ by no more than this share of one."""
+SLOWEST_HZ = 10.0
+"""Even keys further apart are those of an animator, not frames."""
+LONGEST_S = 86_400.0
+ROUNDING_FRAMES = 0.01
+"""Times are in single precision: the last key may be that much before its frame."""
+ARKIT_OF = {
+    "blink": ("eyeBlinkLeft", "eyeBlinkRight"),
+    "blinkLeft": ("eyeBlinkLeft",),
+    "blinkRight": ("eyeBlinkRight",),
+}
+"""Expressions of VRM that are blendshapes of ARKit."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Track:
+    """Curves of one channel of an animation.
+
+    names  : of the S curves
+    time_s : of the K keys
+    keys   : values, with the tangents before and after where they are splines [shape=(K, S) or (K, 3, S)]
+    kind   : the interpolation
+    """
+
+    names: tuple[str, ...]
+    time_s: Array
+    keys: Array
+    kind: str
+
+    def at(self, time_s: Array) -> Array:
+        """Return the values at some times [shape=(len(time_s), S)]; constant beyond both ends."""
+        inside = np.clip(time_s, self.time_s[0], self.time_s[-1])
+        before = np.clip(np.searchsorted(self.time_s, inside, "right") - 1, 0, len(self.time_s) - 1)
+        after = np.minimum(before + 1, len(self.time_s) - 1)
+        if self.kind == STEP:
+            return np.asarray(self.keys[before])
+        step = np.maximum(self.time_s[after] - self.time_s[before], 1e-9)
+        share = ((inside - self.time_s[before]) / step)[:, None]
+        if self.kind != CUBIC:
+            return np.asarray((1 - share) * self.keys[before] + share * self.keys[after])
+        leaving, arriving = step[:, None] * self.keys[before, 2], step[:, None] * self.keys[after, 0]
+        first, last = self.keys[before, 1], self.keys[after, 1]
+        square, cube = share**2, share**3
+        return np.asarray(
+            (2 * cube - 3 * square + 1) * first
+            + (cube - 2 * square + share) * leaving
+            + (3 * square - 2 * cube) * last
+            + (cube - square) * arriving
+        )
+
+
+def read_gltf_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
+    """Return the first animation of a file that moves morph targets or expressions, as weights; an empty timeline.
+
+    Channels have the names of the targets; of several meshes with one name the first counts. Keys that are even are the
+    frames, others are sampled 60 times a second, from 0 on.
+    Raises InputError: the file is damaged or too large, or it has no such animation.
+    """
+    document = read_gltf_document(path)
+    arrays = GltfArrays(document)
+    for animation in document.items("animations"):
+        tracks = list(_tracks(document, arrays, animation))
+        if tracks:
+            return _motion(document, tracks), Timeline(())
+    raise InputError("it has no animation of morph targets or expressions; export the animation with the character")
+
+
+def _motion(document: GltfDocument, tracks: list[_Track]) -> Motion:
+    """Return all curves of some tracks at one rate."""
+    longest = max(tracks, key=lambda track: len(track.time_s))
+    end_s = max(float(track.time_s[-1]) for track in tracks)
+    hertz = _rate(longest.time_s)
+    count = int(np.floor(end_s * hertz + ROUNDING_FRAMES)) + 1
+    document.budget.spend("numbers", count * sum(len(track.names) for track in tracks))
+    time_s = np.arange(count) / hertz
+    curves: dict[str, Array] = {}
+    for track in tracks:
+        for name, curve in zip(track.names, track.at(time_s).T, strict=True):
+            for known in ARKIT_OF.get(name, (name,)):
+                curves.setdefault(known, curve)
+    return Motion(np.stack(list(curves.values()), axis=1), hertz, tuple(Channel(name, WEIGHT) for name in curves))
+
+
+def _rate(time_s: Array) -> float:
+    """Return the frames a second of even keys that begin at 0, else ``SAMPLED_HZ``."""
+    steps = np.diff(time_s)
+    if len(steps) < 2 or time_s[0] > steps[0] * EVEN_SHARE or np.ptp(steps) > EVEN_SHARE * steps.mean():
+        return SAMPLED_HZ
+    hertz = float(len(steps) / (time_s[-1] - time_s[0]))
+    return exact_rate(round(hertz, 3), 1e-3) if hertz >= SLOWEST_HZ else SAMPLED_HZ
+
+
+def _tracks(document: GltfDocument, arrays: GltfArrays, animation: dict[str, Any]) -> Iterator[_Track]:
+    """Yield what moves a face in an animation. Raises InputError: its keys are damaged."""
+    samplers, expressions = animation.get("samplers", []), _expressions(document)
+    for channel in animation.get("channels", []):
+        target, number = channel.get("target", {}), channel.get("sampler", -1)
+        node, path = target.get("node", -1), target.get("path", "")
+        if not 0 <= number < len(samplers) or node < 0:
+            continue
+        sampler = samplers[number]
+        if not {"input", "output"} <= sampler.keys():
+            continue
+        if path == "weights":
+            mesh = (
+                document.items("meshes")[owner] if (owner := document.items("nodes")[node].get("mesh", -1)) >= 0 else {}
+            )
+            names = tuple(target_names(mesh, mesh["primitives"][0])) if mesh.get("primitives") else ()
+            if names:
+                yield _track(arrays, sampler, names, 1)
+        elif path == "translation" and node in expressions:
+            yield _track(arrays, sampler, (expressions[node],), 3)
+
+
+def _track(arrays: GltfArrays, sampler: dict[str, Any], names: tuple[str, ...], width: int) -> _Track:
+    """Return the keys of a sampler; of vectors (``width`` 3) the first numbers."""
+    times = arrays.floats(sampler["input"], 1)[:, 0]
+    if not len(times) or not 0 <= times[0] <= times[-1] <= LONGEST_S or not (np.diff(times) > 0).all():
+        raise InputError("the times of an animation do not rise from 0 on, within a day; export it again")
+    kind = sampler.get("interpolation", "LINEAR")
+    rows = (3 if kind == CUBIC else 1) * len(names)
+    values = arrays.floats(sampler["output"], width, rows * len(times))[:, 0]
+    shape = (len(times), 3, len(names)) if kind == CUBIC else (len(times), len(names))
+    return _Track(names, times, values.reshape(shape), kind)
+
+
+def _expressions(document: GltfDocument) -> dict[int, str]:
+    """Return the names of the expressions of a VRM animation by the numbers of their nodes."""
+    given = document.parts.get("extensions", {}).get("VRMC_vrm_animation", {}).get("expressions", {})
+    return {
+        each["node"]: plain_name(name)
+        for kind in ("preset", "custom")
+        for name, each in given.get(kind, {}).items()
+        if "node" in each
+    }

@@ -1,0 +1,93 @@
+"""Cue files as motion: every format that is written is read, closures stay closed, and what is damaged is named."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.articulation.mouth import spoken_mouth
+from lipmotion.errors import InputError
+from lipmotion.export.base import read_motion
+from lipmotion.export.cues.base import CUE_FORMATS, write_cue_file
+from lipmotion.export.cues.cue_motion import PARSERS, cue_motion, read_cues
+from lipmotion.export.cues.cue_shapes import SHAPES
+from lipmotion.export.cues.sheet import CueSheet
+from lipmotion.types import Span, Timeline
+
+SHOWN = [("X", 0.5), ("A", 0.625), ("D", 0.875), ("G", 1.0), ("C", 1.25), ("F", 1.5), ("H", 1.625), ("B", 1.75),
+         ("E", 2.0), ("X", 2.5)]  # fmt: skip
+"""Shapes and their ends, whole frames at 24 a second."""
+
+
+@pytest.fixture
+def sheet() -> CueSheet:
+    starts = [0.0, *(end_s for _, end_s in SHOWN)]
+    cues = [Span(start_s, end_s, name) for start_s, (name, end_s) in zip(starts, SHOWN, strict=False)]
+    words = Timeline((Span(0.5, 1.0, "map"), Span(1.0, 2.0, "well")))
+    return CueSheet(Timeline(tuple(cues)), 24.0, "".join(SHAPES), words)
+
+
+@pytest.mark.parametrize("form", [form for form in CUE_FORMATS if f".{form}" in PARSERS])
+def test_what_is_written_is_read(form: str, sheet: CueSheet, tmp_path: Path) -> None:
+    write_cue_file(tmp_path / f"a.{form}", sheet, "a.wav", form)
+    again = read_cues(tmp_path / f"a.{form}")
+    assert [cue.label for cue in again.cues] == [name for name, _ in SHOWN]
+    ends_s = [end_s for _, end_s in SHOWN]
+    assert [cue.end_s for cue in again.cues] == pytest.approx(ends_s, abs=1 / 24 if form == "pgo" else 0.011)
+    motion, units = read_motion(tmp_path / f"a.{form}")
+    assert [span.label.phone for span in units] == "sil p aa f eh uw l s ao sil".split()
+    spoken = {span.label.word for span in units}
+    assert spoken == ({"", "map", "well"} if form == "pgo" else {""})
+    assert motion.time_s[-1] == pytest.approx(2.5, abs=1 / 24)
+
+
+def test_lips_close_in_a_and_are_as_open_as_the_drawings(sheet: CueSheet) -> None:
+    mouth = spoken_mouth(*cue_motion(sheet))
+    middle = {name: round(100 * (end_s - 0.0625)) for name, end_s in SHOWN}
+    assert mouth.contact[middle["A"]]
+    assert mouth.contact[:45].all()
+    gaps = [mouth.gap[middle[name]] for name in "FCD"]
+    assert gaps == sorted(gaps)
+    assert 0.03 < gaps[0] < 0.1 < gaps[2] < 0.3
+    assert mouth.tuck[middle["G"]] > 0.8
+    assert mouth.protrusion[middle["F"]] > 0.8
+    assert np.abs(np.diff(mouth.gap)).max() < 0.05
+
+
+def test_switch_data_of_rhubarb_has_letters(tmp_path: Path) -> None:
+    (tmp_path / "a.dat").write_text("MohoSwitch1\n1 X\n13 E\n25 A\n49 X\n")
+    assert [cue.label for cue in read_cues(tmp_path / "a.dat").cues] == ["X", "E", "A"]
+    (tmp_path / "a.dat").write_text("MohoSwitch1\n1 rest\n13 E\n25 WQ\n49 rest\n")
+    found = read_cues(tmp_path / "a.dat").cues
+    assert [(cue.start_s, cue.label) for cue in found] == [(0, "X"), (0.5, "C"), (1, "F")]
+
+
+ERRORS = {
+    "a.tsv": ("0.00\tX\n0.50\tQ\n", "line 2: no mouth shape is 'Q'; the shapes are: a b c d e f g h x"),
+    "b.tsv": ("0.00 X\n", "line 1: required a time, a tab and a mouth shape"),
+    "c.tsv": ("0.00\tX\nnan\tA\n", "line 2: the time is 'nan', required a number from 0 on"),
+    "d.tsv": ("1\tX\n0.5\tA\n2\tX\n", "ends at 0.5 s, before its start"),
+    "e.tsv": ("\n", "there is no mouth shape in it"),
+    "a.xml": ("<rhubarbResult/>", "there is no mouth shape in it"),
+    "b.xml": ('<mouthCue start="0" end="x">A</mouthCue>', "cue 1: the time is 'x'"),
+    "a.json": ('{"mouthCues": [{"start": 0}]}', "cue 1: no mouth shape is 'None'"),
+    "b.json": ('{"mouthCues": ', "not a file of Rhubarb"),
+    "a.dat": ("1 rest\n", "the first line is no MohoSwitch1"),
+    "b.dat": ("MohoSwitch1\n1 rest now\n", "line 2: required a frame and a mouth shape"),
+    "a.pgo": ("lipsync version 2\n", "the first line is no 'lipsync version 1'"),
+    "b.pgo": ("lipsync version 1\na.wav\n24\n", "the project ends after line 3; save it again"),
+    "c.pgo": ("lipsync version 1\na.wav\n0\n1\n1\n", "1 voices at 0 frames a second, required one"),
+    "d.pgo": ("lipsync version 1\na\n24\n9\n1\nv\nt\n1\np\n0\n8\n1\nhi 0 8\n", "line 13 is 'hi 0 8', required a word"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ERRORS)
+def test_damaged_files_are_refused(name: str, tmp_path: Path) -> None:
+    content, message = ERRORS[name]
+    (tmp_path / name).write_text(content, encoding="utf-8")
+    with pytest.raises(InputError, match=re.escape(message)):
+        read_motion(tmp_path / name)
+    assert Path(name).suffix in PARSERS
