@@ -84,6 +84,10 @@ def parse_lrs(text: str, where: str) -> TimedTranscript:
         if found is None:
             raise InputError(f"{where}: line {number} is {shortened(row.strip())!r}; required: word start end")
         start_s, end_s = (required_time(time, f"line {number}", where) for time in found.group(2, 3))
+        if end_s < start_s:
+            raise InputError(
+                f"{where}: line {number} ends at {end_s:g} s, before its start at {start_s:g} s; correct it"
+            )
         timed += timed_words(spoken_text(found[1]), start_s, end_s, where)
         check_word_count(len(timed), where)
     return in_order(lines_by_pauses(timed))
