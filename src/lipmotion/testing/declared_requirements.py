@@ -18,7 +18,7 @@ from importlib import metadata
 from typing import Any
 
 EXTRA = re.compile(r"\s*(?:\band\b)?\s*extra == '([\w-]+)'")
-REQUIREMENT = re.compile(r"\s*([\w.-]+)\s*([^;]*?)\s*(?:;\s*(.*))?")
+REQUIREMENT = re.compile(r"\s*([\w.-]+)\s*((?:\(?[<>=!][^;@]*)?)\s*(?:;\s*(.*))?")
 SPECIFIER = re.compile(r"(==|>=|<=|!=|<|>)\s*([\w.]+)")
 COMPARISONS: Mapping[str, Callable[[Any, Any], bool]] = {
     "==": operator.eq,
