@@ -75,7 +75,7 @@ model: $(VENV)/dev
 	$(BIN)/lipmotion train $(BUILD)/grid-s1 --from none --split all -o src/lipmotion/models/grid-s1.lipmotion
 
 requirements:
-	for list in core dev; do uv pip compile --universal --python-version 3.10 --generate-hashes --no-emit-index-url \
+	for list in core video dev; do uv pip compile --universal --python-version 3.10 --generate-hashes --no-emit-index-url \
 	  --no-annotate --no-header --override requirements/overrides.txt requirements/$$list.in -o requirements/$$list.txt; done
 
 clean:

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -9,6 +10,7 @@ from lipmotion.errors import LipMotionError
 from lipmotion.testing import doctor as doctor_module
 from lipmotion.testing.declared_requirements import Requirement
 from lipmotion.testing.doctor import Finding, doctor
+from lipmotion.vision.packages import missing
 
 
 @pytest.fixture
@@ -84,6 +86,26 @@ def test_whatever_a_part_raises(monkeypatch: pytest.MonkeyPatch) -> None:
     assert found == Finding("foo", "broken", "OSError: libfoo.so: cannot open; install lipmotion again")
     monkeypatch.setattr("av.codec.codecs_available", {"aac"})
     assert "no libx264, so no .mp4" in doctor_module._looked("FFmpeg", doctor_module._PARTS["FFmpeg"]).told
+
+
+@pytest.mark.parametrize(("version", "told"), [("4.10.0", "4.10.0, MediaPipe"), ("5.1.0", "another OpenCV lies over")])
+def test_face_tracking(monkeypatch: pytest.MonkeyPatch, version: str, told: str) -> None:
+    monkeypatch.setattr("lipmotion.vision.packages.import_opencv", lambda: SimpleNamespace(__version__=version))
+    monkeypatch.setattr("lipmotion.vision.packages.import_face_mesh", lambda: None)
+    monkeypatch.setattr("importlib.metadata.version", lambda _: "4.10.0.84")
+    found = doctor_module._looked("", doctor_module._PARTS["face tracking"])
+    assert found.state == "works"
+    assert told in found.told
+
+
+def test_no_face_tracking(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails() -> None:
+        raise missing("OpenCV", ImportError("libGL.so.1"))
+
+    monkeypatch.setattr("lipmotion.vision.packages.import_opencv", fails)
+    found = doctor_module._looked("", doctor_module._PARTS["face tracking"])
+    assert found.state == "absent"
+    assert "libGL.so.1" in found.told
 
 
 def test_a_damaged_model(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

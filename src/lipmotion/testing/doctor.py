@@ -12,7 +12,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Literal
 
-from lipmotion.errors import LipMotionError, ModelFormatError
+from lipmotion.errors import LipMotionError, MissingDependencyError, ModelFormatError
 from lipmotion.extensions import installed_version
 from lipmotion.testing.declared_requirements import Requirement, declared_requirements
 
@@ -33,6 +33,8 @@ WORDS = "mama"
 """A made-up second of speech: its phones with their durations in seconds, and its word."""
 LEAST_OPENING = 0.03
 """Opening of the lips that *mama* has at least, in distances between the outer eye corners."""
+OPENCV = "opencv-python-headless"
+LEAN = "another OpenCV lies over it, as pip installs with MediaPipe; without it: requirements/video.txt (docs/start.md)"
 
 
 @dataclass(frozen=True)
@@ -140,6 +142,20 @@ def _phone_recogniser() -> str:
     return phone_recogniser(name).source
 
 
+def _face_tracking() -> str:
+    """Return which OpenCV and MediaPipe are imported, and whether another OpenCV lies over that of the extra."""
+    from lipmotion.vision.packages import import_face_mesh, import_opencv
+
+    try:
+        opencv = import_opencv().__version__
+        import_face_mesh()
+    except MissingDependencyError as error:
+        raise _AbsentError(str(error)) from error
+    found = f"OpenCV {opencv}, MediaPipe {metadata.version('mediapipe')}"
+    declared = Requirement(OPENCV, "").installed
+    return found if declared.startswith(opencv) else f"{found}; {OPENCV} is {declared or 'not installed'}: {LEAN}"
+
+
 def _model() -> str:
     """Return version, size and digest of the model that ships, once it is read."""
     from lipmotion.pipeline.model import load_model, read_header, shipped_path
@@ -207,6 +223,7 @@ def _main_path() -> str:
 _PARTS: dict[str, Callable[[], str]] = {
     "FFmpeg": _ffmpeg,
     "phone recogniser": _phone_recogniser,
+    "face tracking": _face_tracking,
     "model that ships": _model,
     "compiled kernels": _compiled_kernels,
     "temporary folder": _temporary_folder,
