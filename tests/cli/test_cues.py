@@ -53,9 +53,9 @@ def test_a_format_whatever_the_suffix(run: RunCommand, basics: tuple[object, ...
 
 def test_a_folder(run: RunCommand, basics: tuple[object, ...], here: Path, toy_speech: Path) -> None:
     (here / "made").mkdir()
-    done = run(*basics, "-o", "new/deep/", "made", "a.json", "--format", "dat")
-    assert done == (0, [f"new/deep/{toy_speech.stem}.dat", f"made/{toy_speech.stem}.dat", "a.json"], [])
-    assert (here / done.out[0]).read_bytes() == (here / done.out[1]).read_bytes()
+    new, made = f"new/deep/{toy_speech.stem}.dat", f"made/{toy_speech.stem}.dat"
+    assert run(*basics, "-o", "new/deep/", "made", "a.json", "--format", "dat") == (0, [new, made, "a.json"], [])
+    assert (here / new).read_bytes() == (here / made).read_bytes()
     assert run(*basics, "-o", "new/").out == [f"new/{toy_speech.stem}.tsv"]
 
 

@@ -67,7 +67,7 @@ end
 """
 
 
-class Place(NamedTuple):
+class CommandPlace(NamedTuple):
     """A place in the command line: of the program itself, of a verb, or of an action of a verb.
 
     path    : the verb and the action that lead there
@@ -90,7 +90,7 @@ class Place(NamedTuple):
         return shlex.quote(self.name)
 
 
-def places(parser: argparse.ArgumentParser, path: tuple[str, ...] = ()) -> Iterator[Place]:
+def places(parser: argparse.ArgumentParser, path: tuple[str, ...] = ()) -> Iterator[CommandPlace]:
     """Yield all places of a command line, those that hold others first."""
     options, following = [], []
     parts: list[tuple[str, argparse.ArgumentParser]] = []
@@ -104,7 +104,7 @@ def places(parser: argparse.ArgumentParser, path: tuple[str, ...] = ()) -> Itera
             options.append((tuple(action.option_strings), told % {"default": action.default} if told else "", values))
         elif action.choices:
             following += [(str(choice), told) for choice in action.choices]
-    yield Place(path, tuple(options), tuple(following))
+    yield CommandPlace(path, tuple(options), tuple(following))
     for name, part in parts:
         yield from places(part, (*path, name))
 
@@ -114,7 +114,7 @@ def script(shell: str, parser: argparse.ArgumentParser) -> str:
     return SHELLS[shell](list(places(parser)))
 
 
-def _posix(frame: str, found: list[Place]) -> str:
+def _posix(frame: str, found: list[CommandPlace]) -> str:
     """Return a script with the tables of the shared function."""
     values = []
     for place in found:
@@ -135,15 +135,15 @@ def _case(pattern: str, words: Iterable[str], end: str = "") -> str:
     return f"        {pattern}) echo {shlex.quote(' '.join(words))}{end} ;;"
 
 
-def _bash(found: list[Place]) -> str:
+def _bash(found: list[CommandPlace]) -> str:
     return _posix(BASH, found)
 
 
-def _zsh(found: list[Place]) -> str:
+def _zsh(found: list[CommandPlace]) -> str:
     return _posix(ZSH, found)
 
 
-def _fish(found: list[Place]) -> str:
+def _fish(found: list[CommandPlace]) -> str:
     """Return a script of one line for each option, and for each word that may stand where no option does."""
     lines = []
     for place in found:
@@ -162,5 +162,5 @@ def _fish_word(text: str) -> str:
     return f"'{escaped}'"
 
 
-SHELLS: dict[str, Callable[[list[Place]], str]] = {"bash": _bash, "zsh": _zsh, "fish": _fish}
+SHELLS: dict[str, Callable[[list[CommandPlace]], str]] = {"bash": _bash, "zsh": _zsh, "fish": _fish}
 """What writes the script of each shell."""
