@@ -5,7 +5,7 @@ import json
 import pytest
 
 from cli.conftest import RunCommand
-from lipmotion.testing.doctor import Finding
+from lipmotion.cli.installation.doctor import Finding
 
 GOOD = (Finding("numpy", "works", "2.4"), Finding("[vosk]", "absent", "pip install 'lipmotion[vosk]'"))
 BROKEN = Finding("main path", "broken", "no model")
@@ -15,7 +15,7 @@ BROKEN = Finding("main path", "broken", "no model")
 def found(monkeypatch: pytest.MonkeyPatch) -> list[Finding]:
     """What is found, which a test may change."""
     findings = list(GOOD)
-    monkeypatch.setattr("lipmotion.testing.doctor.doctor", lambda: iter(findings))
+    monkeypatch.setattr("lipmotion.cli.installation.doctor.doctor", lambda: iter(findings))
     return findings
 
 

@@ -17,9 +17,9 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Print what is found, one line for each part. Raises LipMotionError, of exit code 1: something is broken."""
+    from lipmotion.cli.installation.doctor import doctor
     from lipmotion.cli.terminal.progress import reporting
     from lipmotion.errors import LipMotionError
-    from lipmotion.testing.doctor import doctor
     from lipmotion.types.progress import Item
 
     broken = []

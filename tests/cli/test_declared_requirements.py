@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.testing.declared_requirements import Requirement, declared_requirements, requirement
-from lipmotion.testing.doctor import EXTRAS
+from lipmotion.cli.installation.declared_requirements import Requirement, declared_requirements, requirement
+from lipmotion.cli.installation.doctor import EXTRAS
 
 PYPROJECT = Path(__file__).parents[2] / "pyproject.toml"
 

@@ -12,9 +12,9 @@ from importlib import metadata
 from pathlib import Path
 from typing import Literal
 
+from lipmotion.cli.installation.declared_requirements import Requirement, declared_requirements
 from lipmotion.errors import LipMotionError, MissingDependencyError, ModelFormatError
 from lipmotion.extensions import installed_version
-from lipmotion.testing.declared_requirements import Requirement, declared_requirements
 
 State = Literal["works", "absent", "broken"]
 EXTRAS = {
@@ -61,7 +61,6 @@ def doctor() -> Iterator[Finding]:
     yield from (_package(each) for each in declared if not each.extra)
     for extra in sorted({each.extra for each in declared} - {""}):
         yield _extra(extra, [each for each in declared if each.extra == extra])
-    yield from _voices()
     for name, look in _PARTS.items():
         yield _looked(name, look)
 
@@ -89,23 +88,6 @@ def _extra(name: str, its: list[Requirement]) -> Finding:
     return Finding(f"[{name}]", "works", ", ".join(f"{each.name} {each.installed}" for each in its))
 
 
-def _voices() -> Iterator[Finding]:
-    """Yield what is found of each synthesiser."""
-    from lipmotion.speech.voices.installed import SYNTHESISERS, how_to_install
-
-    for each in SYNTHESISERS.values():
-        name = f"voices of {each.name}"
-        try:
-            count, others = len(each.voices()), len(each.others())
-        except LipMotionError as error:
-            yield Finding(name, "absent", f"installed, but does not work: {error}")
-            continue
-        if count + others:
-            yield Finding(name, "works", f"{count} of American English, {others} others")
-        else:
-            yield Finding(name, "absent", f"for 'speak' and training on many voices: {how_to_install(each)}")
-
-
 def _looked(name: str, look: Callable[[], str]) -> Finding:
     """Return what a look at a part says; whatever it raises, the part is broken."""
     try:
@@ -131,6 +113,26 @@ def _ffmpeg() -> str:
     if missing:
         raise LipMotionError(f"no {' and no '.join(missing)}, so no .mp4; install PyAV as a wheel: pip install -U av")
     return f"{getattr(av, 'ffmpeg_version_info', '')} in PyAV {metadata.version('av')}, with H.264 and AAC".strip()
+
+
+def _voices() -> str:
+    """Return how many voices each synthesiser has, and how to install the others."""
+    from lipmotion.speech.voices.installed import SYNTHESISERS, how_to_install, nothing_installed
+
+    found, others = [], []
+    for each in SYNTHESISERS.values():
+        try:
+            count = len(each.voices()) + len(each.others())
+        except LipMotionError as error:
+            others.append(f"{each.name} does not work ({error})")
+            continue
+        if count:
+            found.append(f"{each.name} {count}")
+        else:
+            others.append(f"no {each.name} ({how_to_install(each)})")
+    if not found:
+        raise _AbsentError(f"{EXTRAS['text']}; {nothing_installed()}")
+    return "; ".join([*found, *others])
 
 
 def _phone_recogniser() -> str:
@@ -222,6 +224,7 @@ def _main_path() -> str:
 
 _PARTS: dict[str, Callable[[], str]] = {
     "FFmpeg": _ffmpeg,
+    "voices": _voices,
     "phone recogniser": _phone_recogniser,
     "face tracking": _face_tracking,
     "model that ships": _model,

@@ -1,16 +1,22 @@
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
+from cli.conftest import RunCommand
+from lipmotion.cli.installation import doctor as doctor_module
+from lipmotion.cli.installation.declared_requirements import Requirement
+from lipmotion.cli.installation.doctor import Finding, doctor
 from lipmotion.errors import LipMotionError
-from lipmotion.testing import doctor as doctor_module
-from lipmotion.testing.declared_requirements import Requirement
-from lipmotion.testing.doctor import Finding, doctor
+from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.vision.packages import missing
+
+MAIN = "from lipmotion.cli.main import main; sys.exit(main())"
 
 
 @pytest.fixture
@@ -49,22 +55,22 @@ def test_without_metadata(declared: Callable[..., dict[str, Finding]]) -> None:
     assert declared()["packages"].state == "absent"
 
 
-def test_a_synthesiser_that_does_not_work(
-    declared: Callable[..., dict[str, Finding]], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from dataclasses import replace
-
+def test_voices(monkeypatch: pytest.MonkeyPatch) -> None:
     from lipmotion.speech.voices.installed import SYNTHESISERS
 
     def fails() -> tuple[()]:
         raise LipMotionError("no data")
 
-    some = SYNTHESISERS["flite"]
-    changed = {"a": replace(some, name="a", voices=fails), "b": replace(some, name="b", voices=tuple, others=tuple)}
+    some = replace(SYNTHESISERS["flite"], voices=tuple, others=tuple)
+    speaking = replace(some, name="c", voices=lambda: (SyntheticVoice("kal", "c", "kal"),))
+    changed = {"a": replace(some, name="a", voices=fails), "b": replace(some, name="b"), "c": speaking}
     monkeypatch.setattr("lipmotion.speech.voices.installed.SYNTHESISERS", changed)
-    found = declared()
-    assert "does not work: no data" in found["voices of a"].told
-    assert "apt install" in found["voices of b"].told
+    found = doctor_module._looked("voices", doctor_module._PARTS["voices"])
+    assert (found.state, found.told) == ("works", "c 1; a does not work (no data); no b (apt install flite)")
+    del changed["c"]
+    found = doctor_module._looked("voices", doctor_module._PARTS["voices"])
+    assert found.state == "absent"
+    assert "no speech synthesiser is installed; install one: pip install" in found.told
 
 
 def test_folders_that_cannot_be_written(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -121,3 +127,17 @@ def test_the_main_path() -> None:
     found = doctor_module._looked("main path", doctor_module._PARTS["main path"])
     assert found.state == "works"
     assert "1.0 s of made-up speech → json, cues.tsv, mp4; the lips open by 0." in found.told
+
+
+@pytest.mark.long
+def test_without_numpy(run_outside: RunCommand, tmp_path: Path) -> None:
+    """What most needs a doctor: nothing of it is imported before it is looked at."""
+    for module in ("numpy", "av"):
+        (tmp_path / f"{module}.py").write_text(f"raise ImportError('no {module}')")
+    program = (sys.executable, "-c", f"import sys; sys.path.insert(0, {str(tmp_path)!r}); " + MAIN)
+    done = run_outside("doctor", program=program)
+    states = {line[8:28].strip(): line[:8].strip() for line in done.out}
+    assert done.code == 1
+    assert {states["FFmpeg"], states["main path"], states["model that ships"]} == {"broken"}
+    assert states["temporary folder"] == "works"
+    assert "broken: FFmpeg" in done.err[-1]
