@@ -81,7 +81,7 @@ site: $(VENV)/site
 	  -c docs -d $(BUILD)/site-cache . $(BUILD)/site
 
 requirements:
-	for list in core dev site; do uv pip compile --universal --python-version 3.10 --generate-hashes --no-emit-index-url \
+	for list in core video dev site; do uv pip compile --universal --python-version 3.10 --generate-hashes --no-emit-index-url \
 	  --no-annotate --no-header --override requirements/overrides.txt requirements/$$list.in -o requirements/$$list.txt; done
 
 clean:

@@ -38,6 +38,8 @@ SEE = {
     "study": "study study-analysis",
     "info": "start",
     "cite": "glossary",
+    "doctor": "start",
+    "completion": "verbs",
 }
 """The pages on each verb, without suffix."""
 

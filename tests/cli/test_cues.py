@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from cli.conftest import Done, RunCommand, is_one_error
+from lipmotion.cli.command_line import parser
 from lipmotion.cli.main import main
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import load_model
@@ -48,6 +49,58 @@ def test_it_is_the_functions_of_the_same_names(
 def test_a_format_whatever_the_suffix(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
     assert run(*basics, "-o", "mouth.txt", "-f", "dat") == (0, ["mouth.txt"], [])
     assert (here / "mouth.txt").read_text().startswith("MohoSwitch1\n1 ")
+
+
+def test_a_folder(run: RunCommand, basics: tuple[object, ...], here: Path, toy_speech: Path) -> None:
+    (here / "made").mkdir()
+    new, made = f"new/deep/{toy_speech.stem}.dat", f"made/{toy_speech.stem}.dat"
+    assert run(*basics, "-o", "new/deep/", "made", "a.json", "--format", "dat") == (0, [new, made, "a.json"], [])
+    assert (here / new).read_bytes() == (here / made).read_bytes()
+    assert run(*basics, "-o", "new/").out == [f"new/{toy_speech.stem}.tsv"]
+
+
+def test_folders_that_cannot_be(run: RunCommand, basics: tuple[object, ...], here: Path, toy_speech: Path) -> None:
+    words = here / f"{toy_speech.stem}.tsv"
+    words.write_text("see bob papa mama")
+    for done, code, message in (
+        (run("cues", "-", "-o", "out/"), 3, "comes through a pipe has no name"),
+        (run(*basics, "-o", "out/", "--hold", "0"), 3, "hold is 0 frames"),
+        (run(*basics, "-o", f"{here}/", "--transcript", words), 7, "is the transcript"),
+    ):
+        assert is_one_error(done, code)
+        assert message in done.err[0]
+    assert list(here.iterdir()) == [words]
+    assert words.read_text() == "see bob papa mama"
+
+
+def test_options_of_rhubarb(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
+    (here / "dialog").write_text("see bob papa mama")
+    ours = ("--transcript", "see bob papa mama", "--recogniser", "fast", "--shapes", "GX", "--fps", "30", "-f", "dat")
+    theirs = ("-d", "dialog", "-r", "phonetic", "--extendedShapes", "GX", "--datFrameRate", "30", "--exportFormat=dat")
+    without_effect = ("-q", "--datUsePrestonBlair")
+    written = run(*basics, *ours)
+    assert written.code == 0
+    assert run(*basics, *theirs, *without_effect) == written
+
+
+def test_recognisers_of_rhubarb() -> None:
+    understood = parser()
+    for name, ours in (("pocketSphinx", "auto"), ("phonetic", "fast"), ("general", "general")):
+        assert understood.parse_args(["cues", "a.wav", "--recognizer", name]).recogniser == ours
+    assert understood.parse_args(["cues", "a.wav"]).recogniser == "auto"
+
+
+def test_options_of_rhubarb_without_a_counterpart(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
+    for words, answer in (
+        (["--threads", "2"], "lipmotion batch --workers N"),
+        (["--logFile", "a.log"], "2> FILE"),
+        (["--consoleLevel", "Error"], "--machineReadable"),
+        (["-d", "missing"], "no such file: 'missing'"),
+    ):
+        done = run(*basics, *words)
+        assert (done.code, done.out) == (2, [])
+        assert answer in done.err[-1]
+    assert list(here.iterdir()) == []
 
 
 def test_transcript_and_edited_phones(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:

@@ -36,6 +36,13 @@ def test_a_folder_of_recordings(run: RunCommand, takes: Path, toy_model_file: Pa
     assert (here / "out" / "a.csv").read_bytes() == (here / "out" / "b.csv").read_bytes()
 
 
+def test_a_folder_and_a_file_for_one_recording(run: RunCommand, takes: Path, toy_model_file: Path, here: Path) -> None:
+    (here / "made").mkdir()
+    recording = next(takes.glob("a.*"))
+    done = run("animate", recording, "--model", toy_model_file, "-o", "new/", "made", "b.csv")
+    assert done == (0, ["new/a.json", "made/a.json", "b.csv"], [])
+
+
 def test_words_beside_recordings_are_used(
     run: RunCommand, takes: Path, toy_model_file: Path, toy_sentence: ToySentence, here: Path
 ) -> None:
@@ -75,8 +82,8 @@ def test_places_that_cannot_be(run: RunCommand, takes: Path, toy_model_file: Pat
     for words, code, message in (
         (["-", "-o", "out/"], 3, "comes through a pipe has no name"),
         (["takes/a.wav", "-", "-o", "out/"], 3, "comes through a pipe has no name"),
-        (["takes/a.wav", "-o", "out/", "b.json"], 7, "b.json: is one file, and files do not mix with folders"),
-        (["takes/a.wav", "-o", "out/", "-"], 7, "-: is one file, and files do not mix with folders"),
+        (["takes", "-o", "out/", "b.json"], 7, "b.json: is one file, and there are 2 recordings"),
+        (["takes/a.wav", "-o", "out/", "-"], 7, "-: is one file, and no folder"),
         (["takes", "-o", "out/in/", "--to", "jsn"], 7, "unknown format '.jsn'"),
     ):
         done = run("animate", *words, "--model", toy_model_file)

@@ -24,8 +24,10 @@ from lipmotion.cli.verbs import (
     character,
     cite,
     compare,
+    completion,
     corpus,
     cues,
+    doctor,
     edit,
     evaluate,
     experiment,
@@ -43,6 +45,7 @@ from lipmotion.errors import ExportError
 VERBS = (
     *(animate, batch, speak, render, edit, explain, cues, words, corpus, train, adapt, face),
     *(character, addon, evaluate, compare, experiment, study, info, cite),
+    *(doctor, completion),
 )
 EXIT_CODES = """exit codes: 0 done, 1 a bug, 2 wrong command line, 3 unusable input, 4 corpus, 5 alignment,
 6 model file, 7 output, 8 missing package, 130 interrupted, 143 terminated"""

@@ -29,10 +29,10 @@ class Progress:
 
 @dataclass(frozen=True)
 class Item:
-    """A report that the work on one recording is finished.
+    """A report that the work on one recording is finished; of ``lipmotion doctor``, on a part of the installation.
 
     name    : of the recording
-    outcome : ``prepared``, ``kept`` (it was prepared before) or ``skipped``
+    outcome : ``prepared``, ``kept`` (it was prepared before) or ``skipped``; of a part, its state
     reason  : why it was skipped, or remarks on it
     """
 

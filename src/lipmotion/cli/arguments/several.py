@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -30,19 +31,46 @@ def animated_one_by_one(job: Job, given: Sequence[Path], options: argparse.Names
     Raises InputError: a transcript, units or a picture of posteriors, which belong to one recording; or a pipe.
     Raises the error of the highest exit code among those that occurred, with the number of recordings that failed.
     """
-    from lipmotion.errors import InputError
     from lipmotion.pipeline.understand.recordings import is_for_several, recordings_of
 
     if len(given) == 1 and not (given[0].is_dir() or any(map(is_for_several, job.outputs.files))):
         return False
-    for recording in given:
-        if is_pipe(recording):
-            raise InputError(
-                f"{recording}: what comes through a pipe has no name for a file in a folder; animate it alone, with "
-                "the name of a file: -o FILE.json"
-            )
+    _check_named(given)
     _animate_each(_one_by_one(job, recordings_of(given)), options, report)
     return True
+
+
+@contextmanager
+def placed_outputs(recording: Path, outputs: Sequence[str], kind: str) -> Iterator[list[Path]]:
+    """Yield the output files of one recording; of folders, which are made, the files in them.
+
+    kind : suffix of a file in a folder, without the dot
+    If the block fails, no new folders are left.
+    Raises InputError: a folder for what comes through a pipe. Raises ExportError: as ``planned_outputs``.
+    """
+    from lipmotion.pipeline.understand.recordings import is_for_several, planned_outputs
+    from lipmotion.storage.files import made_folders
+
+    if not any(map(is_for_several, outputs)):
+        yield [Path(output) for output in outputs]
+        return
+    _check_named([recording])
+    (planned,) = planned_outputs([recording], outputs, [kind])
+    files = [Path(file) for file in planned]
+    with made_folders({file.parent for file in files}):
+        yield files
+
+
+def _check_named(recordings: Sequence[Path]) -> None:
+    """Raise InputError where a recording has no name for a file in a folder."""
+    for recording in recordings:
+        if is_pipe(recording):
+            from lipmotion.errors import InputError
+
+            raise InputError(
+                f"{recording}: what comes through a pipe has no name for a file in a folder; give it alone, with "
+                "the name of a file: -o FILE.json"
+            )
 
 
 def _one_by_one(job: Job, recordings: Sequence[Path]) -> list[OpenedJob]:

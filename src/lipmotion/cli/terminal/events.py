@@ -18,7 +18,7 @@ STATUS_VERBS, LINES_VERBS = (
     ("cues",),
     (
         *("animate", "batch", "render", "edit", "face", "speak", "words", "corpus", "train"),
-        *("evaluate", "compare", "experiment", "study"),
+        *("evaluate", "compare", "experiment", "study", "doctor"),
     ),
 )
 

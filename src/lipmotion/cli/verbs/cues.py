@@ -7,8 +7,10 @@ from contextlib import nullcontext
 from typing import Any
 
 from lipmotion.cli.arguments.declared import add_options, part_of
-from lipmotion.cli.arguments.paths import add_output
+from lipmotion.cli.arguments.paths import add_output, check_paths
 from lipmotion.cli.arguments.pipes import is_pipe, read_pipe
+from lipmotion.cli.arguments.rhubarb_options import add_rhubarb_options
+from lipmotion.cli.arguments.several import placed_outputs
 from lipmotion.cli.terminal.printing import flush_output, print_line, print_lines
 from lipmotion.cli.terminal.status import status_lines
 from lipmotion.pipeline.job import Request
@@ -22,22 +24,19 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     add_options(parser, Request)
     add = parser.add_argument
-    outputs: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
-    add_output(
-        parser, "-o", "--output", force=True, help="FILE.tsv .xml .json .dat .pgo .spine.json, or several", **outputs
-    )
-    add(
-        "-f",
-        "--format",
-        choices=("tsv", "xml", "json", "dat", "pgo", "spine.json"),
-        help="(default: that of the suffix; tsv on standard output)",
-    )
+    outputs: dict[str, Any] = {"nargs": "+", "action": "extend", "default": [], "type": str}
+    files = "FILE.tsv .xml .json .dat .pgo .spine.json, or several; FOLDER/"
+    add_output(parser, "-o", "--output", force=True, help=files, **outputs)
+    kinds = ("tsv", "xml", "json", "dat", "pgo", "spine.json")
+    told = "(default: that of the suffix; tsv on standard output and in a folder)"
+    add("-f", "--format", "--exportFormat", choices=kinds, help=told)
     add("--fps", type=float, default=24.0, help="frames per second of the animation (default: 24)")
     add("--hold", type=int, metavar="FRAMES", help="minimum length of a shape (default: that of two frames at 24 fps)")
     add("--shapes", default="GHX", help="optional shapes that the character has (default: GHX; none: '')")
     add("--machine-readable", "--machineReadable", action="store_true", help="progress as JSON lines on standard error")
     hold = "hold every shape for at least N ms, as --hold FRAMES"
     add_options(parser, Delivery, but=("stepped",), min_hold_ms={"help": hold})
+    add_rhubarb_options(parser)
     parser.set_defaults(run=run)
 
 
@@ -51,7 +50,9 @@ def run(options: argparse.Namespace) -> None:
 
     status = status_lines(options) if options.machine_readable else nullcontext(lambda _: None)
     piped = is_pipe(options.speech)
-    with status as set_progress, read_pipe(options.speech) as speech:
+    placed = placed_outputs(options.speech, options.output, options.format or "tsv")
+    with status as set_progress, placed as options.output, read_pipe(options.speech) as speech:
+        check_paths(options)  # in a folder it may be a file that is read
         delivery, asked = part_of(options, Delivery()), part_of(options, Request(), recording=speech)
         check_cue_options(options.fps, options.hold, options.shapes)
         check_cue_outputs(options.output, speech, options.format)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
@@ -48,3 +49,11 @@ class _Cache(FunctionCache):  # type: ignore[misc] # of a package without types
         """Store the machine code for a signature, if that is possible."""
         with suppress(OSError):
             super().save_overload(sig, data)
+
+
+def cache_folder() -> Path | None:
+    """Return the folder where machine code is kept between processes; None: nowhere can be written."""
+    try:
+        return Path(_Cache(cache_folder).cache_path)
+    except RuntimeError:
+        return None

@@ -44,21 +44,20 @@ def is_for_several(output: str) -> bool:
 def planned_outputs(recordings: Sequence[Path], outputs: Sequence[str], kinds: Sequence[str]) -> list[list[str]]:
     """Return the outputs of each recording.
 
-    outputs : folders, for which every kind is written, and paths with ``{name}``
+    outputs : folders, for which every kind is written, and paths with ``{name}``; of one recording, files, too
     kinds   : suffixes without the dot, as ``json``
-    Raises ExportError: an output is neither, or two recordings would be written to one file.
+    Raises ExportError: an output is none of these, or two recordings would be written to one file.
     """
     templates: list[str] = []
     for output in outputs:
-        if not is_for_several(output):
-            several = f"there are {len(recordings)} recordings"
-            mixed = f"files do not mix with folders, nor with names with {NAME}"
+        is_file = not is_for_several(output)
+        if is_file and (len(recordings) > 1 or output == "-"):
+            several = f"there are {len(recordings)} recordings" if len(recordings) > 1 else "no folder"
             raise ExportError(
-                f"{output}: is one file, and {several if len(recordings) > 1 else mixed}; give a folder, with a slash "
-                f"at its end, or {NAME} in the name of the file: 'out/{NAME}{Path(output).suffix or '.json'}'"
+                f"{output}: is one file, and {several}; give a folder, with a slash at its end, or {NAME} in the name "
+                f"of the file: 'out/{NAME}{Path(output).suffix or '.json'}'"
             )
-        is_template = NAME in output
-        templates += [output] if is_template else [str(Path(output) / f"{NAME}.{kind}") for kind in kinds]
+        templates += [output] if is_file or NAME in output else [str(Path(output) / f"{NAME}.{kind}") for kind in kinds]
     planned = [[each.replace(NAME, recording.stem) for each in templates] for recording in recordings]
     seen: dict[str, Path] = {}
     for recording, files in zip(recordings, planned, strict=True):

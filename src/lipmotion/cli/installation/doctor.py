@@ -1,0 +1,235 @@
+"""What is installed, what missing parts would bring, and whether the main path works on this machine."""
+
+from __future__ import annotations
+
+import math
+import os
+import platform
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Literal
+
+from lipmotion.cli.installation.declared_requirements import Requirement, declared_requirements
+from lipmotion.errors import LipMotionError, MissingDependencyError, ModelFormatError
+from lipmotion.extensions import installed_version
+
+State = Literal["works", "absent", "broken"]
+EXTRAS = {
+    "video": "face tracking: corpora, faces and measures from videos",
+    "text": "espeak-ng: text to speech, and other languages than English",
+    "plots": "pictures of 'experiment xieliu2007'",
+    "whisper": "words recognised by faster-whisper, with a model of yours",
+    "vosk": "words recognised by Vosk, with a model of yours",
+    "network": "the recurrent network of 'experiment xieliu2007'",
+    "cluster": "'batch --cluster'",
+    "study": "the page of 'study serve'",
+}
+"""What each extra of the package brings."""
+PHONES = (("sil", 0.3), ("m", 0.09), ("aa", 0.16), ("m", 0.09), ("ax", 0.1), ("sil", 0.3))
+WORDS = "mama"
+"""A made-up second of speech: its phones with their durations in seconds, and its word."""
+LEAST_OPENING = 0.03
+"""Opening of the lips that *mama* has at least, in distances between the outer eye corners."""
+OPENCV = "opencv-python-headless"
+LEAN = "another OpenCV lies over it, as pip installs with MediaPipe; without it: requirements/video.txt (docs/start.md)"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that was looked at.
+
+    name  : what it is
+    state : ``works``, ``absent`` (a part that nothing else needs) or ``broken``
+    told  : what was found; of what is absent or broken, what it would bring and what to do
+    """
+
+    name: str
+    state: State
+    told: str
+
+
+def doctor() -> Iterator[Finding]:
+    """Yield what is found out about this installation, the main path last. Nothing is left on the disk."""
+    system = f"{platform.python_version()}, {platform.system()} {platform.machine()}"
+    yield Finding("lipmotion", "works", f"{installed_version()}, Python {system}")
+    declared = declared_requirements()
+    if not declared:
+        yield Finding("packages", "absent", "not known: lipmotion runs from its sources; to install it: pip install .")
+    yield from (_package(each) for each in declared if not each.extra)
+    for extra in sorted({each.extra for each in declared} - {""}):
+        yield _extra(extra, [each for each in declared if each.extra == extra])
+    for name, look in _PARTS.items():
+        yield _looked(name, look)
+
+
+def _package(each: Requirement) -> Finding:
+    """Return what is found of a package that is always required."""
+    if not each.applies:
+        return Finding(each.name, "absent", f"there is none for this Python or system (required: {each.marker})")
+    if each.is_met:
+        return Finding(each.name, "works", each.installed)
+    found = each.installed or "not installed"
+    return Finding(each.name, "broken", f"{found}, required {each.versions}: pip install '{each.name}{each.versions}'")
+
+
+def _extra(name: str, its: list[Requirement]) -> Finding:
+    """Return what is found of the packages of an extra."""
+    brings = EXTRAS.get(name, "")
+    other = next((each for each in its if not each.applies), None)
+    if other is not None and not all(each.is_met for each in its):
+        return Finding(f"[{name}]", "absent", f"{brings}; not for this Python or system (required: {other.marker})")
+    unmet = [each for each in its if not each.is_met]
+    if unmet:
+        lacks = ", ".join(f"{each.installed or 'no'} {each.name} (required {each.versions})" for each in unmet)
+        return Finding(f"[{name}]", "absent", f"{brings}: pip install 'lipmotion[{name}]'; there is {lacks}")
+    return Finding(f"[{name}]", "works", ", ".join(f"{each.name} {each.installed}" for each in its))
+
+
+def _looked(name: str, look: Callable[[], str]) -> Finding:
+    """Return what a look at a part says; whatever it raises, the part is broken."""
+    try:
+        return Finding(name, "works", look())
+    except _AbsentError as absent:
+        return Finding(name, "absent", str(absent))
+    except LipMotionError as error:
+        return Finding(name, "broken", str(error))
+    except Exception as error:  # a damaged package may raise anything when it is imported
+        return Finding(name, "broken", f"{type(error).__name__}: {error}; install lipmotion again")
+
+
+class _AbsentError(Exception):
+    """Says what an absent part would bring."""
+
+
+def _ffmpeg() -> str:
+    """Return the version of FFmpeg in PyAV, which must write what videos consist of."""
+    import av
+    from av.codec import codecs_available
+
+    missing = [codec for codec in ("libx264", "aac") if codec not in codecs_available]
+    if missing:
+        raise LipMotionError(f"no {' and no '.join(missing)}, so no .mp4; install PyAV as a wheel: pip install -U av")
+    return f"{getattr(av, 'ffmpeg_version_info', '')} in PyAV {metadata.version('av')}, with H.264 and AAC".strip()
+
+
+def _voices() -> str:
+    """Return how many voices each synthesiser has, and how to install the others."""
+    from lipmotion.speech.voices.installed import SYNTHESISERS, how_to_install, nothing_installed
+
+    found, others = [], []
+    for each in SYNTHESISERS.values():
+        try:
+            count = len(each.voices()) + len(each.others())
+        except LipMotionError as error:
+            others.append(f"{each.name} does not work ({error})")
+            continue
+        if count:
+            found.append(f"{each.name} {count}")
+        else:
+            others.append(f"no {each.name} ({how_to_install(each)})")
+    if not found:
+        raise _AbsentError(f"{EXTRAS['text']}; {nothing_installed()}")
+    return "; ".join([*found, *others])
+
+
+def _phone_recogniser() -> str:
+    from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser, phone_recogniser
+
+    name = installed_phone_recogniser()
+    if name is None:
+        raise _AbsentError("none for this machine: voices that the model does not know are recognised less well")
+    return phone_recogniser(name).source
+
+
+def _face_tracking() -> str:
+    """Return which OpenCV and MediaPipe are imported, and whether another OpenCV lies over that of the extra."""
+    from lipmotion.vision.packages import import_face_mesh, import_opencv
+
+    try:
+        opencv = import_opencv().__version__
+        import_face_mesh()
+    except MissingDependencyError as error:
+        raise _AbsentError(str(error)) from error
+    found = f"OpenCV {opencv}, MediaPipe {metadata.version('mediapipe')}"
+    declared = Requirement(OPENCV, "").installed
+    return found if declared.startswith(opencv) else f"{found}; {OPENCV} is {declared or 'not installed'}: {LEAN}"
+
+
+def _model() -> str:
+    """Return version, size and digest of the model that ships, once it is read."""
+    from lipmotion.pipeline.model import load_model, read_header, shipped_path
+    from lipmotion.storage.files import sha256_of
+
+    path = shipped_path()
+    try:
+        header, engine = read_header(path), load_model(path).engine.name
+    except LipMotionError as error:
+        raise ModelFormatError(f"{error}; or install lipmotion again: pip install --force-reinstall") from error
+    digest, size = sha256_of(path)[:12], path.stat().st_size / 1e6
+    return f"{path.name}, {engine}, version {header['version']}, {size:.1f} MB, sha256 {digest}"
+
+
+def _compiled_kernels() -> str:
+    try:
+        from lipmotion.kernels.compiled.compiler import cache_folder
+    except ImportError as error:
+        raise _AbsentError(f"no numba here ({error}): everything works, long work takes longer") from error
+    folder = cache_folder()
+    if folder is None:
+        raise _AbsentError("nowhere to keep machine code: every long command compiles again; set NUMBA_CACHE_DIR")
+    return f"kept in {folder}"
+
+
+def _temporary_folder() -> str:
+    """Return the folder for temporary files, once a file has been written there."""
+    try:
+        with tempfile.TemporaryFile() as file:
+            file.write(b"lipmotion")
+            file.flush()
+    except OSError as error:
+        raise LipMotionError(f"{error}; set TMPDIR to a folder that can be written") from error
+    return tempfile.gettempdir()
+
+
+def _current_folder() -> str:
+    folder = Path.cwd()
+    if not os.access(folder, os.W_OK):
+        raise _AbsentError(f"{folder} cannot be written: give outputs in another folder, as -o /tmp/a.mp4")
+    return str(folder)
+
+
+def _main_path() -> str:
+    """Animate the made-up speech, and write motion, cues and video; return what came out."""
+    from lipmotion.export.sound import write_sound
+    from lipmotion.pipeline.job import Job, Outputs, Request
+    from lipmotion.testing.formant_synthesiser import synthesise
+    from lipmotion.types.staging import Staging
+
+    with tempfile.TemporaryDirectory(prefix="lipmotion-doctor-") as folder:
+        sound = Path(folder) / "mama.wav"
+        write_sound(sound, synthesise(PHONES)[0])
+        files = tuple(str(Path(folder) / name) for name in ("mama.json", "mama.cues.tsv", "mama.mp4"))
+        job = Job(Request(sound, transcript=WORDS), Outputs(files), staging=Staging(size=128))
+        motion = job.run().motion
+        sizes = [Path(file).stat().st_size for file in files]
+    widest = float(motion["opening"].max())
+    if not (math.isfinite(widest) and widest > LEAST_OPENING and min(sizes) > 0):
+        raise LipMotionError(f"the lips open by {widest:.3f}, required more than {LEAST_OPENING}; install numpy again")
+    written = ", ".join(Path(file).name.partition(".")[2] for file in files)
+    return f"{motion.time_s[-1]:.1f} s of made-up speech → {written}; the lips open by {widest:.2f}"
+
+
+_PARTS: dict[str, Callable[[], str]] = {
+    "FFmpeg": _ffmpeg,
+    "voices": _voices,
+    "phone recogniser": _phone_recogniser,
+    "face tracking": _face_tracking,
+    "model that ships": _model,
+    "compiled kernels": _compiled_kernels,
+    "temporary folder": _temporary_folder,
+    "current folder": _current_folder,
+    "main path": _main_path,
+}

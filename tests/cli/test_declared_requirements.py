@@ -1,0 +1,78 @@
+from __future__ import annotations
+
+import re
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+
+from lipmotion.cli.installation.declared_requirements import Requirement, declared_requirements, requirement
+from lipmotion.cli.installation.doctor import EXTRAS
+
+PYPROJECT = Path(__file__).parents[2] / "pyproject.toml"
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("av>=14", Requirement("av", ">=14")),
+        ("torch>=2.4; extra == 'network'", Requirement("torch", ">=2.4", "", "network")),
+        ("opencv-python-headless (<5,>=4.10)", Requirement("opencv-python-headless", "<5,>=4.10")),
+        (
+            "mediapipe==0.10.14; (python_version < '3.13') and extra == 'video'",
+            Requirement("mediapipe", "==0.10.14", "(python_version < '3.13')", "video"),
+        ),
+    ],
+)
+def test_requirements_are_read(text: str, expected: Requirement) -> None:
+    assert requirement(text) == expected
+
+
+def test_what_is_no_requirement() -> None:
+    with pytest.raises(ValueError, match="not a requirement: 'a @ b'"):
+        requirement("a @ b")
+    with pytest.raises(ValueError, match="not a comparison: now"):
+        assert Requirement("a", "", "now").applies
+
+
+def test_markers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.platform", "darwin")
+    monkeypatch.setattr("platform.machine", lambda: "arm64")
+    monkeypatch.setattr("sys.version_info", (3, 9))
+    for marker, expected in (
+        ("", True),
+        ("python_version < '3.13'", True),
+        ("python_version >= '3.10'", False),
+        ("(sys_platform == 'linux' and platform_machine == 'arm64') or (sys_platform == 'darwin')", True),
+        ("sys_platform != 'darwin' or platform_machine != 'arm64'", False),
+    ):
+        assert Requirement("a", "", marker).applies is expected, marker
+
+
+def test_versions(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("importlib.metadata.version", lambda _: "4.10.0.84")
+    for versions, expected in (
+        ("", True),
+        (">=4.9", True),
+        (">=4.10,<5", True),
+        ("<4.9", False),
+        ("==4.10.0.84.0", True),
+        ("!=4.10.0.84", False),
+        (">4.10.0.84", False),
+    ):
+        assert Requirement("a", versions).is_met is expected, versions
+
+
+def test_what_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(name: str) -> str:
+        raise metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr("importlib.metadata.version", missing)
+    monkeypatch.setattr("importlib.metadata.requires", missing)
+    assert not Requirement("a", "").is_met
+    assert declared_requirements() == ()
+
+
+def test_every_extra_is_explained() -> None:
+    table = PYPROJECT.read_text(encoding="utf-8").split("[project.optional-dependencies]")[1].split("\n[")[0]
+    assert set(re.findall(r"^([\w-]+) = \[", table, re.MULTILINE)) == set(EXTRAS)

@@ -1,0 +1,143 @@
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from cli.conftest import RunCommand
+from lipmotion.cli.installation import doctor as doctor_module
+from lipmotion.cli.installation.declared_requirements import Requirement
+from lipmotion.cli.installation.doctor import Finding, doctor
+from lipmotion.errors import LipMotionError
+from lipmotion.speech.voices.synthesiser import SyntheticVoice
+from lipmotion.vision.packages import missing
+
+MAIN = "from lipmotion.cli.main import main; sys.exit(main())"
+
+
+@pytest.fixture
+def declared(monkeypatch: pytest.MonkeyPatch) -> Callable[..., dict[str, Finding]]:
+    """Returns what is found, by name, where some requirements are declared and no part is looked at."""
+
+    def found(*requirements: Requirement) -> dict[str, Finding]:
+        monkeypatch.setattr(doctor_module, "declared_requirements", lambda: requirements)
+        monkeypatch.setattr(doctor_module, "_PARTS", {})
+        return {each.name: each for each in doctor()}
+
+    return found
+
+
+def test_packages(declared: Callable[..., dict[str, Finding]]) -> None:
+    found = declared(
+        Requirement("numpy", ">=2"),
+        Requirement("pytest", "<1"),
+        Requirement("no-such-package", "==1"),
+        Requirement("no-such-kind", "", "sys_platform == 'none'"),
+        Requirement("numpy", ">=2", "", "plots"),
+        Requirement("no-such-package", ">=1", "", "study"),
+        Requirement("no-such-package", "", "sys_platform == 'none'", "video"),
+    )
+    assert found["numpy"].state == "works"
+    assert found["pytest"].state == "broken"
+    assert "required <1: pip install 'pytest<1'" in found["pytest"].told
+    assert found["no-such-package"].told.startswith("not installed, required ==1")
+    assert (found["no-such-kind"].state, found["[plots]"].state) == ("absent", "works")
+    assert found["[study]"].state == "absent"
+    assert "pip install 'lipmotion[study]'; there is no no-such-package (required >=1)" in found["[study]"].told
+    assert "not for this Python or system (required: sys_platform == 'none')" in found["[video]"].told
+
+
+def test_without_metadata(declared: Callable[..., dict[str, Finding]]) -> None:
+    assert declared()["packages"].state == "absent"
+
+
+def test_voices(monkeypatch: pytest.MonkeyPatch) -> None:
+    from lipmotion.speech.voices.installed import SYNTHESISERS
+
+    def fails() -> tuple[()]:
+        raise LipMotionError("no data")
+
+    some = replace(SYNTHESISERS["flite"], voices=tuple, others=tuple)
+    speaking = replace(some, name="c", voices=lambda: (SyntheticVoice("kal", "c", "kal"),))
+    changed = {"a": replace(some, name="a", voices=fails), "b": replace(some, name="b"), "c": speaking}
+    monkeypatch.setattr("lipmotion.speech.voices.installed.SYNTHESISERS", changed)
+    found = doctor_module._looked("voices", doctor_module._PARTS["voices"])
+    assert (found.state, found.told) == ("works", "c 1; a does not work (no data); no b (apt install flite)")
+    del changed["c"]
+    found = doctor_module._looked("voices", doctor_module._PARTS["voices"])
+    assert found.state == "absent"
+    assert "no speech synthesiser is installed; install one: pip install" in found.told
+
+
+def test_folders_that_cannot_be_written(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "missing"))
+    monkeypatch.setattr("os.access", lambda *_: False)
+    monkeypatch.setattr("lipmotion.kernels.compiled.compiler.cache_folder", lambda: None)
+    parts = {name: doctor_module._looked(name, look) for name, look in doctor_module._PARTS.items() if "folder" in name}
+    assert [parts[name].state for name in ("temporary folder", "current folder")] == ["broken", "absent"]
+    assert "set TMPDIR" in parts["temporary folder"].told
+    kernels = doctor_module._looked("kernels", doctor_module._PARTS["compiled kernels"])
+    assert (kernels.state, "NUMBA_CACHE_DIR" in kernels.told) == ("absent", True)
+
+
+def test_whatever_a_part_raises(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails() -> str:
+        raise OSError("libfoo.so: cannot open")
+
+    found = doctor_module._looked("foo", fails)
+    assert found == Finding("foo", "broken", "OSError: libfoo.so: cannot open; install lipmotion again")
+    monkeypatch.setattr("av.codec.codecs_available", {"aac"})
+    assert "no libx264, so no .mp4" in doctor_module._looked("FFmpeg", doctor_module._PARTS["FFmpeg"]).told
+
+
+@pytest.mark.parametrize(("version", "told"), [("4.10.0", "4.10.0, MediaPipe"), ("5.1.0", "another OpenCV lies over")])
+def test_face_tracking(monkeypatch: pytest.MonkeyPatch, version: str, told: str) -> None:
+    monkeypatch.setattr("lipmotion.vision.packages.import_opencv", lambda: SimpleNamespace(__version__=version))
+    monkeypatch.setattr("lipmotion.vision.packages.import_face_mesh", lambda: None)
+    monkeypatch.setattr("importlib.metadata.version", lambda _: "4.10.0.84")
+    found = doctor_module._looked("", doctor_module._PARTS["face tracking"])
+    assert found.state == "works"
+    assert told in found.told
+
+
+def test_no_face_tracking(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails() -> None:
+        raise missing("OpenCV", ImportError("libGL.so.1"))
+
+    monkeypatch.setattr("lipmotion.vision.packages.import_opencv", fails)
+    found = doctor_module._looked("", doctor_module._PARTS["face tracking"])
+    assert found.state == "absent"
+    assert "libGL.so.1" in found.told
+
+
+def test_a_damaged_model(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / "grid.lipmotion").write_bytes(b"damaged")
+    monkeypatch.setattr("lipmotion.pipeline.model.shipped_path", lambda: tmp_path / "grid.lipmotion")
+    found = doctor_module._looked("model", doctor_module._PARTS["model that ships"])
+    assert found.state == "broken"
+    assert "not a lipmotion model" in found.told
+
+
+@pytest.mark.long
+def test_the_main_path() -> None:
+    found = doctor_module._looked("main path", doctor_module._PARTS["main path"])
+    assert found.state == "works"
+    assert "1.0 s of made-up speech → json, cues.tsv, mp4; the lips open by 0." in found.told
+
+
+@pytest.mark.long
+def test_without_numpy(run_outside: RunCommand, tmp_path: Path) -> None:
+    """What most needs a doctor: nothing of it is imported before it is looked at."""
+    for module in ("numpy", "av"):
+        (tmp_path / f"{module}.py").write_text(f"raise ImportError('no {module}')")
+    program = (sys.executable, "-c", f"import sys; sys.path.insert(0, {str(tmp_path)!r}); " + MAIN)
+    done = run_outside("doctor", program=program)
+    states = {line[8:28].strip(): line[:8].strip() for line in done.out}
+    assert done.code == 1
+    assert {states["FFmpeg"], states["main path"], states["model that ships"]} == {"broken"}
+    assert states["temporary folder"] == "works"
+    assert "broken: FFmpeg" in done.err[-1]

@@ -1,0 +1,58 @@
+"""The Containerfile says what the repository has; where a builder is, it is built."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from children import run_child
+
+ROOT = Path(__file__).parents[2]
+LINES = (ROOT / "Containerfile").read_text(encoding="utf-8").splitlines()
+PIN = re.compile(r"^([\w.-]+==[\w.]+)", re.MULTILINE)
+
+
+def after(word: str) -> list[str]:
+    """Return the rest of each line of an instruction."""
+    return [line.removeprefix(f"{word} ") for line in LINES if line.startswith(f"{word} ")]
+
+
+def pins(name: str) -> set[str]:
+    return set(PIN.findall((ROOT / "requirements" / f"{name}.txt").read_text(encoding="utf-8")))
+
+
+def test_what_is_copied_is_there() -> None:
+    copied = [name for line in after("COPY") for name in line.split()[:-1]]
+    assert {"requirements", "pyproject.toml", "src"} <= set(copied)
+    assert all((ROOT / name).exists() for name in copied)
+    kept = (ROOT / ".dockerignore").read_text(encoding="utf-8").splitlines()
+    assert kept[0] == "*"
+    assert set(kept[1:]) == {f"!{name}" for name in copied}
+
+
+def test_the_base_and_the_command() -> None:
+    (base,) = after("FROM")
+    assert re.fullmatch(r"python:3\.1[0-2]-slim", base), "face tracking needs Python 3.10 to 3.12"
+    project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    (entry,) = after("ENTRYPOINT")
+    assert f"{json.loads(entry)[0]} = " in project.split("[project.scripts]")[1]
+    for name in re.findall(r"LIST=(\w+)", "\n".join(LINES)):
+        assert pins(name)
+
+
+def test_the_list_of_face_tracking_is_part_of_the_whole() -> None:
+    assert pins("core") < pins("video") < pins("dev")
+
+
+@pytest.mark.long
+def test_it_can_be_built() -> None:
+    builder = next(filter(shutil.which, ("podman", "docker")), None)
+    if builder is None or run_child([builder, "info"]).returncode:
+        pytest.skip("nothing here builds containers")
+    run_child([builder, "build", "-q", "-f", "Containerfile", "-t", "lipmotion-test", "."], folder=ROOT, check=True)
+    done = run_child([builder, "run", "--rm", "lipmotion-test", "doctor"])
+    assert done.returncode == 0, done.stdout
