@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from pathlib import Path
+from urllib.parse import unquote
 
 import pytest
 
@@ -60,7 +61,9 @@ def test_both_reports_hold_all_lines(tmp_path: Path) -> None:
     text = page.read_text(encoding="utf-8")
     rows = rows_of(text)
     assert [row[COLUMNS.index("error")] for row in rows] == [printable(hostile), None, None]
-    assert rows[2][-1] == ["a.json"]
+    assert rows[2][COLUMNS.index("mark") + 1] == ["a.json"]
+    sound = unquote(rows[2][COLUMNS.index("mark") + 2])
+    assert (tmp_path / sound).resolve() == Path("/x/a.wav")
     assert text.count("</script>") == 2
     assert "default-src 'none'" in text
     assert "http" not in text.replace("http-equiv", "")

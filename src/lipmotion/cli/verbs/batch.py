@@ -22,6 +22,8 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add_output(parser, "--out", is_folder=True, required=True, metavar="DIR", help="folder of the outputs")
     kinds = "what animate writes (json csv livelink.csv glb mp4 ...) and cues.tsv .xml .json .dat (default: json)"
     add_options(parser, Outputs, "kinds", kinds={"help": kinds})
+    marked = "approved lines and those to be done again, as the report saves them (default: DIR/marks.csv)"
+    add_input(parser, "--marks", what="file of marks (no option needed there)", metavar="FILE.csv", help=marked)
     parser.add_argument("--jobs", type=int, metavar="N", help="number of processes (default: one per core)")
     parser.add_argument("--cluster", default="", metavar="ADDRESS", help="Dask scheduler, as tcp://HOST:8786")
     add_options(parser, Request, "recogniser", "model", "lexicon", "language", "speaker", "pauses", "asymmetry")
@@ -52,7 +54,13 @@ def run(options: argparse.Namespace) -> None:
     with reporting(options) as report:
         job = part_of(options, options.start)
         found = batch(
-            options.source, options.out, job, jobs=options.jobs, cluster=options.cluster, monitor=report.receive
+            options.source,
+            options.out,
+            job,
+            jobs=options.jobs,
+            cluster=options.cluster,
+            marks=options.marks,
+            monitor=report.receive,
         )
         if found.failed:
             raise InputError(f"{found.text}; the reasons are in {found.csv}; mend them and run the same command again")

@@ -22,8 +22,8 @@ FILE_COLUMNS = ("file", "path", "recording", "audio", "wav")
 """Names of the column with the recording; the first row of a table is a header if it has one of them."""
 COLUMNS = ("transcript", "output", "speaker")
 """Names of the other columns that are read."""
-OWN_FILES = ("batch.jsonl", "report.csv", "report.html")
-"""Files that a batch writes beside the outputs of its lines."""
+OWN_FILES = ("batch.jsonl", "report.csv", "report.html", "marks.csv")
+"""Files of a batch itself beside the outputs of its lines."""
 OWN_FOLDER = ".batch"
 """Folder of unfinished work in the folder of the outputs."""
 LARGEST_LIST_BYTES, MOST_LINES = 1 << 27, 200_000
