@@ -138,13 +138,14 @@ def _in_folder(folder: Path) -> list[BatchLine]:
         folders[:] = sorted(name for name in folders if not _is_hidden(name))
         for name in sorted(names):
             path = Path(root) / name
-            if not _is_hidden(name) and _is_recording(path) and path.is_file():
+            if not _is_hidden(name) and is_recording(path) and path.is_file():
                 inner = path.relative_to(folder).with_suffix("").as_posix()
                 found.append(BatchLine(inner, os.path.abspath(path)))  # noqa: PTH100 # links are not followed
     return sorted(found, key=lambda line: line.name)
 
 
-def _is_recording(path: Path) -> bool:
+def is_recording(path: Path) -> bool:
+    """Return whether a file is a recording, by its name."""
     return path.suffix.lower() in AUDIO_SUFFIXES | VIDEO_SUFFIXES
 
 

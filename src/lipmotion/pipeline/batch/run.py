@@ -175,8 +175,9 @@ def _some(names: Sequence[str]) -> str:
 def _with_mark(record: Record, marks: Mapping[str, Mark]) -> Record:
     """Return a record that says which mark it was done again for, so that it is done once."""
     mark = marks.get(record["name"])
-    is_redone = mark is not None and mark.kind == REDO and record["outcome"] == DONE
-    return record | {"redone": mark.when} if is_redone else record
+    if mark is None or mark.kind != REDO or record["outcome"] != DONE:
+        return record
+    return record | {"redone": mark.when}
 
 
 def _forget(place: Place, record: Record) -> None:
