@@ -11,7 +11,7 @@ import pytest
 
 from lipmotion.pipeline.batch import check
 from lipmotion.pipeline.batch.check import FEWEST_LINES, Finding, _findings, expected_s
-from lipmotion.pipeline.batch.heard_line import HeardLine, letters_of
+from lipmotion.pipeline.batch.checked_line import CheckedLine, letters_of
 from lipmotion.pipeline.job import Job, Request
 
 pytest.importorskip("joblib")
@@ -79,9 +79,9 @@ def test_a_folder_has_no_orphans(tmp_path: Path) -> None:
 def test_the_measure_of_length_is_the_usual_rate() -> None:
     """What is too long among quick talkers is not among slow ones."""
 
-    def lines(share: float) -> list[HeardLine]:
-        usual = [HeardLine(f"{n}", spoken_s=share * expected_s(60), letters=60) for n in range(FEWEST_LINES)]
-        return [*usual, HeardLine("x", spoken_s=2.6 * expected_s(60), letters=60)]
+    def lines(share: float) -> list[CheckedLine]:
+        usual = [CheckedLine(f"{n}", spoken_s=share * expected_s(60), letters=60) for n in range(FEWEST_LINES)]
+        return [*usual, CheckedLine("x", spoken_s=2.6 * expected_s(60), letters=60)]
 
     assert [each.name for each in _findings(lines(0.8), [])] == ["x"]
     assert list(_findings(lines(1.3), [])) == []
@@ -89,8 +89,8 @@ def test_the_measure_of_length_is_the_usual_rate() -> None:
 
 def test_short_lines_may_have_the_same_words() -> None:
     long, short = ("who", "goes", "there", "now"), ("yes", "sir")
-    heard = [HeardLine(name, words=words) for name, words in zip("abcd", (long, short, long, short), strict=True)]
-    assert list(_findings(heard, [])) == [Finding("same words", "c", "as of a")]
+    checked = [CheckedLine(name, words=words) for name, words in zip("abcd", (long, short, long, short), strict=True)]
+    assert list(_findings(checked, [])) == [Finding("same words", "c", "as of a")]
 
 
 def test_letters_of_other_scripts_take_longer() -> None:

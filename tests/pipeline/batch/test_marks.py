@@ -11,7 +11,13 @@ from lipmotion.pipeline.batch.marks import Mark, is_due, merged, read_marks, wri
 
 
 def test_they_are_read_as_they_were_written(tmp_path: Path) -> None:
-    marks = {"a": Mark("approve", "2026-01-01"), "=1+1": Mark("redo"), 'b, "c"': Mark("redo", "-2"), "'d": Mark("")}
+    marks = {
+        "a": Mark("approve", "2026-01-01"),
+        "=1+1": Mark("redo"),
+        'b, "c"': Mark("redo", "-2"),
+        "'d": Mark(""),
+        "'=e ": Mark(""),
+    }
     write_marks(tmp_path / "marks.csv", marks)
     assert "'=1+1," in (tmp_path / "marks.csv").read_text()
     assert read_marks(tmp_path / "marks.csv") == marks

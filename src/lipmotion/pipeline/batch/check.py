@@ -10,7 +10,7 @@ from pathlib import Path
 from statistics import median
 
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.pipeline.batch.heard_line import HeardLine, LineToHear, heard_line
+from lipmotion.pipeline.batch.checked_line import CheckedLine, LineToCheck, checked_line
 from lipmotion.pipeline.batch.ledger import LEDGER
 from lipmotion.pipeline.batch.lines import BatchLine, is_recording, read_lines
 from lipmotion.pipeline.batch.pool import WorkerDied, local_pool
@@ -83,22 +83,22 @@ def check(
     if jobs is not None and jobs < 1:
         raise InputError(f"{jobs} processes, required 1 or more; leave the number out for one a core")
     lines = read_lines(Path(source), job.outputs.kinds)
-    heard: dict[str, HeardLine] = {}
+    checked: dict[str, CheckedLine] = {}
     try:
         with local_pool(jobs or os.cpu_count() or 1) as pool:
-            for each in pool(heard_line, [LineToHear(line, job.request) for line in lines]):
-                heard[each.name] = each
-                monitor(Progress(STAGE, len(heard), len(lines), len(heard) / len(lines)))
+            for each in pool(checked_line, [LineToCheck(line, job.request) for line in lines]):
+                checked[each.name] = each
+                monitor(Progress(STAGE, len(checked), len(lines), len(checked) / len(lines)))
     except WorkerDied as error:
         raise CorpusError(f"a process that listened to recordings died ({error}); run it with --jobs 1") from error
-    in_order = [heard[line.name] for line in lines]
+    in_order = [checked[line.name] for line in lines]
     return CheckSummary(len(lines), tuple(_findings(in_order, _orphans(Path(source), lines))))
 
 
-def _findings(heard: Sequence[HeardLine], orphans: Iterable[str]) -> Iterator[Finding]:
+def _findings(checked: Sequence[CheckedLine], orphans: Iterable[str]) -> Iterator[Finding]:
     """Yield what is wrong, line after line, and then what is there twice, and the recordings of no line."""
-    usual = _usual(heard)
-    for each in heard:
+    usual = _usual(checked)
+    for each in checked:
         if each.problem:
             yield Finding(each.problem, each.name, each.reason)
             continue
@@ -106,8 +106,8 @@ def _findings(heard: Sequence[HeardLine], orphans: Iterable[str]) -> Iterator[Fi
             yield Finding("language", each.name, each.reason)
         if each.letters:
             yield from _length(each, usual)
-    yield from _doubles("same sound", heard, lambda each: each.digest)
-    yield from _doubles("same words", heard, lambda each: each.words if len(each.words) >= FEWEST_SAME_WORDS else ())
+    yield from _doubles("same sound", checked, lambda each: each.digest)
+    yield from _doubles("same words", checked, lambda each: each.words if len(each.words) >= FEWEST_SAME_WORDS else ())
     yield from (Finding("orphaned", path, "no line has this recording") for path in orphans)
 
 
@@ -120,13 +120,13 @@ def expected_s(letters: float) -> float:
     return PAUSE_S + letters / LETTERS_PER_S
 
 
-def _usual(heard: Sequence[HeardLine]) -> float:
+def _usual(checked: Sequence[CheckedLine]) -> float:
     """Return how many times as long as usual the lines of a batch take; 1 where there are too few to tell."""
-    shares = [each.spoken_s / expected_s(each.letters) for each in heard if each.letters]
+    shares = [each.spoken_s / expected_s(each.letters) for each in checked if each.letters]
     return min(max(median(shares), 1 / SLOWEST), SLOWEST) if len(shares) >= FEWEST_LINES else 1.0
 
 
-def _length(each: HeardLine, usual: float) -> Iterator[Finding]:
+def _length(each: CheckedLine, usual: float) -> Iterator[Finding]:
     wanted_s = usual * expected_s(each.letters)
     text = f"{each.spoken_s:.1f} s of speech, about {wanted_s:.1f} s for its {len(each.words)} words"
     if each.spoken_s < SHORT * wanted_s:
@@ -135,10 +135,10 @@ def _length(each: HeardLine, usual: float) -> Iterator[Finding]:
         yield Finding("too long", each.name, text)
 
 
-def _doubles(kind: str, heard: Sequence[HeardLine], key: Callable[[HeardLine], object]) -> Iterator[Finding]:
+def _doubles(kind: str, checked: Sequence[CheckedLine], key: Callable[[CheckedLine], object]) -> Iterator[Finding]:
     """Yield the lines that have the same as an earlier one; where the key is empty, they have nothing."""
     first: dict[object, str] = {}
-    for each in heard:
+    for each in checked:
         if found := key(each):
             if found in first:
                 yield Finding(kind, each.name, f"as of {first[found]}")

@@ -12,10 +12,14 @@ QUOTE = "'"
 def as_field(text: str) -> str:
     """Return a text as a field; one that a spreadsheet would compute gets an apostrophe first."""
     text = as_text(text)
-    return f"{QUOTE}{text}" if text.startswith(FORMULA) else text
+    return QUOTE + text if _is_formula(text) else text
 
 
 def from_field(field: str) -> str:
     """Return the text of a field that ``as_field`` made."""
-    text = field.removeprefix(QUOTE)
-    return text if text.startswith(FORMULA) else field
+    return field[1:] if field.startswith(QUOTE) and _is_formula(field) else field
+
+
+def _is_formula(text: str) -> bool:
+    """Return whether a text is a formula, or one behind apostrophes."""
+    return text.lstrip(QUOTE).startswith(FORMULA)

@@ -50,7 +50,8 @@ def read_marks(path: Path) -> dict[str, Mark]:
                 f"{path}: no column {missing[0]!r}; required a first row name,mark (and when, if you like)"
             )
         for number, row in enumerate(rows, 2):
-            name, kind, when = (from_field((row.get(column) or "").strip()) for column in COLUMNS)
+            name, kind, when = (from_field(row.get(column) or "") for column in COLUMNS)
+            kind = kind.strip().lower()
             if kind not in KINDS:
                 raise InputError(f"{path}, row {number}: the mark is {shortened(kind)!r}, required approve or redo")
             if name in marks:

@@ -7,7 +7,7 @@ import hashlib
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -123,12 +123,11 @@ def _for_page(record: Record, values: Sequence[Any], out: Path, mark: Mark | Non
     return text.replace("<", "\\u003c")  # nothing that a name says ends the script
 
 
-def _address(recording: str, out: Path) -> str:
-    """Return the address of a recording, relative to a page in a folder; as a whole, where it is on another drive."""
-    try:
-        return quote(os.path.relpath(recording, out).replace(os.sep, "/").encode("utf-8", "surrogateescape"))
-    except ValueError:
-        return Path(recording).as_uri()
+def _address(recording: str, out: Path) -> str | None:
+    """Return the address of a recording, relative to a page in a folder; None: it has none, as on another drive."""
+    with suppress(ValueError):
+        return quote(os.fsencode(os.path.relpath(recording, out)).replace(os.sep.encode(), b"/"))
+    return None
 
 
 def _visible(value: Any) -> Any:

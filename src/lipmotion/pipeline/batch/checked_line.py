@@ -1,4 +1,4 @@
-"""What is heard in the recording of one line, and what is to be said in it: for the check, without any motion."""
+"""What is found in the recording of one line, and what is to be said in it: for the check, without any motion."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ SILENT_DB = -60.0
 LEAST_SPOKEN_S = 0.1
 """A recording with less sound above its quiet level has nothing said in it."""
 SHORTEST_TOLD_S, FEWEST_TOLD_WORDS = 8.0, 5
-"""Of shorter speech, or of fewer words, the language is not told: it takes a dozen long words to be sure."""
+"""The language of shorter speech, or of fewer words, is not told: it takes a dozen long words to be sure."""
 LETTERS_OF = {"CJK": 4.0, "HANGUL": 3.0, "HIRAGANA": 2.0, "KATAKANA": 2.0}
 """How many Latin letters take as long to say as one of a script."""
 
 
 @dataclass(frozen=True)
-class LineToHear:
+class LineToCheck:
     """A line, and how it would be understood."""
 
     line: BatchLine
@@ -39,7 +39,7 @@ class LineToHear:
 
 
 @dataclass(frozen=True)
-class HeardLine:
+class CheckedLine:
     """What was found in the recording and the words of a line.
 
     problem  : kind of what makes the recording of no use: ``missing``, ``unreadable``, ``silent``; empty: it is of use
@@ -59,24 +59,24 @@ class HeardLine:
     words: tuple[str, ...] = ()
 
 
-def heard_line(work: LineToHear) -> HeardLine:
-    """Return what is heard in the recording of a line, and what is to be said in it."""
+def checked_line(work: LineToCheck) -> CheckedLine:
+    """Return what is found in the recording of a line, and what is to be said in it."""
     line, path = work.line, Path(work.line.recording)
     if not path.exists():
-        return HeardLine(line.name, "missing", f"{path}: no such file")
+        return CheckedLine(line.name, "missing", f"{path}: no such file")
     try:
         audio = read_audio(path, warn=False)
         words = _words(work)
     except (LipMotionError, OSError) as error:
-        return HeardLine(line.name, "unreadable", str(error))
+        return CheckedLine(line.name, "unreadable", str(error))
     levels = levels_db(audio)
     loudest_db = float(levels.max())
     if loudest_db < SILENT_DB:
-        return HeardLine(line.name, "silent", f"nowhere louder than {loudest_db:.0f} dB of full scale")
+        return CheckedLine(line.name, "silent", f"nowhere louder than {loudest_db:.0f} dB of full scale")
     spoken_s = sum(end_s - start_s for start_s, end_s in spoken_spans(levels))
     if spoken_s < LEAST_SPOKEN_S:
-        return HeardLine(line.name, "silent", "no sound longer than a click")
-    return HeardLine(
+        return CheckedLine(line.name, "silent", "no sound longer than a click")
+    return CheckedLine(
         line.name,
         reason=_wrong_language(work.request.language, words, audio, spoken_s),
         digest=hashlib.sha256(sixteen_bits(audio.samples).tobytes()).hexdigest(),
@@ -95,7 +95,7 @@ def letters_of(words: Sequence[str]) -> float:
     return sum((LETTERS_OF.get(script_of(letter), 1.0) for word in words for letter in word), 0.0)
 
 
-def _words(work: LineToHear) -> tuple[str, ...]:
+def _words(work: LineToCheck) -> tuple[str, ...]:
     """Return the words of a line, numbers spelled out where they are English; none: they are not known."""
     line, request = work.line, work.request
     named = replace(request, recording=Path(line.recording), lexicon=None)
