@@ -64,3 +64,20 @@ def test_what_it_refuses(run: RunCommand, sounds: Path, toy_model_file: Path, he
     ]:
         done = run("batch", *words, "--model", toy_model_file, "--jobs", "1")
         assert (done.code, len(done.err)) == (code, 1), done
+
+
+def test_a_check_writes_nothing(run: RunCommand, sounds: Path, here: Path) -> None:
+    done = run("batch", "--check", sounds, "--jobs", "1")
+    assert done.code == 3
+    assert done.out == ["problem\tline\tfound", "same sound\tb\tas of a"]
+    assert done.err == ["lipmotion: error: 2 lines: 1 same sound"]
+    (sounds / "b.wav").unlink()
+    done = run("batch", "--check", sounds, "--jobs", "1")
+    assert (done.code, done.out) == (0, ["1 lines: nothing found"])
+    (sounds / "b.wav").touch()
+    done = run("batch", "--check", sounds, "--jobs", "1", "--machine-readable")
+    events = [json.loads(line) for line in done.out]
+    assert [(each["name"], each["outcome"]) for each in events if each["type"] == "item"] == [("b", "unreadable")]
+    assert events[-1]["exit_code"] == done.code == 3
+    assert {path.name for path in here.iterdir()} == {"sounds"}
+    assert "add --out DIR" in run("batch", sounds).err[0]

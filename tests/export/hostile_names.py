@@ -28,6 +28,7 @@ from lipmotion.meshes.files.gltf_writer import write_gltf_scene
 from lipmotion.meshes.files.usd_writer import write_usda
 from lipmotion.meshes.model.mesh import Blendshape, Material, Mesh, MeshPart
 from lipmotion.meshes.model.scene import Scene
+from lipmotion.pipeline.batch.marks import Mark
 from lipmotion.pipeline.batch.report import _field, _for_page
 from lipmotion.printable import is_line, printable
 from lipmotion.storage.files import as_text
@@ -207,8 +208,8 @@ def _glb(folder: Path, name: str) -> None:
 
 
 def _report(_: Path, name: str) -> None:
-    record = {"outputs": [name], "name": name}
-    page = _for_page(record, [name])
+    record = {"outputs": [name], "name": name, "recording": f"/{name}"}
+    page = _for_page(record, [name], Path("/"), Mark("redo", name))
     assert "<" not in page
     assert "\n" not in page
     assert json.loads(page)[0] == printable(name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 import shutil
@@ -112,6 +113,30 @@ def test_what_was_done_is_kept(sounds: Path, settings: Job, tmp_path: Path) -> N
     assert changed == {"one.json", "three.json"}
     assert Counter(row["name"] for row in ledger_rows(out)) == {"one": 2, "three": 2, "deep/two": 1}
     assert batch(sounds, out, replace(settings, outputs=Outputs(kinds=("csv",))), jobs=1).done == 3
+
+
+def test_marks_hold_in_every_run(sounds: Path, settings: Job, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    out, marks = tmp_path / "out", tmp_path / "marked.csv"
+    batch(sounds, out, settings, jobs=1)
+    for name in ("one", "three"):
+        (out / f"{name}.json").write_text("by hand")
+    marks.write_text("name;mark\none;approve\nthree;redo\nnobody;redo\n")
+    assert batch(sounds, out, settings, jobs=1, marks=marks).text == "3 lines: 1 done, 2 kept, 0 failed"
+    assert "1 marks of lines that are not in this batch: nobody" in caplog.text
+    assert (out / "one.json").read_text() == "by hand"
+    assert (out / "three.json").read_text() != "by hand"
+    assert batch(sounds, out, settings, jobs=1).kept == 3
+    (sounds / "one.txt").write_text("see mama")
+    other = replace(settings, outputs=Outputs(rate_hz=50.0))
+    assert batch(sounds, out, other, jobs=1).text == "3 lines: 2 done, 1 kept, 0 failed"
+    assert (out / "one.json").read_text() == "by hand"
+    assert "1 approved lines have another recording or other words now" in caplog.text
+    with (out / "report.csv").open() as file:
+        assert {row["name"]: row["mark"] for row in csv.DictReader(file)} == {
+            "one": "approve", "three": "", "deep/two": "",
+        }  # fmt: skip
+    marks.write_text("name,mark\none,\n")
+    assert batch(sounds, out, other, jobs=1, marks=marks).done == 1
 
 
 def test_inputs_are_never_outputs(sounds: Path, settings: Job) -> None:

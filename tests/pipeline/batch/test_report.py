@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from pathlib import Path
+from urllib.parse import unquote
 
 import pytest
 
@@ -60,7 +61,9 @@ def test_both_reports_hold_all_lines(tmp_path: Path) -> None:
     text = page.read_text(encoding="utf-8")
     rows = rows_of(text)
     assert [row[COLUMNS.index("error")] for row in rows] == [printable(hostile), None, None]
-    assert rows[2][-1] == ["a.json"]
+    assert rows[2][COLUMNS.index("mark") + 1] == ["a.json"]
+    sound = unquote(rows[2][COLUMNS.index("mark") + 2])
+    assert (tmp_path / sound).resolve() == Path("/x/a.wav")
     assert text.count("</script>") == 2
     assert "default-src 'none'" in text
     assert "http" not in text.replace("http-equiv", "")
@@ -78,3 +81,13 @@ def test_no_text_is_a_formula(tmp_path: Path, name: str) -> None:
     assert (row["name"], row["outputs"], row["warnings"]) == (f"'{name}", f"'{name}.json", f"'{name} | a")
     assert row["range_db"] == "-3.0"
     assert rows_of(page.read_text(encoding="utf-8"))[0][0] == name
+
+
+@pytest.mark.parametrize("recording", ["", "/\ud800.wav"])
+def test_a_recording_without_an_address_is_not_played(tmp_path: Path, recording: str) -> None:
+    lines = [BatchLine("a", "/a.wav")]
+    record = GOOD | {"run": "1", "fingerprint": "f", "inputs": [], "name": "a", "outputs": {"a.json": "0"}}
+    with opened_ledger(Place(str(tmp_path), "1"), lines) as ledger:
+        ledger.append(record | {"recording": recording})
+        page = write_reports(lines, ledger, tmp_path)[1]
+    assert rows_of(page.read_text(encoding="utf-8"))[0][COLUMNS.index("mark") + 2] is None

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lipmotion.cli.arguments.declared import add_job_file, add_options, part_of
 from lipmotion.cli.arguments.options import add_machine_readable
 from lipmotion.cli.arguments.paths import add_input, add_output
-from lipmotion.pipeline.job import Outputs, Request
+from lipmotion.pipeline.job import Job, Outputs, Request
 from lipmotion.printable import printable
 from lipmotion.types.delivery import Delivery
 from lipmotion.types.staging import Staging
+
+if TYPE_CHECKING:
+    from lipmotion.cli.terminal.progress import Report
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -19,9 +22,13 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = verbs.add_parser("batch", help="turn thousands of recordings into lip motion, with a report")
     listed = "a folder of recordings, or a list: a path a line, or a table with columns file,transcript,output,speaker"
     add_input(parser, "source", what="list or folder of recordings", metavar="LIST|DIR", help=listed)
-    add_output(parser, "--out", is_folder=True, required=True, metavar="DIR", help="folder of the outputs")
+    add_output(parser, "--out", is_folder=True, metavar="DIR", help="folder of the outputs")
+    checked = "only compare the recordings with their script: missing, silent, of the wrong length, twice there ..."
+    parser.add_argument("--check", action="store_true", help=checked)
     kinds = "what animate writes (json csv livelink.csv glb mp4 ...) and cues.tsv .xml .json .dat (default: json)"
     add_options(parser, Outputs, "kinds", kinds={"help": kinds})
+    marked = "approved lines and those to be done again, as the report saves them (default: DIR/marks.csv)"
+    add_input(parser, "--marks", what="file of marks (no option needed there)", metavar="FILE.csv", help=marked)
     parser.add_argument("--jobs", type=int, metavar="N", help="number of processes (default: one per core)")
     parser.add_argument("--cluster", default="", metavar="ADDRESS", help="Dask scheduler, as tcp://HOST:8786")
     add_options(parser, Request, "recogniser", "model", "lexicon", "language", "speaker", "pauses", "asymmetry")
@@ -44,17 +51,50 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Call ``batch``; print how many lines were done, and the report. Raises InputError: some lines failed."""
+    """Call ``batch`` or, with ``--check``, ``check``; print what was done. Raises InputError: some lines failed."""
     from lipmotion.cli.terminal.progress import reporting
-    from lipmotion.errors import InputError
-    from lipmotion.pipeline.batch import batch
 
     with reporting(options) as report:
         job = part_of(options, options.start)
-        found = batch(
-            options.source, options.out, job, jobs=options.jobs, cluster=options.cluster, monitor=report.receive
-        )
-        if found.failed:
-            raise InputError(f"{found.text}; the reasons are in {found.csv}; mend them and run the same command again")
-        figures = {"done": found.done, "kept": found.kept, "report": [str(found.csv), str(found.html)]}
-        report.finish(printable(f"{found.text}; report: {found.html}"), **figures)
+        if options.check:
+            _check(options, job, report)
+        else:
+            _batch(options, job, report)
+
+
+def _batch(options: argparse.Namespace, job: Job, report: Report) -> None:
+    from lipmotion.errors import InputError
+    from lipmotion.pipeline.batch import batch
+
+    if options.out is None:
+        raise InputError("no folder of the outputs is given; add --out DIR, or --check to write nothing")
+    found = batch(
+        options.source,
+        options.out,
+        job,
+        jobs=options.jobs,
+        cluster=options.cluster,
+        marks=options.marks,
+        monitor=report.receive,
+    )
+    if found.failed:
+        raise InputError(f"{found.text}; the reasons are in {found.csv}; mend them and run the same command again")
+    figures = {"done": found.done, "kept": found.kept, "report": [str(found.csv), str(found.html)]}
+    report.finish(printable(f"{found.text}; report: {found.html}"), **figures)
+
+
+def _check(options: argparse.Namespace, job: Job, report: Report) -> None:
+    from lipmotion.errors import InputError
+    from lipmotion.pipeline.batch import check
+    from lipmotion.types import Item
+
+    found = check(options.source, job, jobs=options.jobs, monitor=report.receive)
+    if not found.findings:
+        report.finish(printable(found.text), lines=found.lines)
+        return
+    if options.machine_readable:
+        for each in found.findings:
+            report.receive(Item(each.name, each.kind, each.text))
+    else:
+        report.finish(found.table)
+    raise InputError(found.text)

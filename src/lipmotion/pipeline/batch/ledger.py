@@ -189,13 +189,22 @@ class Ledger:
         fingerprint = line_fingerprint(line, of_settings)
         if self._last.get(_key(line.name), ("", 0))[0] != fingerprint:
             return None
+        record = self.finished(line, out)
+        return record if record is not None and are_same_inputs(line, record) else None
+
+    def finished(self, line: BatchLine, out: Path) -> Record | None:
+        """Return the record of a line that was done, whatever the settings; None: it was not, or lacks an output."""
         record = self.record_of(line.name)
         if record is None or record["outcome"] != DONE:
             return None
-        inputs = [InputFile(**each) for each in record["inputs"]]
-        same = [each.path for each in inputs] == list(map(str, input_paths(line)))
-        there = all((out / name).is_file() for name in record["outputs"])
-        return record if same and there and all(each.is_unchanged() for each in inputs) else None
+        return record if all((out / name).is_file() for name in record["outputs"]) else None
+
+
+def are_same_inputs(line: BatchLine, record: Record) -> bool:
+    """Return whether the files of a line are those of its record, with the same content."""
+    inputs = [InputFile(**each) for each in record["inputs"]]
+    same = [each.path for each in inputs] == list(map(str, input_paths(line)))
+    return same and all(each.is_unchanged() for each in inputs)
 
 
 def _whole_rows(file: IO[bytes]) -> Iterator[tuple[int, bytes]]:

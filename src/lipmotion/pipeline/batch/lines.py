@@ -22,8 +22,8 @@ FILE_COLUMNS = ("file", "path", "recording", "audio", "wav")
 """Names of the column with the recording; the first row of a table is a header if it has one of them."""
 COLUMNS = ("transcript", "output", "speaker")
 """Names of the other columns that are read."""
-OWN_FILES = ("batch.jsonl", "report.csv", "report.html")
-"""Files that a batch writes beside the outputs of its lines."""
+OWN_FILES = ("batch.jsonl", "report.csv", "report.html", "marks.csv")
+"""Files of a batch itself beside the outputs of its lines."""
 OWN_FOLDER = ".batch"
 """Folder of unfinished work in the folder of the outputs."""
 LARGEST_LIST_BYTES, MOST_LINES = 1 << 27, 200_000
@@ -138,13 +138,14 @@ def _in_folder(folder: Path) -> list[BatchLine]:
         folders[:] = sorted(name for name in folders if not _is_hidden(name))
         for name in sorted(names):
             path = Path(root) / name
-            if not _is_hidden(name) and _is_recording(path) and path.is_file():
+            if not _is_hidden(name) and is_recording(path) and path.is_file():
                 inner = path.relative_to(folder).with_suffix("").as_posix()
                 found.append(BatchLine(inner, os.path.abspath(path)))  # noqa: PTH100 # links are not followed
     return sorted(found, key=lambda line: line.name)
 
 
-def _is_recording(path: Path) -> bool:
+def is_recording(path: Path) -> bool:
+    """Return whether a file is a recording, by its name."""
     return path.suffix.lower() in AUDIO_SUFFIXES | VIDEO_SUFFIXES
 
 

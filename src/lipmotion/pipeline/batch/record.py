@@ -65,7 +65,7 @@ def _are_inputs(value: Any) -> bool:
 
 
 FIELDS: dict[str, Callable[[Any], bool]] = {
-    **dict.fromkeys(("name", "recording", "run", "fingerprint", "words", "error"), _is_text),
+    **dict.fromkeys(("name", "recording", "run", "fingerprint", "words", "error", "redone"), _is_text),
     **dict.fromkeys(("warnings", "advice"), _are_texts),
     **dict.fromkeys(("duration_s", "seconds", "confidence", "range_db", "widest", "motion"), _is_number),
     **dict.fromkeys(("closures_heard", "closures_made", "least_sure_s"), _is_number),

@@ -3,45 +3,55 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import json
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, suppress
 from importlib import resources
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 from lipmotion.export.web_page import coloured
+from lipmotion.pipeline.batch.fields import as_field
 from lipmotion.pipeline.batch.ledger import Ledger
 from lipmotion.pipeline.batch.lines import BatchLine
+from lipmotion.pipeline.batch.marks import APPROVE, Mark, is_due
 from lipmotion.pipeline.batch.record import FAILED, Record
 from lipmotion.printable import printable
 from lipmotion.speech.recognition.recognised_speech import NOISY_DB
 from lipmotion.storage.files import as_text, whole_file
+from lipmotion.storage.json_text import as_json
 from lipmotion.types.generation import FULL_FIT_SHARE, SURE_CONFIDENCE
 
 CSV_REPORT, HTML_REPORT = "report.csv", "report.html"
 COLUMNS = (
     "name outcome doubt duration_s words confidence voice motion least_sure_s closures_heard closures_made widest "
-    "range_db warnings advice error seconds recording outputs"
+    "range_db warnings advice error seconds recording outputs mark"
 ).split()
 """Columns of the table, in order; docs/batch.md says what they mean."""
 ROWS, BETWEEN = "/*ROWS*/", " | "
 """Where the page has its rows; what stands between several texts in a field of the CSV file."""
-FORMULA = ("=", "+", "-", "@", "\t", "\r")
-"""What makes a field a formula for spreadsheets, at its beginning."""
+BASIS = "/*BASIS*/"
+"""Where the page has the digest of the marks that it shows."""
 
 
-def write_reports(lines: Sequence[BatchLine], ledger: Ledger, out: Path) -> tuple[Path, Path]:
+def write_reports(
+    lines: Sequence[BatchLine], ledger: Ledger, out: Path, marks: Mapping[str, Mark] | None = None
+) -> tuple[Path, Path]:
     """Write the reports of some lines into a folder, the most doubtful line first; return their paths.
 
+    marks : of lines, by their names
     Raises ExportError: they cannot be written.
     Memory: a number and a reference a line; the records are read one by one.
     """
     doubts = [doubt_of(ledger.record_of(line.name) or {}) for line in lines]
     order = sorted(range(len(lines)), key=lambda number: (-doubts[number], lines[number].name))
     table, page = out / CSV_REPORT, out / HTML_REPORT
+    marks = marks or {}
     page_text = coloured(resources.files(__package__).joinpath("report_page.html").read_text("utf-8"))
+    page_text = page_text.replace(BASIS, _digest(marks))
     before, _, after = page_text.partition(ROWS)
     with ExitStack() as stack:
         paths = [stack.enter_context(whole_file(path)) for path in (table, page)]
@@ -51,9 +61,11 @@ def write_reports(lines: Sequence[BatchLine], ledger: Ledger, out: Path) -> tupl
         rows.writerow(COLUMNS)
         page_file.write(before)
         for number, record in enumerate(_records(lines, ledger, order)):
+            mark = _shown_mark(marks.get(record["name"]), record)
+            record["mark"] = mark.kind if mark else None
             values = [record.get(name) for name in COLUMNS]
             rows.writerow([_field(value) for value in values])
-            page_file.write(f"{',' if number else ''}\n{_for_page(record, values)}")
+            page_file.write(f"{',' if number else ''}\n{_for_page(record, values, out, mark)}")
         page_file.write(after)
     return table, page
 
@@ -83,21 +95,39 @@ def _records(lines: Sequence[BatchLine], ledger: Ledger, order: Sequence[int]) -
         yield record | {"doubt": doubt_of(record), "outputs": list(record.get("outputs", ()))}
 
 
+def _shown_mark(mark: Mark | None, record: Record) -> Mark | None:
+    """Return the mark of a line as the reports show it; None: it has none, or what it asked for is done."""
+    return mark if mark is not None and (mark.kind == APPROVE or is_due(mark, record)) else None
+
+
+def _digest(marks: Mapping[str, Mark]) -> str:
+    return hashlib.sha256(as_json([[name, mark.kind, mark.when] for name, mark in marks.items()]).encode()).hexdigest()
+
+
 def _field(value: Any) -> str:
-    """Return a value as a field of the CSV file; a text that a spreadsheet would compute gets an apostrophe first."""
+    """Return a value as a field of the CSV file."""
     if value is None:
         return ""
     if not isinstance(value, list | str):
         return str(value)
-    text = as_text(BETWEEN.join(value) if isinstance(value, list) else value)
-    return f"'{text}" if text.startswith(FORMULA) else text
+    return as_field(BETWEEN.join(value) if isinstance(value, list) else value)
 
 
-def _for_page(record: Record, values: Sequence[Any]) -> str:
-    """Return a row of the page: its values, and the addresses of the outputs, relative to the page."""
+def _for_page(record: Record, values: Sequence[Any], out: Path, mark: Mark | None) -> str:
+    """Return a row of the page: its values, the addresses of outputs and recording, and when it was marked."""
     links = [quote(as_text(name)) for name in record["outputs"]]
-    text = json.dumps([*map(_visible, values), links], ensure_ascii=True, separators=(",", ":"))
+    sound = _address(record["recording"], out) if "recording" in record else None
+    text = json.dumps(
+        [*map(_visible, values), links, sound, mark.when if mark else None], ensure_ascii=True, separators=(",", ":")
+    )
     return text.replace("<", "\\u003c")  # nothing that a name says ends the script
+
+
+def _address(recording: str, out: Path) -> str | None:
+    """Return the address of a recording, relative to a page in a folder; None: it has none, as on another drive."""
+    with suppress(ValueError):
+        return quote(os.fsencode(os.path.relpath(recording, out)).replace(os.sep.encode(), b"/"))
+    return None
 
 
 def _visible(value: Any) -> Any:

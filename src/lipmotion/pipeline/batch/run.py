@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import uuid
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from lipmotion.errors import CorpusError, ExportError, InputError
-from lipmotion.pipeline.batch.ledger import Place, opened_ledger
-from lipmotion.pipeline.batch.lines import BatchLine, check_names, read_lines
+from lipmotion.errors import CorpusError, ExportError, InputError, shortened
+from lipmotion.pipeline.batch.ledger import Ledger, Place, are_same_inputs, opened_ledger
+from lipmotion.pipeline.batch.lines import MOST_NAMED_LINES, BatchLine, check_names, read_lines
+from lipmotion.pipeline.batch.marks import APPROVE, MARKS, REDO, Mark, is_due, merged, read_marks, write_marks
 from lipmotion.pipeline.batch.one_line import LineWork, check_line_job, finished_line
 from lipmotion.pipeline.batch.pool import Pool, WorkerDied, cluster_pool, died_alone, local_pool
-from lipmotion.pipeline.batch.record import FAILED, Record
+from lipmotion.pipeline.batch.record import DONE, FAILED, Record
 from lipmotion.pipeline.batch.report import write_reports
 from lipmotion.pipeline.batch.settings import check_job, fingerprint_of, line_fingerprint
 from lipmotion.pipeline.job import Job
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import Item, Monitor, Progress, silent_monitor
 
+LOG = logging.getLogger("lipmotion")
 STAGE = "animating"
 MOST_DEATHS = 3
 """After so many deaths of workers in a row that no line explains, the batch ends."""
@@ -56,6 +59,7 @@ def batch(
     *,
     jobs: int | None = None,
     cluster: str = "",
+    marks: str | Path | None = None,
     monitor: Monitor = silent_monitor,
 ) -> BatchSummary:
     """Turn many recordings into motion files, videos or cues, and write a report of all of them.
@@ -69,9 +73,12 @@ def batch(
     jobs     : number of processes; None: one a core. With more than one, a script must be guarded by
                ``if __name__ == "__main__":``
     cluster  : address of the scheduler of a Dask cluster that does the work instead of this machine
+    marks    : table of approved lines and of those to be done again, as the report saves it; its rows are added to
+               ``marks.csv`` in ``out``, whose marks hold in every run
     monitor  : receives an ``Item`` for every line and the progress
-    A line that was done before, with the same settings and from the same files, is kept. A line that cannot be done is
-    part of the report, and the others go on. The motion is that of ``animate``, whatever the number of processes.
+    A line that was done before, with the same settings and from the same files, is kept; so is an approved one,
+    whatever has changed. A line that cannot be done is part of the report, and the others go on.
+    The motion is that of ``animate``, whatever the number of processes.
     Raises InputError: there are no recordings, a setting is not usable, or the cluster is not.
     Raises ExportError: two lines have the same output, an output would replace a recording, another process is at
     work on the folder, or the disk is full.
@@ -94,25 +101,27 @@ def batch(
         lines = list(source)
         check_names(lines, job.outputs.kinds)
     _check_outside(lines, place)
+    chosen = _chosen_marks(Path(place.out), marks, lines)
     check_line_job(job)
     of_settings = fingerprint_of(job)
     with opened_ledger(place, lines) as ledger:
+        if marks is not None:
+            write_marks(Path(place.out) / MARKS, chosen)
         counter = _Counter(len(lines), monitor)
-        waiting = []
+        kept = _kept_names(lines, ledger, place, of_settings, chosen)
+        waiting = [LineWork(line, job, of_settings, place) for line in lines if line.name not in kept]
         for line in lines:
-            if ledger.kept(line, of_settings, Path(place.out)) is None:
-                waiting.append(LineWork(line, job, of_settings, place))
-            else:
+            if line.name in kept:
                 counter.count(line.name, "kept")
         processes = jobs or os.cpu_count() or 1
         pool = cluster_pool(cluster, Path(place.out)) if cluster else local_pool(processes)
         if waiting:
             with pool as each, closing(_finished(each, waiting)) as records:
                 for record in records:
-                    ledger.append(record)
+                    ledger.append(_with_mark(record, chosen))
                     _forget(place, record)
                     counter.count(record["name"], record["outcome"], record.get("error", ""))
-        csv, html = write_reports(lines, ledger, Path(place.out))
+        csv, html = write_reports(lines, ledger, Path(place.out), chosen)
     return BatchSummary(counter.done, counter.kept, counter.failed, csv, html)
 
 
@@ -122,6 +131,53 @@ def _check_outside(lines: Sequence[BatchLine], place: Place) -> None:
     for line in lines:
         if os.path.realpath(line.recording).startswith(inside):
             raise ExportError(f"{place.out}: holds the recording {line.recording}; give another folder for the outputs")
+
+
+def _chosen_marks(out: Path, given: str | Path | None, lines: Sequence[BatchLine]) -> dict[str, Mark]:
+    """Return the marks in a folder of outputs, with those of a further file in their place. Raises InputError."""
+    kept = read_marks(out / MARKS) if (out / MARKS).is_file() else {}
+    later = read_marks(Path(given)) if given is not None else {}
+    marks = merged(kept, later)
+    names = {line.name for line in lines}
+    unknown = [name for name in later if name not in names]
+    if unknown:
+        LOG.warning("%s: %d marks of lines that are not in this batch: %s", given, len(unknown), _some(unknown))
+    return marks
+
+
+def _kept_names(
+    lines: Sequence[BatchLine], ledger: Ledger, place: Place, of_settings: str, marks: Mapping[str, Mark]
+) -> set[str]:
+    """Return the names of the lines that need not be done; a warning names approved ones that are out of date."""
+    out, kept, outdated = Path(place.out), set(), []
+    for line in lines:
+        mark = marks.get(line.name)
+        if mark is not None and is_due(mark, ledger.record_of(line.name)):
+            continue
+        approved = ledger.finished(line, out) if mark is not None and mark.kind == APPROVE else None
+        if approved is not None or ledger.kept(line, of_settings, out) is not None:
+            kept.add(line.name)
+        if approved is not None and not are_same_inputs(line, approved):
+            outdated.append(line.name)
+    if outdated:
+        LOG.warning(
+            "%d approved lines have another recording or other words now, and are kept: %s; mark them redo",
+            len(outdated),
+            _some(outdated),
+        )
+    return kept
+
+
+def _some(names: Sequence[str]) -> str:
+    return ", ".join(map(shortened, names[:MOST_NAMED_LINES])) + ", ..." * (len(names) > MOST_NAMED_LINES)
+
+
+def _with_mark(record: Record, marks: Mapping[str, Mark]) -> Record:
+    """Return a record that says which mark it was done again for, so that it is done once."""
+    mark = marks.get(record["name"])
+    if mark is None or mark.kind != REDO or record["outcome"] != DONE:
+        return record
+    return record | {"redone": mark.when}
 
 
 def _forget(place: Place, record: Record) -> None:

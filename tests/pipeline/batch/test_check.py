@@ -1,0 +1,97 @@
+"""The check of recordings against their script: every kind of finding, and none where there is nothing."""
+
+from __future__ import annotations
+
+import shutil
+import wave
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.pipeline.batch import check
+from lipmotion.pipeline.batch.check import FEWEST_LINES, Finding, _findings, expected_s
+from lipmotion.pipeline.batch.checked_line import CheckedLine, letters_of
+from lipmotion.pipeline.job import Job, Request
+
+pytest.importorskip("joblib")
+RATE_HZ = 16_000
+
+
+def sound(path: Path, spoken_s: float, seed: int, level: float = 0.1) -> None:
+    """Write noise of a length between two pauses."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    noise = np.random.default_rng(seed).normal(0, level, round(spoken_s * RATE_HZ))
+    quiet = np.random.default_rng(seed).normal(0, level / 1000, RATE_HZ // 2)
+    samples = (np.r_[quiet, noise, quiet].clip(-1, 1) * 32767).astype("<i2")
+    with wave.open(str(path), "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(RATE_HZ)
+        file.writeframes(samples.tobytes())
+
+
+def test_every_kind_is_found(tmp_path: Path) -> None:
+    sounds = tmp_path / "sounds"
+    words = "the old house at the end of the road"
+    for seed, (name, spoken_s) in enumerate({"good": 2.2, "short": 0.6, "long": 9.0, "spanish": 2.2}.items()):
+        sound(sounds / f"{name}.wav", spoken_s, seed)
+    sound(sounds / "deep" / "silent.wav", 1.0, 5, level=1e-4)
+    shutil.copy(sounds / "good.wav", sounds / "again.wav")
+    (sounds / "broken.wav").write_text("no sound")
+    sound(sounds / "deep" / "orphan.wav", 1.0, 6)
+    sound(sounds / "made" / "output.wav", 1.0, 7)
+    (sounds / "made" / "batch.jsonl").touch()
+    listed = {name: f"{number} {words}" for number, name in enumerate(("good", "short", "long", "broken"))}
+    listed |= {
+        "deep/silent": "",
+        "nowhere": "",
+        "again": "",
+        "spanish": "la casa de los padres y el perro de la ni\u00f1a",
+    }
+    script = "".join(f"sounds/{name}.wav,{text}\n" for name, text in listed.items())
+    (tmp_path / "lines.csv").write_text(f"file,transcript\n{script}", encoding="utf-8")
+    found = check(tmp_path / "lines.csv", jobs=1)
+    assert [(each.kind, each.name) for each in found.findings] == [
+        ("too short", "sounds/short"),
+        ("too long", "sounds/long"),
+        ("unreadable", "sounds/broken"),
+        ("silent", "sounds/deep/silent"),
+        ("missing", "sounds/nowhere"),
+        ("language", "sounds/spanish"),
+        ("same sound", "sounds/again"),
+        ("orphaned", str(sounds / "deep" / "orphan.wav")),
+    ]
+    assert found.findings[5].text == "the words are in es, required en"
+    assert found.text.startswith("8 lines: 1 too short, 1 too long, ")
+    assert found.table.splitlines()[-1] == f"orphaned\t{sounds / 'deep' / 'orphan.wav'}\tno line has this recording"
+    assert {path.name for path in tmp_path.iterdir()} == {"sounds", "lines.csv"}
+    spanish = check(tmp_path / "lines.csv", Job(Request(language="es")), jobs=1)
+    assert "sounds/spanish" not in {each.name for each in spanish.findings if each.kind == "language"}
+
+
+def test_a_folder_has_no_orphans(tmp_path: Path) -> None:
+    sound(tmp_path / "a.wav", 1.0, 0)
+    sound(tmp_path / "deep" / "b.wav", 1.0, 1)
+    assert check(tmp_path, jobs=1).text == "2 lines: nothing found"
+
+
+def test_the_measure_of_length_is_the_usual_rate() -> None:
+    """What is too long among quick talkers is not among slow ones."""
+
+    def lines(share: float) -> list[CheckedLine]:
+        usual = [CheckedLine(f"{n}", spoken_s=share * expected_s(60), letters=60) for n in range(FEWEST_LINES)]
+        return [*usual, CheckedLine("x", spoken_s=2.6 * expected_s(60), letters=60)]
+
+    assert [each.name for each in _findings(lines(0.8), [])] == ["x"]
+    assert list(_findings(lines(1.3), [])) == []
+
+
+def test_short_lines_may_have_the_same_words() -> None:
+    long, short = ("who", "goes", "there", "now"), ("yes", "sir")
+    checked = [CheckedLine(name, words=words) for name, words in zip("abcd", (long, short, long, short), strict=True)]
+    assert list(_findings(checked, [])) == [Finding("same words", "c", "as of a")]
+
+
+def test_letters_of_other_scripts_take_longer() -> None:
+    assert letters_of(["hello", "\uac00"]) == pytest.approx(8.0)
