@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
@@ -84,6 +85,13 @@ def test_fish_completes(script_file: Path) -> None:
         offered = {word.split("\t")[0] for word in done.stdout.splitlines()}
         assert offered == expected, words
         assert done.stderr == ""
+
+
+def test_it_loads_no_numpy() -> None:
+    """A shell asks for it whenever it starts."""
+    asked = "main(['completion', 'bash']); sys.exit('numpy' in sys.modules)"
+    program = f"import sys; from lipmotion.cli.main import main; {asked}"
+    assert run_child([sys.executable, "-c", program]).returncode == 0
 
 
 def test_an_unknown_shell(run: RunCommand) -> None:
