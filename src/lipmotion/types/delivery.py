@@ -26,6 +26,8 @@ class Delivery(Configuration):
                       would be before time 0 is left out. For files that are put beside a sound; videos have their own
     min_hold_ms     : 0: the curves are smooth; more: poses are held, each for at least so many milliseconds
     stepped         : poses are held; with ``min_hold_ms`` 0, each for at least two frames at 24 frames a second
+    key_tolerance   : keys of ``.glb`` and ``.usda`` are left out where a straight line between others gives all weights
+                      to within so much; 0: every frame is a key
     Raises InputError: a value out of its range.
 
     >>> Delivery(anticipation_ms=40).hold_ms, Delivery(stepped=True).hold_ms > 80, Delivery(min_hold_ms=120).hold_ms
@@ -57,6 +59,13 @@ class Delivery(Configuration):
         help="hold every pose for at least N ms",
     )
     stepped: bool = option(False, help="hold poses instead of moving smoothly, each for at least 83 ms")
+    key_tolerance: float = option(
+        0.0,
+        Rule(0, most=1),
+        what="tolerance of keys",
+        metavar="X",
+        help="leave out keys of .glb and .usda that others give to within X of a weight, as 0.01",
+    )
 
     @property
     def hold_ms(self) -> float:
