@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lipmotion.articulation.delivery import Delivery, closed_times
 from lipmotion.articulation.expression import mood_table, with_moods
 from lipmotion.errors import InputError
 from lipmotion.faces import Staging
@@ -17,9 +18,17 @@ from lipmotion.faces.head.stage import figure
 from lipmotion.meshes.files.gltf_accessors import GltfArrays
 from lipmotion.meshes.files.gltf_container import read_gltf_document
 from lipmotion.meshes.fitting.driven import driven_character
+from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.scene import Scene
-from lipmotion.pipeline.outputs.output import OutputSettings
-from lipmotion.pipeline.outputs.scenes import SceneOutput, character_scene, head_scene, sound_reference, write_scene
+from lipmotion.pipeline.outputs.output import OutputSettings, Performance
+from lipmotion.pipeline.outputs.scenes import (
+    SceneOutput,
+    character_scene,
+    delivered_scene,
+    head_scene,
+    sound_reference,
+    write_scene,
+)
 from lipmotion.pipeline.outputs.shown_faces import shown_face
 from lipmotion.types import Channel, Generation, Motion, StateTrace
 from lipmotion.types.moods import moods_of
@@ -178,6 +187,24 @@ def test_held_weights_change_at_once_and_others_do_not(character: Scene, tmp_pat
     stored = GltfArrays(read_gltf_document(tmp_path / "a.glb"))
     assert stored.floats(sampler["input"], 1)[:, 0] == pytest.approx(time_s)
     assert stored.floats(sampler["output"], 1)[:, 0] == pytest.approx(table.reshape(-1))
+
+
+def test_keys_that_others_give_are_left_out(generation: Generation, tmp_path: Path) -> None:
+    settings = OutputSettings(shown_face("head"), delivery=Delivery(key_tolerance=0.02))
+    scene = delivered_scene(Performance(generation, settings))
+    assert scene.weights is not None
+    assert scene.thinning == Thinning(0.02, tuple(closed_times(generation)))
+    write_scene(tmp_path / "a.glb", scene)
+    stored, rotation = GltfArrays(read_gltf_document(tmp_path / "a.glb")), len(scene.table())
+    weights, turned = read_gltf_document(tmp_path / "a.glb").json["animations"][0]["samplers"]
+    time_s = stored.floats(weights["input"], 1)[:, 0]
+    values = stored.floats(weights["output"], 1).reshape(len(time_s), -1)
+    assert len(time_s) < rotation == len(stored.floats(turned["input"], 1)) == len(stored.floats(turned["output"], 4))
+    shown = np.stack([np.interp(scene.weights.time_s, time_s, column) for column in values.T], axis=1)
+    assert np.abs(shown - scene.table()).max() < 0.0201
+    closed = [round(each_s * scene.weights.rate_hz) for each_s in scene.thinning.closed_s]
+    assert closed
+    assert shown[closed] == pytest.approx(scene.table()[closed], abs=1e-6)
 
 
 def test_the_shapes_of_the_head_are_those_of_its_mesh(own_head: Scene) -> None:

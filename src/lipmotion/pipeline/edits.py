@@ -390,8 +390,8 @@ class Edits:
 
     >>> Edits().then("phone 2 is p", "pin opening 0.02 at 1.2").sentences
     ('phone 2 is p', 'pin opening 0.02 at 1.2')
-    >>> Edits().then("set intensity 1.3").delivery(Delivery(anticipation_ms=40))
-    Delivery(intensity=1.3, anticipation_ms=40, offset_ms=0.0, min_hold_ms=0.0, stepped=False, mood='')
+    >>> Edits().then("set intensity 1.3").delivery(Delivery(anticipation_ms=40)).as_mapping()
+    {'intensity': 1.3, 'anticipation_ms': 40, 'offset_ms': 0.0, 'min_hold_ms': 0.0, 'stepped': False}
     """
 
     steps: tuple[Step, ...] = ()

@@ -30,6 +30,8 @@ class Delivery(Configuration):
                       ``happy``, ``sad:0.6, whisper``, ``happy:0.7, neutral at 2.5``; empty: what the words or the
                       motion say, else nothing
     stepped         : poses are held; with ``min_hold_ms`` 0, each for at least two frames at 24 frames a second
+    key_tolerance   : keys of ``.glb`` and ``.usda`` are left out where a straight line between others gives all weights
+                      to within so much; 0: every frame is a key
     Raises InputError: a value out of its range, or no such mood.
 
     >>> Delivery(anticipation_ms=40).hold_ms, Delivery(stepped=True).hold_ms > 80, Delivery(min_hold_ms=120).hold_ms
@@ -67,6 +69,14 @@ class Delivery(Configuration):
         metavar="MOOD[:STRENGTH]",
         help="neutral, happy, sad, angry, afraid, disgusted, surprised, tense, tired; plain, whisper, shout, mumble; "
         "strength 0 to 1; over time: 'happy:0.7, sad at 2.5' (docs/expression.md)",
+    )
+    key_tolerance: float = option(
+        0.0,
+        Rule(0, most=1),
+        what="tolerance of keys",
+        later=True,
+        metavar="X",
+        help="leave out keys of .glb and .usda that others give to within X of a weight, as 0.01",
     )
 
     def __post_init__(self) -> None:

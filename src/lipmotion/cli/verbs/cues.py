@@ -35,7 +35,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add("--shapes", default="GHX", help="optional shapes that the character has (default: GHX; none: '')")
     add("--machine-readable", "--machineReadable", action="store_true", help="progress as JSON lines on standard error")
     hold = "hold every shape for at least N ms, as --hold FRAMES"
-    add_options(parser, Delivery, but=("stepped",), min_hold_ms={"help": hold})
+    add_options(parser, Delivery, but=("stepped", "key_tolerance"), min_hold_ms={"help": hold})
     add_rhubarb_options(parser)
     parser.set_defaults(run=run)
 

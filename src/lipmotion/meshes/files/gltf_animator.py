@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.meshes.files.gltf_container import GltfDocument, read_gltf_document, write_container
 from lipmotion.meshes.files.gltf_scene import target_names
-from lipmotion.meshes.model.scene import with_jumps
+from lipmotion.meshes.model.keys import EVERY_KEY, Thinning, keys_of
 from lipmotion.types import Motion
 
 FLOAT = 5126
@@ -25,11 +25,12 @@ def write_animated_gltf(
     *,
     sound_s: float = 0.0,
     stepped: Collection[str] = (),
+    thinning: Thinning = EVERY_KEY,
 ) -> bool:
     """Write a ``.glb`` or ``.vrm`` again, with the weights of its morph targets as its first animation, ``speech``.
 
     weights : channels by the names of the morph targets, in all meshes that have them
-    sound, sound_s, stepped : as of ``Scene``
+    sound, sound_s, stepped, thinning : as of ``Scene``
     Returns False, and writes nothing, where the file is no single ``.glb``, or a channel is none of its morph targets
     (an expression of a VRM file is several of them).
     Raises InputError: the original cannot be read. Raises ExportError: the file cannot be written.
@@ -44,7 +45,7 @@ def write_animated_gltf(
     json = document.json
     body = bytearray(binary[: document.items("buffers")[0].get("byteLength", len(binary))])
     chosen = [name in stepped for name in weights.names]
-    time_s, rows = with_jumps(weights.time_s, weights.values.astype(np.float64), chosen)
+    time_s, rows = keys_of(weights.time_s, weights.values.astype(np.float64), chosen, thinning)
     times = _added(json, body, time_s, limits=True)
     samplers: dict[tuple[str, ...], dict[str, Any]] = {}
     channels: list[dict[str, Any]] = []

@@ -209,7 +209,7 @@ def _animation(buffer: GltfBuffer, scene: Scene, head: int) -> dict[str, Any]:
     if scene.mesh.shapes:
         curves.append((0, "weights", times, buffer.add(table.reshape(-1), "SCALAR")))
     if scene.turn is not None:
-        if len(frames_s) < len(time_s):
+        if not np.array_equal(frames_s, time_s):
             times = buffer.add(frames_s, "SCALAR", limits=True)
         curves.append((head, "rotation", times, buffer.add(scene.turn.rotations, "VEC4")))
     return {

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError, InputError
+from lipmotion.meshes.model.keys import EVERY_KEY, Thinning, keys_of
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.meshes.model.single_sided import single_sided
 from lipmotion.meshes.model.surface import mesh_surface
@@ -18,8 +18,6 @@ from lipmotion.types import Motion
 
 Array = NDArray[np.float64]
 
-JUMP_S = 1e-3
-"""How long a change at once may last, in seconds."""
 LEAST_TURN = 1e-3
 """Normals that a blendshape turns by less than this are left out of it."""
 
@@ -50,6 +48,7 @@ class Scene:
     metres  : the length of the mesh's unit in metres, for formats that say it
     original : the file that the mesh is from; a ``.glb`` of it keeps all that is in that file; None: no file
     stepped : names of weights that change at once from one held value to the next
+    thinning : which keys of weights may be left out; the head's turn has all
     split   : whether vertices at one place may be one: files split them along seams, which should not be seen
     Raises ExportError: a channel that is no blendshape. Raises InputError: a turn that does not fit the mesh.
     """
@@ -63,6 +62,7 @@ class Scene:
     original: Path | None = None
     split: bool = True
     stepped: tuple[str, ...] = ()
+    thinning: Thinning = EVERY_KEY
 
     def __post_init__(self) -> None:
         for name in self.weights.names if self.weights else ():
@@ -93,24 +93,7 @@ class Scene:
         Between two keys weights lie on a straight line: where some are stepped, there is a key just before a change.
         """
         time_s = self.weights.time_s if self.weights else np.zeros(0)
-        return with_jumps(time_s, self.table(), [name in self.stepped for name in self.mesh.shape_names])
-
-
-def with_jumps(time_s: Array, rows: Array, stepped: Sequence[bool]) -> tuple[Array, Array]:
-    """Return evenly spaced keys with those added that let some curves change at once between straight lines.
-
-    time_s  : seconds [shape=(T,)]; rows : of curves [shape=(T, N)]; stepped : which curves change at once [N values]
-    An added key is ``JUMP_S`` before a change, or a tenth of the time between two keys, whichever is shorter.
-    """
-    chosen = np.array(stepped, bool)
-    changed = np.flatnonzero(np.diff(rows[:, chosen], axis=0).any(axis=1)) + 1
-    if not len(changed):
-        return time_s, rows
-    step_s = float(time_s[1] - time_s[0])
-    early_s = min(JUMP_S, step_s / 10)
-    before = rows[changed] - early_s / step_s * (rows[changed] - rows[changed - 1])
-    before[:, chosen] = rows[changed - 1][:, chosen]
-    return np.insert(time_s, changed, time_s[changed] - early_s), np.insert(rows, changed, before, axis=0)
+        return keys_of(time_s, self.table(), [name in self.stepped for name in self.mesh.shape_names], self.thinning)
 
 
 @dataclass(frozen=True, eq=False)

@@ -151,10 +151,10 @@ def _orphans(source: Path, lines: Sequence[BatchLine]) -> list[str]:
         return []
     used = {os.path.realpath(line.recording) for line in lines}
     folders = {Path(line.recording).parent for line in lines}
-    shared = Path(os.path.commonpath(folders))
-    is_inside = shared.is_relative_to(Path(os.path.abspath(source)).parent)  # noqa: PTH100 # links are not followed
-    roots, depth = ([shared], "**/*") if is_inside else (sorted(folders), "*")
-    found = (path for root in roots for path in sorted(root.glob(depth)) if is_recording(path))
+    own = Path(os.path.abspath(source)).parent  # noqa: PTH100 # links are not followed
+    is_inside = all(folder.is_relative_to(own) for folder in folders)
+    roots, depth = ([Path(os.path.commonpath(folders))], "**/*") if is_inside else (sorted(folders), "*")
+    found = (path for root in roots for path in sorted(root.glob(depth)) if is_recording(path) and path.is_file())
     return [str(path) for path in found if os.path.realpath(path) not in used and not _is_output(path, roots)]
 
 

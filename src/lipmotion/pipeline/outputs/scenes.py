@@ -21,6 +21,7 @@ from lipmotion.meshes.files.usd_writer import write_usda
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.head_angles import head_quaternions
+from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.mesh import Blendshape
 from lipmotion.meshes.model.scene import HeadTurn, Scene
 from lipmotion.meshes.model.shape_names import by_arkit_name
@@ -63,7 +64,8 @@ def delivered_scene(performance: Performance) -> Scene:
     settings, delivery = performance.settings, performance.settings.delivery
     moved = with_drawn_channels(delivered(performance.generation, delivery))
     scene = settings.face.scene(moved, settings, performance.once(recorded_prosody))
-    scene = replace(scene, sound_s=delivery.offset_ms / 1000)
+    thinning = Thinning(delivery.key_tolerance, tuple(closed_times(moved)) if delivery.key_tolerance else ())
+    scene = replace(scene, sound_s=delivery.offset_ms / 1000, thinning=thinning)
     weights = scene.weights
     if weights is None or not delivery.hold_ms:
         return scene
@@ -94,7 +96,13 @@ def _keeps_original(path: Path, scene: Scene) -> bool:
     if path.suffix.lower() != GLTF or scene.original is None or scene.original.suffix.lower() not in KEPT:
         return False
     return scene.weights is not None and write_animated_gltf(
-        path, scene.original, scene.weights, scene.sound, sound_s=scene.sound_s, stepped=scene.stepped
+        path,
+        scene.original,
+        scene.weights,
+        scene.sound,
+        sound_s=scene.sound_s,
+        stepped=scene.stepped,
+        thinning=scene.thinning,
     )
 
 
