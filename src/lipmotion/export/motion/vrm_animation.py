@@ -19,7 +19,7 @@ from lipmotion.meshes.files.gltf_container import write_container
 from lipmotion.meshes.files.gltf_weights import read_gltf_motion
 from lipmotion.meshes.files.gltf_writer import GltfBuffer
 from lipmotion.meshes.model.head_angles import ANGLES, head_quaternions
-from lipmotion.meshes.model.scene import with_jumps
+from lipmotion.meshes.model.keys import with_jumps
 from lipmotion.meshes.model.shape_names import VRM_VOWELS
 from lipmotion.types import Generation, Motion
 
