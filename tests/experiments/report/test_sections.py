@@ -89,3 +89,10 @@ def test_an_addition_that_helps_is_named_so() -> None:
 def test_few_recordings_are_warned_of() -> None:
     assert warning_of(FEW_CLIPS) == {}
     assert "Only 2 recordings" in warning_of(2)["Beware"][0]
+
+
+def test_a_share_that_is_not_defined_is_not_told_as_0() -> None:
+    figures = figures_of("folds")
+    figures["conditions"]["audio only"]["recall_p_b_m"] = None
+    (sentence,) = PARTS["folds"].section(figures).words["More closings than a test list has"]
+    assert "the lips close in – %" in sentence

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from lipmotion.experiments.comparison import sign_of_difference
 from lipmotion.experiments.minnis_breen2000.minnis2000 import ADDITIONS, EVERYTHING, PRINTED, UNGUIDED, VARIANTS
 from lipmotion.experiments.report.charts import Dot, dots
+from lipmotion.experiments.report.columns import ACC, ELSEWHERE, NRMSE, RECALL, SCORE, VARIANCE
 from lipmotion.experiments.report.section import Section, named, warning_of
 from lipmotion.experiments.report.table import Column, Row, Table
 from lipmotion.pipeline.evaluation.held_out import AUDIO_ONLY
 
 COLUMNS = (
-    Column("acc", "ACC", ".3f", "correlation of the opening with the recording"),
-    Column("recall_p_b_m", "p b m", ".1f", "p, b and m in which the lips close, without pins, in %"),
-    Column("score", "score", ".1f", "closings of the recording that the motion makes, in %"),
-    Column("false_per_minute", "elsewhere", ".1f", "closings outside p b m, a minute"),
-    Column("nrmse", "nRMSE", ".3f"),
-    Column("global_variance", "variance", ".2f", "of the opening, by that of the recording"),
+    ACC,
+    replace(RECALL, note="p, b and m in which the lips close, without pins, in %"),
+    SCORE,
+    ELSEWHERE,
+    NRMSE,
+    VARIANCE,
     Column("joins_per_clip", "joins", ".1f", "a recording"),
     Column("joins_hard", "hard", ".0f", "joins at which units abut, in %"),
     Column("joins_smooth", "smooth", ".0f", "joins no rougher than 95 % of the speaker's own motion, in %"),

@@ -7,19 +7,11 @@ from typing import Any
 
 from lipmotion.experiments.comparison import sign_of_difference
 from lipmotion.experiments.report.charts import Dot, dots, rising
+from lipmotion.experiments.report.columns import ELSEWHERE, JERK, OPENING
 from lipmotion.experiments.report.section import Section, named, warning_of
 from lipmotion.experiments.report.table import Column, Table
+from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.pipeline.evaluation.held_out import AUDIO_ONLY
-
-OPENING = (
-    Column("acc", "ACC", ".3f", "correlation of the opening with the recording"),
-    Column("nrmse", "nRMSE", ".3f"),
-    Column("score", "score", ".1f", "closings of the recording that the motion makes, in %"),
-    Column("precision", "precision", ".1f", "generated closings that are of the recording, in %"),
-    Column("recall_p_b_m", "p b m", ".1f", "p, b and m in which the lips close, in %"),
-    Column("global_variance", "variance", ".2f", "of the opening, by that of the recording"),
-)
-ELSEWHERE = Column("false_per_minute", "elsewhere", ".1f", "closings outside p b m, a minute of speech")
 
 
 def engines_section(figures: Mapping[str, Any]) -> Section:
@@ -29,10 +21,8 @@ def engines_section(figures: Mapping[str, Any]) -> Section:
         rows = {
             name: {**row, "acc_gain_95": row["acc_gain_95"].get(reference)} for name, row in found["systems"].items()
         }
-        columns = (*OPENING, ELSEWHERE, Column("jerk", "jerk", ".2f", "the same of the jerk"))
-        tables[condition] = Table(
-            f"engines-{condition}".replace(" ", "-"), f"Engines, {condition}", columns, rows, reference
-        )
+        name, columns = f"engines-{condition}".replace(" ", "-"), (*OPENING, ELSEWHERE, JERK)
+        tables[condition] = Table(name, f"Engines, {condition}", columns, rows, reference)
     main = tables.pop(AUDIO_ONLY)
     signs = {name: sign_of_difference(row["acc_gain_95"]) for name, row in main.rows.items() if name != reference}
     best = max(main.rows, key=lambda name: main.rows[name]["acc"] or 0.0)
@@ -122,8 +112,8 @@ def folds_section(figures: Mapping[str, Any]) -> Section:
     )
     words = warning_of(figures["clips"]) | {
         "More closings than a test list has": [
-            f"Of {row['p_b_m']} p, b and m the lips close in {row['recall_p_b_m'] or 0:.1f} %; of {row['closings']} "
-            f"closings {row['score'] or 0:.1f} % are made in time."
+            f"Of {row['p_b_m']} p, b and m the lips close in {figure_text(row['recall_p_b_m'], '.1f')} %; of "
+            f"{row['closings']} closings {figure_text(row['score'], '.1f')} % are made in time."
         ]
     }
     return Section("Cross-validation", about, verdict, words, [], table)
