@@ -10,7 +10,7 @@ from lipmotion.experiments.hofer2008.table1_text import what_held
 from lipmotion.experiments.report.charts import Dot, dots
 from lipmotion.experiments.report.columns import ACC, JERK, NRMSE, PRECISION, RECALL, SCORE, VARIANCE
 from lipmotion.experiments.report.order import PaperOrder, PaperPair
-from lipmotion.experiments.report.section import Section, warning_of
+from lipmotion.experiments.report.section import Section, difference, warning_of
 from lipmotion.experiments.report.table import Column, Table
 from lipmotion.pipeline.evaluation.held_out import AUDIO_ONLY
 
@@ -71,17 +71,13 @@ def _order(block: Mapping[str, Any]) -> PaperOrder:
         PaperPair(
             pair["better"],
             pair["worse"],
-            _difference(rows[pair["better"]]["score"], rows[pair["worse"]]["score"]),
+            difference(rows[pair["better"]]["score"], rows[pair["worse"]]["score"]),
             pair["score_gain_95"],
         )
         for pair in block["paper_order"]
     ]
     paper = {name: PAPER_SCORES[name] for name in rows}
     return PaperOrder("Score of closings", paper, {name: row["score"] for name, row in rows.items()}, pairs, "+.1f")
-
-
-def _difference(better: float | None, worse: float | None) -> float | None:
-    return None if better is None or worse is None else better - worse
 
 
 def _table(block: Mapping[str, Any]) -> Table:
