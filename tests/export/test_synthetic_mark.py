@@ -1,4 +1,5 @@
 import xml.etree.ElementTree as ET
+from importlib import metadata
 from itertools import product
 
 import av
@@ -105,3 +106,11 @@ def test_a_label_that_has_no_room_is_refused():
     with pytest.raises(InputError, match="left before right"):
         next(mark_frames([noise(288, 360)], (50, 5, 20, 283)))
     assert list(mark_frames([])) == []
+
+
+def test_a_program_that_is_not_installed_has_a_mark_too(monkeypatch):
+    def nothing(name: str) -> str:
+        raise metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(metadata, "version", nothing)
+    assert "lipmotion source" in mark_metadata().xmp

@@ -112,6 +112,12 @@ def test_the_compiled_form_gives_the_same_bits(frames, channels, monkeypatch):
     assert np.array_equal(plain, fast)
 
 
+@pytest.mark.parametrize("shape", [(0, 1), (0, 3), (5, 0)])
+def test_solutions_have_the_shape_of_the_system_where_there_is_nothing_in_it(shape):
+    values, variance = solve(tuple(np.ones(shape) for _ in range(4)))
+    assert values.shape == variance.shape == shape
+
+
 def test_pins_have_no_variance():
     mean, precision = statistics(6, 8)
     values, variance = generate(mean, precision, {(3, 1): 0.25})

@@ -23,7 +23,7 @@ ROUNDS = 8
 MIXED_CANDIDATES, MIXTURE_SHARE = 20, 0.95
 """Recorded mouths of which a predicted one is mixed, and the share of the mixture."""
 LEAST_NEARNESS = 1e-3
-"""The furthest of them is penalised as if it were nearer than the next one by this share of its squared distance."""
+"""The furthest of them is penalised as if its squared distance were smaller by this share than the largest one."""
 PICTURES_AT_ONCE = 16
 """Pictures that are restored at a time."""
 BLOCK = 2048

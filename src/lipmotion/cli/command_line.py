@@ -130,9 +130,9 @@ class _Version(argparse.Action):
     """Prints the version, which is looked up only when the option is given."""
 
     def __call__(self, *_: object) -> None:
-        from importlib.metadata import version
+        from lipmotion.extensions import installed_version
 
-        print_line(f"lipmotion {version('lipmotion')}")
+        print_line(f"lipmotion {installed_version()}")
         sys.exit(0)
 
 

@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from html import escape
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError, InputError
+from lipmotion.extensions import installed_version
 from lipmotion.printable import printable
 
 Frame = NDArray[np.uint8]
@@ -56,7 +56,7 @@ def mark_metadata(statement: str = STATEMENT) -> MarkMetadata:
     Source: IPTC Digital Source Type NewsCodes; IPTC Video Metadata Hub; Adobe, XMP Specification Part 1.
     """
     text = escape(printable(statement), quote=False)
-    xmp = _PACKET.format(statement=text, source_type=SOURCE_TYPE, tool=f"lipmotion {version('lipmotion')}")
+    xmp = _PACKET.format(statement=text, source_type=SOURCE_TYPE, tool=f"lipmotion {installed_version()}")
     return MarkMetadata({"comment": statement, "keywords": f"{LABEL}, {SOURCE_TYPE}"}, xmp)
 
 

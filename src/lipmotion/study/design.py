@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from importlib.metadata import version
 from pathlib import Path
 
 from lipmotion.errors import ExportError, InputError
+from lipmotion.extensions import installed_version
 from lipmotion.storage.files import read_text_file, sha256_of, whole_folder
 from lipmotion.study.answers import ANCHOR, KINDS, MOS, PAIRED, RANKING, RECORDING
 from lipmotion.study.encoding import encode_shown
@@ -83,7 +83,7 @@ def design_study(
             sentences={each.name: {"file": each.recording.name, "sha256": sha256_of(each.recording)} for each in said},
             videos=tuple(videos),
             trials=_trials(kind, sources, said, numbers, base, settings),
-            made_by={"lipmotion": version("lipmotion")}
+            made_by={"lipmotion": installed_version()}
             | {name: str(value) for name, value in asdict(settings).items() if name not in texts},
         )
         write_manifest(study, folder)

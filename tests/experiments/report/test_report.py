@@ -23,6 +23,7 @@ from lipmotion.experiments.report.parts import PARTS, PartRun, ReportPart
 from lipmotion.experiments.report.report import PAGE, WrittenReport, experiment_report
 from lipmotion.experiments.runner import ExperimentSettings
 from lipmotion.hmm.model import HmmConfig
+from lipmotion.units import Lexicon
 from study.browser import BROWSER, DRIVER, MISSING, axe_script, browser
 
 SMALL = ExperimentSettings(recogniser=HmmConfig(mixtures=1, iterations=2))
@@ -120,7 +121,9 @@ def test_other_recordings_or_settings_are_run_again(ran: list[str], toy_corpus: 
     assert "quick run" in Links(tmp_path / "r" / PAGE).text
     assert run(toy_corpus.part(toy_corpus.names()[1:]), quick=True).made == ["folds"]
     assert run(toy_corpus, quick=True, settings=replace(SMALL, seed=1)).made == ["folds"]
-    assert len(ran) == len(list((tmp_path / "r" / "models").iterdir())) == 4
+    assert run(toy_corpus, settings=replace(SMALL, lexicon=Lexicon({"a": (("ax",),)}))).made == ["folds"]
+    assert "-o r --only folds --lexicon FILE" in Links(tmp_path / "r" / PAGE).text
+    assert len(ran) == len(list((tmp_path / "r" / "models").iterdir())) == 5
 
 
 @pytest.mark.usefixtures("ran")

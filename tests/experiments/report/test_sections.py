@@ -89,3 +89,33 @@ def test_an_addition_that_helps_is_named_so() -> None:
 def test_few_recordings_are_warned_of() -> None:
     assert warning_of(FEW_CLIPS) == {}
     assert "Only 2 recordings" in warning_of(2)["Beware"][0]
+
+
+def test_a_share_that_is_not_defined_is_not_told_as_0() -> None:
+    figures = figures_of("folds")
+    figures["conditions"]["audio only"]["recall_p_b_m"] = None
+    (sentence,) = PARTS["folds"].section(figures).words["More closings than a test list has"]
+    assert "the lips close in – %" in sentence
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_figures_that_are_not_defined_end_no_run(name: str) -> None:
+    def undefined(content: Any) -> Any:
+        """Return figures whose correlations, scores and their intervals are not defined."""
+        if isinstance(content, list):
+            return [undefined(each) for each in content]
+        if not isinstance(content, dict):
+            return content
+        gone = {"acc", "score", "recall_p_b_m", "acc_95", "score_95", "acc_gain_95", "score_gain_95"}
+        return {
+            key: undefined(each)
+            if key not in gone or isinstance(each, dict)
+            else [None, None]
+            if isinstance(each, list)
+            else None
+            for key, each in content.items()
+        }
+
+    section = PARTS[name].section(undefined(figures_of(name)))
+    assert section.verdict
+    assert "nan" not in "".join(map(str, section.charts))

@@ -17,6 +17,7 @@ from lipmotion.engines import engine_named
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion import posterior_network
 from lipmotion.pipeline.model import Model, save_model
+from lipmotion.pipeline.training import fingerprint as fingerprints
 from lipmotion.pipeline.training import labels
 from lipmotion.pipeline.training import train as module
 from lipmotion.pipeline.training.channels import BOTH, GEOMETRY
@@ -180,7 +181,9 @@ def test_what_is_done_is_not_done_again(corpus: Corpus, work: Path) -> None:
     assert [event for event in again if isinstance(event, Item)] == items
 
 
-def test_the_fingerprint_is_of_all_that_a_training_uses(toy_corpus: Corpus, tmp_path: Path) -> None:
+def test_the_fingerprint_is_of_all_that_a_training_uses(
+    toy_corpus: Corpus, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     corpus = Corpus.create(tmp_path / "corpus")
     utterance = toy_corpus.utterance("toy00")
     engine, job = engine_named("trajectory", {}), (CONFIG, Lexicon())
@@ -198,6 +201,9 @@ def test_the_fingerprint_is_of_all_that_a_training_uses(toy_corpus: Corpus, tmp_
         fingerprint(corpus, ["toy00"], engine, CONFIG, Lexicon({"a": (("ax",),)}), GEOMETRY, None),
     ]
     assert len({plain, *others}) == 5
+    with monkeypatch.context() as changed:
+        changed.setattr(fingerprints, "installed_phone_recogniser", lambda: "another")
+        assert digests()[0] not in (plain, *others)
     crops = np.array(utterance.track.crops)
     crops[3, 4, 5] ^= 1
     corpus.add(replace(utterance, track=replace(utterance.track, crops=crops)))

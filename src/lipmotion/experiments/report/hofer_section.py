@@ -8,22 +8,23 @@ from typing import Any
 from lipmotion.experiments.hofer2008.table1 import PAPER_SCORES, PINS, REFERENCE_SET
 from lipmotion.experiments.hofer2008.table1_text import what_held
 from lipmotion.experiments.report.charts import Dot, dots
+from lipmotion.experiments.report.columns import ACC, JERK, NRMSE, PRECISION, RECALL, SCORE, VARIANCE
 from lipmotion.experiments.report.order import PaperOrder, PaperPair
-from lipmotion.experiments.report.section import Section, warning_of
+from lipmotion.experiments.report.section import Section, difference, warning_of
 from lipmotion.experiments.report.table import Column, Table
 from lipmotion.pipeline.evaluation.held_out import AUDIO_ONLY
 
 AS_PRINTED = next(iter(PINS))
 COLUMNS = (
     Column("paper", "paper: score", ".1f", "the paper's Table 1, in %: another speaker, corpus and threshold"),
-    Column("score", "score", ".1f", "closings of the recording that the motion makes within two frames, in %"),
-    Column("precision", "precision", ".1f", "generated closings that are of the recording, in %"),
-    Column("recall_p_b_m", "p b m", ".1f", "p, b and m in which the lips close, in %"),
+    SCORE,
+    PRECISION,
+    RECALL,
     Column("timing_ms", "timing", "+.0f", "by how much closings are late, in ms"),
-    Column("acc", "ACC", ".3f", "correlation of the opening with the recording"),
-    Column("nrmse", "nRMSE", ".3f"),
-    Column("jerk", "jerk", ".2f", "of the motion by that of the recording"),
-    Column("global_variance", "variance", ".2f", "the same of the variance"),
+    ACC,
+    NRMSE,
+    JERK,
+    VARIANCE,
     Column("units", "units", ".0f", "how many the set has"),
     Column("gaussians", "K", ".0f", "Gaussians a state for speech, chosen on val"),
 )
@@ -70,17 +71,13 @@ def _order(block: Mapping[str, Any]) -> PaperOrder:
         PaperPair(
             pair["better"],
             pair["worse"],
-            _difference(rows[pair["better"]]["score"], rows[pair["worse"]]["score"]),
+            difference(rows[pair["better"]]["score"], rows[pair["worse"]]["score"]),
             pair["score_gain_95"],
         )
         for pair in block["paper_order"]
     ]
     paper = {name: PAPER_SCORES[name] for name in rows}
     return PaperOrder("Score of closings", paper, {name: row["score"] for name, row in rows.items()}, pairs, "+.1f")
-
-
-def _difference(better: float | None, worse: float | None) -> float | None:
-    return None if better is None or worse is None else better - worse
 
 
 def _table(block: Mapping[str, Any]) -> Table:

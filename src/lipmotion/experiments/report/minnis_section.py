@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from lipmotion.experiments.comparison import sign_of_difference
 from lipmotion.experiments.minnis_breen2000.minnis2000 import ADDITIONS, EVERYTHING, PRINTED, UNGUIDED, VARIANTS
 from lipmotion.experiments.report.charts import Dot, dots
-from lipmotion.experiments.report.section import Section, named, warning_of
+from lipmotion.experiments.report.columns import ACC, ELSEWHERE, NRMSE, RECALL, SCORE, VARIANCE
+from lipmotion.experiments.report.section import Section, difference, named, warning_of
 from lipmotion.experiments.report.table import Column, Row, Table
+from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.pipeline.evaluation.held_out import AUDIO_ONLY
 
 COLUMNS = (
-    Column("acc", "ACC", ".3f", "correlation of the opening with the recording"),
-    Column("recall_p_b_m", "p b m", ".1f", "p, b and m in which the lips close, without pins, in %"),
-    Column("score", "score", ".1f", "closings of the recording that the motion makes, in %"),
-    Column("false_per_minute", "elsewhere", ".1f", "closings outside p b m, a minute"),
-    Column("nrmse", "nRMSE", ".3f"),
-    Column("global_variance", "variance", ".2f", "of the opening, by that of the recording"),
+    ACC,
+    replace(RECALL, note="p, b and m in which the lips close, without pins, in %"),
+    SCORE,
+    ELSEWHERE,
+    NRMSE,
+    VARIANCE,
     Column("joins_per_clip", "joins", ".1f", "a recording"),
     Column("joins_hard", "hard", ".0f", "joins at which units abut, in %"),
     Column("joins_smooth", "smooth", ".0f", "joins no rougher than 95 % of the speaker's own motion, in %"),
@@ -41,12 +44,13 @@ def section(figures: Mapping[str, Any]) -> Section:
     split, last = list(figures["lists"].items())[-1]
     main = next(table for table in tables if table.caption == f"Unit selection, {split}, {AUDIO_ONLY}")
     rows, everything = main.rows, main.rows[EVERYTHING]
-    gained = everything["acc"] - rows[PRINTED]["acc"]
+    acc = figure_text(rows[PRINTED]["acc"], ".3f"), figure_text(everything["acc"], ".3f")
+    gained = difference(everything["acc"], rows[PRINTED]["acc"])
     sign = sign_of_difference(everything["acc_gain_95"])
     effect = ("leave open whether they change", "raise", "lower")[sign]
     verdict = (
         f"The paper prints no figures. All additions together {effect} the correlation of the opening: "
-        f"{rows[PRINTED]['acc']:.3f} as printed, {everything['acc']:.3f} with them ({_interval(gained, everything)})."
+        f"{acc[0]} as printed, {acc[1]} with them ({_interval(gained, everything)})."
     )
     words = warning_of(last["clips"]) | {
         "Each addition alone": _effects(rows, ADDITIONS),
@@ -82,16 +86,17 @@ def _effects(rows: Mapping[str, Row], names: Iterable[str]) -> list[str]:
     """Return which of some rows are better than the system as printed, worse, and neither for sure."""
     signs = {name: sign_of_difference(rows[name]["acc_gain_95"]) for name in names}
     printed = rows[PRINTED]["acc"]
-    described = {name: f"{name} ({rows[name]['acc'] - printed:+.3f})" for name in signs}
+    described = {name: f"{name} ({figure_text(difference(rows[name]['acc'], printed), '+.3f')})" for name in signs}
     said = ((1, "ACC is higher"), (-1, "ACC is lower"), (0, "The interval of the difference contains 0"))
     return [
         f"{what}: {named([described[name] for name, each in signs.items() if each == sign])}." for sign, what in said
     ]
 
 
-def _interval(gained: float, row: Row) -> str:
+def _interval(gained: float | None, row: Row) -> str:
     low, high = row["acc_gain_95"]
-    return f"{gained:+.3f}" if low is None else f"{gained:+.3f}, 95 % interval {low:+.3f} to {high:+.3f}"
+    told = figure_text(gained, "+.3f")
+    return told if low is None else f"{told}, 95 % interval {low:+.3f} to {high:+.3f}"
 
 
 def _percent(share: float | None) -> str:

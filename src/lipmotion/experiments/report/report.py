@@ -243,6 +243,7 @@ class _Writer:
     def _command(self, wanted: Sequence[str]) -> str:
         words = ["lipmotion experiment all", self.name, "-o", self.folder.resolve().name]
         words += ["--only", ",".join(wanted)] if len(wanted) < len(PARTS) else []
+        words += ["--lexicon", "FILE"] if self.settings.lexicon else []
         return " ".join([*words, *(["--quick"] if self.quick else [])])
 
 

@@ -56,3 +56,8 @@ def warning_of(clips: int) -> dict[str, list[str]]:
 def named(names: Sequence[str]) -> str:
     """Return names as a list in words; ``none`` for an empty one."""
     return ", ".join(names) or "none"
+
+
+def difference(one: float | None, other: float | None) -> float | None:
+    """Return by how much a figure is above another one; None where one of them is not defined."""
+    return None if one is None or other is None else one - other

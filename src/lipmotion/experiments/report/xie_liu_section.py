@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from lipmotion.experiments.report.charts import Dot, dots
+from lipmotion.experiments.report.columns import RECALL, SCORE, VARIANCE
 from lipmotion.experiments.report.order import PaperOrder, PaperPair
 from lipmotion.experiments.report.section import Section, warning_of
 from lipmotion.experiments.report.table import Column, Table
@@ -18,9 +19,9 @@ COLUMNS = (
     Column("paper_amse", "paper: AMSE", ".3f", "in the paper's units of eigenlips, which do not compare"),
     Column("amse", "AMSE", ".4f", "mean distance from the recording, smaller is better"),
     Column("opening_acc", "opening", ".3f", "correlation of the opening alone"),
-    Column("score", "score", ".1f", "closings of the recording that the motion makes, in %"),
-    Column("recall_p_b_m", "p b m", ".1f", "p, b and m in which the lips close, in %"),
-    Column("global_variance", "variance", ".2f", "of the opening, by that of the recording"),
+    SCORE,
+    RECALL,
+    VARIANCE,
     Column("lag_ms", "lag", "+.0f", "in ms"),
     Column("parameters", "numbers", ".0f", "what the chains have learned"),
     Column("seconds", "seconds", ".1f", "of a processor, for training"),

@@ -89,10 +89,10 @@ def _solved(bands: Bands, fast: bool) -> tuple[Array, Array]:
         from lipmotion.kernels.compiled import banded
 
         return banded.solve(*bands)
-    if bands[0].shape[1] > 1:
-        return _substituted(*_eliminated(*map(list, bands)))
-    values, variance = _substituted(*_eliminated(*(diagonal[:, 0].tolist() for diagonal in bands)))
-    return values[:, None], variance[:, None]
+    shape = bands[0].shape
+    rows = (diagonal[:, 0].tolist() if shape[1] == 1 else list(diagonal) for diagonal in bands)
+    values, variance = _substituted(*_eliminated(*rows))
+    return values.reshape(shape), variance.reshape(shape)
 
 
 def _eliminated(main: Rows, first: Rows, second: Rows, right: Rows) -> tuple[Rows, Rows, Rows, Rows]:

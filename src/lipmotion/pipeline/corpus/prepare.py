@@ -20,6 +20,7 @@ from lipmotion.corpora.separate_sounds import with_separate_sounds
 from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES, RecordingFolder, SourceRecording
 from lipmotion.corpora.store import UTTERANCES, Corpus
 from lipmotion.errors import AlignmentError, CorpusError, ExportError, InputError, MissingDependencyError
+from lipmotion.extensions import installed_version
 from lipmotion.pipeline.corpus.long_videos import DIVIDING_SHARE, VideoPart, single_video, with_long_videos_divided
 from lipmotion.pipeline.corpus.separate_sound import earlier_phones, in_step, separate_sound
 from lipmotion.pipeline.corpus.supplied_motion import DIGESTS, source_digests, supplied_phones, supplied_track
@@ -216,7 +217,7 @@ def _job(
     source = {
         "collection": collection,
         "file": recording.file.name,
-        "lipmotion": metadata.version("lipmotion"),
+        "lipmotion": installed_version(),
         **packages,
         **recording.rights,
     }

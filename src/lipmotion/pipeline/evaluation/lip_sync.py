@@ -17,7 +17,7 @@ def lip_sync(footage: Footage, network: SyncNetwork) -> SyncConfidence:
     """Return how well the lips in a tracked video agree with its sound.
 
     Cost: the video is decoded once more; about 1 s for each second of it.
-    Raises InputError: no sound, or pictures and sound of less than 0.8 s.
+    Raises InputError: no sound, or pictures or sound of hardly 0.8 s or less.
     """
     sounds = network.sound_vectors(framed_cepstra(read_audio(footage.path)))
     faces = network.face_vectors(face_pictures(footage, PICTURE_RATE_HZ, PICTURE_PX))
@@ -25,6 +25,6 @@ def lip_sync(footage: Footage, network: SyncNetwork) -> SyncConfidence:
     if count <= REACH:
         raise InputError(
             f"{footage.path}: pictures and sound for {count} comparisons of lips and sound, required {REACH + 1} or "
-            "more; give 0.8 s or more"
+            "more; give a second or more"
         )
     return sync_confidence(faces, sounds)

@@ -13,10 +13,12 @@ import numpy as np
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import Engine
+from lipmotion.extensions import installed_version
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.kernels.threads import blas_kernels
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.training.channels import GEOMETRY
+from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser
 from lipmotion.storage.files import sha256_of
 from lipmotion.units import Lexicon
 
@@ -33,7 +35,9 @@ def fingerprint(
     visual: str,
     prior: Model | None,
 ) -> str:
-    """Return a digest of utterances, configurations, the user's lexicon, versions of software, and the processor.
+    """Return a digest of utterances, configurations, the user's lexicon, software, and the processor.
+
+    Software are versions, and the phone recogniser that is installed: without one another model comes out.
 
     names  : of the utterances of the corpus
     prior  : the model on which the new one stands, or None
@@ -45,7 +49,8 @@ def fingerprint(
         "recogniser": recogniser.as_mapping(),
         "words": lexicon.user,
         "visual": visual,
-        "versions": {name: metadata.version(name) for name in ("lipmotion", "numpy", "scipy", "pocketsphinx")},
+        "versions": [installed_version(), *map(metadata.version, ("numpy", "scipy", "pocketsphinx"))],
+        "phone recogniser": installed_phone_recogniser(),
         "machine": [platform.machine(), blas_kernels()],
     }
     if prior is not None:

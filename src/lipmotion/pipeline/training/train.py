@@ -16,6 +16,7 @@ import numpy as np
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import Engine, engine_named
 from lipmotion.errors import CorpusError, InputError
+from lipmotion.extensions import installed_version
 from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.resample import model_motion
@@ -133,7 +134,7 @@ def train(  # noqa: PLR0913
     run        : monitor, checkpoints and processes; the model does not depend on them
     Labelled phones are used as they are. The phones of utterances without transcript are recognised, by the phone
     models of the other utterances or, if there are none, by those of the shipped model.
-    Training draws no random numbers: the same corpus gives the same model.
+    Random numbers are drawn by fixed seeds: the same corpus gives the same model.
     Raises CorpusError: no such utterances, none that can be used, or motion without a common channel.
     Raises InputError: no such ``visual``, or ``voices`` for an engine that is not trained on speech alone.
     Source: of the engines; of the two stages of training, Xie & Liu 2007, §3.4.
@@ -354,10 +355,10 @@ def about_training(corpus: Corpus, utterances: Sequence[Utterance], split: str, 
     return {
         "corpus": sorted({source["collection"] for source in sources if "collection" in source}) or [corpus.path.name],
         "split": split,
-        "seed": "none: training draws no random numbers",
+        "seed": "fixed: the same corpus gives the same model",
         "utterances": used,
         "minutes": round(minutes, 1),
         "licence": sorted({source["licence"] for source in sources if "licence" in source}),
         "attribution": sorted({source["attribution"] for source in sources if "attribution" in source}),
-        "versions": {name: metadata.version(name) for name in ("lipmotion", "numpy", "scipy")},
+        "versions": {"lipmotion": installed_version()} | {name: metadata.version(name) for name in ("numpy", "scipy")},
     }
