@@ -14,7 +14,7 @@ from lipmotion.articulation.delivery import Delivery
 from lipmotion.export.base import read_motion
 from lipmotion.faces import Face, Staging
 from lipmotion.meshes.fitting.driven import driven_character
-from lipmotion.pipeline.outputs.curve_sets import with_curves
+from lipmotion.pipeline.outputs.curve_sets import curves_of, with_curves
 from lipmotion.pipeline.outputs.delivered import delivered, held_mouth, shown
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance
 from lipmotion.pipeline.outputs.prosody import moved_prosody
@@ -143,6 +143,16 @@ def test_neutral_is_what_no_mood_is(generation: Generation) -> None:
     plain, neutral = (delivered(generation, Delivery(mood=mood)).motion for mood in ("", "neutral"))
     assert neutral.names == plain.names
     assert np.array_equal(neutral.values, plain.values)
+
+
+def test_vowels_have_expressions_of_moods_that_leave_the_lips_closed(generation: Generation) -> None:
+    afraid = delivered(generation, Delivery(mood="afraid"))
+    curves = curves_of(afraid.motion, afraid.units, "vowels")
+    assert {*curves.names} - {*curves_of(generation.motion, generation.units, "vowels").names} >= {"sad", "surprised"}
+    assert (curves["sad"][0], curves["surprised"][0]) == pytest.approx((0.5, 0.5))
+    pressed = curves["closed"] > 0
+    assert pressed.any()
+    assert curves["surprised"][pressed] == pytest.approx(0)
 
 
 def test_moods_move_on_while_the_mouth_is_held(generation: Generation) -> None:
