@@ -16,7 +16,7 @@ from lipmotion.export.cues import CUE_FORMATS
 from lipmotion.export.timed_labels import LABEL_SUFFIXES
 from lipmotion.extensions import installed_version
 from lipmotion.faces.cut_out import picture_files
-from lipmotion.faces.registry import FACES
+from lipmotion.faces.registry import is_drawings
 from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.job import Job
 from lipmotion.pipeline.model import shipped_path
@@ -71,9 +71,7 @@ def fingerprint_of(job: Job) -> str:
 
 def _drawings(face: str) -> list[dict[str, str]]:
     """Return the digests of the drawings in the folder that a face is; none of another face."""
-    if face in FACES.names or not Path(face).is_dir():
-        return []
-    return [{path.name: sha256_of(path) for path in picture_files(Path(face))}]
+    return [{path.name: sha256_of(path) for path in picture_files(Path(face))}] if is_drawings(face) else []
 
 
 def _told(value: Any) -> Any:

@@ -14,7 +14,7 @@ from lipmotion.faces.base import Face, Staging
 from lipmotion.faces.cut_out import CutOut, read_cut_out
 from lipmotion.faces.filmed.face import SUFFIX, FilmedFace, load_face
 from lipmotion.faces.mesh import MeshFace
-from lipmotion.faces.registry import FACES, face_named, staged_face
+from lipmotion.faces.registry import FACES, face_named, is_drawings, staged_face
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.film.filmed_video import RENDERING, check_film, film_of, person_shown, refuse_film, write_film
@@ -221,7 +221,7 @@ def shown_face(face: AnyFace | ShownFace) -> ShownFace:
 def _opened(face: AnyFace) -> Face | FilmedFace | CutOut:
     if isinstance(face, Face | FilmedFace | CutOut):
         return face
-    if Path(face).is_dir() and str(face) not in FACES.names:
+    if is_drawings(face):
         return read_cut_out(Path(face))
     if Path(face).suffix.lower() == SUFFIX:
         return load_face(face)
