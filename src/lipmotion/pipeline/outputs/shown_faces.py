@@ -183,7 +183,10 @@ class ShownPerson(ShownFace):
             raise ExportError(f"{path}: filmed faces are written as {OPAQUE_SUFFIX}; name the output so")
 
     def check_drawable(self, path: Path, generation: Generation) -> None:
-        """Do nothing: ``film_of`` names the channels that the face needs."""
+        """Log a warning where tags in the words ask for a mood; ``film_of`` names the channels that the face needs."""
+        asked = [key.label for key in generation.moods if key.mood in MOODS]
+        if asked:
+            LOG.warning("%s: a filmed face has the mood of its footage; not shown: %s", path, ", ".join(asked))
 
     def write_video(self, path: Path, performance: Performance) -> None:  # noqa: D102
         settings, played = performance.settings, performance.once(sound_track)
