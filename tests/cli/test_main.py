@@ -21,7 +21,7 @@ def test_help_lists_verbs_and_exit_codes(run: RunCommand) -> None:
     text = " ".join(" ".join(done.out).split())
     for verb in VERBS:
         assert f" {verb} " in text
-    assert "0 done, 1 a bug, 2 wrong command line, 3 unusable input, 4 corpus, 5 alignment, 6 model file" in text
+    assert "0 done, 1 a bug (doctor: a broken part), 2 wrong command line, 3 unusable input, 4 corpus, 5 align" in text
 
 
 def test_every_verb_has_help(run: RunCommand) -> None:

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 import lipmotion
 from docs.site_pages import ROOT
@@ -49,6 +50,7 @@ def set_desk(folder: Path, models: dict[str, Path]) -> None:
     for name in ("RECORDINGS", "takes"):
         _takes(folder / name)
     _motion(folder, words)
+    _of_other_programs(folder, words)
     _characters(folder)
     draw = np.random.default_rng(2)
     judged = ratings(draw, np.array([3.0, 4.0]), (8, 6), Effects())
@@ -89,6 +91,20 @@ def _motion(folder: Path, words: str) -> None:
     names = ("speech.json", "mine.json", "reference.json", "theirs.csv", "film.mp4", "two.mp4")
     lipmotion.write(said, [folder / name for name in names], speech=folder / "speech.wav", fps=10.0)
     (folder / "film.srt").write_text(f"1\n00:00:00,100 --> 00:00:01,000\n{words}\n", encoding="utf-8")
+
+
+def _of_other_programs(folder: Path, words: str) -> None:
+    """Write the timings of a voice, cues, and drawings of mouth shapes."""
+    shutil.copy(folder / "speech.wav", folder / "line.mp3")
+    marks = [
+        {"time": time_ms, "type": "viseme", "value": name} for time_ms, name in ((0, "sil"), (100, "p"), (200, "a"))
+    ]
+    (folder / "line.marks").write_text("".join(f"{json.dumps(mark)}\n" for mark in marks))
+    (folder / "line.json").write_text(json.dumps({"time": 100, "type": "word", "value": words}))
+    (folder / "mouth.tsv").write_text("0.00\tX\n0.10\tA\n0.30\tD\n0.60\tX\n")
+    (folder / "my-drawings").mkdir()
+    for name in "ABCDEF":
+        Image.new("L", (32, 32)).save(folder / "my-drawings" / f"{name}.png")
 
 
 def _characters(folder: Path) -> None:

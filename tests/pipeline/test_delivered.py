@@ -11,15 +11,17 @@ import pytest
 
 from lipmotion.articulation.contact import closures
 from lipmotion.articulation.delivery import Delivery
+from lipmotion.errors import InputError
 from lipmotion.export.base import read_motion
 from lipmotion.faces import Face, Staging
+from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.meshes.fitting.driven import driven_character
-from lipmotion.pipeline.outputs.curve_sets import with_curves
+from lipmotion.pipeline.outputs.curve_sets import curves_of, with_curves
 from lipmotion.pipeline.outputs.delivered import delivered, held_mouth, shown
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance
 from lipmotion.pipeline.outputs.prosody import moved_prosody
 from lipmotion.pipeline.outputs.scenes import delivered_scene
-from lipmotion.pipeline.outputs.shown_faces import shown_face
+from lipmotion.pipeline.outputs.shown_faces import ShownPerson, shown_face
 from lipmotion.pipeline.outputs.write import write
 from lipmotion.types import Generation, Prosody, StateTrace
 from lipmotion.types.moods import MoodKey
@@ -143,6 +145,25 @@ def test_neutral_is_what_no_mood_is(generation: Generation) -> None:
     plain, neutral = (delivered(generation, Delivery(mood=mood)).motion for mood in ("", "neutral"))
     assert neutral.names == plain.names
     assert np.array_equal(neutral.values, plain.values)
+
+
+def test_a_filmed_face_has_the_mood_of_its_footage(generation: Generation, caplog: pytest.LogCaptureFixture) -> None:
+    person = ShownPerson(FilmedFace(None, None, ()))  # type: ignore[arg-type] # nothing of it is needed
+    with pytest.raises(InputError, match="the mood of its footage"):
+        person.check_video(Path("a.mp4"), OutputSettings(face=person, delivery=Delivery(mood="happy")))
+    person.check_video(Path("a.mp4"), OutputSettings(face=person, delivery=Delivery(mood="whisper")))
+    person.check_drawable(Path("a.mp4"), replace(generation, moods=(MoodKey(0, "shout"), MoodKey(1, "sad", 0.5))))
+    assert caplog.messages == ["a.mp4: a filmed face has the mood of its footage; not shown: sad:0.5"]
+
+
+def test_vowels_have_expressions_of_moods_that_leave_the_lips_closed(generation: Generation) -> None:
+    afraid = delivered(generation, Delivery(mood="afraid"))
+    curves = curves_of(afraid.motion, afraid.units, "vowels")
+    assert {*curves.names} - {*curves_of(generation.motion, generation.units, "vowels").names} >= {"sad", "surprised"}
+    assert (curves["sad"][0], curves["surprised"][0]) == pytest.approx((0.5, 0.5))
+    pressed = curves["closed"] > 0
+    assert pressed.any()
+    assert curves["surprised"][pressed] == pytest.approx(0)
 
 
 def test_moods_move_on_while_the_mouth_is_held(generation: Generation) -> None:

@@ -48,6 +48,8 @@ def test_paths_begin_at_the_folder_of_the_file(tmp_path: Path) -> None:
     (tmp_path / "head").mkdir()
     assert located(Outputs(face="head/"), tmp_path).face == f"{tmp_path}/head"
     assert located(Outputs(face="head"), tmp_path).face == "head"
+    (tmp_path / "anna").mkdir()
+    assert located(Outputs(face="anna"), tmp_path).face == str(tmp_path / "anna")
     assert Job.from_file(file) == Job(
         Request(tmp_path / "takes", "my words", model=Path("/else/m.lipmotion")),
         Outputs((f"{tmp_path}/out/", f"{tmp_path}/{{name}}.vtt", "-"), face=str(tmp_path / "my.svg"), curves="arkit"),

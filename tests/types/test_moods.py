@@ -10,6 +10,8 @@ def test_a_text_of_moods_is_read_and_written():
     assert keys == (MoodKey(0.0, "happy", 0.7), MoodKey(2.5, "sad"), MoodKey(4.0, "neutral"))
     assert moods_of(text_of(keys)) == keys
     assert moods_of("") == ()
+    exact = (MoodKey(2e-05, "sad", 1e-05), MoodKey(7201.2345, "happy"))
+    assert moods_of(text_of(exact)) == exact
 
 
 @pytest.mark.parametrize(

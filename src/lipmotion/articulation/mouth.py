@@ -101,6 +101,11 @@ class SpokenMouth:
     tight: Curve
 
     @property
+    def free(self) -> Curve:
+        """How far the lips are free to part, 0 to 1: 0 in p, b and m."""
+        return np.asarray(np.clip(1 - 2 * self.press, 0, 1))
+
+    @property
     def contact(self) -> NDArray[np.bool_]:
         """The frames in which the lips touch [shape=(F,)]."""
         return np.asarray(self.gap == 0)

@@ -47,8 +47,8 @@ VERBS = (
     *(character, addon, evaluate, compare, experiment, study, info, cite),
     *(doctor, completion),
 )
-EXIT_CODES = """exit codes: 0 done, 1 a bug, 2 wrong command line, 3 unusable input, 4 corpus, 5 alignment,
-6 model file, 7 output, 8 missing package, 130 interrupted, 143 terminated"""
+EXIT_CODES = """exit codes: 0 done, 1 a bug (doctor: a broken part), 2 wrong command line, 3 unusable input, 4 corpus,
+5 alignment, 6 model file, 7 output, 8 missing package, 130 interrupted, 143 terminated"""
 
 
 def run(arguments: Sequence[str] | None, stopper: Stopper, events: Events) -> None:

@@ -58,12 +58,19 @@ class CutOut:
             yield staged[shape]
 
 
+def picture_files(folder: Path) -> list[Path]:
+    """Return the pictures in a folder, by their names, in order; at most ``MOST_FILES``."""
+    return [path for path in sorted(folder.iterdir()) if path.suffix.lower() in SUFFIXES and path.is_file()][
+        :MOST_FILES
+    ]
+
+
 def read_cut_out(folder: Path) -> CutOut:
     """Return the character of a folder of pictures.
 
     Raises InputError: a shape from A to F is missing or drawn twice, a picture cannot be read, or their sizes differ.
     """
-    files = [path for path in sorted(folder.iterdir()) if path.suffix.lower() in SUFFIXES][:MOST_FILES]
+    files = picture_files(folder)
     named = {path: found[1].lower() for path in files if (found := _NAME.search(path.stem))}
     readings = (_shapes(named, names) for names in (LETTERS, BLAIR))
     chosen = max(readings, key=lambda found: len(found.keys() & set(REQUIRED)))

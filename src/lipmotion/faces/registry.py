@@ -41,6 +41,11 @@ def face_named(name: str = "portrait") -> Face:
     return chosen()
 
 
+def is_drawings(face: str | Path, folder: Path = Path()) -> bool:
+    """Return whether a face is a folder of drawings in a folder, and not the name of another face."""
+    return str(face) not in FACES.names and (folder / face).is_dir()
+
+
 def staged_face(face: str | Face, staging: Staging, prosody: Prosody | None = None) -> Face:
     """Return a face, or the one of a name, with settings.
 

@@ -274,6 +274,12 @@ class Job(Configuration):
         return opened(self).run(workers=workers)
 
 
+def _is_drawings(face: str, folder: Path) -> bool:
+    from lipmotion.faces.registry import is_drawings
+
+    return is_drawings(face, folder)
+
+
 def located(part: PartT, folder: Path) -> PartT:
     """Return a part with paths that begin at a folder; a text that is no file there, or folder of drawings, stays."""
     found: dict[str, Any] = {}
@@ -282,7 +288,6 @@ def located(part: PartT, folder: Path) -> PartT:
         if isinstance(value, Path) and str(value) != "-":
             found[each.name] = folder / value
         elif isinstance(value, str) and ("reads" in each.metadata or each.name == "curves"):
-            drawings = each.name == "face" and "/" in value and (folder / value).is_dir()
-            if drawings or is_file(folder / value):
-                found[each.name] = str(folder / value)
+            is_read = is_file(folder / value) or (each.name == "face" and _is_drawings(value, folder))
+            found |= {each.name: str(folder / value)} if is_read else {}
     return replace(part, **found)

@@ -16,7 +16,8 @@ PLAIN = "plain"
 MANNERS = ("whisper", "shout", "mumble")
 """The manners of speaking beside the usual one, ``PLAIN``."""
 _NAMES = (NEUTRAL, *MOODS, PLAIN, *MANNERS)
-_KEY = re.compile(r"([a-z]+)(?::([-+]?(?:\d+\.?\d*|\.\d+)))?(?:\s+at\s+([-+]?(?:\d+\.?\d*|\.\d+)))?", re.IGNORECASE)
+_NUMBER = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)"
+_KEY = re.compile(rf"([a-z]+)(?::{_NUMBER})?(?:\s+at\s+{_NUMBER})?", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ class MoodKey:
         return self.mood if self.strength == 1 else f"{self.mood}:{self.strength:g}"
 
     def __str__(self) -> str:
-        return f"{self.label} at {self.time_s:g}"
+        return f"{self.label} at {self.time_s:.12g}"
 
 
 @dataclass(frozen=True)

@@ -69,7 +69,7 @@ ERRORS = {
     "a.tsv": ("0.00\tX\n0.50\tQ\n", "line 2: no mouth shape is 'Q'; the shapes are: a b c d e f g h x"),
     "b.tsv": ("0.00 X\n", "line 1: required a time, a tab and a mouth shape"),
     "c.tsv": ("0.00\tX\nnan\tA\n", "line 2: the time is 'nan', required a number from 0 on"),
-    "d.tsv": ("1\tX\n0.5\tA\n2\tX\n", "ends at 0.5 s, before its start"),
+    "d.tsv": ("1\tX\n0.5\tA\n2\tX\n", "mouth shape 2 begins at 0.5 s, before the one ahead of it at 1 s"),
     "e.tsv": ("\n", "there is no mouth shape in it"),
     "a.xml": ("<rhubarbResult/>", "there is no mouth shape in it"),
     "b.xml": ('<mouthCue start="0" end="x">A</mouthCue>', "cue 1: the time is 'x'"),

@@ -20,6 +20,8 @@ from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Tim
 FRAMES = 31
 NAMES = ("aa", "ih", "ou", "ee", "oh", "closed", "eyeBlinkLeft", "eyeBlinkRight", "headYaw", "headPitch", "headRoll")
 
+BROWS = tuple(Channel(name, WEIGHT) for name in ("browDownLeft", "browDownRight", "a", "b", "c"))
+
 
 @pytest.fixture
 def generation() -> Generation:
@@ -62,6 +64,9 @@ def test_what_is_written_is_read(path: Path, generation: Generation) -> None:
     for name in NAMES:
         assert motion[name] == pytest.approx(generation.motion[name], abs=1e-6)
     assert with_mouth(motion)["lip_gap"].max() > 0.1
+    lowered = replace(generation, motion=replace(generation.motion, channels=(*generation.motion.channels[:6], *BROWS)))
+    write_motion(path, lowered, source={}, model={})
+    assert read_motion(path)[0]["browDownLeft"] == pytest.approx(generation.motion["eyeBlinkLeft"], abs=1e-6)
 
 
 def test_the_head_turns_to_its_left_and_up(tmp_path: Path, generation: Generation) -> None:

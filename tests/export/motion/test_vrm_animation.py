@@ -48,6 +48,12 @@ def test_the_extension_is_as_its_rules_say(path: Path) -> None:
     assert len(used) == len({*used})
 
 
+def test_expressions_of_moods_are_there_where_a_mood_is(tmp_path: Path) -> None:
+    happy = generation("aa", "happy")
+    write_motion(tmp_path / "a.vrma", happy, source={}, model={})
+    assert read_motion(tmp_path / "a.vrma")[0]["happy"] == pytest.approx(happy.motion["happy"], abs=1e-6)
+
+
 def test_equal_blinks_are_one_and_held_poses_jump(tmp_path: Path, talking: Generation) -> None:
     values = talking.motion.values.copy()
     values[:, 7] = values[:, 6]

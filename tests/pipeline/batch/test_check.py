@@ -11,7 +11,8 @@ import pytest
 
 from lipmotion.pipeline.batch import check
 from lipmotion.pipeline.batch.check import FEWEST_LINES, Finding, _findings, expected_s
-from lipmotion.pipeline.batch.checked_line import CheckedLine, letters_of
+from lipmotion.pipeline.batch.checked_line import CheckedLine, LineToCheck, checked_line, letters_of
+from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.job import Job, Request
 
 pytest.importorskip("joblib")
@@ -68,6 +69,12 @@ def test_every_kind_is_found(tmp_path: Path) -> None:
     assert {path.name for path in tmp_path.iterdir()} == {"sounds", "lines.csv"}
     spanish = check(tmp_path / "lines.csv", Job(Request(language="es")), jobs=1)
     assert "sounds/spanish" not in {each.name for each in spanish.findings if each.kind == "language"}
+
+
+def test_tags_are_no_words(tmp_path: Path) -> None:
+    sound(tmp_path / "a.wav", 1.0, 1)
+    line = BatchLine("a", str(tmp_path / "a.wav"), "[angry] Who is <smile> there?")
+    assert checked_line(LineToCheck(line, Request())).words == ("who", "is", "there")
 
 
 def test_a_folder_has_no_orphans(tmp_path: Path) -> None:

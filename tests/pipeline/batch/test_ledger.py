@@ -21,7 +21,7 @@ from lipmotion.pipeline.batch.settings import (
     input_files,
     line_fingerprint,
 )
-from lipmotion.pipeline.job import Job, Request
+from lipmotion.pipeline.job import Job, Outputs, Request
 from lipmotion.storage.files import LOCK
 
 CONTENT = b"motion"
@@ -225,6 +225,13 @@ def test_settings_have_a_fingerprint(tmp_path: Path) -> None:
     before = fingerprint_of(lexicon)
     (tmp_path / "words.txt").write_text("a EY")
     assert fingerprint_of(lexicon) != before
+    (tmp_path / "A.png").write_text("a drawing")
+    drawn = Job(outputs=Outputs(face=str(tmp_path)))
+    before = fingerprint_of(drawn)
+    (tmp_path / "words.txt").write_text("a AY")
+    assert fingerprint_of(drawn) == before
+    (tmp_path / "A.png").write_text("another one")
+    assert fingerprint_of(drawn) != before
 
 
 @pytest.mark.parametrize("kinds", [(), ("wav",), ("json", "json"), ("cues.json5",), ("",)])

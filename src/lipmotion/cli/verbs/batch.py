@@ -25,7 +25,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add_output(parser, "--out", is_folder=True, metavar="DIR", help="folder of the outputs")
     checked = "only compare the recordings with their script: missing, silent, of the wrong length, twice there ..."
     parser.add_argument("--check", action="store_true", help=checked)
-    kinds = "what animate writes (json csv livelink.csv glb mp4 ...) and cues.tsv .xml .json .dat (default: json)"
+    kinds = "what animate writes (json csv glb mp4 ...) and cues.tsv .xml .json .dat .pgo .spine.json (default: json)"
     add_options(parser, Outputs, "kinds", kinds={"help": kinds})
     marked = "approved lines and those to be done again, as the report saves them (default: DIR/marks.csv)"
     add_input(parser, "--marks", what="file of marks (no option needed there)", metavar="FILE.csv", help=marked)
@@ -35,11 +35,6 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     said: dict[str, Any] = {
         "rate_hz": {"help": "rate of motion files (default: --fps, or 100)"},
         "fps": {"help": "frames per second of videos (default: 25) and of cues (24)"},
-        "curves": {"help": "what motion files hold: arkit, visemes, fap, or the controls of a rig (FILE.csv)"},
-        "face": {
-            "metavar": "NAME|FILE",
-            "help": "face of videos: woman, man, cartoon, head, FILE.svg (default: portrait, the woman)",
-        },
         "background": {"metavar": "COLOUR", "help": "of that face: transparent, or as #40a0ff"},
     }
     add_options(parser, Outputs, "rate_hz", "fps", "channels", "curves", "articulation", "face", "background", **said)

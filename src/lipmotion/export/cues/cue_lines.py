@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.export.cues.cue_shapes import REST, SHAPES
@@ -50,6 +51,12 @@ def sheet_of(
         raise InputError("there is no mouth shape in it; export the cues again")
     if len(rows) > MOST_CUES or end_s > LONGEST_S:
         raise InputError(f"{len(rows)} mouth shapes in {end_s:g} s, required at most {MOST_CUES} in {LONGEST_S:g} s")
+    late = next((place for place, (row, after) in enumerate(pairwise(rows), 1) if after[0] < row[0]), None)
+    if late is not None:
+        raise InputError(
+            f"mouth shape {late + 1} begins at {rows[late][0]:.6g} s, before the one ahead of it at "
+            f"{rows[late - 1][0]:.6g} s, required in order of time; export the cues again"
+        )
     whole = [(0.0, REST), *rows] if rows[0][0] > 0 else list(rows)
     ends = [*(start_s for start_s, _ in whole[1:]), max(end_s, whole[-1][0])]
     spans = (Span(start_s, stop_s, shape) for (start_s, shape), stop_s in zip(whole, ends, strict=True))

@@ -22,11 +22,6 @@ def text(sheet: CueSheet, sound_file: str) -> str:
     return f'{{\n  "metadata": {{\n{metadata}  }},\n  "mouthCues": [\n{cues}\n  ]\n}}\n'
 
 
-def is_rhubarb(text: str) -> bool:
-    """Return whether JSON may be such a file: it has the name of its list of cues."""
-    return f'"{CUES}"' in text
-
-
 def parse(text: str) -> CueSheet:
     """Return the cues of a file. Raises InputError: it is no JSON, or a cue is none, with its number."""
     try:

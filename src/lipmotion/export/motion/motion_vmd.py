@@ -24,8 +24,11 @@ MORPHS: Mapping[str, tuple[str, ...]] = {
     "ん": (CLOSED,),
     "まばたき": ("eyeBlinkLeft", "eyeBlinkRight"),
     "上": ("browInnerUp",),
+    "下": ("browDownLeft", "browDownRight"),
+    "びっくり": ("eyeWideLeft", "eyeWideRight"),
 }
-"""The standard morphs of models, and the channels whose mean each is: vowels, pressed lips, blinks, raised brows."""
+"""The standard morphs of models, and the channels whose mean each is: vowels, pressed lips, blinks, raised brows; of
+moods, lowered brows and wide eyes."""
 HEAD = "頭"
 """The bone of the head."""
 MIRRORED = np.array([-1.0, -1.0, 1.0, 1.0])

@@ -1,7 +1,8 @@
 """``.vrma``: a VRM animation: the expressions ``aa`` ``ih`` ``ou`` ``ee`` ``oh`` and blinks, and the turns of the head.
 
 Source: VRMC_vrm_animation 1.0 (VRM Consortium). The weight of an expression is the x of the translation of a node of
-its own; the rest pose of the bones is a T-pose a metre high at the hips. In p, b and m all vowels are 0.
+its own; the rest pose of the bones is a T-pose a metre high at the hips. In p, b and m all vowels are 0, and so are the
+expressions of moods (``happy``, ``sad`` ...), which are there where a mood is.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from lipmotion.export.base import MotionFormat
 from lipmotion.meshes.files.gltf_container import write_container
 from lipmotion.meshes.files.gltf_weights import read_gltf_motion
 from lipmotion.meshes.files.gltf_writer import GltfBuffer
+from lipmotion.meshes.fitting.mood_weights import EMOTIONS
 from lipmotion.meshes.model.head_angles import ANGLES, head_quaternions
 from lipmotion.meshes.model.keys import with_jumps
 from lipmotion.meshes.model.shape_names import VRM_VOWELS
@@ -83,7 +85,7 @@ def write(path: Path, generation: Generation, source: Mapping[str, str], _model:
 
 def _expressions(motion: Motion) -> dict[str, Array]:
     """Return the curves of the expressions, 0 to 1: one blink of both eyes where they do the same."""
-    curves = {name: motion[name].astype(np.float64) for name in VRM_VOWELS if name in motion.names}
+    curves = {name: motion[name].astype(np.float64) for name in (*VRM_VOWELS, *EMOTIONS) if name in motion.names}
     if all(name in motion.names for name in BLINKS):
         left, right = (motion[name].astype(np.float64) for name in BLINKS)
         same = np.array_equal(left, right)

@@ -19,7 +19,7 @@ from lipmotion.errors import InputError
 from lipmotion.meshes.files.binding_files import BINDING_SUFFIX, load_binding, read_points, read_weights
 from lipmotion.meshes.files.character_files import read_character
 from lipmotion.meshes.fitting.lip_placement import LipPlacement, placed_by_points, placed_by_shape, surface_of_named
-from lipmotion.meshes.fitting.mood_weights import EXPRESSIONS, expression_weights
+from lipmotion.meshes.fitting.mood_weights import EMOTIONS, expression_weights
 from lipmotion.meshes.fitting.point_motion import point_motion
 from lipmotion.meshes.fitting.shape_weights import shape_weights
 from lipmotion.meshes.model.binding import ControlBinding, bind, painted
@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 
 METRIC = (".glb", ".gltf", ".vrm")
 """Suffixes of characters whose unit is the metre."""
-EYES_AND_BROWS = tuple(name for name in ARKIT_OTHERS if name != "cheekPuff")
+BESIDE_THE_MOUTH = tuple(name for name in ARKIT_OTHERS if name != "cheekPuff")
 
 
 class DrivenPose(NamedTuple):
@@ -107,9 +107,10 @@ class DrivenCharacter:
         None, where the character has finer shapes, or no expressions. Those that part the lips vanish in p, b and m.
         """
         found = expression_weights(moods_shown(motion)) if self._expressions else {}
-        free = np.clip(1 - 2 * mouth.press, 0, 1)
         curves = {own: found[name] for name, own in self._expressions.items() if name in found}
-        return {own: curve * free if self._parted_by(own) > LEAST_GAP / 2 else curve for own, curve in curves.items()}
+        return {
+            own: curve * mouth.free if self._parted_by(own) > LEAST_GAP / 2 else curve for own, curve in curves.items()
+        }
 
     def _parted_by(self, name: str) -> float:
         """Return how far a blendshape parts the middle of the lips, in eye distances."""
@@ -122,8 +123,7 @@ class DrivenCharacter:
         if {"browDownLeft", "browInnerUp", "browDownRight"} & {*self._other_names}:
             return {}
         own = {shape.name.lower(): shape.name for shape in self.mesh.shapes if len(shape.rows)}
-        wanted = {name for each in EXPRESSIONS.values() for name, _ in each}
-        return {name: own[name] for name in sorted(wanted) if name in own}
+        return {name: own[name] for name in EMOTIONS if name in own}
 
     def vertices(
         self, motion: Motion, units: Timeline[Unit], time_s: Array, others: Mapping[str, Array] | None = None
@@ -163,7 +163,7 @@ class DrivenCharacter:
     def _other_names(self) -> dict[str, str]:
         """The mesh's names of ARKit's blendshapes of eyes and brows, by ARKit's."""
         known = by_arkit_name(shape.name for shape in self.mesh.shapes if len(shape.rows))
-        return {name: known[name] for name in EYES_AND_BROWS if name in known}
+        return {name: known[name] for name in BESIDE_THE_MOUTH if name in known}
 
     @cached_property
     def _displacements(self) -> Array:

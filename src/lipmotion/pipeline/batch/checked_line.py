@@ -18,6 +18,7 @@ from lipmotion.types import Audio, TimedTranscript
 from lipmotion.types.audio import sixteen_bits
 from lipmotion.types.languages import AUTO, ENGLISH, script_of
 from lipmotion.units.languages_told import COMMON_WORDS, language_of_text
+from lipmotion.units.mood_tags import tagged_text
 from lipmotion.units.text_normalisation import words_in, written_words
 
 SILENT_DB = -60.0
@@ -96,13 +97,13 @@ def letters_of(words: Sequence[str]) -> float:
 
 
 def _words(work: LineToCheck) -> tuple[str, ...]:
-    """Return the words of a line, numbers spelled out where they are English; none: they are not known."""
+    """Return the words of a line without tags, numbers spelled out where they are English; none: they are not known."""
     line, request = work.line, work.request
     named = replace(request, recording=Path(line.recording), lexicon=None)
     given = line.transcript or read_request(named, words_beside=True).transcript
     if given is None or isinstance(given, TimedTranscript):
         return given.words if given else ()
-    text = str(given)
+    text = tagged_text(str(given)).text
     if request.language == ENGLISH:
         return words_in(text)
     return written_words(text) if text.strip() else ()

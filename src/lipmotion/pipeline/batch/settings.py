@@ -15,6 +15,8 @@ from lipmotion.export.base import motion_suffixes
 from lipmotion.export.cues import CUE_FORMATS
 from lipmotion.export.timed_labels import LABEL_SUFFIXES
 from lipmotion.extensions import installed_version
+from lipmotion.faces.cut_out import picture_files
+from lipmotion.faces.registry import is_drawings
 from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.job import Job
 from lipmotion.pipeline.model import shipped_path
@@ -63,7 +65,13 @@ def fingerprint_of(job: Job) -> str:
     """Return a digest of a job, with the content of the files that it names, and of the version of lipmotion."""
     request = replace(job.request, model=job.request.model or shipped_path())
     parts = [{name: _told(value) for name, value in part.as_mapping().items()} for part in (request, job.outputs)]
-    return _digest(as_json([*parts, job.delivery.as_mapping(), job.staging.as_mapping(), installed_version()]))
+    parts += [job.delivery.as_mapping(), job.staging.as_mapping(), *_drawings(job.outputs.face)]
+    return _digest(as_json([*parts, installed_version()]))
+
+
+def _drawings(face: str) -> list[dict[str, str]]:
+    """Return the digests of the drawings in the folder that a face is; none of another face."""
+    return [{path.name: sha256_of(path) for path in picture_files(Path(face))}] if is_drawings(face) else []
 
 
 def _told(value: Any) -> Any:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion.articulation.curve_edits import with_edited_curves
+from lipmotion.articulation.expression import moods_shown
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.errors import InputError
 from lipmotion.faces.base import Staging
@@ -16,6 +17,7 @@ from lipmotion.meshes.files.rig_tables import read_rig_table, rig_motion
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.facial_animation import fap_motion
+from lipmotion.meshes.fitting.mood_weights import expression_weights
 from lipmotion.meshes.fitting.oculus_visemes import viseme_motion
 from lipmotion.meshes.fitting.reference_mouth import arkit_mouth, vowel_mouth
 from lipmotion.meshes.fitting.shape_weights import shape_weights
@@ -30,8 +32,8 @@ LIVING_SETS = (WHOLE_FACE, VOWELS)
 """Sets of curves with eyes, brows and head, which move on their own."""
 SHAPE_SETS = (ARKIT, WHOLE_FACE, "visemes", VOWELS, "fap")
 """Sets of curves that need no mesh: ARKit's blendshapes of the mouth, the same with eyes, brows and head (which move on
-their own), the 15 visemes of Oculus and OpenXR, the five vowels of VRM with pressed lips, eyes, brows and head, and
-MPEG-4's facial animation parameters of lips and jaw."""
+their own), the 15 visemes of Oculus and OpenXR, the five vowels of VRM with pressed lips, moods, eyes, brows and head,
+and MPEG-4's facial animation parameters of lips and jaw."""
 
 
 def check_curve_set(curves: str | Path) -> None:
@@ -110,10 +112,16 @@ def _curves_of(
 
 
 def _vowel_motion(motion: Motion, units: Timeline[Unit]) -> Motion:
-    """Return the weights of the vowels of VRM, and how far the lips are pressed together."""
-    pressed = spoken_mouth(motion, units).closing if CLOSED not in motion.names else motion[CLOSED]
-    closed = Motion(np.asarray(pressed)[:, None], motion.rate_hz, (Channel(CLOSED, WEIGHT),))
-    return beside(shape_weights(motion, units, vowel_mouth()), closed)
+    """Return the weights of the vowels of VRM, how far the lips are pressed together, and VRM's expressions of moods.
+
+    Expressions vanish where the lips are pressed: whether one parts them, the model alone knows.
+    """
+    mouth, shown = spoken_mouth(motion, units), expression_weights(moods_shown(motion))
+    curves = {CLOSED: mouth.closing if CLOSED not in motion.names else motion[CLOSED]}
+    curves |= {name: curve * mouth.free for name, curve in shown.items()}
+    channels = tuple(Channel(name, WEIGHT) for name in curves)
+    added = Motion(np.stack(list(curves.values()), axis=1), motion.rate_hz, channels)
+    return beside(shape_weights(motion, units, vowel_mouth()), added)
 
 
 def beside(first: Motion, second: Motion) -> Motion:

@@ -45,9 +45,7 @@ def read_generation(path: str | Path, units: str | Path | None = None) -> Genera
         raise InputError(f"{path}: the motion lasts {lasts_s:.0f} s, required at most {LONGEST_S:.0f}; cut it")
     phones = found if units is None else read_units(units)
     channels = tuple(
-        Channel(each.name, WEIGHT)
-        if each.unit == EYE_DISTANCE and (is_known(each.name) or is_mood(each.name))
-        else each
+        Channel(each.name, WEIGHT) if each.unit == EYE_DISTANCE and _is_weight(each.name) else each
         for each in motion.channels
     )
     states = np.zeros(len(motion.values), np.intp)

@@ -14,7 +14,7 @@ from lipmotion.faces.base import Face, Staging
 from lipmotion.faces.cut_out import CutOut, read_cut_out
 from lipmotion.faces.filmed.face import SUFFIX, FilmedFace, load_face
 from lipmotion.faces.mesh import MeshFace
-from lipmotion.faces.registry import FACES, face_named, staged_face
+from lipmotion.faces.registry import FACES, face_named, is_drawings, staged_face
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.film.filmed_video import RENDERING, check_film, film_of, person_shown, refuse_film, write_film
@@ -183,7 +183,10 @@ class ShownPerson(ShownFace):
             raise ExportError(f"{path}: filmed faces are written as {OPAQUE_SUFFIX}; name the output so")
 
     def check_drawable(self, path: Path, generation: Generation) -> None:
-        """Do nothing: ``film_of`` names the channels that the face needs."""
+        """Log a warning where tags in the words ask for a mood; ``film_of`` names the channels that the face needs."""
+        asked = [key.label for key in generation.moods if key.mood in MOODS]
+        if asked:
+            LOG.warning("%s: a filmed face has the mood of its footage; not shown: %s", path, ", ".join(asked))
 
     def write_video(self, path: Path, performance: Performance) -> None:  # noqa: D102
         settings, played = performance.settings, performance.once(sound_track)
@@ -221,7 +224,7 @@ def shown_face(face: AnyFace | ShownFace) -> ShownFace:
 def _opened(face: AnyFace) -> Face | FilmedFace | CutOut:
     if isinstance(face, Face | FilmedFace | CutOut):
         return face
-    if Path(face).is_dir() and str(face) not in FACES.names:
+    if is_drawings(face):
         return read_cut_out(Path(face))
     if Path(face).suffix.lower() == SUFFIX:
         return load_face(face)
