@@ -49,8 +49,9 @@ def read(folder: Path, _: Good) -> None:
     require(not any(name.startswith("/") or ".." in name.split("/") for name in names), "an output outside its folder")
     if (folder / MARKS).is_file():
         marks = read_marks(folder / MARKS)
-        write_marks(folder / MARKS, marks)
-        require(read_marks(folder / MARKS) == marks, "marks that are not read as they were written")
+        with TemporaryDirectory() as out:
+            write_marks(Path(out) / MARKS, marks)
+            require(read_marks(Path(out) / MARKS) == marks, "marks that are not read as they were written")
     if ledger.is_file():
         with TemporaryDirectory() as out:
             shutil.copy(ledger, Path(out) / LEDGER)

@@ -141,7 +141,7 @@ def test_figures_of_pictures(models: dict[str, Path], toy_corpus: Corpus) -> Non
         assert len(lips["channels"]) == 90
         assert lips["acc"] == pytest.approx(np.mean([row["acc"] for row in lips["channels"].values()]))
         assert (condition["acc"], condition["amse"]) == (lips["acc"], lips["amse"])
-        assert lips["channels"]["lips_r_01"]["acc"] > 0.9
+        assert lips["channels"]["lips_r_01"]["acc"] > 0.85
         assert condition["leading"] in lips["channels"]
     assert "90 eigenlips" in figures_table(figures)
     assert "lips_r_01 " not in figures_table(figures).replace("lag of lips_r_01 ", "")
