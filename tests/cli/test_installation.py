@@ -11,7 +11,7 @@ import pytest
 from cli.conftest import RunCommand
 from lipmotion.cli.installation import doctor as doctor_module
 from lipmotion.cli.installation.declared_requirements import Requirement
-from lipmotion.cli.installation.doctor import Finding, doctor
+from lipmotion.cli.installation.doctor import InstalledPart, doctor
 from lipmotion.errors import LipMotionError
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.vision.packages import missing
@@ -20,10 +20,10 @@ MAIN = "from lipmotion.cli.main import main; sys.exit(main())"
 
 
 @pytest.fixture
-def declared(monkeypatch: pytest.MonkeyPatch) -> Callable[..., dict[str, Finding]]:
+def declared(monkeypatch: pytest.MonkeyPatch) -> Callable[..., dict[str, InstalledPart]]:
     """Returns what is found, by name, where some requirements are declared and no part is looked at."""
 
-    def found(*requirements: Requirement) -> dict[str, Finding]:
+    def found(*requirements: Requirement) -> dict[str, InstalledPart]:
         monkeypatch.setattr(doctor_module, "declared_requirements", lambda: requirements)
         monkeypatch.setattr(doctor_module, "_PARTS", {})
         return {each.name: each for each in doctor()}
@@ -31,7 +31,7 @@ def declared(monkeypatch: pytest.MonkeyPatch) -> Callable[..., dict[str, Finding
     return found
 
 
-def test_packages(declared: Callable[..., dict[str, Finding]]) -> None:
+def test_packages(declared: Callable[..., dict[str, InstalledPart]]) -> None:
     found = declared(
         Requirement("numpy", ">=2"),
         Requirement("pytest", "<1"),
@@ -51,7 +51,7 @@ def test_packages(declared: Callable[..., dict[str, Finding]]) -> None:
     assert "not for this Python or system (required: sys_platform == 'none')" in found["[video]"].told
 
 
-def test_without_metadata(declared: Callable[..., dict[str, Finding]]) -> None:
+def test_without_metadata(declared: Callable[..., dict[str, InstalledPart]]) -> None:
     assert declared()["packages"].state == "absent"
 
 
@@ -89,7 +89,7 @@ def test_whatever_a_part_raises(monkeypatch: pytest.MonkeyPatch) -> None:
         raise OSError("libfoo.so: cannot open")
 
     found = doctor_module._looked("foo", fails)
-    assert found == Finding("foo", "broken", "OSError: libfoo.so: cannot open; install lipmotion again")
+    assert found == InstalledPart("foo", "broken", "OSError: libfoo.so: cannot open; install lipmotion again")
     monkeypatch.setattr("av.codec.codecs_available", {"aac"})
     assert "no libx264, so no .mp4" in doctor_module._looked("FFmpeg", doctor_module._PARTS["FFmpeg"]).told
 

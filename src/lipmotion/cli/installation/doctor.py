@@ -38,8 +38,8 @@ LEAN = "another OpenCV lies over it, as pip installs with MediaPipe; without it:
 
 
 @dataclass(frozen=True)
-class Finding:
-    """Something that was looked at.
+class InstalledPart:
+    """A part of the installation that was looked at.
 
     name  : what it is
     state : ``works``, ``absent`` (a part that nothing else needs) or ``broken``
@@ -51,13 +51,15 @@ class Finding:
     told: str
 
 
-def doctor() -> Iterator[Finding]:
+def doctor() -> Iterator[InstalledPart]:
     """Yield what is found out about this installation, the main path last. Nothing is left on the disk."""
     system = f"{platform.python_version()}, {platform.system()} {platform.machine()}"
-    yield Finding("lipmotion", "works", f"{installed_version()}, Python {system}")
+    yield InstalledPart("lipmotion", "works", f"{installed_version()}, Python {system}")
     declared = declared_requirements()
     if not declared:
-        yield Finding("packages", "absent", "not known: lipmotion runs from its sources; to install it: pip install .")
+        yield InstalledPart(
+            "packages", "absent", "not known: lipmotion runs from its sources; to install it: pip install ."
+        )
     yield from (_package(each) for each in declared if not each.extra)
     for extra in sorted({each.extra for each in declared} - {""}):
         yield _extra(extra, [each for each in declared if each.extra == extra])
@@ -65,39 +67,43 @@ def doctor() -> Iterator[Finding]:
         yield _looked(name, look)
 
 
-def _package(each: Requirement) -> Finding:
+def _package(each: Requirement) -> InstalledPart:
     """Return what is found of a package that is always required."""
     if not each.applies:
-        return Finding(each.name, "absent", f"there is none for this Python or system (required: {each.marker})")
+        return InstalledPart(each.name, "absent", f"there is none for this Python or system (required: {each.marker})")
     if each.is_met:
-        return Finding(each.name, "works", each.installed)
+        return InstalledPart(each.name, "works", each.installed)
     found = each.installed or "not installed"
-    return Finding(each.name, "broken", f"{found}, required {each.versions}: pip install '{each.name}{each.versions}'")
+    return InstalledPart(
+        each.name, "broken", f"{found}, required {each.versions}: pip install '{each.name}{each.versions}'"
+    )
 
 
-def _extra(name: str, its: list[Requirement]) -> Finding:
+def _extra(name: str, its: list[Requirement]) -> InstalledPart:
     """Return what is found of the packages of an extra."""
     brings = EXTRAS.get(name, "")
     other = next((each for each in its if not each.applies), None)
     if other is not None and not all(each.is_met for each in its):
-        return Finding(f"[{name}]", "absent", f"{brings}; not for this Python or system (required: {other.marker})")
+        return InstalledPart(
+            f"[{name}]", "absent", f"{brings}; not for this Python or system (required: {other.marker})"
+        )
     unmet = [each for each in its if not each.is_met]
     if unmet:
         lacks = ", ".join(f"{each.installed or 'no'} {each.name} (required {each.versions})" for each in unmet)
-        return Finding(f"[{name}]", "absent", f"{brings}: pip install 'lipmotion[{name}]'; there is {lacks}")
-    return Finding(f"[{name}]", "works", ", ".join(f"{each.name} {each.installed}" for each in its))
+        return InstalledPart(f"[{name}]", "absent", f"{brings}: pip install 'lipmotion[{name}]'; there is {lacks}")
+    return InstalledPart(f"[{name}]", "works", ", ".join(f"{each.name} {each.installed}" for each in its))
 
 
-def _looked(name: str, look: Callable[[], str]) -> Finding:
+def _looked(name: str, look: Callable[[], str]) -> InstalledPart:
     """Return what a look at a part says; whatever it raises, the part is broken."""
     try:
-        return Finding(name, "works", look())
+        return InstalledPart(name, "works", look())
     except _AbsentError as absent:
-        return Finding(name, "absent", str(absent))
+        return InstalledPart(name, "absent", str(absent))
     except LipMotionError as error:
-        return Finding(name, "broken", str(error))
+        return InstalledPart(name, "broken", str(error))
     except Exception as error:  # a damaged package may raise anything when it is imported
-        return Finding(name, "broken", f"{type(error).__name__}: {error}; install lipmotion again")
+        return InstalledPart(name, "broken", f"{type(error).__name__}: {error}; install lipmotion again")
 
 
 class _AbsentError(Exception):
