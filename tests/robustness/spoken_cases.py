@@ -18,7 +18,12 @@ _text("an empty text to speak", "", 3, NO_WORD)
 _text("lone surrogates to speak", "\udcff\udcfe", 3, NO_WORD)
 _text("control characters among words to speak", "papa\x07\x1b[31m \x9d mama\0", 0)
 _text("a number of thirty digits to speak", "9" * 30, 0)
-_text("tags and phones in brackets", "<speak>papa</speak> [[m'A:m@]]", 0, ("not known, and not spoken: <speak>, </speak>",))
+_text(
+    "tags and phones in brackets",
+    "<speak>papa</speak> [[m'A:m@]]",
+    0,
+    ("not known, and not spoken: <speak>, </speak>",),
+)
 _text("a million characters without a blank", "a" * 1_000_000, 3, ("has 1000000 characters, required at most 50000",))
 _text("one word of 10,000 letters to speak", "ab" * 5000, 3, ("a word of 10000 characters", "required at most 200"))
 
