@@ -147,7 +147,7 @@ class PosteriorNetwork(Predictor):
 
         Raises InputError: posteriors of another phone recogniser than in training.
         """
-        rows = self.network.hidden(_inputs(self._components(self._checked(posteriors)), None)[0])
+        rows = self.network.hidden(_shifted_inputs(self._components(self._checked(posteriors)), None, 0))
         return rows[np.minimum(np.arange(steps), len(rows) - 1)]
 
     def _predict(self, posteriors: TokenPosteriors, spectrum: NDArray[np.floating] | None, frames: int) -> Array:
