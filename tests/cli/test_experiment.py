@@ -57,6 +57,7 @@ def test_folds_of_the_training_list(run: RunCommand, toy_corpus: Corpus, here: P
     assert (figures["folds"], figures["trained_on"]) == (2, [4, 4])
 
 
+@pytest.mark.long
 def test_a_program_reads_them(run: RunCommand, toy_corpus: Corpus) -> None:
     done = run("experiment", "learning-curve", toy_corpus.path, "--sizes", "3", "--machine-readable")
     assert (done.code, done.err) == (0, [])

@@ -72,7 +72,8 @@ def test_the_interval_of_one_clip_is_its_value() -> None:
 
 
 @pytest.mark.parametrize(
-    ("gain", "wanted"), [((0.1, 0.2), "*"), ((-2, -0.1), "*"), ((-0.1, 0.1), ""), ((0, 0), ""), ((None, None), "")]
+    ("gain", "wanted"),
+    [((0.1, 0.2), "*"), ((-2, -0.1), "*"), ((-0.1, 0.1), ""), ((0, 0), ""), ((2e-10, 7e-9), ""), ((None, None), "")],
 )
 def test_marks(gain: tuple[float, float], wanted: str) -> None:
     assert significance_mark(gain) == wanted

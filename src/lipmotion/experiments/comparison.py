@@ -15,6 +15,8 @@ from lipmotion.pipeline.evaluation.held_out import OPENING, ComparedClip, HeldOu
 from lipmotion.stats.rounding import varies
 
 Array = NDArray[np.float64]
+LEAST_DIFFERENCE = 1e-6
+"""A smaller difference of correlations, or of lengths in eye distances, is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,11 +85,14 @@ def opening_curves(recordings: HeldOutRecordings, made: Sequence[ComparedClip]) 
 
 
 def sign_of_difference(interval: Sequence[float | None]) -> int:
-    """Return 1 or -1 for a difference whose interval does not contain 0, else 0."""
+    """Return 1 or -1 for a difference whose interval does not contain 0, else 0.
+
+    Systems that are the same by definition differ by rounding: ends within ``LEAST_DIFFERENCE`` of 0 count as 0.
+    """
     low, high = interval
     if low is None or high is None:
         return 0
-    return int(low > 0) - int(high < 0)
+    return int(low > LEAST_DIFFERENCE) - int(high < -LEAST_DIFFERENCE)
 
 
 def significance_mark(gain: Sequence[float | None]) -> str:
