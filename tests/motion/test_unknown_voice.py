@@ -92,6 +92,20 @@ def test_half_known_voices_open_before_they_speak(voice: float, share: float) ->
     np.testing.assert_array_equal(kept, precisions[10:250])
 
 
+def test_a_model_of_few_phones_opens_no_mouth_before_speech() -> None:
+    """Such a model half knows its own speaker's voice."""
+    prior, units = load_model().learned.prior, timeline(("p", "aa"), 0.2)
+    few = replace(prior, contexts=dict.fromkeys(list(prior.contexts)[:10], 1))
+    means, precisions = np.zeros((250, 3, len(prior.centre))), np.ones((250, 3, len(prior.centre)))
+    changes = [
+        np.abs(
+            with_breath(lambda frames: (means[frames], precisions[frames]), each, units, 250, 1.0, 0.8)(slice(250))[0]
+        ).max()
+        for each in (prior, few)
+    ]
+    assert changes[1] == pytest.approx(changes[0] * 10 / 5000)
+
+
 @pytest.mark.parametrize("confidence", CONFIDENCES)
 @pytest.mark.usefixtures("no_distortion_is_low")
 def test_vowels_are_open_at_any_confidence(welcome: Speech, confidence: float) -> None:
