@@ -103,6 +103,7 @@ def test_options_of_rhubarb_without_a_counterpart(run: RunCommand, basics: tuple
     assert list(here.iterdir()) == []
 
 
+@pytest.mark.long
 def test_transcript_and_edited_phones(run: RunCommand, basics: tuple[object, ...], here: Path) -> None:
     said = run(*basics, "--transcript", "see bob papa mama")
     run("animate", *basics[1:], "--transcript", "see bob papa mama", "-o", "a.json")

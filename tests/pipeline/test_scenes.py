@@ -86,6 +86,7 @@ def test_the_head_closes_its_lips_in_m_and_p_and_opens_them_in_aa(own_head: Scen
     assert gap[(time_s > 0.7) & (time_s < 0.8)].max() > 0.15
 
 
+@pytest.mark.long
 def test_what_moves_on_its_own_can_be_switched_off(generation: Generation) -> None:
     still = head_scene(generation, 25.0, staging=Staging(blinks=False, gaze=False, brows=False, head=False))
     moving = head_scene(generation, 25.0)
@@ -99,6 +100,7 @@ def test_what_moves_on_its_own_can_be_switched_off(generation: Generation) -> No
     assert np.abs(still.turn.rotations - [0, 0, 0, 1]).max() < 1e-9
 
 
+@pytest.mark.long
 def test_shapes_of_moods_are_in_the_head_where_a_mood_is(generation: Generation, own_head: Scene) -> None:
     moody = replace(generation, motion=with_moods(generation.motion, moods_of("angry:0.8, surprised at 1.0")))
     scene = head_scene(moody, staging=Staging(brows=False))

@@ -114,6 +114,7 @@ def test_a_run_that_was_stopped_goes_on(
     assert "not chosen" in Links(tmp_path / "r" / PAGE).text
 
 
+@pytest.mark.long
 def test_other_recordings_or_settings_are_run_again(ran: list[str], toy_corpus: Corpus, tmp_path: Path) -> None:
     run: Callable[..., WrittenReport] = partial(experiment_report, folder=tmp_path / "r", only=["folds"])
     run(toy_corpus)
@@ -126,6 +127,7 @@ def test_other_recordings_or_settings_are_run_again(ran: list[str], toy_corpus: 
     assert len(ran) == len(list((tmp_path / "r" / "models").iterdir())) == 5
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("ran")
 def test_a_corpus_without_a_list_has_what_can_be_run(toy_corpus: Corpus, tmp_path: Path) -> None:
     without_val = toy_corpus.part([*toy_corpus.names("train"), *toy_corpus.names("test")])

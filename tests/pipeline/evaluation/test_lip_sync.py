@@ -80,6 +80,7 @@ def test_the_sound_of_a_made_network_is_as_late_as_it_was_made(
     assert [line.partition("sound late by ")[2] for line in lines] == ["+0 ms", "+120 ms"]
 
 
+@pytest.mark.long
 def test_what_it_is_not_computed_for(tmp_path: Path, weights: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("cv2")
     script(monkeypatch, faces(12) * 2)
