@@ -153,7 +153,7 @@ class Session:
     ) -> None:
         self.request: SpeechRequest = in_language(request_of(speech))
         self.model = model if isinstance(model, Model) else load_model(model)
-        self._work = map_in_processes(workers, meanwhile)
+        self._work = map_in_processes(workers, self._prepare)
         self._monitor, self._curves, self._outlook = monitor, frozenset(curves), outlook
         self._meanwhile = meanwhile
         self._understood: _Kept[UnderstoodSpeech] = _Kept()

@@ -232,3 +232,14 @@ def test_sessions_in_two_threads_do_not_disturb_each_other(toy_model: Model, toy
     with ThreadPoolExecutor(2) as pool:
         for number, found in enumerate(pool.map(work, range(2))):
             assert all(np.array_equal(values, alone[number]) for values in found)
+
+
+@pytest.mark.long
+def test_what_comes_next_is_prepared_while_processes_work(
+    request_: SpeechRequest, toy_model: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    prepared: list[object] = []
+    monkeypatch.setattr(session_module, "prepare_search", prepared.append)
+    session = Session(request_, model=toy_model, workers=2, meanwhile=lambda: prepared.append("face"))
+    assert list(session._work(abs, [-1, -2, -3])) == [1, 2, 3]
+    assert prepared == [session.request, "face"]
