@@ -61,8 +61,8 @@ MOOD_GAZE_RAD = 0.22
 """How far the eyes look down for the action unit 64, in radians."""
 DROOPING_LIDS = 0.75
 """How far the eyes are closed by the action unit 43."""
-UPPER_FACE = (1, 2, 4, 5, 6, 7, 9)
-"""Action units of brows, lids, cheeks and nose."""
+UPPER_FACE_UNITS = {"inner": 1, "outer": 2, "lowered": 4, "wide": 5, "cheek": 6, "tight": 7, "sneer": 9}
+"""Action units of brows (inner and outer ends raised, lowered), lids (wide, tight), cheeks and nose."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +73,8 @@ class Liveliness:
     brows : how far the brows are raised, in eye distances [shape=(F,)]
     gaze  : of the eyes against the head, to the character's left and upwards, in radians [shape=(F, 2)]
     turn  : of the head to its left, upwards and to its left shoulder, in radians [shape=(F, 3)]
-    units : what a mood does to brows, lids, cheeks and nose: the action units of ``UPPER_FACE`` that it asks for, 0 to
-            1 [each shape=(F,)]
+    units : what a mood does to brows, lids, cheeks and nose: those action units of
+            ``UPPER_FACE_UNITS`` that it asks for, 0 to 1 [each shape=(F,)]
     """
 
     lids: Curve
@@ -82,6 +82,11 @@ class Liveliness:
     gaze: Curve
     turn: Curve
     units: Mapping[int, Curve] = field(default_factory=dict)
+
+    @property
+    def upper_face(self) -> dict[str, Curve]:
+        """What a mood does to each part of ``UPPER_FACE_UNITS`` [each shape=(F,)]."""
+        return {name: self.unit(number) for name, number in UPPER_FACE_UNITS.items()}
 
     def unit(self, number: int) -> Curve:
         """Return an action unit of a mood, 0 to 1 [shape=(F,)]; 0 where no mood asks for it."""
@@ -121,7 +126,10 @@ def liveliness(  # noqa: PLR0913
     mood = action_units(motion, time_s)
     if mood and brows:
         lively = _mood_strength(time_s, accent, _generator(seed, 5))
-        mood = {unit: np.clip(curve * lively, 0, 1) if unit in UPPER_FACE else curve for unit, curve in mood.items()}
+        mood = {
+            unit: np.clip(curve * lively, 0, 1) if unit in UPPER_FACE_UNITS.values() else curve
+            for unit, curve in mood.items()
+        }
     return _in_mood(Liveliness(lids, raised, aim - GAZE_COUNTER_SHARE * turn[:, :2], turn), mood, head=head)
 
 
@@ -144,7 +152,9 @@ def _in_mood(moved: Liveliness, mood: Mapping[int, Curve], *, head: bool) -> Liv
         gaze[:, 1] -= MOOD_GAZE_RAD * mood[64]
     if 43 in mood:
         lids = np.maximum(lids, DROOPING_LIDS * mood[43])
-    return Liveliness(lids, moved.brows, gaze, turn, {unit: mood[unit] for unit in UPPER_FACE if unit in mood})
+    return Liveliness(
+        lids, moved.brows, gaze, turn, {unit: mood[unit] for unit in UPPER_FACE_UNITS.values() if unit in mood}
+    )
 
 
 def phrases(units: Timeline[Unit]) -> list[tuple[float, float]]:

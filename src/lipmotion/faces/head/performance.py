@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.liveliness import UPPER_FACE, Liveliness
+from lipmotion.articulation.liveliness import Liveliness
 from lipmotion.articulation.mouth import SpokenMouth, spoken_mouth, upper_share
 from lipmotion.articulation.phone_targets import TIP_UP
 from lipmotion.faces.base import Staging, alive
@@ -76,13 +76,7 @@ def posed(mouth: SpokenMouth, moved: Liveliness) -> list[CharacterPose]:
         + (MOOD_SMILE * mouth.smile - MOOD_FROWN * mouth.frown - MOOD_TIGHT * serious) * (1 - roundness),
         "shut": moved.lids,
         "brows": moved.brows,
-        **dict(
-            zip(
-                ("inner", "outer", "lowered", "wide", "cheek", "squint", "sneer"),
-                map(moved.unit, UPPER_FACE),
-                strict=True,
-            )
-        ),
+        **{"squint" if name == "tight" else name: curve for name, curve in moved.upper_face.items()},
     }
     rows = np.stack(list(curves.values()), axis=1).tolist()
     return [

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lipmotion.articulation.liveliness import UPPER_FACE, Liveliness
+from lipmotion.articulation.liveliness import Liveliness
 from lipmotion.articulation.mouth import SpokenMouth
 
 
@@ -68,9 +68,10 @@ def mood_poses(moved: Liveliness) -> list[MoodPose]:
     """Return the pose of every frame of what a mood does beside the mouth."""
     if not moved.units:
         return [CALM] * len(moved.lids)
-    inner, outer, lowered, wide, cheek, tight, sneer = map(moved.unit, UPPER_FACE)
-    curves = (inner, outer, lowered, wide, np.maximum(tight, 0.8 * cheek), cheek, sneer)
-    return [MoodPose(*row) for row in np.stack(curves, axis=1).tolist()]
+    curves = moved.upper_face
+    curves["squint"] = np.maximum(curves.pop("tight"), 0.8 * curves["cheek"])
+    rows = np.stack([curves[name] for name in MoodPose._fields], axis=1).tolist()
+    return [MoodPose(*row) for row in rows]
 
 
 def mouth_poses(mouth: SpokenMouth) -> list[MouthPose]:
