@@ -30,6 +30,21 @@ Rule = Callable[[str], Iterator[int]]
 parsed = cache(ast.parse)
 
 
+@cache
+def nodes(text: str) -> list[ast.AST]:
+    """Return all nodes of a module."""
+    return list(ast.walk(parsed(text)))
+
+
+def calls(text: str, *last_names: str) -> Iterator[tuple[ast.Call, str]]:
+    """Give calls of functions whose last name begins with one of some, with their whole names."""
+    for node in nodes(text):
+        if isinstance(node, ast.Call):
+            last = getattr(node.func, "attr", getattr(node.func, "id", ""))
+            if last.startswith(last_names):
+                yield node, ast.unparse(node.func)
+
+
 def public(body: list[ast.stmt]) -> Iterator[Definition]:
     """Give the public functions and classes of a module, and their public methods."""
     for node in body:
@@ -52,22 +67,20 @@ def without_docstring(text: str) -> Iterator[int]:
 
 def asserted(text: str) -> Iterator[int]:
     """Input is checked by raising an error that says what to do."""
-    return (node.lineno for node in ast.walk(parsed(text)) if isinstance(node, ast.Assert))
+    return (node.lineno for node in nodes(text) if isinstance(node, ast.Assert))
 
 
 def pickled(text: str) -> Iterator[int]:
     """Nothing that runs code when it is read."""
-    for node in ast.walk(parsed(text)):
+    for node in nodes(text):
         if isinstance(node, ast.Import | ast.ImportFrom):
             modules = {alias.name for alias in node.names} | {getattr(node, "module", "")}
             of_joblib = {"load", "dump"} & modules and getattr(node, "module", "") == "joblib"
             if modules & PICKLES or of_joblib or "joblib" in {alias.name for alias in node.names}:
                 yield node.lineno
-        if not isinstance(node, ast.Call):
-            continue
-        loads = ast.unparse(node.func) in ("np.load", "np.lib.format.read_array")
-        if loads and "allow_pickle=False" not in ast.unparse(node):
-            yield node.lineno
+    for call, name in calls(text, "load", "read_array"):
+        if name in ("np.load", "np.lib.format.read_array") and "allow_pickle=False" not in ast.unparse(call):
+            yield call.lineno
 
 
 def changeable(text: str) -> Iterator[int]:
@@ -81,28 +94,26 @@ def changeable(text: str) -> Iterator[int]:
 
 def printed(text: str) -> Iterator[int]:
     """A library does not print, and one module of the command line prints for all: it knows what a terminal obeys."""
-    tree = parsed(text)
-    calls = ((n.lineno, ast.unparse(n.func)) for n in ast.walk(tree) if isinstance(n, ast.Call))
-    return (
-        line for line, name in calls if name == "print" or re.fullmatch(r"sys\.(__)?std(out|err)(__)?\.write.*", name)
-    )
+    for call, name in calls(text, "print", "write"):
+        if name == "print" or re.fullmatch(r"sys\.(__)?std(out|err)(__)?\.write.*", name):
+            yield call.lineno
 
 
 def by_chance(text: str) -> Iterator[int]:
     """Chance comes from ``np.random.default_rng(seed)``: no hidden state, no clock."""
-    for node in ast.walk(parsed(text)):
+    if "random" not in text:
+        return
+    for node in nodes(text):
         if isinstance(node, ast.Import) and any(alias.name == "random" for alias in node.names):
             yield node.lineno
-        if not isinstance(node, ast.Call):
-            continue
-        drawn = re.fullmatch(r"np\.random\.\w+", ast.unparse(node.func))
-        if drawn and (ast.unparse(node.func) != "np.random.default_rng" or not node.args):
-            yield node.lineno
+    for call, name in calls(text, ""):
+        if re.fullmatch(r"np\.random\.\w+", name) and (name != "np.random.default_rng" or not call.args):
+            yield call.lineno
 
 
 def fragmentary(text: str) -> Iterator[int]:
     """A docstring, also that of a constant, is clear to a reader who meets it alone."""
-    for node in ast.walk(parsed(text)):
+    for node in nodes(text):
         if not (isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)):
             continue
         if str(node.value.value).strip().partition(" ")[0] in FRAGMENTS:
