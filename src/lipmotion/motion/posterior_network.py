@@ -61,7 +61,10 @@ STEPS, RECURRENT_STEPS = 50.0, 50.0
 """Optimiser steps of either network by the square root of the seconds of motion: 390 for a minute, 1,800 for 22
 minutes."""
 RECURRENT = RecurrentShape("recurrent", "recurrent network", SHAPE.inputs, 96, 2)
-RECURRENT_BATCH, RECURRENT_RATE, RECURRENT_DROPOUT = 8, 1.2e-2, 0.5
+RECURRENT_BATCH, RECURRENT_DROPOUT = 8, 0.5
+RECURRENT_RATE, LARGEST_RECURRENT_RATE = 0.36, 3e-2
+"""Learning rate, by one over the square root of the seconds of motion, and the largest one: large steps keep a network
+of little speech from learning it by heart (docs/results/learning-curve.md)."""
 RECURRENT_SHARE = 0.6
 """Weight of the recurrent network beside the convolutional one, for a voice that training knows."""
 LARGEST_COMPONENT = 100.0
@@ -261,7 +264,9 @@ def _trained(training: PredictorTraining, sequences: Sequence[Sequence[TrainingS
         rows[:, :SPECTRUM] = 0
         return piece._replace(inputs=rows)
 
-    plan = TrainingPlan(_steps(training, STEPS), min(BATCH_SIZE, len(sequences)), LEARNING_RATE, DROPOUT, SEED)
+    plan = TrainingPlan(
+        _steps(STEPS, _seconds(training)), min(BATCH_SIZE, len(sequences)), LEARNING_RATE, DROPOUT, SEED
+    )
     return SHAPE.trained(training, sequences[0][0].targets.shape[1], draw, plan)
 
 
@@ -269,16 +274,21 @@ def _trained_recurrent(
     training: PredictorTraining, sequences: Sequence[Sequence[TrainingSequence]]
 ) -> RecurrentNetwork:
     """Return the trained recurrent network."""
-    batch_size = min(RECURRENT_BATCH, len(sequences))
-    steps = _steps(training, RECURRENT_STEPS)
-    plan = TrainingPlan(steps, batch_size, RECURRENT_RATE, RECURRENT_DROPOUT, SEED)
+    motion_s = _seconds(training)
+    rate = min(RECURRENT_RATE / math.sqrt(motion_s), LARGEST_RECURRENT_RATE)
+    steps, batch_size = _steps(RECURRENT_STEPS, motion_s), min(RECURRENT_BATCH, len(sequences))
+    plan = TrainingPlan(steps, batch_size, rate, RECURRENT_DROPOUT, SEED)
     outputs = sequences[0][0].targets.shape[1]
     return RECURRENT.trained(training, outputs, lambda rng, number: _drawn(rng, sequences[number]), plan)
 
 
-def _steps(training: PredictorTraining, of_second: float) -> int:
+def _seconds(training: PredictorTraining) -> float:
+    """Return how many seconds of measured motion the examples have."""
+    return sum(int(example.valid.sum()) for example in training.examples) / FRAME_RATE_HZ
+
+
+def _steps(of_second: float, motion_s: float) -> int:
     """Return the number of optimiser steps; ``of_second`` is that for one second of motion."""
-    motion_s = sum(int(example.valid.sum()) for example in training.examples) / FRAME_RATE_HZ
     return max(round(of_second * math.sqrt(motion_s)), 1)
 
 
