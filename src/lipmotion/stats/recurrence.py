@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.stats.network_training import Array, Dropout, LinearMap, SequenceNetwork
 
 GATES = 4
-"""Of a cell, in this order: input, forget, value, output."""
+"""Weighted sums of a cell, in this order: input gate, forget gate, value, output gate."""
 SLOPES, OFFSETS = (np.array(values, np.float32)[:, None] for values in ((0.5, 0.5, 1.0, 0.5), (0.5, 0.5, 0.0, 0.5)))
 """A sigmoid is 0.5 + 0.5 tanh(x / 2), the value is tanh(x) [each shape=(4, 1)]."""
 FORGET_BIAS = 1.0
@@ -37,7 +37,7 @@ class RecurrentLayer(NamedTuple):
     biases: Array
 
 
-class _Pass(NamedTuple):
+class _CellPass(NamedTuple):
     """What the backward pass needs of one layer, in the order of time of either direction.
 
     inputs : [shape=(2, T, B, I)]
@@ -96,7 +96,7 @@ class RecurrentNetwork(SequenceNetwork):
 
     def forward(  # noqa: D102
         self, inputs: Array, inside: NDArray[np.bool_], dropout: Dropout | None
-    ) -> tuple[Array, list[_Pass]]:
+    ) -> tuple[Array, list[_CellPass]]:
         states, passes, counts = inputs, [], _both_directions(inside[:, :, None].astype(np.float32))
         for layer in self.layers:
             passed = _layer_pass(layer, _both_directions(states), counts)
@@ -147,7 +147,7 @@ def _side_by_side(values: Array) -> Array:
     return np.ascontiguousarray(np.concatenate([values[0], values[1, ::-1]], axis=2).transpose(1, 0, 2))
 
 
-def _layer_pass(layer: RecurrentLayer, inputs: Array, inside: Array) -> _Pass:
+def _layer_pass(layer: RecurrentLayer, inputs: Array, inside: Array) -> _CellPass:
     """Return the cells of one layer at all time steps; inputs [shape=(2, T, B, I)], inside [shape=(2, T, B, 1)]."""
     _, length, batch, size = inputs.shape
     cells = layer.memory.shape[1]
@@ -169,10 +169,10 @@ def _layer_pass(layer: RecurrentLayer, inputs: Array, inside: Array) -> _Pass:
         kept[:, step] = cell
         output = gate[:, :, 3] * np.tanh(cell)
         outputs[:, step] = output
-    return _Pass(inputs, gates, kept, outputs, inside, None)
+    return _CellPass(inputs, gates, kept, outputs, inside, None)
 
 
-def _layer_gradients(layer: RecurrentLayer, passed: _Pass, slope: Array) -> tuple[list[Array], Array]:
+def _layer_gradients(layer: RecurrentLayer, passed: _CellPass, slope: Array) -> tuple[list[Array], Array]:
     """Return the gradients of the parameters of one layer, and that of its inputs [shape=(B, T, I)].
 
     slope : of its outputs [shape=(B, T, 2·H)]
