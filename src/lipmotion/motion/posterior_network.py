@@ -60,7 +60,7 @@ BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED = 16, 2e-3, 0.4, 0
 STEPS, RECURRENT_STEPS = 50.0, 50.0
 """Optimiser steps of either network by the square root of the seconds of motion: 390 for a minute, 1,800 for 22
 minutes."""
-RECURRENT = RecurrentShape("recurrent", "recurrent network", SHAPE.inputs, 96, 2)
+RECURRENT = RecurrentShape("recurrent", "recurrent-network", SHAPE.inputs, 96, 2)
 RECURRENT_BATCH, RECURRENT_DROPOUT = 8, 0.5
 RECURRENT_RATE, LARGEST_RECURRENT_RATE = 0.36, 3e-2
 """Learning rate, by one over the square root of the seconds of motion, and the largest one: large steps keep a network
