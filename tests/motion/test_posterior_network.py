@@ -9,7 +9,7 @@ from lipmotion.errors import CorpusError, InputError, ModelFormatError
 from lipmotion.motion import posterior_network
 from lipmotion.motion.acoustic_network import POSTERIOR_SHARES, AcousticNetwork
 from lipmotion.motion.network_steps import STEP
-from lipmotion.motion.posterior_network import PosteriorNetwork
+from lipmotion.motion.posterior_network import RECURRENT, PosteriorNetwork
 from lipmotion.motion.predictors import PredictorTraining, predictor_arrays, predictor_from_arrays
 from lipmotion.pipeline.model import load_model
 from lipmotion.types import (
@@ -23,6 +23,8 @@ from lipmotion.types import (
     TokenPosteriors,
 )
 
+TRAINED_RECURRENT = posterior_network._trained_recurrent
+"""The tests of all else train none (``conftest``)."""
 TOKENS, FRAMES, SOURCE = 30, 200, "hama 1.7.0 abc"
 
 
@@ -68,6 +70,8 @@ def trained(examples: list[Example]) -> PosteriorNetwork:
     values = [np.asarray(each.motion.values) for each in examples]
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(posterior_network, "STEPS", 15.0)
+        patched.setattr(posterior_network, "RECURRENT_STEPS", 8.0)
+        patched.setattr(posterior_network, "_trained_recurrent", TRAINED_RECURRENT)
         return PosteriorNetwork.trained(PredictorTraining(examples, values, 2))
 
 
@@ -96,8 +100,25 @@ def test_the_spectrum_of_an_unknown_voice_counts_nothing(network: PosteriorNetwo
     assert width < 0.5
 
 
+def test_the_recurrent_network_counts_for_a_known_voice(
+    network: PosteriorNetwork, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def motion(share: float, voice: float) -> np.ndarray:
+        monkeypatch.setattr(posterior_network, "RECURRENT_SHARE", share)
+        return network.predict(speech(99, voice=voice))[0]
+
+    none, half, whole = (motion(share, 1.0) for share in (0.0, 0.5, 1.0))
+    assert half == pytest.approx((none + whole) / 2)
+    wanted = motion_of(99)
+    assert all(np.corrcoef(whole[:, each], wanted[:, each])[0, 1] > 0.6 for each in range(2))
+    assert np.abs(whole - none).max() > 0.01
+    assert motion(1.0, 0.0) == pytest.approx(motion(0.0, 0.0))
+
+
 def test_it_is_trained_without_spectra_where_one_is_missing() -> None:
     unheard = trained([example(number, heard=number > 0) for number in range(4)])
+    assert unheard.recurrent is None
+    assert predictor_arrays(unheard).keys() == PosteriorNetwork.ARRAYS.keys() - RECURRENT.specs.keys()
     with_spectrum, without = unheard.predict(speech(99))[0], unheard.predict(speech(99, heard=False))[0]
     assert np.isfinite(with_spectrum).all()
     assert np.isfinite(without).all()
@@ -109,6 +130,10 @@ def test_it_is_stored_and_restored(network: PosteriorNetwork) -> None:
     restored = predictor_from_arrays(arrays, 2)
     assert isinstance(restored, PosteriorNetwork)
     assert restored.source == SOURCE
+    without = {name: values for name, values in arrays.items() if name not in RECURRENT.specs}
+    before = predictor_from_arrays(without, 2)
+    assert isinstance(before, PosteriorNetwork)
+    assert before.recurrent is None
     earlier = {name: values for name, values in arrays.items() if name != "posterior_variances"}
     with pytest.raises(ModelFormatError, match="train again"):
         predictor_from_arrays(earlier, 2)
@@ -169,7 +194,8 @@ def test_its_share_depends_on_voice_recogniser_and_noise(
     output, ones = network.network.output, np.ones(dimensions)
     weights = np.resize(output.weights, (len(output.weights), dimensions))
     widened = output._replace(weights=weights, biases=np.resize(output.biases, dimensions))
-    beside = replace(network, network=replace(network.network, output=widened), centre=0 * ones, scale=ones)
+    convolutional = replace(network.network, output=widened)
+    beside = replace(network, network=convolutional, centre=0 * ones, scale=ones, recurrent=None)
     spoken = speech(0, voice=voice)
     spoken = replace(spoken, posteriors=replace(posteriors(0), mean=mean))
     without, same = alone.predict(spoken)

@@ -5,13 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.stats import convolution
-from lipmotion.stats.convolution import (
-    TrainingPlan,
-    TrainingSequence,
-    fit_network,
-    initial_network,
-)
+from lipmotion.stats import convolution, network_training
+from lipmotion.stats.convolution import initial_network
+from lipmotion.stats.network_training import TrainingPlan, TrainingSequence, fit_network
 
 
 def sequence(length: int = 40, seed: int = 0) -> TrainingSequence:
@@ -27,7 +23,7 @@ def test_gradients_are_those_of_differences() -> None:
     network = initial_network(3, 5, 2, (1, 2), seed=1)
     batch, weights = [sequence(9), sequence(6, 1)], np.array([0.3, 0.7], np.float32)
     batch[0].valid[2] = False
-    _, gradients = convolution._gradients(network, batch, weights, 0.0, 0)
+    _, gradients = network_training._gradients(network, batch, weights, 0.0, 0)
     arrays = [array for layer in (*network.layers, network.output) for array in layer]
     rng = np.random.default_rng(0)
     differences, slopes = [], []
@@ -39,7 +35,7 @@ def test_gradients_are_those_of_differences() -> None:
             errors = []
             for value in (before + step, before - step):
                 array[index] = value
-                errors.append(convolution._gradients(network, batch, weights, 0.0, 0)[0])
+                errors.append(network_training._gradients(network, batch, weights, 0.0, 0)[0])
             array[index] = before
             differences.append((errors[0] - errors[1]) / (2 * step))
             slopes.append(float(gradient[index]))
@@ -97,6 +93,6 @@ def test_steps_that_do_not_count_are_not_learned() -> None:
     valid[10:20] = False
     network = initial_network(3, 5, 2, (1,), seed=1)
     weights = np.full(2, 0.5, np.float32)
-    good, _ = convolution._gradients(network, [TrainingSequence(x, y, valid)], weights, 0.0, 0)
-    bad, _ = convolution._gradients(network, [TrainingSequence(x, broken, valid)], weights, 0.0, 0)
+    good, _ = network_training._gradients(network, [TrainingSequence(x, y, valid)], weights, 0.0, 0)
+    bad, _ = network_training._gradients(network, [TrainingSequence(x, broken, valid)], weights, 0.0, 0)
     assert bad == pytest.approx(good)

@@ -13,7 +13,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.stats.convolution import LinearMap
+from lipmotion.stats.network_training import LinearMap
 from lipmotion.storage.archive import UNREADABLE, read_archive
 from lipmotion.storage.files import check_source
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.motion.network_steps import (
     STEP,
-    NetworkShape,
+    ConvolutionalShape,
     between_steps,
     checked_scale,
     error_variances,
@@ -25,12 +25,13 @@ from lipmotion.motion.posterior_network import PosteriorNetwork, have_posteriors
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining
 from lipmotion.motion.reliability import clearness
 from lipmotion.motion.speaker_knowledge import strangeness
-from lipmotion.stats.convolution import ConvolutionalNetwork, TrainingPlan, TrainingSequence
+from lipmotion.stats.convolution import ConvolutionalNetwork
+from lipmotion.stats.network_training import TrainingPlan, TrainingSequence
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays
 from lipmotion.types import SPECTRUM_BANDS, ConditionSpectrum, Speech, sub_monitor
 
 Array = NDArray[np.float64]
-SHAPE = NetworkShape("network", "network", STEP * SPECTRUM_BANDS, 192, (1, 2, 4, 8, 1, 2, 4, 8))
+SHAPE = ConvolutionalShape("network", "network", STEP * SPECTRUM_BANDS, 192, (1, 2, 4, 8, 1, 2, 4, 8))
 """Its input is 1.2 s before and after a frame."""
 BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED = 16, 2e-3, 0.3, 0
 LEAST_STEPS = 600

@@ -2,29 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.motion.predictors import PredictorTraining
-from lipmotion.stats.convolution import (
-    TAPS,
-    ConvolutionalNetwork,
+from lipmotion.stats.convolution import TAPS, ConvolutionalNetwork, initial_network
+from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
+from lipmotion.stats.network_training import (
     LinearMap,
+    SequenceNetwork,
     TrainingPlan,
     TrainingSequence,
     fit_network,
-    initial_network,
 )
-from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
+from lipmotion.stats.recurrence import GATES, RecurrentLayer, RecurrentNetwork, initial_recurrent_network
 from lipmotion.storage.schema import LARGEST_MEAN, Arrays, ArraySpec, checked_arrays
 from lipmotion.types import Progress
 
 Array = NDArray[np.float64]
 FloatT = TypeVar("FloatT", bound=np.floating[Any])
+NetworkT = TypeVar("NetworkT", bound=SequenceNetwork)
 STEP = 4
 """Frames of a time step, 40 ms: about a picture of a video."""
 DIRECT_WEIGHT = 4.0
@@ -89,56 +91,56 @@ def random_piece(sequence: TrainingSequence, rng: np.random.Generator) -> Traini
 
 
 @dataclass(frozen=True)
-class NetworkShape:
-    """Shape of a convolutional network, and how it is trained and stored.
+class NetworkShape(ABC, Generic[NetworkT]):
+    """Shape of a network, and how it is trained and stored.
 
-    prefix       : of the names of its arrays in a model file
-    name         : in messages and of its checkpoint
-    inputs       : values of a time step
-    hidden_units : of every hidden layer
-    dilations    : time steps between the taps of each layer
+    prefix : of the names of its arrays in a model file
+    name   : in messages and of its checkpoint
+    inputs : values of a time step
     """
 
     prefix: str
     name: str
     inputs: int
-    hidden_units: int
-    dilations: tuple[int, ...]
 
     @property
     def specs(self) -> dict[str, ArraySpec]:
         """Shapes and ranges of the arrays; ``O`` is the number of outputs."""
-        hidden, later = self.hidden_units, len(self.dilations) - 1
-        shapes = {
-            "first": f"{TAPS * self.inputs} {hidden}",
-            "layers": f"{later} {TAPS * hidden} {hidden}",
-            "biases": f"{later + 1} {hidden}",
-            "output": f"{hidden + 1} O",
-        }
         return {
             f"{self.prefix}_{name}": ArraySpec(np.float32, shape, -LARGEST_MEAN, LARGEST_MEAN)
-            for name, shape in shapes.items()
+            for name, shape in self.sizes.items()
         }
 
-    def arrays(self, network: ConvolutionalNetwork) -> dict[str, NDArray[np.float32]]:
-        """Return the arrays of a network of this shape."""
-        values = (
-            network.layers[0].weights,
-            np.stack([layer.weights for layer in network.layers[1:]]),
-            np.stack([layer.biases for layer in network.layers]),
-            np.concatenate([network.output.weights, network.output.biases[None]]),
-        )
-        return dict(zip(self.specs, values, strict=True))
+    @property
+    @abstractmethod
+    def sizes(self) -> dict[str, str]:
+        """Shape of each array, as in ``ArraySpec``, by its name without the prefix; ``output`` is the last one."""
 
-    def from_arrays(self, arrays: Arrays, outputs: int) -> ConvolutionalNetwork:
+    @abstractmethod
+    def stacked(self, network: NetworkT) -> tuple[NDArray[np.float32], ...]:
+        """Return the arrays of a network of this shape, in the order of ``sizes``, but for ``output``."""
+
+    @abstractmethod
+    def network(self, stacked: Sequence[NDArray[np.float32]], output: LinearMap) -> NetworkT:
+        """Return the network of the arrays of ``stacked``."""
+
+    @abstractmethod
+    def initial(self, outputs: int, seed: int) -> NetworkT:
+        """Return an untrained network with random weights."""
+
+    def arrays(self, network: NetworkT) -> dict[str, NDArray[np.float32]]:
+        """Return the arrays of a network of this shape."""
+        output = np.concatenate([network.output.weights, network.output.biases[None]])
+        return dict(zip(self.specs, (*self.stacked(network), output), strict=True))
+
+    def from_arrays(self, arrays: Arrays, outputs: int) -> NetworkT:
         """Return the network of arrays.
 
         Raises KeyError, ValueError: an array is missing, or has a wrong shape, type or range.
         """
         stored = checked_arrays(arrays, self.specs, O=outputs)
-        first, later, biases, output = (stored[name] for name in self.specs)
-        layers = tuple(LinearMap(each, bias) for each, bias in zip([first, *later], biases, strict=True))
-        return ConvolutionalNetwork(layers, self.dilations, LinearMap(output[:-1], output[-1]))
+        *stacked, output = (stored[name] for name in self.specs)
+        return self.network(stacked, LinearMap(output[:-1], output[-1]))
 
     def trained(
         self,
@@ -146,7 +148,7 @@ class NetworkShape:
         outputs: int,
         draw: Callable[[np.random.Generator, int], TrainingSequence],
         plan: TrainingPlan,
-    ) -> ConvolutionalNetwork:
+    ) -> NetworkT:
         """Return a network that is trained on the examples of ``training``; from its checkpoint, if that is there.
 
         draw : returns the inputs and targets of the example of a number, or a piece of them
@@ -163,10 +165,82 @@ class NetworkShape:
                     Progress(f"training the {self.name}", step, plan.steps, step / plan.steps, figure=error)
                 )
 
-        start = initial_network(self.inputs, self.hidden_units, outputs, self.dilations, plan.seed)
+        start = self.initial(outputs, plan.seed)
         network = fit_network(start, draw, len(training.examples), weights, plan, report)
         training.checkpoint.save(self.name, self.arrays(network))
         return network
+
+
+@final
+@dataclass(frozen=True)
+class ConvolutionalShape(NetworkShape[ConvolutionalNetwork]):
+    """Shape of a convolutional network.
+
+    hidden_units : of every hidden layer
+    dilations    : time steps between the taps of each layer
+    """
+
+    hidden_units: int
+    dilations: tuple[int, ...]
+
+    @property
+    def sizes(self) -> dict[str, str]:  # noqa: D102
+        hidden, later = self.hidden_units, len(self.dilations) - 1
+        return {
+            "first": f"{TAPS * self.inputs} {hidden}",
+            "layers": f"{later} {TAPS * hidden} {hidden}",
+            "biases": f"{later + 1} {hidden}",
+            "output": f"{hidden + 1} O",
+        }
+
+    def stacked(self, network: ConvolutionalNetwork) -> tuple[NDArray[np.float32], ...]:  # noqa: D102
+        layers = network.layers
+        later = np.stack([layer.weights for layer in layers[1:]])
+        return layers[0].weights, later, np.stack([layer.biases for layer in layers])
+
+    def network(self, stacked: Sequence[NDArray[np.float32]], output: LinearMap) -> ConvolutionalNetwork:  # noqa: D102
+        first, later, biases = stacked
+        layers = tuple(LinearMap(each, bias) for each, bias in zip([first, *later], biases, strict=True))
+        return ConvolutionalNetwork(layers, self.dilations, output)
+
+    def initial(self, outputs: int, seed: int) -> ConvolutionalNetwork:  # noqa: D102
+        return initial_network(self.inputs, self.hidden_units, outputs, self.dilations, seed)
+
+
+@final
+@dataclass(frozen=True)
+class RecurrentShape(NetworkShape[RecurrentNetwork]):
+    """Shape of a recurrent network.
+
+    cells  : of every layer, in either direction of time
+    layers : their number, two or more
+    """
+
+    cells: int
+    layers: int
+
+    @property
+    def sizes(self) -> dict[str, str]:  # noqa: D102
+        gates = GATES * self.cells
+        return {
+            "first": f"2 {self.inputs} {gates}",
+            "layers": f"{self.layers - 1} 2 {2 * self.cells} {gates}",
+            "memory": f"{self.layers} 2 {self.cells} {gates}",
+            "biases": f"{self.layers} {2 * gates}",
+            "output": f"{2 * self.cells + 1} O",
+        }
+
+    def stacked(self, network: RecurrentNetwork) -> tuple[NDArray[np.float32], ...]:  # noqa: D102
+        weights, memory, biases = zip(*network.layers, strict=True)
+        return weights[0], np.stack(weights[1:]), np.stack(memory), np.stack(biases)
+
+    def network(self, stacked: Sequence[NDArray[np.float32]], output: LinearMap) -> RecurrentNetwork:  # noqa: D102
+        first, later, memory, biases = stacked
+        layers = tuple(RecurrentLayer(*each) for each in zip([first, *later], memory, biases, strict=True))
+        return RecurrentNetwork(layers, output)
+
+    def initial(self, outputs: int, seed: int) -> RecurrentNetwork:  # noqa: D102
+        return initial_recurrent_network(self.inputs, self.cells, outputs, self.layers, seed)
 
 
 def checked_scale(scale: NDArray[FloatT], name: str) -> NDArray[FloatT]:

@@ -1,7 +1,8 @@
 """Posterior networks: motion from the posteriors of a phone recogniser, and from the spectrum of a voice that is known.
 
 Posteriors are much the same for every speaker. Spectra tell more, but of the voices of the training alone: in a part of
-the training they are switched off, so that one network does both.
+the training of the convolutional network they are switched off, so that it serves every voice. The recurrent network
+beside it serves those that are known.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ from lipmotion.errors import CorpusError, InputError, ModelFormatError
 from lipmotion.motion.network_steps import (
     LEAST_DEVIATION,
     STEP,
-    NetworkShape,
+    ConvolutionalShape,
+    RecurrentShape,
     between_steps,
     checked_scale,
     error_variances,
@@ -29,7 +31,9 @@ from lipmotion.motion.network_steps import (
 )
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining
 from lipmotion.motion.speaker_knowledge import strangeness
-from lipmotion.stats.convolution import ConvolutionalNetwork, TrainingPlan, TrainingSequence
+from lipmotion.stats.convolution import ConvolutionalNetwork
+from lipmotion.stats.network_training import SequenceNetwork, TrainingPlan, TrainingSequence
+from lipmotion.stats.recurrence import RecurrentNetwork
 from lipmotion.storage.schema import LARGEST_MEAN, POSITIVE, Arrays, ArraySpec, checked_arrays
 from lipmotion.types import FRAME_RATE_HZ, SPECTRUM_BANDS, Example, Speech, TokenPosteriors
 
@@ -48,13 +52,21 @@ SPECTRUM = STEP * SPECTRUM_BANDS
 """The first inputs of a time step: the spectrum."""
 SPECTRUM_OFF = 0.3
 """Share of the training in which the spectrum is switched off (0)."""
-SHAPE = NetworkShape("posterior", "posterior-network", SPECTRUM + ROWS * COMPONENTS, 128, (1, 2, 4, 8, 1, 2, 4))
+SHAPE = ConvolutionalShape("posterior", "posterior-network", SPECTRUM + ROWS * COMPONENTS, 128, (1, 2, 4, 8, 1, 2, 4))
 """Its input is 0.88 s before and after a frame."""
 SHIFTS = 2
 """Time steps begin at so many rows of posteriors: training draws one of them, the motion is the mean over all."""
 BATCH_SIZE, LEARNING_RATE, DROPOUT, SEED = 16, 2e-3, 0.4, 0
-STEPS = 50.0
-"""Optimiser steps by the square root of the seconds of motion: 390 for a minute, 1,800 for 22 minutes."""
+STEPS, RECURRENT_STEPS = 50.0, 50.0
+"""Optimiser steps of either network by the square root of the seconds of motion: 390 for a minute, 1,800 for 22
+minutes."""
+RECURRENT = RecurrentShape("recurrent", "recurrent-network", SHAPE.inputs, 96, 2)
+RECURRENT_BATCH, RECURRENT_DROPOUT = 8, 0.5
+RECURRENT_RATE, LARGEST_RECURRENT_RATE = 0.36, 3e-2
+"""Learning rate, by one over the square root of the seconds of motion, and the largest one: large steps keep a network
+of little speech from learning it by heart (docs/results/learning-curve.md)."""
+RECURRENT_SHARE = 0.6
+"""Weight of the recurrent network beside the convolutional one, for a voice that training knows."""
 LARGEST_COMPONENT = 100.0
 """More is in no basis."""
 
@@ -77,6 +89,8 @@ class PosteriorNetwork(Predictor):
     centre, scale : mean and standard deviation of the motion in training [each shape=(Q,)]
     variances   : of the error of static value, Δ and Δ² in training [shape=(3, Q)]
     source      : name, version and digest of the phone recogniser (``TokenPosteriors.source``)
+    recurrent   : for voices that training knows, from the same inputs to the same outputs (None: an example of the
+                  training had no spectrum, or the model is an earlier one)
     """
 
     network: ConvolutionalNetwork
@@ -86,8 +100,9 @@ class PosteriorNetwork(Predictor):
     scale: Array
     variances: Array
     source: str
+    recurrent: RecurrentNetwork | None = None
     name: ClassVar[str] = "posteriors"
-    ARRAYS: ClassVar[Mapping[str, ArraySpec]] = SHAPE.specs | TARGETS
+    ARRAYS: ClassVar[Mapping[str, ArraySpec]] = SHAPE.specs | TARGETS | RECURRENT.specs
 
     @classmethod
     def conditions(cls, motion_s: float, most: int) -> int:  # noqa: ARG003
@@ -115,13 +130,15 @@ class PosteriorNetwork(Predictor):
         mean, basis = _principal_components(rows)
         spectra = _spectra_of(training.examples)
         inputs = [_inputs((row - mean) @ basis, x) for row, x in zip(rows, spectra, strict=True)]
-        network = _trained(training, inputs, centre, scale)
+        sequences = _sequences(training, inputs, centre, scale)
+        network = _trained(training, sequences)
+        recurrent = None if spectra[0] is None else _trained_recurrent(training, sequences)
         predicted = (
             _outputs(network, shifted, len(values)) * scale + centre
             for shifted, values in zip(inputs, training.values, strict=True)
         )
         variances = error_variances(training, predicted, scale)
-        return cls(network, mean, basis, centre, scale, variances, found[0].source)
+        return cls(network, mean, basis, centre, scale, variances, found[0].source, recurrent)
 
     def can_predict(self, speech: Speech) -> bool:
         """Return whether speech has posteriors."""
@@ -153,7 +170,10 @@ class PosteriorNetwork(Predictor):
     def _predict(self, posteriors: TokenPosteriors, spectrum: NDArray[np.floating] | None, frames: int) -> Array:
         """Return motion in the motion space [shape=(frames, Q)], with the spectrum or without."""
         shifted = _inputs(self._components(posteriors), spectrum)
-        return _outputs(self.network, shifted, frames) * self.scale + self.centre
+        outputs = _outputs(self.network, shifted, frames)
+        if self.recurrent is not None and spectrum is not None:
+            outputs += RECURRENT_SHARE * (_outputs(self.recurrent, shifted, frames) - outputs)
+        return outputs * self.scale + self.centre
 
     def _components(self, posteriors: TokenPosteriors) -> NDArray[np.floating]:
         """Return the principal components of the logarithms of posteriors [shape=(N, 120)]."""
@@ -171,8 +191,9 @@ class PosteriorNetwork(Predictor):
         return posteriors
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """Serialise the network, at half precision."""
+        """Serialise the networks, at half precision."""
         arrays = SHAPE.arrays(self.network) | {"posterior_mean": self.mean, "posterior_basis": self.basis}
+        arrays |= RECURRENT.arrays(self.recurrent) if self.recurrent is not None else {}
         return {name: array.astype(np.float16) for name, array in arrays.items()} | {
             "posterior_targets": np.stack([self.centre, self.scale]),
             "posterior_variances": self.variances,
@@ -196,6 +217,7 @@ class PosteriorNetwork(Predictor):
             checked_scale(scale, "posterior_targets"),
             stored["posterior_variances"],
             str(stored["posterior_source"][0]),
+            None if arrays.keys().isdisjoint(RECURRENT.specs) else RECURRENT.from_arrays(arrays, dimensions),
         )
 
 
@@ -218,31 +240,61 @@ def _spectra_of(examples: Sequence[Example]) -> list[NDArray[np.floating] | None
     return [None] * len(examples)
 
 
-def _trained(
+def _sequences(
     training: PredictorTraining, inputs: Sequence[Sequence[NDArray[np.float32]]], centre: Array, scale: Array
-) -> ConvolutionalNetwork:
-    """Return the trained network.
+) -> list[list[TrainingSequence]]:
+    """Return the sequences of each example, by shift.
 
     inputs : of each example in its time steps, by shift [each shape=(N, 400)]
     """
-    sequences = [
+    return [
         [_sequence(rows, (x - centre) / scale, example.valid, shift) for shift, rows in enumerate(shifted)]
         for shifted, x, example in zip(inputs, training.values, training.examples, strict=True)
     ]
 
+
+def _trained(training: PredictorTraining, sequences: Sequence[Sequence[TrainingSequence]]) -> ConvolutionalNetwork:
+    """Return the trained convolutional network."""
+
     def draw(rng: np.random.Generator, number: int) -> TrainingSequence:
-        shifted = sequences[number]
-        piece = random_piece(shifted[int(rng.integers(len(shifted)))], rng)
+        piece = _drawn(rng, sequences[number])
         if rng.random() >= SPECTRUM_OFF:
             return piece
         rows = piece.inputs.copy()
         rows[:, :SPECTRUM] = 0
         return piece._replace(inputs=rows)
 
-    motion_s = sum(int(example.valid.sum()) for example in training.examples) / FRAME_RATE_HZ
-    steps = max(round(STEPS * math.sqrt(motion_s)), 1)
-    plan = TrainingPlan(steps, min(BATCH_SIZE, len(sequences)), LEARNING_RATE, DROPOUT, SEED)
-    return SHAPE.trained(training, len(centre), draw, plan)
+    plan = TrainingPlan(
+        _steps(STEPS, _seconds(training)), min(BATCH_SIZE, len(sequences)), LEARNING_RATE, DROPOUT, SEED
+    )
+    return SHAPE.trained(training, sequences[0][0].targets.shape[1], draw, plan)
+
+
+def _trained_recurrent(
+    training: PredictorTraining, sequences: Sequence[Sequence[TrainingSequence]]
+) -> RecurrentNetwork:
+    """Return the trained recurrent network."""
+    motion_s = _seconds(training)
+    rate = min(RECURRENT_RATE / math.sqrt(motion_s), LARGEST_RECURRENT_RATE)
+    steps, batch_size = _steps(RECURRENT_STEPS, motion_s), min(RECURRENT_BATCH, len(sequences))
+    plan = TrainingPlan(steps, batch_size, rate, RECURRENT_DROPOUT, SEED)
+    outputs = sequences[0][0].targets.shape[1]
+    return RECURRENT.trained(training, outputs, lambda rng, number: _drawn(rng, sequences[number]), plan)
+
+
+def _seconds(training: PredictorTraining) -> float:
+    """Return how many seconds of measured motion the examples have."""
+    return sum(int(example.valid.sum()) for example in training.examples) / FRAME_RATE_HZ
+
+
+def _steps(of_second: float, motion_s: float) -> int:
+    """Return the number of optimiser steps; ``of_second`` is that for one second of motion."""
+    return max(round(of_second * math.sqrt(motion_s)), 1)
+
+
+def _drawn(rng: np.random.Generator, shifted: Sequence[TrainingSequence]) -> TrainingSequence:
+    """Return one of the shifts of an example, or a piece of it."""
+    return random_piece(shifted[int(rng.integers(len(shifted)))], rng)
 
 
 def _sequence(rows: NDArray[np.float32], targets: Array, valid: NDArray[np.bool_], shift: int) -> TrainingSequence:
@@ -251,7 +303,7 @@ def _sequence(rows: NDArray[np.float32], targets: Array, valid: NDArray[np.bool_
     return TrainingSequence(rows, targets[frames].astype(np.float32), valid[frames])
 
 
-def _outputs(network: ConvolutionalNetwork, shifted: Sequence[NDArray[np.float32]], frames: int) -> Array:
+def _outputs(network: SequenceNetwork, shifted: Sequence[NDArray[np.float32]], frames: int) -> Array:
     """Return the outputs of a network, the mean over all shifts of its inputs [shape=(frames, Q)]."""
     outputs = [between_steps(network(x).astype(float), frames, s * ROW_FRAMES) for s, x in enumerate(shifted)]
     mean: Array = np.mean(outputs, axis=0)

@@ -1,0 +1,218 @@
+"""A recurrent network in both directions of time, from sequences of vectors to sequences of vectors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.stats.network_training import Array, Dropout, LinearMap, SequenceNetwork
+
+GATES = 4
+"""Weighted sums of a cell, in this order: input gate, forget gate, value, output gate."""
+SLOPES, OFFSETS = (np.array(values, np.float32)[:, None] for values in ((0.5, 0.5, 1.0, 0.5), (0.5, 0.5, 0.0, 0.5)))
+"""A sigmoid is 0.5 + 0.5 tanh(x / 2), the value is tanh(x) [each shape=(4, 1)]."""
+FORGET_BIAS = 1.0
+"""Bias of the forget gates before training: cells remember."""
+PIECE, REACH = 250, 50
+"""Long sequences are computed in pieces of so many time steps, side by side; so many steps before and after a piece are
+computed with it, for what its cells remember."""
+PIECES = 16
+"""Pieces computed at a time, so that the memory does not grow with the sequence."""
+
+
+class RecurrentLayer(NamedTuple):
+    """Weights of H cells forward and H cells backward in time.
+
+    weights : of the inputs [shape=(2, I, 4·H)]
+    memory  : of the outputs of the time step before, or after [shape=(2, H, 4·H)]
+    biases  : [shape=(2·4·H,)]
+    """
+
+    weights: Array
+    memory: Array
+    biases: Array
+
+
+class _CellPass(NamedTuple):
+    """What the backward pass needs of one layer, in the order of time of either direction.
+
+    inputs : [shape=(2, T, B, I)]
+    gates  : values of all gates [shape=(2, T, B, 4, H)]
+    cells, outputs : of all cells [each shape=(2, T, B, H)]
+    inside : 1 before the end of a sequence, 0 after it [shape=(2, T, B, 1)]
+    dropped : 0, or the factor of the outputs [shape=(B, T, 2·H)]
+    """
+
+    inputs: Array
+    gates: Array
+    cells: Array
+    outputs: Array
+    inside: Array
+    dropped: Array | None
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class RecurrentNetwork(SequenceNetwork):
+    """Layers of long short-term memory cells, as many forward as backward in time, and a linear output.
+
+    layers : from the inputs to the outputs; each one's inputs are the outputs of the cells of the one before
+    output : the linear map from the last layer
+    Source: Graves & Schmidhuber 2005, without connections from cells to gates.
+    """
+
+    layers: tuple[RecurrentLayer, ...]
+    output: LinearMap
+
+    def hidden(self, inputs: Array) -> Array:  # noqa: D102
+        result = np.empty((len(inputs), len(self.output.weights)), np.float32)
+        starts = list(range(0, len(inputs), PIECE))
+        for number in range(0, len(starts), PIECES):
+            pieces = [(max(start - REACH, 0), start) for start in starts[number : number + PIECES]]
+            rows = [inputs[first : start + PIECE + REACH] for first, start in pieces]
+            length = max(len(each) for each in rows)
+            batch, inside = (
+                np.zeros((len(rows), length, inputs.shape[1]), np.float32),
+                np.zeros((len(rows), length), bool),
+            )
+            for place, each in enumerate(rows):
+                batch[place, : len(each)], inside[place, : len(each)] = each, True
+            states, _ = self.forward(batch, inside, None)
+            for (first, start), each, found in zip(pieces, rows, states, strict=True):
+                result[start : start + PIECE] = found[start - first : min(start - first + PIECE, len(each))]
+        return result
+
+    @property
+    def parameters(self) -> list[Array]:  # noqa: D102
+        return [array for layer in (*self.layers, self.output) for array in layer]
+
+    def with_parameters(self, parameters: Sequence[Array]) -> RecurrentNetwork:  # noqa: D102
+        layers = tuple(RecurrentLayer(*parameters[i : i + 3]) for i in range(0, len(parameters) - 2, 3))
+        return replace(self, layers=layers, output=LinearMap(*parameters[-2:]))
+
+    def forward(  # noqa: D102
+        self, inputs: Array, inside: NDArray[np.bool_], dropout: Dropout | None
+    ) -> tuple[Array, list[_CellPass]]:
+        states, passes, counts = inputs, [], _both_directions(inside[:, :, None].astype(np.float32))
+        for layer in self.layers:
+            passed = _layer_pass(layer, _both_directions(states), counts)
+            states = _side_by_side(passed.outputs)
+            if dropout is not None:
+                dropped = dropout.mask(states.shape) * dropout.gain
+                states = states * dropped
+                passes.append(passed._replace(dropped=dropped))
+        return states, passes
+
+    def backward(self, slope: Array, passed: Any) -> list[Array]:  # noqa: D102
+        gradients: list[Array] = []
+        for layer, each in zip(reversed(self.layers), reversed(passed), strict=True):
+            by_layer, slope = _layer_gradients(layer, each, slope * each.dropped)
+            gradients = [*by_layer, *gradients]
+        return gradients
+
+
+def initial_recurrent_network(inputs: int, cells: int, outputs: int, layers: int, seed: int) -> RecurrentNetwork:
+    """Return an untrained network with random weights, uniform between ± 1 / √cells.
+
+    cells : of every layer, in either direction
+    """
+    rng, bound = np.random.default_rng(seed), 1 / np.sqrt(cells)
+
+    def uniform(*shape: int) -> Array:
+        return rng.uniform(-bound, bound, shape).astype(np.float32)
+
+    made = []
+    for number in range(layers):
+        biases = np.zeros((2, GATES, cells), np.float32)
+        biases[:, 1] = FORGET_BIAS
+        size = 2 * cells if number else inputs
+        made.append(
+            RecurrentLayer(uniform(2, size, GATES * cells), uniform(2, cells, GATES * cells), biases.reshape(-1))
+        )
+    return RecurrentNetwork(tuple(made), LinearMap(uniform(2 * cells, outputs), np.zeros(outputs, np.float32)))
+
+
+def _both_directions(values: Array) -> Array:
+    """Return the values of a batch [shape=(B, T, C)] forward and backward in time [shape=(2, T, B, C)]."""
+    forward = values.transpose(1, 0, 2)
+    return np.stack([forward, forward[::-1]])
+
+
+def _side_by_side(values: Array) -> Array:
+    """Return values of both directions [shape=(2, T, B, C)] at each time step of a batch [shape=(B, T, 2·C)]."""
+    return np.ascontiguousarray(np.concatenate([values[0], values[1, ::-1]], axis=2).transpose(1, 0, 2))
+
+
+def _layer_pass(layer: RecurrentLayer, inputs: Array, inside: Array) -> _CellPass:
+    """Return the cells of one layer at all time steps; inputs [shape=(2, T, B, I)], inside [shape=(2, T, B, 1)]."""
+    _, length, batch, size = inputs.shape
+    cells = layer.memory.shape[1]
+    scale = np.repeat(SLOPES, cells)
+    biases = (layer.biases.reshape(2, 1, -1) * scale).astype(np.float32)
+    gates = np.matmul(inputs.reshape(2, length * batch, size), layer.weights * scale)
+    gates += biases
+    gates = gates.reshape(2, length, batch, GATES, cells)
+    memory = layer.memory * scale
+    kept, outputs = (np.empty((2, length, batch, cells), np.float32) for _ in range(2))
+    cell, output = np.zeros((2, batch, cells), np.float32), np.zeros((2, batch, cells), np.float32)
+    for step in range(length):
+        gate = gates[:, step]
+        gate += np.matmul(output, memory).reshape(gate.shape)
+        np.tanh(gate, out=gate)
+        gate *= SLOPES
+        gate += OFFSETS
+        cell = (gate[:, :, 1] * cell + gate[:, :, 0] * gate[:, :, 2]) * inside[:, step]
+        kept[:, step] = cell
+        output = gate[:, :, 3] * np.tanh(cell)
+        outputs[:, step] = output
+    return _CellPass(inputs, gates, kept, outputs, inside, None)
+
+
+def _layer_gradients(layer: RecurrentLayer, passed: _CellPass, slope: Array) -> tuple[list[Array], Array]:
+    """Return the gradients of the parameters of one layer, and that of its inputs [shape=(B, T, I)].
+
+    slope : of its outputs [shape=(B, T, 2·H)]
+    """
+    _, length, batch, cells = passed.cells.shape
+    own = _both_directions(slope)
+    of_outputs = np.stack([own[0, :, :, :cells], own[1, :, :, cells:]])
+    gates, bent = passed.gates, np.tanh(passed.cells)
+    before = _before(passed.cells)
+    curve = gates * (1 - gates)
+    by_cell = np.stack(
+        [
+            gates[:, :, :, 2] * curve[:, :, :, 0],
+            before * curve[:, :, :, 1],
+            gates[:, :, :, 0] * (1 - np.square(gates[:, :, :, 2])),
+        ],
+        axis=3,
+    )
+    by_output, to_cell = bent * curve[:, :, :, 3], gates[:, :, :, 3] * (1 - np.square(bent))
+    inner, back = np.empty_like(gates), np.ascontiguousarray(layer.memory.transpose(0, 2, 1))
+    of_cell, of_output = (np.zeros((2, batch, cells), np.float32) for _ in range(2))
+    for step in reversed(range(length)):
+        of_output = of_output + of_outputs[:, step]
+        of_cell = (of_cell + of_output * to_cell[:, step]) * passed.inside[:, step]
+        here = inner[:, step]
+        np.multiply(by_cell[:, step], of_cell[:, :, None], out=here[:, :, :3])
+        np.multiply(by_output[:, step], of_output, out=here[:, :, 3])
+        of_cell = of_cell * gates[:, step, :, 1]
+        of_output = np.matmul(here.reshape(2, batch, GATES * cells), back)
+    flat = inner.reshape(2, length * batch, GATES * cells)
+    inputs, outputs = (
+        values.reshape(2, length * batch, -1).transpose(0, 2, 1) for values in (passed.inputs, _before(passed.outputs))
+    )
+    of_inputs = np.matmul(flat, layer.weights.transpose(0, 2, 1)).reshape(passed.inputs.shape)
+    both = (of_inputs[0] + of_inputs[1, ::-1]).transpose(1, 0, 2)
+    return [np.matmul(inputs, flat), np.matmul(outputs, flat), flat.sum(axis=1).reshape(-1)], both
+
+
+def _before(values: Array) -> Array:
+    """Return values at the time step before [shape=(2, T, B, C)], 0 before the first one."""
+    result = np.zeros_like(values)
+    result[:, 1:] = values[:, :-1]
+    return result

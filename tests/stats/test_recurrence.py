@@ -1,0 +1,89 @@
+"""The recurrent network: gradients, ends of sequences, pieces, learning, determinism."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from lipmotion.stats import network_training, recurrence
+from lipmotion.stats.network_training import TrainingPlan, TrainingSequence, fit_network
+from lipmotion.stats.recurrence import RecurrentNetwork, initial_recurrent_network
+from oracles.recurrence import recurrent_outputs
+
+
+def sequence(length: int = 30, seed: int = 0) -> TrainingSequence:
+    """A sequence whose targets are the inputs a step before and a step after."""
+    x = np.random.default_rng(seed).standard_normal((length, 2)).astype(np.float32)
+    y = np.zeros((length, 2), np.float32)
+    y[1:, 0], y[:-1, 1] = x[:-1, 0], x[1:, 1]
+    return TrainingSequence(x, y, np.ones(length, bool))
+
+
+def test_it_is_what_its_equations_say() -> None:
+    network, x = initial_recurrent_network(2, 4, 3, 2, seed=0), sequence(7).inputs.astype(np.float32)
+    np.testing.assert_allclose(network(x), recurrent_outputs(network, x), atol=1e-5)
+
+
+def test_gradients_are_those_of_differences() -> None:
+    network, weights = initial_recurrent_network(2, 4, 2, 2, seed=1), np.array([0.3, 0.7], np.float32)
+    batch = [sequence(9), sequence(6, 1)]
+    batch[0].valid[2] = False
+    _, gradients = network_training._gradients(network, batch, weights, 0.0, 0)
+    rng = np.random.default_rng(0)
+    for array, gradient in zip(network.parameters, gradients, strict=True):
+        assert gradient.shape == array.shape
+        for index in [tuple(rng.integers(size) for size in array.shape) for _ in range(4)]:
+            before, errors = array[index], []
+            for value in (before + 5e-3, before - 5e-3):
+                array[index] = value
+                errors.append(network_training._gradients(network, batch, weights, 0.0, 0)[0])
+            array[index] = before
+            assert (errors[0] - errors[1]) / 1e-2 == pytest.approx(float(gradient[index]), abs=1e-3)
+
+
+def test_dropped_units_have_no_gradient() -> None:
+    network, weights = initial_recurrent_network(2, 4, 2, 2, seed=1), np.ones(2, np.float32)
+    _, gradients = network_training._gradients(network, [sequence(9)], weights, 1 - 1e-6, 0)
+    assert not any(gradient.any() for gradient in gradients[:-1])
+    assert gradients[-1].any()
+
+
+def test_what_follows_the_end_of_a_shorter_sequence_counts_nothing() -> None:
+    network, x = initial_recurrent_network(2, 4, 2, 2, seed=0), sequence(9).inputs.astype(np.float32)
+    inside = np.array([[True] * 9, [True] * 6 + [False] * 3])
+    together, _ = network.forward(np.stack([x, x]), inside, None)
+    np.testing.assert_allclose(together[1, :6], network.hidden(x[:6]), atol=1e-6)
+
+
+def test_long_sequences_are_computed_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
+    network, x = initial_recurrent_network(2, 4, 2, 2, seed=0), sequence(100).inputs.astype(np.float32)
+    whole = network(x)
+    for name, value in {"PIECE": 8, "REACH": 60, "PIECES": 3}.items():
+        monkeypatch.setattr(recurrence, name, value)
+    np.testing.assert_allclose(network(x), whole, atol=1e-3)
+    monkeypatch.setattr(recurrence, "REACH", 0)
+    assert np.abs(network(x) - whole).max() > 1e-2
+    assert network(x[:0]).shape == (0, 2)
+
+
+def train() -> tuple[list[float], RecurrentNetwork]:
+    errors: list[float] = []
+    sequences = [sequence(seed=number) for number in range(8)]
+    network = fit_network(
+        initial_recurrent_network(2, 12, 2, 1, seed=0),
+        lambda _, number: sequences[number],
+        len(sequences),
+        np.ones(2),
+        TrainingPlan(steps=60, batch_size=4, rate=5e-2, dropout=0.0, seed=0),
+        lambda _, error: errors.append(error),
+    )
+    return errors, network
+
+
+def test_it_learns_what_it_must_remember_in_both_directions_and_always_the_same() -> None:
+    errors, network = train()
+    assert np.mean(errors[-10:]) < 0.1 * np.mean(errors[:5])
+    unseen = sequence(seed=99)
+    made = network(unseen.inputs.astype(np.float32))
+    assert all(np.corrcoef(made[:, each], unseen.targets[:, each])[0, 1] > 0.9 for each in range(2))
+    assert train()[0][:5] == pytest.approx(errors[:5])
