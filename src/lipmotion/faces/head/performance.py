@@ -76,12 +76,13 @@ def posed(mouth: SpokenMouth, moved: Liveliness) -> list[CharacterPose]:
         + (MOOD_SMILE * mouth.smile - MOOD_FROWN * mouth.frown - MOOD_TIGHT * serious) * (1 - roundness),
         "shut": moved.lids,
         "brows": moved.brows,
-        **{"squint" if name == "tight" else name: curve for name, curve in moved.upper_face.items()},
     }
     rows = np.stack(list(curves.values()), axis=1).tolist()
     return [
-        CharacterPose(**dict(zip(curves, row, strict=True)), gaze=(gaze[0], gaze[1]), turn=(turn[0], turn[1], turn[2]))
-        for row, gaze, turn in zip(rows, moved.gaze.tolist(), moved.turn.tolist(), strict=True)
+        CharacterPose(**dict(zip(curves, row, strict=True)), mood=mood, gaze=(across, up), turn=(yaw, pitch, roll))
+        for row, mood, (across, up), (yaw, pitch, roll) in zip(
+            rows, moved.upper_face, moved.gaze.tolist(), moved.turn.tolist(), strict=True
+        )
     ]
 
 

@@ -13,7 +13,7 @@ from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.faces.base import Picture, Staging, alive
 from lipmotion.faces.portrait.movement import HeadPlacement
 from lipmotion.faces.portrait.portrait_rasteriser import FacePose
-from lipmotion.faces.portrait.pose import mood_poses, mouth_poses
+from lipmotion.faces.portrait.pose import mouth_poses
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 
 CanvasT = TypeVar("CanvasT")
@@ -43,7 +43,7 @@ def face_poses(
             gaze.tolist(),
             moved.brows.tolist(),
             heads.tolist(),
-            mood_poses(moved),
+            moved.upper_face,
             strict=True,
         )
     ]
