@@ -98,7 +98,10 @@ class Liveliness:
     gaze  : of the eyes against the head, to the character's left and upwards, in radians [shape=(F, 2)]
     turn  : of the head to its left, upwards and to its left shoulder, in radians [shape=(F, 3)]
     units : what a mood does to brows, lids, cheeks and nose: those action units of
-            ``UPPER_FACE_UNITS`` that it asks for, 0 to 1 [each shape=(F,)]
+            ``UPPER_FACE_UNITS`` that it asks for, 0 to 1 [each shape=(F,)]; where blendshapes are given, also 12 and
+            15, the corners of the lips
+    given : weights that the motion itself has for blendshapes beside the mouth, by ARKit's names, 0 to 1
+            [each shape=(F,)]; all of the above follows from them, where they say it
     """
 
     lids: Curve
@@ -106,6 +109,7 @@ class Liveliness:
     gaze: Curve
     turn: Curve
     units: Mapping[int, Curve] = field(default_factory=dict)
+    given: Mapping[str, Curve] = field(default_factory=dict)
 
     @property
     def upper_face(self) -> list[UpperFace]:
@@ -116,7 +120,7 @@ class Liveliness:
         return [UpperFace(*row) for row in rows]
 
     def unit(self, number: int) -> Curve:
-        """Return an action unit of a mood, 0 to 1 [shape=(F,)]; 0 where no mood asks for it."""
+        """Return an action unit, 0 to 1 [shape=(F,)]; 0 where nothing asks for it."""
         return self.units.get(number, np.zeros(len(self.lids)))
 
 

@@ -14,6 +14,7 @@ from lipmotion.export.motion.vmd_file import RATE_HZ, Turns, VmdFile, read_vmd, 
 from lipmotion.meshes.model.head_angles import ANGLES, head_angles, head_quaternions
 from lipmotion.meshes.model.other_shapes import CLOSED
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Timeline, Unit
+from lipmotion.types.motion import RADIAN
 
 MORPHS: Mapping[str, tuple[str, ...]] = {
     "あ": ("aa",),
@@ -33,7 +34,6 @@ HEAD = "頭"
 """The bone of the head."""
 MIRRORED = np.array([-1.0, -1.0, 1.0, 1.0])
 """Signs that turn a rotation of glTF's axes into one of MikuMikuDance's, whose z goes into the face, and back."""
-RADIAN = "radian"
 TOLERANCE = 1e-7
 """Keys are left out where a straight line is that near."""
 

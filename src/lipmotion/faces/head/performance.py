@@ -48,6 +48,7 @@ def head_poses(
 
 def posed(mouth: SpokenMouth, moved: Liveliness) -> list[CharacterPose]:
     """Return the poses that show a mouth, and eyes, brows and head, one a frame."""
+    mouth = mouth.with_corners(moved.unit(12), moved.unit(15))
     gap, change = mouth.gap, mouth.width - 1
     spread = mouth.spread * (1 - mouth.protrusion)
     roundness = np.maximum(mouth.protrusion, 0.4 * np.clip(-change / FULL_NARROWING, 0, 1) * (1 - spread))
