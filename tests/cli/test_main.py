@@ -61,10 +61,11 @@ def test_words_of_other_tools_are_answered_with_a_verb(run: RunCommand) -> None:
         (["animat", "a.wav"], "no verb 'animat'; did you mean: lipmotion animate"),
         (["-o", "b.tsv", "a.wav"], "no verb 'b.tsv'; did you mean: lipmotion animate SPEECH -o OUT"),
         (["version"], "no verb 'version'; did you mean: lipmotion --version"),
-        (["bogus"], f"no verb 'bogus'; the verbs are: {', '.join(VERBS)}"),
+        (["bogus"], "no verb 'bogus'; the verbs are: animate, batch, speak"),
     ):
         done = run(*words)
-        assert (done.code, done.err[-1]) == (2, f"lipmotion: error: {hint}")
+        assert done.code == 2
+        assert done.err[-1].startswith(f"lipmotion: error: {hint}")
 
 
 def test_an_error_is_one_line(run: RunCommand, monkeypatch: pytest.MonkeyPatch) -> None:
