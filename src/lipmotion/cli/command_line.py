@@ -105,11 +105,11 @@ def parser() -> argparse.ArgumentParser:
 def _parsed(
     whole: argparse.ArgumentParser, arguments: Sequence[str] | None, options: argparse.Namespace
 ) -> argparse.Namespace:
-    """Return the options, over those of a job file; of a misspelt one the error names the nearest."""
+    """Return the options, over those of a job file and a level; of a misspelt one the error names the nearest."""
     _check_verb(whole, sys.argv[1:] if arguments is None else arguments)
     empty = argparse.Namespace(**vars(options))
     options, unknown = whole.parse_known_args(arguments, options)
-    if getattr(options, "job", None):  # what it says are the defaults by now
+    if getattr(options, "job", None) or getattr(options, "detail", None):  # what they say are the defaults by now
         options, unknown = whole.parse_known_args(arguments, empty)
     if unknown:
         option = next((word for word in unknown if word.startswith("-")), unknown[0]).split("=")[0]

@@ -23,6 +23,7 @@ from lipmotion.meshes.files.rig_tables import CONTROL
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.facial_animation import FAP
+from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.shape_names import arkit_name
 from lipmotion.pipeline.outputs.curve_sets import ARKIT, LIVING_SETS, WHOLE_FACE, beside, curves_of, with_curves
 from lipmotion.pipeline.outputs.delivered import delivered, held_mouth, with_motion
@@ -71,6 +72,8 @@ class MotionOutput(Output):
         warn_of_unused(self.path, held, asked)
         frames = settings.delivery.hold_frames(held.motion.rate_hz)
         held = held_mouth(held, frames, performance.once(_closed_s))
+        if motion_format(self.path).keyed and settings.delivery.key_tolerance:
+            held = thinned(held, Thinning(settings.delivery.key_tolerance, tuple(closed_times(held))))
         check_motion(self.path, held.motion)
         return partial(self._write, held, performance)
 
@@ -85,6 +88,23 @@ class MotionOutput(Output):
         if speech and motion_format(self.path).names_sound:
             source["path"] = sound_reference(speech, self.path)
         write_motion(self.path, held, source=source, model=model)
+
+
+def thinned(held: Generation, thinning: Thinning) -> Generation:
+    """Return a generation whose weights go straight between the keys that are kept of each.
+
+    Weights that never exceed the tolerance are left out, and held poses stay as they are.
+    """
+    motion, kept = held.motion, []
+    values = motion.values.astype(np.float64)
+    for column, channel in enumerate(motion.channels):
+        curve = values[:, column]
+        if channel.unit != WEIGHT or np.abs(curve).max(initial=0.0) > thinning.tolerance:
+            kept.append(channel.name)
+        if channel.unit == WEIGHT and channel.name not in held.stepped:
+            keys = thinning.kept(motion.time_s, curve[:, None])
+            values[:, column] = np.interp(motion.time_s, motion.time_s[keys], curve[keys])
+    return replace(held, motion=replace(motion, values=values)).selected(kept)
 
 
 def _delivered(performance: Performance) -> Generation:
