@@ -46,7 +46,10 @@ def test_godot_parser_reads_the_same_tracks(tmp_path: Path) -> None:
     write_motion(tmp_path / "a.tres", talking, source={}, model={})
     read = godot_parser.load(str(tmp_path / "a.tres"))
     (resource,) = read.get_sections("resource")
-    assert (read.find_section("gd_resource").header.attributes["type"], resource["resource_name"]) == ("Animation", "speech")
+    assert (read.find_section("gd_resource").header.attributes["type"], resource["resource_name"]) == (
+        "Animation",
+        "speech",
+    )
     assert [str(resource[f"tracks/{n}/path"].path) for n in range(2)] == [".:jawOpen", ".:viseme_PP"]
     keys = np.array(resource["tracks/0/keys"].args, float).reshape(-1, 3)
     again = np.interp(talking.motion.time_s, keys[:, 0], keys[:, 2])
