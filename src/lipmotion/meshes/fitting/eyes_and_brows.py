@@ -126,7 +126,7 @@ def eye_and_brow_weights(moved: Liveliness) -> dict[str, Array]:
     raised = np.clip(moved.brows / FULL_BROW_RISE, 0, 1)
     moods = _of_moods(moved) if moved.units else {}
     weights: dict[str, Array] = {}
-    for side, outward in zip(SIDES, (1.0, -1.0), strict=True):
+    for side, outward in (("Left", 1.0), ("Right", -1.0)):
         weights[f"eyeBlink{side}"] = np.clip(moved.lids, 0, 1)
         weights[f"eyeLookOut{side}"] = np.clip(outward * across / FULL_LOOK_RAD, 0, 1)
         weights[f"eyeLookIn{side}"] = np.clip(-outward * across / FULL_LOOK_RAD, 0, 1)
