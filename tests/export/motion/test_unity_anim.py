@@ -61,8 +61,8 @@ def test_unityparser_reads_the_same_clip(tmp_path: Path) -> None:
     names = [curve["attribute"] for curve in clip.m_FloatCurves]
     assert names == ["blendShape.jawOpen", "blendShape.Mund auf", "blendShape.aa"]
     for name, curve in zip(talking.motion.names[:2], clip.m_FloatCurves[:2], strict=True):
-        keys = [(float(key["time"]), float(key["value"])) for key in curve["curve"]["m_Curve"]]
-        again = np.interp(talking.motion.time_s, *zip(*keys, strict=True))
+        times_s, values = ([float(key[field]) for key in curve["curve"]["m_Curve"]] for field in ("time", "value"))
+        again = np.interp(talking.motion.time_s, times_s, values)
         assert again == pytest.approx(100 * talking.motion[name], abs=0.02)
 
 

@@ -103,7 +103,7 @@ def with_given(moved: Liveliness, given: Mapping[str, Array]) -> Liveliness:
         brows=moved.brows + FULL_BROW_RISE * raised,
         gaze=gaze,
         turn=turn,
-        units=moved.units | {unit: np.clip(moved.unit(unit) + curve, 0, 1) for unit, curve in units.items()},
+        units={**moved.units} | {unit: np.clip(moved.unit(unit) + curve, 0, 1) for unit, curve in units.items()},
         given={
             name: curve if name.startswith("eyeLook") else np.clip(of_mood.get(name, 0) + curve, 0, 1)
             for name, curve in given.items()
@@ -135,7 +135,7 @@ def eye_and_brow_weights(moved: Liveliness) -> dict[str, Array]:
         weights[f"browOuterUp{side}"] = np.clip(OUTER_BROW_SHARE * raised + moved.unit(2), 0, 1)
         weights |= {f"{name}{side}": curve for name, curve in moods.items()}
     weights["browInnerUp"] = np.clip(raised + moved.unit(1), 0, 1)
-    return weights | moved.given
+    return weights | {**moved.given}
 
 
 def _of_moods(moved: Liveliness) -> dict[str, Array]:
