@@ -29,11 +29,13 @@ CHEEK_SQUINT = 0.6
 """Raised cheeks narrow the eyes by this part of their weight."""
 OUTER_BROW_SHARE = 0.6
 """The outer ends of the brows rise by this part of the weight of the inner ends."""
+LOOKS = tuple(f"{way}{side}" for side in SIDES for way in ("Out", "In", "Up", "Down"))
+"""The ways that ARKit's blendshapes turn each eye."""
 LARGEST_COUNTER_RAD = 0.4
 """The eyes turn at most so far against a head whose angles are given."""
 MOVED_BY = {
     "blinks": ("eyeBlinkLeft", "eyeBlinkRight"),
-    "gaze": tuple(name for name in ARKIT_OTHERS if name.startswith("eyeLook")),
+    "gaze": tuple(f"eyeLook{name}" for name in LOOKS),
     "brows": tuple(name for name in ARKIT_OTHERS if name.startswith("brow")),
     "head": ANGLES,
 }
@@ -95,7 +97,7 @@ def with_given(moved: Liveliness, given: Mapping[str, Array]) -> Liveliness:
         turn = np.stack([given.get(name, none) for name in ANGLES], axis=1)
         gaze = gaze - np.clip(GAZE_COUNTER_SHARE * turn[:, :2], -LARGEST_COUNTER_RAD, LARGEST_COUNTER_RAD)
     if not moves_by_itself("gaze", given):
-        gaze = _looks(given, none)
+        gaze = given_gaze(given)
     of_mood = eye_and_brow_weights(moved)
     return replace(
         moved,
@@ -112,26 +114,38 @@ def with_given(moved: Liveliness, given: Mapping[str, Array]) -> Liveliness:
     )
 
 
-def _looks(given: Mapping[str, Array], none: Array) -> Array:
-    """Return where both eyes look in the mean, to the character's left and upwards, in radians [shape=(F, 2)]."""
-    looks = {name: given.get(f"eyeLook{name}", none) for name in ("OutLeft", "InLeft", "InRight", "OutRight")}
+def given_gaze(given: Mapping[str, Array]) -> Array:
+    """Return where both eyes look in the mean, to the character's left and upwards, in radians [shape=(F, 2)].
+
+    given : the weights of ARKit's blendshapes that turn the eyes, all of them [each shape=(F,)]
+    """
+    looks = {name: given[f"eyeLook{name}"] for name in LOOKS}
     across = looks["OutLeft"] - looks["InLeft"] + looks["InRight"] - looks["OutRight"]
-    upwards = sum(given.get(f"eyeLookUp{side}", none) - given.get(f"eyeLookDown{side}", none) for side in SIDES)
+    upwards = looks["UpLeft"] - looks["DownLeft"] + looks["UpRight"] - looks["DownRight"]
     return FULL_LOOK_RAD / 2 * np.stack([across, upwards], axis=1)
+
+
+def gaze_weights(gaze: Array) -> dict[str, Array]:
+    """Return the weights of ARKit's blendshapes that turn the eyes, 0 to 1 [each shape=(F,)].
+
+    gaze : of both eyes, to the character's left and upwards, in radians [shape=(F, 2)]
+    """
+    across, upwards = gaze.T
+    return {
+        f"eyeLook{name}{side}": np.clip(angle / FULL_LOOK_RAD, 0, 1)
+        for side, outward in (("Left", 1.0), ("Right", -1.0))
+        for name, angle in (("Out", outward * across), ("In", -outward * across), ("Up", upwards), ("Down", -upwards))
+    }
 
 
 def eye_and_brow_weights(moved: Liveliness) -> dict[str, Array]:
     """Return the weights of ARKit's blendshapes of eyes and brows, 0 to 1 [each shape=(F,)]; given ones as they are."""
-    across, upwards = moved.gaze.T
-    raised = np.clip(moved.brows / FULL_BROW_RISE, 0, 1)
+    gaze, raised = gaze_weights(moved.gaze), np.clip(moved.brows / FULL_BROW_RISE, 0, 1)
     moods = _of_moods(moved) if moved.units else {}
     weights: dict[str, Array] = {}
-    for side, outward in (("Left", 1.0), ("Right", -1.0)):
+    for side in SIDES:
         weights[f"eyeBlink{side}"] = np.clip(moved.lids, 0, 1)
-        weights[f"eyeLookOut{side}"] = np.clip(outward * across / FULL_LOOK_RAD, 0, 1)
-        weights[f"eyeLookIn{side}"] = np.clip(-outward * across / FULL_LOOK_RAD, 0, 1)
-        weights[f"eyeLookUp{side}"] = np.clip(upwards / FULL_LOOK_RAD, 0, 1)
-        weights[f"eyeLookDown{side}"] = np.clip(-upwards / FULL_LOOK_RAD, 0, 1)
+        weights |= {name: curve for name, curve in gaze.items() if name.endswith(side)}
         weights[f"browOuterUp{side}"] = np.clip(OUTER_BROW_SHARE * raised + moved.unit(2), 0, 1)
         weights |= {f"{name}{side}": curve for name, curve in moods.items()}
     weights["browInnerUp"] = np.clip(raised + moved.unit(1), 0, 1)
