@@ -67,8 +67,9 @@ def _angles(motion: Motion) -> dict[str, np.ndarray]:
     found = {}
     if {*ANGLES} <= {*curves}:
         found[HEAD] = np.stack([curves[name] for name in ANGLES], axis=1)
-    if {*MOVED_BY["gaze"]} <= {*curves}:
-        found[EYES] = np.pad(given_gaze(curves), ((0, 0), (0, 1)))
+    if {*MOVED_BY["gaze"]} & {*curves}:
+        still = dict.fromkeys(MOVED_BY["gaze"], np.zeros(len(motion.values)))
+        found[EYES] = np.pad(given_gaze(still | curves), ((0, 0), (0, 1)))
     return found
 
 
