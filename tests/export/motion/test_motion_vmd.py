@@ -82,7 +82,7 @@ def test_eyes_turn_in_one_bone(tmp_path: Path, generation: Generation) -> None:
         model={},
     )
     motion, _ = read_motion(tmp_path / "a.vmd")
-    assert given_gaze({name: motion[name] for name in looks}) == pytest.approx(gaze, abs=1e-6)
+    assert given_gaze({name: motion[name].astype(np.float64) for name in looks}) == pytest.approx(gaze, abs=1e-6)
     assert motion["headYaw"] == pytest.approx(generation.motion["headYaw"], abs=1e-6)
 
 
