@@ -17,13 +17,13 @@ import numpy as np
 
 import lipmotion
 from lipmotion.export.cues.choose import choose_cues, default_hold_frames
-from lipmotion.export.cues.cue_shapes import SHAPES
 from lipmotion.export.cues.shape_costs import frame_costs
 from lipmotion.export.cues.sheet import CueSheet, cue_frame_count, cue_sheet
 from lipmotion.pipeline.training.train import phones_of
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.types import Generation, Motion, Speech, StateTrace, Timeline
 from lipmotion.units import LIP_CLOSING, VISEMES, Lexicon, is_silent
+from lipmotion.units.mouth_chart import SHAPES
 
 MARGIN_S = 0.1
 """Silence this close to speech is not counted: the mouth may already move."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import sys
 from collections.abc import Callable
@@ -15,7 +16,7 @@ from lipmotion.corpora.discover import READERS
 from lipmotion.engines import ENGINES, Engine, engine_named
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import MOTION_FORMATS, MotionFormat, check_motion
-from lipmotion.extensions import Registry
+from lipmotion.extensions import Registry, install_command
 from lipmotion.faces import FACES, Face, face_named
 from lipmotion.testing.examples import example
 
@@ -132,3 +133,19 @@ def test_what_fails_in_a_package_is_told_from_a_bug(plugin) -> None:
     with pytest.raises(ZeroDivisionError) as own:
         1 / 0  # noqa: B018
     assert outcome(own.value) is None
+
+
+def test_an_extra_is_installed_from_where_lipmotion_came_from(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    class Installed:
+        record: str | None = None
+
+        def read_text(self, _: str) -> str | None:
+            return self.record
+
+    here = Installed()
+    monkeypatch.setattr(metadata, "distribution", lambda _: here)
+    assert install_command("video") == 'pip install "lipmotion[video]"'
+    here.record = json.dumps({"url": (tmp_path / "a copy").as_uri(), "dir_info": {}})
+    assert install_command("video") == 'pip install "lipmotion[video]"'
+    (tmp_path / "a copy").mkdir()
+    assert install_command("video") == f'pip install "{tmp_path / "a copy"}[video]"'

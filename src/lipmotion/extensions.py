@@ -13,6 +13,7 @@ from contextlib import redirect_stdout
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module, metadata
+from pathlib import Path
 from traceback import walk_tb
 from typing import Generic, TypeVar
 
@@ -36,6 +37,31 @@ def installed_version() -> str:
         return metadata.version("lipmotion")
     except metadata.PackageNotFoundError:
         return SOURCE
+
+
+def install_command(extra: str) -> str:
+    """Return the command that installs an extra of lipmotion, as a shell takes it.
+
+    It names the folder or wheel that lipmotion was installed from, or runs in, where that is there: an index need not
+    have lipmotion.
+    """
+    return f'pip install "{_installed_from()}[{extra}]"'
+
+
+def _installed_from() -> str:
+    """Return the path that lipmotion was installed from, as pip has recorded it (PEP 610); without one its name."""
+    import json
+    from urllib.parse import urlsplit
+    from urllib.request import url2pathname
+
+    try:
+        record = metadata.distribution("lipmotion").read_text("direct_url.json") or "{}"
+        url = urlsplit(json.loads(record).get("url", ""))
+        origin = url2pathname(url.path) if url.scheme == "file" else ""
+    except metadata.PackageNotFoundError:
+        origin = str(Path(__file__).parents[2])
+        return origin if (Path(origin) / "pyproject.toml").is_file() else "lipmotion"
+    return origin if origin and Path(origin).exists() else "lipmotion"
 
 
 @dataclass(frozen=True)

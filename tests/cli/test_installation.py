@@ -13,6 +13,7 @@ from lipmotion.cli.installation import doctor as doctor_module
 from lipmotion.cli.installation.declared_requirements import Requirement
 from lipmotion.cli.installation.doctor import InstalledPart, doctor
 from lipmotion.errors import LipMotionError
+from lipmotion.extensions import install_command
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.vision.packages import missing
 
@@ -47,7 +48,7 @@ def test_packages(declared: Callable[..., dict[str, InstalledPart]]) -> None:
     assert found["no-such-package"].told.startswith("not installed, required ==1")
     assert (found["no-such-kind"].state, found["[plots]"].state) == ("absent", "works")
     assert found["[study]"].state == "absent"
-    assert "pip install 'lipmotion[study]'; there is no no-such-package (required >=1)" in found["[study]"].told
+    assert f"{install_command('study')}; there is no no-such-package (required >=1)" in found["[study]"].told
     assert "not for this Python or system (required: sys_platform == 'none')" in found["[video]"].told
 
 

@@ -14,7 +14,7 @@ import pytest
 from cli.conftest import RunCommand, is_one_error
 from lipmotion.cli import command_line
 from lipmotion.cli.arguments.declared import part_of
-from lipmotion.pipeline.job import Job, Outputs, Request
+from lipmotion.pipeline.job import DETAILS, Job, Outputs, Request
 from lipmotion.types import Delivery, Staging
 
 LINE = """animate a.wav --transcript t.txt --model m.lipmotion --pauses natural -o a.json b.mp4 -o c.vtt --channels
@@ -87,6 +87,18 @@ def test_a_file_is_behind_the_command_line(here: Path) -> None:
     assert (job.outputs.files, job.outputs.face, job.outputs.fps) == (("d.json", "e.json"), "portrait", 30)
     assert job.staging == Staging(gaze=False)
     assert job.delivery == Delivery(stepped=True)
+
+
+def test_a_level_of_detail_is_behind_the_command_line() -> None:
+    job = parsed("animate", "a.wav", "-o", "a.json", "--detail", "mobile")
+    assert (job.outputs.rate_hz, job.delivery, job.staging) == (
+        30,
+        DETAILS["mobile"].delivery,
+        DETAILS["mobile"].staging,
+    )
+    job = parsed("animate", "a.wav", "--rate", "60", "--detail", "game", "-o", "a.json", "--still", "head")
+    assert (job.outputs.rate_hz, job.delivery, job.staging.head) == (60, DETAILS["game"].delivery, False)
+    assert parsed("animate", "a.wav", "-o", "a.json", "--detail", "film") == parsed("animate", "a.wav", "-o", "a.json")
 
 
 def test_each_option_is_declared_once() -> None:

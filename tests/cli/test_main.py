@@ -55,6 +55,19 @@ def test_a_misspelt_option(run: RunCommand) -> None:
         assert done.err[-1] == f"lipmotion: error: unrecognized arguments: {hint}"
 
 
+def test_words_of_other_tools_are_answered_with_a_verb(run: RunCommand) -> None:
+    for words, hint in (
+        (["convert", "a.vmd", "b.mp4"], "no verb 'convert'; did you mean: lipmotion render IN -o OUT"),
+        (["animat", "a.wav"], "no verb 'animat'; did you mean: lipmotion animate"),
+        (["-o", "b.tsv", "a.wav"], "no verb 'b.tsv'; did you mean: lipmotion animate SPEECH -o OUT"),
+        (["version"], "no verb 'version'; did you mean: lipmotion --version"),
+        (["bogus"], "no verb 'bogus'; the verbs are: animate, batch, speak"),
+    ):
+        done = run(*words)
+        assert done.code == 2
+        assert done.err[-1].startswith(f"lipmotion: error: {hint}")
+
+
 def test_an_error_is_one_line(run: RunCommand, monkeypatch: pytest.MonkeyPatch) -> None:
     errors: list[tuple[BaseException, int, str]] = [
         (LipMotionError("what"), 1, "lipmotion: error: what"),

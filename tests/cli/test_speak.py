@@ -8,6 +8,7 @@ import pytest
 
 from cli.conftest import RunCommand, is_one_error
 from lipmotion.export.base import read_motion
+from lipmotion.extensions import install_command
 from lipmotion.pipeline.generate.speak import speak
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.outputs.write import write
@@ -107,7 +108,7 @@ def test_without_a_synthesiser_it_says_what_to_install(
     monkeypatch.setattr(installed, "SYNTHESISERS", {"stand-in": replace(only, voices=tuple)})
     done = run(*basics, "-o", "a.wav")
     assert is_one_error(done, 8)
-    assert "pip install 'lipmotion[text]', or: apt install stand-in" in done.err[0]
+    assert f"{install_command('text')}, or: apt install stand-in" in done.err[0]
 
 
 def test_an_output_never_replaces_the_model(run: RunCommand, basics: tuple[object, ...], toy_model_file: Path) -> None:

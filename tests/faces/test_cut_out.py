@@ -10,7 +10,8 @@ from PIL import Image
 
 from lipmotion.errors import InputError
 from lipmotion.faces.base import Staging
-from lipmotion.faces.cut_out import BLAIR, read_cut_out
+from lipmotion.faces.cut_out import read_cut_out
+from lipmotion.units.mouth_chart import BLAIR
 
 LETTERS = "ABCDEFGHX"
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from lipmotion.articulation.liveliness import UpperFace
 from lipmotion.faces import base
 from lipmotion.faces.base import DrawsPlanes, Face, Staging
 from lipmotion.faces.portrait.cartoon import CARTOON
@@ -10,7 +11,7 @@ from lipmotion.faces.portrait.man import MAN
 from lipmotion.faces.portrait.movement import HeadPlacement
 from lipmotion.faces.portrait.planar import FROM_RGB, OFFSETS, PlanarRasteriser, planes_of
 from lipmotion.faces.portrait.portrait_rasteriser import FacePose, Rasteriser
-from lipmotion.faces.portrait.pose import MoodPose, MouthPose
+from lipmotion.faces.portrait.pose import MouthPose
 from lipmotion.faces.portrait.woman import WOMAN
 from lipmotion.faces.registry import staged_face
 from lipmotion.types import Channel, Motion, Timeline
@@ -22,8 +23,8 @@ POSES = (
     FacePose(MouthPose(gap=0.08, width=0.75, protrusion=1.0), lids=0.6, head=HeadPlacement(yaw=0.03, pitch=-0.02)),
     FacePose(MouthPose(gap=0.044, tuck=1.0)),
     FacePose(MouthPose(gap=0.08, tongue=1.0, jaw=0.03)),
-    FacePose(MouthPose(gap=0.04, frown=1.0, upper_raise=1.0), mood=MoodPose(lowered=1.0, squint=0.6, sneer=1.0)),
-    FacePose(MouthPose(gap=0.0, smile=1.0), mood=MoodPose(inner=0.8, outer=0.5, wide=1.0, cheek=0.7)),
+    FacePose(MouthPose(gap=0.04, frown=1.0, upper_raise=1.0), mood=UpperFace(lowered=1.0, squint=0.6, sneer=1.0)),
+    FacePose(MouthPose(gap=0.0, smile=1.0), mood=UpperFace(inner=0.8, outer=0.5, wide=1.0, cheek=0.7)),
 )
 
 

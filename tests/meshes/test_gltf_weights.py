@@ -91,3 +91,35 @@ def test_what_moves_no_face_or_is_damaged_is_refused(tmp_path: Path) -> None:
     for message, file in cases.items():
         with pytest.raises(InputError, match=message):
             read_motion(file)
+
+
+def test_turns_of_neck_and_head_are_against_their_rest(tmp_path: Path) -> None:
+    """The head of a VRM animation whose bones are not along the axes at rest."""
+    from scipy.spatial.transform import Rotation
+
+    vowel = [[0, 0, 0], [0.5, 0, 0], [1, 0, 0]]
+    content, binary = gltf.animated_document([0, 0.05, 0.1], vowel, target={"node": 1, "path": "translation"})
+    rest = [Rotation.from_euler("xyz", angles) for angles in ((0.3, 0.2, -0.1), (-0.2, 0.4, 0.3))]
+    neck, head = len(content["nodes"]), len(content["nodes"]) + 1
+    for name, turned in zip(("J_Bip_C_Neck", "J_Bip_C_Head"), rest, strict=True):
+        content["nodes"].append({"name": name, "rotation": turned.as_quat().tolist()})
+    content["nodes"][neck]["children"] = [head]
+    content["scenes"][0]["nodes"].append(neck)
+    world = (rest[0], rest[0] * rest[1])
+    turns = [Rotation.from_rotvec(np.outer(angles, (0, 1, 0))) for angles in ((0, 0.1, 0.2), (0, 0.2, 0.4))]
+    animation = content["animations"][1]
+    for number, parent, at_rest, turn in zip((neck, head), (Rotation.identity(), world[0]), world, turns, strict=True):
+        local = (parent.inv() * turn * at_rest).as_quat().astype("<f4")
+        content["bufferViews"].append({"buffer": 0, "byteOffset": len(binary), "byteLength": local.nbytes})
+        view = len(content["bufferViews"]) - 1
+        content["accessors"].append({"bufferView": view, "componentType": 5126, "count": 3, "type": "VEC4"})
+        binary += local.tobytes()
+        animation["samplers"].append({"input": 4, "output": len(content["accessors"]) - 1})
+        animation["channels"].append(
+            {"sampler": len(animation["samplers"]) - 1, "target": {"node": number, "path": "rotation"}}
+        )
+    content["buffers"] = [{"byteLength": len(binary)}]
+    (tmp_path / "a.vrma").write_bytes(gltf.glb(content, binary))
+    motion, _ = read_motion(tmp_path / "a.vrma")
+    assert motion["headYaw"] == pytest.approx([0, 0.3, 0.6], abs=1e-5)
+    assert motion.values[:, -2:] == pytest.approx(np.zeros((3, 2)), abs=1e-5)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lipmotion.articulation.delivery import Delivery
+from lipmotion.articulation.delivery import Delivery, closed_times
 from lipmotion.articulation.expression import with_moods
 from lipmotion.articulation.liveliness import Liveliness
 from lipmotion.articulation.mouth import spoken_mouth
@@ -19,10 +19,11 @@ from lipmotion.errors import ExportError
 from lipmotion.faces import Staging
 from lipmotion.meshes.fitting.eyes_and_brows import FULL_LOOK_RAD, eye_and_brow_weights
 from lipmotion.meshes.model.head_angles import ANGLES as HEAD
+from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH
 from lipmotion.pipeline.outputs.curve_sets import curves_of
 from lipmotion.pipeline.outputs.living_curves import living_curves
-from lipmotion.pipeline.outputs.motion_files import in_format
+from lipmotion.pipeline.outputs.motion_files import in_format, thinned
 from lipmotion.pipeline.outputs.motion_input import read_generation
 from lipmotion.pipeline.outputs.output import OutputSettings, checked_outputs
 from lipmotion.pipeline.outputs.shown_faces import shown_face
@@ -183,3 +184,20 @@ def test_files_of_motion_hold_moods(generation: Generation, tmp_path: Path, suff
     found = read_generation(path).motion
     assert found.channels[-1] == Channel("mood_sad", WEIGHT)
     assert spoken_mouth(found, generation.units).frown.max() > 0.2
+
+
+def test_files_of_keys_hold_fewer_of_them_and_no_curve_that_is_hardly_there(
+    generation: Generation, tmp_path: Path
+) -> None:
+    plain, fewer = (written(tmp_path, generation, f"{n}.tres", delivery=Delivery(key_tolerance=n)) for n in (0, 0.03))
+    assert sum(map(len, fewer)) < 0.5 * sum(map(len, plain))
+    names = [line for line in fewer if "NodePath" in line]
+    assert 5 < len(names) < sum("NodePath" in line for line in plain)
+    held = in_format(Path("a.tres"), generation, generation, None)
+    thin = thinned(held, Thinning(0.03, tuple(closed_times(held)))).motion
+    for name in thin.names:
+        assert np.abs(thin[name] - held.motion[name]).max() < 0.0301
+    assert all(held.motion[name].max() <= 0.03 for name in {*held.motion.names} - {*thin.names})
+    assert {*HEAD} < {*thin.names}
+    json = [written(tmp_path, generation, f"{n}.json", delivery=Delivery(key_tolerance=n)) for n in (0, 0.03)]
+    assert json[0] == json[1]

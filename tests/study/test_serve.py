@@ -136,4 +136,4 @@ def test_without_the_extra_the_error_says_what_to_install(tmp_path: Path) -> Non
     variables["PYTHONPATH"] = f"{tmp_path / 'without'}:{variables.get('PYTHONPATH', '')}"
     done = run_child([*LIPMOTION, "study", "serve", tmp_path / "study"], variables=variables)
     assert done.returncode == 8
-    assert "lipmotion[study]" in done.stderr
+    assert "[study]" in done.stderr

@@ -7,6 +7,7 @@ import pytest
 
 from children import run_child
 from lipmotion.errors import MissingDependencyError
+from lipmotion.extensions import install_command
 from lipmotion.vision.face_mesh import FaceMesh, quiet_stderr
 from lipmotion.vision.packages import import_face_mesh, import_opencv
 from lipmotion.vision.trackers import tracker_named
@@ -18,7 +19,7 @@ def test_missing_packages_are_named_with_the_way_to_install_them(monkeypatch):
     for load, package in ((import_opencv, "OpenCV"), (import_face_mesh, "MediaPipe")):
         with pytest.raises(MissingDependencyError, match=package) as caught:
             load()
-        assert 'pip install "lipmotion[video]"' in str(caught.value)
+        assert install_command("video") in str(caught.value)
         assert "Python < 3.13" in str(caught.value)
     with pytest.raises(MissingDependencyError, match="MediaPipe"):
         FaceMesh()

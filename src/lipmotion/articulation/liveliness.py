@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,8 +62,31 @@ MOOD_GAZE_RAD = 0.22
 """How far the eyes look down for the action unit 64, in radians."""
 DROOPING_LIDS = 0.75
 """How far the eyes are closed by the action unit 43."""
-UPPER_FACE_UNITS = {"inner": 1, "outer": 2, "lowered": 4, "wide": 5, "cheek": 6, "tight": 7, "sneer": 9}
-"""Action units of brows (inner and outer ends raised, lowered), lids (wide, tight), cheeks and nose."""
+UPPER_FACE_UNITS = {"inner": 1, "outer": 2, "lowered": 4, "wide": 5, "squint": 7, "cheek": 6, "sneer": 9}
+"""The action units of the parts of ``UpperFace``."""
+
+
+class UpperFace(NamedTuple):
+    """What a mood does to brows, lids, cheeks and nose in one frame, each 0 to 1.
+
+    inner, outer : the inner and the outer ends of the brows are raised
+    lowered      : the brows are lowered and drawn together
+    wide         : the upper lids are raised
+    squint       : the lids are tightened: the lower ones raised, the upper ones lowered a little
+    cheek        : the cheeks are raised
+    sneer        : the nose is wrinkled
+    """
+
+    inner: float = 0.0
+    outer: float = 0.0
+    lowered: float = 0.0
+    wide: float = 0.0
+    squint: float = 0.0
+    cheek: float = 0.0
+    sneer: float = 0.0
+
+
+CALM = UpperFace()
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +98,10 @@ class Liveliness:
     gaze  : of the eyes against the head, to the character's left and upwards, in radians [shape=(F, 2)]
     turn  : of the head to its left, upwards and to its left shoulder, in radians [shape=(F, 3)]
     units : what a mood does to brows, lids, cheeks and nose: those action units of
-            ``UPPER_FACE_UNITS`` that it asks for, 0 to 1 [each shape=(F,)]
+            ``UPPER_FACE_UNITS`` that it asks for, 0 to 1 [each shape=(F,)]; where blendshapes are given, also 12 and
+            15, the corners of the lips
+    given : weights that the motion itself has for blendshapes beside the mouth, by ARKit's names, 0 to 1
+            [each shape=(F,)]; all of the above follows from them, where they say it
     """
 
     lids: Curve
@@ -82,14 +109,18 @@ class Liveliness:
     gaze: Curve
     turn: Curve
     units: Mapping[int, Curve] = field(default_factory=dict)
+    given: Mapping[str, Curve] = field(default_factory=dict)
 
     @property
-    def upper_face(self) -> dict[str, Curve]:
-        """What a mood does to each part of ``UPPER_FACE_UNITS`` [each shape=(F,)]."""
-        return {name: self.unit(number) for name, number in UPPER_FACE_UNITS.items()}
+    def upper_face(self) -> list[UpperFace]:
+        """What a mood does beside the mouth in every frame."""
+        if not self.units:
+            return [CALM] * len(self.lids)
+        rows = np.stack([self.unit(UPPER_FACE_UNITS[name]) for name in UpperFace._fields], axis=1).tolist()
+        return [UpperFace(*row) for row in rows]
 
     def unit(self, number: int) -> Curve:
-        """Return an action unit of a mood, 0 to 1 [shape=(F,)]; 0 where no mood asks for it."""
+        """Return an action unit, 0 to 1 [shape=(F,)]; 0 where nothing asks for it."""
         return self.units.get(number, np.zeros(len(self.lids)))
 
 

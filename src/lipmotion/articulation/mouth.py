@@ -6,7 +6,7 @@ Lengths are in eye distances (the distance between the outer corners of the eyes
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -119,6 +119,10 @@ class SpokenMouth:
     def between_teeth(self) -> Curve:
         """How far the tip of the tongue is between the teeth, 0 to 1 [shape=(F,)]."""
         return np.clip((self.tongue - TIP_UP) / (TIP_OUT - TIP_UP), 0, 1)
+
+    def with_corners(self, up: Curve, down: Curve) -> SpokenMouth:
+        """Return the same mouth whose corners are raised and lowered further, 0 to 1 [each shape=(F,)]."""
+        return replace(self, smile=np.minimum(self.smile + up, 1), frown=np.minimum(self.frown + down, 1))
 
     def at(self, fps: float) -> SpokenMouth:
         """Return the same mouth at another frame rate, to its last frame, with the contact of ``shown_contact``."""

@@ -9,6 +9,7 @@ import sys
 import warnings
 from collections.abc import Sequence
 from difflib import get_close_matches
+from pathlib import Path
 from typing import Any, NoReturn
 
 from lipmotion.cli.arguments.paths import check_paths
@@ -47,6 +48,19 @@ VERBS = (
     *(character, addon, evaluate, compare, experiment, study, info, cite),
     *(doctor, completion),
 )
+OF_OTHER_TOOLS = {
+    **dict.fromkeys(("convert", "export", "import", "draw", "video", "play"), "render IN -o OUT"),
+    **dict.fromkeys(("generate", "lipsync", "sync", "process", "run", "infer", "predict"), "animate SPEECH -o OUT"),
+    "align": "animate SPEECH --transcript TEXT -o OUT.TextGrid",
+    **dict.fromkeys(("say", "tts", "synthesize", "synthesise"), "speak TEXT -o OUT"),
+    **dict.fromkeys(("transcribe", "recognize", "recognise"), "words SPEECH"),
+    **dict.fromkeys(("visemes", "mouth"), "cues SPEECH -o OUT"),
+    **dict.fromkeys(("finetune", "fine-tune"), "adapt"),
+    **dict.fromkeys(("check", "validate", "lint"), "batch --check LIST"),
+    **dict.fromkeys(("setup", "install", "status"), "doctor"),
+    **{name: f"--{name}" for name in ("version", "help")},
+}
+"""Words that do in other programs what verbs do here."""
 EXIT_CODES = """exit codes: 0 done, 1 a bug (doctor: a broken part), 2 wrong command line, 3 unusable input, 4 corpus,
 5 alignment, 6 model file, 7 output, 8 missing package, 130 interrupted, 143 terminated"""
 
@@ -91,10 +105,11 @@ def parser() -> argparse.ArgumentParser:
 def _parsed(
     whole: argparse.ArgumentParser, arguments: Sequence[str] | None, options: argparse.Namespace
 ) -> argparse.Namespace:
-    """Return the options, over those of a job file; of a misspelt one the error names the nearest."""
+    """Return the options, over those of a job file and a level; of a misspelt one the error names the nearest."""
+    _check_verb(whole, sys.argv[1:] if arguments is None else arguments)
     empty = argparse.Namespace(**vars(options))
     options, unknown = whole.parse_known_args(arguments, options)
-    if getattr(options, "job", None):  # what it says are the defaults by now
+    if getattr(options, "job", None) or getattr(options, "detail", None):  # what they say are the defaults by now
         options, unknown = whole.parse_known_args(arguments, empty)
     if unknown:
         option = next((word for word in unknown if word.startswith("-")), unknown[0]).split("=")[0]
@@ -102,6 +117,19 @@ def _parsed(
         hint = f"did you mean {near[0]}?" if near else f"see: {whole.prog} {options.verb} --help"
         whole.error(f"unrecognized arguments: {' '.join(unknown)}; {hint}")
     return options
+
+
+def _check_verb(whole: argparse.ArgumentParser, words: Sequence[str]) -> None:
+    """End with an error if the first word is no verb; it names the verb that is meant, by other tools' words, too."""
+    word = next((word for word in words if not word.startswith("-")), None)
+    (verbs,) = (action.choices for action in whole._actions if isinstance(action, argparse._SubParsersAction))
+    if word is None or word in verbs:
+        return
+    near = get_close_matches(word, verbs, n=1)
+    usual = "animate SPEECH -o OUT" if Path(word).suffix else ""
+    meant = OF_OTHER_TOOLS.get(word.lower(), near[0] if near else usual)
+    hint = f"did you mean: {whole.prog} {meant}" if meant else f"the verbs are: {', '.join(verbs)}"
+    whole.error(f"no verb {word!r}; {hint}")
 
 
 def _option_strings(parser: argparse.ArgumentParser, verb: str = "") -> list[str]:

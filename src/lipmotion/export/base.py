@@ -37,6 +37,7 @@ class MotionFormat:
     most_frames : number of frames that such a file can hold; None: any number
     fixed_rate : whether a file can have no other rate than ``rate_hz``
     other_curves : whether weights and controls that the user asks for take the place of ``curves``
+    keyed   : whether the file holds keys of weights with straight lines between, and needs none where a line goes on
     names_sound  : whether the file names the recording: the description of the speech then has ``path``, the path from
                    the folder of the file
 
@@ -54,6 +55,7 @@ class MotionFormat:
     other_curves: bool = False
     names_sound: bool = False
     mouth: bool = False
+    keyed: bool = False
     most_frames: int | None = None
 
 

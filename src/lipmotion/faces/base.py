@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.liveliness import Liveliness, liveliness
+from lipmotion.meshes.fitting.eyes_and_brows import MOVED_BY, given_movements, moves_by_itself, with_given
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 from lipmotion.types.staging import SCENE as SCENE  # noqa: PLC0414 (part of this module's interface)
 from lipmotion.types.staging import SMALLEST_PX as SMALLEST_PX  # noqa: PLC0414 (part of this module's interface)
@@ -105,11 +106,12 @@ def alive(
 ) -> Liveliness:
     """Return what moves beside the mouth at some times, as a staging asks for it; None: everything moves.
 
-    motion, units, prosody : as of ``articulation.liveliness``
+    motion, units, prosody : as of ``articulation.liveliness``; blinks, gaze, brows and angles of the head that the
+                             motion itself has take the place of what would move on its own
     """
-    chosen = staging or Staging()
-    moving = {name: getattr(chosen, name) for name in ("blinks", "gaze", "brows", "head")}
-    return liveliness(time_s, motion, units, prosody, seed=chosen.seed, **moving)
+    chosen, given = staging or Staging(), given_movements(motion, time_s)
+    moving = {part: getattr(chosen, part) and moves_by_itself(part, given) for part in MOVED_BY}
+    return with_given(liveliness(time_s, motion, units, prosody, seed=chosen.seed, **moving), given)
 
 
 @runtime_checkable

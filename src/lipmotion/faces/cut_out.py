@@ -18,14 +18,12 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.faces.base import TRANSPARENT, Staging
+from lipmotion.units.mouth_chart import BLAIR, LETTERS, SHAPES
 
 Picture = NDArray[np.uint8]
 SUFFIXES = (".png", ".webp", ".jpg", ".jpeg")
 BASE = "base"
-REQUIRED = "ABCDEF"
-LETTERS = {name.lower(): name for name in "ABCDEFGHX"}
-BLAIR = {"mbp": "A", "etc": "B", "e": "C", "ai": "D", "o": "E", "u": "F", "wq": "F", "fv": "G", "l": "H", "rest": "X"}
-"""Preston Blair's names of the shapes."""
+REQUIRED = "".join(name for name, shape in SHAPES.items() if not shape.fallback)
 LARGEST_PX, MOST_PIXELS = 4096, 1 << 26
 """Largest side of a picture, and most pixels of all together."""
 LARGEST_BYTES = 1 << 26

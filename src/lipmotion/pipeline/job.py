@@ -274,6 +274,18 @@ class Job(Configuration):
         return opened(self).run(workers=workers)
 
 
+DETAILS = {
+    "film": Job(),
+    "game": Job(outputs=Outputs(rate_hz=30.0), delivery=Delivery(key_tolerance=0.01)),
+    "mobile": Job(
+        outputs=Outputs(rate_hz=30.0),
+        delivery=Delivery(key_tolerance=0.04),
+        staging=Staging(gaze=False, brows=False),
+    ),
+}
+"""Levels of detail, and the options that each sets; what each loses: docs/controls.md."""
+
+
 def _is_drawings(face: str, folder: Path) -> bool:
     from lipmotion.faces.registry import is_drawings
 

@@ -8,6 +8,7 @@ from contextlib import closing
 from pathlib import Path
 
 from lipmotion.errors import InputError, MissingDependencyError
+from lipmotion.extensions import install_command
 from lipmotion.study.manifest import check_videos, read_study
 from lipmotion.study.store import StudyStore
 
@@ -34,7 +35,7 @@ def serve_study(
         import uvicorn
     except ImportError as error:
         raise MissingDependencyError(
-            f"serving a study needs Starlette and uvicorn ({error}); install them: pip install 'lipmotion[study]'"
+            f"serving a study needs Starlette and uvicorn ({error}); install them: {install_command('study')}"
         ) from error
     from lipmotion.study.application import study_application
 

@@ -13,10 +13,10 @@ from lipmotion.meshes.fitting.facial_animation import FAP
 from lipmotion.meshes.model.other_shapes import CLOSED
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS
 from lipmotion.pipeline.outputs.curve_sets import curves_of
-from lipmotion.pipeline.outputs.living_curves import RADIAN
 from lipmotion.testing.contract import require
 from lipmotion.testing.examples import example
 from lipmotion.types import Generation, StateTrace
+from lipmotion.types.motion import RADIAN
 
 
 def check_exporter(exporter: MotionFormat) -> None:

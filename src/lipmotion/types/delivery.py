@@ -30,7 +30,7 @@ class Delivery(Configuration):
                       ``happy``, ``sad:0.6, whisper``, ``happy:0.7, neutral at 2.5``; empty: what the words or the
                       motion say, else nothing
     stepped         : poses are held; with ``min_hold_ms`` 0, each for at least two frames at 24 frames a second
-    key_tolerance   : keys of ``.glb`` and ``.usda`` are left out where a straight line between others gives all weights
+    key_tolerance   : keys of files that have keys are left out where a straight line between others gives the weights
                       to within so much; 0: every frame is a key
     Raises InputError: a value out of its range, or no such mood.
 
@@ -76,7 +76,7 @@ class Delivery(Configuration):
         what="tolerance of keys",
         later=True,
         metavar="X",
-        help="leave out keys of .glb and .usda that others give to within X of a weight, as 0.01",
+        help="leave out keys of .glb .usda .anim .tres .vmd that others give to within X of a weight, as 0.01",
     )
 
     def __post_init__(self) -> None:

@@ -16,6 +16,8 @@ EYE_DISTANCE = "eye_distance"
 """The unit of all tracked lengths: the distance between the outer eye corners."""
 WEIGHT = "weight"
 """The unit of blendshapes: 0 is no effect, 1 the full effect; never negative."""
+RADIAN = "radian"
+"""The unit of angles."""
 GREY = "grey"
 """The unit of eigenlips: coefficients of an orthonormal basis of mouth pictures in grey levels, 0 to 255."""
 LARGEST_MAGNITUDE = {EYE_DISTANCE: 1e4, WEIGHT: 255.0, GREY: 1e5}

@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import Any
 
 from lipmotion.errors import MissingDependencyError
+from lipmotion.extensions import install_command
 
 
 def import_opencv() -> Any:
@@ -42,5 +43,5 @@ def missing(package: str, error: ImportError) -> MissingDependencyError:
     """Return the error that a package cannot be imported, which says how to install it."""
     return MissingDependencyError(
         f"face tracking needs {package}, which cannot be imported ({error}); "
-        'pip install "lipmotion[video]" with Python 3.10 to 3.12 (MediaPipe needs Python < 3.13)'
+        f"{install_command('video')} with Python 3.10 to 3.12 (MediaPipe needs Python < 3.13)"
     )

@@ -2,16 +2,9 @@ from __future__ import annotations
 
 import pytest
 
-from lipmotion.export.cues.cue_shapes import (
-    ANY_OPEN,
-    ANY_SHAPE,
-    OPTIONAL,
-    PHONE_SHAPES,
-    SHAPES,
-    drawn_shape,
-    shapes_of_phone,
-)
+from lipmotion.export.cues.cue_shapes import ANY_OPEN, ANY_SHAPE, PHONE_SHAPES, shapes_of_phone
 from lipmotion.units import LIP_CLOSING, PHONES, VISEMES, is_silent
+from lipmotion.units.mouth_chart import OPTIONAL, SHAPES, drawn_shape
 
 BLAIR = "AI E O U FV L MBP WQ etc rest".split()
 """The names that OpenToonz knows."""

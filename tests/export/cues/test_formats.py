@@ -15,10 +15,10 @@ from export.cues.conftest import result, spoken
 from lipmotion.errors import ExportError
 from lipmotion.export.cues.base import CUE_FORMATS, format_of, write_cue_file
 from lipmotion.export.cues.choose import choose_cues
-from lipmotion.export.cues.cue_shapes import SHAPES
 from lipmotion.export.cues.sheet import CueSheet
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Channel, Motion, Timeline
+from lipmotion.units.mouth_chart import SHAPES
 
 NAMES = ["hi.wav", "C:\\av\\hi.wav", 'Größe & <"tea\'s"> 茶 😀.wav', "line\nbreak\ttab.wav", "bell\x07\x00.wav", ""]
 OPENTOONZ = {"ai", "e", "o", "u", "fv", "l", "mbp", "wq", "other", "etc", "rest"}

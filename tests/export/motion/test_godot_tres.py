@@ -39,6 +39,23 @@ def test_a_resource_has_the_tracks_of_the_motion(tmp_path: Path) -> None:
     assert keys[1][:, 2].tolist() == [0.25, 0.75, 0.5, 0.5]
 
 
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_godot_parser_reads_the_same_tracks(tmp_path: Path) -> None:
+    godot_parser = pytest.importorskip("godot_parser")
+    talking = generation("jawOpen", "viseme_PP", "headYaw", stepped=("viseme_PP",))
+    write_motion(tmp_path / "a.tres", talking, source={}, model={})
+    read = godot_parser.load(str(tmp_path / "a.tres"))
+    (resource,) = read.get_sections("resource")
+    assert (read.find_section("gd_resource").header.attributes["type"], resource["resource_name"]) == (
+        "Animation",
+        "speech",
+    )
+    assert [str(resource[f"tracks/{n}/path"].path) for n in range(2)] == [".:jawOpen", ".:viseme_PP"]
+    keys = np.array(resource["tracks/0/keys"].args, float).reshape(-1, 3)
+    again = np.interp(talking.motion.time_s, keys[:, 0], keys[:, 2])
+    assert again == pytest.approx(talking.motion["jawOpen"], abs=2e-4)
+
+
 def test_names_that_no_path_has_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ExportError, match=r"'Face\.jawOpen' has one of the letters"):
         write_motion(tmp_path / "a.tres", generation("Face.jawOpen"), source={}, model={})

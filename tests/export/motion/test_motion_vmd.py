@@ -14,6 +14,7 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import read_motion, write_motion
 from lipmotion.export.motion.motion_vmd import MORPHS
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
+from lipmotion.meshes.fitting.eyes_and_brows import gaze_weights, given_gaze
 from lipmotion.pipeline.outputs.motion_files import check_rate
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
 
@@ -69,6 +70,22 @@ def test_what_is_written_is_read(path: Path, generation: Generation) -> None:
     assert read_motion(path)[0]["browDownLeft"] == pytest.approx(generation.motion["eyeBlinkLeft"], abs=1e-6)
 
 
+def test_eyes_turn_in_one_bone(tmp_path: Path, generation: Generation) -> None:
+    gaze = np.stack([0.3 * np.sin(np.arange(FRAMES)), 0.1 * np.cos(np.arange(FRAMES))], axis=1)
+    looks = gaze_weights(gaze)
+    values = np.concatenate([generation.motion.values, np.stack(list(looks.values()), axis=1)], axis=1)
+    channels = (*generation.motion.channels, *(Channel(name, WEIGHT) for name in looks))
+    write_motion(
+        tmp_path / "a.vmd",
+        replace(generation, motion=Motion(values, 30.0, channels), spread=values),
+        source={},
+        model={},
+    )
+    motion, _ = read_motion(tmp_path / "a.vmd")
+    assert given_gaze({name: motion[name].astype(np.float64) for name in looks}) == pytest.approx(gaze, abs=1e-6)
+    assert motion["headYaw"] == pytest.approx(generation.motion["headYaw"], abs=1e-6)
+
+
 def test_the_head_turns_to_its_left_and_up(tmp_path: Path, generation: Generation) -> None:
     """MikuMikuDance's x is to the character's left, y up, z into its face."""
     values = np.zeros((2, len(NAMES)))
@@ -105,7 +122,7 @@ def test_damaged_files_are_refused(path: Path) -> None:
         "its first bytes are not those of the format": b"PK" + good[2:],
         "is cut short": good[:-200],
         "a key of '頭' at frame 4294967295 is none": _damaged(good, 54 + 15, b"\xff" * 4),
-        "a rotation of the head is none": _damaged(good, 54 + 31, bytes(16)),
+        "a rotation of the bone 頭 is none": _damaged(good, 54 + 31, bytes(16)),
         "a key of 'あ' at frame 0 is none": _damaged(good, morphs + 19, struct.pack("<f", np.nan)),
         "has none of the morphs あ い う え お; its morphs are: none": good[:50] + bytes(20),
     }

@@ -51,6 +51,21 @@ def test_a_clip_has_the_curves_of_the_motion(tmp_path: Path) -> None:
         assert {key["tangentMode"] for key in keys} == {69}
 
 
+def test_unityparser_reads_the_same_clip(tmp_path: Path) -> None:
+    unityparser = pytest.importorskip("unityparser")
+    talking = generation("jawOpen", "Mund auf", "aa", stepped=("aa",))
+    write_motion(tmp_path / "a.anim", talking, source={}, model={})
+    clip = unityparser.UnityDocument.load_yaml(str(tmp_path / "a.anim")).entry
+    assert (clip.anchor, clip.m_Name, clip.m_AnimationClipSettings["m_StopTime"]) == ("7400000", "speech", "1.000000")
+    assert clip.m_FloatCurves == clip.m_EditorCurves
+    names = [curve["attribute"] for curve in clip.m_FloatCurves]
+    assert names == ["blendShape.jawOpen", "blendShape.Mund auf", "blendShape.aa"]
+    for name, curve in zip(talking.motion.names[:2], clip.m_FloatCurves[:2], strict=True):
+        times_s, values = ([float(key[field]) for key in curve["curve"]["m_Curve"]] for field in ("time", "value"))
+        again = np.interp(talking.motion.time_s, times_s, values)
+        assert again == pytest.approx(100 * talking.motion[name], abs=0.02)
+
+
 def test_held_poses_have_constant_tangents(tmp_path: Path) -> None:
     write_motion(tmp_path / "a.anim", generation("aa", stepped=("aa",)), source={}, model={})
     keys = curves((tmp_path / "a.anim").read_text(), "m_FloatCurves")["blendShape.aa"]

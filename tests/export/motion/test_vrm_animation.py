@@ -33,7 +33,7 @@ def path(talking: Generation, tmp_path: Path) -> Path:
 def test_what_is_written_is_read(path: Path, talking: Generation) -> None:
     motion, _ = read_motion(path)
     assert motion.rate_hz == 30
-    for name in ("aa", "oh", "eyeBlinkLeft", "eyeBlinkRight"):
+    for name in ("aa", "oh", "eyeBlinkLeft", "eyeBlinkRight", *ANGLES):
         assert motion[name] == pytest.approx(talking.motion[name], abs=1e-6)
 
 
@@ -51,7 +51,7 @@ def test_the_extension_is_as_its_rules_say(path: Path) -> None:
 def test_expressions_of_moods_are_there_where_a_mood_is(tmp_path: Path) -> None:
     happy = generation("aa", "happy")
     write_motion(tmp_path / "a.vrma", happy, source={}, model={})
-    assert read_motion(tmp_path / "a.vrma")[0]["happy"] == pytest.approx(happy.motion["happy"], abs=1e-6)
+    assert read_motion(tmp_path / "a.vrma")[0]["mood_happy"] == pytest.approx(happy.motion["happy"], abs=1e-6)
 
 
 def test_equal_blinks_are_one_and_held_poses_jump(tmp_path: Path, talking: Generation) -> None:

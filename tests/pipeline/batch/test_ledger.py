@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from lipmotion.errors import ExportError
+from lipmotion.pipeline.batch import settings
 from lipmotion.pipeline.batch.ledger import RECEIPTS, RUN, WORK, Place, opened_ledger, read_receipt, write_receipt
 from lipmotion.pipeline.batch.lines import OWN_FILES, OWN_FOLDER, BatchLine
 from lipmotion.pipeline.batch.record import DONE, LARGEST_RECORD_BYTES, Record
@@ -232,6 +233,14 @@ def test_settings_have_a_fingerprint(tmp_path: Path) -> None:
     assert fingerprint_of(drawn) == before
     (tmp_path / "A.png").write_text("another one")
     assert fingerprint_of(drawn) != before
+
+
+def test_a_line_without_the_recogniser_of_phones_is_another_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = set()
+    for name in ("hama", None):
+        monkeypatch.setattr(settings, "installed_phone_recogniser", lambda name=name: name)
+        found.add(fingerprint_of(Job()))
+    assert len(found) == 2
 
 
 @pytest.mark.parametrize("kinds", [(), ("wav",), ("json", "json"), ("cues.json5",), ("",)])

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.errors import InputError
-from lipmotion.pipeline.job import Job, Outputs
+from lipmotion.pipeline.job import DETAILS, Job, Outputs
 from lipmotion.types.configuration import Configuration, kind_of
 from lipmotion.types.delivery import Delivery
 from lipmotion.types.staging import Staging
@@ -50,6 +50,13 @@ def add_outputs(parser: argparse.ArgumentParser, files: str, *, required: bool =
     add_options(parser, Outputs, but=OF_ANIMATE, files={"help": files, "required": required})
     add_options(parser, Staging)
     add_options(parser, Delivery)
+    add_detail(parser)
+
+
+def add_detail(parser: argparse.ArgumentParser) -> None:
+    """Add ``--detail``: options of a level of detail. What the command line says is ahead of them."""
+    told = "film: all; game, mobile: fewer frames, keys and curves (docs/controls.md#levels-of-detail)"
+    parser.add_argument("--detail", choices=tuple(DETAILS), action=_Detail, help=told)
 
 
 def add_job_file(parser: argparse.ArgumentParser) -> None:
@@ -144,10 +151,23 @@ class _JobFile(argparse.Action):
         setattr(namespace, self.dest, path)
         job = Job.from_file(path)
         parser.set_defaults(start=job)
-        defaults = dict(_given(job))
-        for action in parser._actions:
-            if action.dest in defaults and action.default != defaults[action.dest]:
-                action.default, action.required = defaults[action.dest], False
+        _make_defaults(parser, job)
+
+
+class _Detail(argparse.Action):
+    """Makes the options of a level of detail the defaults; for those the command line is parsed again."""
+
+    def __call__(self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, *given: Any) -> None:
+        setattr(namespace, self.dest, given[0])
+        _make_defaults(parser, DETAILS[given[0]])
+
+
+def _make_defaults(parser: argparse.ArgumentParser, job: Job) -> None:
+    """Make the options of a job that are not as usual the defaults of a parser."""
+    defaults = dict(_given(job))
+    for action in parser._actions:
+        if action.dest in defaults and action.default != defaults[action.dest]:
+            action.default, action.required = defaults[action.dest], False
 
 
 def _given(part: Configuration) -> Iterator[tuple[str, Any]]:

@@ -14,7 +14,7 @@ from typing import Literal
 
 from lipmotion.cli.installation.declared_requirements import Requirement, declared_requirements
 from lipmotion.errors import LipMotionError, MissingDependencyError, ModelFormatError
-from lipmotion.extensions import installed_version
+from lipmotion.extensions import install_command, installed_version
 
 State = Literal["works", "absent", "broken"]
 EXTRAS = {
@@ -90,7 +90,7 @@ def _extra(name: str, its: list[Requirement]) -> InstalledPart:
     unmet = [each for each in its if not each.is_met]
     if unmet:
         lacks = ", ".join(f"{each.installed or 'no'} {each.name} (required {each.versions})" for each in unmet)
-        return InstalledPart(f"[{name}]", "absent", f"{brings}: pip install 'lipmotion[{name}]'; there is {lacks}")
+        return InstalledPart(f"[{name}]", "absent", f"{brings}: {install_command(name)}; there is {lacks}")
     return InstalledPart(f"[{name}]", "works", ", ".join(f"{each.name} {each.installed}" for each in its))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from lipmotion.cli.arguments.declared import add_job_file, add_options, part_of
+from lipmotion.cli.arguments.declared import add_detail, add_job_file, add_options, part_of
 from lipmotion.cli.arguments.options import add_machine_readable
 from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.pipeline.job import Job, Outputs, Request
@@ -40,6 +40,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add_options(parser, Outputs, "rate_hz", "fps", "channels", "curves", "articulation", "face", "background", **said)
     add_options(parser, Staging)
     add_options(parser, Delivery)
+    add_detail(parser)
     add_job_file(parser)
     add_machine_readable(parser)
     parser.set_defaults(run=run)

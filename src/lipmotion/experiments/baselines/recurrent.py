@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import MissingDependencyError
 from lipmotion.experiments.baselines.frame_regression import Array, Baseline, Float32Array
+from lipmotion.extensions import install_command
 from lipmotion.types import Monitor, with_progress
 
 UNITS, LAYERS = 192, 2
@@ -84,7 +85,7 @@ def import_torch() -> Any:
         import torch
     except ImportError as error:
         raise MissingDependencyError(
-            f'the network needs PyTorch, which cannot be imported ({error}); pip install "lipmotion[network]"'
+            f"the network needs PyTorch, which cannot be imported ({error}); {install_command('network')}"
         ) from error
     torch.set_num_threads(1)  # as all other systems: results do not depend on the number of cores
     return torch

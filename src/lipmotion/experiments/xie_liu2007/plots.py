@@ -12,6 +12,7 @@ from lipmotion.engines.coupled.conversion.em_conversion import convert
 from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.errors import ExportError, MissingDependencyError
 from lipmotion.experiments.xie_liu2007.tuning import TrainedSystem
+from lipmotion.extensions import install_command
 from lipmotion.pipeline.evaluation.held_out import AUDIO_ONLY, ComparedClip, HeldOutRecordings, compared_clips
 from lipmotion.storage.files import whole_file
 from lipmotion.types import GREY
@@ -41,7 +42,7 @@ def import_figure() -> Any:
         from matplotlib.figure import Figure
     except ImportError as error:
         raise MissingDependencyError(
-            f'pictures need matplotlib, which cannot be imported ({error}); pip install "lipmotion[plots]"'
+            f"pictures need matplotlib, which cannot be imported ({error}); {install_command('plots')}"
         ) from error
     return Figure
 

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.export.cues.cue_shapes import OPTIONAL, SHAPES, drawn_shape
 from lipmotion.export.cues.shape_costs import frame_costs
 from lipmotion.export.cues.sheet import CueSheet, cue_frame_count, cue_sheet, drawn_shapes
 from lipmotion.kernels.sequences.segments import best_segments
 from lipmotion.types import Generation, Timeline
 from lipmotion.units import words_in_time
+from lipmotion.units.mouth_chart import OPTIONAL, SHAPES, drawn_shape
 
 CHANGE_COST = 0.35
 """Cost of a change of shape, in the unit of ``costs``."""

@@ -7,14 +7,10 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from lipmotion.errors import InputError, shortened
-from lipmotion.export.cues.cue_shapes import REST, SHAPES
 from lipmotion.export.cues.sheet import CueSheet
 from lipmotion.types import Span, Timeline
+from lipmotion.units.mouth_chart import REST, SHAPES
 
-LETTERS = {name.lower(): name for name in SHAPES}
-"""Shapes by Rhubarb's letters."""
-BLAIR = {shape.blair.lower(): name for name, shape in SHAPES.items()} | {"wq": "F"}
-"""Shapes by Preston Blair's names; his E is another shape than the letter."""
 LONGEST_S = 86_400.0
 MOST_CUES = 250_000
 

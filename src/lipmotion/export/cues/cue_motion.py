@@ -17,12 +17,12 @@ from lipmotion.articulation.crossfade import phone_weights
 from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import InputError
 from lipmotion.export.cues import moho_dat, papagayo_pgo, rhubarb_json, rhubarb_tsv, rhubarb_xml
-from lipmotion.export.cues.cue_shapes import REST, SHAPES
 from lipmotion.export.cues.sheet import CueSheet
 from lipmotion.printable import is_line
 from lipmotion.storage.files import read_text_file
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 from lipmotion.units import SILENCE
+from lipmotion.units.mouth_chart import REST, SHAPES
 
 PARSERS: Mapping[str, Callable[[str], CueSheet]] = {
     ".tsv": rhubarb_tsv.parse,

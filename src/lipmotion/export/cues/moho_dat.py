@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from lipmotion.errors import InputError
-from lipmotion.export.cues.cue_lines import BLAIR, LETTERS, cue_time, shape_of, sheet_of
-from lipmotion.export.cues.cue_shapes import SHAPES
+from lipmotion.export.cues.cue_lines import cue_time, shape_of, sheet_of
 from lipmotion.export.cues.sheet import CUES_FPS, CueSheet
+from lipmotion.units.mouth_chart import BLAIR, LETTERS, SHAPES
 
 MARK = "MohoSwitch1"
 

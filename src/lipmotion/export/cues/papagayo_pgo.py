@@ -12,11 +12,11 @@ from dataclasses import replace
 from itertools import islice, takewhile
 
 from lipmotion.errors import InputError, shortened
-from lipmotion.export.cues.cue_lines import BLAIR, cue_time, shape_of, sheet_of
-from lipmotion.export.cues.cue_shapes import REST, SHAPES
+from lipmotion.export.cues.cue_lines import cue_time, shape_of, sheet_of
 from lipmotion.export.cues.sheet import CueSheet, shown_shapes
 from lipmotion.printable import is_line, printable
 from lipmotion.types import Span, Timeline
+from lipmotion.units.mouth_chart import BLAIR, REST, SHAPES
 
 MARK = "lipsync version 1"
 FASTEST_FPS = 1000

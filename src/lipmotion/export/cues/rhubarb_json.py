@@ -6,9 +6,10 @@ import json
 from typing import Any
 
 from lipmotion.errors import InputError
-from lipmotion.export.cues.cue_lines import LETTERS, cue_time, shape_of, sheet_of
+from lipmotion.export.cues.cue_lines import cue_time, shape_of, sheet_of
 from lipmotion.export.cues.sheet import CUES_FPS, CueSheet
 from lipmotion.storage.json_text import as_json
+from lipmotion.units.mouth_chart import LETTERS
 
 CUES = "mouthCues"
 

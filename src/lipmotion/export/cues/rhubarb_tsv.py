@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from lipmotion.errors import InputError
-from lipmotion.export.cues.cue_lines import LETTERS, cue_time, shape_of, sheet_of
+from lipmotion.export.cues.cue_lines import cue_time, shape_of, sheet_of
 from lipmotion.export.cues.sheet import CUES_FPS, CueSheet
+from lipmotion.units.mouth_chart import LETTERS
 
 
 def text(sheet: CueSheet, _sound_file: str) -> str:

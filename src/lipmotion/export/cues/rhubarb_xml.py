@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from html import escape
 
-from lipmotion.export.cues.cue_lines import LETTERS, cue_time, shape_of, sheet_of
+from lipmotion.export.cues.cue_lines import cue_time, shape_of, sheet_of
 from lipmotion.export.cues.sheet import CUES_FPS, CueSheet
+from lipmotion.units.mouth_chart import LETTERS
 
 _NOT_XML = re.compile("[^\t\n\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _CONTROL = re.compile("[\t\n\x7f]")

@@ -7,9 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.export.cues.cue_shapes import SHAPES, PhoneShapes, shapes_of_phone
+from lipmotion.export.cues.cue_shapes import PhoneShapes, shapes_of_phone
 from lipmotion.types import Generation, Motion, Span, Timeline, Unit
 from lipmotion.units import SILENCE, VISEMES, closing_phones, is_silent
+from lipmotion.units.mouth_chart import SHAPES
 
 Array = NDArray[np.float64]
 COST_RATE_HZ = 24.0

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from lipmotion.export.cues.cue_shapes import REST, SHAPES, drawn_shape
 from lipmotion.types import Span, Timeline
+from lipmotion.units.mouth_chart import REST, SHAPES, drawn_shape
 
 CUES_FPS = 24.0
 """Frame rate of cues where none is given."""

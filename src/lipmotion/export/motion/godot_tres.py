@@ -64,4 +64,4 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
     path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
 
 
-MOTION_FORMAT = MotionFormat(write, check=check, curves="face", other_curves=True)
+MOTION_FORMAT = MotionFormat(write, check=check, curves="face", other_curves=True, keyed=True)

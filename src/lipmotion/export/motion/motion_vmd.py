@@ -1,4 +1,4 @@
-"""``.vmd``: a motion of MikuMikuDance: the morphs あ い う え お ん, blinks and brows, and the turns of the head."""
+"""``.vmd``: a motion of MikuMikuDance: the morphs あ い う え お ん, blinks, brows, and the turns of head and eyes."""
 
 from __future__ import annotations
 
@@ -11,9 +11,11 @@ from lipmotion.errors import InputError
 from lipmotion.export.base import MotionFormat
 from lipmotion.export.motion.keys import key_frames
 from lipmotion.export.motion.vmd_file import RATE_HZ, Turns, VmdFile, read_vmd, write_vmd
+from lipmotion.meshes.fitting.eyes_and_brows import MOVED_BY, gaze_weights, given_gaze
 from lipmotion.meshes.model.head_angles import ANGLES, head_angles, head_quaternions
 from lipmotion.meshes.model.other_shapes import CLOSED
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Timeline, Unit
+from lipmotion.types.motion import RADIAN
 
 MORPHS: Mapping[str, tuple[str, ...]] = {
     "あ": ("aa",),
@@ -29,11 +31,10 @@ MORPHS: Mapping[str, tuple[str, ...]] = {
 }
 """The standard morphs of models, and the channels whose mean each is: vowels, pressed lips, blinks, raised brows; of
 moods, lowered brows and wide eyes."""
-HEAD = "頭"
-"""The bone of the head."""
+HEAD, EYES = "頭", "両目"
+"""The bones of the head, and of both eyes."""
 MIRRORED = np.array([-1.0, -1.0, 1.0, 1.0])
 """Signs that turn a rotation of glTF's axes into one of MikuMikuDance's, whose z goes into the face, and back."""
-RADIAN = "radian"
 TOLERANCE = 1e-7
 """Keys are left out where a straight line is that near."""
 
@@ -53,15 +54,27 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
                 kept = sorted({*kept, *(frame - 1 for frame in kept if frame)})
             morphs[morph] = [(frames[frame], float(values[frame])) for frame in kept]
     bones = {}
-    if all(name in motion.names for name in ANGLES):
-        turned = head_quaternions(np.stack([motion[name] for name in ANGLES], axis=1).astype(np.float64)) * MIRRORED
+    for bone, angles in _angles(motion).items():
+        turned = head_quaternions(angles) * MIRRORED
         turns: Turns = [(frame, (x, y, z, w)) for frame, (x, y, z, w) in zip(frames, turned.tolist(), strict=True)]
-        bones[HEAD] = turns
+        bones[bone] = turns
     write_vmd(path, VmdFile(morphs, bones), "lipmotion")
 
 
+def _angles(motion: Motion) -> dict[str, np.ndarray]:
+    """Return the angles of the bones that a motion turns, as of ``head_quaternions`` [each shape=(T, 3)]."""
+    curves = {name: motion[name].astype(np.float64) for name in (*ANGLES, *MOVED_BY["gaze"]) if name in motion.names}
+    found = {}
+    if {*ANGLES} <= {*curves}:
+        found[HEAD] = np.stack([curves[name] for name in ANGLES], axis=1)
+    if {*MOVED_BY["gaze"]} & {*curves}:
+        still = dict.fromkeys(MOVED_BY["gaze"], np.zeros(len(motion.values)))
+        found[EYES] = np.pad(given_gaze(still | curves), ((0, 0), (0, 1)))
+    return found
+
+
 def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
-    """Return the vowels, blinks, raised brows and head's angles of a file at 30 frames a second; an empty timeline.
+    """Return the vowels, blinks, brows, gaze and head's angles of a file at 30 frames a second; an empty timeline.
 
     Weights are linear between keys, and constant before the first and after the last one. Raises InputError: no motion
     of MikuMikuDance, or none of its morphs is one of the mouth.
@@ -78,14 +91,21 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
             at, values = zip(*file.morphs[morph], strict=True)
             curves |= dict.fromkeys(sources, (np.interp(frames, at, values), WEIGHT))
     if HEAD in file.bones:
-        at, turns = zip(*file.bones[HEAD], strict=True)
-        if not all(map(any, turns)):
-            raise InputError("a rotation of the head is none (0 0 0 0); save the motion again in MikuMikuDance")
-        angles = head_angles(np.array(turns) * MIRRORED)
-        for name, column in zip(ANGLES, np.unwrap(angles, axis=0).T, strict=True):
-            curves[name] = (np.interp(frames, at, column), RADIAN)
+        curves |= {name: (curve, RADIAN) for name, curve in zip(ANGLES, _turned(file, HEAD, frames).T, strict=True)}
+    if EYES in file.bones:
+        looks = gaze_weights(_turned(file, EYES, frames)[:, :2])
+        curves |= {name: (curve, WEIGHT) for name, curve in looks.items()}
     table = np.stack([curve for curve, _ in curves.values()], axis=1)
     return Motion(table, RATE_HZ, tuple(Channel(name, unit) for name, (_, unit) in curves.items())), Timeline(())
 
 
-MOTION_FORMAT = MotionFormat(write, read, curves="vowels", rate_hz=RATE_HZ, fixed_rate=True)
+def _turned(file: VmdFile, bone: str, frames: np.ndarray) -> np.ndarray:
+    """Return the angles of a bone at some frames [shape=(T, 3)]. Raises InputError: a rotation is none."""
+    at, turns = zip(*file.bones[bone], strict=True)
+    if not all(map(any, turns)):
+        raise InputError(f"a rotation of the bone {bone} is none (0 0 0 0); save the motion again in MikuMikuDance")
+    angles = np.unwrap(head_angles(np.array(turns) * MIRRORED), axis=0)
+    return np.stack([np.interp(frames, at, column) for column in angles.T], axis=1)
+
+
+MOTION_FORMAT = MotionFormat(write, read, curves="vowels", rate_hz=RATE_HZ, fixed_rate=True, keyed=True)

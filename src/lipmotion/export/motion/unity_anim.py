@@ -101,4 +101,4 @@ def _curve(generation: Generation, name: str) -> Iterator[str]:
     yield from ("    path: ", f"    classID: {RENDERER}", "    script: {fileID: 0}")
 
 
-MOTION_FORMAT = MotionFormat(write, check=check, curves="face", rate_hz=RATE_HZ, other_curves=True)
+MOTION_FORMAT = MotionFormat(write, check=check, curves="face", rate_hz=RATE_HZ, other_curves=True, keyed=True)

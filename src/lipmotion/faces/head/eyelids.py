@@ -67,10 +67,11 @@ class Eyelids:
         upper = UPPER_LID + gaze * (1 - LID_ACROSS**2) + 0.15 * pose.brows * (1 - LID_ACROSS**2)
         lower = LOWER_LID + (0.5 * gaze * (1 - pose.shut) + squint + LOWER_LID_RISE * pose.shut) * (1 - LID_ACROSS**2)
         bow = 1 - LID_ACROSS**2
-        slant = pose.lowered * (1 - pose.inner) * np.clip(0.6 - LID_ACROSS, 0, 1)
-        slant = slant + 0.7 * pose.inner * (1 - pose.outer) * (1 - pose.wide) * np.clip(0.6 + LID_ACROSS, 0, 1)
-        upper = upper + (WIDE_RISE * pose.wide - SQUINT_FALL * pose.squint - SLANT * slant) * bow
-        lower = lower + SQUINT_RISE * max(pose.squint, 0.7 * pose.cheek) * (1 - pose.shut) * bow
+        mood = pose.mood
+        slant = mood.lowered * (1 - mood.inner) * np.clip(0.6 - LID_ACROSS, 0, 1)
+        slant = slant + 0.7 * mood.inner * (1 - mood.outer) * (1 - mood.wide) * np.clip(0.6 + LID_ACROSS, 0, 1)
+        upper = upper + (WIDE_RISE * mood.wide - SQUINT_FALL * mood.squint - SLANT * slant) * bow
+        lower = lower + SQUINT_RISE * max(mood.squint, 0.7 * mood.cheek) * (1 - pose.shut) * bow
         upper = np.maximum(upper + min(1.12 * pose.shut, 1.0) * (lower - upper), lower)
         return EYE[0] + HALF_WIDTH * LID_ACROSS, np.where(LID_SIDE > 0, upper, lower)
 

@@ -139,8 +139,8 @@ def brow_shift(places: Real, pose: CharacterPose) -> Real:
     """Return how a mood moves places of a brow at rest [shape=(N, 3)]."""
     outwards = np.clip((np.abs(places[:, 0]) - 0.135) / 0.4, 0, 1)
     inner = (1 - outwards) ** 1.5
-    moved = np.zeros_like(places)
-    moved[:, 1] = INNER_RISE * pose.inner * inner + OUTER_RISE * pose.outer * np.sin(0.72 * np.pi * outwards**1.3)
-    moved[:, 1] -= pose.lowered * (LOWERED[0] * inner + LOWERED[1] * (1 - inner))
-    moved[:, 0] = -TOGETHER * pose.lowered * np.sign(places[:, 0]) * (1 - outwards)
+    moved, mood = np.zeros_like(places), pose.mood
+    moved[:, 1] = INNER_RISE * mood.inner * inner + OUTER_RISE * mood.outer * np.sin(0.72 * np.pi * outwards**1.3)
+    moved[:, 1] -= mood.lowered * (LOWERED[0] * inner + LOWERED[1] * (1 - inner))
+    moved[:, 0] = -TOGETHER * mood.lowered * np.sign(places[:, 0]) * (1 - outwards)
     return moved

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.liveliness import UpperFace
 from lipmotion.faces.head.figure import Figure
 from lipmotion.faces.head.pose import CharacterPose
 from lipmotion.faces.head.skin import REST
@@ -37,14 +38,14 @@ SIDED_POSES = {
     "eyeBlink": CharacterPose(shut=1),
 }
 """The poses of the shapes that are one each for the left and the right side."""
-MOOD_POSES = {"browInnerUp": CharacterPose(inner=1)}
+MOOD_POSES = {"browInnerUp": CharacterPose(mood=UpperFace(inner=1))}
 SIDED_MOOD_POSES = {
-    "browDown": CharacterPose(lowered=1),
-    "browOuterUp": CharacterPose(outer=1),
-    "eyeSquint": CharacterPose(squint=1),
-    "eyeWide": CharacterPose(wide=1),
-    "cheekSquint": CharacterPose(cheek=1),
-    "noseSneer": CharacterPose(sneer=1),
+    "browDown": CharacterPose(mood=UpperFace(lowered=1)),
+    "browOuterUp": CharacterPose(mood=UpperFace(outer=1)),
+    "eyeSquint": CharacterPose(mood=UpperFace(squint=1)),
+    "eyeWide": CharacterPose(mood=UpperFace(wide=1)),
+    "cheekSquint": CharacterPose(mood=UpperFace(cheek=1)),
+    "noseSneer": CharacterPose(mood=UpperFace(sneer=1)),
     "mouthFrown": CharacterPose(smile=-0.05),
 }
 """The poses of the shapes that moods need, instead of those above and beside them; other files do not have these."""

@@ -48,6 +48,7 @@ def head_poses(
 
 def posed(mouth: SpokenMouth, moved: Liveliness) -> list[CharacterPose]:
     """Return the poses that show a mouth, and eyes, brows and head, one a frame."""
+    mouth = mouth.with_corners(moved.unit(12), moved.unit(15))
     gap, change = mouth.gap, mouth.width - 1
     spread = mouth.spread * (1 - mouth.protrusion)
     roundness = np.maximum(mouth.protrusion, 0.4 * np.clip(-change / FULL_NARROWING, 0, 1) * (1 - spread))
@@ -76,12 +77,13 @@ def posed(mouth: SpokenMouth, moved: Liveliness) -> list[CharacterPose]:
         + (MOOD_SMILE * mouth.smile - MOOD_FROWN * mouth.frown - MOOD_TIGHT * serious) * (1 - roundness),
         "shut": moved.lids,
         "brows": moved.brows,
-        **{"squint" if name == "tight" else name: curve for name, curve in moved.upper_face.items()},
     }
     rows = np.stack(list(curves.values()), axis=1).tolist()
     return [
-        CharacterPose(**dict(zip(curves, row, strict=True)), gaze=(gaze[0], gaze[1]), turn=(turn[0], turn[1], turn[2]))
-        for row, gaze, turn in zip(rows, moved.gaze.tolist(), moved.turn.tolist(), strict=True)
+        CharacterPose(**dict(zip(curves, row, strict=True)), mood=mood, gaze=(across, up), turn=(yaw, pitch, roll))
+        for row, mood, (across, up), (yaw, pitch, roll) in zip(
+            rows, moved.upper_face, moved.gaze.tolist(), moved.turn.tolist(), strict=True
+        )
     ]
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from lipmotion.articulation.liveliness import CALM, UpperFace
+
 
 class CharacterPose(NamedTuple):
     """Numbers that move the head. Lengths are in eye distances; most others go from 0 to 1.
@@ -25,8 +27,7 @@ class CharacterPose(NamedTuple):
     smile      : how far the corners rise, a length
     shut       : 1: eyes closed
     brows      : how far the brows rise, a length
-    inner, outer, lowered, wide, squint, cheek, sneer : of a mood: brows raised at their inner and outer ends, lowered
-                 and drawn together; upper lids raised, lids narrowed, cheeks raised, nose wrinkled
+    mood       : what a mood does to brows, lids, cheeks and nose
     gaze       : of the eyes to the character's left and upwards, in radians
     turn       : of the head: yaw to the character's left, pitch upwards, roll to the left shoulder, in radians
     """
@@ -48,12 +49,6 @@ class CharacterPose(NamedTuple):
     smile: float = 0.0
     shut: float = 0.0
     brows: float = 0.0
-    inner: float = 0.0
-    outer: float = 0.0
-    lowered: float = 0.0
-    wide: float = 0.0
-    squint: float = 0.0
-    cheek: float = 0.0
-    sneer: float = 0.0
+    mood: UpperFace = CALM
     gaze: tuple[float, float] = (0.0, 0.0)
     turn: tuple[float, float, float] = (0.0, 0.0, 0.0)

@@ -163,7 +163,7 @@ class Skin:
         face = self.face + by_jaw
         face[self._bound] += self._shares @ own
         face += (CHEEKS_SPREAD * pose.spread - CHEEKS_ROUND * pose.roundness) * self._cheeks
-        face += CHEEKS_RAISED * pose.cheek * self._cheeks + NOSE_LIFT * pose.sneer * self._nose
+        face += CHEEKS_RAISED * pose.mood.cheek * self._cheeks + NOSE_LIFT * pose.mood.sneer * self._nose
         face[:COLUMNS] = lips[0]
         left = self.lids_of_eye.rings(pose).reshape(-1, 3)
         return np.concatenate([face, lips[1:].reshape(-1, 3), left, left * [-1, 1, 1]])

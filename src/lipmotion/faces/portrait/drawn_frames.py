@@ -13,7 +13,7 @@ from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.faces.base import Picture, Staging, alive
 from lipmotion.faces.portrait.movement import HeadPlacement
 from lipmotion.faces.portrait.portrait_rasteriser import FacePose
-from lipmotion.faces.portrait.pose import mood_poses, mouth_poses
+from lipmotion.faces.portrait.pose import mouth_poses
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 
 CanvasT = TypeVar("CanvasT")
@@ -23,6 +23,8 @@ LOOK, YAW, PITCH = 0.25, 0.3, 0.4
 """How far an iris moves for an angle of the eyes, and features for angles of the head, in eye distances a radian."""
 SWAY_X, SWAY_Y = 0.25, 0.12
 """How far the head moves to the side and up for the same angles."""
+LARGEST_TURN = np.array([0.35, 0.35, 0.13])
+"""The furthest that a drawing turns to its left, upwards and to its left shoulder, in radians."""
 
 
 def face_poses(
@@ -32,18 +34,18 @@ def face_poses(
     mouth = spoken_mouth(motion, units, fps)
     moved = alive(np.arange(len(mouth.gap)) / fps, motion, units, staging, prosody)
     gaze = LOOK * moved.gaze
-    yaw, pitch, roll = moved.turn.T
+    yaw, pitch, roll = np.clip(moved.turn, -LARGEST_TURN, LARGEST_TURN).T
     heads = np.stack([SWAY_X * yaw, -SWAY_Y * pitch, roll, YAW * yaw, -PITCH * pitch], axis=1)
     lids = np.maximum(moved.lids, RESTING_LIDS)
     return [
         FacePose(pose, shut, look[0], -look[1], brows, HeadPlacement(*head), mood)
         for pose, shut, look, brows, head, mood in zip(
-            mouth_poses(mouth),
+            mouth_poses(mouth.with_corners(moved.unit(12), moved.unit(15))),
             lids.tolist(),
             gaze.tolist(),
             moved.brows.tolist(),
             heads.tolist(),
-            mood_poses(moved),
+            moved.upper_face,
             strict=True,
         )
     ]

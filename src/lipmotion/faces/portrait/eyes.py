@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.liveliness import CALM, UpperFace
 from lipmotion.faces.portrait.design import Design
 from lipmotion.faces.portrait.layer import Glow, Layer, Rim
 from lipmotion.faces.portrait.outlines import Points, ellipse, mirrored, open_curve, stroke
 from lipmotion.faces.portrait.palette import WHITE
-from lipmotion.faces.portrait.pose import CALM, MoodPose
 from lipmotion.faces.portrait.view import Pixels, Window
 from lipmotion.kernels.pixels.painting import warp
 
@@ -22,6 +22,8 @@ MOOD_LIDS = 8
 WIDE_RISE, SQUINT_RISE, SQUINT_FALL, LID_SLANT = 0.045, 0.055, 0.025, 0.045
 """How far a mood raises the upper lids, and the lower ones, and how far it then lowers the upper ones; how far lowered
 brows take the inner half of the upper lids with them, and brows raised at their inner ends leave the outer half."""
+CHEEK_SQUINT = 0.8
+"""Raised cheeks narrow the eyes by this part."""
 GAZE_STEPS = 8
 """Positions of the gaze in a pixel."""
 Knots = tuple[tuple[float, float], ...]
@@ -43,11 +45,12 @@ class LidPose(NamedTuple):
     sneer: int = 0
 
 
-def lid_pose(shut: float, mood: MoodPose) -> LidPose:
+def lid_pose(shut: float, mood: UpperFace) -> LidPose:
     """Return the nearest pose of lids that are closed so far, 0..1, in a mood."""
     slant = mood.lowered * (1 - mood.inner) - 0.8 * mood.inner * (1 - mood.outer) * (1 - mood.wide)
     furrow = mood.lowered * (1 - 0.5 * mood.inner)
-    steps = (round(share * MOOD_LIDS) for share in (mood.wide, mood.squint, slant, furrow, mood.sneer))
+    squint = max(mood.squint, CHEEK_SQUINT * mood.cheek)
+    steps = (round(share * MOOD_LIDS) for share in (mood.wide, squint, slant, furrow, mood.sneer))
     return LidPose(round(shut * LID_POSITIONS), *steps)
 
 
@@ -65,7 +68,7 @@ class EyePainter:
         self.lids = lru_cache(maxsize=2 * LID_POSITIONS)(self._painted_lids)
         self._cached = lru_cache(maxsize=128)(self._painted)
 
-    def painted(self, shut: float, gaze_x: float, gaze_y: float, mood: MoodPose = CALM) -> Pixels:
+    def painted(self, shut: float, gaze_x: float, gaze_y: float, mood: UpperFace = CALM) -> Pixels:
         """Return the eyes, premultiplied colour and cover [shape=(h, w, 4)]; not to be changed.
 
         shut           : how far they are closed, 0..1

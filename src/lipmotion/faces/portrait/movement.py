@@ -10,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.liveliness import CALM, UpperFace
 from lipmotion.faces.portrait.design import LipDesign
-from lipmotion.faces.portrait.pose import CALM, MoodPose, MouthPose
+from lipmotion.faces.portrait.pose import MouthPose
 from lipmotion.faces.portrait.view import Window
 
 Floats = NDArray[np.float64]
@@ -67,7 +68,7 @@ class SkinField:
         self._nose = np.exp(-((side / 0.26) ** 4) - ((low + 0.29) / 0.17) ** 4) * np.clip((low + 0.5) / 0.08, 0, 1)
         self._half_width = lips.half_width
 
-    def shifts(self, pose: MouthPose, mood: MoodPose = CALM) -> tuple[Floats, Floats]:
+    def shifts(self, pose: MouthPose, mood: UpperFace = CALM) -> tuple[Floats, Floats]:
         """Return the shifts to the right and down, in pixels: to the place that is shown."""
         pulled = np.clip(pose.width - 1, -0.5, 0.3) * self._half_width
         jaw = np.clip(pose.jaw, 0, 0.5)
@@ -91,7 +92,7 @@ class BrowPose(NamedTuple):
     lowered: int = 0
 
 
-def brow_pose(raised: float, mood: MoodPose, scale: float) -> BrowPose:
+def brow_pose(raised: float, mood: UpperFace, scale: float) -> BrowPose:
     """Return the nearest pose of brows that are raised by a length in eye distances; ``scale``: pixels in one."""
     of_mood = (round(share * MOOD_STEPS) for share in (mood.inner, mood.outer, mood.lowered))
     return BrowPose(round(raised * BROW_STEPS * scale), *of_mood)

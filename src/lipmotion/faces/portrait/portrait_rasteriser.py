@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.liveliness import CALM, UpperFace
 from lipmotion.faces.portrait import surroundings
 from lipmotion.faces.portrait.design import Design
 from lipmotion.faces.portrait.eyes import EyePainter
@@ -16,7 +17,7 @@ from lipmotion.faces.portrait.layer import Layer
 from lipmotion.faces.portrait.mouth_painting import MouthPainter
 from lipmotion.faces.portrait.movement import STEP, BrowField, BrowPose, HeadField, HeadPlacement, SkinField, brow_pose
 from lipmotion.faces.portrait.palette import Colour
-from lipmotion.faces.portrait.pose import CALM, MoodPose, MouthPose
+from lipmotion.faces.portrait.pose import MouthPose
 from lipmotion.faces.portrait.view import View, Window
 from lipmotion.kernels.pixels.painting import stack, warp, warp_bytes
 
@@ -41,7 +42,7 @@ class FacePose(NamedTuple):
     gaze_y: float = 0.0
     brows: float = 0.0
     head: HeadPlacement = HeadPlacement()
-    mood: MoodPose = CALM
+    mood: UpperFace = CALM
 
 
 class Rasteriser:

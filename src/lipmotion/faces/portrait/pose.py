@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
-from lipmotion.articulation.liveliness import Liveliness
 from lipmotion.articulation.mouth import SpokenMouth
 
 
@@ -39,39 +36,6 @@ class MouthPose(NamedTuple):
     upper_raise: float = 0.0
     chin_raise: float = 0.0
     tight: float = 0.0
-
-
-class MoodPose(NamedTuple):
-    """What a mood does to brows, lids, cheeks and nose in one frame, each 0..1.
-
-    inner, outer : the inner and the outer ends of the brows are raised
-    lowered      : the brows are lowered and drawn together
-    wide         : the upper lids are raised
-    squint       : the lower lids are raised, the upper ones lowered a little
-    cheek        : the cheeks are raised
-    sneer        : the nose is wrinkled
-    """
-
-    inner: float = 0.0
-    outer: float = 0.0
-    lowered: float = 0.0
-    wide: float = 0.0
-    squint: float = 0.0
-    cheek: float = 0.0
-    sneer: float = 0.0
-
-
-CALM = MoodPose()
-
-
-def mood_poses(moved: Liveliness) -> list[MoodPose]:
-    """Return the pose of every frame of what a mood does beside the mouth."""
-    if not moved.units:
-        return [CALM] * len(moved.lids)
-    curves = moved.upper_face
-    curves["squint"] = np.maximum(curves.pop("tight"), 0.8 * curves["cheek"])
-    rows = np.stack([curves[name] for name in MoodPose._fields], axis=1).tolist()
-    return [MoodPose(*row) for row in rows]
 
 
 def mouth_poses(mouth: SpokenMouth) -> list[MouthPose]:

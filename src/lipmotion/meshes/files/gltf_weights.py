@@ -1,4 +1,4 @@
-"""Animations of glTF as motion: the weights of morph targets, and the expressions of a VRM animation.
+"""Animations of glTF as motion: the weights of morph targets, the expressions of a VRM animation, turns of the head.
 
 Source: glTF 2.0 Specification, 3.11 and Appendix C (interpolation); VRMC_vrm_animation 1.0 (VRM Consortium): the
 weight of an expression is the x of the translation of its node.
@@ -6,7 +6,7 @@ weight of an expression is the x of the translation of its node.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,12 +14,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.expression import PREFIX
 from lipmotion.errors import InputError
 from lipmotion.meshes.files.gltf_accessors import GltfArrays
 from lipmotion.meshes.files.gltf_container import GltfDocument, plain_name, read_gltf_document
+from lipmotion.meshes.files.gltf_nodes import placed_nodes
 from lipmotion.meshes.files.gltf_scene import target_names
 from lipmotion.meshes.files.steady_rate import exact_rate
+from lipmotion.meshes.fitting.mood_weights import EMOTIONS
+from lipmotion.meshes.model.bones import HEAD, NECK, bone_kind
+from lipmotion.meshes.model.head_angles import ANGLES, head_angles
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
+from lipmotion.types.moods import MOODS
+from lipmotion.types.motion import RADIAN
 
 Array = NDArray[np.float64]
 STEP, CUBIC = "STEP", "CUBICSPLINE"
@@ -32,12 +39,16 @@ SLOWEST_HZ = 10.0
 LONGEST_S = 86_400.0
 ROUNDING_FRAMES = 0.01
 """Times are in single precision: the last key may be that much before its frame."""
-ARKIT_OF = {
+KNOWN_AS = {
     "blink": ("eyeBlinkLeft", "eyeBlinkRight"),
     "blinkLeft": ("eyeBlinkLeft",),
     "blinkRight": ("eyeBlinkRight",),
+    **{mood: (PREFIX + mood,) for mood in MOODS if mood in EMOTIONS},
 }
-"""Expressions of VRM that are blendshapes of ARKit."""
+"""Expressions of VRM that are blendshapes of ARKit, or moods."""
+QUATERNION = ("x", "y", "z", "w")
+TURNING = (NECK, HEAD)
+"""The bones whose turns, one after the other, are those of the head."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,11 +100,11 @@ def read_gltf_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
     for animation in document.items("animations"):
         tracks = list(_tracks(document, arrays, animation))
         if tracks:
-            return _motion(document, tracks), Timeline(())
+            return _motion(document, tracks, _turns(document, arrays, animation)), Timeline(())
     raise InputError("it has no animation of morph targets or expressions; export the animation with the character")
 
 
-def _motion(document: GltfDocument, tracks: list[_Track]) -> Motion:
+def _motion(document: GltfDocument, tracks: list[_Track], turns: Mapping[int, _Track]) -> Motion:
     """Return all curves of some tracks at one rate."""
     longest = max(tracks, key=lambda track: len(track.time_s))
     end_s = max(float(track.time_s[-1]) for track in tracks)
@@ -104,9 +115,44 @@ def _motion(document: GltfDocument, tracks: list[_Track]) -> Motion:
     curves: dict[str, Array] = {}
     for track in tracks:
         for name, curve in zip(track.names, track.at(time_s).T, strict=True):
-            for known in ARKIT_OF.get(name, (name,)):
+            for known in KNOWN_AS.get(name, (name,)):
                 curves.setdefault(known, curve)
-    return Motion(np.stack(list(curves.values()), axis=1), hertz, tuple(Channel(name, WEIGHT) for name in curves))
+    channels = [Channel(name, WEIGHT) for name in curves]
+    if turns:
+        angles = np.unwrap(head_angles(_turned(document, turns, time_s)), axis=0)
+        curves |= dict(zip(ANGLES, angles.T, strict=True))
+        channels += [Channel(name, RADIAN) for name in ANGLES]
+    return Motion(np.stack(list(curves.values()), axis=1), hertz, tuple(channels))
+
+
+def _turned(document: GltfDocument, turns: Mapping[int, _Track], time_s: Array) -> Array:
+    """Return how the head is turned against its rest pose, in the axes of the scene, as quaternions [shape=(T, 4)].
+
+    turns : of the neck and the head, in this order, by the numbers of their nodes
+    Raises InputError: a rotation is none.
+    """
+    from scipy.spatial.transform import Rotation
+
+    placed, whole = placed_nodes(document), Rotation.identity()
+    try:
+        for number, track in turns.items():
+            if number in placed:
+                own = Rotation.from_quat(document.items("nodes")[number].get("rotation", (0.0, 0.0, 0.0, 1.0)))
+                at_rest = Rotation.from_matrix(placed[number].matrix[:3, :3])
+                whole = whole * (at_rest * own.inv() * Rotation.from_quat(track.at(time_s)) * at_rest.inv())
+    except ValueError as error:  # a quaternion of zeros, a bone without size
+        raise InputError(f"a rotation of the head is none ({error}); export the animation again") from error
+    return np.asarray(np.broadcast_to(whole.as_quat(), (len(time_s), 4)))
+
+
+def _turns(document: GltfDocument, arrays: GltfArrays, animation: dict[str, Any]) -> dict[int, _Track]:
+    """Return the turns of the first neck and the first head that an animation turns, by the numbers of their nodes."""
+    found: dict[str, tuple[int, _Track]] = {}
+    for number, path, sampler in _targets(animation):
+        kind = bone_kind(document.items("nodes")[number].get("name", ""))
+        if path == "rotation" and kind in TURNING and kind not in found:
+            found[kind] = number, _track(arrays, sampler, QUATERNION, 4)
+    return dict(found[kind] for kind in TURNING if kind in found)
 
 
 def _rate(time_s: Array) -> float:
@@ -118,21 +164,23 @@ def _rate(time_s: Array) -> float:
     return exact_rate(round(hertz, 3), 1e-3) if hertz >= SLOWEST_HZ else SAMPLED_HZ
 
 
-def _tracks(document: GltfDocument, arrays: GltfArrays, animation: dict[str, Any]) -> Iterator[_Track]:
-    """Yield what moves a face in an animation. Raises InputError: its keys are damaged."""
-    samplers, expressions = animation.get("samplers", []), _expressions(document)
+def _targets(animation: dict[str, Any]) -> Iterator[tuple[int, str, dict[str, Any]]]:
+    """Yield the node, the path and the sampler of every channel of an animation that has keys."""
+    samplers = animation.get("samplers", [])
     for channel in animation.get("channels", []):
         target, number = channel.get("target", {}), channel.get("sampler", -1)
         node, path = target.get("node", -1), target.get("path", "")
-        if not 0 <= number < len(samplers) or node < 0:
-            continue
-        sampler = samplers[number]
-        if not {"input", "output"} <= sampler.keys():
-            continue
+        if 0 <= number < len(samplers) and node >= 0 and {"input", "output"} <= samplers[number].keys():
+            yield node, path, samplers[number]
+
+
+def _tracks(document: GltfDocument, arrays: GltfArrays, animation: dict[str, Any]) -> Iterator[_Track]:
+    """Yield what moves a face in an animation. Raises InputError: its keys are damaged."""
+    expressions = _expressions(document)
+    for node, path, sampler in _targets(animation):
         if path == "weights":
-            mesh = (
-                document.items("meshes")[owner] if (owner := document.items("nodes")[node].get("mesh", -1)) >= 0 else {}
-            )
+            owner = document.items("nodes")[node].get("mesh", -1)
+            mesh = document.items("meshes")[owner] if owner >= 0 else {}
             names = tuple(target_names(mesh, mesh["primitives"][0])) if mesh.get("primitives") else ()
             if names:
                 yield _track(arrays, sampler, names, 1)
@@ -141,13 +189,13 @@ def _tracks(document: GltfDocument, arrays: GltfArrays, animation: dict[str, Any
 
 
 def _track(arrays: GltfArrays, sampler: dict[str, Any], names: tuple[str, ...], width: int) -> _Track:
-    """Return the keys of a sampler; of vectors (``width`` 3) the first numbers."""
+    """Return the keys of a sampler; of vectors (``width`` 3) the first numbers, of quaternions (4) all."""
     times = arrays.floats(sampler["input"], 1)[:, 0]
     if not len(times) or not 0 <= times[0] <= times[-1] <= LONGEST_S or not (np.diff(times) > 0).all():
         raise InputError("the times of an animation do not rise from 0 on, within a day; export it again")
-    kind = sampler.get("interpolation", "LINEAR")
-    rows = (3 if kind == CUBIC else 1) * len(names)
-    values = arrays.floats(sampler["output"], width, rows * len(times))[:, 0]
+    kind, turns = sampler.get("interpolation", "LINEAR"), width == len(QUATERNION)
+    rows = (3 if kind == CUBIC else 1) * (1 if turns else len(names))
+    values = arrays.floats(sampler["output"], width, rows * len(times))[:, : width if turns else 1]
     shape = (len(times), 3, len(names)) if kind == CUBIC else (len(times), len(names))
     return _Track(names, times, values.reshape(shape), kind)
 

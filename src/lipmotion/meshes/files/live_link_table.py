@@ -18,6 +18,7 @@ from lipmotion.errors import InputError, shortened
 from lipmotion.meshes.files.steady_rate import steady_rows
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, arkit_name
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
+from lipmotion.types.motion import RADIAN
 
 Array = NDArray[np.float64]
 
@@ -25,7 +26,6 @@ FIRST, COUNT = "timecode", "blendshapecount"
 """Names of the first two columns; capitals do not matter, for versions of the app differ."""
 ANGLES = ("Yaw", "Pitch", "Roll")
 """Endings of the curves that are angles of the head and of the eyes."""
-RADIAN = "radian"
 SPEECH_CURVES = frozenset(
     (*ARKIT_MOUTH, "cheekPuff", "cheekSquintLeft", "cheekSquintRight", "noseSneerLeft", "noseSneerRight")
 )

@@ -34,7 +34,6 @@ Array = NDArray[np.float64]
 
 METRIC = (".glb", ".gltf", ".vrm")
 """Suffixes of characters whose unit is the metre."""
-BESIDE_THE_MOUTH = tuple(name for name in ARKIT_OTHERS if name != "cheekPuff")
 
 
 class DrivenPose(NamedTuple):
@@ -163,7 +162,7 @@ class DrivenCharacter:
     def _other_names(self) -> dict[str, str]:
         """The mesh's names of ARKit's blendshapes of eyes and brows, by ARKit's."""
         known = by_arkit_name(shape.name for shape in self.mesh.shapes if len(shape.rows))
-        return {name: known[name] for name in BESIDE_THE_MOUTH if name in known}
+        return {name: known[name] for name in ARKIT_OTHERS if name in known}
 
     @cached_property
     def _displacements(self) -> Array:

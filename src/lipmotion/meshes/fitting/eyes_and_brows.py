@@ -1,11 +1,23 @@
-"""Blinks, glances, brows, and what moods do to the upper face, as weights of ARKit's blendshapes."""
+"""Blinks, glances, brows, and what moods do to the upper face, as weights of ARKit's blendshapes, and back.
+
+Motion of captures, of other programs and of edited files may have such weights itself, and angles of the head. They
+take the place of what a face does by itself; moods are added to them.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.articulation.liveliness import Liveliness
+from lipmotion.articulation.liveliness import GAZE_COUNTER_SHARE, Liveliness
+from lipmotion.meshes.fitting.blendshape_motion import arkit_weights
+from lipmotion.meshes.model.head_angles import ANGLES
+from lipmotion.meshes.model.other_shapes import SIDES
+from lipmotion.meshes.model.shape_names import ARKIT_OTHERS
+from lipmotion.types import Motion
 
 Array = NDArray[np.float64]
 
@@ -17,24 +29,127 @@ CHEEK_SQUINT = 0.6
 """Raised cheeks narrow the eyes by this part of their weight."""
 OUTER_BROW_SHARE = 0.6
 """The outer ends of the brows rise by this part of the weight of the inner ends."""
+LOOKS = tuple(f"{way}{side}" for side in SIDES for way in ("Out", "In", "Up", "Down"))
+"""The ways that ARKit's blendshapes turn each eye."""
+LARGEST_COUNTER_RAD = 0.4
+"""The eyes turn at most so far against a head whose angles are given."""
+MOVED_BY = {
+    "blinks": ("eyeBlinkLeft", "eyeBlinkRight"),
+    "gaze": tuple(f"eyeLook{name}" for name in LOOKS),
+    "brows": tuple(name for name in ARKIT_OTHERS if name.startswith("brow")),
+    "head": ANGLES,
+}
+"""What a face moves by itself, and the curves that take its place."""
+GROUPS = (
+    *MOVED_BY.values(),
+    tuple(name for name in ARKIT_OTHERS if not name.startswith(("eyeBlink", "eyeLook", "brow"))),
+)
+"""Curves that are given together, or not at all; the last ones a face does not move by itself."""
+GIVEN_UNITS = {4: "browDown", 5: "eyeWide", 6: "cheekSquint", 7: "eyeSquint", 9: "noseSneer", 15: "mouthFrown"}
+"""The action units that blendshapes of both sides stand for."""
+SPOKEN_SMILE, FULL_SMILE = 0.3, 0.75
+"""Lips spread by speech smile up to the first weight; the corners rise from it to the second."""
+CORNERS = tuple(f"{name}{side}" for name in ("mouthSmile", "mouthFrown") for side in SIDES)
+
+
+def given_movements(motion: Motion, time_s: Array) -> dict[str, Array]:
+    """Return what a motion says of eyes, brows, cheeks, nose, head and corners of the lips, at some times.
+
+    Each has the shape (len(time_s),).
+
+    Blendshapes have ARKit's names, 0 to 1; angles of the head those of ``ANGLES``, in radians. Groups that never move
+    are left out: exporters write curves that nothing was captured for as 0.
+    """
+    found = {name: curve for name, curve in arkit_weights(motion).items() if name in (*ARKIT_OTHERS, *CORNERS)}
+    found |= {name: motion[name].astype(np.float64) for name in ANGLES if name in motion.names}
+    for group in GROUPS:
+        if any(found[name].any() for name in group if name in found):
+            found |= {name: np.zeros(len(motion.values)) for name in group if name not in found}
+        else:
+            found = {name: curve for name, curve in found.items() if name not in group}
+    return {name: np.interp(time_s, motion.time_s, curve) for name, curve in found.items()}
+
+
+def moves_by_itself(part: str, given: Mapping[str, Array]) -> bool:
+    """Return whether a face moves a part of ``MOVED_BY`` by itself, beside given movements."""
+    return not {*MOVED_BY[part]} & {*given}
+
+
+def with_given(moved: Liveliness, given: Mapping[str, Array]) -> Liveliness:
+    """Return movements of moods, and of what a face moves by itself, with those that are given.
+
+    Faces that move both sides alike show the mean of both.
+    """
+    if not given:
+        return moved
+    none = np.zeros(len(moved.lids))
+
+    def of_both(name: str) -> Array:
+        return (given.get(f"{name}Left", none) + given.get(f"{name}Right", none)) / 2
+
+    inner, outer = given.get("browInnerUp", none), of_both("browOuterUp")
+    raised = np.minimum(inner, outer / OUTER_BROW_SHARE)
+    units = {1: inner - raised, 2: outer - OUTER_BROW_SHARE * raised}
+    units |= {unit: of_both(name) for unit, name in GIVEN_UNITS.items()}
+    units[12] = (of_both("mouthSmile") - SPOKEN_SMILE) / (FULL_SMILE - SPOKEN_SMILE)
+    turn, gaze = moved.turn, moved.gaze
+    if not moves_by_itself("head", given):
+        turn = np.stack([given.get(name, none) for name in ANGLES], axis=1)
+        gaze = gaze - np.clip(GAZE_COUNTER_SHARE * turn[:, :2], -LARGEST_COUNTER_RAD, LARGEST_COUNTER_RAD)
+    if not moves_by_itself("gaze", given):
+        gaze = given_gaze(given)
+    of_mood = eye_and_brow_weights(moved)
+    return replace(
+        moved,
+        lids=np.clip(moved.lids + of_both("eyeBlink"), 0, 1),
+        brows=moved.brows + FULL_BROW_RISE * raised,
+        gaze=gaze,
+        turn=turn,
+        units={**moved.units} | {unit: np.clip(moved.unit(unit) + curve, 0, 1) for unit, curve in units.items()},
+        given={
+            name: curve if name.startswith("eyeLook") else np.clip(of_mood.get(name, 0) + curve, 0, 1)
+            for name, curve in given.items()
+            if name in ARKIT_OTHERS
+        },
+    )
+
+
+def given_gaze(given: Mapping[str, Array]) -> Array:
+    """Return where both eyes look in the mean, to the character's left and upwards, in radians [shape=(F, 2)].
+
+    given : the weights of ARKit's blendshapes that turn the eyes, all of them [each shape=(F,)]
+    """
+    looks = {name: given[f"eyeLook{name}"] for name in LOOKS}
+    across = looks["OutLeft"] - looks["InLeft"] + looks["InRight"] - looks["OutRight"]
+    upwards = looks["UpLeft"] - looks["DownLeft"] + looks["UpRight"] - looks["DownRight"]
+    return FULL_LOOK_RAD / 2 * np.stack([across, upwards], axis=1)
+
+
+def gaze_weights(gaze: Array) -> dict[str, Array]:
+    """Return the weights of ARKit's blendshapes that turn the eyes, 0 to 1 [each shape=(F,)].
+
+    gaze : of both eyes, to the character's left and upwards, in radians [shape=(F, 2)]
+    """
+    across, upwards = gaze.T
+    return {
+        f"eyeLook{name}{side}": np.clip(angle / FULL_LOOK_RAD, 0, 1)
+        for side, outward in (("Left", 1.0), ("Right", -1.0))
+        for name, angle in (("Out", outward * across), ("In", -outward * across), ("Up", upwards), ("Down", -upwards))
+    }
 
 
 def eye_and_brow_weights(moved: Liveliness) -> dict[str, Array]:
-    """Return the weights of ARKit's blendshapes of eyes and brows, 0 to 1 [each shape=(F,)]."""
-    across, upwards = moved.gaze.T
-    raised = np.clip(moved.brows / FULL_BROW_RISE, 0, 1)
+    """Return the weights of ARKit's blendshapes of eyes and brows, 0 to 1 [each shape=(F,)]; given ones as they are."""
+    gaze, raised = gaze_weights(moved.gaze), np.clip(moved.brows / FULL_BROW_RISE, 0, 1)
     moods = _of_moods(moved) if moved.units else {}
     weights: dict[str, Array] = {}
-    for side, outward in (("Left", 1.0), ("Right", -1.0)):
+    for side in SIDES:
         weights[f"eyeBlink{side}"] = np.clip(moved.lids, 0, 1)
-        weights[f"eyeLookOut{side}"] = np.clip(outward * across / FULL_LOOK_RAD, 0, 1)
-        weights[f"eyeLookIn{side}"] = np.clip(-outward * across / FULL_LOOK_RAD, 0, 1)
-        weights[f"eyeLookUp{side}"] = np.clip(upwards / FULL_LOOK_RAD, 0, 1)
-        weights[f"eyeLookDown{side}"] = np.clip(-upwards / FULL_LOOK_RAD, 0, 1)
+        weights |= {name: curve for name, curve in gaze.items() if name.endswith(side)}
         weights[f"browOuterUp{side}"] = np.clip(OUTER_BROW_SHARE * raised + moved.unit(2), 0, 1)
         weights |= {f"{name}{side}": curve for name, curve in moods.items()}
     weights["browInnerUp"] = np.clip(raised + moved.unit(1), 0, 1)
-    return weights
+    return weights | {**moved.given}
 
 
 def _of_moods(moved: Liveliness) -> dict[str, Array]:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from lipmotion.errors import CorpusError, InputError, MissingDependencyError
+from lipmotion.extensions import install_command
 from lipmotion.kernels.threads import one_thread
 
 ItemT = TypeVar("ItemT")
@@ -102,7 +103,7 @@ def cluster_pool(address: str, out: Path) -> Iterator[Pool]:
         from distributed import Client
     except ImportError as error:
         raise MissingDependencyError(
-            "a cluster needs the package distributed: pip install 'lipmotion[cluster]', here and on all workers"
+            f"a cluster needs the package distributed: {install_command('cluster')}, here and on all workers"
         ) from error
     with ExitStack() as stack:
         try:

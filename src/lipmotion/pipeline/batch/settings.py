@@ -23,6 +23,7 @@ from lipmotion.pipeline.model import shipped_path
 from lipmotion.pipeline.outputs.cues import SHEET
 from lipmotion.pipeline.outputs.drawn_video import VIDEO_SUFFIXES
 from lipmotion.pipeline.outputs.scenes import SCENE_SUFFIXES
+from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser
 from lipmotion.storage.files import check_source, sha256_of
 from lipmotion.storage.json_text import as_json
 from lipmotion.storage.sources import is_file
@@ -62,11 +63,12 @@ def check_kinds(kinds: Sequence[str]) -> None:
 
 
 def fingerprint_of(job: Job) -> str:
-    """Return a digest of a job, with the content of the files that it names, and of the version of lipmotion."""
+    """Return a digest of a job, with the content of the files that it names, and of what is installed: the version of
+    lipmotion, and the recogniser of phones."""
     request = replace(job.request, model=job.request.model or shipped_path())
     parts = [{name: _told(value) for name, value in part.as_mapping().items()} for part in (request, job.outputs)]
     parts += [job.delivery.as_mapping(), job.staging.as_mapping(), *_drawings(job.outputs.face)]
-    return _digest(as_json([*parts, installed_version()]))
+    return _digest(as_json([*parts, installed_version(), installed_phone_recogniser()]))
 
 
 def _drawings(face: str) -> list[dict[str, str]]:

@@ -22,9 +22,9 @@ from lipmotion.meshes.fitting.blendshape_motion import is_of_blendshapes, with_m
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, arkit_name
 from lipmotion.pipeline.outputs.curve_sets import with_curves
-from lipmotion.pipeline.outputs.living_curves import RADIAN
 from lipmotion.types import Generation, Motion
 from lipmotion.types.moods import in_time
+from lipmotion.types.motion import RADIAN
 
 
 def delivered(generation: Generation, delivery: Delivery) -> Generation:

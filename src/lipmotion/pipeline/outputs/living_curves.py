@@ -8,10 +8,7 @@ from lipmotion.faces.base import Staging, alive
 from lipmotion.meshes.fitting.eyes_and_brows import eye_and_brow_weights
 from lipmotion.meshes.model.head_angles import ANGLES
 from lipmotion.types import Channel, Motion, Prosody, Timeline, Unit
-from lipmotion.types.motion import WEIGHT
-
-RADIAN = "radian"
-"""The unit of the angles of a head."""
+from lipmotion.types.motion import RADIAN, WEIGHT
 
 
 def living_curves(

@@ -23,17 +23,18 @@ from lipmotion.meshes.files.rig_tables import CONTROL
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.facial_animation import FAP
-from lipmotion.meshes.model.head_angles import ANGLES
-from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, arkit_name
-from lipmotion.pipeline.outputs.curve_sets import ARKIT, LIVING_SETS, VOWELS, WHOLE_FACE, beside, curves_of, with_curves
+from lipmotion.meshes.model.keys import Thinning
+from lipmotion.meshes.model.shape_names import arkit_name
+from lipmotion.pipeline.outputs.curve_sets import ARKIT, LIVING_SETS, WHOLE_FACE, beside, curves_of, with_curves
 from lipmotion.pipeline.outputs.delivered import delivered, held_mouth, with_motion
-from lipmotion.pipeline.outputs.living_curves import RADIAN, living_curves
+from lipmotion.pipeline.outputs.living_curves import living_curves
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
 from lipmotion.pipeline.outputs.prosody import recorded_prosody
 from lipmotion.pipeline.outputs.scenes import sound_reference
 from lipmotion.speech.sound.audio_files import stated_length_s
 from lipmotion.storage.files import as_text
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Prosody
+from lipmotion.types.motion import RADIAN
 
 LOG = logging.getLogger("lipmotion")
 CURVES = (WEIGHT, CONTROL, RADIAN)
@@ -71,6 +72,8 @@ class MotionOutput(Output):
         warn_of_unused(self.path, held, asked)
         frames = settings.delivery.hold_frames(held.motion.rate_hz)
         held = held_mouth(held, frames, performance.once(_closed_s))
+        if motion_format(self.path).keyed and settings.delivery.key_tolerance:
+            held = thinned(held, Thinning(settings.delivery.key_tolerance, tuple(closed_times(held))))
         check_motion(self.path, held.motion)
         return partial(self._write, held, performance)
 
@@ -85,6 +88,23 @@ class MotionOutput(Output):
         if speech and motion_format(self.path).names_sound:
             source["path"] = sound_reference(speech, self.path)
         write_motion(self.path, held, source=source, model=model)
+
+
+def thinned(held: Generation, thinning: Thinning) -> Generation:
+    """Return a generation whose weights go straight between the keys that are kept of each.
+
+    Weights that never exceed the tolerance are left out, and held poses stay as they are.
+    """
+    motion, kept = held.motion, []
+    values = motion.values.astype(np.float64)
+    for column, channel in enumerate(motion.channels):
+        curve = values[:, column]
+        if channel.unit != WEIGHT or np.abs(curve).max(initial=0.0) > thinning.tolerance:
+            kept.append(channel.name)
+        if channel.unit == WEIGHT and channel.name not in held.stepped:
+            keys = thinning.kept(motion.time_s, curve[:, None])
+            values[:, column] = np.interp(motion.time_s, motion.time_s[keys], curve[keys])
+    return replace(held, motion=replace(motion, values=values)).selected(kept)
 
 
 def _delivered(performance: Performance) -> Generation:
@@ -226,8 +246,7 @@ def _curves(generation: Generation, name: str, staging: Staging | None, prosody:
     motion, units = generation.motion, generation.units
     own = _held_already(motion, name)
     if own is None:
-        found = curves_of(motion, units, name, staging=staging, prosody=prosody)
-        return _with_captured(found, motion) if name == VOWELS else found
+        return curves_of(motion, units, name, staging=staging, prosody=prosody)
     if name in (ARKIT, WHOLE_FACE):
         moods = [channel.name for channel in motion.channels if is_mood(channel.name)]
         own = _closed(own, curves_of(beside(own, generation.selected(moods).motion) if moods else own, units, ARKIT))
@@ -237,16 +256,6 @@ def _curves(generation: Generation, name: str, staging: Staging | None, prosody:
     added = [column for column, name in enumerate(living.names) if name not in own.names]
     channels = tuple(living.channels[column] for column in added)
     return beside(own, Motion(living.values[:, added], motion.rate_hz, channels))
-
-
-def _with_captured(curves: Motion, motion: Motion) -> Motion:
-    """Return curves in which eyes, brows and head are those of a motion, where it has them."""
-    known = {arkit_name(name) or name: name for name in reversed(motion.names)}
-    values = curves.values.astype(np.float64)
-    for column, name in enumerate(curves.names):
-        if name in known and name in (*ARKIT_OTHERS, *ANGLES):
-            values[:, column] = motion[known[name]]
-    return replace(curves, values=values)
 
 
 def _closed(own: Motion, mouth: Motion) -> Motion:

@@ -12,6 +12,7 @@ import numpy as np
 from lipmotion.articulation.contact import in_pictures
 from lipmotion.articulation.delivery import closed_times
 from lipmotion.articulation.expression import is_mood
+from lipmotion.articulation.liveliness import CALM
 from lipmotion.articulation.mouth import frame_times, spoken_mouth
 from lipmotion.faces.base import Staging
 from lipmotion.meshes.files.gltf_animator import write_animated_gltf
@@ -128,8 +129,8 @@ def head_scene(
     motion, hertz = generation.motion, rate_hz or generation.motion.rate_hz
     poses = head_poses(motion, generation.units, hertz, staging, prosody)
     character = figure()
-    mesh = head_mesh(character, moods=any(map(is_mood, motion.names)))
     living = living_curves(motion, generation.units, staging, prosody, len(poses), hertz)
+    mesh = head_mesh(character, moods=any(map(is_mood, motion.names)) or any(pose.mood != CALM for pose in poses))
     curves = mouth_weights(character, mesh, poses) | {name: living[name].astype(np.float64) for name in living.names}
     names = [name for name in mesh.shape_names if name in curves]
     weights = Motion(

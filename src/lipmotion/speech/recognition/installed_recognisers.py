@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lipmotion.errors import InputError, MissingDependencyError, shortened
+from lipmotion.extensions import install_command
 from lipmotion.types import Audio, TimedTranscript, TimedWord, TranscriptLine, in_order
 from lipmotion.units.spoken_text import spoken_text, timed_words
 
@@ -55,7 +56,7 @@ def recognise_words(audio: Audio, kind: str) -> TimedTranscript | None:
         module = import_module(recogniser.package)
     except ImportError as error:
         raise MissingDependencyError(
-            f"the recogniser {kind!r} needs {recogniser.package}: pip install 'lipmotion[{recogniser.extra}]'; then "
+            f"the recogniser {kind!r} needs {recogniser.package}: {install_command(recogniser.extra)}; then "
             f"set {recogniser.variable} to the folder of its model (docs/transcripts.md)"
         ) from error
     folder = _folder(recogniser, kind)

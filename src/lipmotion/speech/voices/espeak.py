@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from lipmotion.errors import InputError, LipMotionError, MissingDependencyError
+from lipmotion.extensions import install_command
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.espeak_events import PART, SILENCE
 from lipmotion.speech.voices.espeak_times import corrected_phone_times
@@ -31,7 +32,7 @@ from lipmotion.speech.voices.synthesiser import SynthesisedSentence, Synthesiser
 from lipmotion.types import Span, Timeline
 
 LOG = logging.getLogger("lipmotion")
-PACKAGE, WHEEL, EXTRA = "espeak-ng", "espeakng_loader", "lipmotion[text]"
+PACKAGE, WHEEL, EXTRA = "espeak-ng", "espeakng_loader", "text"
 LANGUAGE = "en-us"
 VARIANTS = ("f1", "f2", "f3", "f4", "m1", "m2", "m3", "m4", "m7", "m8")
 """The variants with the vocal tract, pitch and breath of a person; not the robots, whispers, echoes and growls."""
@@ -135,7 +136,7 @@ def pronounced_words(words: Sequence[str], voice: str) -> list[str]:
     Raises InputError: it fails.
     """
     if voice not in [each.name for each in _others()]:
-        raise MissingDependencyError(f"espeak-ng is not installed, or has no {voice}: pip install '{EXTRA}'")
+        raise MissingDependencyError(f"espeak-ng is not installed, or has no {voice}: {install_command(EXTRA)}")
     task = {"voice": voice, "words": list(words)} | _library()
     found = _answer(program_output(PROGRAM, PACKAGE, len(words), json.dumps(task)))
     if not isinstance(found, list) or len(found) != len(words):

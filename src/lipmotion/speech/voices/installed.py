@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lipmotion.errors import InputError, LipMotionError, MissingDependencyError, shortened
+from lipmotion.extensions import install_command
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.espeak import ESPEAK_NG
 from lipmotion.speech.voices.festival import FESTIVAL
@@ -126,7 +127,7 @@ def nothing_installed() -> MissingDependencyError:
     """Return the error that says how to install a synthesiser."""
     debian = " ".join(synthesiser.package for synthesiser in SYNTHESISERS.values())
     return MissingDependencyError(
-        f"no speech synthesiser is installed; install one: pip install '{ESPEAK_NG.extra}', or: apt install {debian}"
+        f"no speech synthesiser is installed; install one: {install_command(ESPEAK_NG.extra)}, or: apt install {debian}"
     )
 
 
@@ -194,4 +195,4 @@ def _is_other(name: str, synthesiser: Synthesiser) -> bool:
 def how_to_install(synthesiser: Synthesiser) -> str:
     """Return the commands that install a synthesiser, for a message."""
     package = f"apt install {synthesiser.package}"
-    return f"{package}, or pip install '{synthesiser.extra}'" if synthesiser.extra else package
+    return f"{package}, or {install_command(synthesiser.extra)}" if synthesiser.extra else package

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from lipmotion.errors import InputError, MissingDependencyError, shortened
+from lipmotion.extensions import install_command
 from lipmotion.speech.voices.espeak import EXTRA, pronounced_words
 from lipmotion.types.languages import ENGLISH, LANGUAGES, foreign_letters
 from lipmotion.units import Lexicon, Pronunciation
@@ -62,8 +63,8 @@ def _pronounced(words: Sequence[str], language: str) -> dict[str, tuple[Pronunci
         found = espeak_pronunciations(words, spoken.voice or language)
     except MissingDependencyError as error:
         raise MissingDependencyError(
-            f"no pronunciation of {shortened(repr(words[0]))} in {spoken.name}: install espeak-ng (pip install "
-            f"'{EXTRA}'), or give a lexicon file with its {len(words)} words"
+            f"no pronunciation of {shortened(repr(words[0]))} in {spoken.name}: install espeak-ng "
+            f"({install_command(EXTRA)}), or give a lexicon file with its {len(words)} words"
         ) from error
     silent = next((word for word, (phones,) in found.items() if not phones), None)
     if silent is not None:

@@ -63,7 +63,7 @@ class Synthesiser:
     synthesise : yields the sentences of some texts in a voice (name, texts, a folder for temporary files), in order
     phone_map  : its phones to those of the inventory (``phone_maps``)
     others     : returns its voices of other languages and kinds of English
-    extra      : what pip installs it by; empty: it is no Python package
+    extra      : of lipmotion, that installs it; empty: it is no Python package
     """
 
     name: str
