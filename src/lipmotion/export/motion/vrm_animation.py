@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import ExportError
 from lipmotion.export.base import MotionFormat
 from lipmotion.meshes.files.gltf_container import write_container
+from lipmotion.meshes.files.gltf_sound import sound_extras
 from lipmotion.meshes.files.gltf_weights import read_gltf_motion
 from lipmotion.meshes.files.gltf_writer import GltfBuffer
 from lipmotion.meshes.model.head_angles import ANGLES, head_quaternions
@@ -64,7 +65,7 @@ def write(path: Path, generation: Generation, source: Mapping[str, str], _model:
     bones = {name: {"node": number} for number, name in enumerate(BONES)}
     scene: dict[str, Any] = {"nodes": [0, *range(len(BONES), len(nodes))]}
     if source.get("path"):
-        scene["extras"] = {"audio": {"uri": source["path"], "start_s": float(source.get("start_s", 0.0))}}
+        scene["extras"] = sound_extras(source["path"], float(source.get("start_s", 0.0)))
     document = {
         "asset": {"version": "2.0", "generator": "lipmotion"},
         "extensionsUsed": [EXTENSION],
