@@ -55,6 +55,7 @@ def run(options: argparse.Namespace) -> None:
     if options.character.suffix.lower() == ".csv":
         _calibrate_rig(options)
         return
+    stated = _stated(options)
     by_points = bool(options.control_points or options.write_weights or options.write_binding)
     try:
         character = character_of(part_of(options, Outputs(), control_points=by_points))
@@ -63,7 +64,6 @@ def run(options: argparse.Namespace) -> None:
             _write_blank_table(options.character)
         raise
     print_lines("\n".join(described(character)))
-    stated = _stated(options)
     if options.write_table or stated:
         _write_table(character.table_file, character.table_rows(), character, stated)
     if options.write_points:

@@ -78,8 +78,7 @@ class DrivenCharacter:
             )
         if self._own_curves is None:
             return shape_weights(motion, units, self.shapes)
-        solved = shape_weights(self._own_curves.solved(motion), units, self.shapes)
-        return self._own_curves.weights(solved, self.shapes)
+        return self._own_curves.weights(motion, units, self.shapes)
 
     def poses(
         self,

@@ -8,13 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.articulation.contact import LEAST_GAP
 from lipmotion.meshes.files.rig_tables import RigRow, rig_motion
 from lipmotion.meshes.fitting.lip_placement import LipPlacement
-from lipmotion.meshes.fitting.shape_weights import with_gap
+from lipmotion.meshes.fitting.shape_weights import shape_weights, with_gap
 from lipmotion.meshes.model.face_shapes import FaceShapes, parted_lips
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
 from lipmotion.meshes.model.shape_names import arkit_name, spoken_name
-from lipmotion.types import WEIGHT, Channel, Motion
+from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
 
 Array = NDArray[np.float64]
 
@@ -30,39 +31,53 @@ class OwnCurves:
     rows: tuple[RigRow, ...]
     parted: Array
 
-    def weights(self, solved: Motion, shapes: FaceShapes) -> Motion:
+    def weights(self, motion: Motion, units: Timeline[Unit], shapes: FaceShapes) -> Motion:
         """Return the weights of all blendshapes of the mouth, ``offset + gain · solved``, within their limits.
 
-        solved : weights of the shapes (``shape_weights``)
         Where the lips touch in solved weights they touch with these gains, too; elsewhere they are as far apart as the
-        gains make them. What the offsets do to the lips, they do in every frame.
+        gains make them. What the offsets do to the lips, they do in every frame. Weights that the motion has for
+        blendshapes by the mesh's names are such weights already, and stay.
+        Raises InputError: as ``shape_weights``.
         """
-        weights = solved.values.astype(np.float64)
-        gains = np.array([row.gain for row in self.rows])
-        if (gains != 1).any():
-            weights = self._with_gains(weights, shapes, gains)
-        moved = rig_motion(self.rows, dict(zip(shapes.names, weights.T, strict=True)), solved.rate_hz)
+        parting = self._parting(shapes)
+        given = self._given(motion)
+        if given is not None:
+            solved = shape_weights(given, units, replace(shapes, gap=parting))
+        else:
+            solved = shape_weights(motion, units, shapes)
+            if any(row.gain != 1 for row in self.rows):
+                solved = replace(solved, values=self._with_gains(solved.values.astype(np.float64), shapes, parting))
+        curves = dict(zip(shapes.names, solved.values.astype(np.float64).T, strict=True))
+        moved = rig_motion(self.rows, curves, solved.rate_hz)
         return replace(moved, channels=tuple(Channel(name, WEIGHT) for name in moved.names))
 
-    def solved(self, motion: Motion) -> Motion:
-        """Return a motion whose weights of these blendshapes are those that ``weights`` was given; others stay."""
+    def _given(self, motion: Motion) -> Motion | None:
+        """Return a motion with solved weights in place of those of blendshapes by the mesh's names; None: no such."""
         found: dict[str, Array] = {}
         for row in self.rows:
             if row.control in motion.names and row.gain and row.source not in found:
                 found[row.source] = (motion[row.control].astype(np.float64) - row.offset) / row.gain
+        if not found:
+            return None
         kept = [name for name in motion.names if name not in {*found, *(row.control for row in self.rows)}]
         values = [motion[name] for name in kept] + list(found.values())
         channels = [motion.channels[motion.column(name)] for name in kept] + [Channel(name, WEIGHT) for name in found]
-        return Motion(np.stack(values, axis=1), motion.rate_hz, tuple(channels)) if found else motion
+        return Motion(np.stack(values, axis=1), motion.rate_hz, tuple(channels))
 
-    def _with_gains(self, weights: Array, shapes: FaceShapes, gains: Array) -> Array:
-        """Return solved weights that close the lips after the gains where they closed them before [shape=(T, S)]."""
-        columns = [shapes.names.index(row.source) for row in self.rows]
+    def _parting(self, shapes: FaceShapes) -> Array:
+        """Return how far the solved shapes part the lips with these gains [shape=(S,)]."""
         parting = np.zeros(len(shapes.names))
-        np.add.at(parting, columns, gains * self.parted)
+        for row, parted in zip(self.rows, self.parted.tolist(), strict=True):
+            parting[shapes.names.index(row.source)] += row.gain * parted
+        return parting
+
+    def _with_gains(self, weights: Array, shapes: FaceShapes, parting: Array) -> Array:
+        """Return solved weights that close the lips after the gains where they closed them before [shape=(T, S)]."""
+        gains = [row.gain for row in self.rows]
         before, after = weights @ shapes.gap, weights @ parting
-        share = np.clip(after / np.maximum(before, 1e-9), gains.min(), gains.max())
-        return with_gap(weights, replace(shapes, gap=parting), np.where(before > 0, share * before, before))
+        share = np.clip(after / np.maximum(before, 1e-9), min(gains), max(gains))
+        wanted = np.maximum(share * before, np.minimum(before, LEAST_GAP))
+        return with_gap(weights, replace(shapes, gap=parting), np.where(before > 0, wanted, before))
 
 
 def own_curves(
