@@ -24,6 +24,7 @@ PHONES = ("aa", "m", "uw")
 OPENINGS, WIDTHS = (0.25, 0.0, 0.06), (1.0, 0.98, 0.85)
 """Their openings, in eye distances (the first is as wide as talkers open their mouths), and widths, that at rest 1."""
 RATE_HZ, PHONE_S, PAUSE_S = 100.0, 0.3, 0.5
+DIGITS = 6
 LEAST_CHANGE = 1e-3
 """A control that changes by less between two poses does not follow them."""
 
@@ -107,4 +108,4 @@ def _line(control: str, now: np.ndarray, wanted: np.ndarray) -> tuple[float, flo
             f"{shortened(control)!r} follows no curve that tells these poses apart; give it another source in the table"
         )
     gain = float(apart @ (wanted - wanted.mean()) / (apart @ apart))
-    return gain, float(wanted.mean() - gain * now.mean())
+    return gain, round(float(wanted.mean() - gain * now.mean()), DIGITS)
