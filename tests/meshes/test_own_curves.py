@@ -81,7 +81,7 @@ def test_weights_that_are_given_back_stay(file):
 
 @pytest.mark.parametrize(
     ("rows", "message"),
-    [("jawOpn,jawOpen,,\n", "head.character.csv: there is no blendshape 'jawOpn'; nearest: jawOpen"),
+    [("jawOpn,jawOpen,,\n", "head.glb.character.csv: there is no blendshape 'jawOpn'; nearest: jawOpen"),
      ("jawOpen,jawopen,,\n", "'jawOpen' follows 'jawopen', which is no curve; nearest: jawOpen"),
      ("jawOpen,jawOpen,,\njawOpen,,,\n", "'jawOpen' occurs twice"),
      ("jawOpen,jawOpen,,\nmouthPucker,ou,,\n", "has jawOpen and ou; leave the sources of one kind empty")],

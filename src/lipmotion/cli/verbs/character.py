@@ -38,7 +38,9 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     weights = "write the weights of control points, to paint and give back: vertex,point,weight"
     add_output(parser, "--write-weights", metavar="FILE.csv", help=weights)
     add_output(parser, "--write-binding", metavar="FILE.binding", help="write the binding, which is computed once")
-    table = "write which curve moves which blendshape, with gain and offset, beside the character: head.character.csv"
+    table = (
+        "write which curve moves which blendshape, with gain and offset, beside the character: head.glb.character.csv"
+    )
     parser.add_argument("--write-table", action="store_true", help=table)
     for pose, says in CALIBRATION.items():
         parser.add_argument(f"--{pose}", default="", metavar="NAME=X,NAME=X", help=f"{says}; written to the table")

@@ -23,8 +23,9 @@ CLOSED_VISEME = "viseme_PP"
 
 
 def table_path(character: Path) -> Path:
-    """Return where the table of a character is: ``head.glb`` has ``head.character.csv`` in the same folder."""
-    return character.parent / f"{character.name if character.is_dir() else character.stem}{TABLE_SUFFIX}"
+    """Return where the table of a character is: ``head.glb`` has ``head.glb.character.csv`` in the same folder."""
+    named = character.resolve() if character.name in {"", ".."} else character
+    return named.parent / f"{named.name}{TABLE_SUFFIX}"
 
 
 def read_character_table(character: Path, mesh: Mesh) -> dict[str, RigRow]:
