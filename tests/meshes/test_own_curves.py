@@ -11,6 +11,7 @@ from lipmotion.errors import InputError
 from lipmotion.meshes.files.character_tables import table_path
 from lipmotion.meshes.files.rig_tables import write_rig_table
 from lipmotion.meshes.fitting.driven import driven_character
+from lipmotion.meshes.model.face_shapes import life_scale
 from meshes.heads import head, write_glb
 from meshes.speech import motion, units
 
@@ -92,14 +93,10 @@ def test_damaged_tables_are_refused(file, rows, message):
         driven_character(file)
 
 
-@pytest.mark.parametrize("unit", [0.01, 0.1, 1.0])
-def test_a_head_parts_its_lips_as_far_in_any_unit(tmp_path, unit):
+def test_a_head_in_metres_parts_its_lips_as_far_as_in_centimetres(file):
     mesh = head()
-    shapes = tuple(replace(each, displacements=unit * each.displacements) for each in mesh.shapes)
-    write_glb(tmp_path / "head.glb", replace(mesh, vertices=unit * mesh.vertices, shapes=shapes))
-    assert driven_character(tmp_path / "head.glb").shapes.gap == pytest.approx(_gaps_of(tmp_path, mesh), rel=1e-3)
-
-
-def _gaps_of(folder, mesh):
-    write_glb(folder / "whole.glb", mesh)
-    return driven_character(folder / "whole.glb").shapes.gap
+    shapes = tuple(replace(each, displacements=each.displacements / 100) for each in mesh.shapes)
+    write_glb(file.with_name("metres.glb"), replace(mesh, vertices=mesh.vertices / 100, shapes=shapes))
+    metres, centimetres = (driven_character(each) for each in (file.with_name("metres.glb"), file))
+    assert life_scale(centimetres.mesh, centimetres.placement) == pytest.approx(9.0)
+    np.testing.assert_allclose(metres.shapes.gap, centimetres.shapes.gap, rtol=1e-3, atol=1e-6)

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote, unquote, urlsplit
+from urllib.parse import quote, unquote
 
 from lipmotion.meshes.files.gltf_container import read_gltf_document
 from lipmotion.storage.files import as_text
 
 AUDIO = "audio"
+SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:|//")
+"""With this a URI begins that is no path from the folder of the file."""
+LATEST_S = 86_400.0
 
 
 def sound_extras(sound: str, start_s: float) -> dict[str, Any]:
@@ -27,15 +31,15 @@ def named_sound(path: Path) -> tuple[Path, float] | None:
     Only paths from the folder of the file count; whether the sound is there is not looked at.
     Raises InputError: the file is no glTF.
     """
-    json = read_gltf_document(path).json
-    scenes, number = json.get("scenes"), json.get("scene", 0)
-    shown = scenes[number] if isinstance(scenes, list) and isinstance(number, int) and number < len(scenes) else json
-    extras = shown.get("extras") if isinstance(shown, dict) else None
-    given = extras.get(AUDIO) if isinstance(extras, dict) else None
-    uri, start_s = (given.get("uri"), given.get("start_s", 0.0)) if isinstance(given, dict) else (None, 0.0)
-    if not isinstance(uri, str) or not uri or not isinstance(start_s, int | float):
+    json: Any = read_gltf_document(path).json
+    json = json["scenes"][json.get("scene", 0)] if json.get("scenes") else json
+    for key in ("extras", AUDIO):
+        json = json.get(key) if isinstance(json, dict) else None
+    given = json if isinstance(json, dict) else {}
+    uri, start_s = given.get("uri"), given.get("start_s", 0.0)
+    if not isinstance(uri, str) or not uri or not isinstance(start_s, int | float) or not abs(start_s) <= LATEST_S:
         return None
     name = unquote(uri)
-    if "\0" in name or urlsplit(uri).scheme or urlsplit(uri).netloc or Path(name).is_absolute():
+    if "\0" in name or SCHEME.match(uri) or Path(name).is_absolute():
         return None
     return path.parent / name, float(start_s)
