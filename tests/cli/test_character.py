@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import av
@@ -35,6 +36,33 @@ def test_what_is_in_a_file_is_printed(run: RunCommand, glb: Path) -> None:
     assert done.out[-2:] == ["points.csv", "head.png"]
     assert Path("points.csv").read_text().startswith("point,vertex\n61,")
     assert Path("head.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_table_is_written_calibrated_and_found(run: RunCommand, glb: Path, here: Path) -> None:
+    assert run("character", glb, "--write-table").out[-1].endswith("head.glb.character.csv")
+    assert (here / "head.glb.character.csv").read_text(encoding="utf-8-sig").startswith("control,source,gain,offset,")
+    done = run("character", glb, "--open", "jawOpen=0.3", "--closed", "jawOpen=0.02")
+    assert any(line.startswith("table ") for line in done.out)
+    assert "jawOpen        jawOpen: gain 0." in done.out[-2]
+    (here / "rig.csv").write_text("control,source\nJaw,jawOpen\n")
+    assert run("character", "rig.csv", "--open", "Jaw=-20").out[-1] == "rig.csv"
+    assert "Jaw,jawOpen,-" in (here / "rig.csv").read_text(encoding="utf-8-sig")
+    for arguments, message in (
+        (("character", glb, "--open", "0.3"), "--open: '0.3' states no value"),
+        (("character", "rig.csv"), "state values of its controls"),
+    ):
+        done = run(*arguments)
+        assert is_one_error(done, 3)
+        assert message in done.err[0]
+
+
+def test_the_table_of_a_mouth_that_is_not_found_is_written_to_be_filled_in(run: RunCommand, here: Path) -> None:
+    named = tuple(replace(shape, name=f"no {number}") for number, shape in enumerate(head().shapes))
+    write_glb(here / "odd.glb", replace(head(), shapes=named))
+    done = run("character", "odd.glb", "--write-table")
+    assert (done.code, done.out) == (3, ["odd.glb.character.csv"])
+    assert "Say which one does in a table beside the character" in done.err[0]
+    assert (here / "odd.glb.character.csv").read_text(encoding="utf-8-sig").splitlines()[1] == "no 0,,1,0,0,1"
 
 
 def test_a_mesh_without_blendshapes_is_bound_once(run: RunCommand, here: Path, basics: tuple[object, ...]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from shutil import copy
 
 import av
 import numpy as np
@@ -12,7 +13,11 @@ import pytest
 from cli.conftest import RunCommand, is_one_error
 from lipmotion.errors import InputError
 from lipmotion.export.base import read_motion
+from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.motion_input import read_generation
+from lipmotion.pipeline.outputs.scenes import write_scene
+from lipmotion.types import WEIGHT, Channel, Motion
+from meshes.heads import head
 
 
 @pytest.fixture
@@ -53,6 +58,20 @@ def test_blendshapes_without_phones_or_sound(run: RunCommand, here: Path) -> Non
     assert int(np.abs(frames[6] - frames[20]).max()) > 60
     weights = read_motion(here / "a.json")[0]
     assert weights["jawOpen"] == pytest.approx(jaw, abs=1e-3)
+
+
+def test_a_glb_plays_with_its_sound_wherever_its_folder_goes(run: RunCommand, toy_speech: Path, here: Path) -> None:
+    weights = Motion(np.zeros((26, 1)), 25.0, (Channel("jawOpen", WEIGHT),))
+    (here / "old").mkdir()
+    copy(toy_speech, here / "old" / "take #1 50%.wav")
+    write_scene(here / "old" / "a.glb", Scene(head(), weights), here / "old" / "take #1 50%.wav")
+    (here / "old").rename(here / "new")
+    done = run("render", "new/a.glb", "-o", "a.mp4", "--size", "96", "--fps", "5")
+    assert done.code == 0
+    with av.open(str(here / "a.mp4")) as video:
+        assert max(float(np.abs(frame.to_ndarray()).max()) for frame in video.decode(audio=0)) > 0.01
+    (here / "new" / "take #1 50%.wav").unlink()
+    assert "is not there; give a sound" in run("render", "new/a.glb", "-o", "b.json").err[0]
 
 
 def test_sound_and_motion_of_other_lengths(run: RunCommand, motion_file: Path, toy_speech: Path, here: Path) -> None:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from io import StringIO
 from itertools import product
 from pathlib import Path
+from urllib.parse import quote
 from xml.etree import ElementTree
 
 import numpy as np
@@ -203,7 +204,7 @@ def _glb(folder: Path, name: str) -> None:
     )
     document = read_gltf_document(path).json
     assert document["meshes"][0]["extras"]["targetNames"] == [name]
-    assert document["scenes"][0]["extras"]["audio"]["uri"] == f"x{name}"
+    assert document["scenes"][0]["extras"]["audio"]["uri"] == quote(as_text(f"x{name}"), safe="/")
     assert document["materials"][0]["name"] == (name or "part")
 
 

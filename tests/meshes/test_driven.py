@@ -74,13 +74,6 @@ def test_bindings_are_stored_and_painted(files):
         assert max(np.abs(one - two).max() for one, two in pairs) < 1e-4
 
 
-def test_chosen_blendshapes_alone_are_used(files):
-    character = driven_character(files / "head.glb", only=["jawOpen", "mouthPucker"])
-    assert character.weights(motion(), units()).names == ("jawOpen", "mouthPucker")
-    with pytest.raises(InputError, match="no blendshape 'jaw'"):
-        driven_character(files / "head.glb", only=["jaw"])
-
-
 def test_a_mesh_without_blendshapes_needs_points(files):
     with pytest.raises(InputError, match=r"head\.obj: no blendshape opens the mouth.*name the lip points"):
         driven_character(files / "head.obj")

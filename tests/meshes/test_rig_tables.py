@@ -32,7 +32,7 @@ def test_a_control_may_be_constant(tmp_path):
 
 
 def test_an_unknown_source_is_named(tmp_path):
-    with pytest.raises(InputError, match="'Jaw' follows 'jawopen', required one of jawOpen"):
+    with pytest.raises(InputError, match="'Jaw' follows 'jawopen', which is no curve; nearest: jawOpen"):
         rig_motion(_table(tmp_path, "control,source\nJaw,jawopen\n"), SOURCES, 25.0)
 
 

@@ -27,5 +27,5 @@ def test_names_as_files_spell_them():
     assert {spelled: arkit_name(spelled) for spelled in arkit} == arkit
     visemes = {"viseme_PP": "PP", "viseme_I": "ih", "vrc.v_oh": "oh", "Viseme_aa": "aa", "viseme_ZZ": None, "aa": None}
     assert {spelled: viseme_name(spelled) for spelled in visemes} == visemes
-    vowels = {"Fcl_MTH_A": "aa", "aa": "aa", "oh": "oh", "Fcl_MTH_Angry": None, "Alpha": None}
+    vowels = {"Fcl_MTH_A": "aa", "aa": "aa", "う": "ou", "oh": "oh", "Fcl_MTH_Angry": None, "Alpha": None}
     assert {spelled: vowel_name(spelled) for spelled in vowels} == vowels

@@ -118,8 +118,7 @@ def characters(tmp_path_factory: pytest.TempPathFactory) -> dict[str, DrivenChar
     write_obj(folder / "points.obj", plain)
     rows = "".join(f"{point},{vertex}\n" for point, vertex in lip_points(plain).items())
     (folder / "points.csv").write_text("point,vertex\n" + rows)
-    found = {name: driven_character(folder / f"{name}.glb") for name in ("arkit", "visemes")}
-    found["vowels"] = driven_character(folder / "vowels.glb", only=["A", "O", "E"])
+    found = {name: driven_character(folder / f"{name}.glb") for name in ("arkit", "visemes", "vowels")}
     found["points"] = driven_character(folder / "points.obj", points=folder / "points.csv")
     return found
 

@@ -252,7 +252,7 @@ class Job(Configuration):
         except InputError as error:
             raise InputError(f"{path}: {error}") from error
 
-    def of(self, recording: Path, files: tuple[str, ...] | None = None) -> Job:
+    def of(self, recording: Path | None, files: tuple[str, ...] | None = None) -> Job:
         """Return the same job for another recording; with other output files, if some are given."""
         outputs = self.outputs if files is None else replace(self.outputs, files=files)
         return replace(self, request=replace(self.request, recording=recording), outputs=outputs)

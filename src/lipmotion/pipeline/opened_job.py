@@ -42,7 +42,7 @@ class OpenedJob:
     curves: str | driven.DrivenCharacter | None
     edits: EditFile
 
-    def of(self, recording: Path, files: tuple[str, ...] | None = None) -> OpenedJob:
+    def of(self, recording: Path | None, files: tuple[str, ...] | None = None) -> OpenedJob:
         """Return the same for another recording, and other output files, as of ``Job.of``."""
         return replace(self, job=self.job.of(recording, files))
 

@@ -222,6 +222,10 @@ def test_settings_have_a_fingerprint(tmp_path: Path) -> None:
     plain = Job()
     assert fingerprint_of(plain) == fingerprint_of(Job())
     assert fingerprint_of(plain) != fingerprint_of(Job(Request(recogniser="fast")))
+    own = Job(outputs=Outputs(character=tmp_path / "head.glb"))
+    before = fingerprint_of(own)
+    (tmp_path / "head.glb.character.csv").write_text("control,source\n")
+    assert fingerprint_of(own) != before
     lexicon = Job(Request(lexicon=tmp_path / "words.txt"))
     before = fingerprint_of(lexicon)
     (tmp_path / "words.txt").write_text("a EY")

@@ -1,13 +1,28 @@
-"""``lipmotion character``: what a character's files hold, and tables of its lip points and weights."""
+"""``lipmotion character``: what a character's files hold; tables of its curves, lip points and weights."""
 
 from __future__ import annotations
 
 import argparse
+from typing import TYPE_CHECKING
 
 from lipmotion.cli.arguments.declared import add_options, part_of
 from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.cli.terminal.printing import print_line, print_lines
+from lipmotion.errors import InputError, shortened
 from lipmotion.pipeline.job import Outputs
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from lipmotion.meshes.files.rig_tables import RigRow
+    from lipmotion.meshes.fitting.driven import DrivenCharacter
+
+CALIBRATION = {
+    "open": "values at which the mouth is as wide open as speech opens it: A=0.8",
+    "closed": "values at which the lips are closed: A=0.02,M=1",
+    "rounded": "values at which the lips are rounded, as in OO: U=0.9",
+}
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -15,7 +30,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = verbs.add_parser(
         "character", help="look into a character's files: lip points, blendshapes, control points"
     )
-    kinds = "FILE.glb .gltf .vrm .obj, or a folder of .obj files"
+    kinds = "FILE.glb .gltf .vrm .obj, or a folder of .obj files; or a rig's table (.csv), to calibrate"
     add_input(parser, "character", what="character", metavar="FILE", help=kinds)
     add_options(parser, Outputs, "lip_points", "binding", "control_points")
     points = "write the vertex of each lip point, to correct and give back: point,vertex"
@@ -23,6 +38,12 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     weights = "write the weights of control points, to paint and give back: vertex,point,weight"
     add_output(parser, "--write-weights", metavar="FILE.csv", help=weights)
     add_output(parser, "--write-binding", metavar="FILE.binding", help="write the binding, which is computed once")
+    table = (
+        "write which curve moves which blendshape, with gain and offset, beside the character: head.glb.character.csv"
+    )
+    parser.add_argument("--write-table", action="store_true", help=table)
+    for pose, says in CALIBRATION.items():
+        parser.add_argument(f"--{pose}", default="", metavar="NAME=X,NAME=X", help=f"{says}; written to the table")
     add_output(parser, "--picture", metavar="FILE.png", help="draw it at rest")
     parser.set_defaults(run=run)
 
@@ -33,9 +54,20 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.pipeline.opened_job import character_of
     from lipmotion.pipeline.outputs.curve_sets import described, write_picture
 
+    if options.character.suffix.lower() == ".csv":
+        _calibrate_rig(options)
+        return
+    stated = _stated(options)
     by_points = bool(options.control_points or options.write_weights or options.write_binding)
-    character = character_of(part_of(options, Outputs(), control_points=by_points))
+    try:
+        character = character_of(part_of(options, Outputs(), control_points=by_points))
+    except InputError:
+        if options.write_table:
+            _write_blank_table(options.character)
+        raise
     print_lines("\n".join(described(character)))
+    if options.write_table or stated:
+        _write_table(character.table_file, character.table_rows(), character, stated)
     if options.write_points:
         write_points(options.write_points, character.placement)
     if options.write_weights and character.binding is not None:
@@ -47,3 +79,57 @@ def run(options: argparse.Namespace) -> None:
     for path in (options.write_points, options.write_weights, options.write_binding, options.picture):
         if path:
             print_line(path)
+
+
+def _write_blank_table(character: Path) -> None:
+    """Write the table of a character whose mouth was not found, to be filled in; where there is none yet."""
+    from lipmotion.meshes.files.character_files import read_character
+    from lipmotion.meshes.files.character_tables import table_path
+    from lipmotion.meshes.files.rig_tables import write_rig_table
+    from lipmotion.meshes.fitting.own_curves import rows_found
+    from lipmotion.storage.sources import is_file
+
+    path = table_path(character)
+    if not is_file(path):
+        write_rig_table(path, rows_found(read_character(character), None, {}))
+        print_line(path)
+
+
+def _calibrate_rig(options: argparse.Namespace) -> None:
+    from lipmotion.meshes.files.rig_tables import read_rig_table
+
+    rows, stated = read_rig_table(options.character), _stated(options)
+    if not stated:
+        raise InputError(f"{options.character}: is a rig's table; state values of its controls: --open NAME=X")
+    _write_table(options.character, rows, options.character, stated)
+
+
+def _write_table(
+    path: Path, rows: Sequence[RigRow], curves: DrivenCharacter | Path, stated: dict[str, dict[str, float]]
+) -> None:
+    """Write a table with the gains and offsets by which its controls have the stated values; print those."""
+    from lipmotion.meshes.files.rig_tables import write_rig_table
+    from lipmotion.pipeline.outputs.calibration import calibrated, posed_sources
+
+    changed = calibrated(rows, posed_sources(curves, rows), stated) if stated else rows
+    for row in changed:
+        if row not in rows:
+            print_line(f"{shortened(row.control):14} {row.source}: gain {row.gain:.3g}, offset {row.offset:.3g}")
+    write_rig_table(path, changed)
+    print_line(path)
+
+
+def _stated(options: argparse.Namespace) -> dict[str, dict[str, float]]:
+    """Return what options say of controls in poses. Raises InputError: something that states no value."""
+    stated: dict[str, dict[str, float]] = {}
+    for pose in CALIBRATION:
+        for part in filter(None, getattr(options, pose).split(",")):
+            name, _, text = part.rpartition("=")
+            try:
+                value = float(text)
+            except ValueError:
+                value = float("nan")
+            if not name.strip() or not abs(value) < float("inf"):
+                raise InputError(f"--{pose}: {shortened(part)!r} states no value, required NAME=X, as A=0.8")
+            stated.setdefault(pose, {})[name.strip()] = value
+    return stated

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,12 +20,15 @@ if TYPE_CHECKING:
     from lipmotion.types import Monitor
 
 
+LOG = logging.getLogger("lipmotion")
+
+
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb to the parser of the command line."""
     parser = verbs.add_parser("render", help="draw edited or imported motion, or write it in another form")
     motion = "motion file: .json .csv .npz, or another that can be read; or edits (docs/edit.md)"
     add_input(parser, "motion", what="motion file", replaceable=True, help=motion)
-    sound = "the sound of videos (default: none; the video is silent)"
+    sound = "the sound of videos (default: the one that a .glb names; without one the video is silent)"
     add_input(parser, "--sound", what="recording", metavar="FILE", help=sound)
     phones = "phones in time for motion without them: they move tongue and lips where the channels do not"
     add_options(parser, Request, "units", units={"help": phones})
@@ -41,7 +45,7 @@ def run(options: argparse.Namespace) -> None:
 
     with reporting(options) as report:
         with written_pipe(options) as (files, pipe):
-            job = opened(part_of(options, Job()).of(options.sound, files))
+            job = opened(part_of(options, Job()).of(options.sound or _sound_named_by(options.motion), files))
             _render(job, options.motion, report.receive)
         written = [] if pipe else list(files)
         report.finish("\n".join(map(printable, written)), files=written)
@@ -68,6 +72,23 @@ def _render(job: OpenedJob, motion: Path, monitor: Monitor) -> None:
         samples = round(float(generation.motion.time_s[-1]) * SILENT_HZ)
         sound = Audio(np.zeros(samples, np.float32), SILENT_HZ)
     job.write(generation, sound, monitor=monitor)
+
+
+def _sound_named_by(motion: Path) -> Path | None:
+    """Return the sound that a glTF file of motion names, where it is there and begins with the motion."""
+    from lipmotion.meshes.files.gltf_sound import named_sound
+    from lipmotion.pipeline.outputs.scenes import GLTF
+    from lipmotion.storage.sources import is_file
+
+    named = named_sound(motion) if motion.suffix.lower() == GLTF and is_file(motion) else None
+    if named is None:
+        return None
+    sound, start_s = named
+    if not start_s and is_file(sound):
+        return sound
+    why = "is not there" if not start_s else f"begins at {start_s:g} s of the motion"
+    LOG.warning("%s: its sound %s %s; give a sound: --sound FILE", motion, sound, why)
+    return None
 
 
 def _replay(job: OpenedJob, path: Path, monitor: Monitor) -> None:

@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from lipmotion.errors import ExportError
 from lipmotion.export.base import MotionFormat
 from lipmotion.meshes.files.gltf_container import write_container
+from lipmotion.meshes.files.gltf_sound import sound_extras
 from lipmotion.meshes.files.gltf_weights import read_gltf_motion
 from lipmotion.meshes.files.gltf_writer import GltfBuffer
-from lipmotion.meshes.fitting.mood_weights import EMOTIONS
 from lipmotion.meshes.model.head_angles import ANGLES, head_quaternions
 from lipmotion.meshes.model.keys import with_jumps
-from lipmotion.meshes.model.shape_names import VRM_VOWELS
+from lipmotion.meshes.model.shape_names import VRM_EMOTIONS, VRM_VOWELS
 from lipmotion.types import Generation, Motion
 
 Array = NDArray[np.float64]
@@ -65,7 +65,7 @@ def write(path: Path, generation: Generation, source: Mapping[str, str], _model:
     bones = {name: {"node": number} for number, name in enumerate(BONES)}
     scene: dict[str, Any] = {"nodes": [0, *range(len(BONES), len(nodes))]}
     if source.get("path"):
-        scene["extras"] = {"audio": {"uri": source["path"], "start_s": float(source.get("start_s", 0.0))}}
+        scene["extras"] = sound_extras(source["path"], float(source.get("start_s", 0.0)))
     document = {
         "asset": {"version": "2.0", "generator": "lipmotion"},
         "extensionsUsed": [EXTENSION],
@@ -85,7 +85,7 @@ def write(path: Path, generation: Generation, source: Mapping[str, str], _model:
 
 def _expressions(motion: Motion) -> dict[str, Array]:
     """Return the curves of the expressions, 0 to 1: one blink of both eyes where they do the same."""
-    curves = {name: motion[name].astype(np.float64) for name in (*VRM_VOWELS, *EMOTIONS) if name in motion.names}
+    curves = {name: motion[name].astype(np.float64) for name in (*VRM_VOWELS, *VRM_EMOTIONS) if name in motion.names}
     if all(name in motion.names for name in BLINKS):
         left, right = (motion[name].astype(np.float64) for name in BLINKS)
         same = np.array_equal(left, right)

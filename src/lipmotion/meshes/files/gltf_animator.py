@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.meshes.files.gltf_container import GltfDocument, read_gltf_document, write_container
 from lipmotion.meshes.files.gltf_scene import target_names
+from lipmotion.meshes.files.gltf_sound import sound_extras
 from lipmotion.meshes.model.keys import EVERY_KEY, Thinning, keys_of
 from lipmotion.types import Motion
 
@@ -65,7 +66,7 @@ def write_animated_gltf(
     if sound:
         shown = json["scenes"][json.get("scene", 0)] if json.get("scenes") else json
         extras = shown.get("extras")
-        shown["extras"] = (extras if isinstance(extras, dict) else {}) | {"audio": {"uri": sound, "start_s": sound_s}}
+        shown["extras"] = (extras if isinstance(extras, dict) else {}) | sound_extras(sound, sound_s)
     write_container(path, json, bytes(body))
     return True
 

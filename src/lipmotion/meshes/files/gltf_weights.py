@@ -21,9 +21,9 @@ from lipmotion.meshes.files.gltf_container import GltfDocument, plain_name, read
 from lipmotion.meshes.files.gltf_nodes import placed_nodes
 from lipmotion.meshes.files.gltf_scene import target_names
 from lipmotion.meshes.files.steady_rate import exact_rate
-from lipmotion.meshes.fitting.mood_weights import EMOTIONS
 from lipmotion.meshes.model.bones import HEAD, NECK, bone_kind
 from lipmotion.meshes.model.head_angles import ANGLES, head_angles
+from lipmotion.meshes.model.shape_names import VRM_EMOTIONS
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
 from lipmotion.types.moods import MOODS
 from lipmotion.types.motion import RADIAN
@@ -43,7 +43,7 @@ KNOWN_AS = {
     "blink": ("eyeBlinkLeft", "eyeBlinkRight"),
     "blinkLeft": ("eyeBlinkLeft",),
     "blinkRight": ("eyeBlinkRight",),
-    **{mood: (PREFIX + mood,) for mood in MOODS if mood in EMOTIONS},
+    **{mood: (PREFIX + mood,) for mood in MOODS if mood in VRM_EMOTIONS},
 }
 """Expressions of VRM that are blendshapes of ARKit, or moods."""
 QUATERNION = ("x", "y", "z", "w")

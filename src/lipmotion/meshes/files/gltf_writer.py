@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.meshes.files.gltf_container import write_container
+from lipmotion.meshes.files.gltf_sound import sound_extras
 from lipmotion.meshes.model.mesh import Blendshape, MeshPart
 from lipmotion.meshes.model.scene import HeadTurn, Scene, ShadingNormals, shading_normals
 
@@ -79,8 +80,7 @@ def write_gltf_scene(path: Path, scene: Scene) -> None:
     """Write a scene as ``.glb``: its mesh with blendshapes, and their weights over time as its animation.
 
     Every part becomes a primitive with its own vertices; those that no blendshape moves are a mesh of their own.
-    Textures are not written, colours of vertices are. A sound is named as ``extras`` of the scene, which programs that
-    do not know it pass on: ``{"audio": {"uri": ..., "start_s": ...}}``.
+    Textures are not written, colours of vertices are. A sound is named as ``extras`` of the scene (``gltf_sound``).
     Raises ExportError: the file cannot be written.
     """
     buffer = GltfBuffer()
@@ -118,7 +118,7 @@ def _document(scene: Scene, buffer: GltfBuffer, normals: ShadingNormals) -> dict
         "materials": materials,
     }
     if scene.sound:
-        document["scenes"][0]["extras"] = {"audio": {"uri": scene.sound, "start_s": scene.sound_s}}
+        document["scenes"][0]["extras"] = sound_extras(scene.sound, scene.sound_s)
     if scene.turn is not None:
         _add_joints(document, buffer, scene.turn)
     if scene.weights is not None and len(scene.weights.values) and (mesh.shapes or scene.turn):

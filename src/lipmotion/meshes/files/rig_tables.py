@@ -1,18 +1,19 @@
-"""A user's own rig: a table that says which controls follow which curves."""
+"""A user's own rig: a table that says which controls follow which curves, with gain and offset."""
 
 from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
-from lipmotion.storage.files import read_text_file
+from lipmotion.storage.files import read_text_file, whole_file
 from lipmotion.types import Channel, Motion
 
 COLUMNS = ("control", "source", "gain", "offset", "low", "high")
@@ -35,6 +36,10 @@ class RigRow:
     offset: float = 0.0
     low: float = -np.inf
     high: float = np.inf
+
+    def alone(self, curve: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the control where no other row moves it.  curve : of the source"""
+        return np.clip(self.offset + self.gain * curve, self.low, self.high)
 
 
 def read_rig_table(path: Path) -> tuple[RigRow, ...]:
@@ -65,6 +70,24 @@ def read_rig_table(path: Path) -> tuple[RigRow, ...]:
     return tuple(rows)
 
 
+def write_rig_table(path: Path, rows: Iterable[RigRow]) -> None:
+    """Write a table, which ``read_rig_table`` reads. Raises ExportError: it cannot be written."""
+    with whole_file(path) as unfinished, unfinished.open("w", encoding="utf-8-sig", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(COLUMNS)
+        for row in rows:
+            limits = [f"{limit:g}" if np.isfinite(limit) else "" for limit in (row.low, row.high)]
+            table.writerow([row.control, row.source, f"{row.gain:.4g}", f"{row.offset:.4g}", *limits])
+
+
+def nearest(name: str, names: Iterable[str]) -> str:
+    """Return what a message says where there is no such name: the nearest ones, or else the first ones."""
+    known = list(dict.fromkeys(names))
+    by_lower = {each.lower(): each for each in reversed(known)}
+    near = [by_lower[each] for each in get_close_matches(name.lower(), by_lower, 3)]
+    return f"nearest: {', '.join(near)}" if near else f"there are {shortened(', '.join(known)) or 'none'}"
+
+
 def rig_motion(rows: tuple[RigRow, ...], sources: Mapping[str, NDArray[np.float64]], rate_hz: float) -> Motion:
     """Return the controls of a rig over time, in the order of the table.
 
@@ -75,8 +98,10 @@ def rig_motion(rows: tuple[RigRow, ...], sources: Mapping[str, NDArray[np.float6
     limits: dict[str, tuple[float, float]] = {}
     for row in rows:
         if row.source and row.source not in sources:
-            some = ", ".join(list(sources)[:8])
-            raise InputError(f"the control {row.control!r} follows {row.source!r}, required one of {some}, ...")
+            raise InputError(
+                f"the control {shortened(row.control)!r} follows {shortened(row.source)!r}, which is no curve; "
+                f"{nearest(row.source, sources)}"
+            )
         value = row.gain * sources[row.source] if row.source else np.zeros(len(next(iter(sources.values()))))
         curves[row.control] = curves.get(row.control, 0.0) + value + row.offset
         limits.setdefault(row.control, (row.low, row.high))

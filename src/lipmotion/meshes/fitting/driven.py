@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
@@ -18,22 +18,22 @@ from lipmotion.articulation.mouth import SpokenMouth
 from lipmotion.errors import InputError
 from lipmotion.meshes.files.binding_files import BINDING_SUFFIX, load_binding, read_points, read_weights
 from lipmotion.meshes.files.character_files import read_character
+from lipmotion.meshes.files.character_tables import read_character_table, table_path, with_sources
+from lipmotion.meshes.files.rig_tables import RigRow
 from lipmotion.meshes.fitting.lip_placement import LipPlacement, placed_by_points, placed_by_shape, surface_of_named
-from lipmotion.meshes.fitting.mood_weights import EMOTIONS, expression_weights
+from lipmotion.meshes.fitting.mood_weights import expression_weights
+from lipmotion.meshes.fitting.own_curves import OwnCurves, own_curves, plain_row, rows_found
 from lipmotion.meshes.fitting.point_motion import point_motion
 from lipmotion.meshes.fitting.shape_weights import shape_weights
 from lipmotion.meshes.model.binding import ControlBinding, bind, painted
-from lipmotion.meshes.model.face_shapes import FaceShapes, face_shapes
+from lipmotion.meshes.model.face_shapes import FaceShapes, face_shapes, numbers_by_name
 from lipmotion.meshes.model.jaw_bone import with_jaw
 from lipmotion.meshes.model.mesh import Mesh
-from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, by_arkit_name
+from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, VRM_EMOTIONS, arkit_name
 from lipmotion.meshes.model.surface import mesh_surface
 from lipmotion.types import Motion, Timeline, Unit
 
 Array = NDArray[np.float64]
-
-METRIC = (".glb", ".gltf", ".vrm")
-"""Suffixes of characters whose unit is the metre."""
 
 
 class DrivenPose(NamedTuple):
@@ -54,6 +54,7 @@ class DrivenCharacter:
     shapes  : the blendshapes of its mouth; None: control points move it
     binding : weights of control points; None: blendshapes move it
     file    : where it was read from; None: from no file
+    table   : rows of the table beside its file, by blendshapes
     """
 
     mesh: Mesh
@@ -61,6 +62,7 @@ class DrivenCharacter:
     shapes: FaceShapes | None
     binding: ControlBinding | None
     file: Path | None = None
+    table: Mapping[str, RigRow] = field(default_factory=dict)
 
     def weights(self, motion: Motion, units: Timeline[Unit]) -> Motion:
         """Return the weights of the blendshapes over time, channels by the names of the mesh, 0 to 1.
@@ -72,7 +74,9 @@ class DrivenCharacter:
                 "the character is moved by control points and has no weights of blendshapes; write a video, or the "
                 "motion without --character"
             )
-        return shape_weights(motion, units, self.shapes)
+        if self._own_curves is None:
+            return shape_weights(motion, units, self.shapes)
+        return self._own_curves.weights(motion, units, self.shapes)
 
     def poses(
         self,
@@ -92,12 +96,12 @@ class DrivenCharacter:
         beside, contact = self._beside(others or {}, len(time_s)), points.mouth.contact
         moved = points.expressed
         if self.shapes is not None:
-            moved = shape_weights(motion, units, self.shapes).values.astype(np.float64)
+            moved = self.weights(motion, units).values.astype(np.float64)
         rows = in_pictures(moved, contact, motion.rate_hz, time_s)
         moods = self.expressions(motion, points.mouth)
         if moods:
             table = np.stack([moods.get(name, np.zeros(len(contact))) for name in self._expressions.values()], axis=1)
-            beside[:, len(self._other_names) :] = in_pictures(table, contact, motion.rate_hz, time_s)
+            beside[:, len(self._other_rows) :] = in_pictures(table, contact, motion.rate_hz, time_s)
         return list(map(DrivenPose, rows, beside))
 
     def expressions(self, motion: Motion, mouth: SpokenMouth) -> dict[str, Array]:
@@ -106,7 +110,8 @@ class DrivenCharacter:
         None, where the character has finer shapes, or no expressions. Those that part the lips vanish in p, b and m.
         """
         found = expression_weights(moods_shown(motion)) if self._expressions else {}
-        curves = {own: found[name] for name, own in self._expressions.items() if name in found}
+        shown = [(name, own) for name, own in self._expressions.items() if name in found]
+        curves = {own: self.table.get(own, plain_row(own, name)).alone(found[name]) for name, own in shown}
         return {
             own: curve * mouth.free if self._parted_by(own) > LEAST_GAP / 2 else curve for own, curve in curves.items()
         }
@@ -119,10 +124,10 @@ class DrivenCharacter:
     @cached_property
     def _expressions(self) -> dict[str, str]:
         """The mesh's names of VRM's expressions, by VRM's; none where it has ARKit's blendshapes of brows."""
-        if {"browDownLeft", "browInnerUp", "browDownRight"} & {*self._other_names}:
+        if {"browDownLeft", "browInnerUp", "browDownRight"} & {row.source for row in self._other_rows}:
             return {}
-        own = {shape.name.lower(): shape.name for shape in self.mesh.shapes if len(shape.rows)}
-        return {name: own[name] for name in EMOTIONS if name in own}
+        own = {shape.called.lower(): shape.name for shape in self.mesh.shapes if len(shape.rows)}
+        return {name: own[name] for name in VRM_EMOTIONS if name in own}
 
     def vertices(
         self, motion: Motion, units: Timeline[Unit], time_s: Array, others: Mapping[str, Array] | None = None
@@ -148,7 +153,7 @@ class DrivenCharacter:
     @cached_property
     def moving(self) -> NDArray[np.int64]:
         """The vertices that ever move, but for the turning of the head, ascending [shape=(N,)]."""
-        names = {*(self.shapes.names if self.shapes else ()), *self._other_names.values(), *self._expressions.values()}
+        names = {*self._mouth_names, *(row.control for row in self._other_rows), *self._expressions.values()}
         rows = [shape.rows for shape in self.mesh.shapes if shape.name in names]
         if self.binding is not None:
             rows.append(self.binding.rows)
@@ -156,30 +161,71 @@ class DrivenCharacter:
 
     def has_shape(self, known: str) -> bool:
         """Return whether the mesh has a blendshape that moves something, by its name of ARKit."""
-        return known in self._other_names or (self.shapes is not None and known in self.shapes.known)
+        others = (row.source for row in self._other_rows)
+        return known in others or (self.shapes is not None and known in self.shapes.known)
+
+    def beside(self, others: Mapping[str, Array], count: int) -> dict[str, Array]:
+        """Return the weights of the blendshapes of eyes and brows over time, by the mesh's names [each shape=(T,)].
+
+        others : weights of ARKit's blendshapes [each shape=(T,)]; those that are missing are 0;  count : of frames
+        """
+        nothing = np.zeros(count)
+        return {row.control: row.alone(others.get(row.source, nothing)) for row in self._other_rows}
+
+    def table_rows(self) -> tuple[RigRow, ...]:
+        """Return the table of the character: the rows that it has, and for other blendshapes what moves them now."""
+        beside = {
+            shape.name: shape.called.lower() for shape in self.mesh.shapes if shape.called.lower() in VRM_EMOTIONS
+        }
+        beside |= {row.control: row.source for row in self._other_rows}
+        found = rows_found(self.mesh, self.shapes, beside)
+        return tuple(self.table.get(row.control, row) for row in found)
+
+    @property
+    def table_file(self) -> Path:
+        """Where the table of the character is. Raises InputError: it is from no file."""
+        if self.file is None:
+            raise InputError("the character was read from no file, so no table is beside it; read it from one")
+        return table_path(self.file)
 
     @cached_property
-    def _other_names(self) -> dict[str, str]:
-        """The mesh's names of ARKit's blendshapes of eyes and brows, by ARKit's."""
-        known = by_arkit_name(shape.name for shape in self.mesh.shapes if len(shape.rows))
-        return {name: known[name] for name in ARKIT_OTHERS if name in known}
+    def _own_curves(self) -> OwnCurves | None:
+        return own_curves(self.mesh, self.placement, self.shapes, self.table) if self.shapes else None
+
+    @cached_property
+    def _mouth_names(self) -> tuple[str, ...]:
+        """The mesh's names of the blendshapes of the mouth."""
+        if self._own_curves is not None:
+            return tuple(dict.fromkeys(row.control for row in self._own_curves.rows))
+        return self.shapes.names if self.shapes else ()
+
+    @cached_property
+    def _other_rows(self) -> tuple[RigRow, ...]:
+        """What moves ARKit's blendshapes of eyes and brows, in ARKit's order."""
+        numbers = numbers_by_name(self.mesh, arkit_name)
+        found = [(known, self.mesh.shapes[number]) for known in ARKIT_OTHERS for number in numbers.get(known, ())]
+        return tuple(
+            replace(self.table.get(shape.name, plain_row(shape.name, known)), source=known)
+            for known, shape in found
+            if len(shape.rows)
+        )
 
     @cached_property
     def _displacements(self) -> Array:
         """What every blendshape of the mouth does to the moving vertices [shape=(S, N · 3)]."""
-        return self._moved(self.shapes.names if self.shapes else ())
+        return self._moved(self._mouth_names)
 
     @cached_property
     def _others(self) -> Array:
         """What the blendshapes of eyes and brows do to the moving vertices [shape=(S, N · 3)]."""
-        return self._moved((*self._other_names.values(), *self._expressions.values()))
+        return self._moved((*(row.control for row in self._other_rows), *self._expressions.values()))
 
     def _moved(self, names: Sequence[str]) -> Array:
         return self.mesh.displacements(self.moving, names).reshape(len(names), 3 * len(self.moving))
 
     def _beside(self, others: Mapping[str, Array], count: int) -> Array:
         """Return the weights of the blendshapes of eyes and brows over time [shape=(T, S)]."""
-        columns = [others.get(known, np.zeros(count)) for known in (*self._other_names, *self._expressions)]
+        columns = [*self.beside(others, count).values(), *(np.zeros(count) for _ in self._expressions)]
         return np.stack(columns, axis=1) if columns else np.zeros((count, 0))
 
     def _shaped(self, moved: Array, other: Array) -> Array:
@@ -191,29 +237,25 @@ class DrivenCharacter:
 
 
 def driven_character(
-    path: str | Path,
-    *,
-    points: Path | None = None,
-    binding: Path | None = None,
-    by_points: bool = False,
-    only: Sequence[str] = (),
+    path: str | Path, *, points: Path | None = None, binding: Path | None = None, by_points: bool = False
 ) -> DrivenCharacter:
-    """Return a character from its files, ready to be moved.
+    """Return a character from its files, ready to be moved; with the table beside it, if there is one.
 
     path      : ``.glb``, ``.gltf``, ``.vrm``, ``.obj``, or a folder of OBJ files
     points    : a table of the vertices of lip points; None: they are found by the blendshape that opens the mouth
     binding   : a binding file, or a table of painted weights (``.csv``); both mean control points
     by_points : move it by control points, though it has blendshapes
-    only      : the names of the blendshapes to use; empty: those that are understood
     Raises InputError: a file is damaged, or what moves the mouth is not found in it.
     Raises ModelFormatError: the binding is damaged.
     """
-    mesh, in_metres = with_jaw(read_character(path)), Path(path).suffix.lower() in METRIC
+    path, mesh = Path(path), with_jaw(read_character(path))
+    table = read_character_table(path, mesh)
+    mesh = with_sources(mesh, table)
     is_stored = binding is not None and binding.suffix.lower() == BINDING_SUFFIX
     try:
         if is_stored and binding is not None:
             stored = load_binding(binding, mesh)
-            return DrivenCharacter(mesh, stored.placement, None, stored, Path(path))
+            return DrivenCharacter(mesh, stored.placement, None, stored, path, table)
         if points is not None:
             named = read_points(points)
             surface = surface_of_named(mesh, named)
@@ -222,13 +264,11 @@ def driven_character(
             surface = mesh_surface(mesh)
             placement = placed_by_shape(mesh, surface)
         if mesh.shapes and not by_points and binding is None:
-            return DrivenCharacter(
-                mesh, placement, face_shapes(mesh, placement, only, in_metres=in_metres), None, Path(path)
-            )
+            return DrivenCharacter(mesh, placement, face_shapes(mesh, placement), None, path, table)
         bound = bind(mesh, surface, placement)
         if binding is not None:
             bound = painted(bound, mesh, read_weights(binding))
-        return DrivenCharacter(mesh, placement, None, bound, Path(path))
+        return DrivenCharacter(mesh, placement, None, bound, path, table)
     except InputError as error:
         text = str(error)
         raise InputError(text if str(path) in text else f"{path}: {text}") from error

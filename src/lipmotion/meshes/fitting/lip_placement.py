@@ -173,13 +173,13 @@ def opening_shape(mesh: Mesh) -> Blendshape:
         lambda name: "open" in name.lower() and ("mouth" in name.lower() or "jaw" in name.lower()),
     )
     for test in tests:
-        found = next((shape for shape in mesh.shapes if len(shape.rows) and test(shape.name)), None)
+        found = next((shape for shape in mesh.shapes if len(shape.rows) and test(shape.called)), None)
         if found is not None:
             return found
     names = shortened(", ".join(mesh.shape_names)) or "none"
     raise InputError(
-        f"no blendshape opens the mouth, required jawOpen, viseme_aa or aa; the mesh has: {names}. Rename one, or name "
-        "the lip points by their vertices (docs/meshes.md)"
+        f"no blendshape opens the mouth, required jawOpen, viseme_aa or aa; the mesh has: {names}. Say which one "
+        "does in a table beside the character, or name the lip points by their vertices (docs/meshes.md)"
     )
 
 

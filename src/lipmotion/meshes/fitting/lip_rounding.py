@@ -16,10 +16,10 @@ Array = NDArray[np.float64]
 
 PUCKER, FUNNEL = 0.5, 0.3
 """Least weights of ``mouthPucker`` and ``mouthFunnel`` in a phone of roundness 1."""
-MOST_NARROWING = 0.11
-"""Where both make the mouth narrower than this, in eye distances, there is less of them."""
-LEAST_SHARE = 0.6
-"""The least share of them that remains then."""
+NARROWING = 0.11
+"""Both together make the mouth narrower by this, in eye distances; there is less, or more, of them for it."""
+SHARES = (0.6, 1.4)
+"""The least and the largest share of them that there is then."""
 SPREADING = tuple(
     f"{name}{side}" for name in ("mouthSmile", "mouthStretch", "mouthDimple") for side in ("Left", "Right")
 )
@@ -37,7 +37,7 @@ def rounded_weights(weights: Array, shapes: FaceShapes, protrusion: Array) -> Ar
     wanted = [(shapes.row(name), most) for name, most in (("mouthPucker", PUCKER), ("mouthFunnel", FUNNEL))]
     present = [(row, most) for row, most in wanted if row is not None]
     narrower = sum(most * float(shapes.moved[row, right, 0] - shapes.moved[row, left, 0]) for row, most in present)
-    share = float(np.clip(MOST_NARROWING / narrower, LEAST_SHARE, 1.0)) if narrower > 0 else 1.0
+    share = float(np.clip(NARROWING / narrower, *SHARES)) if narrower > 0 else 1.0
     for row, most in present:
         result[:, row] = np.maximum(result[:, row], share * most * protrusion)
     rows = [row for row in map(shapes.row, SPREADING) if row is not None]

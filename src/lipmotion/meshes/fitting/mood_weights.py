@@ -34,8 +34,6 @@ EXPRESSIONS: Mapping[str, tuple[tuple[str, float], ...]] = {
     "tired": (("sad", 0.3), ("relaxed", 0.4)),
 }
 """The expressions of VRM that stand for a mood, with their weights, on characters without finer shapes."""
-EMOTIONS = tuple(sorted({name for each in EXPRESSIONS.values() for name, _ in each}))
-"""The expressions of VRM that moods use."""
 
 
 def mood_weights(mouth: SpokenMouth, shapes: FaceShapes) -> Array | None:

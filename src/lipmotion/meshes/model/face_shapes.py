@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,7 @@ from lipmotion.articulation.lip_points import CHIN, FACING
 from lipmotion.errors import InputError, shortened
 from lipmotion.meshes.fitting.lip_placement import LipPlacement
 from lipmotion.meshes.model.mesh import Mesh
-from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, arkit_name, viseme_name, vowel_name
+from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, arkit_name, spoken_name
 
 Array = NDArray[np.float64]
 
@@ -62,65 +62,95 @@ class FaceShapes:
 
 
 def life_scale(mesh: Mesh, placement: LipPlacement) -> float:
-    """Return the length of an eye distance in units of a mesh that is in metres: of a head as high as people's, theirs.
+    """Return the length of an eye distance in units of a mesh: of a head as high as people's, theirs.
 
+    The unit is the metre, the decimetre, the centimetre or another power of ten: the one in which the head is as high.
     Of a head of another size, it is that of the placement, which goes by the width of the mouth.
     """
     heights = mesh.vertices @ (placement.axes[:, 1] / np.linalg.norm(placement.axes[:, 1]))
-    height_m = float(heights.max() - heights[placement.vertices[placement.row(CHIN)]])
-    return EYES_M if HEAD_M[0] <= height_m <= HEAD_M[1] else placement.scale
+    height = max(float(heights.max() - heights[placement.vertices[placement.row(CHIN)]]), 1e-12)
+    unit = 10.0 ** np.floor(np.log10(height / HEAD_M[0]))
+    return float(EYES_M * unit) if height / unit <= HEAD_M[1] else placement.scale
 
 
-def face_shapes(
-    mesh: Mesh, placement: LipPlacement, only: Collection[str] = (), *, in_metres: bool = False
-) -> FaceShapes:
+def face_shapes(mesh: Mesh, placement: LipPlacement) -> FaceShapes:
     """Return the blendshapes of a mesh that move the mouth.
 
-    ARKit's, where the mesh has ``jawOpen`` and five more of them; otherwise visemes and vowels, where it has five;
-    otherwise all that move lip points.
-    only      : names of the mesh; empty: as above
-    in_metres : whether the mesh is in metres; then one motion parts the lips by the same length on all heads that are
-                as high as people's, however wide their mouths are
-    Raises InputError: there is no such blendshape, or none that moves the mouth.
+    Visemes and vowels, where a table says what follows them; ARKit's, where the mesh has ``jawOpen`` and five more of
+    them; otherwise eight visemes or three vowels; otherwise all that move lip points. Blendshapes that a table lets
+    follow one curve are one of these shapes, by the name of the first.
+    One motion parts the lips by the same length on all heads that are as high as people's, however wide their mouths.
+    Raises InputError: none moves the mouth, or a table lets some follow visemes and others ``jawOpen``.
     """
     moved = placement.to_motion(mesh.displacements(placement.vertices))
     strong = np.abs(moved).max(axis=(1, 2), initial=0.0) > LEAST_DISPLACEMENT
-    arkit = [arkit_name(name) or "" for name in mesh.shape_names]
-    mouths = {name: n for n, name in enumerate(arkit) if name in ARKIT_MOUTH and len(mesh.shapes[n].rows)}
-    if only:
-        unknown = [name for name in only if name not in mesh.shape_names]
-        if unknown:
-            raise InputError(f"there is no blendshape {shortened(unknown[0])!r}; the mesh has {_listed(mesh)}")
-        chosen, style = [mesh.shape_names.index(name) for name in only], "own"
-        known = [arkit[number] for number in chosen]
-        style = "arkit" if "jawOpen" in known else style
-    elif "jawOpen" in mouths and strong[mouths["jawOpen"]] and len(mouths) > 5:
-        chosen, known, style = list(mouths.values()), list(mouths), "arkit"
-    else:
-        chosen, known, style = _spoken(mesh, strong)
-    if not chosen:
+    found, style = _mouth(mesh, strong)
+    if not found:
         raise InputError(f"no blendshape moves the mouth; the mesh has {_listed(mesh)}. Drive it by control points")
-    if len(chosen) > MOST_SHAPES:
-        raise InputError(f"{len(chosen)} blendshapes move the mouth, required at most {MOST_SHAPES}; name those to use")
-    facing = [(placement.row(upper), placement.row(lower)) for upper, lower in FACING[:3]]
-    gap = np.mean([moved[:, upper, 1] - moved[:, lower, 1] for upper, lower in facing], axis=0)
-    if in_metres:
-        gap = gap * placement.scale / life_scale(mesh, placement)
-    return FaceShapes(tuple(mesh.shape_names[n] for n in chosen), tuple(known), moved[chosen], gap[chosen], style)
+    if len(found) > MOST_SHAPES:
+        raise InputError(
+            f"{len(found)} blendshapes move the mouth, required at most {MOST_SHAPES}; leave some empty in its table "
+            "(docs/meshes.md)"
+        )
+    names = tuple(mesh.shape_names[numbers[0]] for _, numbers in found)
+    gap = parted_lips(mesh, placement)
+    return FaceShapes(
+        names,
+        tuple(known for known, _ in found),
+        np.stack([moved[numbers].sum(axis=0) for _, numbers in found]),
+        np.array([gap[numbers].sum() for _, numbers in found]),
+        style,
+    )
 
 
-def _spoken(mesh: Mesh, strong: NDArray[np.bool_]) -> tuple[list[int], list[str], str]:
-    """Return visemes or vowels, or else everything that moves the mouth: rows, known names, style."""
-    for label, test, least in (("viseme", viseme_name, 8), ("vowel", vowel_name, 5)):
-        found: dict[str, int] = {}
-        for number, name in enumerate(mesh.shape_names):
-            known = test(name)
-            if known is not None and known != "sil" and (strong[number] or known == "PP"):
-                found.setdefault(f"{label}_{known}", number)
-        if len(found) >= least:
-            return list(found.values()), list(found), "visemes"
-    chosen = np.flatnonzero(strong).tolist()
-    return chosen, [arkit_name(mesh.shape_names[number]) or "" for number in chosen], "own"
+def parted_lips(mesh: Mesh, placement: LipPlacement) -> Array:
+    """Return how far each blendshape of a mesh parts the middle of the inner lips, eye distances [shape=(S,)]."""
+    rows = [[placement.vertices[placement.row(point)] for point in pair] for pair in FACING[:3]]
+    moved = placement.to_motion(mesh.displacements(np.ravel(rows))).reshape(len(mesh.shapes), -1, 2, 3)
+    gap = (moved[:, :, 0, 1] - moved[:, :, 1, 1]).mean(axis=1)
+    return np.asarray(gap * placement.scale / life_scale(mesh, placement))
+
+
+def numbers_by_name(mesh: Mesh, named: Callable[[str], str | None]) -> dict[str, list[int]]:
+    """Return the numbers of the blendshapes of a mesh by the names that they are understood as.
+
+    Those that a table says, all of one name; else the first of one name that moves something.
+    """
+    found: dict[str, list[int]] = {}
+    for number, shape in enumerate(mesh.shapes):
+        known = named(shape.called)
+        if known is not None:
+            found.setdefault(known, []).append(number)
+    told = {known: [each for each in found[known] if mesh.shapes[each].source] for known in found}
+    first = {known: min(numbers, key=lambda each: not len(mesh.shapes[each].rows)) for known, numbers in found.items()}
+    return {known: told[known] or [first[known]] for known in found}
+
+
+def _mouth(mesh: Mesh, strong: NDArray[np.bool_]) -> tuple[list[tuple[str, list[int]]], str]:
+    """Return the known names of the shapes of the mouth with their blendshapes, and their style."""
+    spoken = numbers_by_name(mesh, spoken_name)
+    arkit = {known: numbers for known, numbers in numbers_by_name(mesh, arkit_name).items() if known in ARKIT_MOUTH}
+    arkit = {known: numbers for known, numbers in arkit.items() if len(mesh.shapes[numbers[0]].rows)}
+    jaw = arkit.get("jawOpen", [])
+    told = [known for known, numbers in spoken.items() if mesh.shapes[numbers[0]].source]
+    if told and any(mesh.shapes[number].source for number in jaw):
+        raise InputError(
+            f"its table has jawOpen and {told[0].removeprefix('vowel_')}; leave the sources of one kind empty"
+        )
+    if told:
+        return [(known, spoken[known]) for known in told], "visemes"
+    if strong[jaw].any() and len(arkit) > 5:
+        return list(arkit.items()), "arkit"
+    for kind, least in (("viseme_", 8), ("vowel_", 3)):
+        those = {known: numbers for known, numbers in spoken.items() if known.startswith(kind)}
+        those = {known: numbers for known, numbers in those.items() if strong[numbers].any() or known == "viseme_PP"}
+        if len(those) >= least:
+            return list(those.items()), "visemes"
+    own = [(known, numbers) for known, numbers in arkit.items() if strong[numbers].any()]
+    named = {number for _, numbers in own for number in numbers}
+    others = [number for number in np.flatnonzero(strong).tolist() if mesh.shapes[number].called]
+    own += [("", [number]) for number in others if number not in named]
+    return sorted(own, key=lambda each: each[1]), "own"
 
 
 def _listed(mesh: Mesh) -> str:

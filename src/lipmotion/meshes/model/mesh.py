@@ -76,11 +76,18 @@ class Blendshape:
 
     rows          : the vertices that move, ascending [shape=(N,)]
     displacements : how far they move at weight 1, in the mesh's own unit of length [shape=(N, 3)]
+    source        : the curve that a table says moves it, "" none; None: what its name says
     """
 
     name: str
     rows: NDArray[np.int64]
     displacements: NDArray[np.float64]
+    source: str | None = None
+
+    @property
+    def called(self) -> str:
+        """The name by which it is understood: that of its source, or its own."""
+        return self.name if self.source is None else self.source
 
     @classmethod
     def between(

@@ -4,7 +4,6 @@ them."""
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
 
 ARKIT_MOUTH = (
     *("jawForward", "jawLeft", "jawRight", "jawOpen", "mouthClose", "mouthFunnel", "mouthPucker"),
@@ -27,8 +26,11 @@ VISEMES_15 = ("sil", "PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa",
 """The visemes of Oculus and OpenXR, in their order."""
 VRM_VOWELS = ("aa", "ih", "ou", "ee", "oh")
 """The mouth shapes of VRM."""
+VRM_EMOTIONS = ("angry", "happy", "relaxed", "sad", "surprised")
+"""The expressions of VRM that moods use."""
 _VISEME_SPELLINGS = {"i": "ih", "o": "oh", "u": "ou"} | {name.lower(): name for name in VISEMES_15}
 _VOWEL_SPELLINGS = {"a": "aa", "i": "ih", "u": "ou", "e": "ee", "o": "oh"} | {name: name for name in VRM_VOWELS}
+_VOWEL_SPELLINGS |= dict(zip("あいうえお", VRM_VOWELS, strict=True))
 _ARKIT = {name.lower(): name for name in (*ARKIT_MOUTH, *ARKIT_OTHERS)}
 _SIDES = {"l": "left", "r": "right", "left": "left", "right": "right"}
 
@@ -52,19 +54,20 @@ def viseme_name(name: str) -> str | None:
 
 
 def vowel_name(name: str) -> str | None:
-    """Return the VRM name of a vowel as files spell it, or None: ``Fcl_MTH_A`` and ``aa`` are ``aa``."""
-    found = re.search(r"(?:^|mth_|mouth_)(aa|ih|ou|ee|oh|[aiueo])$", name, re.IGNORECASE)
+    """Return the VRM name of a vowel as files spell it, or None: ``Fcl_MTH_A``, ``あ`` and ``aa`` are ``aa``."""
+    found = re.search(r"(?:^|mth_|mouth_)(aa|ih|ou|ee|oh|[aiueoあいうえお])$", name, re.IGNORECASE)
     return _VOWEL_SPELLINGS[found[1].lower()] if found else None
 
 
-def by_arkit_name(names: Iterable[str]) -> dict[str, str]:
-    """Return the names of a mesh by ARKit's names; of two spellings of one, the first."""
-    found: dict[str, str] = {}
-    for name in names:
-        known = arkit_name(name)
-        if known is not None:
-            found.setdefault(known, name)
-    return found
+def spoken_name(name: str) -> str | None:
+    """Return the viseme or vowel of a blendshape, but for silence, or None.
+
+    ``viseme_I`` is ``viseme_ih``, ``Fcl_MTH_A`` is ``vowel_aa``.
+    """
+    viseme, vowel = viseme_name(name), vowel_name(name)
+    if viseme is not None:
+        return None if viseme == "sil" else f"viseme_{viseme}"
+    return None if vowel is None else f"vowel_{vowel}"
 
 
 def is_known(name: str) -> bool:

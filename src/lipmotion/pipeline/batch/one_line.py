@@ -21,6 +21,7 @@ from lipmotion.export.base import motion_suffix
 from lipmotion.extensions import failed_extension
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.measures.closures import CLOSED_SHARE
+from lipmotion.meshes.files.character_tables import table_path
 from lipmotion.motion.closure import OPENING, closable_ranges
 from lipmotion.motion.rest import speech_intervals
 from lipmotion.motion.speaker_maps import SpeakerMap
@@ -268,7 +269,8 @@ def _lexicon_of(request: Request, _: tuple[int, ...]) -> Lexicon | None:
 
 def _opened(job: Job) -> OpenedJob:
     shown = job.outputs
-    return _opened_of(job, _stamp(shown.face, shown.character, shown.lip_points, shown.binding))
+    table = table_path(shown.character) if shown.character else None
+    return _opened_of(job, _stamp(shown.face, shown.character, table, shown.lip_points, shown.binding))
 
 
 @lru_cache(maxsize=1)

@@ -17,6 +17,7 @@ from lipmotion.export.timed_labels import LABEL_SUFFIXES
 from lipmotion.extensions import installed_version
 from lipmotion.faces.cut_out import picture_files
 from lipmotion.faces.registry import is_drawings
+from lipmotion.meshes.files.character_tables import table_path
 from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.job import Job
 from lipmotion.pipeline.model import shipped_path
@@ -68,12 +69,19 @@ def fingerprint_of(job: Job) -> str:
     request = replace(job.request, model=job.request.model or shipped_path())
     parts = [{name: _told(value) for name, value in part.as_mapping().items()} for part in (request, job.outputs)]
     parts += [job.delivery.as_mapping(), job.staging.as_mapping(), *_drawings(job.outputs.face)]
+    parts += _table(job.outputs.character)
     return _digest(as_json([*parts, installed_version(), installed_phone_recogniser()]))
 
 
 def _drawings(face: str) -> list[dict[str, str]]:
     """Return the digests of the drawings in the folder that a face is; none of another face."""
     return [{path.name: sha256_of(path) for path in picture_files(Path(face))}] if is_drawings(face) else []
+
+
+def _table(character: Path | None) -> list[dict[str, str]]:
+    """Return the digest of the table beside a character; none where there is no such table."""
+    path = table_path(character) if character else None
+    return [{"table": sha256_of(path)}] if path and is_file(path) else []
 
 
 def _told(value: Any) -> Any:

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lipmotion.articulation.curve_edits import with_edited_curves
 from lipmotion.articulation.expression import moods_shown
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.errors import InputError
 from lipmotion.faces.base import Staging
-from lipmotion.meshes.files.rig_tables import read_rig_table, rig_motion
+from lipmotion.meshes.files.rig_tables import RigRow, read_rig_table, rig_motion
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.facial_animation import fap_motion
@@ -21,6 +22,7 @@ from lipmotion.meshes.fitting.mood_weights import expression_weights
 from lipmotion.meshes.fitting.oculus_visemes import viseme_motion
 from lipmotion.meshes.fitting.reference_mouth import arkit_mouth, vowel_mouth
 from lipmotion.meshes.fitting.shape_weights import shape_weights
+from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.meshes.model.other_shapes import CLOSED
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, arkit_name
 from lipmotion.pipeline.outputs.living_curves import living_curves
@@ -47,8 +49,7 @@ def check_curve_set(curves: str | Path) -> None:
 def curve_names(curves: str | Path | DrivenCharacter) -> tuple[str, ...]:
     """Return the names that a character or a rig has for its curves; none, for the sets of ``SHAPE_SETS``."""
     if isinstance(curves, DrivenCharacter):
-        names = curves.mesh.shape_names
-        return (*names, *(arkit_name(name) or name for name in names))
+        return (*curves.mesh.shape_names, *_known_names(curves.mesh))
     return () if curves in SHAPE_SETS else tuple(row.control for row in read_rig_table(Path(curves)))
 
 
@@ -70,30 +71,58 @@ def curves_of(
     edits  : pins and gains of curves; controls of a rig also follow those of the curves that they are made of
     Raises InputError: no such set or file, the character has no blendshapes, or the motion has no channel ``opening``.
     """
-
-    def plain(name: str) -> Motion:
-        return with_edited_curves(_curves_of(motion, units, name, staging, prosody), units, edits)
-
     if isinstance(curves, DrivenCharacter):
-        return edited_weights(curves.weights(motion, units), units, edits)
+        return edited_weights(curves.weights(motion, units), units, edits, _known_names(curves.mesh))
     check_curve_set(curves)
     if curves in SHAPE_SETS:
-        return plain(str(curves))
+        return with_edited_curves(_curves_of(motion, units, str(curves), staging, prosody), units, edits)
     rows = read_rig_table(Path(curves))
-    sets = [with_mouth(motion), plain(ARKIT), plain("visemes")]
-    if not all(row.source in {"", *(name for each in sets for name in each.names)} for row in rows):
-        sets.append(living_curves(with_mouth(motion), units, staging, prosody))
-    sources = {name: each[name].astype(np.float64) for each in sets for name in each.names}
-    sources = {name: np.zeros(len(motion.values)) for name in ARKIT_OTHERS} | sources
+    sources = rig_sources(motion, units, rows, staging=staging, prosody=prosody, edits=edits)
     own = [edit for edit in edits if edit.channel not in sources]
     return with_edited_curves(rig_motion(rows, sources, motion.rate_hz), units, own)
 
 
-def edited_weights(weights: Motion, units: Timeline[Unit], edits: Sequence[Pin | Gain]) -> Motion:
-    """Return weights of a character with pins and gains, which name its blendshapes as it does or as ARKit does."""
-    named = {arkit_name(name) or name: name for name in weights.names} | {name: name for name in weights.names}
+def rig_sources(
+    motion: Motion,
+    units: Timeline[Unit],
+    rows: Sequence[RigRow],
+    *,
+    staging: Staging | None = None,
+    prosody: Prosody | None = None,
+    edits: Sequence[Pin | Gain] = (),
+) -> dict[str, NDArray[np.float64]]:
+    """Return the curves that controls of a rig may follow, by their names [each shape=(T,)].
+
+    Channels of motion, ARKit's blendshapes, visemes; where rows ask for others, also vowels, moods, eyes, brows and the
+    head. staging, prosody, edits : as of ``curves_of``
+    """
+
+    def plain(name: str) -> Motion:
+        return with_edited_curves(_curves_of(motion, units, name, staging, prosody), units, edits)
+
+    sets = [with_mouth(motion), plain(ARKIT), plain("visemes")]
+    if not all(row.source in {"", *(name for each in sets for name in each.names)} for row in rows):
+        sets.append(plain(VOWELS))
+    sources = {name: each[name].astype(np.float64) for each in sets for name in each.names}
+    return {name: np.zeros(len(motion.values)) for name in ARKIT_OTHERS} | sources
+
+
+def edited_weights(
+    weights: Motion, units: Timeline[Unit], edits: Sequence[Pin | Gain], known: Mapping[str, str] | None = None
+) -> Motion:
+    """Return weights of a character with pins and gains, which name its blendshapes as it does or as ``known``.
+
+    known : its blendshapes by other names
+    """
+    named = {other: name for other, name in (known or {}).items() if name in weights.names}
+    named |= {name: name for name in weights.names}
     ours = [replace(edit, channel=named[edit.channel]) for edit in edits if edit.channel in named]
     return with_edited_curves(weights, units, ours)
+
+
+def _known_names(mesh: Mesh) -> dict[str, str]:
+    """Return the blendshapes of a mesh by the names of the curves that they follow, or by ARKit's."""
+    return {arkit_name(shape.called) or shape.called: shape.name for shape in reversed(mesh.shapes) if shape.called}
 
 
 def _curves_of(
@@ -178,6 +207,8 @@ def described(character: DrivenCharacter) -> Iterator[str]:
     yield f"{'parts':14} {parts}"
     yield f"{'blendshapes':14} {len(mesh.shapes)}"
     yield f"{'eye distance':14} {placement.scale:.6g} units of the mesh, by the width of the mouth"
+    if character.table:
+        yield f"{'table':14} {character.table_file}, {len(character.table)} rows"
     if character.shapes is not None:
         named = zip(character.shapes.names, character.shapes.known, strict=True)
         listed = ", ".join(name if known in {"", name} else f"{name} = {known}" for name, known in named)

@@ -25,7 +25,6 @@ from lipmotion.meshes.model.head_angles import head_quaternions
 from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.mesh import Blendshape
 from lipmotion.meshes.model.scene import HeadTurn, Scene
-from lipmotion.meshes.model.shape_names import by_arkit_name
 from lipmotion.pipeline.outputs.curve_sets import curves_of, edited_weights
 from lipmotion.pipeline.outputs.delivered import delivered, held_mouth, with_drawn_channels
 from lipmotion.pipeline.outputs.drawn_video import check_drawable
@@ -159,14 +158,14 @@ def character_scene(
     """
     motion, units = generation.motion, generation.units
     weights = curves_of(motion, units, character, edits=generation.curve_edits)
-    known = by_arkit_name(character.mesh.shape_names)
     living = living_curves(with_mouth(motion), units, staging, prosody)
-    added = [name for name in living.names if name in known and known[name] not in weights.names]
     mouth = spoken_mouth(with_mouth(motion), units)
-    moods = character.expressions(motion, mouth)
-    beside = [living[name] for name in added] + list(moods.values())
-    table = np.concatenate([weights.values, *(curve[:, None] for curve in beside)], axis=1)
-    channels = weights.channels + tuple(Channel(name, WEIGHT) for name in (*(known[name] for name in added), *moods))
+    others = {name: living[name].astype(np.float64) for name in living.names}
+    beside = character.beside(others, len(weights.values))
+    beside = {name: curve for name, curve in beside.items() if name not in weights.names}
+    beside |= character.expressions(motion, mouth)
+    table = np.concatenate([weights.values, *(curve[:, None] for curve in beside.values())], axis=1)
+    channels = weights.channels + tuple(Channel(name, WEIGHT) for name in beside)
     hertz = rate_hz or motion.rate_hz
     rows = in_pictures(table, mouth.contact, motion.rate_hz, frame_times(len(table), motion.rate_hz, hertz))
     return Scene(character.mesh, Motion(rows, hertz, channels), original=character.file)

@@ -1,0 +1,111 @@
+"""Gains and offsets of a table, from weights at which a mouth is wide open, closed and rounded."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from lipmotion.articulation.lip_points import mouth_template
+from lipmotion.errors import InputError, shortened
+from lipmotion.meshes.files.rig_tables import RigRow, nearest
+from lipmotion.meshes.fitting.driven import DrivenCharacter
+from lipmotion.meshes.fitting.shape_weights import shape_weights
+from lipmotion.pipeline.outputs.curve_sets import rig_sources
+from lipmotion.types import Channel, Motion, Span, Timeline, Unit
+
+Sources = Mapping[str, Sequence[float]]
+"""By the name of a curve its value in each of ``POSES``."""
+POSES = ("open", "closed", "rounded")
+PHONES = ("aa", "m", "uw")
+"""The phones whose mouths they are."""
+OPENINGS, WIDTHS = (0.25, 0.0, 0.06), (1.0, 0.98, 0.85)
+"""Their openings, in eye distances (the first is as wide as talkers open their mouths), and widths, that at rest 1."""
+RATE_HZ, PHONE_S, PAUSE_S = 100.0, 0.3, 0.5
+DIGITS = 6
+LEAST_CHANGE = 1e-3
+"""A control that changes by less between two poses does not follow them."""
+
+
+def calibrated(rows: Sequence[RigRow], sources: Sources, stated: Mapping[str, Mapping[str, float]]) -> list[RigRow]:
+    """Return the rows of a table with gains and offsets by which controls have the stated values.
+
+    sources : of the curves that the rows follow
+    stated  : by pose the values of some controls; what is not stated of a control stays as it is, as far as the line
+              through what is stated allows
+    Raises InputError: no such control, or one that does not change between the poses.
+    """
+    values = _values(rows, sources)
+    lines = {}
+    for control in dict.fromkeys(name for given in stated.values() for name in given):
+        if control not in values:
+            raise InputError(f"the table has no {shortened(control)!r}; {nearest(control, values)}")
+        now = values[control]
+        wanted = {number: stated[pose][control] for number, pose in enumerate(POSES) if control in stated.get(pose, {})}
+        if len(wanted) == 1:
+            only = next(iter(wanted))
+            other = int(np.abs(now - now[only]).argmax())
+            wanted[other] = float(now[other])
+        lines[control] = _line(control, now[list(wanted)], np.array(list(wanted.values())))
+    moved, seen = [], set[str]()
+    for row in rows:
+        if row.control in lines:
+            gain, offset = lines[row.control]
+            first = offset if row.control not in seen else 0.0
+            row = replace(row, gain=gain * row.gain, offset=gain * row.offset + first)  # noqa: PLW2901
+            seen.add(row.control)
+        moved.append(row)
+    return moved
+
+
+def posed_sources(curves: DrivenCharacter | Path, rows: Sequence[RigRow]) -> Sources:
+    """Return the values of curves in ``POSES``: those of a character, or those that the rows of a rig follow.
+
+    Raises InputError: the character has no blendshapes of the mouth, or a row follows no curve.
+    """
+    motion, units, frames = _spoken()
+    if isinstance(curves, Path):
+        found = rig_sources(motion, units, rows)
+        return {name: curve[frames].tolist() for name, curve in found.items()}
+    if curves.shapes is None:
+        raise InputError("the character is moved by control points, which have no weights to calibrate")
+    solved = shape_weights(motion, units, curves.shapes)
+    by_name = {name: solved[name][frames].tolist() for name in solved.names}
+    return {row.source: by_name[row.control] for row in curves.table_rows() if row.control in by_name}
+
+
+def _spoken() -> tuple[Motion, Timeline[Unit], list[int]]:
+    """Return a motion with its phones, and the frames of the poses."""
+    edges = PAUSE_S + PHONE_S * np.arange(len(PHONES) + 1)
+    spans = [Span(0.0, PAUSE_S, Unit("sil"))]
+    spans += [Span(float(at), float(at + PHONE_S), Unit(phone)) for at, phone in zip(edges, PHONES, strict=False)]
+    spans.append(Span(float(edges[-1]), float(edges[-1] + PAUSE_S), Unit("sil")))
+    time_s = np.arange(round((edges[-1] + PAUSE_S) * RATE_HZ)) / RATE_HZ
+    inside = [at + share * PHONE_S for at in edges[:-1] for share in (0.3, 0.7)]
+    keys = [0.0, float(edges[0]), *inside, float(edges[-1]), float(time_s[-1])]
+    opening = np.interp(time_s, keys, [0, 0, *np.repeat(OPENINGS, 2), 0, 0])
+    width = np.interp(time_s, keys, [1, 1, *np.repeat(WIDTHS, 2), 1, 1]) * mouth_template().width
+    motion = Motion(np.stack([opening, width], axis=1), RATE_HZ, (Channel("opening"), Channel("width")))
+    return motion, Timeline(tuple(spans)), [round((at + PHONE_S / 2) * RATE_HZ) for at in edges[:-1]]
+
+
+def _values(rows: Sequence[RigRow], sources: Sources) -> dict[str, np.ndarray]:
+    """Return the value of each control in ``POSES``, without its limits [each shape=(3,)]."""
+    values: dict[str, np.ndarray] = {}
+    for row in rows:
+        followed = np.array(sources.get(row.source, np.zeros(len(POSES))))
+        values[row.control] = values.get(row.control, 0.0) + row.offset + row.gain * followed
+    return values
+
+
+def _line(control: str, now: np.ndarray, wanted: np.ndarray) -> tuple[float, float]:
+    """Return gain and offset that bring a control's values nearest to the wanted ones."""
+    apart = now - now.mean()
+    if np.abs(apart).max() < LEAST_CHANGE:
+        raise InputError(
+            f"{shortened(control)!r} follows no curve that tells these poses apart; give it another source in the table"
+        )
+    gain = float(apart @ (wanted - wanted.mean()) / (apart @ apart))
+    return gain, round(float(wanted.mean() - gain * now.mean()), DIGITS)
