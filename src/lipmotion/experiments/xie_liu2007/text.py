@@ -18,6 +18,11 @@ HEAD = (
     "nRMSE    RMSE    lag  score  p b m  false  variance   numbers  seconds"
 )
 
+LEGEND = (
+    "paper: its AMSE and ACC; nRMSE, RMSE, variance: of the opening, the last by that of the recordings; lag: ms",
+    "score, p b m: %; false: closings outside p b m, a minute of speech; seconds: of a processor, for training",
+)
+
 
 def table(figures: Mapping[str, Any]) -> str:
     """Return the figures of ``xieliu2007`` as text."""
@@ -40,6 +45,7 @@ def table(figures: Mapping[str, Any]) -> str:
     lines += [
         "",
         f"* differs from {REFERENCE_SYSTEM}: the 95 % interval of the difference on the same clips leaves out 0",
+        *LEGEND,
     ]
     return "\n".join(map(printable, lines))
 
