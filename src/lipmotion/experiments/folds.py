@@ -44,7 +44,7 @@ _ABOUT = "about"
 
 
 @dataclass(frozen=True, eq=False)
-class _Fold:
+class _GeneratedFold:
     """What a model of the other recordings generates for a part of them.
 
     clips        : by condition
@@ -70,14 +70,14 @@ class _Fold:
         return arrays
 
 
-def _fold_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> _Fold:
+def _fold_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> _GeneratedFold:
     conditions, *about = json.loads(str(arrays[_ABOUT]))
     parts: list[dict[str, NDArray[Any]]] = [{} for _ in conditions]
     for key, array in arrays.items():
         number, _, name = key.partition("/")
         if name:
             parts[int(number)][name] = array
-    return _Fold(dict(zip(conditions, map(clips_from_arrays, parts), strict=True)), *about)
+    return _GeneratedFold(dict(zip(conditions, map(clips_from_arrays, parts), strict=True)), *about)
 
 
 @one_thread()
@@ -123,7 +123,7 @@ def folds(
         others = [name for name in names if name not in held_out]
         made = train_and_generate(corpus, others, held_out, (OPENING,), replace(settings, monitor=monitor), work)
         speakers = [utterance.speaker for utterance in made.recordings.utterances]
-        results.append(_Fold(made.clips, speakers, len(made.used), made.recordings.closed_under))
+        results.append(_GeneratedFold(made.clips, speakers, len(made.used), made.recordings.closed_under))
         if work is not None:
             kept.save(stage, results[-1].as_arrays())
     about: dict[str, Any] = {"folds": count, "seed": settings.seed, "clips": len(names)}
@@ -141,7 +141,7 @@ def _of_each_speaker(corpus: Corpus) -> list[tuple[str, ...]]:
     return list(filter(None, (corpus.names("train", [speaker]) for speaker in corpus.speakers)))
 
 
-def _row(results: Sequence[_Fold], condition: str, seed: int) -> dict[str, Any]:
+def _row(results: Sequence[_GeneratedFold], condition: str, seed: int) -> dict[str, Any]:
     """Return the figures of the clips of all folds in one condition."""
     pooled = [clip for result in results for clip in result.clips[condition]]
     figures = figures_of(pooled, results[0], seed)
@@ -149,7 +149,7 @@ def _row(results: Sequence[_Fold], condition: str, seed: int) -> dict[str, Any]:
     return opening_row(figures) | {name: lips[name] for name in ("false_per_minute", "original_per_minute")}
 
 
-def _acc_of_speakers(results: Sequence[_Fold], condition: str) -> dict[str, float]:
+def _acc_of_speakers(results: Sequence[_GeneratedFold], condition: str) -> dict[str, float]:
     """Return the correlation of the opening of all clips of each speaker, by name."""
     clips: dict[str, list[ComparedClip]] = {}
     for result in results:
