@@ -38,21 +38,14 @@ def sheets() -> dict[str, Sheet]:
     return {path.stem: json.loads(path.read_text(encoding="utf-8")) for path in sorted(SHEETS.glob("*.json"))}
 
 
-def digest(content: bytes) -> str:
-    """Return the digits that name a model file or the default options of an engine."""
-    return hashlib.sha256(content).hexdigest()[:8]
-
-
 def current_models() -> frozenset[str]:
     """Return the stamps of what makes figures now: the shipped model, every engine with its defaults, no model."""
     from lipmotion.engines import ENGINES
+    from lipmotion.experiments.stamp import engine_digest
 
     (model,) = (ROOT / "src" / "lipmotion").rglob(SHIPPED)
-    found = {"none", f"shipped {digest(model.read_bytes())}"}
-    for name in ENGINES.built_in:
-        options = json.dumps(ENGINES.load(name).Config().as_mapping(), sort_keys=True)
-        found.add(f"{name} {digest(options.encode())}")
-    return frozenset(found)
+    shipped = f"shipped {hashlib.sha256(model.read_bytes()).hexdigest()[:8]}"
+    return frozenset({"none", shipped, *(f"{name} {engine_digest(name)}" for name in ENGINES.built_in)})
 
 
 def made_by(model: str, current: frozenset[str]) -> str:

@@ -139,7 +139,7 @@ def test_each_clip_is_held_out_once_and_never_trained_on(toy_corpus: Corpus, mon
         cut.append(tuple(held_out))
         conditions = CONDITIONS if len(cut) != 2 else CONDITIONS[:1]
         clips = {condition: [f"{name} {condition}" for name in held_out] for condition in conditions}
-        return SimpleNamespace(used=names, clips=clips, recordings=SimpleNamespace(closed_under=0.1))
+        return SimpleNamespace(used=names, clips=clips, recordings=SimpleNamespace(closed_under=0.1, utterances=[]))
 
     monkeypatch.setattr(module, "train_and_generate", result)
     monkeypatch.setattr(module, "figures_of", lambda clips, *_: {"clips": clips, "closures_p_b_m": LIPS})
@@ -154,6 +154,39 @@ def test_each_clip_is_held_out_once_and_never_trained_on(toy_corpus: Corpus, mon
     cut.clear()
     folds(toy_corpus, count=3, settings=ExperimentSettings(seed=1))
     assert cut != first
+
+
+def test_finished_parts_are_not_generated_again(
+    toy_corpus: Corpus, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[tuple[str, ...]] = []
+
+    def result(_: object, names: Sequence[str], held_out: Sequence[str], *__: object) -> SimpleNamespace:
+        made.append(tuple(held_out))
+        if len(made) == 2:
+            raise KeyboardInterrupt
+        curves = [np.full((3 + n, 1), float(toy_corpus.names().index(name))) for n, name in enumerate(held_out)]
+        clips = [ComparedClip(x, x + 0.5, np.arange(len(x)) / RATE_HZ, ((0.04, 0.08, "b"),)) for x in curves]
+        recordings = SimpleNamespace(closed_under=0.1, utterances=[toy_corpus.utterance(name) for name in held_out])
+        return SimpleNamespace(used=names, clips=dict.fromkeys(CONDITIONS, clips), recordings=recordings)
+
+    def run(work: Path | None) -> dict[str, Any]:
+        return folds(toy_corpus, count=2, by_speaker=False, work=work)
+
+    def told(clips: Sequence[ComparedClip], *_: object) -> dict[str, Any]:
+        parts = [(clip.original.tolist(), clip.generated.tolist(), clip.time_s.tolist(), clip.spoken) for clip in clips]
+        return {"clips": parts, "closures_p_b_m": LIPS}
+
+    monkeypatch.setattr(module, "train_and_generate", result)
+    monkeypatch.setattr(module, "figures_of", told)
+    monkeypatch.setattr(module, "opening_row", lambda figures: {"clips": figures["clips"]})
+    with pytest.raises(KeyboardInterrupt):
+        run(tmp_path)
+    again = run(tmp_path)
+    assert len(made) == 3
+    assert len(set(made)) == 2
+    made[:] = [("whole",)] * 2
+    assert run(None) == again
 
 
 def test_by_speaker_everybody_is_a_stranger_once(

@@ -84,11 +84,17 @@ def test_the_document_shows_the_figures_beside_it() -> None:
     assert [row["names"] for row in figures["rows"]] == [4, 10, *SIZES, 452]
 
 
-def test_by_default_the_training_list_is_shuffled(toy_corpus: Corpus, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_by_default_the_training_list_is_shuffled_and_no_finished_size_is_trained_again(
+    toy_corpus: Corpus, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     trained: list[list[str]] = []
+    stops = [True]
 
     def result(_: object, names: Sequence[str], held_out: Sequence[str], *__: object) -> SimpleNamespace:
         trained.append(list(names))
+        if len(names) == 8 and stops.pop():
+            stops.append(False)
+            raise KeyboardInterrupt
         assert tuple(held_out) == toy_corpus.names("test")
         return SimpleNamespace(recordings=SimpleNamespace(closed_under=0.1), clips={"audio only": []})
 
@@ -97,7 +103,11 @@ def test_by_default_the_training_list_is_shuffled(toy_corpus: Corpus, monkeypatc
     monkeypatch.setattr(module, "_row", lambda *_: {})
     received: list[tuple[str, str]] = []
     settings = ExperimentSettings(seed=1, receive=lambda *given: received.append(given[:2]))
-    figures = learning_curve(toy_corpus, settings=settings)
+    with pytest.raises(KeyboardInterrupt):
+        learning_curve(toy_corpus, work=tmp_path, settings=settings)
+    del trained[1:]
+    figures = learning_curve(toy_corpus, work=tmp_path, settings=settings)
+    assert [row["names"] for row in figures["rows"]] == [3, 8]
     assert received == [("3 recordings", "audio only"), ("8 recordings", "audio only")]
     names = toy_corpus.names("train")
     mixed = [names[i] for i in np.random.default_rng(1).permutation(8)]

@@ -6,7 +6,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from kernels.networks import network_posteriors
-from lipmotion.kernels.sequences import factorial
+from lipmotion.kernels.sequences import factorial, factorial_path
 from lipmotion.kernels.sequences.factorial import factorial_posteriors
 from lipmotion.kernels.sequences.factorial_path import factorial_best_path
 from lipmotion.kernels.sequences.loops import FactorialLogLikelihoods, Loop
@@ -22,7 +22,8 @@ def form(request, monkeypatch) -> str:
     """Every test runs with both forms, NumPy and compiled."""
     if request.param == "compiled":
         pytest.importorskip("numba")
-    monkeypatch.setattr(factorial, "numba_works", lambda: request.param == "compiled")
+    for module in (factorial, factorial_path):
+        monkeypatch.setattr(module, "numba_works", lambda: request.param == "compiled")
     return request.param
 
 

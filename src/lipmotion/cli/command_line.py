@@ -78,7 +78,8 @@ def run(arguments: Sequence[str] | None, stopper: Stopper, events: Events) -> No
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # a terminal may not know every letter of a file's name
     try:
-        options = _parsed(parser(), arguments, argparse.Namespace(stopper=stopper, events=events))
+        words = list(sys.argv[1:] if arguments is None else arguments)
+        options = _parsed(parser(), words, argparse.Namespace(stopper=stopper, events=events, words=words))
         events.start(options)
         check_paths(options)
         options.run(options)

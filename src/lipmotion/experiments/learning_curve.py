@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from lipmotion.corpora.store import Corpus
+from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.experiments.runner import (
     DEFAULT_SETTINGS,
     ExperimentSettings,
     HeldOutResult,
+    PartKey,
     channels_with_opening,
+    finished_parts,
     opening_row,
     shuffled,
     train_and_generate,
@@ -30,6 +35,8 @@ SIZES = (20, 50, 100, 200)
 """Default numbers of recordings: those of them that are smaller than the list; and the whole list."""
 OTHERS = ("width", "outer")
 """Channels that are compared beside the opening."""
+_ROW = "row"
+"""Name of the array of a kept size: the threshold of a closed mouth, and its row."""
 
 
 @one_thread()
@@ -39,12 +46,14 @@ def learning_curve(
     order: Sequence[str] | None = None,
     sizes: Sequence[int] | None = None,
     split: str | None = "test",
+    work: Path | None = None,
     settings: ExperimentSettings = DEFAULT_SETTINGS,
 ) -> dict[str, Any]:
     """Train on the first N utterances of a list, for every N of ``sizes``; return figures of each model on ``split``.
 
     order    : names of utterances; by default the training list, shuffled with the seed
     sizes    : by default 20, 50, 100, 200, as far as the list goes, and the whole list
+    work     : a folder for the figures of finished sizes, from which the same call goes on after a stop; None: none
     settings : its seed is also that of the shuffled list
     Phone models and engine are both trained on those N utterances alone; the phone models also align and recognise
     the utterances of the split.
@@ -58,15 +67,23 @@ def learning_curve(
     check_training_names(corpus, listed, held_out)
     channels = channels_with_opening(corpus, held_out)
     shares = np.cumsum([0, *steps]) / sum(steps)
+    kept = finished_parts(work, corpus, settings, PartKey(engine_named("trajectory"), (*listed, *held_out)))
     rows = []
     for count, (start, stop) in zip(steps, pairwise(shares), strict=True):
-        monitor = sub_monitor(settings.monitor, float(start), float(stop), f"{count} clips: ")
-        result = train_and_generate(corpus, listed[:count], held_out, channels, replace(settings, monitor=monitor))
-        rows.append({"names": count} | _row(corpus, result, settings.seed))
-        for condition, clips in result.clips.items():
-            settings.receive(f"{count} recordings", condition, result.recordings, clips)
+        found = kept.load(str(count))
+        if found is None:
+            monitor = sub_monitor(settings.monitor, float(start), float(stop), f"{count} clips: ")
+            part = replace(settings, monitor=monitor)
+            result = train_and_generate(corpus, listed[:count], held_out, channels, part, work)
+            row = {"names": count} | _row(corpus, result, settings.seed)
+            for condition, clips in result.clips.items():
+                settings.receive(f"{count} recordings", condition, result.recordings, clips)
+            found = {_ROW: np.array(json.dumps([result.recordings.closed_under, row]))}
+            kept.save(str(count), found)
+        closed_under, row = json.loads(str(found[_ROW]))
+        rows.append(row)
     about = {"split": split or "all", "clips": len(held_out), "seed": settings.seed, "workers": settings.workers}
-    about |= {"order": "given" if order is not None else "shuffled", "closed_under": result.recordings.closed_under}
+    about |= {"order": "given" if order is not None else "shuffled", "closed_under": closed_under}
     return nan_as_null(about | {"rows": rows})
 
 
@@ -125,10 +142,14 @@ def table(figures: Mapping[str, Any]) -> str:
     ]
     for condition in figures["rows"][0]["conditions"]:
         lines += ["", condition, HEAD, *(_line(row, row["conditions"][condition]) for row in figures["rows"])]
-    return "\n".join(lines)
+    return "\n".join([*lines, "", LEGEND])
 
 
 HEAD = f"      N  used  minutes  seconds  {'ACC (95 %)':20}  nRMSE  variance  width  outer"
+LEGEND = (
+    "used, minutes: of the N clips what training could use; seconds: of training; ACC, nRMSE, variance: of the "
+    "opening, the last by that of the recordings; width, outer: their ACC"
+)
 
 
 def _line(row: Mapping[str, Any], opening: Mapping[str, Any]) -> str:

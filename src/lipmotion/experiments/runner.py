@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from time import perf_counter
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
+from lipmotion.corpora.splits import SPLITS
 from lipmotion.corpora.store import Corpus, Selection
+from lipmotion.engines import Engine
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.evaluation.held_out import (
@@ -20,14 +25,22 @@ from lipmotion.pipeline.evaluation.held_out import (
     compared_clips,
     held_out_recordings,
 )
+from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.training.channels import GEOMETRY
+from lipmotion.pipeline.training.fingerprint import fingerprint
 from lipmotion.pipeline.training.train import Run, train
 from lipmotion.speech.recognition.recogniser import cached_recogniser
+from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import Monitor, silent_monitor, sub_monitor, with_progress
 from lipmotion.units import Lexicon
 
 ItemT = TypeVar("ItemT")
 MotionReceiver = Callable[[str, str, HeldOutRecordings, Sequence[ComparedClip]], None]
 """Called with the name of a system, a condition, the recordings, and what the system generates for each of them."""
+QUICK_CLIPS = {"train": 20, "val": 4, "test": 6}
+"""Most recordings of each list in a quick run of any experiment."""
+_CURVES, _ABOUT = ("original", "generated", "time_s"), "about"
+"""Fields of ``ComparedClip`` that are curves; the array with the rest of stored clips."""
 
 
 def ignore_motion(system: str, condition: str, recordings: HeldOutRecordings, clips: Sequence[ComparedClip]) -> None:
@@ -74,10 +87,16 @@ class HeldOutResult:
 
 
 def train_and_generate(
-    corpus: Corpus, names: Sequence[str], held_out: Sequence[str], channels: Sequence[str], settings: ExperimentSettings
+    corpus: Corpus,
+    names: Sequence[str],
+    held_out: Sequence[str],
+    channels: Sequence[str],
+    settings: ExperimentSettings,
+    work: Path | None = None,
 ) -> HeldOutResult:
     """Train the default engine on the utterances ``names``; return the ``channels`` it generates for ``held_out``.
 
+    work : a folder from which training that was stopped goes on; None: none
     The names are sorted, so their order does not matter: all names of a list give the model of ``lipmotion train``.
     Raises as ``train`` and ``evaluate``.
     """
@@ -88,7 +107,7 @@ def train_and_generate(
         selection=Selection(names=sorted(names)),
         recogniser=settings.recogniser,
         lexicon=lexicon,
-        run=Run(monitor=sub_monitor(monitor, 0, 0.8), workers=settings.workers),
+        run=Run(sub_monitor(monitor, 0, 0.8), work, settings.workers),
     )
     seconds = perf_counter() - start_s
     phones, recognising = cached_recogniser(model.phones), sub_monitor(monitor, 0.8, 0.95)
@@ -122,6 +141,58 @@ def channels_with_opening(corpus: Corpus, names: Sequence[str]) -> tuple[str, ..
 def shuffled(items: Sequence[ItemT], seed: int) -> tuple[ItemT, ...]:
     """Return the items in an order that depends on the seed alone."""
     return tuple(items[i] for i in np.random.default_rng(seed).permutation(len(items)))
+
+
+def quick_part(corpus: Corpus, seed: int) -> Corpus:
+    """Return a corpus with a few utterances of each list: those of every quick run with this seed."""
+    return corpus.part([name for split in SPLITS for name in shuffled(corpus.names(split), seed)[: QUICK_CLIPS[split]]])
+
+
+@dataclass(frozen=True)
+class PartKey:
+    """What the finished parts of an experiment depend on, beside corpus and settings.
+
+    engine : with its configuration
+    names  : of the utterances
+    visual : kind of the channels
+    model  : on which the parts stand, or None
+    others : everything else, as text
+    """
+
+    engine: Engine[Any]
+    names: Sequence[str]
+    visual: str = GEOMETRY
+    model: Model | None = None
+    others: str = ""
+
+
+def finished_parts(folder: Path | None, corpus: Corpus, settings: ExperimentSettings, key: PartKey) -> Checkpoint:
+    """Return the finished parts of an experiment, from which a call goes on after a stop.
+
+    folder : made if need be, in one that exists; None: nothing is kept
+    """
+    if folder is None:
+        return NO_CHECKPOINT
+    folder.mkdir(exist_ok=True)
+    config, lexicon = settings.recogniser or HmmConfig(), settings.lexicon or Lexicon()
+    of_input = fingerprint(corpus, key.names, key.engine, config, lexicon, key.visual, key.model)
+    return Checkpoint(folder, f"{of_input} {settings.seed} {key.others}")
+
+
+def stored_clips(clips: Sequence[ComparedClip]) -> dict[str, NDArray[Any]]:
+    """Return what a system generated as arrays, from which ``clips_from_arrays`` makes it again."""
+    arrays = {name: np.concatenate([getattr(clip, name) for clip in clips]) for name in _CURVES}
+    about = [(len(clip.time_s), clip.spoken) for clip in clips]
+    return {**arrays, _ABOUT: np.array(json.dumps(about))}
+
+
+def clips_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> list[ComparedClip]:
+    """Return the clips that ``stored_clips`` stored."""
+    about = json.loads(str(arrays[_ABOUT]))
+    edges = np.cumsum([frames for frames, _ in about])[:-1]
+    original, generated, time_s = (np.split(arrays[name], edges) for name in _CURVES)
+    spoken = [tuple((start_s, end_s, phone) for start_s, end_s, phone in phones) for _, phones in about]
+    return list(map(ComparedClip, original, generated, time_s, spoken))
 
 
 def opening_row(figures: Mapping[str, Any]) -> dict[str, Any]:

@@ -31,8 +31,9 @@ class Progress:
 class Item:
     """A report that the work on one recording is finished; of ``lipmotion doctor``, on a part of the installation.
 
-    name    : of the recording
-    outcome : ``prepared``, ``kept`` (it was prepared before) or ``skipped``; of a part, its state
+    name    : of the recording, or of an experiment
+    outcome : ``prepared``, ``kept`` (it was prepared before) or ``skipped``; of a part, its state; of an experiment,
+              ``failed``
     reason  : why it was skipped, or remarks on it
     """
 

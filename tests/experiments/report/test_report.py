@@ -89,6 +89,7 @@ def test_what_is_finished_is_not_run_again_and_no_byte_changes(
     assert (stamp["seed"], stamp["corpus"]["train"], stamp["machine"]["cores"] > 0) == (0, 8, True)
     assert len(stamp["corpus"]["SHA-256"]) == 64
     assert stamp["versions"]["numpy"] in links.text
+    assert stamp["command"].endswith("-o report --only folds")
 
 
 def test_a_run_that_was_stopped_goes_on(
@@ -112,6 +113,33 @@ def test_a_run_that_was_stopped_goes_on(
     assert ran == ["hofer2008", "folds"]
     assert not list((tmp_path / "r").glob("*.unfinished"))
     assert "not chosen" in Links(tmp_path / "r" / PAGE).text
+
+
+def test_what_fails_is_told_and_stops_nothing_else(
+    ran: list[str], toy_corpus: Corpus, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An experiment with an error of its own, and one whose figures cannot be told."""
+
+    def broken(_: object) -> Any:
+        raise KeyError("no such figure")
+
+    stand_ins: dict[str, ReportPart] = vars(report)["PARTS"]
+    whole = dict(stand_ins)
+    monkeypatch.setitem(stand_ins, "hofer2008", replace(whole["hofer2008"], run=broken))
+    reports: list[tuple[str, str]] = []
+    settings = ExperimentSettings(monitor=lambda event: reports.append((event.name, event.outcome)))
+    found = experiment_report(toy_corpus, tmp_path / "r", only=TWO, settings=settings)
+    assert (list(found.failed), list(found.made), reports) == (["hofer2008"], ["folds"], [("hofer2008", "failed")])
+    monkeypatch.setitem(stand_ins, "hofer2008", whole["hofer2008"])
+    monkeypatch.setitem(stand_ins, "folds", replace(whole["folds"], section=broken))
+    found = experiment_report(toy_corpus, tmp_path / "r", only=TWO)
+    assert (list(found.failed), list(found.verdicts), list(found.made)) == (["folds"], ["hofer2008"], ["hofer2008"])
+    text = Links(tmp_path / "r" / PAGE).text
+    assert "foldsfailed: KeyError: 'no such figure'; mend that" in text
+    assert "not finished" not in text
+    monkeypatch.setitem(stand_ins, "folds", whole["folds"])
+    assert not experiment_report(toy_corpus, tmp_path / "r", only=TWO).failed
+    assert ran == ["folds", "hofer2008"]
 
 
 @pytest.mark.long

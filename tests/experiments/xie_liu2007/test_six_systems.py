@@ -189,7 +189,7 @@ def test_the_text_names_every_system(figures: dict[str, Any]) -> None:
 @LONG
 @pytest.mark.parametrize("visual", ["both"])
 def test_eigenlips(visual: str, toy_corpus: Corpus) -> None:
-    options = ComparisonOptions(systems=["trajectory HMM"], visual=visual, train_on=20)  # more than there are
+    options = ComparisonOptions(systems=["trajectory HMM"], visual=visual)
     received: list[tuple[str, str]] = []
     settings = replace(SMALL, receive=lambda *given: received.append(given[:2]))
     made = xieliu2007(toy_corpus, options, settings=settings)

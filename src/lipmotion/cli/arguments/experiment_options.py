@@ -19,9 +19,15 @@ if TYPE_CHECKING:
     from lipmotion.units import Lexicon
 
 
-def add_experiment_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the corpus, ``--workers``, and the options of ``add_figures_arguments``."""
+def add_experiment_arguments(parser: argparse.ArgumentParser, *, quick: str = "") -> None:
+    """Add the corpus, ``--workers``, and the options of ``add_figures_arguments``.
+
+    quick : what is small with ``--quick``, beside the recordings; without it there is no such option
+    """
     add_input(parser, "corpus", what="corpus")
+    if quick:
+        help_text = f"see that it runs: 20 recordings to train on, at most 6 to compare, {quick}"
+        parser.add_argument("--quick", action="store_true", help=help_text)
     add_workers(parser)
     add_figures_arguments(parser)
 
@@ -31,13 +37,22 @@ def run_experiment(
     experiment: Callable[[Corpus, ExperimentSettings], dict[str, Any]],
     table: Callable[[dict[str, Any]], str],
 ) -> None:
-    """Call ``experiment(corpus, settings)`` and print its table."""
+    """Call ``experiment(corpus, settings)``, print its table, and give its figures with their stamp.
+
+    With ``--quick`` the corpus is ``runner.quick_part``, the same recordings for all experiments.
+    """
     from lipmotion.corpora.store import Corpus
-    from lipmotion.experiments.runner import ExperimentSettings
+    from lipmotion.experiments.runner import ExperimentSettings, quick_part
+    from lipmotion.experiments.stamp import Stamp
 
     def compute(lexicon: Lexicon | None, monitor: Monitor) -> dict[str, Any]:
+        stamp = Stamp()
         settings = ExperimentSettings(lexicon=lexicon, workers=worker_count(options), monitor=monitor)
-        return experiment(Corpus.open(options.corpus), settings)
+        corpus = Corpus.open(options.corpus)
+        if getattr(options, "quick", False):
+            corpus = quick_part(corpus, settings.seed)
+        figures = experiment(corpus, settings)
+        return {"stamp": stamp.content(["lipmotion", *options.words], corpus, settings)} | figures
 
     report_figures(options, compute, table)
 

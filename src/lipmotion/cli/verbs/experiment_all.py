@@ -27,10 +27,10 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Call ``experiment_report``; print what was found, and the page."""
+    """Call ``experiment_report``; print what was found, and the page. Raises the error of an experiment that failed."""
     from lipmotion.cli.terminal.progress import reporting
     from lipmotion.corpora.store import Corpus
-    from lipmotion.experiments.report.report import experiment_report
+    from lipmotion.experiments.report.report import experiment_report, told
     from lipmotion.experiments.runner import ExperimentSettings
     from lipmotion.units import Lexicon
 
@@ -42,7 +42,12 @@ def run(options: argparse.Namespace) -> None:
         )
         lines = [f"{name}: {verdict}" for name, verdict in found.verdicts.items()]
         lines += [f"{name}: {reason}" for name, reason in found.left_out.items()]
-        lines.append(f"report: {found.page}" if found.made else f"nothing was left to do; report: {found.page}")
+        lines += [f"{name}: failed: {told(error)}" for name, error in found.failed.items()]
+        is_done = not (found.made or found.failed)
+        lines.append(f"{'nothing was left to do; ' if is_done else ''}report: {found.page}")
         figures: dict[str, Any] = {"report": str(found.page), "verdicts": dict(found.verdicts)}
         figures |= {"left_out": dict(found.left_out), "made": list(found.made)}
-        report.finish("\n".join(map(printable, lines)), **figures)
+        if not (found.failed and options.machine_readable):  # the last event is that of the failure
+            report.finish("\n".join(map(printable, lines)), **figures)
+        if found.failed:
+            raise next(iter(found.failed.values()))

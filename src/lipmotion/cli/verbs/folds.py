@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from lipmotion.cli.arguments.experiment_options import add_experiment_arguments, run_experiment
+from lipmotion.cli.arguments.experiment_options import add_experiment_arguments, run_experiment, unfinished_parts
 
 if TYPE_CHECKING:
     from lipmotion.corpora.store import Corpus
@@ -25,10 +25,11 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Call ``experiment.folds`` and print its table."""
+    """Call ``experiment.folds``, print its table; with ``--output``, a second run goes on after a stop."""
     from lipmotion.experiments.folds import folds, table
 
     def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
-        return folds(corpus, count=options.folds, by_speaker=options.by_speaker, settings=settings)
+        with unfinished_parts(options) as work:
+            return folds(corpus, count=options.folds, by_speaker=options.by_speaker, work=work, settings=settings)
 
     run_experiment(options, experiment, table)

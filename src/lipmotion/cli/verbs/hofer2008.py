@@ -19,8 +19,7 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "hofer2008", help="which unit set predicts closings of the mouth, by the paper's own system (Table 1)"
     )
     parser.add_argument("--split", default="test", help="compare on test, val, train or all (default: test)")
-    parser.add_argument("--quick", action="store_true", help="40 clips to train on, one or two Gaussians a state")
-    add_experiment_arguments(parser)
+    add_experiment_arguments(parser, quick="one or two Gaussians a state")
     parser.set_defaults(run=run)
 
 

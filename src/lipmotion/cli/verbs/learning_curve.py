@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from lipmotion.cli.arguments.experiment_options import add_experiment_arguments, run_experiment
+from lipmotion.cli.arguments.experiment_options import add_experiment_arguments, run_experiment, unfinished_parts
 from lipmotion.cli.arguments.options import list_or_all, numbers
 from lipmotion.cli.arguments.paths import add_input
 
@@ -27,13 +27,14 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Call ``experiment.learning_curve`` and print its table."""
+    """Call ``experiment.learning_curve``, print its table; with ``--output``, a second run goes on after a stop."""
     from lipmotion.corpora.splits import read_names
     from lipmotion.experiments.learning_curve import learning_curve, table
 
     def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
         order = read_names(options.order) if options.order else None
         split = list_or_all(options.split)
-        return learning_curve(corpus, order=order, sizes=options.sizes, split=split, settings=settings)
+        with unfinished_parts(options) as work:
+            return learning_curve(corpus, order=order, sizes=options.sizes, split=split, work=work, settings=settings)
 
     run_experiment(options, experiment, table)

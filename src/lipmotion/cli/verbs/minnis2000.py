@@ -18,8 +18,7 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = actions.add_parser("minnis2000", help="unit selection as Minnis & Breen 2000 print it, and each addition")
     kept = "keep the model there, so that a run that was stopped goes on and a second one does not train"
     add_output(parser, "--models", is_folder=True, metavar="FOLDER", help=kept)
-    parser.add_argument("--quick", action="store_true", help="few recordings, few epochs: see that it runs")
-    add_experiment_arguments(parser)
+    add_experiment_arguments(parser, quick="few epochs; the model is not kept")
     parser.set_defaults(run=run)
 
 

@@ -29,8 +29,6 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     systems = "these systems, separated by semicolons (default: those of the paper, and baselines)"
     parser.add_argument("--systems", type=lambda text: text.split(";"), metavar="NAME;NAME", help=systems)
-    quick = "the paper's systems, four of them also tuned, trained on 20 recordings and compared on 6"
-    parser.add_argument("--quick", action="store_true", help=quick)
     parser.add_argument("--visual", default="geometry", metavar="KIND", help="geometry, eigenlips or both")
     parser.add_argument("--transcripts", action="store_true", help="compare also with known transcripts")
     parser.add_argument("--noise", default="", metavar="KIND,KIND", help="compare also in noise: white, babble")
@@ -44,16 +42,20 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     talkers = "recordings of other people, for the babble"
     add_input(parser, "--talkers", what="folder of recordings", metavar="FOLDER", help=talkers)
     add_output(parser, "--plots", metavar="FOLDER", help="write pictures like Figs. 7, 10 and 11 there")
-    add_experiment_arguments(parser)
+    add_experiment_arguments(parser, quick="the paper's systems, four of them also tuned; not with --order")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
     """Call ``experiment.xieliu2007`` and print its table."""
     from lipmotion.corpora.splits import read_names
+    from lipmotion.errors import InputError
     from lipmotion.experiments.noise import NoiseConditions, read_talkers
     from lipmotion.experiments.xie_liu2007.six_systems import DEFAULT_OPTIONS, QUICK, xieliu2007
     from lipmotion.experiments.xie_liu2007.text import table
+
+    if options.quick and options.order:
+        raise InputError("--quick takes recordings of its own, and --order is a list of others; leave out one of them")
 
     def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
         kinds = tuple(kind for kind in options.noise.split(",") if kind)

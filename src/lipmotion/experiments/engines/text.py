@@ -15,6 +15,10 @@ HEAD = (
     f"  {'system':{NAME_WIDTH}}{'ACC (95 %)':23}  nRMSE  variance  jerk  width | score  precision  p b m  false |"
     "  no pins: score  precision  p b m  false"
 )
+LEGEND = (
+    "variance, jerk: by those of the recordings; width: its ACC; score, precision, p b m: %; false: closings outside "
+    "p b m, a minute of speech; no pins: lips not made to meet"
+)
 CLOSURES = (("score", "6.1f"), ("precision", "11.1f"), ("recall_p_b_m", "7.1f"), ("false_per_minute", "7.0f"))
 
 
@@ -40,6 +44,7 @@ def table(figures: Mapping[str, Any]) -> str:
     lines += [
         "",
         f"* differs from {figures['reference']}: the 95 % interval of the difference on the same clips leaves out 0",
+        LEGEND,
         "",
         f"confidence in every second of every clip, {name}: 1 where {_list(ENGINES_COMPARED)} agree, "
         "0 where they are half as far apart as the mouth moves (a deviation)",

@@ -24,9 +24,10 @@ from lipmotion.experiments.comparison import (
 from lipmotion.experiments.runner import (
     DEFAULT_SETTINGS,
     ExperimentSettings,
+    PartKey,
     channels_with_opening,
+    finished_parts,
     opening_row,
-    shuffled,
 )
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.hmm.multistream.streams import SPEECH
@@ -42,12 +43,10 @@ from lipmotion.pipeline.evaluation.held_out import (
     held_out_recordings,
     speech_of_condition,
 )
-from lipmotion.pipeline.training.channels import GEOMETRY
-from lipmotion.pipeline.training.fingerprint import fingerprint
 from lipmotion.pipeline.training.train import UTTERANCES_PER_WORKER, phones_and_examples
 from lipmotion.pipeline.workers import worker_pool
 from lipmotion.speech.recognition.recogniser import cached_recogniser
-from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
+from lipmotion.storage.checkpoint import Checkpoint
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import Example, Monitor, sub_monitor
 from lipmotion.units import UNIT_SETS, Lexicon
@@ -69,15 +68,13 @@ class Table1Options:
 
     states   : numbers of states a unit
     mixtures : numbers of Gaussians a state for speech, powers of two; of these one is chosen on ``val`` for each model
-    clips    : so many of the training list, shuffled with the seed; None: all
     """
 
     states: Sequence[int] = (3, 5)
     mixtures: Sequence[int] = (1, 2, 4, 8)
-    clips: int | None = None
 
 
-FULL, QUICK = Table1Options(), Table1Options(mixtures=(1, 2), clips=40)
+FULL, QUICK = Table1Options(), Table1Options(mixtures=(1, 2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,13 +111,9 @@ def hofer2008(
     Source: Hofer 2008, §6 and Table 1.
     """
     channels_with_opening(corpus, held_out := corpus.required(split))  # before the long work
-    validation, names = corpus.required("val"), corpus.required("train")
-    names = tuple(sorted(shuffled(names, settings.seed)[: options.clips]))
+    validation, names = corpus.required("val"), tuple(sorted(corpus.required("train")))
     lexicon, config, monitor = settings.lexicon or Lexicon(), settings.recogniser or HmmConfig(), settings.monitor
-    checkpoint = NO_CHECKPOINT
-    if work is not None:
-        job = (*names, *validation, *held_out)
-        checkpoint = Checkpoint(work, fingerprint(corpus, job, _engine(), config, lexicon, GEOMETRY, None))
+    checkpoint = finished_parts(work, corpus, settings, PartKey(_engine(), (*names, *validation, *held_out)))
     with worker_pool(min(settings.workers, len(names) // UTTERANCES_PER_WORKER)) as team:
         phones, examples, _ = phones_and_examples(
             [corpus.utterance(name) for name in names],

@@ -24,8 +24,14 @@ from lipmotion.experiments.comparison import correlation_statistic, opening_curv
 from lipmotion.experiments.engines.models import EngineModel, engine_models
 from lipmotion.experiments.learning_curve import check_training_names
 from lipmotion.experiments.minnis_breen2000.joins import join_figures
-from lipmotion.experiments.runner import DEFAULT_SETTINGS, ExperimentSettings, channels_with_opening, opening_row
-from lipmotion.hmm.model import HmmConfig
+from lipmotion.experiments.runner import (
+    DEFAULT_SETTINGS,
+    ExperimentSettings,
+    PartKey,
+    channels_with_opening,
+    finished_parts,
+    opening_row,
+)
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.evaluation.figures import figures_of
 from lipmotion.pipeline.evaluation.held_out import (
@@ -37,14 +43,11 @@ from lipmotion.pipeline.evaluation.held_out import (
     speech_of_condition,
 )
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.training.channels import GEOMETRY
-from lipmotion.pipeline.training.fingerprint import fingerprint
 from lipmotion.pipeline.training.train import Run, train
 from lipmotion.speech.recognition.recogniser import cached_recogniser
-from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
+from lipmotion.storage.checkpoint import Checkpoint
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import Speech, sub_monitor, with_progress
-from lipmotion.units import Lexicon
 
 ENGINE = "selection"
 PRINTED, UNGUIDED, EVERYTHING = "as printed", "all additions but the guide", "all additions: the default"
@@ -71,7 +74,7 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
     "window N = 7": {"window": 7},
 }
 """Other readings of the print, and what it leaves open."""
-QUICK_TRAINING, QUICK_CLIPS, QUICK_EPOCHS = 40, 8, 20
+QUICK_EPOCHS = 20
 _ROW, _SUMS = "row", "correlation"
 """Names of the arrays of a kept row: its figures, and the sums over clips of its correlation."""
 WHAT_IS_SHOWN = ("acc", "nrmse", "global_variance", "jerk")
@@ -104,7 +107,7 @@ def minnis2000(
 
     models : folder of the model ``selection.lipmotion`` (``models.engine_models``), so that a second run does not train
              again; None: it is trained and not kept
-    quick  : train on a few utterances, for few epochs, and compare few; the model is not kept
+    quick  : train for few epochs; the model is not kept
     work   : a folder for finished rows, from which the same call goes on after a stop; None: none
     All rows use one model, with the default's inventory, guide and phone recogniser, of which each takes what it needs:
     the row as printed is what ``train --preset minnis2000`` makes (tests/experiments/minnis_breen2000).
@@ -112,7 +115,7 @@ def minnis2000(
     Raises InputError, ModelFormatError, ExportError: as ``engine_models``.
     """
     splits = [split for split in ("val", "test") if split == "test" or corpus.names(split)]
-    lists = {split: corpus.required(split)[: QUICK_CLIPS if quick else None] for split in splits}
+    lists = {split: corpus.required(split) for split in splits}
     for held_out in lists.values():
         check_training_names(corpus, corpus.required("train"), held_out)
     monitor = settings.monitor
@@ -122,7 +125,8 @@ def minnis2000(
     for number, (split, names) in enumerate(lists.items()):
         start, stop = (0.6 + 0.4 * (number + step) / len(lists) for step in (0, 1))
         part = replace(settings, monitor=sub_monitor(monitor, start, stop, f"{split}: "))
-        kept = _kept_rows(corpus, names, trained.model, work / split, settings) if work else NO_CHECKPOINT
+        key = PartKey(trained.model.engine, names, model=trained.model, others=str(rows()))
+        kept = finished_parts(work and work / split, corpus, settings, key)
         found[split] = _on_list(corpus, names, trained.model, kept, part)
     about: dict[str, Any] = {"seed": settings.seed, "quick": quick, "seconds": trained.seconds}
     about |= {key: trained.model.about[key] for key in ("utterances", "minutes")}
@@ -140,23 +144,12 @@ def _quick_model(corpus: Corpus, settings: ExperimentSettings) -> EngineModel:
     start_s = perf_counter()
     model, _ = train(
         corpus,
-        selection=Selection(names=sorted(corpus.required("train")[:QUICK_TRAINING])),
         engine=engine_named(ENGINE, {"epochs": QUICK_EPOCHS}),
         recogniser=settings.recogniser,
         lexicon=settings.lexicon,
         run=Run(settings.monitor, None, settings.workers),
     )
     return EngineModel(model, perf_counter() - start_s)
-
-
-def _kept_rows(
-    corpus: Corpus, names: Sequence[str], model: Model, folder: Path, settings: ExperimentSettings
-) -> Checkpoint:
-    """Return what is kept of the rows on some utterances, in a folder that is made if need be."""
-    folder.mkdir(exist_ok=True)
-    config, lexicon = settings.recogniser or HmmConfig(), settings.lexicon or Lexicon()
-    of_input = fingerprint(corpus, names, model.engine, config, lexicon, GEOMETRY, model)
-    return Checkpoint(folder, f"{of_input} {rows()} {settings.seed}")
 
 
 def _on_list(

@@ -52,6 +52,7 @@ class ReportPage:
     about    : of the corpus and the run, by name
     finished : experiments, in their order
     open     : names of those that are not finished, with what is the matter
+    failed   : names of those that failed, with their errors
     quick    : whether it is a quick run
     """
 
@@ -59,6 +60,7 @@ class ReportPage:
     about: Mapping[str, str]
     finished: Sequence[FinishedPart]
     open: Mapping[str, str]
+    failed: Mapping[str, str]
     quick: bool
 
     def as_html(self) -> str:
@@ -80,7 +82,8 @@ class ReportPage:
             )
             for part in self.finished
         ]
-        found += [element("li", element("strong", name), reason) for name, reason in self.open.items()]
+        for reasons, look in ((self.failed, "failed"), (self.open, None)):
+            found += [element("li", element("strong", name), why, class_=look) for name, why in reasons.items()]
         warning = [element("p", QUICK_WARNING, class_="warning")] if self.quick else []
         reading = element(
             "p",

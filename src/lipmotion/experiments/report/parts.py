@@ -91,12 +91,14 @@ def _engines(run: PartRun) -> dict[str, Any]:
 
 def _learning_curve(run: PartRun) -> dict[str, Any]:
     count = len(run.corpus.names("train"))
-    return learning_curve(run.corpus, sizes=[(count + 1) // 2, count] if run.quick else None, settings=run.settings)
+    sizes = [(count + 1) // 2, count] if run.quick else None
+    return learning_curve(run.corpus, sizes=sizes, work=run.work, settings=run.settings)
 
 
 def _folds(run: PartRun) -> dict[str, Any]:
     most = QUICK_FOLDS if run.quick else FOLDS
-    return folds(run.corpus, count=min(most, len(run.corpus.names("train"))), settings=run.settings)
+    count = min(most, len(run.corpus.names("train")))
+    return folds(run.corpus, count=count, work=run.work, settings=run.settings)
 
 
 PARTS: dict[str, ReportPart] = {

@@ -3,43 +3,40 @@
 from __future__ import annotations
 
 import hashlib
-import os
+import shlex
 import shutil
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from datetime import datetime, timezone
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from time import perf_counter
 from typing import Any
 
 from lipmotion.corpora.splits import SPLITS
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
-from lipmotion.errors import CorpusError, ExportError, InputError
+from lipmotion.errors import CorpusError, ExportError, InputError, LipMotionError
 from lipmotion.experiments.report.page import FinishedPart, ReportPage
 from lipmotion.experiments.report.parts import PARTS, TEST, PartRun, can_draw
 from lipmotion.experiments.report.section import Section
 from lipmotion.experiments.report.shown_clip import ClipKeeper, write_videos
-from lipmotion.experiments.report.stamp import machine_stamp
-from lipmotion.experiments.runner import DEFAULT_SETTINGS, ExperimentSettings, channels_with_opening, shuffled
+from lipmotion.experiments.runner import DEFAULT_SETTINGS, ExperimentSettings, channels_with_opening, quick_part
+from lipmotion.experiments.stamp import Stamp
 from lipmotion.experiments.xie_liu2007.plots import PLOT_CAPTIONS
 from lipmotion.export.web_page import GENERATOR
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.training.channels import GEOMETRY
-from lipmotion.pipeline.training.fingerprint import corpus_digest, fingerprint
+from lipmotion.pipeline.training.fingerprint import fingerprint
 from lipmotion.storage.files import TEMPORARY, locked, remove_unfinished, unfinished_work, whole_file, whole_folder
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.storage.sources import Source, check_apart
-from lipmotion.types import sub_monitor
+from lipmotion.types import Item, sub_monitor
 from lipmotion.units import Lexicon
 
 PAGE, FIGURES, MOTION = "index.html", "figures.json", "motion.json"
 """The page; and in the folder of an experiment its figures with their stamp, and the motion of one clip."""
-QUICK_CLIPS = {"train": 20, "val": 4, "test": 6}
-"""Most recordings of each list in a quick run."""
 KEY_DIGITS = 8
 """Digits of a key in the name of a folder."""
 NOT_YET = "not finished; the same command goes on with it"
+FAILED, AGAIN = "failed: ", "mend that, then give the same command: it goes on with it"
 NOT_CHOSEN = "not chosen"
 
 
@@ -50,12 +47,14 @@ class WrittenReport:
     page     : its path
     verdicts : what was found, one sentence by experiment
     left_out : why experiments are not in it, by name
+    failed   : errors of experiments that failed, by name; the same command tries them again
     made     : names of the experiments that ran now; the others were there
     """
 
     page: Path
     verdicts: Mapping[str, str]
     left_out: Mapping[str, str]
+    failed: Mapping[str, Exception]
     made: Sequence[str]
 
 
@@ -75,13 +74,13 @@ def experiment_report(
     settings : of all experiments
     The page is written anew when an experiment is finished; where nothing is left to do, nothing is written. Every
     experiment has a folder of its own beside the page. Where the corpus lacks a list, the page says what is left out.
+    An experiment that fails does not stop the others: the page says with what error it failed.
     Raises InputError: no such experiment.
     Raises CorpusError: no utterances to train on or for an experiment of ``only``, or motion without an opening.
     Raises ExportError: the folder holds something else or cannot be written to, or another call is at work on it.
-    Raises AlignmentError, MissingDependencyError: as the experiments.
     """
     wanted = _wanted(only)
-    corpus = _few(corpus, settings.seed) if quick else corpus
+    corpus = quick_part(corpus, settings.seed) if quick else corpus
     possible, lacking = _possible(corpus, wanted, named=only is not None)
     check_apart((), [Source(corpus.path, "corpus")], folders=[folder])
     _check_folder(folder)
@@ -89,18 +88,19 @@ def experiment_report(
         remove_unfinished(folder)
         writer = _Writer(corpus, folder, quick, settings, lacking, _digest(corpus, quick, settings))
         writer.write_page(wanted)
-        missing = [name for name in possible if writer.found(name) is None]
+        missing = [name for name in possible if writer.record(name) is None]
         whole = sum(PARTS[name].share for name in missing)
         done = 0.0
         for name in missing:
             share = PARTS[name].share
             part = sub_monitor(settings.monitor, done / whole, (done + share) / whole, f"{name}: ")
-            writer.run(name, replace(settings, monitor=part))
+            writer.try_to_run(name, replace(settings, monitor=part))
             writer.write_page(wanted)
             done += share
         finished = writer.finished()
     verdicts = {part.name: part.section.verdict for part in finished}
-    return WrittenReport(folder / PAGE, verdicts, lacking, missing)
+    made = [name for name in missing if name not in writer.failed]
+    return WrittenReport(folder / PAGE, verdicts, lacking, writer.failed, made)
 
 
 def _wanted(only: Sequence[str] | None) -> list[str]:
@@ -108,11 +108,6 @@ def _wanted(only: Sequence[str] | None) -> list[str]:
     if unknown:
         raise InputError(f"no experiment {unknown[0]!r}; there are: {', '.join(PARTS)}")
     return [name for name in PARTS if only is None or name in only]
-
-
-def _few(corpus: Corpus, seed: int) -> Corpus:
-    """Return a corpus with a few utterances of each list."""
-    return corpus.part([name for split in SPLITS for name in shuffled(corpus.names(split), seed)[: QUICK_CLIPS[split]]])
 
 
 def _possible(corpus: Corpus, wanted: Sequence[str], *, named: bool) -> tuple[list[str], dict[str, str]]:
@@ -156,6 +151,7 @@ class _Writer:
 
     lacking : why experiments are left out, by name
     digest  : of all that the figures of every experiment depend on
+    failed  : errors of experiments that failed, by name
     """
 
     corpus: Corpus
@@ -164,6 +160,7 @@ class _Writer:
     settings: ExperimentSettings
     lacking: Mapping[str, str]
     digest: str
+    failed: dict[str, Exception] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -174,19 +171,25 @@ class _Writer:
         """Return a digest of all that the figures of an experiment depend on."""
         return hashlib.sha256(f"{name} {self.digest}".encode()).hexdigest()
 
-    def found(self, name: str) -> FinishedPart | None:
-        """Return an experiment that is finished; None: it is not, or was another one."""
+    def record(self, name: str) -> tuple[dict[str, Any], dict[str, Any]] | None:
+        """Return figures and motion of an experiment that is finished; None: it is not, or was another one."""
         try:
             record, motion = (from_json((self.folder / name / file).read_bytes()) for file in (FIGURES, MOTION))
-            if record["key"] != self.key(name):
-                return None
-            return FinishedPart(name, record, motion, PARTS[name].section(record["figures"]))
+            return (record, motion) if record["key"] == self.key(name) else None
         except (OSError, ValueError, KeyError, TypeError):
             return None
 
     def finished(self) -> list[FinishedPart]:
         """Return all experiments that are finished, in the order of the page."""
-        return [part for name in PARTS if (part := self.found(name)) is not None]
+        found = []
+        for name in PARTS:
+            record = self.record(name)
+            if record is not None:
+                try:
+                    found.append(FinishedPart(name, *record, PARTS[name].section(record[0]["figures"])))
+                except Exception as error:  # what one experiment says must not hide the others
+                    self.failed[name] = error
+        return found
 
     def write_page(self, wanted: Sequence[str]) -> None:
         """Write the page, if anything in it has changed."""
@@ -195,71 +198,66 @@ class _Writer:
         left_open = {
             name: self.lacking.get(name, NOT_YET if name in wanted else NOT_CHOSEN)
             for name in PARTS
-            if name not in there
+            if name not in there and name not in self.failed
         }
+        failed = {name: f"{FAILED}{told(error)}; {AGAIN}" for name, error in self.failed.items()}
         summary = self.corpus.summary() | {"corpus": self.name}
-        about = summary | {"made with": self._command(wanted)}
-        text = ReportPage(f"Experiments on {self.name}", about, finished, left_open, self.quick).as_html()
+        about = summary | {"made with": shlex.join(self._command(wanted))}
+        text = ReportPage(f"Experiments on {self.name}", about, finished, left_open, failed, self.quick).as_html()
         page = self.folder / PAGE
         if not page.is_file() or page.read_text("utf-8", errors="replace") != text:
             with whole_file(page) as unfinished:
                 unfinished.write_text(text, encoding="utf-8")
 
-    def run(self, name: str, settings: ExperimentSettings) -> None:
-        """Run an experiment, and write its folder.
+    def try_to_run(self, name: str, settings: ExperimentSettings) -> None:
+        """Run an experiment, and write its folder; where it fails, keep the error.
 
         settings : with the monitor of this experiment
+        Raises ExportError: something cannot be written.
         """
+        try:
+            self._run(name, settings)
+        except ExportError:
+            raise  # nor could the others write
+        except Exception as error:  # one experiment must not stop the others
+            settings.monitor(Item(name, "failed", told(error)))
+            self.failed[name] = error
+
+    def _run(self, name: str, settings: ExperimentSettings) -> None:
         part, target = PARTS[name], self.folder / name
         models = self.folder / "models" / self.key("models")[:KEY_DIGITS]  # of other recordings, other models
         with unfinished_work(self.folder / f"{name}.json") as work:
-            begun, clock = datetime.now(timezone.utc), _Clock()
+            stamp = Stamp()
             keeper = ClipKeeper(work / MOTION, self.key(name))
             running = replace(settings, monitor=sub_monitor(settings.monitor, 0, 0.95), receive=keeper)
             plots = work / "plots" if part.draws and can_draw() else None
             figures = part.run(PartRun(self.corpus, self.quick, work, models, plots, running))
             section, motion = part.section(figures), keeper.content()
-            stamp = {"begun": begun.isoformat(timespec="seconds"), **clock.stamp()} | self._stamp()
+            made_with = stamp.content(self._command([name]), self.corpus, settings)
             shutil.rmtree(target, ignore_errors=True)
             with whole_folder(target) as made:
                 videos = []
                 if motion:
                     drawing = sub_monitor(settings.monitor, 0.95, 1)
                     videos = write_videos(motion, section.shown, self.corpus, made, drawing)
-                record: dict[str, Any] = {"experiment": name, "key": self.key(name), "stamp": stamp, "figures": figures}
+                record: dict[str, Any] = {"experiment": name, "key": self.key(name), "stamp": made_with}
+                record["figures"] = figures
                 record |= {"videos": videos, "pictures": _moved_pictures(plots, made)}
                 _write_tables(section, made / "tables")
                 _write_json(made / MOTION, motion)
                 _write_json(made / FIGURES, record)
 
-    def _stamp(self) -> dict[str, Any]:
-        """Return what figures are stamped with, beside the time."""
-        options = {"quick": "yes" if self.quick else "no", "workers": self.settings.workers}
-        options |= {"lexicon": "the user's" if self.settings.lexicon else "none but the dictionary"}
-        lists = {split: len(self.corpus.names(split)) for split in SPLITS}
-        about = {"name": self.name, "SHA-256": corpus_digest(self.corpus), **lists}
-        return {"corpus": about, "seed": self.settings.seed, "options": options, **machine_stamp()}
-
-    def _command(self, wanted: Sequence[str]) -> str:
-        words = ["lipmotion experiment all", self.name, "-o", self.folder.resolve().name]
+    def _command(self, wanted: Sequence[str]) -> list[str]:
+        """Return the words of a command for some experiments."""
+        words = ["lipmotion", "experiment", "all", self.name, "-o", self.folder.resolve().name]
         words += ["--only", ",".join(wanted)] if len(wanted) < len(PARTS) else []
         words += ["--lexicon", "FILE"] if self.settings.lexicon else []
-        return " ".join([*words, *(["--quick"] if self.quick else [])])
+        return [*words, *(["--quick"] if self.quick else [])]
 
 
-class _Clock:
-    """Measures time from when it is made."""
-
-    def __init__(self) -> None:
-        self._begin = perf_counter(), self._used()
-
-    def stamp(self) -> dict[str, float]:
-        """Return the seconds since then, and those of processors, with processes that have ended."""
-        seconds, used = perf_counter() - self._begin[0], self._used() - self._begin[1]
-        return {"seconds": round(seconds, 1), "processor seconds": round(used, 1)}
-
-    def _used(self) -> float:
-        return sum(os.times()[:4])
+def told(error: Exception) -> str:
+    """Return what an error says; of one that is not raised on purpose its kind, too."""
+    return str(error) if isinstance(error, LipMotionError) else f"{type(error).__name__}: {error}"
 
 
 def _digest(corpus: Corpus, quick: bool, settings: ExperimentSettings) -> str:

@@ -20,10 +20,15 @@ from lipmotion.experiments.learning_curve import check_training_names, training_
 from lipmotion.experiments.noise import NoiseConditions, recordings_in_noise
 from lipmotion.experiments.runner import (
     DEFAULT_SETTINGS,
+    QUICK_CLIPS,
     ExperimentSettings,
+    PartKey,
     channels_with_opening,
+    clips_from_arrays,
+    finished_parts,
     opening_row,
     shuffled,
+    stored_clips,
 )
 from lipmotion.experiments.xie_liu2007.plots import check_plot_folder, draw_plots
 from lipmotion.experiments.xie_liu2007.systems import (
@@ -31,9 +36,7 @@ from lipmotion.experiments.xie_liu2007.systems import (
     PAPER_FIGURES,
     REFERENCE_SYSTEM,
     TUNED,
-    clips_from_arrays,
     selected_systems,
-    stored_clips,
     stored_system,
     system_from_arrays,
     train_system,
@@ -67,7 +70,6 @@ from lipmotion.pipeline.training.channels import (
     train_eigenlips,
     with_visual_channels,
 )
-from lipmotion.pipeline.training.fingerprint import fingerprint
 from lipmotion.pipeline.training.train import UTTERANCES_PER_WORKER, phones_and_examples
 from lipmotion.pipeline.workers import worker_pool
 from lipmotion.speech.recognition.recogniser import cached_recogniser
@@ -90,8 +92,6 @@ class ComparisonOptions:
     visual      : which motion is modelled and compared, as in ``train``; eigenlips are those of the training
     transcripts : compare also with known transcripts
     noise       : noise in which the systems trained on the largest size are compared as well
-    most        : choose and compare with no more recordings
-    train_on    : train on no more recordings where no sizes are given
     """
 
     systems: Sequence[str] | None = None
@@ -99,19 +99,16 @@ class ComparisonOptions:
     visual: str = GEOMETRY
     transcripts: bool = False
     noise: NoiseConditions | None = None
-    most: int | None = None
-    train_on: int | None = None
 
 
 DEFAULT_OPTIONS = ComparisonOptions()
-QUICK_SIZE = 20
 QUICK = ComparisonOptions(
     systems=[*PAPER_FIGURES, *(name + TUNED for name in PAPER_FIGURES if "FHMM" not in name), "mean pose"],
-    tuning=TuningOptions(clips=QUICK_SIZE, judges=4, weights=(1.0, 0.3), mixtures=2, states=()),
-    most=6,
-    train_on=QUICK_SIZE,
+    tuning=TuningOptions(
+        clips=QUICK_CLIPS["train"], judges=QUICK_CLIPS["val"], weights=(1.0, 0.3), mixtures=2, states=()
+    ),
 )
-"""A small comparison, of systems trained on ``QUICK_SIZE`` recordings; conversion by factorial chains is slow."""
+"""A small comparison, for the recordings of ``runner.quick_part``; conversion by factorial chains is slow."""
 
 
 @one_thread()
@@ -144,12 +141,9 @@ def xieliu2007(  # noqa: PLR0913
     check_visual(options.visual)
     tunes = list(dict.fromkeys(filter(None, (COMPARED_SYSTEMS[name].tunes for name in names))))
     listed = tuple(order) if order is not None else shuffled(corpus.required("train"), seed)
-    held_out, validation = (
-        corpus.required(split)[: options.most],
-        corpus.required("val")[: options.most] if tunes else (),
-    )
+    held_out, validation = corpus.required(split), corpus.required("val") if tunes else ()
     check_training_names(corpus, listed, (*held_out, *validation))
-    steps = training_sizes(sizes if sizes is not None else [len(listed[: options.train_on])], len(listed))
+    steps = training_sizes(sizes if sizes is not None else [len(listed)], len(listed))
     setup = _TrainingSetup(corpus, held_out, validation, options, settings, work)
     if options.visual != EIGENLIPS:
         channels_with_opening(corpus, held_out)  # before the long work
@@ -274,14 +268,9 @@ class _TrainingSetup:
 
     def checkpoint(self, names: Sequence[str], compared: Sequence[str] = ()) -> Checkpoint:
         """Return what is kept of the work on the first recordings of a list, and of comparisons on others."""
-        if self.work is None:
-            return NO_CHECKPOINT
-        folder = self.work / str(len(names))
-        folder.mkdir(exist_ok=True)
-        config, lexicon = self.settings.recogniser or HmmConfig(), self.settings.lexicon or Lexicon()
-        everything, engine = (*names, *self.corpus.names("val")), engine_named("coupled")
-        of_input = fingerprint(self.corpus, everything, engine, config, lexicon, self.options.visual, None)
-        return Checkpoint(folder, " ".join((of_input, str(self.options.tuning), *compared)))
+        everything, others = (*names, *self.corpus.names("val")), " ".join((str(self.options.tuning), *compared))
+        key = PartKey(engine_named("coupled"), everything, self.options.visual, others=others)
+        return finished_parts(self.work and self.work / str(len(names)), self.corpus, self.settings, key)
 
 
 def _size(

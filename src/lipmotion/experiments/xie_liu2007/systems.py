@@ -33,7 +33,7 @@ from lipmotion.experiments.xie_liu2007.tuning import (
     trained_on_the_way,
     tuned,
 )
-from lipmotion.pipeline.evaluation.held_out import ComparedClip, HeldOutRecordings
+from lipmotion.pipeline.evaluation.held_out import HeldOutRecordings
 from lipmotion.pipeline.training.sound_inputs import with_sound_inputs
 from lipmotion.types import Example, Monitor, silent_monitor
 
@@ -51,8 +51,6 @@ PAPER_FIGURES: dict[str, tuple[float, float]] = {
 BEST_PATH = "ph-vi-CHMM, best path"
 BLSTM = "BLSTM"
 TUNED = ", tuned"
-CURVES = ("original", "generated", "time_s")
-"""Fields of ``ComparedClip`` that are curves."""
 ABOUT = "about"
 """Name of the array with settings and figures of a stored system."""
 MATCHED = "ph-MSHMM, as large as ph-vi-FHMM"
@@ -208,19 +206,3 @@ def system_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> TrainedSystem:
     engine = CoupledEngine(CoupledConfig.parsed(about["config"]))
     model = engine.from_arrays({name: array for name, array in arrays.items() if name != ABOUT})
     return TrainedSystem(engine, model, about["seconds"], tuple(Trial(**trial) for trial in about["tried"]))
-
-
-def stored_clips(clips: Sequence[ComparedClip]) -> dict[str, NDArray[Any]]:
-    """Return what a system generated as arrays, from which ``clips_from_arrays`` makes it again."""
-    arrays = {name: np.concatenate([getattr(clip, name) for clip in clips]) for name in CURVES}
-    about = [(len(clip.time_s), clip.spoken) for clip in clips]
-    return {**arrays, ABOUT: np.array(json.dumps(about))}
-
-
-def clips_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> list[ComparedClip]:
-    """Return the clips that ``stored_clips`` stored."""
-    about = json.loads(str(arrays[ABOUT]))
-    edges = np.cumsum([frames for frames, _ in about])[:-1]
-    original, generated, time_s = (np.split(arrays[name], edges) for name in CURVES)
-    spoken = [tuple((start_s, end_s, phone) for start_s, end_s, phone in phones) for _, phones in about]
-    return list(map(ComparedClip, original, generated, time_s, spoken))

@@ -8,6 +8,7 @@ from typing import Any
 from lipmotion.experiments.comparison import significance_mark
 from lipmotion.experiments.xie_liu2007.systems import PAPER_FIGURES, REFERENCE_SYSTEM
 from lipmotion.measures.evaluation_table import figure_text
+from lipmotion.pipeline.training.channels import EIGENLIPS
 from lipmotion.printable import printable
 
 WIDTH = 34
@@ -16,6 +17,11 @@ NAMED_CHANNELS = 8
 HEAD = (
     f"  {'system':{WIDTH}}{'paper':>13}  {'AMSE (95 %)':25}  {'ACC (95 %)':22}  {'opening (95 %)':22}  "
     "nRMSE    RMSE    lag  score  p b m  false  variance   numbers  seconds"
+)
+
+LEGEND = (
+    "paper: its AMSE and ACC; nRMSE, RMSE, variance: of the opening, the last by that of the recordings; lag: ms",
+    "score, p b m: %; false: closings outside p b m, a minute of speech; seconds: of a processor, for training",
 )
 
 
@@ -32,21 +38,27 @@ def table(figures: Mapping[str, Any]) -> str:
     for size in figures["rows"]:
         for condition, rows in size["conditions"].items():
             lines += ["", f"{condition}, {size['used']} of the first {size['names']} clips", HEAD]
-            lines += [_line(name, row, size["training"][name]) for name, row in rows.items()]
+            lines += [_line(name, row, size["training"][name], _amse_form(figures)) for name, row in rows.items()]
             lines += _eigenlips(rows)
-        lines += [*_settings(size["training"]), *_pairs(size["pairs"])]
+        lines += [*_settings(size["training"]), *_pairs(size["pairs"], _amse_form(figures))]
     for kind in dict.fromkeys(row["kind"] for row in figures["noise"]):
         lines += ["", *_noise(kind, figures)]
     lines += [
         "",
         f"* differs from {REFERENCE_SYSTEM}: the 95 % interval of the difference on the same clips leaves out 0",
+        *LEGEND,
     ]
     return "\n".join(map(printable, lines))
 
 
-def _line(name: str, row: Mapping[str, Any], training: Mapping[str, Any]) -> str:
+def _amse_form(figures: Mapping[str, Any]) -> str:
+    """Return how AMSE is written: in eye distances, or in grey levels."""
+    return ".1f" if figures["visual"] == EIGENLIPS else ".4f"
+
+
+def _line(name: str, row: Mapping[str, Any], training: Mapping[str, Any], amse_form: str) -> str:
     printed = "{:.3f} {:.3f}".format(*PAPER_FIGURES[name]) if name in PAPER_FIGURES else ""
-    amse, acc = _with_interval(row, "amse", ".4f"), _with_interval(row, "acc", ".3f")
+    amse, acc = _with_interval(row, "amse", amse_form), _with_interval(row, "acc", ".3f")
     return (
         f"  {name:{WIDTH}}{printed:>13}  {amse:25}  {acc:22}  {_opening(row)}"
         f"{figure_text(training['parameters'], '10.0f')}{training['seconds']:9.1f}"
@@ -66,17 +78,17 @@ def _settings(training: Mapping[str, Any]) -> list[str]:
     return ["", "settings, the best on val", *lines] if lines else []
 
 
-def _pairs(pairs: Sequence[Mapping[str, Any]]) -> list[str]:
+def _pairs(pairs: Sequence[Mapping[str, Any]], amse_form: str) -> list[str]:
     """Return the lines of the paper's order, pair by pair."""
     if not pairs:
         return []
     lines = ["", f"  {'in the paper better than':{2 * WIDTH}}{'ACC (95 %)':27}AMSE (95 %)"]
     for pair in pairs:
         acc, amse = (
-            "{:+.{p}f}{} ({:+.{p}f} to {:+.{p}f})".format(
-                pair[key], significance_mark(pair[f"{key}_95"]), *pair[f"{key}_95"], p=places
+            "{:+{f}}{} ({:+{f}} to {:+{f}})".format(
+                pair[key], significance_mark(pair[f"{key}_95"]), *pair[f"{key}_95"], f=form
             )
-            for key, places in (("acc", 3), ("amse", 4))
+            for key, form in (("acc", ".3f"), ("amse", amse_form))
         )
         lines.append(f"  {pair['better']:{WIDTH}}{pair['worse']:{WIDTH}}{acc:27}{amse}")
     return lines
@@ -122,7 +134,7 @@ def _noise(kind: str, figures: Mapping[str, Any]) -> list[str]:
     for name in clean:
         cells = [
             f"{row['acc']:.3f}{significance_mark(row['acc_gain_95'])} / "
-            f"{row['amse']:.4f}{significance_mark(row['amse_gain_95'])}"
+            f"{row['amse']:{_amse_form(figures)}}{significance_mark(row['amse_gain_95'])}"
             for row in (clean[name], *(row["systems"][name] for row in in_noise))
         ]
         lines.append(f"  {name:{WIDTH}}" + "".join(f"{cell:>17}" for cell in cells))

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.kernels.compiled.compiler import compiled_to_rounding
+from lipmotion.kernels.compiled.compiler import compiled, compiled_to_rounding
 
 Array = NDArray[Any]
 Index = NDArray[np.intp]
@@ -109,6 +109,26 @@ def backward(
         total += _sum(after[i])
     _share(after, total, whole)
     return total / whole
+
+
+@compiled
+def take_best_entering(last: Array, leaving: Array, score: Array, decision: Array) -> None:
+    """Replace the log scores of first states by those of the best transition from a last state, where that is greater,
+    and their decisions by the unit that is left.
+
+    last     : log scores of the last states [shape=(U, M)]
+    leaving  : log probabilities of the transitions from them to the first states [shape=(U, U)]
+    score, decision : of the first states [shapes=(U, M)]
+    """
+    for i in range(len(score)):
+        best, unit = score[i], decision[i]
+        for u in range(len(last)):
+            before, weight = last[u], leaving[u, i]
+            for j in range(len(best)):
+                other = before[j] + weight
+                is_better = other > best[j]
+                best[j] = other if is_better else best[j]
+                unit[j] = u if is_better else unit[j]
 
 
 @compiled_to_rounding

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.kernels.choice import numba_works
 from lipmotion.kernels.sequences.factorial import kept_frames
 from lipmotion.kernels.sequences.factorial_logs import LogTransitions
 from lipmotion.kernels.sequences.loops import Array, FactorialLogLikelihoods, Index, Loop
@@ -68,9 +69,14 @@ class _ViterbiTransitions(LogTransitions):
         decision = np.full(score.shape, units, np.min_scalar_type(units + 1))
         moved = score[: len(self.onward)] + self.onward[:, None]
         _take_better(after[units:], decision[units:], moved, units + 1)
-        for unit, weight in enumerate(self.leaving):
-            moved = score[len(score) - units + unit] + weight[:, None]
-            _take_better(after[:units], decision[:units], moved, unit)
+        last, first = score[len(score) - units :], (after[:units], decision[:units])
+        if numba_works():
+            from lipmotion.kernels.compiled.factorial import take_best_entering
+
+            take_best_entering(last, self.leaving, *first)
+        else:
+            for unit, weight in enumerate(self.leaving):
+                _take_better(*first, last[unit] + weight[:, None], unit)
         return after, decision
 
     def previous(self, state: int, decision: int) -> int:

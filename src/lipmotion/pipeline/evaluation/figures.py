@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from lipmotion.measures import curves
 from lipmotion.measures.bootstrap import bootstrap_interval
 from lipmotion.measures.closures import closure_figures, phone_closures
 from lipmotion.motion.rest import away_from_speech
-from lipmotion.pipeline.evaluation.held_out import OPENING, ComparedClip, HeldOutRecordings
+from lipmotion.pipeline.evaluation.held_out import OPENING, ComparedClip
 from lipmotion.units import VISEMES
 
 BILABIAL = VISEMES["bi"]
@@ -21,7 +21,23 @@ SILENCE_MARGIN_S = 0.3
 """Seconds before and after speech in which the mouth may still close or already open."""
 
 
-def figures_of(clips: Sequence[ComparedClip], recordings: HeldOutRecordings, seed: int) -> dict[str, Any]:
+class Compared(Protocol):
+    """What is compared in some recordings: part of ``HeldOutRecordings``."""
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the channels."""
+
+    @property
+    def closed_under(self) -> float | None:
+        """The opening under which the mouth counts as closed (None: no channel ``opening``)."""
+
+    @property
+    def eigenlips_channels(self) -> tuple[str, ...]:
+        """Names of the channels that are eigenlips."""
+
+
+def figures_of(clips: Sequence[ComparedClip], recordings: Compared, seed: int) -> dict[str, Any]:
     """Return the figures of one condition, by name; figures that cannot be computed are NaN.
 
     recordings : of the clips
