@@ -1,0 +1,60 @@
+// The panel beside the face: what is selected, delivery, why, history.
+
+import { made, replaced } from "../dom.js";
+import { TEXT } from "../strings.js";
+import { editTab } from "./edit_tab.js";
+import { deliveryTab } from "./delivery_tab.js";
+import { whyTab } from "./why_tab.js";
+import { historyTab } from "./history_tab.js";
+
+const TABS = { edit: editTab, delivery: deliveryTab, why: whyTab, history: historyTab };
+
+export class Panel {
+  /**
+   * @param {HTMLElement} place
+   * @param {import("../studio.js").Studio} studio
+   */
+  constructor(place, studio) {
+    const { store } = studio, names = Object.keys(TABS);
+    this.body = made("div", { className: "body", role: "tabpanel", tabIndex: 0, id: "panel-body" });
+    const tabs = names.map((name) => made("button", { type: "button", role: "tab", id: `tab-${name}`, textContent: TEXT.tabs[name],
+      "aria-controls": "panel-body", onclick: () => store.set({ tab: name }) }));
+    const list = made("div", { className: "tabs", role: "tablist" }, ...tabs);
+    list.addEventListener("keydown", (event) => {
+      const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+      if (!step) return;
+      event.preventDefault();
+      event.stopPropagation();
+      const tab = names[(names.indexOf(store.tab) + step + names.length) % names.length];
+      store.set({ tab });
+      document.getElementById(`tab-${tab}`).focus();
+    });
+    place.append(list, this.body);
+    store.on(["tab"], () => {
+      tabs.forEach((tab, n) => {
+        tab.setAttribute("aria-selected", names[n] === store.tab);
+        tab.tabIndex = names[n] === store.tab ? 0 : -1;
+      });
+      this.body.setAttribute("aria-labelledby", `tab-${store.tab}`);
+    });
+    store.on(["tab", "line", "selected", "span", "project", "doubts", "why", "other", "playing", "channels"], () => {
+      if (!store.playing) replaced(this.body, ...TABS[store.tab](studio));
+    });
+    store.on(["time_s"], () => {
+      if (!store.playing) for (const each of this.body.querySelectorAll("[data-follows]")) each.follow?.();
+    });
+  }
+}
+
+/** A part of a panel under a heading. */
+export const section = (title, ...children) => made("section", {}, title && made("h3", { textContent: title }), ...children.filter(Boolean));
+
+export const row = (...children) => made("div", { className: "row" }, ...children.filter(Boolean));
+
+/** Element that shows something at the playhead: `follow` runs when it moves, and now. */
+export function following(element, follow) {
+  element.dataset.follows = "";
+  element.follow = () => follow(element);
+  follow(element);
+  return element;
+}

@@ -1,0 +1,32 @@
+// The lane of edits that have a place in time: moods, gains, locks.
+
+import { made } from "../dom.js";
+import { placed } from "../sentences.js";
+
+export class Lane {
+  constructor(timeline) {
+    this.timeline = timeline;
+    this.selectable = true;
+    this.element = made("div", { className: "track lane" });
+  }
+
+  draw() {
+    const { timeline, timeline: { store, store: { line } } } = this, { moods, gains, locks } = placed(line?.steps ?? []);
+    const item = (className, text, start_s, end_s) => {
+      const button = made("button", { type: "button", className, textContent: text, title: text, tabIndex: -1, onclick: () => {
+        store.set({ span: end_s > start_s ? { start_s, end_s } : store.span, tab: "edit" });
+        timeline.studio.player.seek(start_s);
+      } });
+      button.style.left = `${timeline.x(start_s)}px`;
+      button.style.width = `${Math.max((end_s - start_s) * timeline.px_s, 12)}px`;
+      return button;
+    };
+    const ends = (n) => moods[n + 1]?.time_s ?? timeline.duration_s;
+    this.element.replaceChildren(
+      ...moods.map(({ mood, time_s }, n) => item("mood", mood, time_s, ends(n))),
+      ...gains.map(({ channel, factor, start_s, end_s }) => item("gain", `${channel} ×${factor}`, start_s, end_s)),
+      ...locks.map(({ start_s, end_s }) => item("lock", "🔒", start_s, end_s)),
+    );
+    this.element.hidden = !this.element.children.length;
+  }
+}
