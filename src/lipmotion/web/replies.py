@@ -12,7 +12,7 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from lipmotion.errors import AlignmentError, ExportError, InputError
+from lipmotion.errors import ExportError, LipMotionError
 
 LOG = logging.getLogger("lipmotion")
 HEADERS = {
@@ -36,6 +36,8 @@ class SecurityHeaders:
         self._headers = [(name.encode(), value.encode()) for name, value in headers.items()]
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on."""
+
         async def secured(message: Message) -> None:
             if message["type"] == "http.response.start":
                 message = {**message, "headers": [*message.get("headers", ()), *self._headers]}
@@ -58,8 +60,12 @@ async def _failed(status: int, _: Request, error: Exception) -> Response:
 
 ERRORS: dict[type[Exception], Callable[[Request, Any], Any]] = {
     HTTPException: _refused,
-    InputError: partial(_failed, 422),
-    AlignmentError: partial(_failed, 422),
+    LipMotionError: partial(_failed, 422),
     ExportError: partial(_failed, 503),
 }
 """What is replied to errors that are raised on purpose: JSON, ``{"error": text}``."""
+
+
+def json_bytes(content: bytes, status: int = 200) -> Response:
+    """Return JSON that is encoded already as a reply."""
+    return Response(content, status, FRESH, "application/json")
