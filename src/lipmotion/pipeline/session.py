@@ -108,6 +108,9 @@ class _Kept(Generic[KeptT]):
     def __init__(self) -> None:
         self._results: OrderedDict[Hashable, KeptT] = OrderedDict()
 
+    def __contains__(self, key: Hashable) -> bool:
+        return key in self._results
+
     def once(self, key: Hashable, make: Callable[[], KeptT]) -> KeptT:
         """Return the result for a key, made if it is not kept."""
         if key not in self._results:
@@ -129,6 +132,7 @@ class Session:
     curves    : names of further curves that outputs will have: controls of a rig, blendshapes of a character
     outlook   : what to expect of the motion, where it is known; None: it follows from the speech
     lasts_s   : duration of the recording that was edited, in seconds: another one is refused; None: not known
+    audio     : the sound of the recording, where it has been read already; None: it is read when it is needed
     A session may be used by several threads, one at a time; several sessions do not disturb one another.
     Raises InputError: the model knows no such speaker.  Raises ModelFormatError: as ``load_model``.
 
@@ -150,6 +154,7 @@ class Session:
         curves: Iterable[str] = (),
         outlook: Outlook | None = None,
         lasts_s: float | None = None,
+        audio: AnalysedAudio | None = None,
     ) -> None:
         self.request: SpeechRequest = in_language(request_of(speech))
         self.model = model if isinstance(model, Model) else load_model(model)
@@ -163,7 +168,7 @@ class Session:
         self._delivered: _Kept[Generation] = _Kept()
         self._faces: _Kept[DrawsSingly] = _Kept()
         self._drawn: _Kept[DrawnMotion[Any]] = _Kept()
-        self._lasts_s, self._motions = lasts_s, 0
+        self._lasts_s, self._motions, self._given_audio = lasts_s, 0, audio
         self._one_at_a_time = RLock()
 
     def units(self, edits: Edits = NO_EDITS) -> Timeline[Unit]:
@@ -232,24 +237,25 @@ class Session:
     @cached_property
     def _recording(self) -> UnderstoodSpeech:
         """The speech without edits."""
-        self._speaker  # noqa: B018 # what is refused is refused before the long work
+        self.speaker  # noqa: B018 # what is refused is refused before the long work
         request = self.request
-        if self._lasts_s is not None:
-            if abs(self._audio.duration_s - self._lasts_s) > LATE_S:
-                raise InputError(
-                    f"the recording lasts {self._audio.duration_s:.2f} s, the edited one {self._lasts_s:.2f} s: the "
-                    "edits are of another recording; make some of this one: lipmotion edit FILE --of RECORDING"
-                )
+        if self._lasts_s is not None and abs(self._audio.duration_s - self._lasts_s) > LATE_S:
+            raise InputError(
+                f"the recording lasts {self._audio.duration_s:.2f} s, the edited one {self._lasts_s:.2f} s: the "
+                "edits are of another recording; make some of this one: lipmotion edit FILE --of RECORDING"
+            )
+        if self._lasts_s is not None or self._given_audio is not None:
             request = replace(request, recording=self._audio)
         return understood_speech(self.model, request, self._work, self._monitor)
 
     @cached_property
-    def _speaker(self) -> SpeakerMap | None:
+    def speaker(self) -> SpeakerMap | None:
+        """The map onto the person whose motion is generated; None: the model knows one person."""
         return person_of(self.model, self.request)
 
     @cached_property
     def _audio(self) -> AnalysedAudio:
-        return analysed(audio_of(self.request))
+        return self._given_audio or analysed(audio_of(self.request))
 
     @cached_property
     def _prosody(self) -> Prosody:
@@ -259,14 +265,17 @@ class Session:
     def _edited_units(self, steps: tuple[Step, ...]) -> Timeline[Unit]:
         """Return the phones in time after some edits; each edit sees those that the ones before it left."""
         ours = tuple(step for step in steps if isinstance(step, PhoneStep | WordIs | LockStep | UnlockStep))
-        while ours and isinstance(ours[-1], LockStep | UnlockStep):
-            ours = ours[:-1]
-        if not ours:
-            return self._recording.speech.units
-        return self._units.once(ours, lambda: self._changed_units(ours))
+        done = next((count for count in range(len(ours), 0, -1) if ours[:count] in self._units), 0)
+        units = self._units.once(ours[:done], lambda: self._recording.speech.units)
+        for count in range(done + 1, len(ours) + 1):
+            units = self._changed_units(units, ours[:count])
+        return self._units.once(ours, lambda: units)
 
-    def _changed_units(self, ours: tuple[PhoneStep | WordIs | LockStep | UnlockStep, ...]) -> Timeline[Unit]:
-        before, step = self._edited_units(ours[:-1]), ours[-1]
+    def _changed_units(
+        self, before: Timeline[Unit], ours: tuple[PhoneStep | WordIs | LockStep | UnlockStep, ...]
+    ) -> Timeline[Unit]:
+        """Return phones in time after the last of some edits; ``before``: after the others."""
+        step = ours[-1]
         if isinstance(step, LockStep | UnlockStep):
             return before
         after = self._reworded(before, step) if isinstance(step, WordIs) else step.applied(before)
@@ -373,7 +382,7 @@ class Session:
         if self._motions == INTERACTIVE:
             expect_more()
         self._monitor(Progress("moving the mouth", 0, 1, UNDERSTANDING))
-        generation = generation_of(self.request, self._speaker, self.model, understood, Constraints(pins))
+        generation = generation_of(self.request, self.speaker, self.model, understood, Constraints(pins))
         self._monitor(Progress("moving the mouth", 1, 1, 1.0))
         return generation if self._outlook is None else replace(generation, outlook=self._outlook)
 
