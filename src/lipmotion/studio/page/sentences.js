@@ -19,6 +19,21 @@ export const say = {
   set: (name, value) => `set ${name} ${value}`,
 };
 
+/** Seconds between the pins of a stroke. */
+export const STROKE_STEP_S = 0.02;
+
+/** Return how many of the last steps one stroke of the pen made, or else 1. */
+export function lastStroke(steps) {
+  let count = 1;
+  const pinned = (step) => FORMS.pin.exec(step ?? "");
+  for (let later = pinned(steps.at(-1)); later; count++) {
+    const before = pinned(steps[steps.length - 1 - count]), apart = before ? later[3] - before[3] : 0;
+    if (before?.[1] !== later[1] || apart <= 0 || apart > STROKE_STEP_S + 1e-6) break;
+    later = before;
+  }
+  return count;
+}
+
 const NUMBER = "([-+\\d.e]+)";
 const FORMS = {
   pin: new RegExp(`^pin (\\S+) ${NUMBER} at ${NUMBER}$`),

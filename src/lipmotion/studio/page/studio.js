@@ -7,7 +7,7 @@ import { added } from "./files.js";
 import { listen } from "./keys.js";
 import { Panel } from "./panel/panel.js";
 import { Queue } from "./queue/queue.js";
-import { say } from "./sentences.js";
+import { lastStroke, say } from "./sentences.js";
 import { Refused, Server } from "./server.js";
 import { Player } from "./sound/player.js";
 import { samplesOf } from "./sound/samples.js";
@@ -16,7 +16,9 @@ import { TEXT, filled } from "./strings.js";
 import { Timeline } from "./timeline/timeline.js";
 import { Transport } from "./transport.js";
 
-const PAGE_OF_LINES = 1000, POLL_MS = 700, CALM_MS = 5000, NUDGE_MS = 250;
+const PAGE_OF_LINES = 1000, POLL_MS = 300, CALM_MS = 5000, NUDGE_MS = 250;
+/** Of a line that is not ready. */
+const NOTHING = { words: [], phones: [], channels: [], steps: [], undo: 0, redo: 0 };
 
 export class Studio {
   constructor() {
@@ -24,6 +26,7 @@ export class Studio {
     this.store = new Store();
     this.player = new Player(this.store);
     this.edits = Promise.resolve();
+    this.undone = []; // how many steps each undo took back that can be made again
     this.askedAt = this.editedAt = 0; // when the edit was asked for whose motion is on its way, or is shown next
     this.build();
     listen(this);
@@ -133,17 +136,26 @@ export class Studio {
       if (error instanceof Refused) this.refuse(error);
       else throw error;
     }
-    setTimeout(() => this.poll(), pause_ms);
+    clearTimeout(this.polling);
+    this.polling = setTimeout(() => this.poll(), pause_ms);
+  }
+
+  /** Ask soon, and often. */
+  wake() {
+    clearTimeout(this.polling);
+    this.polling = setTimeout(() => this.poll(), POLL_MS);
   }
 
   /** Show another line. */
   async open(id, again = false) {
     if (id === this.store.lineId && !again) return;
     this.player.stop();
+    this.undone = [];
     this.store.set({ lineId: id, line: null, sound: null, motion: null, deviation: null, weights: null, other: null, comparing: false, doubts: [], selected: null, span: null, time_s: 0, progress: null });
     try {
-      const line = await this.server.read(`lines/${id}`);
+      const line = { ...NOTHING, ...(await this.server.read(`lines/${id}`)) };
       if (id !== this.store.lineId) return;
+      if (line.status !== "ready") this.wake();
       this.store.set({ line });
       const sound = this.server.bytes(`lines/${id}/sound.wav`).then((buffer) => {
         if (id !== this.store.lineId) return;
@@ -198,12 +210,24 @@ export class Studio {
 
   /** Make edits; one after another, each with the revision that the one before left. Returns whether they were made. */
   edit(steps, instead = 0) {
+    this.undone = [];
     return this.request("edits", { steps, ...(instead ? { instead } : {}) }, filled(TEXT.changed, { what: steps.length > 1 ? `${steps[0]} … (${steps.length})` : steps[0] }));
   }
 
-  undo() { return this.store.line?.undo ? this.request("undo", {}, TEXT.undone) : this.say(TEXT.nothingToUndo); }
+  /** Take back the last edit; a stroke of the pen is one. */
+  async undo() {
+    const { line } = this.store;
+    if (!line?.undo) return this.say(TEXT.nothingToUndo);
+    const count = lastStroke(line.steps);
+    if (await this.request("undo", { count }, TEXT.undone)) this.undone.push(count);
+    return undefined;
+  }
 
-  redo() { return this.store.line?.redo ? this.request("redo", {}, TEXT.redone) : this.say(TEXT.nothingToRedo); }
+  redo() {
+    const { line } = this.store;
+    if (!line?.redo) return this.say(TEXT.nothingToRedo);
+    return this.request("redo", { count: Math.min(this.undone.pop() ?? 1, line.redo) }, TEXT.redone);
+  }
 
   async realign(text) {
     const { span } = this.store;

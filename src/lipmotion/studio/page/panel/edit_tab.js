@@ -6,6 +6,8 @@ import { TEXT, filled } from "../strings.js";
 import { following, row, section } from "./panel.js";
 
 const MOST_GAIN = 2;
+/** Moods that have no strength. */
+const PLAIN = ["neutral", "plain"];
 
 /** Return what the tab shows. */
 export function editTab(studio) {
@@ -110,8 +112,9 @@ function spanPart(studio, { start_s, end_s }) {
 
 function moodPart(studio) {
   const { project } = studio.store, strength = made("input", { id: "mood-strength", type: "range", min: "0.1", max: "1", step: "0.1", value: "0.7", "aria-label": TEXT.strength });
-  const moods = choice(project.forms.moods.map((each) => [each, each]), project.forms.moods[0], () => {}, { id: "mood", "aria-label": TEXT.mood });
-  const set = () => studio.edit([say.mood(moods.value === "neutral" ? moods.value : `${moods.value}:${strength.value}`, studio.store.time_s)]);
+  const known = ["neutral", ...project.forms.moods, "plain", ...project.forms.manners].map((each) => [each, each]);
+  const moods = choice(known, "happy", () => {}, { id: "mood", "aria-label": TEXT.mood });
+  const set = () => studio.edit([say.mood(PLAIN.includes(moods.value) ? moods.value : `${moods.value}:${strength.value}`, studio.store.time_s)]);
   return section(TEXT.moodAt, row(moods, strength, textButton(TEXT.set, set, { id: "mood-set" })));
 }
 

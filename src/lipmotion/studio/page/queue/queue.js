@@ -12,6 +12,9 @@ const ORDERS = {
   marked: (a, b) => (a.mark !== "none") - (b.mark !== "none"),
 };
 
+/** Return a name without its ending. */
+const shortName = (name) => name.replace(/\.[a-z0-9]{2,4}$/i, "");
+
 export class Queue {
   /**
    * @param {HTMLElement} place
@@ -38,7 +41,7 @@ export class Queue {
     this.view.addEventListener("scroll", this.draw, { passive: true });
     this.view.addEventListener("click", (event) => {
       const row = event.target.closest(".line");
-      if (row) studio.open(row.dataset.id);
+      if (row) studio.open(this.lines[Number(row.dataset.place)].id);
     });
     this.view.addEventListener("keydown", (event) => {
       const steps = { ArrowDown: 1, ArrowUp: -1, PageDown: 10, PageUp: -10, Home: -Infinity, End: Infinity };
@@ -95,9 +98,9 @@ export class Queue {
     const length = line.duration_s ? clock(line.duration_s, 0) : "";
     const row = made("div", { className: `line ${line.status}`, id: `line-${line.id}`, role: "option", title: line.error || line.name,
       "aria-selected": line.id === this.store.lineId, "aria-posinset": place + 1, "aria-setsize": this.lines.length },
-    made("span", { className: "state", title: TEXT.states[line.status] }), made("span", { className: "name", textContent: line.name }),
+    made("span", { className: "state", title: TEXT.states[line.status] }), made("span", { className: "name", textContent: shortName(line.name) }),
     edits, doubt, made("span", { className: "length", textContent: length }), mark);
-    row.dataset.id = line.id;
+    row.dataset.place = String(place);
     row.style.transform = `translateY(${place * ROW_PX}px)`;
     return row;
   }

@@ -1,10 +1,10 @@
 // Curves of the motion with their deviations, pins, and the pen that draws over them.
 
 import { made } from "../dom.js";
-import { placed, say } from "../sentences.js";
+import { placed, say, STROKE_STEP_S } from "../sentences.js";
 import { cleared, colours } from "./canvas.js";
 
-const PAD_PX = 6, DRAWN_STEP_S = 0.02, ROOM = 0.12;
+const PAD_PX = 6, ROOM = 0.12;
 
 export class CurveTracks {
   constructor(timeline) {
@@ -188,7 +188,7 @@ export class CurveTracks {
 /** Return points every 20 ms on the lines between drawn ones, and the last one. */
 export function alongLine(points) {
   const [start] = points[0], [end, last] = points.at(-1), along = [];
-  for (let time = start, n = 0; time < end - DRAWN_STEP_S / 2; time += DRAWN_STEP_S) {
+  for (let time = start, n = 0; time < end - STROKE_STEP_S / 2; time += STROKE_STEP_S) {
     while (n + 1 < points.length - 1 && points[n + 1][0] <= time) n++;
     const [before, from] = points[n], [after, to] = points[Math.min(n + 1, points.length - 1)];
     along.push([time, after > before ? from + ((time - before) / (after - before)) * (to - from) : from]);

@@ -1,6 +1,7 @@
 // The lane of edits that have a place in time: moods, gains, locks.
 
 import { made } from "../dom.js";
+import { TEXT } from "../strings.js";
 import { placed } from "../sentences.js";
 
 export class Lane {
@@ -25,7 +26,7 @@ export class Lane {
     this.element.replaceChildren(
       ...moods.map(({ mood, time_s }, n) => item("mood", mood, time_s, ends(n))),
       ...gains.map(({ channel, factor, start_s, end_s }) => item("gain", `${channel} ×${factor}`, start_s, end_s)),
-      ...locks.map(({ start_s, end_s }) => item("lock", "🔒", start_s, end_s)),
+      ...locks.map(({ start_s, end_s }) => item("lock", TEXT.locked, start_s, end_s)),
     );
     this.element.hidden = !this.element.children.length;
   }
