@@ -27,7 +27,7 @@ export function lastStroke(steps) {
   let count = 1;
   const pinned = (step) => FORMS.pin.exec(step ?? "");
   for (let later = pinned(steps.at(-1)); later; count++) {
-    const before = pinned(steps[steps.length - 1 - count]), apart = before ? later[3] - before[3] : 0;
+    const before = pinned(steps[steps.length - 1 - count]), apart = before ? Number(later[3]) - Number(before[3]) : 0;
     if (before?.[1] !== later[1] || apart <= 0 || apart > STROKE_STEP_S + 1e-6) break;
     later = before;
   }

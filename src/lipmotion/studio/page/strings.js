@@ -108,7 +108,9 @@ export const TEXT = {
   aligned: "The words are aligned anew.",
   settings: "How the motion is delivered",
   delivery: {
-    intensity: "Intensity", anticipation_ms: "Anticipation", offset_ms: "Offset", min_hold_ms: "Shortest hold", stepped: "Held poses",
+    intensity: "Intensity", anticipation_ms: "Anticipation, ms", offset_ms: "Offset, ms", min_hold_ms: "Shortest hold, ms", stepped: "Held poses",
+    key_tolerance: "Tolerance of keys", size: "Picture height", background: "Background", blinks: "Blinks", gaze: "Gaze", brows: "Brows", head: "Head moves",
+    seed: "Chance (seed)",
   },
   why: "At {time} s",
   whyHint: "Why the mouth is as it is at the playhead.",

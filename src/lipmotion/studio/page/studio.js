@@ -16,7 +16,7 @@ import { TEXT, filled } from "./strings.js";
 import { Timeline } from "./timeline/timeline.js";
 import { Transport } from "./transport.js";
 
-const PAGE_OF_LINES = 1000, POLL_MS = 300, CALM_MS = 5000, NUDGE_MS = 250;
+const PAGE_OF_LINES = 1000, POLL_MS = 300, DOUBTFUL = 0.7, MOST_DOUBTS = 12, CALM_MS = 5000, NUDGE_MS = 250;
 /** Of a line that is not ready. */
 const NOTHING = { words: [], phones: [], channels: [], steps: [], undo: 0, redo: 0 };
 
@@ -25,7 +25,7 @@ export class Studio {
     this.server = new Server(location.hash.slice(1));
     this.store = new Store();
     this.player = new Player(this.store);
-    this.edits = Promise.resolve();
+    /** @type {Promise<any>} */ this.edits = Promise.resolve();
     this.undone = []; // how many steps each undo took back that can be made again
     this.askedAt = this.editedAt = 0; // when the edit was asked for whose motion is on its way, or is shown next
     this.build();
@@ -45,7 +45,7 @@ export class Studio {
     const header = made("header", {}, iconButton("lines", TEXT.hideLines, () => document.body.classList.toggle("without-queue"), { id: "hide-lines" }), this.title,
       bothButton("plus", TEXT.open, () => picker.click(), { id: "open" }), picker,
       bothButton("out", TEXT.export, () => showExport(this), { id: "export" }), textButton("?", () => this.help(), { id: "help", title: TEXT.help, "aria-label": TEXT.help }));
-    const places = made("div", { id: "places", role: "group", "aria-label": TEXT.show }, ...["lines", "stage", "panel"].map((name) => textButton(TEXT.places[name],
+    const places = made("nav", { id: "places", "aria-label": TEXT.show }, ...["lines", "stage", "panel"].map((name) => textButton(TEXT.places[name],
       () => this.showPlace(name), { id: `place-${name}` })));
     document.body.append(header, made("main", {}, queue, face, panel, transport, timeline, this.cover), made("footer", {}, this.message, this.state), places,
       made("datalist", { id: "phones-known" }));
@@ -181,7 +181,7 @@ export class Studio {
     ]);
     if (id !== store.lineId) return;
     const found = { motion: patched(store.motion, motion), deviation: deviation && patched(store.deviation, deviation), weights: weights && patched(store.weights, weights) };
-    if (changed && (!found.motion || (weights && !found.weights))) return this.moved(id, null);
+    if (changed && Object.values(found).some((part) => part === null && (part !== found.weights || weights))) return this.moved(id, null);
     this.editedAt = this.askedAt;
     this.askedAt = 0;
     store.set(found);
@@ -191,7 +191,7 @@ export class Studio {
   async doubted(id) {
     const doubts = await this.server.read(`lines/${id}/doubts`).catch(() => []), { phones } = this.store.line ?? { phones: [] };
     if (id !== this.store.lineId) return;
-    const spans = doubts.map(({ time_s, confidence, phone }) => {
+    const spans = doubts.filter(({ confidence }) => confidence < DOUBTFUL).slice(0, MOST_DOUBTS).map(({ time_s, confidence, phone }) => {
       const place = phones.findIndex(({ end_s }) => end_s > time_s), { start_s = time_s, end_s = time_s } = phones[place] ?? {};
       return { start_s, end_s, confidence, place, text: filled(TEXT.doubtOf, { phone: phones[place]?.label ?? phone, share: Math.round(100 * confidence) }) };
     });
@@ -237,9 +237,9 @@ export class Studio {
   request(kind, content, done) {
     const id = this.store.lineId;
     this.store.set({ saving: this.store.saving + 1 });
-    const made_ = this.edits.then(() => this.requested(id, kind, content, done)).finally(() => this.store.set({ saving: this.store.saving - 1 }));
-    this.edits = made_.catch(() => {});
-    return made_;
+    const reply = this.edits.then(() => this.requested(id, kind, content, done)).finally(() => this.store.set({ saving: this.store.saving - 1 }));
+    this.edits = reply.catch(() => {});
+    return reply;
   }
 
   async requested(id, kind, content, done) {
@@ -328,7 +328,7 @@ export class Studio {
     const span = this.store.line[`${selected.kind}s`][selected.index];
     this.timeline.reveal(span.start_s, span.end_s);
     this.timeline.drawNow();
-    this.timeline.tracks.find(({ kind }) => kind === selected.kind).type(selected.index);
+    this.timeline[`${selected.kind}s`].type(selected.index);
   }
 
   relabel(kind, index, label) { return this.edit([kind === "word" ? say.word(index + 1, label) : say.phone(index + 1, label)]); }
@@ -363,7 +363,7 @@ export class Studio {
   /** Move a border of the selected phone by frames; presses in quick succession are one edit. */
   nudge(side, frames) {
     this.withPhone((index) => {
-      const tier = this.timeline.tracks.find(({ name }) => name === "phones"), before = side === "end" ? index : index - 1;
+      const tier = this.timeline.phones, before = side === "end" ? index : index - 1;
       if (before < 0 || before + 1 >= this.store.line.phones.length) return;
       const from_s = tier.dragged?.before === before ? tier.dragged.time_s : this.store.line.phones[before].end_s;
       tier.drag(before, from_s + frames / this.store.line.rate_hz);

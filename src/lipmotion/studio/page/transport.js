@@ -14,7 +14,7 @@ export class Transport {
     const pressed = (name, title, act, properties) => iconButton(name, title, act, { "aria-pressed": "false", ...properties });
     const play = iconButton("play", TEXT.play, () => player.toggle(), { id: "play" });
     const loop = pressed("loop", TEXT.loop, () => store.set({ looping: !store.looping }), { id: "loop" });
-    const half = made("button", { type: "button", id: "half", textContent: "½×", title: TEXT.half, "aria-label": TEXT.half, "aria-pressed": "false",
+    const half = made("button", { type: "button", id: "half", textContent: "½×", title: TEXT.half, "aria-label": `½×, ${TEXT.half}`, "aria-pressed": "false",
       onclick: () => store.set({ speed: store.speed === 0.5 ? 1 : 0.5 }) });
     const time = made("output", { id: "time", "aria-label": TEXT.follow });
     const frame = made("span", { id: "frame" });
@@ -38,6 +38,7 @@ export class Transport {
       loop.setAttribute("aria-pressed", String(store.looping));
       half.setAttribute("aria-pressed", String(store.speed === 0.5));
       half.textContent = store.speed > 1 ? `${store.speed}×` : "½×";
+      half.setAttribute("aria-label", `${half.textContent}, ${TEXT.half}`);
       draw.setAttribute("aria-pressed", String(store.tool === "draw"));
     });
     store.on(["line"], () => {

@@ -27,7 +27,7 @@ export class Head {
     key.position.set(-1, 1.2, 2);
     rim.position.set(2, 0.5, -1);
     this.scene.add(new HemisphereLight("#eef4ff", "#b08870", 1.9), new AmbientLight(new Color("#fff"), 0.15), key, rim);
-    this.look("front");
+    [this.turn, this.tilt, this.distance, this.height] = VIEWS.front;
   }
 
   /** Show another character. `buffer`: a .glb. Throws where it cannot be read. */
@@ -59,14 +59,15 @@ export class Head {
   pose(weights, time_s) {
     this.shown_s = time_s;
     if (!this.character) return;
-    if (weights && weights.names !== this.named) {
-      this.named = weights.names;
+    if (weights?.names !== this.named) {
+      this.named = weights?.names;
       this.columns = this.turned = null;
     }
     this.turned ??= this.turnedNodes(weights);
     this.columns ??= this.meshes.map((mesh) => Object.entries(mesh.morphTargetDictionary)
       .map(([name, place]) => [place, weights ? weights.column(name) : -1]).filter(([, column]) => column >= 0));
     this.meshes.forEach((mesh, n) => {
+      if (!weights) mesh.morphTargetInfluences.fill(0);
       for (const [place, column] of this.columns[n]) mesh.morphTargetInfluences[place] = weights.at(time_s, column);
     });
     for (const [node, columns] of this.turned) node.quaternion.set(...columns.map((column) => weights.at(time_s, column))).normalize();

@@ -12,7 +12,8 @@ export class Stage {
   constructor(place, studio) {
     this.studio = studio;
     this.store = studio.store;
-    this.head = null;
+    /** @type {Head | null} */ this.head = null;
+    this.isWebgl = true;
     this.loaded = ""; // name of the character in WebGL
     this.asked = false; // a picture is on its way
     this.wanted = false; // and another one is wanted
@@ -48,7 +49,7 @@ export class Stage {
     this.store.on(["weights", "time_s", "line", "other", "comparing"], () => this.show());
   }
 
-  get isSolid() { return Boolean(this.store.project?.forms.faces.find(({ name }) => name === this.store.face)?.mesh) && this.head !== false; }
+  get isSolid() { return Boolean(this.store.project?.forms.faces.find(({ name }) => name === this.store.face)?.mesh) && this.isWebgl; }
 
   offer() {
     const faces = this.store.project?.forms.faces ?? [];
@@ -63,7 +64,7 @@ export class Stage {
       try {
         this.head = new Head(this.solid);
       } catch {
-        this.head = false;
+        this.isWebgl = false;
         this.say(TEXT.noWebgl);
         const other = this.store.project.forms.faces.find(({ mesh }) => !mesh);
         if (other) this.store.set({ face: other.name });

@@ -11,7 +11,9 @@ const WIDEST_SLIDER = 10;
 export function deliveryTab(studio) {
   const { project, line } = studio.store, set = placed(line?.steps ?? []).set;
   if (!line) return [];
-  return [section(TEXT.settings, ...project.forms.controls.filter(({ name }) => name !== "mood").map((form) => field(studio, form, set[form.name] ?? form.usual)))];
+  const shown = section(TEXT.settings, ...project.forms.controls.filter(({ name }) => name !== "mood").map((form) => field(studio, form, set[form.name] ?? form.usual)));
+  shown.className = "settings";
+  return [shown];
 }
 
 function field(studio, { name, kind, least, most, choices, help }, value) {

@@ -47,7 +47,7 @@ export class Panel {
 }
 
 /** A part of a panel under a heading. */
-export const section = (title, ...children) => made("section", {}, title && made("h3", { textContent: title }), ...children.filter(Boolean));
+export const section = (title, ...children) => made("section", {}, title && made("h2", { textContent: title }), ...children.filter(Boolean));
 
 export const row = (...children) => made("div", { className: "row" }, ...children.filter(Boolean));
 

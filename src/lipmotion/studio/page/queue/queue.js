@@ -9,7 +9,7 @@ const ORDERS = {
   order: null,
   doubt: (a, b) => (b.doubt ?? -1) - (a.doubt ?? -1),
   name: (a, b) => a.name.localeCompare(b.name, "en", { numeric: true }),
-  marked: (a, b) => (a.mark !== "none") - (b.mark !== "none"),
+  marked: (a, b) => Number(a.mark !== "none") - Number(b.mark !== "none"),
 };
 
 /** Return a name without its ending. */

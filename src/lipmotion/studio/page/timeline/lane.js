@@ -4,6 +4,8 @@ import { made } from "../dom.js";
 import { TEXT } from "../strings.js";
 import { placed } from "../sentences.js";
 
+const LANE_PX = 18;
+
 export class Lane {
   constructor(timeline) {
     this.timeline = timeline;
@@ -13,21 +15,24 @@ export class Lane {
 
   draw() {
     const { timeline, timeline: { store, store: { line } } } = this, { moods, gains, locks } = placed(line?.steps ?? []);
-    const item = (className, text, start_s, end_s) => {
+    const kinds = [moods, gains, locks].filter((each) => each.length), lane = (each) => `${kinds.indexOf(each) * LANE_PX + 2}px`;
+    const item = (top, className, text, start_s, end_s) => {
       const button = made("button", { type: "button", className, textContent: text, title: text, tabIndex: -1, onclick: () => {
         store.set({ span: end_s > start_s ? { start_s, end_s } : store.span, tab: "edit" });
         timeline.studio.player.seek(start_s);
       } });
+      button.style.top = top;
       button.style.left = `${timeline.x(start_s)}px`;
       button.style.width = `${Math.max((end_s - start_s) * timeline.px_s, 12)}px`;
       return button;
     };
     const ends = (n) => moods[n + 1]?.time_s ?? timeline.duration_s;
     this.element.replaceChildren(
-      ...moods.map(({ mood, time_s }, n) => item("mood", mood, time_s, ends(n))),
-      ...gains.map(({ channel, factor, start_s, end_s }) => item("gain", `${channel} ×${factor}`, start_s, end_s)),
-      ...locks.map(({ start_s, end_s }) => item("lock", TEXT.locked, start_s, end_s)),
+      ...moods.map(({ mood, time_s }, n) => item(lane(moods), "mood", mood, time_s, ends(n))),
+      ...gains.map(({ channel, factor, start_s, end_s }) => item(lane(gains), "gain", `${channel} ×${factor}`, start_s, end_s)),
+      ...locks.map(({ start_s, end_s }) => item(lane(locks), "lock", TEXT.locked, start_s, end_s)),
     );
-    this.element.hidden = !this.element.children.length;
+    this.element.hidden = !kinds.length;
+    this.element.style.height = `${kinds.length * LANE_PX + 2}px`;
   }
 }

@@ -6,7 +6,7 @@ import { ROWS, Spectra } from "../sound/spectrum.js";
 import { cleared, colours } from "./canvas.js";
 
 const STEPS_S = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120];
-const LABEL_PX = 64, TILE_PX = 256, TILES = 48;
+const LABEL_PX = 64, SURE = 0.85, LEAST_SURE = 0.35, TILE_PX = 256, TILES = 48;
 
 export class Ruler {
   constructor(timeline) {
@@ -121,14 +121,13 @@ export class ConfidenceStrip {
   }
 
   draw() {
-    const { timeline, timeline: { width, store: { line, doubts } } } = this, pen = cleared(this.canvas, width, 8), colour = colours();
-    const mark = ({ start_s, end_s }, doubt) => {
-      pen.globalAlpha = doubt;
-      pen.fillRect(timeline.x(start_s), 1, Math.max((end_s - start_s) * timeline.px_s, 2), 6);
-    };
+    const { timeline, timeline: { width, store: { line } } } = this, pen = cleared(this.canvas, width, 8), colour = colours();
     pen.fillStyle = colour.doubt;
-    for (const phone of line?.phones ?? []) if (phone.confidence !== null && phone.confidence < 0.95) mark(phone, 0.15 + 0.85 * (1 - phone.confidence));
-    for (const doubt of doubts) mark(doubt, 1);
+    for (const { start_s, end_s, confidence } of line?.phones ?? []) {
+      if (confidence === null || end_s < timeline.start_s || start_s > timeline.end_s) continue;
+      pen.globalAlpha = Math.min(Math.max((SURE - confidence) / (SURE - LEAST_SURE), 0), 1);
+      pen.fillRect(timeline.x(start_s), 1, Math.max((end_s - start_s) * timeline.px_s, 2), 6);
+    }
     pen.globalAlpha = 1;
   }
 }

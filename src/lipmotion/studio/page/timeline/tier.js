@@ -4,7 +4,7 @@ import { made, onDrag } from "../dom.js";
 import { say } from "../sentences.js";
 import { TEXT, filled } from "../strings.js";
 
-const LEAST_PX = 3, LABEL_PX = 11, BORDER_PX = 9, LEAST_PHONE_S = 0.01, SURE = 0.6;
+const LEAST_PX = 3, LABEL_PX = 11, BORDER_PX = 9, LEAST_PHONE_S = 0.01, SURE = 0.5;
 
 export class Tier {
   /** @param {"words" | "phones"} name */

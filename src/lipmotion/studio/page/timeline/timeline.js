@@ -26,9 +26,11 @@ export class Timeline {
     place.append(this.scroller);
     this.spanShade = made("div", { className: "span", hidden: true });
     this.playhead = made("div", { className: "playhead" });
-    this.tracks = [
+    this.words = new Tier(this, "words");
+    this.phones = new Tier(this, "phones");
+    /** @type {any[]} */ this.tracks = [
       new Ruler(this), new Lane(this), new WaveTrack(this), new SpectrumTrack(this),
-      new Tier(this, "words"), new Tier(this, "phones"), new ConfidenceStrip(this), new CurveTracks(this),
+      this.words, this.phones, new ConfidenceStrip(this), new CurveTracks(this),
     ];
     this.window.append(...this.tracks.map(({ element }) => element), this.spanShade, this.playhead);
     for (const track of this.tracks) if (track.selectable) this.selecting(track.element);
@@ -49,7 +51,7 @@ export class Timeline {
       this.sized();
     });
     const { store } = this;
-    store.on(["line", "sound", "motion", "deviation", "channels", "selected", "tool", "other", "comparing", "doubts"], this.draw);
+    store.on(["line", "sound", "motion", "deviation", "channels", "selected", "tool", "other", "comparing"], this.draw);
     store.on(["span"], () => this.place());
     store.on(["time_s"], () => this.followPlayhead());
   }
