@@ -56,6 +56,13 @@ export class Store {
     const told = this.#told;
     this.#told = new Set();
     this.#waiting = false;
-    for (const [names, act] of this.#listeners) if (names.some((name) => told.has(name))) act();
+    for (const [names, act] of this.#listeners) {
+      if (!names.some((name) => told.has(name))) continue;
+      try {
+        act();
+      } catch (error) {
+        reportError(error); // the others are told all the same
+      }
+    }
   }
 }

@@ -211,7 +211,7 @@ export class Studio {
   /** Make edits; one after another, each with the revision that the one before left. Returns whether they were made. */
   edit(steps, instead = 0) {
     this.undone = [];
-    return this.request("edits", { steps, ...(instead ? { instead } : {}) }, filled(TEXT.changed, { what: steps.length > 1 ? `${steps[0]} … (${steps.length})` : steps[0] }));
+    return this.request("edits", { steps, ...(instead ? { instead } : {}) }, filled(TEXT.changed, { what: !steps.length ? TEXT.undone : steps.length > 1 ? `${steps[0]} … (${steps.length})` : steps[0] }));
   }
 
   /** Take back the last edit; a stroke of the pen is one. */

@@ -15,6 +15,8 @@ export class Tier {
     this.kind = name === "words" ? "word" : "phone";
     this.shown = new Map(); // elements by place
     this.borders = new Map();
+    this.sent_s = null; // where the server has that border
+    this.sending = false;
     this.dragged = null; // a border on its way: the phone before it, and its time
     this.element = made("div", { className: `track tier ${name}`, role: "group", "aria-label": TEXT[name] });
   }
@@ -94,7 +96,7 @@ export class Tier {
         start: (event) => { this.offset = event.clientX - this.timeline.x(this.store.line.phones[n].end_s); },
         move: (event) => this.drag(n, (event.clientX - this.offset + this.timeline.left_px) / this.timeline.px_s),
         end: () => this.drop(),
-        cancel: () => this.leave(),
+        cancel: () => this.cancel(),
       });
     }
     return this.borders.get(n);
@@ -108,14 +110,42 @@ export class Tier {
     this.borders.get(before)?.classList.add("dragged");
     this.timeline.studio.player.seek(this.dragged.time_s);
     this.timeline.draw();
+    this.preview();
   }
 
+  /** Let the face follow while a border is dragged: each edit takes the place of the one before. */
+  async preview() {
+    if (this.sending || !this.dragged) return;
+    const { before, time_s } = this.dragged;
+    if (time_s === this.sent_s) return;
+    this.sending = true;
+    const sent = await this.timeline.studio.edit([say.ends(before + 1, time_s)], this.sent_s === null ? 0 : 1);
+    this.sending = false;
+    if (!sent) return;
+    this.sent_s = time_s;
+    this.preview();
+  }
+
+  /** The border stays where it is: what was sent last is the edit, or else one more. */
   async drop() {
     if (!this.dragged) return;
-    const { before, time_s } = this.dragged;
+    const { before, time_s } = this.dragged, { studio } = this.timeline;
     this.borders.get(before)?.classList.remove("dragged");
-    if (Math.abs(time_s - this.store.line.phones[before].end_s) > 5e-4) await this.timeline.studio.edit([say.ends(before + 1, time_s)]);
+    await studio.edits;
+    if (time_s !== this.sent_s && Math.abs(time_s - this.store.line.phones[before].end_s) > 5e-4) {
+      await studio.edit([say.ends(before + 1, time_s)], this.sent_s === null ? 0 : 1);
+    }
+    this.sent_s = null;
     this.leave();
+  }
+
+  /** Leave the border where it was. */
+  async cancel() {
+    const { studio } = this.timeline;
+    this.leave();
+    await studio.edits;
+    if (this.sent_s !== null) await studio.edit([], 1);
+    this.sent_s = null;
   }
 
   leave() {

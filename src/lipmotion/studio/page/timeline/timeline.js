@@ -7,7 +7,7 @@ import { Lane } from "./lane.js";
 import { ConfidenceStrip, Ruler, SpectrumTrack, WaveTrack } from "./sound_tracks.js";
 import { Tier } from "./tier.js";
 
-const MOST_PX_S = 4000, LEAST_SPAN_PX = 4, FOLLOW_SHARE = 0.08;
+const MOST_PX_S = 4000, READABLE_PX_S = 100, LEAST_SPAN_PX = 4, FOLLOW_SHARE = 0.08;
 
 export class Timeline {
   /**
@@ -40,6 +40,7 @@ export class Timeline {
       this.draw();
     }, { passive: true });
     this.scroller.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
+    this.pinching();
     new ResizeObserver(() => this.resized()).observe(this.scroller);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
       for (const track of this.tracks) track.recolour?.();
@@ -47,7 +48,10 @@ export class Timeline {
     });
     this.store.on(["lineId"], () => { this.fitted = false; });
     this.store.on(["sound", "line"], () => {
-      if (!this.fitted && this.duration_s) this.fit();
+      if (!this.fitted && this.duration_s) {
+        this.fit();
+        if (this.px_s < READABLE_PX_S) this.zoom(READABLE_PX_S / this.px_s, 0);
+      }
       this.sized();
     });
     const { store } = this;
@@ -126,6 +130,20 @@ export class Timeline {
       event.preventDefault();
       this.scrollTo(this.left_px + event.deltaY);
     }
+  }
+
+  /** Two fingers zoom. */
+  pinching() {
+    const apart = ({ touches: [a, b] }) => Math.abs(a.clientX - b.clientX) + 20;
+    let before = 0;
+    this.scroller.addEventListener("touchstart", (event) => { before = event.touches.length === 2 ? apart(event) : 0; }, { passive: true });
+    this.scroller.addEventListener("touchmove", (event) => {
+      if (!before || event.touches.length !== 2) return;
+      event.preventDefault();
+      const [a, b] = event.touches, now = apart(event);
+      this.zoom(now / before, this.time((a.clientX + b.clientX) / 2 - this.window.getBoundingClientRect().left));
+      before = now;
+    }, { passive: false });
   }
 
   /** Clicks set the playhead, drags of a mouse select a span; a finger scrolls, and sets the playhead by a tap. */
