@@ -102,7 +102,8 @@ class ProjectFolder:
             ]
             known = {os.path.realpath(self.sound(line)) for line in self.project.lines.values()}
             new = [each for each in named if os.path.realpath(each[0]) not in known]
-            project, added = self.project, []
+            project = self.project
+            added: list[int] = []
             taken = {_key(line.name) for line in project.lines.values()}
             for recording, name, transcript in new:
                 line = ProjectLine(

@@ -24,8 +24,8 @@ from lipmotion.studio.meshes import with_turn
 from lipmotion.types import Audio, Channel, Explanation, Generation, Motion, Timeline, Unit
 from lipmotion.units import is_silent, words_in_time
 
-LEAST_MOVE = 1e-6
-"""Frames whose values differ by less have not moved."""
+LEAST_MOVE = 5e-4
+"""Frames whose values differ by less, in the units of the channels, have not moved: 0.03 mm of a mouth."""
 MOST_SHOWN_DOUBTS = 200
 LONGEST_VIDEO_S = 60.0
 CONFIDENCE = (Channel("confidence", "share"),)
@@ -123,9 +123,13 @@ class OpenLine:
             return Motion(confidence_of(generation)[:, None], generation.motion.rate_hz, CONFIDENCE)
         return generation.motion
 
-    def weights(self, face: ShownFace) -> Motion:
-        """Return the weights of a face's morph targets, and its head's turn, as its ``.glb`` holds them."""
-        return with_turn(delivered_scene(self.performance(face)))
+    def weights(self, face: ShownFace, frames: slice | None = None) -> Motion:
+        """Return the weights of a face's morph targets, and its head's turn, as its ``.glb`` holds them.
+
+        frames : which of them are computed alone; None: all
+        """
+        found = with_turn(delivered_scene(self.performance(face), frames))
+        return found if frames is None or len(found.values) == frames.stop - frames.start else _cut(found, frames)
 
     def performance(self, face: ShownFace) -> Performance:
         """Return the motion with what outputs need of it."""
@@ -157,6 +161,10 @@ class OpenLine:
     def doubts(self) -> list[dict[str, Any]]:
         """Return the phones, by their confidence, the least sure first."""
         return doubts_of(self.generation)
+
+
+def _cut(motion: Motion, frames: slice) -> Motion:
+    return replace(motion, values=motion.values[frames])
 
 
 def moved_stretch(before: Motion, after: Motion) -> dict[str, float] | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -116,7 +117,8 @@ class LineReplies:
 
         def found(line: OpenLine) -> Response:
             motion = line.numbers(of)
-            return _numbers(motion, stretch(query, motion.rate_hz, len(motion.values)), {})
+            frames = stretch(query, motion.rate_hz, len(motion.values))
+            return _numbers(replace(motion, values=motion.values[frames]), frames.start, {})
 
         return await self._desk.at(self._number(request), found)
 
@@ -126,11 +128,12 @@ class LineReplies:
         name = text(query, "face", "head")
 
         def found(line: OpenLine) -> Response:
-            motion = line.weights(self._studio.faces.shown(name))
-            mesh = self._studio.faces.mesh_name(name, line.numbers("delivered"))
-            return _numbers(
-                motion, stretch(query, motion.rate_hz, len(motion.values)), {"x-lipmotion-mesh": quote(mesh)}
-            )
+            delivered = line.numbers("delivered")
+            frames = stretch(query, delivered.rate_hz, len(delivered.values))
+            is_part = frames.stop - frames.start < len(delivered.values)
+            motion = line.weights(self._studio.faces.shown(name), frames if is_part else None)
+            mesh = self._studio.faces.mesh_name(name, delivered)
+            return _numbers(motion, frames.start, {"x-lipmotion-mesh": quote(mesh)})
 
         return await self._desk.at(self._number(request), found)
 
@@ -198,11 +201,11 @@ class LineReplies:
         }
 
 
-def _numbers(motion: Motion, frames: slice, more: dict[str, str]) -> Response:
+def _numbers(motion: Motion, first: int, more: dict[str, str]) -> Response:
     headers = {
         "x-lipmotion-names": as_json(list(motion.names), ensure_ascii=True),
         "x-lipmotion-rate": f"{motion.rate_hz:g}",
-        "x-lipmotion-first": str(frames.start),
+        "x-lipmotion-first": str(first),
     }
-    content = np.ascontiguousarray(motion.values[frames], "<f4").tobytes()
+    content = np.ascontiguousarray(motion.values, "<f4").tobytes()
     return Response(content, headers=FRESH | headers | more, media_type="application/octet-stream")

@@ -45,9 +45,9 @@ def serve_studio(
     with listening(HOST, port) as place, opened_folder(source, out) as folder:
         file = folder.path.absolute() / PROJECT
         own = {name: sound_reference(path.absolute(), file) for name, path in (characters or {}).items()}
-        chosen = {"model": sound_reference(model.absolute(), file)} if model else {}
-        if own or chosen:
-            folder.change(lambda project: replace(project, characters={**project.characters, **own}, **chosen))
+        chosen = sound_reference(model.absolute(), file) if model else folder.project.model
+        if own or model:
+            folder.change(lambda now: replace(now, characters={**now.characters, **own}, model=chosen))
         token = token_urlsafe(TOKEN_BYTES)
         hosts = frozenset(f"{name}:{place.getsockname()[1]}" for name in NAMES)
         with closing(Studio(folder)) as studio:

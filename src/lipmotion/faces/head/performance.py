@@ -35,18 +35,20 @@ def head_poses(
     fps: float,
     staging: Staging | None = None,
     prosody: Prosody | None = None,
+    frames: slice = slice(None),
 ) -> list[CharacterPose]:
     """Return the pose of every video frame, frame n at ``n / fps`` seconds, to the end of the motion.
 
     staging : seed, and what moves on its own; None: everything moves
     prosody : of the speech, for accents of brows and head; None: they follow the opening
+    frames  : those whose poses are returned
     Raises InputError: as ``spoken_mouth``.
     """
     mouth = spoken_mouth(motion, units, fps)
-    return posed(mouth, alive(np.arange(len(mouth.gap)) / fps, motion, units, staging, prosody))
+    return posed(mouth, alive(np.arange(len(mouth.gap)) / fps, motion, units, staging, prosody), frames)
 
 
-def posed(mouth: SpokenMouth, moved: Liveliness) -> list[CharacterPose]:
+def posed(mouth: SpokenMouth, moved: Liveliness, frames: slice = slice(None)) -> list[CharacterPose]:
     """Return the poses that show a mouth, and eyes, brows and head, one a frame."""
     gap, change = mouth.gap, mouth.width - 1
     spread = mouth.spread * (1 - mouth.protrusion)
@@ -78,10 +80,10 @@ def posed(mouth: SpokenMouth, moved: Liveliness) -> list[CharacterPose]:
         "brows": moved.brows,
         **{"squint" if name == "tight" else name: curve for name, curve in moved.upper_face.items()},
     }
-    rows = np.stack(list(curves.values()), axis=1).tolist()
+    rows = np.stack(list(curves.values()), axis=1)[frames].tolist()
     return [
         CharacterPose(**dict(zip(curves, row, strict=True)), gaze=(gaze[0], gaze[1]), turn=(turn[0], turn[1], turn[2]))
-        for row, gaze, turn in zip(rows, moved.gaze.tolist(), moved.turn.tolist(), strict=True)
+        for row, gaze, turn in zip(rows, moved.gaze[frames].tolist(), moved.turn[frames].tolist(), strict=True)
     ]
 
 

@@ -25,7 +25,7 @@ from lipmotion.meshes.model.other_shapes import CLOSED
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, arkit_name
 from lipmotion.pipeline.outputs.living_curves import living_curves
 from lipmotion.storage.files import whole_file
-from lipmotion.types import WEIGHT, Channel, Gain, Generation, Motion, Pin, Prosody, Timeline, Unit
+from lipmotion.types import WEIGHT, Channel, CurveEdit, Generation, Motion, Prosody, Timeline, Unit
 
 ARKIT, WHOLE_FACE, VOWELS = "arkit", "face", "vowels"
 LIVING_SETS = (WHOLE_FACE, VOWELS)
@@ -59,7 +59,7 @@ def curves_of(
     *,
     staging: Staging | None = None,
     prosody: Prosody | None = None,
-    edits: Sequence[Pin | Gain] = (),
+    edits: Sequence[CurveEdit] = (),
 ) -> Motion:
     """Return motion as curves that drive a character.
 
@@ -89,7 +89,7 @@ def curves_of(
     return with_edited_curves(rig_motion(rows, sources, motion.rate_hz), units, own)
 
 
-def edited_weights(weights: Motion, units: Timeline[Unit], edits: Sequence[Pin | Gain]) -> Motion:
+def edited_weights(weights: Motion, units: Timeline[Unit], edits: Sequence[CurveEdit]) -> Motion:
     """Return weights of a character with pins and gains, which name its blendshapes as it does or as ARKit does."""
     named = {arkit_name(name) or name: name for name in weights.names} | {name: name for name in weights.names}
     ours = [replace(edit, channel=named[edit.channel]) for edit in edits if edit.channel in named]
