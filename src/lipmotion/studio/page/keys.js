@@ -1,5 +1,7 @@
 // Keys, and what each does: the page of help is made from this table.
 
+import { say } from "./sentences.js";
+
 const LISTEN = { group: "listen" };
 
 /**
@@ -29,7 +31,8 @@ export const KEYS = [
     act: (studio, { key }) => studio.nudge("start", key === "ArrowLeft" ? -1 : 1) },
   { key: ["v"], group: "edit", shown: ["V"], help: "pinValue", act: (studio) => studio.focusOn("curve-value") },
   { key: ["d"], group: "edit", shown: ["D"], help: "drawTool", act: ({ store }) => store.set({ tool: store.tool === "draw" ? "select" : "draw" }) },
-  { key: ["g"], group: "edit", shown: ["G"], help: "lockSpan", act: (studio) => studio.lock() },
+  { key: ["g"], group: "edit", shown: ["G"], help: "lockSpan", act: (studio) => studio.over(say.lock) },
+  { key: ["f"], group: "edit", shown: ["F"], help: "holdSpan", act: (studio) => studio.over(say.hold) },
   { key: ["[", "]"], group: "edit", shown: ["[", "]"], help: "markStart", act: (studio, { key }) => studio.markSpan(key === "[") },
   { key: ["z"], ctrl: true, group: "edit", shown: ["⌃ Z"], help: "undo", act: (studio) => studio.undo() },
   { key: ["z", "y"], ctrl: true, shift: true, group: "edit", shown: ["⌃⇧ Z", "⌃ Y"], help: "redo", act: (studio) => studio.redo() },

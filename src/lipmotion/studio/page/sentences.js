@@ -6,38 +6,29 @@ const seconds = (value) => String(Number(value.toFixed(3)));
 /** Sentences. Phones and words are numbered from 1. */
 export const say = {
   word: (number, word) => `word ${number} is ${word}`,
+  wordSaid: (number, word, phones) => `word ${number} is ${word} said ${phones.join(" ")}`,
   phone: (number, phone) => `phone ${number} is ${phone}`,
   begins: (number, time_s) => `phone ${number} begins ${seconds(time_s)}`,
   ends: (number, time_s) => `phone ${number} ends ${seconds(time_s)}`,
+  split: (number, time_s) => `split phone ${number} at ${seconds(time_s)}`,
   remove: (number) => `remove phone ${number}`,
   insert: (phone, start_s, end_s) => `insert ${phone} from ${seconds(start_s)} to ${seconds(end_s)}`,
   pin: (channel, value, time_s) => `pin ${channel} ${rounded(value)} at ${seconds(time_s)}`,
   gain: (channel, factor, start_s, end_s) => `gain ${channel ? `${channel} ` : ""}${rounded(factor)} from ${seconds(start_s)} to ${seconds(end_s)}`,
+  draw: (channel, values, start_s, end_s) => `draw ${channel} ${values.map(rounded).join(" ")} from ${seconds(start_s)} to ${seconds(end_s)}`,
+  hold: (start_s, end_s) => `hold from ${seconds(start_s)} to ${seconds(end_s)}`,
   lock: (start_s, end_s) => `lock from ${seconds(start_s)} to ${seconds(end_s)}`,
   unlock: (start_s, end_s) => `unlock from ${seconds(start_s)} to ${seconds(end_s)}`,
   mood: (mood, time_s) => `mood ${mood} at ${seconds(time_s)}`,
   set: (name, value) => `set ${name} ${value}`,
 };
 
-/** Seconds between the pins of a stroke. */
-export const STROKE_STEP_S = 0.02;
-
-/** Return how many of the last steps one stroke of the pen made, or else 1. */
-export function lastStroke(steps) {
-  let count = 1;
-  const pinned = (step) => FORMS.pin.exec(step ?? "");
-  for (let later = pinned(steps.at(-1)); later; count++) {
-    const before = pinned(steps[steps.length - 1 - count]), apart = before ? Number(later[3]) - Number(before[3]) : 0;
-    if (before?.[1] !== later[1] || apart <= 0 || apart > STROKE_STEP_S + 1e-6) break;
-    later = before;
-  }
-  return count;
-}
-
 const NUMBER = "([-+\\d.e]+)";
 const FORMS = {
   pin: new RegExp(`^pin (\\S+) ${NUMBER} at ${NUMBER}$`),
   gain: new RegExp(`^gain (?:(\\S+) )?${NUMBER} from ${NUMBER} to ${NUMBER}$`),
+  draw: new RegExp(`^draw (\\S+) (.+) from ${NUMBER} to ${NUMBER}$`),
+  hold: new RegExp(`^hold from ${NUMBER} to ${NUMBER}$`),
   lock: new RegExp(`^lock from ${NUMBER} to ${NUMBER}$`),
   unlock: new RegExp(`^unlock from ${NUMBER} to ${NUMBER}$`),
   mood: new RegExp(`^mood (\\S+) at ${NUMBER}$`),
@@ -49,10 +40,12 @@ const FORMS = {
  * @param {string[]} steps
  */
 export function placed(steps) {
-  const found = { pins: [], gains: [], locks: [], moods: [], set: {} };
+  const found = { pins: [], gains: [], drawn: [], holds: [], locks: [], moods: [], set: {} };
   const read = {
     pin: ([, channel, value, time_s]) => found.pins.push({ channel, value: +value, time_s: +time_s }),
     gain: ([, channel, factor, start_s, end_s]) => found.gains.push({ channel: channel ?? "", factor: +factor, start_s: +start_s, end_s: +end_s }),
+    draw: ([, channel, , start_s, end_s]) => found.drawn.push({ channel, start_s: +start_s, end_s: +end_s }),
+    hold: ([, start_s, end_s]) => found.holds.push({ start_s: +start_s, end_s: +end_s }),
     lock: ([, start_s, end_s]) => found.locks.push({ start_s: +start_s, end_s: +end_s }),
     unlock: ([, start_s, end_s]) => {
       const place = found.locks.findLastIndex((lock) => lock.start_s === +start_s && lock.end_s === +end_s);

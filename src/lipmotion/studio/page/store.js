@@ -46,6 +46,9 @@ export class Store {
     }
   }
 
+  /** The curves that have one of a name: the motion, or the weights of the face; null: neither. */
+  curvesOf(name, { motion, weights } = this) { return [motion, weights].find((curves) => curves && curves.column(name) >= 0) ?? null; }
+
   /** Run `act` whenever one of some parts has changed, and now. */
   on(names, act) {
     this.#listeners.push([names, act]);

@@ -7,7 +7,7 @@ import { added } from "./files.js";
 import { listen } from "./keys.js";
 import { Panel } from "./panel/panel.js";
 import { Queue } from "./queue/queue.js";
-import { lastStroke, say } from "./sentences.js";
+import { say } from "./sentences.js";
 import { Refused, Server } from "./server.js";
 import { Player } from "./sound/player.js";
 import { samplesOf } from "./sound/samples.js";
@@ -26,7 +26,6 @@ export class Studio {
     this.store = new Store();
     this.player = new Player(this.store);
     /** @type {Promise<any>} */ this.edits = Promise.resolve();
-    this.undone = []; // how many steps each undo took back that can be made again
     this.askedAt = this.editedAt = 0; // when the edit was asked for whose motion is on its way, or is shown next
     this.build();
     listen(this);
@@ -150,7 +149,6 @@ export class Studio {
   async open(id, again = false) {
     if (id === this.store.lineId && !again) return;
     this.player.stop();
-    this.undone = [];
     this.store.set({ lineId: id, line: null, sound: null, motion: null, deviation: null, weights: null, other: null, comparing: false, doubts: [], selected: null, span: null, time_s: 0, progress: null });
     try {
       const line = { ...NOTHING, ...(await this.server.read(`lines/${id}`)) };
@@ -210,24 +208,12 @@ export class Studio {
 
   /** Make edits; one after another, each with the revision that the one before left. Returns whether they were made. */
   edit(steps, instead = 0) {
-    this.undone = [];
-    return this.request("edits", { steps, ...(instead ? { instead } : {}) }, filled(TEXT.changed, { what: !steps.length ? TEXT.undone : steps.length > 1 ? `${steps[0]} … (${steps.length})` : steps[0] }));
+    return this.request("edits", { steps, ...(instead ? { instead } : {}) }, filled(TEXT.changed, { what: steps[0] ?? "" }));
   }
 
-  /** Take back the last edit; a stroke of the pen is one. */
-  async undo() {
-    const { line } = this.store;
-    if (!line?.undo) return this.say(TEXT.nothingToUndo);
-    const count = lastStroke(line.steps);
-    if (await this.request("undo", { count }, TEXT.undone)) this.undone.push(count);
-    return undefined;
-  }
+  undo() { return this.store.line?.undo ? this.request("undo", {}, TEXT.undone) : this.say(TEXT.nothingToUndo); }
 
-  redo() {
-    const { line } = this.store;
-    if (!line?.redo) return this.say(TEXT.nothingToRedo);
-    return this.request("redo", { count: Math.min(this.undone.pop() ?? 1, line.redo) }, TEXT.redone);
-  }
+  redo() { return this.store.line?.redo ? this.request("redo", {}, TEXT.redone) : this.say(TEXT.nothingToRedo); }
 
   async realign(text) {
     const { span } = this.store;
@@ -341,9 +327,9 @@ export class Studio {
 
   /** Split a phone at the playhead, or else in its middle: the second half can then be made another one. */
   async split(index) {
-    const { start_s, end_s, label } = this.store.line.phones[index], { time_s } = this.store;
+    const { start_s, end_s } = this.store.line.phones[index], { time_s } = this.store;
     const inside = time_s > start_s + 0.01 && time_s < end_s - 0.01;
-    if (await this.edit([say.insert(label, inside ? this.frameTime : (start_s + end_s) / 2, end_s)])) this.choose("phone", index + 1);
+    if (await this.edit([say.split(index + 1, inside ? time_s : (start_s + end_s) / 2)])) this.choose("phone", index + 1);
   }
 
   async merge(index) {
@@ -354,10 +340,11 @@ export class Studio {
     if (await this.edit([say.remove(index + 1)])) this.choose("phone", Math.max(index - 1, 0));
   }
 
-  lock() {
+  /** Lock the selection, or hold the pose of its beginning. */
+  over(sentence) {
     const { span } = this.store;
     if (!span) return this.say(TEXT.needsSpan, "bad");
-    return this.edit([say.lock(span.start_s, span.end_s)]);
+    return this.edit([sentence(span.start_s, span.end_s)]);
   }
 
   /** Move a border of the selected phone by frames; presses in quick succession are one edit. */

@@ -4,6 +4,8 @@ import { choice, icon, iconButton, made } from "./dom.js";
 import { clock } from "./timeline/sound_tracks.js";
 import { TEXT, filled } from "./strings.js";
 
+const LIP_POINT = /^[xyz]_\d+$/;
+
 export class Transport {
   /**
    * @param {HTMLElement} place
@@ -45,10 +47,13 @@ export class Transport {
       undo.disabled = !store.line?.undo;
       redo.disabled = !store.line?.redo;
     });
-    store.on(["line", "channels"], () => {
-      const known = (store.line?.channels ?? []).map(({ name }) => name);
-      add.replaceChildren(made("option", { value: "", textContent: TEXT.curves, disabled: true, selected: true }),
-        ...known.map((name) => made("option", { value: name, textContent: `${store.channels.includes(name) ? "✓ " : ""}${name}` })));
+    store.on(["line", "channels", "weights"], () => {
+      const channels = (store.line?.channels ?? []).map(({ name }) => name), shapes = (store.weights?.names ?? []).filter((name) => !name.includes("."));
+      const group = (label, names) => names.length && made("optgroup", { label }, ...names.map((name) => made("option", { value: name,
+        textContent: `${store.channels.includes(name) ? "✓ " : ""}${name}` })));
+      add.replaceChildren(...[made("option", { value: "", textContent: TEXT.curves, disabled: true, selected: true }),
+        group(TEXT.curveGroups.motion, channels.filter((name) => !LIP_POINT.test(name))), group(TEXT.curveGroups.shapes, shapes),
+        group(TEXT.curveGroups.points, channels.filter((name) => LIP_POINT.test(name)))].filter(Boolean));
     });
     store.on(["time_s", "line"], () => {
       time.textContent = `${clock(store.time_s)} / ${clock(player.duration_s)}`;

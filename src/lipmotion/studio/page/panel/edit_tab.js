@@ -51,16 +51,20 @@ function wordPart(studio, index) {
   const field = made("input", { id: "word-label", value: word.label, autocapitalize: "none", spellcheck: false, "aria-label": TEXT.word });
   const offers = made("div", { className: "offers", id: "offers", role: "group", "aria-label": TEXT.pronunciations });
   const phones = made("input", { id: "word-phones", spellcheck: false, autocapitalize: "none" });
-  const spoken = line.phones.filter((phone) => phone.word === index + 1).map(({ label }) => label);
-  phones.value = spoken.join(" ");
+  const spoken = spokenAs(line, index).join(" ");
+  phones.value = spoken;
   const offer = () => offerPronunciations(studio, field.value.trim().toLowerCase(), offers, phones);
   let waiting = 0;
   field.addEventListener("input", () => {
     clearTimeout(waiting);
     waiting = setTimeout(offer, 200);
+    phones.value = field.value.trim().toLowerCase() === word.label ? spoken : "";
   });
   field.addEventListener("keydown", (event) => { if (event.key === "Enter") apply(); });
-  const apply = () => studio.relabel("word", index, field.value.trim().toLowerCase());
+  const apply = () => {
+    const label = field.value.trim().toLowerCase(), said = phones.value.trim();
+    return said && said !== spoken ? studio.edit([say.wordSaid(index + 1, label, said.split(/\s+/))]) : studio.relabel("word", index, label);
+  };
   offer();
   return section(`${TEXT.word} ${index + 1}`,
     row(field, textButton(TEXT.change, apply, { id: "word-change" })), offers,
@@ -83,11 +87,17 @@ async function offerPronunciations(studio, word, place, phones) {
     ...(found.pronunciations ?? []).map((said) => textButton(said.join(" "), () => { phones.value = said.join(" "); }, { className: "offer" })));
 }
 
+/** Return the phones of a word: those that the server counts to it. */
+function spokenAs({ words, phones }, index) {
+  const { start_s, end_s } = words[index];
+  return phones.filter((phone) => phone.start_s >= start_s - 1e-6 && phone.end_s <= end_s + 1e-6).map(({ label }) => label);
+}
+
 function curvePart(studio, channel) {
   const { store } = studio;
   const field = following(made("input", { id: "curve-value", type: "number", step: "0.01", "aria-label": TEXT.value }), (shown) => {
-    const column = store.motion?.column(channel) ?? -1;
-    if (column >= 0 && document.activeElement !== shown) shown.value = store.motion.at(store.time_s, column).toFixed(3);
+    const curves = store.curvesOf(channel);
+    if (curves && document.activeElement !== shown) shown.value = curves.at(store.time_s, curves.column(channel)).toFixed(3);
   });
   const pin = () => studio.edit([say.pin(channel, Number(field.value), studio.frameTime)]);
   field.addEventListener("keydown", (event) => { if (event.key === "Enter") pin(); });
@@ -106,7 +116,8 @@ function spanPart(studio, { start_s, end_s }) {
     row(labelled(`${TEXT.gain}: ${channel || TEXT.wholeMouth}`, factor, shown),
       textButton(TEXT.apply, () => studio.edit([say.gain(channel, Number(factor.value), start_s, end_s)]), { id: "gain-apply" })),
     row(locked ? textButton(TEXT.unlock, () => studio.edit([say.unlock(locked.start_s, locked.end_s)]), { id: "unlock" })
-      : textButton(TEXT.lock, () => studio.lock(), { id: "lock", title: TEXT.lockOf }),
+      : textButton(TEXT.lock, () => studio.over(say.lock), { id: "lock", title: TEXT.lockOf }),
+    textButton(TEXT.hold, () => studio.over(say.hold), { id: "hold", title: TEXT.holdOf }),
     phone, textButton(TEXT.insert, () => studio.edit([say.insert(phone.value, start_s, end_s)]), { id: "insert" })));
 }
 

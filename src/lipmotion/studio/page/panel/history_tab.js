@@ -1,20 +1,8 @@
 // The edits of the line, newest first, and the comparison with an earlier version.
 
 import { choice, labelled, made, textButton } from "../dom.js";
-import { lastStroke } from "../sentences.js";
 import { TEXT, filled } from "../strings.js";
 import { row, section } from "./panel.js";
-
-/** Return rows of steps, newest first; a stroke of the pen is one. */
-function rows(steps) {
-  const found = [];
-  for (let end = steps.length; end > 0;) {
-    const count = lastStroke(steps.slice(0, end)), last = steps[end - 1];
-    found.push(made("li", { value: end, textContent: count > 1 ? filled(TEXT.stroke, { first: steps[end - count], last, count }) : last }));
-    end -= count;
-  }
-  return found;
-}
 
 export function historyTab(studio) {
   const { line, other } = studio.store;
@@ -29,7 +17,7 @@ export function historyTab(studio) {
   return [
     section(TEXT.history,
       row(textButton(TEXT.undo, () => studio.undo(), { id: "undo-here", disabled: !line.undo }), textButton(TEXT.redo, () => studio.redo(), { id: "redo-here", disabled: !line.redo })),
-      line.steps.length ? made("ol", { className: "list steps", reversed: true }, ...rows(line.steps))
+      line.steps.length ? made("ol", { className: "list steps", reversed: true }, ...line.steps.map((step, n) => made("li", { value: n + 1, textContent: step })).reverse())
         : made("p", { className: "hint", textContent: TEXT.noHistory })),
     line.steps.length > 0 && studio.store.project.forms.versions && section(TEXT.compare,
       row(labelled(TEXT.compare, choice(versions, other ? String(other.version) : "", (version) => studio.compare(version), { id: "compare" })), hold)),

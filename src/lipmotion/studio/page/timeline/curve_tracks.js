@@ -1,10 +1,10 @@
 // Curves of the motion with their deviations, pins, and the pen that draws over them.
 
 import { made } from "../dom.js";
-import { placed, say, STROKE_STEP_S } from "../sentences.js";
+import { placed, say } from "../sentences.js";
 import { cleared, colours } from "./canvas.js";
 
-const PAD_PX = 6, ROOM = 0.12;
+const PAD_PX = 6, STROKE_STEP_S = 0.02, ROOM = 0.2, OF_WEIGHTS = [-0.06, 1.06];
 
 export class CurveTracks {
   constructor(timeline) {
@@ -46,7 +46,7 @@ export class CurveTracks {
     if (row.of === curves) return;
     row.of = curves;
     const [least, most] = curves.range(column), room = (most - least) * ROOM || 0.05;
-    row.range = [least - room, most + room];
+    row.range = curves === this.store.weights ? OF_WEIGHTS : [least - room, most + room];
   }
 
   y(row, value) {
@@ -55,7 +55,7 @@ export class CurveTracks {
   }
 
   drawRow(name, row, pins, locks) {
-    const { timeline, store: { motion, deviation, selected, comparing, other } } = this, height = row.element.clientHeight, colour = colours();
+    const { timeline, store, store: { deviation, selected, comparing, other } } = this, motion = store.curvesOf(name), its = other && store.curvesOf(name, other), height = row.element.clientHeight, colour = colours();
     const pen = cleared(row.canvas, timeline.width, height), isSelected = selected?.kind === "curve" && selected.channel === name;
     row.element.classList.toggle("selected", isSelected);
     row.label.setAttribute("aria-pressed", isSelected);
@@ -68,10 +68,7 @@ export class CurveTracks {
     const frames = this.frames(motion), place = (frame) => timeline.x(frame / motion.rate_hz);
     const spread = deviation?.column(name) ?? -1;
     if (spread >= 0) this.band(pen, row, frames, place, (frame) => [motion.value(frame, column), deviation.value(frame, spread)], colour.band);
-    if (other?.motion && other.motion.column(name) >= 0) {
-      const its = other.motion.column(name);
-      this.trace(pen, row, frames, place, (frame) => other.motion.value(frame, its), colour.other, comparing ? 2 : 1);
-    }
+    if (its) this.trace(pen, row, frames, place, (frame) => its.value(frame, its.column(name)), colour.other, comparing ? 2 : 1);
     this.trace(pen, row, frames, place, (frame) => motion.value(frame, column), isSelected ? colour.main : colour.curve, comparing ? 1 : 1.5);
     pen.fillStyle = colour.main;
     for (const { time_s, value } of pins) this.dot(pen, timeline.x(time_s), this.y(row, value), 3);
@@ -132,7 +129,7 @@ export class CurveTracks {
     pen.fill();
   }
 
-  /** Draw over a curve with the pen: a click pins one value, a stroke pins one every 20 ms. */
+  /** Draw over a curve with the pen: a click pins one value. */
   drawable(name, element) {
     const value = (event) => {
       const row = this.rows.get(name), box = element.getBoundingClientRect(), [least, most] = row.range;
@@ -142,7 +139,7 @@ export class CurveTracks {
     const down = (event) => {
       if (event.button !== 0) return;
       this.timeline.studio.chooseCurve(name);
-      if (this.store.tool !== "draw" || !this.store.motion) return;
+      if (this.store.tool !== "draw" || !this.store.curvesOf(name)) return;
       event.preventDefault();
       event.stopPropagation();
       element.setPointerCapture(event.pointerId);
@@ -167,7 +164,7 @@ export class CurveTracks {
   }
 
   point(time_s, value) {
-    const rate = this.store.motion.rate_hz;
+    const rate = this.store.line.rate_hz;
     this.stroke.points.set(Math.round(time_s * rate) / rate, value);
   }
 
@@ -175,7 +172,8 @@ export class CurveTracks {
 
   async drop() {
     const points = this.sorted(), { channel } = this.stroke;
-    await this.timeline.studio.edit(alongLine(points).map(([time_s, value]) => say.pin(channel, value, time_s)));
+    const [start_s, value] = points[0], end_s = points.at(-1)[0], count = Math.round((end_s - start_s) / STROKE_STEP_S) + 1;
+    await this.timeline.studio.edit([count < 2 ? say.pin(channel, value, start_s) : say.draw(channel, alongLine(points, count), start_s, end_s)]);
     this.leave();
   }
 
@@ -185,13 +183,14 @@ export class CurveTracks {
   }
 }
 
-/** Return points every 20 ms on the lines between drawn ones, and the last one. */
-export function alongLine(points) {
-  const [start] = points[0], [end, last] = points.at(-1), along = [];
-  for (let time = start, n = 0; time < end - STROKE_STEP_S / 2; time += STROKE_STEP_S) {
-    while (n + 1 < points.length - 1 && points[n + 1][0] <= time) n++;
-    const [before, from] = points[n], [after, to] = points[Math.min(n + 1, points.length - 1)];
-    along.push([time, after > before ? from + ((time - before) / (after - before)) * (to - from) : from]);
+/** Return values at `count` equal distances on the lines between drawn points. */
+export function alongLine(points, count) {
+  const [start] = points[0], [end] = points.at(-1), along = [];
+  for (let step = 0, n = 0; step < count; step++) {
+    const time = start + ((end - start) * step) / (count - 1);
+    while (n + 2 < points.length && points[n + 1][0] <= time) n++;
+    const [before, from] = points[n], [after, to] = points[n + 1];
+    along.push(from + Math.min((time - before) / (after - before), 1) * (to - from));
   }
-  return [...along, [end, last]];
+  return along;
 }

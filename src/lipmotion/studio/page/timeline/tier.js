@@ -16,7 +16,7 @@ export class Tier {
     this.shown = new Map(); // elements by place
     this.borders = new Map();
     this.sent_s = null; // where the server has that border
-    this.sending = false;
+    /** @type {Promise<void> | null} */ this.loop = null; // edits on their way while it is dragged
     this.dragged = null; // a border on its way: the phone before it, and its time
     this.element = made("div", { className: `track tier ${name}`, role: "group", "aria-label": TEXT[name] });
   }
@@ -110,41 +110,36 @@ export class Tier {
     this.borders.get(before)?.classList.add("dragged");
     this.timeline.studio.player.seek(this.dragged.time_s);
     this.timeline.draw();
-    this.preview();
+    this.following();
   }
 
   /** Let the face follow while a border is dragged: each edit takes the place of the one before. */
-  async preview() {
-    if (this.sending || !this.dragged) return;
-    const { before, time_s } = this.dragged;
-    if (time_s === this.sent_s) return;
-    this.sending = true;
-    const sent = await this.timeline.studio.edit([say.ends(before + 1, time_s)], this.sent_s === null ? 0 : 1);
-    this.sending = false;
-    if (!sent) return;
-    this.sent_s = time_s;
-    this.preview();
+  async follow() {
+    while (this.dragged && this.dragged.time_s !== this.sent_s) {
+      const { before, time_s } = this.dragged;
+      if (!await this.timeline.studio.edit([say.ends(before + 1, time_s)], this.sent_s === null ? 0 : 1)) break;
+      this.sent_s = time_s;
+    }
   }
 
-  /** The border stays where it is: what was sent last is the edit, or else one more. */
+  following() {
+    this.loop ??= this.follow().finally(() => { this.loop = null; });
+    return this.loop;
+  }
+
+  /** The border stays where it is. */
   async drop() {
     if (!this.dragged) return;
-    const { before, time_s } = this.dragged, { studio } = this.timeline;
-    this.borders.get(before)?.classList.remove("dragged");
-    await studio.edits;
-    if (time_s !== this.sent_s && Math.abs(time_s - this.store.line.phones[before].end_s) > 5e-4) {
-      await studio.edit([say.ends(before + 1, time_s)], this.sent_s === null ? 0 : 1);
-    }
+    await this.following();
     this.sent_s = null;
     this.leave();
   }
 
-  /** Leave the border where it was. */
+  /** The border goes back to where it was. */
   async cancel() {
-    const { studio } = this.timeline;
     this.leave();
-    await studio.edits;
-    if (this.sent_s !== null) await studio.edit([], 1);
+    await this.loop;
+    if (this.sent_s !== null) await this.timeline.studio.edit([], 1);
     this.sent_s = null;
   }
 
