@@ -302,10 +302,9 @@ export class Studio {
   changeTier(up) {
     const { line, selected } = this.store;
     if (!line) return;
-    if (up && selected?.kind === "phone") {
-      const { word } = line.phones[selected.index];
-      if (word) this.choose("word", word - 1);
-    } else if (!up && selected?.kind === "word") this.choose("phone", line.phones.findIndex(({ word }) => word === selected.index + 1));
+    const holds = (span, { start_s, end_s }) => span.start_s <= (start_s + end_s) / 2 && span.end_s > (start_s + end_s) / 2;
+    if (up && selected?.kind === "phone") this.choose("word", line.words.findIndex((word) => holds(word, line.phones[selected.index])));
+    if (!up && selected?.kind === "word") this.choose("phone", line.phones.findIndex((phone) => holds(line.words[selected.index], phone)));
   }
 
   type() {

@@ -4,7 +4,10 @@ import { made, onDrag } from "../dom.js";
 import { say } from "../sentences.js";
 import { TEXT, filled } from "../strings.js";
 
-const LEAST_PX = 3, LABEL_PX = 11, BORDER_PX = 9, LEAST_PHONE_S = 0.01, SURE = 0.5;
+const LEAST_PX = 3, LABEL_PX = 11, LEAST_BORDER_PX = 3, LEAST_PHONE_S = 0.01, SURE = 0.5;
+
+/** A finger needs more room; a border leaves half of a short phone to the phone. */
+const BORDER_PX = matchMedia("(pointer: coarse)").matches ? 19 : 9;
 
 export class Tier {
   /** @param {"words" | "phones"} name */
@@ -15,9 +18,8 @@ export class Tier {
     this.kind = name === "words" ? "word" : "phone";
     this.shown = new Map(); // elements by place
     this.borders = new Map();
-    this.sent_s = null; // where the server has that border
-    /** @type {Promise<void> | null} */ this.loop = null; // edits on their way while it is dragged
-    this.dragged = null; // a border on its way: the phone before it, and its time
+    this.settled = Promise.resolve(); // when what was dragged before is on the server
+    this.dragged = null; // a border on its way: the phone before it, its time, and the time that the server has
     this.element = made("div", { className: `track tier ${name}`, role: "group", "aria-label": TEXT[name] });
   }
 
@@ -34,14 +36,16 @@ export class Tier {
     const first = firstAfter(spans, timeline.start_s), { end_s, px_s } = timeline;
     for (let n = first; n < spans.length && spans[n].start_s < end_s; n++) {
       const span = spans[n], wide = (span.end_s - span.start_s) * px_s;
-      if (wide < LEAST_PX) continue;
+      if (wide < LEAST_PX && this.dragged?.before !== n) continue;
       seen.add(n);
       this.drawSpan(n, span, wide, selected);
-      if (this.name === "phones" && n + 1 < spans.length && wide >= BORDER_PX) {
-        seenBorders.add(n);
-        const border = this.border(n);
-        border.style.transform = `translateX(${timeline.x(span.end_s) - BORDER_PX / 2}px)`;
-      }
+      if (this.name !== "phones" || n + 1 >= spans.length) continue;
+      const across = Math.min(BORDER_PX, wide / 2, ((spans[n + 1].end_s - spans[n + 1].start_s) * px_s) / 2);
+      if (across < LEAST_BORDER_PX && this.dragged?.before !== n) continue;
+      seenBorders.add(n);
+      const border = this.border(n);
+      border.style.width = `${across}px`;
+      border.style.transform = `translateX(${timeline.x(span.end_s) - across / 2}px)`;
     }
     for (const [kept, known] of [[seen, this.shown], [seenBorders, this.borders]]) {
       for (const [n, element] of known) {
@@ -95,57 +99,65 @@ export class Tier {
       onDrag(border, {
         start: (event) => { this.offset = event.clientX - this.timeline.x(this.store.line.phones[n].end_s); },
         move: (event) => this.drag(n, (event.clientX - this.offset + this.timeline.left_px) / this.timeline.px_s),
-        end: () => this.drop(),
+        end: (event) => {
+          if (this.dragged && !this.dragged.dropped) return this.drop();
+          return this.timeline.studio.choose("phone", this.timeline.timeOf(event) < this.store.line.phones[n].end_s ? n : n + 1);
+        },
         cancel: () => this.cancel(),
       });
     }
     return this.borders.get(n);
   }
 
-  /** Show a border elsewhere, between the phones beside it. */
+  /** Show a border elsewhere, between the phones beside it, and let the face follow. */
   drag(before, time_s) {
-    const { phones } = this.store.line;
-    const least = phones[before].start_s + LEAST_PHONE_S, most = phones[before + 1].end_s - LEAST_PHONE_S;
-    this.dragged = { before, time_s: Number(Math.min(Math.max(time_s, least), most).toFixed(3)) };
+    const { phones } = this.store.line, least = phones[before].start_s + LEAST_PHONE_S, most = phones[before + 1].end_s - LEAST_PHONE_S;
+    if (this.dragged?.before !== before || this.dragged.dropped) {
+      this.drop();
+      this.dragged = { before, time_s: null, sent_s: null, loop: null, earlier: this.settled, dropped: false };
+    }
+    this.dragged.time_s = Number(Math.min(Math.max(time_s, least), most).toFixed(3));
     this.borders.get(before)?.classList.add("dragged");
     this.timeline.studio.player.seek(this.dragged.time_s);
     this.timeline.draw();
-    this.following();
+    this.sent(this.dragged);
   }
 
-  /** Let the face follow while a border is dragged: each edit takes the place of the one before. */
-  async follow() {
-    while (this.dragged && this.dragged.time_s !== this.sent_s) {
-      const { before, time_s } = this.dragged;
-      if (!await this.timeline.studio.edit([say.ends(before + 1, time_s)], this.sent_s === null ? 0 : 1)) break;
-      this.sent_s = time_s;
-    }
-  }
-
-  following() {
-    this.loop ??= this.follow().finally(() => { this.loop = null; });
-    return this.loop;
+  /** Send where a border is until the server has it there: each edit takes the place of the one before. */
+  sent(dragged) {
+    const send = async () => {
+      await dragged.earlier;
+      while (dragged.time_s !== dragged.sent_s) {
+        const { before, time_s } = dragged;
+        if (!await this.timeline.studio.edit([say.ends(before + 1, time_s)], dragged.sent_s === null ? 0 : 1)) break;
+        dragged.sent_s = time_s;
+      }
+    };
+    dragged.loop ??= send().finally(() => { dragged.loop = null; });
+    return dragged.loop;
   }
 
   /** The border stays where it is. */
-  async drop() {
-    if (!this.dragged) return;
-    await this.following();
-    this.sent_s = null;
-    this.leave();
+  drop() {
+    const { dragged } = this;
+    if (!dragged || dragged.dropped) return;
+    dragged.dropped = true;
+    this.settled = this.sent(dragged).then(() => this.leave(dragged));
   }
 
   /** The border goes back to where it was. */
-  async cancel() {
-    this.leave();
-    await this.loop;
-    if (this.sent_s !== null) await this.timeline.studio.edit([], 1);
-    this.sent_s = null;
+  cancel() {
+    const { dragged } = this;
+    if (!dragged || dragged.dropped) return;
+    dragged.dropped = true;
+    dragged.time_s = dragged.sent_s; // no more is sent
+    this.leave(dragged);
+    this.settled = this.sent(dragged).then(() => dragged.sent_s !== null && this.timeline.studio.edit([], 1));
   }
 
-  leave() {
-    this.borders.get(this.dragged?.before)?.classList.remove("dragged");
-    this.dragged = null;
+  leave(dragged) {
+    this.borders.get(dragged.before)?.classList.remove("dragged");
+    if (this.dragged === dragged) this.dragged = null;
     this.timeline.draw();
   }
 
