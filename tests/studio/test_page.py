@@ -174,7 +174,7 @@ def test_what_another_window_did_is_shown(page: Page) -> None:
     before = page.steps
     page.window.run_until_done(
         """const done = arguments[0], { server, store } = studio;
-        server.told(`lines/${store.lineId}/edits`, { revision: store.line.revision, steps: ["set intensity 1.1"] }).then(done);"""
+        server.told(`lines/${store.lineId}/edits`, { revision: store.line.revision, steps: ["set intensity 1.1"] }).then(() => done());"""
     )
     page.window.click("#tab-edit")
     page.window.click("#mood-set")
