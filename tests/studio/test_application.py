@@ -156,7 +156,13 @@ def test_a_line_is_marked_exported_and_then_changed(studio: OpenStudio) -> None:
     assert studio.studio.row(1)["exported"] == "yes"
     studio.edit("phone 3 is m")
     assert studio.studio.row(1)["exported"] == "changed"
-    for wrong in ({"files": ["/../x.csv"]}, {"files": []}, {"preset": "x"}, {"preset": "arkit", "only": "some"}):
+    wrongs: tuple[dict[str, object], ...] = (
+        {"files": ["/../x.csv"]},
+        {"files": []},
+        {"preset": "x"},
+        {"preset": "arkit", "only": "some"},
+    )
+    for wrong in wrongs:
         assert studio.ask("/api/export", wrong).status == 422
 
 
