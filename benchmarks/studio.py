@@ -87,7 +87,7 @@ def times_of(sound: Path, seconds: float) -> dict[str, Any]:
         line.weights(head, slice(0, 20))
     found |= {"the head, all of it, s": round(timed(lambda: line.weights(head)) / 1000, 2)}
     found |= {"a picture of the woman, s": round(timed(lambda: line.picture(1.0, face_named("woman"))) / 1000, 2)}
-    chance, parts = Random(3), []
+    chance, parts = Random(3), []  # noqa: S311
     while len(parts) < EDITS:
         phones = line.state()["phones"]
         number = chance.randrange(2, len(phones) - 1)
@@ -149,7 +149,7 @@ def hostile(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
 
 def undo(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
     """Make random edits, then take all back; after a restart, too. Raises AssertionError: not the first bytes."""
-    count, line, chance, refused = options.count or 1000, opened(sound), Random(9), 0
+    count, line, chance, refused = options.count or 1000, opened(sound), Random(9), 0  # noqa: S311
     first = line.numbers("delivered").values.tobytes()
     started_s = time.process_time()
     while line.revision < count:
