@@ -172,6 +172,7 @@ def test_pronunciations_are_offered_and_kept(studio: OpenStudio) -> None:
     kept = studio.ask("/api/lexicon", {"word": "zenodo", "phones": ["z", "eh", "n", "ow"]}).content
     assert (kept["own"], kept["pronunciations"]) == (True, [["z", "eh", "n", "ow"]])
     assert studio.folder.lexicon().pronunciations("zenodo") == (("z", "eh", "n", "ow"),)
+    assert studio.edit("word 1 is zenodo").content["steps"] == ["word 1 is zenodo said z eh n ow"]
     for wrong in ({"word": "a b", "phones": ["b"]}, {"word": "a", "phones": ["B!"]}, {"word": "a", "phones": []}):
         assert studio.ask("/api/lexicon", wrong).status == 422
 

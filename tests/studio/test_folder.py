@@ -30,9 +30,11 @@ def lines(tmp_path: Path, toy_sentence: ToySentence) -> Path:
 def test_a_project_is_there_again(lines: Path) -> None:
     with opened_folder(lines) as folder:
         assert [line.name for line in folder.project.lines.values()] == ["a", "b", "inner/a"]
-        number = folder.drop("C:\\over there\\..\\A.WAV", b"sound", "hello")
+        for content in ("sound", "other"):
+            (folder.path / content).write_text(content, encoding="utf-8")
+        number = folder.drop("C:\\over there\\..\\A.WAV", folder.path / "sound", "hello")
         assert folder.line(number).name == "C__over there_.._A"
-        assert folder.drop("a.wav", b"other", "") == number + 1
+        assert folder.drop("a.wav", folder.path / "other", "") == number + 1
         folder.change_line(1, lambda line: replace(line, mark="approved", exports=(RECORD,)))
         folder.add_pronunciation("tear", ("t", "eh", "r"))
         folder.add_pronunciation("tear", ("t", "ih", "r"))
