@@ -43,6 +43,10 @@ class NotReadyError(HTTPException):
         super().__init__(503, "the line is still being understood; ask again", {"retry-after": "1"})
 
 
+class StoppedError(LipMotionError):
+    """What was being done is not wanted any more."""
+
+
 @dataclass
 class Work:
     """What happens to a line.
@@ -51,6 +55,7 @@ class Work:
     since_s : when the status changed, by a clock that only grows
     line    : once the line is open
     users   : requests that need it now
+    stopped : whether what is done for it is to end soon
     """
 
     number: int
@@ -61,6 +66,7 @@ class Work:
     since_s: float = field(default_factory=time.monotonic)
     line: OpenLine | None = None
     users: int = 0
+    stopped: bool = False
     thread: ThreadPoolExecutor | None = None
 
     def turn(self, status: str, error: str = "") -> None:
@@ -68,7 +74,9 @@ class Work:
         self.status, self.error, self.since_s = status, error, time.monotonic()
 
     def report(self, event: Progress | Item) -> None:
-        """Take a report of the progress."""
+        """Take a report of the progress. Raises StoppedError: the work is not wanted any more."""
+        if self.stopped:
+            raise StoppedError("stopped")
         if isinstance(event, Progress):
             self.stage, self.share = event.stage, event.share
 
@@ -157,6 +165,7 @@ class Desk:
         """Close a line, and what is kept of it."""
         work = self._works.pop(number, None)
         if work is not None:
+            work.stopped = True
             _close(work)
             self._no_longer_waits(work)
 
@@ -169,6 +178,7 @@ class Desk:
         self._waiting.clear()
         self._background.shutdown(wait=False, cancel_futures=True)
         for work in self._works.values():
+            work.stopped = True
             _close(work)
         self.folder.save()
 
@@ -211,8 +221,6 @@ class Desk:
             work.turn(READY)
         except LipMotionError as error:
             work.turn(FAILED, str(error))
-        except KeyError:  # the line has been removed
-            work.turn(FAILED, "the line is no longer in the project")
         except Exception as error:  # a bug, which must not stop the others
             LOG.error("line %d: %s: %s", work.number, type(error).__name__, error)
             work.turn(FAILED, f"a bug: {type(error).__name__}: {error}")

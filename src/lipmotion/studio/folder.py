@@ -45,8 +45,11 @@ class ProjectFolder:
         self.project = _read(file) if file.exists() else Project()
 
     def line(self, number: int) -> ProjectLine:
-        """Return a line. Raises KeyError: there is none of that number."""
-        return self.project.lines[number]
+        """Return a line. Raises InputError: there is none of that number."""
+        found = self.project.lines.get(number)
+        if found is None:
+            raise InputError(f"there is no line {number} in the project")
+        return found
 
     def sound(self, line: ProjectLine) -> Path:
         """Return the path of a line's recording."""
@@ -77,7 +80,7 @@ class ProjectFolder:
         """Replace a line, if it is still there, as ``change`` does."""
         with self._lock:
             if number in self.project.lines:
-                self.change(lambda project: project.with_line(changed(project.lines[number])), save=save)
+                self.change(lambda project: project.with_lines([changed(project.lines[number])]), save=save)
 
     def save(self) -> None:
         """Write the project. Raises ExportError: it cannot be written."""
@@ -102,25 +105,20 @@ class ProjectFolder:
             ]
             known = {os.path.realpath(self.sound(line)) for line in self.project.lines.values()}
             new = [each for each in named if os.path.realpath(each[0]) not in known]
-            project = self.project
-            added: list[int] = []
-            taken = {_key(line.name) for line in project.lines.values()}
-            for recording, name, transcript in new:
-                line = ProjectLine(
-                    project.next_number,
-                    _free(name, taken),
-                    sound_reference(recording.absolute(), self.path.absolute() / PROJECT),
-                    sha256_of(recording),
-                    transcript,
-                )
-                project, added = project.with_line(line), [*added, line.number]
+            taken, file = {_key(line.name) for line in self.project.lines.values()}, self.path.absolute() / PROJECT
+            added = [
+                ProjectLine(number, _free(name, taken), sound_reference(sound.absolute(), file), sha256_of(sound), said)
+                for number, (sound, name, said) in enumerate(new, self.project.next_number)
+            ]
+            project = self.project.with_lines(added)
             check_lines(project)
             self.change(lambda _: project)
-            return added
+            return [line.number for line in added]
 
-    def drop(self, name: str, content: bytes, transcript: str) -> int:
-        """Add a recording whose content was dropped on the page, as a file of the project; return its number.
+    def drop(self, name: str, content: Path, transcript: str) -> int:
+        """Add a recording that was dropped on the page, as a file of the project; return its number.
 
+        content : a file on the same disk, which becomes that of the project
         Raises InputError: no name of a recording. ExportError: as ``change``, or the sound cannot be written.
         """
         if not is_recording(Path(name)):
@@ -132,11 +130,11 @@ class ProjectFolder:
             folder.mkdir(exist_ok=True)
             file = folder / f"{stem}{Path(name).suffix.lower()}"
             with whole_file(file) as temporary:
-                temporary.write_bytes(content)
+                content.replace(temporary)
             number = self.project.next_number
             line = ProjectLine(number, stem, f"{SOUNDS}/{file.name}", sha256_of(file), transcript)
-            check_lines(self.project.with_line(line))
-            self.change(lambda project: project.with_line(line))
+            check_lines(self.project.with_lines([line]))
+            self.change(lambda project: project.with_lines([line]))
             return number
 
     @property

@@ -13,6 +13,7 @@ from lipmotion.errors import InputError, LipMotionError
 from lipmotion.export.video import write_mp4
 from lipmotion.faces.base import Face
 from lipmotion.pipeline.edit_files import EditFile, write_edits
+from lipmotion.pipeline.edits import Step
 from lipmotion.pipeline.generate.explain import explain_session, explanation_text
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.drawn_video import DRAWN_HZ, read_sound
@@ -61,7 +62,7 @@ class OpenLine:
         """The end of the last phone, in seconds."""
         return self.generation.units[-1].end_s
 
-    def edited(self, revision: int, steps: tuple[str, ...], instead: int = 0) -> dict[str, Any]:
+    def edited(self, revision: int, steps: tuple[str | Step, ...], instead: int = 0) -> dict[str, Any]:
         """Make some edits; return what moved. Nothing has changed where one is refused.
 
         instead : so many of the last edits are taken back first, for good

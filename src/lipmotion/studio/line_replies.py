@@ -47,8 +47,9 @@ class LineReplies:
         """Edits to be made."""
         content = await content_of(request)
         steps, revision = texts(content, "steps", most=MOST_STEPS), whole(content, "revision")
-        instead = whole(content, "instead", 0)
-        return await self._state_after(self._number(request), lambda line: line.edited(revision, steps, instead))
+        instead, number = whole(content, "instead", 0), self._number(request)
+        said = self._studio.with_pronunciations(steps)
+        return await self._state_after(number, lambda line: line.edited(revision, said, instead))
 
     async def undo(self, request: Request) -> Response:
         """Edits to be taken back."""

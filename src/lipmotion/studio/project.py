@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any
 
@@ -88,10 +88,10 @@ class Project:
     characters: Mapping[str, str] = field(default_factory=dict)
     next_number: int = 1
 
-    def with_line(self, line: ProjectLine) -> Project:
-        """Return the project with a line that is new, or in place of the one of its number."""
-        lines = {**self.lines, line.number: line}
-        return replace(self, lines=lines, next_number=max(self.next_number, line.number + 1))
+    def with_lines(self, lines: Sequence[ProjectLine]) -> Project:
+        """Return the project with lines that are new, or in place of those of their numbers."""
+        together = {**self.lines, **{line.number: line for line in lines}}
+        return replace(self, lines=together, next_number=max([self.next_number, *(n.number + 1 for n in lines)]))
 
     def without_line(self, number: int) -> Project:
         """Return the project without a line."""
@@ -134,7 +134,7 @@ def project_from(content: Any) -> Project:
         project = Project({line.number: line for line in lines}, **given)
         if not all(isinstance(text, str) for text in (project.model, project.preset, *project.characters.values())):
             raise ValueError("a path or a name that is no text")
-        project = replace(project, next_number=max([int(project.next_number), *(n + 1 for n in project.lines)]))
+        project = replace(project, next_number=int(project.next_number)).with_lines(lines)
     except InputError:
         raise
     except (TypeError, ValueError, KeyError, AttributeError) as error:

@@ -14,7 +14,7 @@ from lipmotion.studio.presets import preset_of
 from lipmotion.studio.project import APPROVED
 from lipmotion.studio.studio import Studio
 from lipmotion.units import PHONES
-from lipmotion.web.bodies import body_of
+from lipmotion.web.bodies import write_body
 from lipmotion.web.replies import FRESH
 
 LARGEST_UPLOAD_BYTES = 1 << 29
@@ -53,8 +53,10 @@ class ProjectReplies:
         """A recording that was dropped on the page, as body."""
         name = text(request.query_params, "name", longest=500)
         said = unquote(request.headers.get("x-lipmotion-transcript", ""), errors="replace")
-        body = await body_of(request, LARGEST_UPLOAD_BYTES, UPLOAD_S)
-        number = await self._desk.beside(lambda: self._studio.dropped(name, body, said))
+        with self._studio.arriving() as file:
+            with file.open("wb") as content:
+                await write_body(request, content, LARGEST_UPLOAD_BYTES, UPLOAD_S)
+            number = await self._desk.beside(lambda: self._studio.folder.drop(name, file, said))
         self._desk.queue([number])
         return JSONResponse(self._studio.row(number), 201, headers=FRESH)
 

@@ -7,6 +7,7 @@ from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from secrets import token_urlsafe
+from threading import Thread
 
 from lipmotion.pipeline.outputs.scenes import sound_reference
 from lipmotion.web.listening import HOST, check_installed, listening, serve
@@ -51,5 +52,16 @@ def serve_studio(
         token = token_urlsafe(TOKEN_BYTES)
         hosts = frozenset(f"{name}:{place.getsockname()[1]}" for name in NAMES)
         with closing(Studio(folder)) as studio:
+            Thread(target=_prepare, name="prepare", daemon=True).start()
             application = studio_application(studio, Access(token, hosts))
             serve(application, place, started=lambda address: started(f"{address}#{token}") if started else None)
+
+
+def _prepare() -> None:
+    """Load what the first edit will need, while the page is opened."""
+    from lipmotion.faces.head.stage import mesh_of_figure
+    from lipmotion.kernels.choice import expect_more, numba_works
+
+    expect_more()
+    numba_works()
+    mesh_of_figure()

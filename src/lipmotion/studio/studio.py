@@ -7,10 +7,12 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 from starlette.exceptions import HTTPException
 
@@ -19,13 +21,13 @@ from lipmotion.export.sound import write_sound
 from lipmotion.extensions import installed_version
 from lipmotion.faces.base import Face
 from lipmotion.pipeline.edit_files import read_edits, write_edits
-from lipmotion.pipeline.edits import FORMS
+from lipmotion.pipeline.edits import FORMS, Step, Text, WordIs, WordSaid, step_of
 from lipmotion.pipeline.job import Job, Outputs
 from lipmotion.pipeline.model import Model, load_model, shipped_path
 from lipmotion.pipeline.opened_job import opened
 from lipmotion.pipeline.outputs.curve_sets import SHAPE_SETS
 from lipmotion.pipeline.outputs.drawn_video import read_sound
-from lipmotion.storage.files import made_folders, read_text_file, sha256_of
+from lipmotion.storage.files import TEMPORARY, made_folders, read_text_file, sha256_of
 from lipmotion.storage.json_text import from_json
 from lipmotion.studio.desk import NEW, READY, WAITING, WORKING, Desk, NotReadyError, Work
 from lipmotion.studio.folder import EXPORTS, ProjectFolder
@@ -64,6 +66,7 @@ class Studio:
         places = {name: Path(os.path.normpath(folder.path / file)) for name, file in folder.project.characters.items()}
         self.faces = Faces(places)
         self._sounds = Path(tempfile.mkdtemp(prefix="lipmotion-studio-"))
+        self._exporting: dict[str, int] | None = None
         self._summaries: dict[int, tuple[int, EditsSummary]] = {}
         self._model_digest = sha256_of(folder.model_file or shipped_path())
 
@@ -136,7 +139,7 @@ class Studio:
         works = self.desk.at_work()
         lines = [{"id": work.number, "status": work.status, **_progress(work), "error": work.error} for work in works]
         waiting = sum(work.status == WAITING for work in works)
-        return {"lines": lines, "waiting": waiting, "revision": self.folder.revision}
+        return {"lines": lines, "waiting": waiting, "revision": self.folder.revision, "export": self._exporting}
 
     def forms(self) -> dict[str, Any]:
         """Return what can be chosen, from the registries and configurations."""
@@ -178,9 +181,30 @@ class Studio:
             raise HTTPException(404, "no such line")
         return self.desk.queue(known if numbers is None else numbers)
 
-    def dropped(self, name: str, content: bytes, transcript: str) -> int:
-        """Add a recording that was dropped on the page; return its number. Raises as ``ProjectFolder.drop``."""
-        return self.folder.drop(name, content, transcript)
+    @contextmanager
+    def arriving(self) -> Iterator[Path]:
+        """Give the path of a file that something dropped is written to; afterwards it is gone."""
+        path = self.folder.path / f"{TEMPORARY}{uuid4().hex}"
+        try:
+            yield path
+        finally:
+            path.unlink(missing_ok=True)
+
+    def with_pronunciations(self, sentences: Sequence[str]) -> tuple[str | Step, ...]:
+        """Return edits that say words of the project's lexicon with their phones, which then stand in the edits.
+
+        Raises InputError: a sentence is no edit.
+        """
+        steps = [step_of(sentence) for sentence in sentences]
+        if not any(isinstance(step, WordIs) for step in steps):
+            return tuple(steps)
+        own = self.folder.lexicon().user
+        return tuple(
+            WordSaid(step.number, step.word, Text(" ".join(own[step.word.lower()][0])))
+            if isinstance(step, WordIs) and step.word.lower() in own
+            else step
+            for step in steps
+        )
 
     async def say(self, number: int, transcript: str) -> None:
         """Let a line be understood again, with its words; without any, they are recognised.
@@ -246,14 +270,18 @@ class Studio:
         self.folder.change_line(number, lambda now: _with_export(now, record))
         return {"id": number, "files": list(digests), "edits": record.edits}
 
-    def export_several(self, numbers: Iterable[int], preset: Preset) -> dict[str, Any]:
+    def export_several(self, numbers: Sequence[int], preset: Preset) -> dict[str, Any]:
         """Write files of several lines, as ``export``; what fails is told, and the others are written."""
         exported, failed = [], []
-        for number in numbers:
-            try:
-                exported.append(self.export(number, preset))
-            except LipMotionError as error:
-                failed.append({"id": number, "error": str(error)})
+        try:
+            for done, number in enumerate(numbers):
+                self._exporting = {"done": done, "count": len(numbers)}
+                try:
+                    exported.append(self.export(number, preset))
+                except LipMotionError as error:
+                    failed.append({"id": number, "error": str(error)})
+        finally:
+            self._exporting = None
         self.folder.change(lambda project: replace(project, preset=preset.name or project.preset))
         return {"exported": exported, "failed": failed}
 

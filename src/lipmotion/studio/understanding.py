@@ -35,6 +35,7 @@ def understand_line(
 ) -> AnalysedAudio:
     """Find words and phones of a line, and write them as its file of edits; return its sound.
 
+    The project's lexicon is not named there: what it says of later words stands in the edits that say them.
     Its words: those that were given, else those of a file beside the recording; else they are recognised.
     Raises InputError, AlignmentError: the recording or its words are not usable. ExportError: it cannot be written.
     """
@@ -50,7 +51,7 @@ def understand_line(
     if line.transcript:
         request = replace(request, transcript=line.transcript)
     session = Session(request, model=model, monitor=monitor, audio=audio)
-    file, generation = begun_with(named, session)
+    file, generation = begun_with(replace(named, lexicon=None), session)
     path = folder.edits(line)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_edits(file, path)
@@ -67,7 +68,7 @@ def open_line(folder: ProjectFolder, line: ProjectLine, model: Model, audio: Ana
     """
     file = read_edits(folder.edits(line))
     recording = folder.sound(line)
-    named = replace(file.named, recording=recording, model=folder.model_file, lexicon=folder.lexicon_file)
+    named = replace(file.named, recording=recording, model=folder.model_file)
     return OpenLine(
         replace(file, named=named), folder.edits(line), recording, model, audio or read_sound_of(folder, line)
     )

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Any
+import io
+from typing import IO, Any
 
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
@@ -27,18 +28,25 @@ async def json_of(request: Request, largest: int = LARGEST_JSON_BYTES) -> Any:
 
 async def body_of(request: Request, largest: int, within_s: float) -> bytes:
     """Return the body of a request. Raises HTTPException: more than ``largest`` bytes, too slow, or broken off."""
+    file = io.BytesIO()
+    await write_body(request, file, largest, within_s)
+    return file.getvalue()
+
+
+async def write_body(request: Request, file: IO[bytes], largest: int, within_s: float) -> None:
+    """Write the body of a request into a file. Raises as ``body_of``."""
     try:
-        return await asyncio.wait_for(_read(request, largest), within_s)
+        await asyncio.wait_for(_write(request, file, largest), within_s)
     except (TimeoutError, asyncio.TimeoutError) as error:
         raise HTTPException(408, "the request came too slowly") from error
     except ClientDisconnect as error:
         raise HTTPException(400, "the request broke off") from error
 
 
-async def _read(request: Request, largest: int) -> bytes:
-    body = bytearray()
+async def _write(request: Request, file: IO[bytes], largest: int) -> None:
+    size = 0
     async for part in request.stream():
-        body += part
-        if len(body) > largest:
+        size += len(part)
+        if size > largest:
             raise HTTPException(413, f"required at most {largest} bytes", {"connection": "close"})
-    return bytes(body)
+        file.write(part)

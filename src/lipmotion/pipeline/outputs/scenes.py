@@ -39,7 +39,7 @@ GLTF, USD = ".glb", ".usda"
 SCENE_SUFFIXES = (GLTF, USD)
 KEPT = (GLTF, ".vrm")
 """Suffixes of files of characters that are kept as they are, with an animation more."""
-MARGIN = 25
+MARGIN = 10
 """Frames before and after those that are wanted alone, within which weights settle."""
 METRES = 0.09
 """The distance between the outer eye corners of the 3D head, in metres."""
@@ -64,7 +64,7 @@ class SceneOutput(Output):
 def delivered_scene(performance: Performance, frames: slice | None = None) -> Scene:
     """Return the scene of a face as it is delivered; held poses are those of the mouth.
 
-    frames : the only ones that it is to have, which differ by less than 0.001 from those of the whole; None: all
+    frames : the only ones that it is to have, which differ by less than 0.01 from those of the whole; None: all
     """
     settings, delivery = performance.settings, performance.settings.delivery
     moved = with_drawn_channels(delivered(performance.generation, delivery))
