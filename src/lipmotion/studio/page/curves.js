@@ -40,6 +40,14 @@ export class Curves {
     return [least, most];
   }
 
+  /** Some of these curves alone, in this order; those that are not here are left out. */
+  only(names) {
+    const kept = names.filter((name) => this.names.includes(name)), columns = kept.map((name) => this.column(name));
+    const values = new Float32Array(this.frames * kept.length);
+    for (let frame = 0, place = 0; frame < this.frames; frame++) for (const column of columns) values[place++] = this.values[frame * this.names.length + column];
+    return new Curves(kept, this.rate_hz, values, this.first);
+  }
+
   /** Whether other curves are a part of these: the same names and rate, within their frames. */
   holds(part) {
     return part.rate_hz === this.rate_hz && part.first + part.frames <= this.frames && String(part.names) === String(this.names);

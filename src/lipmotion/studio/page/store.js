@@ -13,6 +13,7 @@ export class Store {
     /** @type {any} */ this.sound = null; // samples of the open line
     /** @type {any} */ this.motion = null;
     /** @type {any} */ this.deviation = null;
+    /** @type {any} */ this.confidence = null;
     /** @type {any} */ this.weights = null;
     /** @type {any} */ this.other = null; // curves and weights of the version it is compared with
     /** @type {any[]} */ this.doubts = [];

@@ -2,7 +2,9 @@
 
 import { showExport, showKeys } from "./dialogs.js";
 import { bothButton, icon, iconButton, made, textButton } from "./dom.js";
+import { Curves } from "./curves.js";
 import { Stage } from "./face/stage.js";
+import { Weights } from "./face/weights.js";
 import { added } from "./files.js";
 import { listen } from "./keys.js";
 import { Panel } from "./panel/panel.js";
@@ -50,6 +52,7 @@ export class Studio {
       made("datalist", { id: "phones-known" }));
     this.showPlace("stage");
     this.queue = new Queue(queue, this);
+    this.weights = new Weights(this);
     this.stage = new Stage(face, this);
     this.timeline = new Timeline(timeline, this);
     this.transport = new Transport(transport, this);
@@ -149,7 +152,8 @@ export class Studio {
   async open(id, again = false) {
     if (id === this.store.lineId && !again) return;
     this.player.stop();
-    this.store.set({ lineId: id, line: null, sound: null, motion: null, deviation: null, weights: null, other: null, comparing: false, doubts: [], selected: null, span: null, time_s: 0, progress: null });
+    this.weights.forget();
+    this.store.set({ lineId: id, line: null, sound: null, motion: null, deviation: null, confidence: null, weights: null, other: null, comparing: false, doubts: [], selected: null, span: null, time_s: 0, progress: null });
     try {
       const line = { ...NOTHING, ...(await this.server.read(`lines/${id}`)) };
       if (id !== this.store.lineId) return;
@@ -166,24 +170,21 @@ export class Studio {
     }
   }
 
-  /** Read curves and weights of a line again; `changed`: only this stretch of them, null: all. */
+  /** Read curves of a line again; `changed`: only this stretch of them, null: all. The weights of the face follow. */
   async moved(id, changed) {
-    const { store, server } = this, names = store.channels.filter((name) => store.line.channels.some((channel) => channel.name === name));
-    const stretch = changed ? `&start_s=${changed.start_s}&end_s=${changed.end_s}` : "";
-    const isMesh = store.project.forms.faces.find(({ name }) => name === store.face)?.mesh;
-    const patched = (before, part) => (changed && before?.holds(part) ? before.patched(part) : part.first === 0 ? part : null);
-    const read = (path) => server.curves(`lines/${id}/${path}${stretch}`);
-    const [motion, deviation, weights] = await Promise.all([
-      read(`motion?names=${names}`), read(`motion?of=deviation&names=${names}`).catch(() => null),
-      isMesh ? read(`weights?face=${encodeURIComponent(store.face)}`) : null,
-    ]);
+    const { store, server } = this, stretch = changed ? `&start_s=${changed.start_s}&end_s=${changed.end_s}` : "";
+    const following = this.weights.change(changed);
+    const read = async (of, before) => {
+      const part = (await server.curves(`lines/${id}/motion?of=${of}${stretch}`)).only(store.channels);
+      if (!changed) return part;
+      return before?.holds(part) ? before.patched(part) : (await server.curves(`lines/${id}/motion?of=${of}`)).only(store.channels);
+    };
+    const [motion, deviation, confidence] = await Promise.all([
+      read("motion", store.motion), read("deviation", store.deviation), changed ? store.confidence : server.curves(`lines/${id}/motion?of=confidence`)]);
     if (id !== store.lineId) return;
-    const found = { motion: patched(store.motion, motion), deviation: deviation && patched(store.deviation, deviation), weights: weights && patched(store.weights, weights) };
-    if (changed && Object.values(found).some((part) => part === null && (part !== found.weights || weights))) return this.moved(id, null);
-    this.editedAt = this.askedAt;
-    this.askedAt = 0;
-    store.set(found);
+    store.set({ motion, deviation, confidence });
     this.doubted(id);
+    if (!changed) await following;
   }
 
   async doubted(id) {
@@ -262,6 +263,12 @@ export class Studio {
     const listed = lines.map((each) => (each.id === line.id ? { ...each, edits: line.steps.length, exported: each.exported === "yes" ? "changed" : each.exported } : each));
     this.store.set({ line, lines: listed, ...(list && !is ? { selected: null } : {}),
       ...(follows ? { span: { start_s: is.start_s, end_s: is.end_s } } : {}) });
+  }
+
+  /** The face that is drawn next is that after the last edit. */
+  faceComes() {
+    this.editedAt = this.askedAt;
+    this.askedAt = 0;
   }
 
   /** The face has been drawn: how long after the edit is kept with the measures of the page. */
@@ -420,19 +427,12 @@ export class Studio {
     }
   }
 
-  /** Compare with the motion after the first edits, by their number; empty: with nothing. */
-  async compare(version) {
-    if (version === "") return this.store.set({ other: null, comparing: false });
-    const { lineId, channels, face } = this.store;
-    try {
-      const [motion, weights] = await Promise.all([
-        this.server.curves(`lines/${lineId}/motion?version=${version}&names=${channels}`),
-        this.server.curves(`lines/${lineId}/weights?face=${encodeURIComponent(face)}&version=${version}`)]);
-      this.store.set({ other: { version: Number(version), motion, weights } });
-    } catch (error) {
-      this.refuse(error);
-    }
-    return undefined;
+  /** Keep the motion as it is now, to compare with later; or keep nothing. */
+  compare(kept) {
+    const { motion, weights, line } = this.store;
+    if (!kept || !motion) return this.store.set({ other: null, comparing: false });
+    const copy = weights && new Curves(weights.names, weights.rate_hz, weights.values.slice());
+    return this.store.set({ other: { steps: line.steps.length, motion, weights: copy } });
   }
 
   async add(dropped) {
@@ -454,7 +454,7 @@ export class Studio {
     cover.hidden = !project || Boolean(lines.length && (status === "ready" || !status));
     if (cover.hidden) return;
     if (!lines.length) {
-      cover.replaceChildren(icon("lines"), made("h2", { textContent: TEXT.empty }), made("p", { textContent: TEXT.emptyHint }),
+      cover.replaceChildren(icon("plus"), made("h2", { textContent: TEXT.empty }), made("p", { textContent: TEXT.emptyHint }),
         textButton(TEXT.open, () => document.getElementById("open").click(), { className: "main" }));
     } else if (status === "failed") {
       cover.replaceChildren(made("h2", { textContent: TEXT.failed }), made("p", { className: "bad", textContent: line?.error ?? listed?.error ?? "" }),

@@ -82,6 +82,11 @@ export class Stage {
       }
     }
     this.show();
+    if (this.isSolid && this.loadedFor !== this.store.face) {
+      this.loadedFor = this.store.face;
+      this.store.set({ weights: null });
+      this.studio.weights.change(null);
+    }
   }
 
   say(text) {
@@ -92,6 +97,7 @@ export class Stage {
   show() {
     const { weights, other, comparing, time_s, line } = this.store;
     if (this.isSolid && this.head) {
+      if (weights && !this.studio.weights.known(time_s)) return; // the pose before stays until it is known
       this.head.pose(comparing && other ? other.weights : weights, time_s);
       this.studio.measured();
     } else if (line && !this.drawn.hidden) this.picture();

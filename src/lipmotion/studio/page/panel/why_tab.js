@@ -32,9 +32,9 @@ async function tell(studio, shown, facts) {
     if (studio.store.time_s !== time_s) return;
     shown.firstChild.textContent = filled(TEXT.why, { time: time_s.toFixed(2) });
     facts.replaceChildren(
-      made("p", { textContent: why.text ?? "" }),
       made("dl", {}, ...FACTS.filter((name) => why[name] !== undefined && why[name] !== null && why[name] !== "").flatMap((name) => [
-        made("dt", { textContent: TEXT.facts[name] }), made("dd", { textContent: shownFact(name, why[name]) })])));
+        made("dt", { textContent: TEXT.facts[name] }), made("dd", { textContent: shownFact(name, why[name]) })])),
+      made("p", { textContent: why.text ?? "" }));
   } catch (error) {
     facts.replaceChildren(made("p", { className: "hint", textContent: error.message }));
   }

@@ -6,7 +6,7 @@ import { ROWS, Spectra } from "../sound/spectrum.js";
 import { cleared, colours } from "./canvas.js";
 
 const STEPS_S = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120];
-const LABEL_PX = 64, SURE = 0.85, LEAST_SURE = 0.35, TILE_PX = 256, TILES = 48;
+const LABEL_PX = 64, STRIP_PX = 2, TILE_PX = 256, TILES = 48;
 
 export class Ruler {
   constructor(timeline) {
@@ -111,7 +111,13 @@ export class SpectrumTrack {
   }
 }
 
-/** How sure each phone is, as a strip. */
+/** Return the confidence that is least, and that of which half of the line has less; a line that is sure has no doubt. */
+function quantiles(curves) {
+  const values = Float32Array.from(curves.values).sort(), at = (share) => values[Math.floor(share * (values.length - 1))];
+  return [at(0.03), Math.min(at(0.5), 0.95)];
+}
+
+/** How sure the motion is, as a strip: the less, the darker. */
 export class ConfidenceStrip {
   constructor(timeline) {
     this.timeline = timeline;
@@ -121,12 +127,16 @@ export class ConfidenceStrip {
   }
 
   draw() {
-    const { timeline, timeline: { width, store: { line } } } = this, pen = cleared(this.canvas, width, 8), colour = colours();
+    const { timeline, timeline: { width, store: { confidence } } } = this, pen = cleared(this.canvas, width, 8), colour = colours();
     pen.fillStyle = colour.doubt;
-    for (const { start_s, end_s, confidence } of line?.phones ?? []) {
-      if (confidence === null || end_s < timeline.start_s || start_s > timeline.end_s) continue;
-      pen.globalAlpha = Math.min(Math.max((SURE - confidence) / (SURE - LEAST_SURE), 0), 1);
-      pen.fillRect(timeline.x(start_s), 1, Math.max((end_s - start_s) * timeline.px_s, 2), 6);
+    if (!confidence?.frames) return;
+    if (this.of !== confidence) this.levels = quantiles(this.of = confidence);
+    const [least, sure] = this.levels;
+    for (let x = 0; x < width; x += STRIP_PX) {
+      const time_s = (timeline.left_px + x) / timeline.px_s;
+      if (time_s > timeline.duration_s) break;
+      pen.globalAlpha = Math.min(Math.max((sure - confidence.at(time_s, 0)) / (sure - least + 1e-6), 0), 1);
+      pen.fillRect(x, 1, STRIP_PX, 6);
     }
     pen.globalAlpha = 1;
   }
