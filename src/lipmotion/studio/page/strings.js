@@ -119,6 +119,7 @@ export const TEXT = {
   },
   why: "At {time} s",
   whyHint: "Why the mouth is as it is at the playhead.",
+  inFull: "In full",
   facts: { word: "word", phone: "phone", unit: "unit", state: "state", experts: "decided by", confidence: "sure to" },
   doubts: "Moments to look at",
   doubtOf: "{phone}, sure to {share} %",

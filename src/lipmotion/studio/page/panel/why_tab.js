@@ -7,7 +7,7 @@ import { following, row, section } from "./panel.js";
 const SETTLED_MS = 120, FACTS = ["word", "phone", "unit", "state", "experts", "confidence"];
 
 const percent = (share) => `${Math.round(100 * share)} %`;
-const shownFact = (name, value) => (name === "experts" ? value.map((each) => `${each.name} ${percent(each.share)}`).join(", ") || "–"
+const shownFact = (name, value) => (name === "experts" ? value.map((each) => `${each.name} ${percent(each.share)}`).join(", ")
   : name === "confidence" ? percent(value) : String(value));
 
 export function whyTab(studio) {
@@ -32,9 +32,9 @@ async function tell(studio, shown, facts) {
     if (studio.store.time_s !== time_s) return;
     shown.firstChild.textContent = filled(TEXT.why, { time: time_s.toFixed(2) });
     facts.replaceChildren(
-      made("dl", {}, ...FACTS.filter((name) => why[name] !== undefined && why[name] !== null && why[name] !== "").flatMap((name) => [
+      made("dl", {}, ...FACTS.filter((name) => ![undefined, null, ""].includes(why[name]) && why[name].length !== 0).flatMap((name) => [
         made("dt", { textContent: TEXT.facts[name] }), made("dd", { textContent: shownFact(name, why[name]) })])),
-      made("p", { textContent: why.text ?? "" }));
+      made("details", { open: facts.querySelector("details")?.open ?? false }, made("summary", { textContent: TEXT.inFull }), made("p", { textContent: why.text ?? "" })));
   } catch (error) {
     facts.replaceChildren(made("p", { className: "hint", textContent: error.message }));
   }

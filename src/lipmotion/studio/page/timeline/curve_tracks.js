@@ -24,6 +24,7 @@ export class CurveTracks {
       this.rows.delete(name);
     }
     this.element.classList.toggle("drawing", this.store.tool === "draw");
+    if (channels.some((name) => !this.row(name).height)) this.read();
     const { pins, locks } = placed(line?.steps ?? []);
     for (const name of channels) this.drawRow(name, this.row(name), pins.filter(({ channel }) => channel === name), locks);
   }
@@ -34,12 +35,15 @@ export class CurveTracks {
       const element = made("div", { className: "curve" }, canvas, label);
       element.dataset.channel = name;
       label.addEventListener("click", () => this.timeline.studio.chooseCurve(name));
-      this.rows.set(name, { element, canvas, label, range: [0, 1] });
+      this.rows.set(name, { element, canvas, label, range: [0, 1], height: 0 });
       this.element.append(element);
       this.drawable(name, element);
     }
     return this.rows.get(name);
   }
+
+  /** Read heights before anything is changed: the page is laid out once. */
+  read() { for (const row of this.rows.values()) row.height = row.element.clientHeight; }
 
   /** The range of values that a row shows. */
   measure(row, curves, column) {
@@ -50,12 +54,12 @@ export class CurveTracks {
   }
 
   y(row, value) {
-    const [least, most] = row.range, height = row.element.clientHeight;
+    const [least, most] = row.range, { height } = row;
     return height - PAD_PX - ((value - least) / (most - least)) * (height - 2 * PAD_PX);
   }
 
   drawRow(name, row, pins, locks) {
-    const { timeline, store, store: { deviation, selected, comparing, other } } = this, motion = store.curvesOf(name), its = other && store.curvesOf(name, other), height = row.element.clientHeight, colour = colours();
+    const { timeline, store, store: { deviation, selected, comparing, other } } = this, motion = store.curvesOf(name), its = other && store.curvesOf(name, other), { height } = row, colour = colours();
     const pen = cleared(row.canvas, timeline.width, height), isSelected = selected?.kind === "curve" && selected.channel === name;
     row.element.classList.toggle("selected", isSelected);
     row.label.setAttribute("aria-pressed", isSelected);
@@ -81,9 +85,9 @@ export class CurveTracks {
     }
   }
 
-  /** Frames to draw: about two a pixel at most. */
+  /** Frames to draw: about one a pixel at most. */
   frames(motion) {
-    const { start_s, end_s, px_s } = this.timeline, step = Math.max(Math.floor(motion.rate_hz / px_s / 2), 1), frames = [];
+    const { start_s, end_s, px_s } = this.timeline, step = Math.max(Math.floor(motion.rate_hz / px_s), 1), frames = [];
     const first = Math.floor((Math.max(start_s * motion.rate_hz - 1, 0)) / step) * step;
     for (let frame = first; frame <= Math.min(end_s * motion.rate_hz + step, motion.frames - 1); frame += step) frames.push(frame);
     return frames;

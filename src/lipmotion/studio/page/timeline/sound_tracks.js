@@ -6,7 +6,7 @@ import { ROWS, Spectra } from "../sound/spectrum.js";
 import { cleared, colours } from "./canvas.js";
 
 const STEPS_S = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120];
-const LABEL_PX = 64, STRIP_PX = 2, TILE_PX = 256, TILES = 48;
+const LABEL_PX = 64, STRIP_PX = 2, SHADES = 8, TILE_PX = 256, TILES = 48;
 
 export class Ruler {
   constructor(timeline) {
@@ -46,8 +46,10 @@ export class WaveTrack {
     this.element = made("div", { className: "track wave" }, this.canvas);
   }
 
+  read() { this.height = this.element.clientHeight; }
+
   draw() {
-    const { timeline, timeline: { width, store: { sound } } } = this, height = this.element.clientHeight;
+    const { height, timeline, timeline: { width, store: { sound } } } = this;
     const pen = cleared(this.canvas, width, height), middle = height / 2, colour = colours();
     pen.fillStyle = colour.faint;
     pen.fillRect(0, middle, width, 1);
@@ -73,10 +75,12 @@ export class SpectrumTrack {
     this.element = made("div", { className: "track spectrum" }, this.canvas);
   }
 
+  read() { this.height = this.element.clientHeight; }
+
   recolour() { this.tiles.clear(); }
 
   draw() {
-    const { timeline, timeline: { width, px_s, left_px, store: { sound } } } = this, height = this.element.clientHeight;
+    const { height, timeline, timeline: { width, px_s, left_px, store: { sound } } } = this;
     const pen = cleared(this.canvas, width, height);
     if (!sound) return;
     if (this.of !== sound) this.spectra = new Spectra(this.of = sound);
@@ -132,11 +136,14 @@ export class ConfidenceStrip {
     if (!confidence?.frames) return;
     if (this.of !== confidence) this.levels = quantiles(this.of = confidence);
     const [least, sure] = this.levels;
-    for (let x = 0; x < width; x += STRIP_PX) {
-      const time_s = (timeline.left_px + x) / timeline.px_s;
-      if (time_s > timeline.duration_s) break;
-      pen.globalAlpha = Math.min(Math.max((sure - confidence.at(time_s, 0)) / (sure - least + 1e-6), 0), 1);
-      pen.fillRect(x, 1, STRIP_PX, 6);
+    const level = (x) => Math.round(SHADES * Math.min(Math.max((sure - confidence.at((timeline.left_px + x) / timeline.px_s, 0)) / (sure - least + 1e-6), 0), 1));
+    const end = Math.min(width, timeline.x(timeline.duration_s));
+    for (let x = 0, from = 0, shade = level(0); x <= end; x += STRIP_PX) {
+      const next = x + STRIP_PX > end ? -1 : level(x);
+      if (next === shade) continue;
+      pen.globalAlpha = shade / SHADES;
+      if (shade) pen.fillRect(from, 1, x - from, 6);
+      [from, shade] = [x, next];
     }
     pen.globalAlpha = 1;
   }

@@ -193,6 +193,7 @@ export class Timeline {
 
   drawNow() {
     if (!this.width) return;
+    for (const track of this.tracks) track.read?.();
     for (const track of this.tracks) track.draw();
     this.place();
   }
