@@ -44,7 +44,7 @@ export class Stage {
       event.stopPropagation();
     });
     new ResizeObserver(() => this.head?.draw()).observe(this.solid);
-    this.store.on(["project"], () => this.offer());
+    this.store.on(["project", "face"], () => this.offer());
     this.store.on(["face", "project"], () => this.change());
     this.store.on(["weights", "time_s", "line", "other", "comparing"], () => this.show());
   }
