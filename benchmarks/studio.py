@@ -1,7 +1,7 @@
 """The studio measured: how long an edit takes, kills, hostile requests, a thousand edits and back.
 
 python benchmarks/studio.py times RECORDING [SECONDS ...]     processor time from an edit to the weights of the head
-python benchmarks/studio.py kills RECORDING [--count 100]     of the server;  forks: of a process that edits, much faster
+python benchmarks/studio.py kills RECORDING [--count 100]     of the server; forks: of a process that edits
 python benchmarks/studio.py hostile RECORDING [--count 2000]
 python benchmarks/studio.py undo RECORDING [--count 1000]
 
@@ -176,7 +176,7 @@ def forks(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
         if not child:
             edit_for_ever(line, Random(options.seed + found["kills"]), writing)  # noqa: S311
         os.close(writing)
-        time.sleep(chance.uniform(0.05, 0.6))
+        time.sleep(chance.uniform(0.1, 2.5))
         os.kill(child, signal.SIGKILL)
         os.waitpid(child, 0)
         with os.fdopen(reading, encoding="utf-8") as file:
