@@ -1,7 +1,7 @@
 """The studio measured: how long an edit takes, kills, hostile requests, a thousand edits and back.
 
 python benchmarks/studio.py times RECORDING [SECONDS ...]     processor time from an edit to the weights of the head
-python benchmarks/studio.py kills RECORDING [--count 100]
+python benchmarks/studio.py kills RECORDING [--count 100]     of the server; forks: of a process that edits
 python benchmarks/studio.py hostile RECORDING [--count 2000]
 python benchmarks/studio.py undo RECORDING [--count 1000]
 
@@ -13,15 +13,19 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import resource
 import shutil
+import signal
 import sys
 import tempfile
 import time
 from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from random import Random
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -31,7 +35,9 @@ sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "src")]
 from lipmotion.export.sound import write_sound  # noqa: E402
 from lipmotion.faces.registry import face_named  # noqa: E402
 from lipmotion.kernels.choice import expect_more  # noqa: E402
-from lipmotion.pipeline.edit_files import read_edits  # noqa: E402
+from lipmotion.pipeline.edit_files import EditFile, read_edits, write_edits  # noqa: E402
+from lipmotion.pipeline.edits import step_of  # noqa: E402
+from lipmotion.pipeline.job import Request  # noqa: E402
 from lipmotion.pipeline.model import load_model  # noqa: E402
 from lipmotion.pipeline.outputs.shown_faces import shown_face  # noqa: E402
 from lipmotion.speech.sound.audio_files import read_audio  # noqa: E402
@@ -39,12 +45,14 @@ from lipmotion.storage.json_text import as_json  # noqa: E402
 from lipmotion.studio.folder import opened_folder  # noqa: E402
 from lipmotion.studio.line import OpenLine  # noqa: E402
 from lipmotion.studio.understanding import open_line, understand_line  # noqa: E402
-from lipmotion.types import Audio  # noqa: E402
+from lipmotion.types import Audio, Timeline  # noqa: E402
 from studio.attack import attacked  # noqa: E402
 from studio.served import lost_edits, random_edit, served  # noqa: E402
 
-EDITS = 40
-"""Edits of each kind of which the time is taken, after some that load what they need."""
+RECOGNISED_S = 100.0
+"""In longer recordings phones are repeated, not recognised."""
+EDITS, FEW_EDITS = 40, 10
+"""Edits of which the time is taken, after some that load what they need; of longer recordings fewer."""
 
 
 def main() -> None:
@@ -53,6 +61,7 @@ def main() -> None:
     parser.add_argument("recording", type=Path)
     parser.add_argument("seconds", type=float, nargs="*")
     parser.add_argument("--count", type=int, default=0)
+    parser.add_argument("--seed", type=int, default=5)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         sound = Path(shutil.copy(options.recording, name))
@@ -78,17 +87,22 @@ def times_of(sound: Path, seconds: float) -> dict[str, Any]:
     part = sound.with_name(f"part-{seconds:g}.wav")
     write_sound(part, Audio(samples, whole.rate_hz))
     expect_more()
-    started_s = time.process_time()
-    line = opened(part)
-    found: dict[str, Any] = {"until it is open, s": round(time.process_time() - started_s, 2)}
+    found: dict[str, Any] = {}
+    if seconds <= RECOGNISED_S:
+        started_s = time.process_time()
+        line = opened(part)
+        found["until it is open, s"] = round(time.process_time() - started_s, 2)
+    else:
+        line = repeated(sound, part, whole.duration_s, seconds)
     head = shown_face("head")
     for _ in range(4):  # loads what edits and faces need
         timed_edit(line, f"phone 3 is {'pm'[line.revision % 2]}")
         line.weights(head, slice(0, 20))
-    found |= {"the head, all of it, s": round(timed(lambda: line.weights(head)) / 1000, 2)}
+    if seconds <= RECOGNISED_S:
+        found |= {"the head, all of it, s": round(timed(lambda: line.weights(head)) / 1000, 2)}
     found |= {"a picture of the woman, s": round(timed(lambda: line.picture(1.0, face_named("woman"))) / 1000, 2)}
     chance, parts = Random(3), []  # noqa: S311
-    while len(parts) < EDITS:
+    while len(parts) < (EDITS if seconds <= RECOGNISED_S else FEW_EDITS):
         phones = line.state()["phones"]
         number = chance.randrange(2, len(phones) - 1)
         changed, edit_ms = timed_edit(line, phone_edit(chance, phones, number))
@@ -103,6 +117,19 @@ def times_of(sound: Path, seconds: float) -> dict[str, Any]:
     for name, column in zip(names, zip(*parts, strict=True), strict=True):
         found[name] = [round(float(np.percentile(column, share)), 1) for share in (50, 95)]
     return found | {"memory, MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024}
+
+
+def repeated(sound: Path, part: Path, each_s: float, seconds: float) -> OpenLine:
+    """Return the line of a recording that is repeated, open, with the phones of the recording again and again."""
+    units = opened(sound).file.units
+    assert units is not None
+    spans = [span for n in range(int(seconds / each_s)) for span in units.shifted(n * each_s)]
+    spans[-1] = replace(spans[-1], end_s=seconds)
+    with opened_folder(part) as folder:
+        line, model = folder.line(1), load_model()
+        folder.edits(line).parent.mkdir(exist_ok=True)
+        write_edits(EditFile(named=Request(part), units=Timeline(tuple(spans))), folder.edits(line))
+        return open_line(folder, line, model)
 
 
 def phone_edit(chance: Random, phones: list[dict[str, Any]], number: int) -> str:
@@ -132,8 +159,57 @@ def timed_edit(line: OpenLine, step: str) -> tuple[dict[str, float] | None, floa
 
 def kills(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
     errors = sound.with_name("errors.txt")
-    found = lost_edits(sound, None, errors, options.count or 100, 2.0)
+    found = lost_edits(sound, None, errors, options.count or 100, 2.0, options.seed)
     return found | {"tracebacks": errors.read_text(encoding="utf-8").count("Traceback")}
+
+
+def forks(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
+    """Kill a process that edits a line as fast as it can, again and again; compare the file with what it said.
+
+    The process is a copy of this one, in which the line is open: so a hundred kills take seconds.
+    """
+    line, chance, count = opened(sound), Random(options.seed), options.count or 100  # noqa: S311
+    found = {"kills": 0, "acknowledged": 0, "last edit lost": 0, "lost": 0}
+    while found["kills"] < count:
+        reading, writing = os.pipe()
+        child = os.fork()
+        if not child:
+            edit_for_ever(line, Random(options.seed + found["kills"]), writing)  # noqa: S311
+        os.close(writing)
+        time.sleep(chance.uniform(0.1, 2.5))
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+        with os.fdopen(reading, encoding="utf-8") as file:
+            told = [json.loads(row) for row in file.read().splitlines(keepends=True) if row.endswith("\n")]
+        line.file = replace(read_edits(line.path), named=line.file.named)
+        steps = list(line.file.edits.sentences)
+        done = [each["done"] for each in told if "done" in each]
+        found["kills"] += 1
+        found["acknowledged"] += len(done)
+        if told and steps != (done or [told[0]["before"]])[-1]:
+            found["last edit lost" if steps == told[-1].get("tried") else "lost"] += 1
+    found["last edit written, not acknowledged"] = found.pop("last edit lost")
+    return found
+
+
+def edit_for_ever(line: OpenLine, chance: Random, writing: int) -> NoReturn:
+    """Make random edits, and write what was tried and what was done into a pipe."""
+
+    def tell(**told: list[str]) -> None:
+        os.write(writing, f"{json.dumps(told)}\n".encode())
+
+    tell(before=list(line.file.edits.sentences))
+    while True:
+        steps = list(line.file.edits.sentences)
+        with suppress(ValueError):
+            if len(steps) > 20:
+                tell(tried=[])
+                line.undone(line.revision, len(steps))
+            else:
+                step = random_edit(chance, line.state()["phones"])
+                tell(tried=[*steps, str(step_of(step))])
+                line.edited(line.revision, (step,))
+            tell(done=list(line.file.edits.sentences))
 
 
 def hostile(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
@@ -170,7 +246,7 @@ def undo(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
     return {"edits": count, "refused": refused, "undone": "the first bytes", **times_s}
 
 
-WHAT = {"times": times, "kills": kills, "hostile": hostile, "undo": undo}
+WHAT = {"times": times, "kills": kills, "forks": forks, "hostile": hostile, "undo": undo}
 
 if __name__ == "__main__":
     main()

@@ -112,12 +112,14 @@ class Editor:
         return status
 
 
-def lost_edits(project: Path, model: Path | None, errors: Path, kills: int, each_s: float) -> dict[str, int]:
+def lost_edits(
+    project: Path, model: Path | None, errors: Path, kills: int, each_s: float, seed: int = 5
+) -> dict[str, int]:
     """Kill a studio again and again while its line is edited; return what was acknowledged, and what was lost.
 
     each_s : how long it is edited, at most, between two kills
     """
-    editor, chance = Editor(5), Random(6)
+    editor, chance = Editor(seed), Random(seed)
     found = {"kills": 0, "acknowledged": 0, "lost": 0}
     while found["kills"] < kills:
         with served(project, errors, model) as server:

@@ -224,6 +224,27 @@ def test_what_is_dropped_is_read_by_the_same_readers(studio: OpenStudio) -> None
 
 
 @pytest.mark.long
+def test_lines_that_are_not_used_are_closed_and_open_again_as_they_were(
+    studio: OpenStudio, toy_speech: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("lipmotion.studio.desk.MOST_OPEN", 1)
+    studio.edit("phone 3 is p")
+    reply = studio.ask("/api/lines?name=other.wav", toy_speech.read_bytes())
+    other = reply.content["id"]
+    assert studio.ready(other)["status"] == "ready"
+    assert studio.studio.desk.work(1) is None
+    again = studio.ready()
+    assert (again["steps"], again["revision"]) == (["phone 3 is p"], 0)
+    assert studio.studio.desk.work(other) is None
+    assert studio.ask("/api/understand", {"lines": "all"}).content["waiting"] == 0
+    assert studio.ask("/api/understand", {"lines": [99]}).status == 404
+    said = studio.ask(f"/api/lines/{other}/transcript", {"text": "mama"}).content
+    assert said["status"] in ("waiting", "working")
+    assert {word["label"] for word in studio.ready(other)["words"]} == {"mama"}
+    assert studio.ask(f"/api/lines/{other}/remove", {}).status == 200
+
+
+@pytest.mark.long
 def test_the_weights_of_the_page_are_those_of_the_file(studio: OpenStudio) -> None:
     studio.edit("phone 3 is p", "pin jawOpen 0.7 at 1.0")
     reply = studio.ask("/api/lines/1/weights?face=head")

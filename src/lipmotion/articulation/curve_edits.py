@@ -12,7 +12,7 @@ from lipmotion.articulation.delivery import intensified
 from lipmotion.articulation.rest import rest_frames
 from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING
-from lipmotion.types import WEIGHT, CurveEdit, Drawn, Gain, Generation, Hold, Motion, Pin, Timeline, Unit, frame_of
+from lipmotion.types import WEIGHT, CurveEdit, DrawnCurve, Gain, Generation, Hold, Motion, Pin, Timeline, Unit, frame_of
 
 Curve = NDArray[np.float64]
 
@@ -45,7 +45,7 @@ def with_edited_curves(motion: Motion, units: Timeline[Unit], edits: Sequence[Cu
         if isinstance(edit, Pin):
             pins.append((pinned_frame(edit, motion, is_weight=is_weight), column, edit.value))
             continue
-        if isinstance(edit, Drawn):
+        if isinstance(edit, DrawnCurve):
             check_drawn(edit, is_weight=is_weight)
             values[:, column] += _drawn_change(values[:, column], edit, motion)
             continue
@@ -61,7 +61,7 @@ def with_edited_curves(motion: Motion, units: Timeline[Unit], edits: Sequence[Cu
     return replace(motion, values=values)
 
 
-def check_drawn(edit: Drawn, *, is_weight: bool) -> None:
+def check_drawn(edit: DrawnCurve, *, is_weight: bool) -> None:
     """Raise InputError if values that are drawn are not possible; ``is_weight``: whether the curve is 0 to 1."""
     if is_weight and not 0 <= min(edit.values) <= max(edit.values) <= 1:
         raise InputError(
@@ -69,7 +69,7 @@ def check_drawn(edit: Drawn, *, is_weight: bool) -> None:
         )
 
 
-def _drawn_change(curve: Curve, edit: Drawn, motion: Motion) -> Curve:
+def _drawn_change(curve: Curve, edit: DrawnCurve, motion: Motion) -> Curve:
     """Return what is to be added to a curve so that it is as drawn, and goes over into that smoothly [shape=(T,)]."""
     from scipy.interpolate import PchipInterpolator
 

@@ -10,7 +10,7 @@ from functools import lru_cache
 from typing import Any, ClassVar, get_type_hints
 
 from lipmotion.errors import InputError, shortened
-from lipmotion.types import CurveEdit, Drawn, Gain, Hold, Pin, Span, Timeline, Unit
+from lipmotion.types import CurveEdit, DrawnCurve, Gain, Hold, Pin, Span, Timeline, Unit
 from lipmotion.types.delivery import Delivery
 from lipmotion.types.moods import MoodKey, in_time, moods_of, text_of
 from lipmotion.types.staging import Staging
@@ -333,9 +333,9 @@ class DrawStep(CurveStep):
     end_s: float
 
     @property
-    def edit(self) -> Drawn:
+    def edit(self) -> DrawnCurve:
         """The drawn stretch."""
-        return Drawn(self.start_s, self.end_s, self.channel, self.values)
+        return DrawnCurve(self.start_s, self.end_s, self.channel, self.values)
 
 
 @dataclass(frozen=True)

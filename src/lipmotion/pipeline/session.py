@@ -76,7 +76,7 @@ from lipmotion.types import (
     WEIGHT,
     Constraints,
     CurveEdit,
-    Drawn,
+    DrawnCurve,
     Gain,
     Generation,
     Hold,
@@ -384,7 +384,10 @@ class Session:
         """Raise InputError if an edit is of no curve that is known, or of no time of the recording."""
         known = (*motion.names, *GESTURES, *KNOWN_CURVES, *self._curves)
         if edit.channel and edit.channel not in known:
-            what, lower = {Pin: "pin", Drawn: "draw"}.get(type(edit), "change"), {name.lower(): name for name in known}
+            what, lower = (
+                {Pin: "pin", DrawnCurve: "draw"}.get(type(edit), "change"),
+                {name.lower(): name for name in known},
+            )
             near = get_close_matches(edit.channel.lower(), lower, 1)
             others = ", ".join(name for name in (*motion.names, *GESTURES) if not LIP_POINT.fullmatch(name))
             named = shortened(repr(edit.channel)) + (f" (is it {lower[near[0]]}?)" if near else "")
@@ -396,9 +399,9 @@ class Session:
         if isinstance(edit, Pin):
             pinned_frame(edit, motion, is_weight=edit.channel in WEIGHTS)
         elif not 0 <= edit.start_s <= edit.end_s <= last_s + LATE_S:
-            kind = type(edit).__name__.lower()
+            kind = {DrawnCurve: "draw", Hold: "hold"}.get(type(edit), "gain")
             raise InputError(f"{kind} from {edit.start_s} to {edit.end_s} s, required times from 0 to {last_s:.2f} s")
-        if isinstance(edit, Drawn):
+        if isinstance(edit, DrawnCurve):
             check_drawn(edit, is_weight=edit.channel in WEIGHTS)
 
     def _phone_steps(self, steps: tuple[Step, ...]) -> tuple[Step, ...]:

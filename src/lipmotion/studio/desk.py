@@ -14,7 +14,6 @@ from collections import OrderedDict, deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass, field
 from typing import TypeVar
 
 from starlette.exceptions import HTTPException
@@ -47,27 +46,24 @@ class StoppedError(LipMotionError):
     """What was being done is not wanted any more."""
 
 
-@dataclass
 class Work:
     """What happens to a line.
 
+    number  : of the line
     status, stage, share, error : as the page shows them
     since_s : when the status changed, by a clock that only grows
     line    : once the line is open
+    thread  : in which it is worked on, once it has been opened
     users   : requests that need it now
     stopped : whether what is done for it is to end soon
     """
 
-    number: int
-    status: str = WAITING
-    stage: str = ""
-    share: float = 0.0
-    error: str = ""
-    since_s: float = field(default_factory=time.monotonic)
-    line: OpenLine | None = None
-    users: int = 0
-    stopped: bool = False
-    thread: ThreadPoolExecutor | None = None
+    def __init__(self, number: int) -> None:
+        self.number, self.status, self.error = number, WAITING, ""
+        self.stage, self.share, self.since_s = "", 0.0, time.monotonic()
+        self.line: OpenLine | None = None
+        self.thread: ThreadPoolExecutor | None = None
+        self.users, self.stopped = 0, False
 
     def turn(self, status: str, error: str = "") -> None:
         """Go over to another status."""

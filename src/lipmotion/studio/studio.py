@@ -213,9 +213,10 @@ class Studio:
         """
         if self.desk.status(number) in (WAITING, WORKING):
             raise NotReadyError
-        edits = self.folder.edits(self.folder.line(number))
-        if self.desk.status(number) == READY:
+        edits, work = self.folder.edits(self.folder.line(number)), self.desk.work(number)
+        if work is not None and work.line is not None:
             await self.desk.at(number, lambda _: edits.unlink(missing_ok=True))
+        edits.unlink(missing_ok=True)
         self.folder.change_line(number, lambda line: replace(line, transcript=transcript.strip()))
         self.desk.forget(number)
         self.desk.opened(number)

@@ -169,7 +169,7 @@ LARGEST_GAIN = 3.0
 
 
 @dataclass(frozen=True)
-class Drawn:
+class DrawnCurve:
     """Values that a curve takes over a stretch, as somebody has drawn them.
 
     start_s, end_s : seconds; before and after them the curve goes over into them within 0.1 s
@@ -178,7 +178,7 @@ class Drawn:
     Raises InputError: fewer than 2 values, or more than ``MOST_DRAWN``; no numbers; or an end that is not after the
     start.
 
-    >>> Drawn(1.0, 1.5, "opening", (0.0, 0.1, 0.0)).channel
+    >>> DrawnCurve(1.0, 1.5, "opening", (0.0, 0.1, 0.0)).channel
     'opening'
     """
 
@@ -212,7 +212,7 @@ class Hold:
         _check_stretch(self.start_s, self.end_s)
 
 
-CurveEdit = Pin | Gain | Drawn
+CurveEdit = Pin | Gain | DrawnCurve
 """Changes of one curve, or of all curves of the mouth."""
 
 
