@@ -45,11 +45,18 @@ export class Server {
   async told(path, content, headers) { return (await this.send(path, content, headers)).json(); }
 
   /** Return curves: float32 frames by names, as the headers of the reply say. */
-  async curves(path) {
+  async curves(path) { return curvesOf(await this.reply(path)); }
+
+  /** Return weights, and the name of the mesh that they move. */
+  async weights(path) {
     const reply = await this.reply(path);
-    const names = JSON.parse(reply.headers.get("x-lipmotion-names") ?? "[]");
-    const rate_hz = Number(reply.headers.get("x-lipmotion-rate"));
-    const first = Number(reply.headers.get("x-lipmotion-first") ?? 0);
-    return new Curves(names, rate_hz, new Float32Array(await reply.arrayBuffer()), first);
+    return { weights: await curvesOf(reply), mesh: decodeURIComponent(reply.headers.get("x-lipmotion-mesh") ?? "") };
   }
+}
+
+async function curvesOf(reply) {
+  const names = JSON.parse(reply.headers.get("x-lipmotion-names") ?? "[]");
+  const rate_hz = Number(reply.headers.get("x-lipmotion-rate"));
+  const first = Number(reply.headers.get("x-lipmotion-first") ?? 0);
+  return new Curves(names, rate_hz, new Float32Array(await reply.arrayBuffer()), first);
 }

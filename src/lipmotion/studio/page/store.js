@@ -32,6 +32,7 @@ export class Store {
     this.looping = false;
     this.speed = 1;
     this.face = "head";
+    this.mesh = ""; // name of the character that the weights move; empty: that of the face
   }
 
   /** Change some of it; listeners run once, after the code that runs now. */

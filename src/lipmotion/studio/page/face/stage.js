@@ -45,7 +45,7 @@ export class Stage {
     });
     new ResizeObserver(() => this.head?.draw()).observe(this.solid);
     this.store.on(["project", "face"], () => this.offer());
-    this.store.on(["face", "project"], () => this.change());
+    this.store.on(["face", "project", "mesh"], () => this.change());
     this.store.on(["weights", "time_s", "line", "other", "comparing"], () => this.show());
   }
 
@@ -54,7 +54,7 @@ export class Stage {
   offer() {
     const faces = this.store.project?.forms.faces ?? [];
     this.faces.replaceChildren(choice(faces.map(({ name, title }) => [name, title ?? name]), this.store.face,
-      (face) => this.store.set({ face }), { "aria-label": TEXT.face, id: "face" }));
+      (face) => this.store.set({ face, mesh: "" }), { "aria-label": TEXT.face, id: "face" }));
   }
 
   async change() {
@@ -67,15 +67,16 @@ export class Stage {
         this.isWebgl = false;
         this.say(TEXT.noWebgl);
         const other = this.store.project.forms.faces.find(({ mesh }) => !mesh);
-        if (other) this.store.set({ face: other.name });
+        if (other) this.store.set({ face: other.name, mesh: "" });
       }
     }
     this.solid.hidden = this.views.hidden = !this.isSolid;
     this.drawn.hidden = this.isSolid;
-    if (this.isSolid && this.loaded !== this.store.face) {
-      this.loaded = this.store.face;
+    const mesh = this.store.mesh || this.store.face;
+    if (this.isSolid && this.loaded !== mesh) {
+      this.loaded = mesh;
       try {
-        await this.head.load(await this.studio.server.bytes(`faces/${encodeURIComponent(this.store.face)}.glb`));
+        await this.head.load(await this.studio.server.bytes(`faces/${encodeURIComponent(mesh)}.glb`));
         this.say("");
       } catch (error) {
         this.say(filled(TEXT.noFace, { reason: error.message }));

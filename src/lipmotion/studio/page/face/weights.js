@@ -70,7 +70,7 @@ export class Weights {
 
   async read(first, stop) {
     const { number, store, studio } = this, stretch = `&start_s=${first * PORTION_S}&end_s=${stop * PORTION_S}`;
-    const part = await studio.server.curves(this.address() + stretch);
+    const { weights: part, mesh } = await studio.server.weights(this.address() + stretch);
     if (number !== this.number || !this.held) return;
     const frames = Math.max(Math.ceil(store.line.duration_s * part.rate_hz) + 1, part.first + part.frames);
     const fits = store.weights && String(store.weights.names) === String(part.names) && store.weights.frames >= frames;
@@ -78,17 +78,17 @@ export class Weights {
     values.set(part.values, part.first * part.names.length);
     this.held.fill(1, first, stop);
     if (this.known(store.time_s)) studio.faceComes();
-    store.set({ weights: new Curves(part.names, part.rate_hz, values) });
+    store.set({ weights: new Curves(part.names, part.rate_hz, values), mesh });
   }
 
   /** Take all weights as the file has them: a stretch differs a little, as its solution begins elsewhere. */
   async settle() {
     const { number, studio } = this;
     try {
-      const all = await studio.server.curves(this.address());
+      const { weights, mesh } = await studio.server.weights(this.address());
       if (number !== this.number) return;
       this.exact = true;
-      this.store.set({ weights: all });
+      this.store.set({ weights, mesh });
     } catch (error) {
       studio.refuse(error);
     }

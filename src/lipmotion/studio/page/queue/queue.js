@@ -4,7 +4,7 @@ import { choice, icon, inNextFrame, made, textButton } from "../dom.js";
 import { clock } from "../timeline/sound_tracks.js";
 import { TEXT, filled } from "../strings.js";
 
-const ROW_PX = 30, BEYOND = 6, DOUBT_FULL = 0.5;
+const ROW_PX = 30, BEYOND = 6, DOUBT_FULL = 1;
 const ORDERS = {
   order: null,
   doubt: (a, b) => (b.doubt ?? -1) - (a.doubt ?? -1),

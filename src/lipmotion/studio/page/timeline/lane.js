@@ -1,10 +1,10 @@
-// The lane of edits that have a place in time: moods, gains, locks.
+// The lane of edits that have a place in time: moods, gains, drawn curves, held poses, locks.
 
 import { made } from "../dom.js";
 import { TEXT, filled } from "../strings.js";
 import { placed } from "../sentences.js";
 
-const LANE_PX = 18;
+const ROW_PX = 18, LEAST_PX = 14;
 
 export class Lane {
   constructor(timeline) {
@@ -14,27 +14,45 @@ export class Lane {
   }
 
   draw() {
-    const { timeline, timeline: { store, store: { line } } } = this, { moods, gains, drawn, holds, locks } = placed(line?.steps ?? []);
-    const kinds = [moods, gains, drawn, holds, locks].filter((each) => each.length), lane = (each) => `${kinds.indexOf(each) * LANE_PX + 2}px`;
-    const item = (top, className, text, start_s, end_s) => {
-      const button = made("button", { type: "button", className, textContent: text, title: text, tabIndex: -1, onclick: () => {
-        store.set({ span: end_s > start_s ? { start_s, end_s } : store.span, tab: "edit" });
-        timeline.studio.player.seek(start_s);
-      } });
-      button.style.top = top;
-      button.style.left = `${timeline.x(start_s)}px`;
-      button.style.width = `${Math.max((end_s - start_s) * timeline.px_s, 12)}px`;
-      return button;
-    };
-    const ends = (n) => moods[n + 1]?.time_s ?? timeline.duration_s;
-    this.element.replaceChildren(
-      ...moods.map(({ mood, time_s }, n) => item(lane(moods), "mood", mood, time_s, ends(n))),
-      ...gains.map(({ channel, factor, start_s, end_s }) => item(lane(gains), "gain", `${channel} ×${factor}`, start_s, end_s)),
-      ...drawn.map(({ channel, start_s, end_s }) => item(lane(drawn), "gain", filled(TEXT.drawn, { channel }), start_s, end_s)),
-      ...holds.map(({ start_s, end_s }) => item(lane(holds), "gain", TEXT.held, start_s, end_s)),
-      ...locks.map(({ start_s, end_s }) => item(lane(locks), "lock", TEXT.locked, start_s, end_s)),
-    );
-    this.element.hidden = !kinds.length;
-    this.element.style.height = `${kinds.length * LANE_PX + 2}px`;
+    const { line } = this.timeline.store;
+    if (this.of !== line) this.items = packed(itemsOf((this.of = line)?.steps ?? [], this.timeline.duration_s));
+    const { start_s, end_s } = this.timeline, rows = 1 + Math.max(-1, ...this.items.map(({ row }) => row));
+    this.element.replaceChildren(...this.items.filter((item) => item.end_s >= start_s && item.start_s <= end_s).map((item) => this.button(item)));
+    this.element.hidden = !rows;
+    this.element.style.height = `${rows * ROW_PX + 2}px`;
   }
+
+  button({ kind, text, start_s, end_s, row }) {
+    const { timeline, timeline: { store, studio } } = this;
+    const button = made("button", { type: "button", className: kind, textContent: text, title: text, tabIndex: -1, onclick: () => {
+      store.set({ span: { start_s, end_s }, tab: "edit" });
+      studio.player.seek(start_s);
+    } });
+    button.style.top = `${row * ROW_PX + 2}px`;
+    button.style.left = `${timeline.x(start_s)}px`;
+    button.style.width = `${Math.max((end_s - start_s) * timeline.px_s, LEAST_PX)}px`;
+    return button;
+  }
+}
+
+/** Return what edits have a place in time: kind, text, and where. */
+function itemsOf(steps, duration_s) {
+  const { moods, gains, drawn, holds, locks } = placed(steps);
+  return [
+    ...moods.map(({ mood, time_s }, n) => ({ kind: "mood", text: mood, start_s: time_s, end_s: moods[n + 1]?.time_s ?? duration_s })),
+    ...gains.map((gain) => ({ ...gain, kind: "gain", text: `${gain.channel} ×${gain.factor}` })),
+    ...drawn.map((stroke) => ({ ...stroke, kind: "gain", text: filled(TEXT.drawn, stroke) })),
+    ...holds.map((hold) => ({ ...hold, kind: "gain", text: TEXT.held })),
+    ...locks.map((lock) => ({ ...lock, kind: "lock", text: TEXT.locked })),
+  ];
+}
+
+/** Return items with the row of each, so that none lies over another. */
+function packed(items) {
+  const ends = [];
+  return items.sort((a, b) => a.start_s - b.start_s).map((item) => {
+    const free = ends.findIndex((end_s) => end_s <= item.start_s), row = free < 0 ? ends.length : free;
+    ends[row] = item.end_s;
+    return { ...item, row };
+  });
 }
