@@ -83,6 +83,7 @@ export class Stage {
       }
     }
     this.show();
+    this.loadedFor ??= this.store.face;
     if (this.isSolid && this.loadedFor !== this.store.face) {
       this.loadedFor = this.store.face;
       this.store.set({ weights: null });
