@@ -1,4 +1,4 @@
-"""The studio's page in a real browser: each edit reaches the project, sound and face are in step, nobody is kept out."""
+"""The studio's page in a real browser: each edit reaches the project, sound and face are in step, all can use it."""
 
 from __future__ import annotations
 
@@ -41,6 +41,8 @@ SCREENS = ((1440, 900, "light"), (900, 800, "dark"), (320, 640, "light"), (320, 
 WEBGL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--autoplay-policy=no-user-gesture-required")
 LIMIT_S = 120.0
 FRAME_S = 1 / 60
+CLOSED = "document.querySelector('dialog').close()"
+FAILED = "{ ...studio.store.line, status: 'failed', error: 'no speech' }"
 READY = "return Boolean(globalThis.studio?.store.weights && studio.stage.head?.character && !studio.store.saving)"
 
 
@@ -63,6 +65,11 @@ class Page:
         """The edits, as the page shows them."""
         return list(self.of("studio.store.line.steps"))
 
+    def wait_for_steps(self, count: int) -> None:
+        """Wait until the line has so many edits, and all that follows is done."""
+        wait_until(lambda: len(self.steps) == count, LIMIT_S)
+        self.ready()
+
     def middle(self, selector: str) -> tuple[float, float]:
         """The middle of an element [pixels]."""
         box = self.of(f"document.querySelector({selector!r}).getBoundingClientRect().toJSON()")
@@ -76,8 +83,7 @@ class Page:
         """Act, and expect one more edit; ``sentence`` is a pattern of it."""
         before = self.steps
         act()
-        wait_until(lambda: len(self.steps) > len(before), LIMIT_S)
-        self.ready()
+        self.wait_for_steps(len(before) + 1)
         after = self.steps
         assert after[:-1] == before
         assert re.fullmatch(sentence, after[-1]), after[-1]
@@ -142,13 +148,12 @@ def test_each_edit_by_pointer_and_keys(page: Page) -> None:
     window.click("#tab-delivery")
     page.edit(lambda: window.click("#set-stepped"), "set stepped true")
     made = page.steps
-    for count in range(len(made)):
+    for count in reversed(range(len(made))):
         window.press_together(CONTROL, "z")
-        wait_until(lambda count=count: len(page.steps) == len(made) - count - 1, LIMIT_S)
+        page.wait_for_steps(count)
     for count in range(len(made)):
         window.press_together(CONTROL, SHIFT, "z")
-        wait_until(lambda count=count: len(page.steps) == count + 1, LIMIT_S)
-    page.ready()
+        page.wait_for_steps(count + 1)
     assert page.steps == made
     assert [each for each in window.problems() if each.startswith("SEVERE") and "favicon" not in each] == []
 
@@ -170,11 +175,42 @@ def test_sound_and_face_are_in_step(page: Page) -> None:
     assert max(map(abs, page.of("offsets"))) <= FRAME_S
 
 
+def test_a_dropped_line_is_read_corrected_and_exported(tmp_path: Path) -> None:
+    said = WELCOME.with_suffix(".txt").read_text(encoding="utf-8")
+    (tmp_path / "home").mkdir()
+    with served(tmp_path / "project", WELCOME) as address, browser(tmp_path / "home", *WEBGL) as window:
+        window.open(address)
+        page = Page(window)
+        page.ready()
+        window.run(
+            """studio.server.bytes(`lines/${studio.store.lineId}/sound.wav`).then((sound) => studio.add(
+              [new File([sound], "second.wav"), new File([arguments[0]], "second.txt")]));""",
+            said,
+        )
+        wait_until(lambda: window.text("#title").endswith("second"), LIMIT_S)
+        page.ready()
+        assert page.of("studio.store.line.words[1].label") == "speak"
+        window.click('.words [data-index="1"]')
+        window.run("document.getElementById('word-phones').value = 's p iy k s'")
+        window.click("#word-keep")
+        wait_until(lambda: "s p iy k s" in window.text("#offers"), LIMIT_S)
+        page.edit(lambda: window.click("#word-change"), "word 2 is speak said s p iy k s")
+        window.press(ESCAPE, ESCAPE, "a")
+        wait_until(lambda: page.of("studio.store.lines.at(-1).mark") == "approved", LIMIT_S)
+        window.run("document.getElementById('transcript').value += ' now'")
+        page.edit(lambda: window.click("#align"), r"say Please .* now from \S+ to \S+")
+        window.click("#export")
+        window.click("#export-approved")
+        wait_until(lambda: "Written" in window.text("dialog"), LIMIT_S)
+        wait_until(lambda: page.of("studio.store.lines.at(-1).exported") == "yes", LIMIT_S)
+
+
 def test_what_another_window_did_is_shown(page: Page) -> None:
     before = page.steps
     page.window.run_until_done(
         """const done = arguments[0], { server, store } = studio;
-        server.told(`lines/${store.lineId}/edits`, { revision: store.line.revision, steps: ["set intensity 1.1"] }).then(() => done());"""
+        const content = { revision: store.line.revision, steps: ["set intensity 1.1"] };
+        server.told(`lines/${store.lineId}/edits`, content).then(() => done());"""
     )
     page.window.click("#tab-edit")
     page.window.click("#mood-set")
@@ -186,7 +222,8 @@ def test_what_another_window_did_is_shown(page: Page) -> None:
 def test_ten_thousand_lines_scroll(page: Page) -> None:
     page.window.run(
         """const [line] = studio.store.lines;
-        studio.store.set({ lines: Array.from({ length: 10000 }, (_, n) => ({ ...line, id: n + 1, name: `line ${n}`, doubt: (n * 7919 % 997) / 997 })) });"""
+        const made = (_, n) => ({ ...line, id: n + 1, name: `line ${n}`, doubt: (n * 7919 % 997) / 997 });
+        studio.store.set({ lines: Array.from({ length: 10000 }, made) });"""
     )
     wait_until(lambda: "10000" in page.window.text(".count"), LIMIT_S)
     page.window.run("document.querySelector('.view').scrollTop = 150000")
@@ -208,8 +245,8 @@ def test_every_screen(page: Page) -> None:
         ("lines", "studio.showPlace('lines')"),
         ("timeline", "studio.showPlace('stage')"),
         ("keys", "studio.help()"),
-        ("export", "document.querySelector('dialog').close(); document.getElementById('export').click()"),
-        ("failed", "document.querySelector('dialog').close(); studio.store.set({ line: { ...studio.store.line, status: 'failed', error: 'no speech' } })"),
+        ("export", f"{CLOSED}; document.getElementById('export').click()"),
+        ("failed", f"{CLOSED}; studio.store.set({{ line: {FAILED} }})"),
         ("empty", "studio.store.set({ lines: [], line: null, lineId: '' })"),
     )  # fmt: skip
     for width, height, scheme in SCREENS:

@@ -130,7 +130,7 @@ function moodPart(studio) {
 }
 
 function transcriptPart(studio) {
-  const { line } = studio.store, words = line.transcript || line.words.map(({ label }) => label).join(" ");
+  const { line } = studio.store, words = (!line.steps.length && line.transcript) || line.words.map(({ label }) => label).join(" ");
   const field = made("textarea", { id: "transcript", rows: 3, value: words, "aria-label": TEXT.transcript });
   return section(TEXT.transcript, field, row(textButton(TEXT.align, () => studio.realign(field.value), { id: "align" })));
 }
