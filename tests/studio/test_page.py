@@ -159,6 +159,7 @@ def test_each_edit_by_pointer_and_keys(page: Page) -> None:
 
 
 def test_sound_and_face_are_in_step(page: Page) -> None:
+    wait_until(lambda: page.of("studio.weights.exact"), LIMIT_S)
     page.window.press(ESCAPE, ESCAPE)
     page.window.run(
         """const { head } = studio.stage, posed = head.pose.bind(head);
@@ -169,7 +170,7 @@ def test_sound_and_face_are_in_step(page: Page) -> None:
         };"""
     )
     page.window.press(SPACE)
-    wait_until(lambda: page.of("offsets.length") > 20, LIMIT_S)
+    wait_until(lambda: page.of("offsets.length") > 5, LIMIT_S)
     page.window.press(SPACE)
     assert page.of("studio.player.audio.paused")
     assert max(map(abs, page.of("offsets"))) <= FRAME_S
@@ -198,7 +199,7 @@ def test_a_dropped_line_is_read_corrected_and_exported(tmp_path: Path) -> None:
         window.press(ESCAPE, ESCAPE, "a")
         wait_until(lambda: page.of("studio.store.lines.at(-1).mark") == "approved", LIMIT_S)
         window.run("document.getElementById('transcript').value += ' now'")
-        page.edit(lambda: window.click("#align"), r"say Please .* now from \S+ to \S+")
+        page.edit(lambda: window.click("#align"), r"say please .* now from \S+ to \S+")
         window.click("#export")
         window.click("#export-approved")
         wait_until(lambda: "Written" in window.text("dialog"), LIMIT_S)

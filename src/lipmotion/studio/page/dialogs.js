@@ -27,7 +27,8 @@ export function showKeys() {
 export function showExport(studio) {
   const { project, lines, line } = studio.store, presets = project.forms.presets;
   let chosen = project.forms.preset || presets[0].name;
-  const told = made("p", { role: "status", className: "hint" }), approved = lines.filter(({ mark }) => mark === "approved").length;
+  const was = lines.find(({ id }) => id === line?.id)?.exported;
+  const told = made("p", { role: "status", className: "hint", textContent: was ? TEXT.wasExported[was] : "" }), approved = lines.filter(({ mark }) => mark === "approved").length;
   const about = made("p", { className: "hint" });
   const describe = () => { about.textContent = presets.find(({ name }) => name === chosen).files.join("  "); };
   const run = (act) => async () => {

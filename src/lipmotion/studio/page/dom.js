@@ -82,7 +82,7 @@ export function replaced(place, ...children) {
 /**
  * Follow a pointer from where it goes down to where it goes up; Escape gives up.
  * @param {any} element
- * @param {{start: (event: PointerEvent) => boolean | void, move: (event: PointerEvent) => void,
+ * @param {{start: (event: PointerEvent) => any, move: (event: PointerEvent) => void,
  *   end: (event: PointerEvent) => void, cancel?: () => void}} acts  start: false refuses
  */
 export function onDrag(element, acts) {

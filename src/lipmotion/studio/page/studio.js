@@ -28,6 +28,7 @@ export class Studio {
     this.store = new Store();
     this.player = new Player(this.store);
     /** @type {Promise<any>} */ this.edits = Promise.resolve();
+    this.left = false; // whether tabulators go on past the timeline
     this.askedAt = this.editedAt = 0; // when the edit was asked for whose motion is on its way, or is shown next
     this.build();
     listen(this);
@@ -280,6 +281,7 @@ export class Studio {
 
   /** Select a phone or a word, and its time. */
   choose(kind, index) {
+    this.left = false;
     const span = this.store.line?.[`${kind}s`][index];
     if (!span) return;
     this.store.set({ selected: { kind, index }, span: { start_s: span.start_s, end_s: span.end_s }, tab: this.store.tab === "why" ? "why" : "edit" });
@@ -297,7 +299,7 @@ export class Studio {
   /** The next or previous phone or word, by the key of tabulators; past the last one the focus goes on. */
   tab(event) {
     const target = /** @type {HTMLElement} */ (event.target), { line, selected, time_s } = this.store;
-    if (!line?.phones?.length || !(target === document.body || target.closest(".timeline"))) return;
+    if (!line?.phones?.length || !target.closest(".timeline") || (this.left && !selected)) return;
     const kind = selected?.kind === "word" ? "word" : "phone", spans = line[`${kind}s`];
     const here = selected?.kind === kind ? selected.index + (event.shiftKey ? -1 : 1) : Math.max(spans.findIndex(({ end_s }) => end_s > time_s), 0);
     if (here < 0 || here >= spans.length) return;
@@ -383,8 +385,10 @@ export class Studio {
     return this.store.set({ span: { start_s: span && span.start_s < time_s ? span.start_s : 0, end_s: time_s } });
   }
 
+  /** Leave a field for the timeline; there, clear the selection; then tabulators go on to what follows the timeline. */
   leave() {
     if (document.activeElement instanceof HTMLElement && document.activeElement !== this.timeline.scroller) return this.timeline.scroller.focus({ preventScroll: true });
+    this.left = !this.store.selected;
     return this.store.set({ selected: null, span: null, tool: "select" });
   }
 

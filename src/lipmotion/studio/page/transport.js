@@ -43,6 +43,7 @@ export class Transport {
       half.setAttribute("aria-label", `${half.textContent}, ${TEXT.half}`);
       draw.setAttribute("aria-pressed", String(store.tool === "draw"));
     });
+    store.on(["tool"], () => { if (store.tool === "draw") studio.say(TEXT.drawing); });
     store.on(["line"], () => {
       undo.disabled = !store.line?.undo;
       redo.disabled = !store.line?.redo;

@@ -49,9 +49,6 @@ export class Head {
     this.draw();
   }
 
-  /** Names of the blendshapes that the character has. */
-  get shapes() { return new Set(this.meshes.flatMap((mesh) => Object.keys(mesh.morphTargetDictionary))); }
-
   /**
    * Show weights at a time.
    * @param {import("../curves.js").Curves | null} weights

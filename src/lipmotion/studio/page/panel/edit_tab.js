@@ -132,5 +132,6 @@ function moodPart(studio) {
 function transcriptPart(studio) {
   const { line } = studio.store, words = (!line.steps.length && line.transcript) || line.words.map(({ label }) => label).join(" ");
   const field = made("textarea", { id: "transcript", rows: 3, value: words, "aria-label": TEXT.transcript });
-  return section(TEXT.transcript, field, row(textButton(TEXT.align, () => studio.realign(field.value), { id: "align" })));
+  const warnings = (line.warnings ?? []).map((text) => made("p", { className: "warning", textContent: text }));
+  return section(TEXT.transcript, ...warnings, field, row(textButton(TEXT.align, () => studio.realign(field.value), { id: "align" })));
 }

@@ -7,7 +7,11 @@ import { deliveryTab } from "./delivery_tab.js";
 import { whyTab } from "./why_tab.js";
 import { historyTab } from "./history_tab.js";
 
-const TABS = { edit: editTab, delivery: deliveryTab, why: whyTab, history: historyTab };
+/** Each tab, and what it is made anew for: a panel that is made anew under the pointer loses a click. */
+const TABS = {
+  edit: { shown: editTab, follows: ["line", "selected", "span", "project"] }, delivery: { shown: deliveryTab, follows: ["line", "project"] },
+  why: { shown: whyTab, follows: ["line", "doubts"] }, history: { shown: historyTab, follows: ["line", "other"] },
+};
 
 export class Panel {
   /**
@@ -37,9 +41,9 @@ export class Panel {
       });
       this.body.setAttribute("aria-labelledby", `tab-${store.tab}`);
     });
-    store.on(["tab", "line", "selected", "span", "project", "doubts", "why", "other", "playing", "channels"], () => {
-      if (!store.playing) replaced(this.body, ...TABS[store.tab](studio));
-    });
+    const show = () => replaced(this.body, ...TABS[store.tab].shown(studio));
+    for (const [tab, { follows }] of Object.entries(TABS)) store.on(follows, () => { if (store.tab === tab) show(); });
+    store.on(["tab"], show);
     store.on(["time_s"], () => {
       if (!store.playing) for (const each of this.body.querySelectorAll("[data-follows]")) each.follow?.();
     });

@@ -59,7 +59,7 @@ export class Player {
   stop() {
     this.audio.pause();
     this.backwards = null;
-    this.store.set({ playing: false });
+    this.store.set({ playing: false, speed: Math.min(this.store.speed, 1) });
   }
 
   toggle() { return this.store.playing ? this.stop() : this.play(); }

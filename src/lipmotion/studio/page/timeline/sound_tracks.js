@@ -1,6 +1,6 @@
 // Tracks that follow from the sound, and the ruler above them.
 
-import { made } from "../dom.js";
+import { made, onDrag } from "../dom.js";
 import { TEXT } from "../strings.js";
 import { ROWS, Spectra } from "../sound/spectrum.js";
 import { cleared, colours } from "./canvas.js";
@@ -11,9 +11,10 @@ const LABEL_PX = 64, STRIP_PX = 2, SHADES = 8, TILE_PX = 256, TILES = 48;
 export class Ruler {
   constructor(timeline) {
     this.timeline = timeline;
-    this.selectable = true;
     this.canvas = made("canvas");
     this.element = made("div", { className: "track ruler" }, this.canvas);
+    const seek = (event) => timeline.studio.player.seek(timeline.timeOf(event));
+    onDrag(this.element, { start: seek, move: seek, end: seek });
   }
 
   draw() {
