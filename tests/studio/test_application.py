@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +20,8 @@ from lipmotion.testing.toy import ToySentence
 pytest.importorskip("starlette", reason="the extra 'studio' is not installed")
 
 from lipmotion.studio.access import TOKEN_HEADER, Access
+from lipmotion.studio.folder import opened_folder
+from lipmotion.studio.studio import Studio
 from studio.open_studio import HOST, TOKEN, OpenStudio, open_studio
 
 
@@ -221,6 +225,23 @@ def test_what_is_dropped_is_read_by_the_same_readers(studio: OpenStudio) -> None
     assert studio.ask(f"/api/lines/{reply.content['id']}/doubts").status == 422
     assert studio.ask(f"/api/lines/{reply.content['id']}/remove", {}).status == 200
     assert studio.ask("/api/project").content["count"] == 1
+
+
+def test_a_project_outlives_its_model(
+    tmp_path: Path, toy_model: Model, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    asked: list[Path | None] = []
+
+    def loaded(path: Path | None) -> Model:
+        asked.append(path)
+        return toy_model
+
+    monkeypatch.setattr("lipmotion.studio.studio.load_model", loaded)
+    with opened_folder(None, tmp_path / "project") as folder:
+        folder.change(lambda project: replace(project, model="../gone.lipmotion"))
+        with closing(Studio(folder)):
+            assert asked == [None]
+    assert "the model of the project is not there" in caplog.text
 
 
 @pytest.mark.long

@@ -35,7 +35,7 @@ class ProjectReplies:
         query = request.query_params
         first, count = whole(query, "from", 0), whole(query, "count", 200, most=2000)
         chosen = {name: text(query, name, "") for name in ("order", "status", "mark")}
-        found = self._studio.listed(first, count, **chosen)
+        found = await self._desk.beside(lambda: self._studio.listed(first, count, **chosen))
         return JSONResponse(found | {"largest_upload_bytes": LARGEST_UPLOAD_BYTES}, headers=FRESH)
 
     async def progress(self, _: Request) -> Response:

@@ -61,14 +61,15 @@ class Studio:
 
     def __init__(self, folder: ProjectFolder, model: Model | None = None) -> None:
         self.folder = folder
-        self.model = model or _model_of(folder)
+        file = _model_file(folder)
+        self.model = model or load_model(file)
         self.desk = Desk(folder, self.model)
         places = {name: Path(os.path.normpath(folder.path / file)) for name, file in folder.project.characters.items()}
         self.faces = Faces(places)
         self._sounds = Path(tempfile.mkdtemp(prefix="lipmotion-studio-"))
         self._exporting: dict[str, int] | None = None
         self._summaries: dict[int, tuple[int, EditsSummary]] = {}
-        self._model_digest = sha256_of(folder.model_file or shipped_path())
+        self._model_digest = sha256_of(file or shipped_path())
 
     def close(self) -> None:
         """Write what is not written, and remove what was kept for this run alone."""
@@ -315,10 +316,10 @@ def _controls() -> Iterator[dict[str, Any]]:
             yield told | {"least": rule.least, "most": rule.most, "help": each.metadata.get("help", "")}
 
 
-def _model_of(folder: ProjectFolder) -> Model:
-    """Return the model of a project; the one that ships, with a warning, where the project's is not there."""
+def _model_file(folder: ProjectFolder) -> Path | None:
+    """Return the file of a project's model; None: the one that ships, with a warning where the project's is gone."""
     file = folder.model_file
     if file is not None and not file.exists():
         LOG.warning("%s: the model of the project is not there; the one that ships is used", file)
-        file = None
-    return load_model(file)
+        return None
+    return file
