@@ -23,6 +23,7 @@ SEE = {
     "speak": "speak",
     "render": "controls",
     "edit": "edit",
+    "studio": "studio",
     "explain": "explain",
     "cues": "cues",
     "words": "start",

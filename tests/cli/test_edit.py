@@ -59,7 +59,7 @@ def test_what_edit_refuses(run: RunCommand, speech: Path, toy_model_file: Path, 
     assert run("edit", file, "--of", speech, "--model", toy_model_file, "--recogniser", "own").code == 0
     for words, message in (
         (["edit", file, "--of", speech], "exists; add edits without --of"),
-        (["edit", file, "--undo", 2], "--undo 2, required 0 to 0"),
+        (["edit", file, "--undo", 2], "2 edits to take back, required 0 to 0"),
         (["render", file, "--sound", speech, "-o", tmp_path / "a.csv"], "leave --sound and --units out"),
         (["animate", speech, "--edits", file, "-o", file], "a.edits.json"),
     ):

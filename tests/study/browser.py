@@ -20,6 +20,7 @@ BROWSER = next(filter(None, map(shutil.which, PROGRAMS)), None)
 DRIVER = shutil.which("chromedriver")
 MISSING = "no Chromium with its driver: apt install chromium chromium-driver"
 SPACE, ENTER, LEFT, RIGHT = " ", "\ue007", "\ue012", "\ue014"
+ESCAPE, TAB, SHIFT, CONTROL, UP, DELETE = "\ue00c", "\ue004", "\ue008", "\ue009", "\ue013", "\ue017"
 """Keys, as WebDriver names them."""
 
 
@@ -49,6 +50,22 @@ class Browser:
         """Press keys one after another, where the focus is."""
         actions = [{"type": kind, "value": key} for key in keys for kind in ("keyDown", "keyUp")]
         self.command("POST", "/actions", {"actions": [{"type": "key", "id": "keyboard", "actions": actions}]})
+
+    def press_together(self, *keys: str) -> None:
+        """Press keys while the ones before are held."""
+        downs = [{"type": "keyDown", "value": key} for key in keys]
+        ups = [{"type": "keyUp", "value": key} for key in reversed(keys)]
+        self.command("POST", "/actions", {"actions": [{"type": "key", "id": "keyboard", "actions": downs + ups}]})
+
+    def drag(self, start: tuple[float, float], *way: tuple[float, float]) -> None:
+        """Take hold with the mouse where the way starts, and let go at its end [pixels]."""
+
+        def to(place: tuple[float, float], ms: int) -> dict[str, Any]:
+            return {"type": "pointerMove", "duration": ms, "x": round(place[0]), "y": round(place[1])}
+
+        acts = [to(start, 0), {"type": "pointerDown", "button": 0}]
+        acts += [*(to(place, 50) for place in way), {"type": "pointerUp", "button": 0}]
+        self.command("POST", "/actions", {"actions": [{"type": "pointer", "id": "mouse", "actions": acts}]})
 
     def click(self, selector: str) -> None:
         """Click an element, as a person does: it must be seen."""
@@ -95,7 +112,7 @@ def webdriver(port: int, method: str, path: str, content: Any = None) -> Any:
 
 
 @contextmanager
-def browser(folder: Path) -> Iterator[Browser]:
+def browser(folder: Path, *more_switches: str) -> Iterator[Browser]:
     """Give a browser with a profile of its own in a folder."""
     variables = environment(HOME=str(folder))
     with child([DRIVER, "--port=0"], variables=variables, stdout=PIPE, stderr=NOWHERE) as driver:
@@ -106,7 +123,7 @@ def browser(folder: Path) -> Iterator[Browser]:
         port = int(line.rstrip().rstrip(".").split()[-1])
         wait_until(lambda: webdriver(port, "GET", "/status")["ready"], 60)
         switches = ["--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--mute-audio", "--disable-gpu"]
-        switches += [f"--user-data-dir={folder / 'profile'}", "--window-size=1200,900"]
+        switches += [f"--user-data-dir={folder / 'profile'}", "--window-size=1200,900", *more_switches]
         options = {"binary": BROWSER, "args": switches}
         wanted = {"browserName": "chrome", "goog:chromeOptions": options, "goog:loggingPrefs": {"browser": "WARNING"}}
         session = webdriver(port, "POST", "/session", {"capabilities": {"alwaysMatch": wanted}})["sessionId"]

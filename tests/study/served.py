@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import json
+import socket
 import threading
 import time
 from collections.abc import Iterator
@@ -14,6 +15,7 @@ from typing import Any
 
 from children import LIPMOTION, Child, child
 from lipmotion.study.manifest import Study
+from study.hostile import Hostile
 from study.small_study import scripted_answer
 
 NO_REPLY = (ConnectionError, http.client.HTTPException, TimeoutError)
@@ -80,6 +82,29 @@ class Connection:
     def close(self) -> None:
         """Close the connection."""
         self._connection.close()
+
+
+def raw_reply(port: int, hostile: Hostile) -> tuple[http.client.HTTPResponse, bytes] | None:
+    """Return the reply to a hostile request, as it is, and its body; None: the connection was closed, which is safe."""
+    raw = http.client.HTTPConnection("127.0.0.1", port, timeout=PATIENCE_S)
+    try:
+        raw.putrequest(hostile.method, hostile.path, skip_host="host" in hostile.headers, skip_accept_encoding=True)
+        for name, value in {**hostile.headers, "content-length": str(len(hostile.body))}.items():
+            raw.putheader(name, value.encode("utf-8"))
+        raw.endheaders(hostile.body)
+        reply = raw.getresponse()
+        return reply, reply.read()
+    except NO_REPLY:
+        return None
+    finally:
+        raw.close()
+
+
+def send_junk(port: int) -> None:
+    """Send what is no request."""
+    for content in (b"\x16\x03\x01" * 200, b"GET / HTTP/9.9\r\n\r\n", b"GET /" + b"a" * 100_000, b"\r\n" * 500):
+        with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S) as plain:
+            plain.sendall(content)
 
 
 class ScriptedRater(threading.Thread):

@@ -18,7 +18,8 @@ from study.small_study import scripted_answer, small_study
 
 starlette = pytest.importorskip("starlette", reason="the extra 'study' is not installed")
 
-from lipmotion.study.application import ANSWER_BURST, HEADERS, JOIN_BURST, PAGE, study_application  # noqa: E402
+from lipmotion.study.application import ANSWER_BURST, JOIN_BURST, PAGE, study_application  # noqa: E402
+from lipmotion.web.replies import HEADERS  # noqa: E402
 
 
 class Open(NamedTuple):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import http.client
 import socket
 import sqlite3
 from contextlib import ExitStack, closing
@@ -17,7 +16,7 @@ from lipmotion.study.manifest import VIDEOS
 from lipmotion.study.serve import serve_study
 from lipmotion.study.store import ANSWERS
 from study.hostile import FOREIGN, hostile_requests
-from study.served import NO_REPLY, Connection, ScriptedRater, served
+from study.served import Connection, ScriptedRater, raw_reply, send_junk, served
 from study.small_study import small_study
 
 pytest.importorskip("uvicorn", reason="the extra 'study' is not installed")
@@ -76,18 +75,10 @@ def test_hostile_requests_get_no_file_and_leave_no_traceback(tmp_path: Path) -> 
         manifest = (folder / "study.json").read_bytes()
         statuses = set()
         for hostile in hostile_requests(500, video, token):
-            raw = http.client.HTTPConnection("127.0.0.1", server.port, timeout=30)
-            try:
-                raw.putrequest(hostile.method, hostile.path, skip_accept_encoding=True)
-                for name, value in {**hostile.headers, "content-length": str(len(hostile.body))}.items():
-                    raw.putheader(name, value.encode("utf-8"))
-                raw.endheaders(hostile.body)
-                reply = raw.getresponse()
-                body = reply.read()
-            except NO_REPLY:
-                continue  # the connection was closed: no reply is a safe one
-            finally:
-                raw.close()
+            answered = raw_reply(server.port, hostile)
+            if answered is None:
+                continue
+            reply, body = answered
             statuses.add(reply.status)
             assert FOREIGN.encode() not in body
             assert manifest[:200] not in body
@@ -97,9 +88,7 @@ def test_hostile_requests_get_no_file_and_leave_no_traceback(tmp_path: Path) -> 
             if reply.getheader("content-type") == "video/mp4" and reply.status == 200 and body:
                 assert body in shown
         assert {404, 405, 401, 400} <= statuses
-        for bytes_sent in (b"\x16\x03\x01" * 200, b"GET / HTTP/9.9\r\n\r\n", b"GET /" + b"a" * 100_000, b"\r\n" * 500):
-            with socket.create_connection(("127.0.0.1", server.port), timeout=30) as raw_socket:
-                raw_socket.sendall(bytes_sent)
+        send_junk(server.port)
         connection.close()
         later = Connection(server.port, token)
         wait_until(lambda: later.ask("/api/state")[0] == 200, 60)  # the limit on its requests has passed

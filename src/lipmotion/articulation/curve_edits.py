@@ -1,4 +1,4 @@
-"""Pins and gains of curves that exist already: of channels that no model generates by themselves, of blendshapes."""
+"""Edits of curves that exist already: of channels that no model generates by themselves, of blendshapes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from lipmotion.articulation.delivery import intensified
 from lipmotion.articulation.rest import rest_frames
 from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING
-from lipmotion.types import WEIGHT, Gain, Generation, Motion, Pin, Timeline, Unit, frame_of
+from lipmotion.types import WEIGHT, CurveEdit, DrawnCurve, Gain, Generation, Hold, Motion, Pin, Timeline, Unit, frame_of
 
 Curve = NDArray[np.float64]
 
@@ -21,17 +21,17 @@ PIN_REACH_S = 0.1
 GAIN_EDGE_S = 0.1
 """A gain grows and fades in this time."""
 LOCK_EDGE_S = 0.05
-"""Motion goes over into a locked span, and out of it, in this time."""
+"""Motion goes over into a locked span, or one that is held, and out of it, in this time."""
 
 
-def with_edited_curves(motion: Motion, units: Timeline[Unit], edits: Sequence[Pin | Gain]) -> Motion:
-    """Return motion with pins and gains of its channels; those of other channels change nothing.
+def with_edited_curves(motion: Motion, units: Timeline[Unit], edits: Sequence[CurveEdit]) -> Motion:
+    """Return motion with edits of its channels; those of other channels change nothing.
 
     A pinned value holds exactly in the frame nearest to its time, also where a gain acts; the curve bends towards it
-    within ``PIN_REACH_S``. A gain multiplies weights, and the distance of other channels to their rest pose. Weights
-    stay between 0 and 1.
+    within ``PIN_REACH_S``. A gain multiplies weights, and the distance of other channels to their rest pose. What is
+    drawn replaces the curve, and what the gains before it did there. Weights stay between 0 and 1.
     units : phones in time, whose silences show the rest pose
-    Raises InputError: a pin outside the motion, or a weight that is pinned to less than 0 or more than 1.
+    Raises InputError: a pin outside the motion, or a weight that is to be less than 0 or more than 1.
     """
     ours = [edit for edit in edits if edit.channel in motion.names]
     edited = {edit.channel for edit in ours}
@@ -45,6 +45,10 @@ def with_edited_curves(motion: Motion, units: Timeline[Unit], edits: Sequence[Pi
         if isinstance(edit, Pin):
             pins.append((pinned_frame(edit, motion, is_weight=is_weight), column, edit.value))
             continue
+        if isinstance(edit, DrawnCurve):
+            check_drawn(edit, is_weight=is_weight)
+            values[:, column] += _drawn_change(values[:, column], edit, motion)
+            continue
         still = 0.0 if is_weight else float(np.median(values[rest, column]))
         factor = 1 + (edit.factor - 1) * span_weight(motion.time_s, edit.start_s, edit.end_s, GAIN_EDGE_S)
         values[:, column] = still + factor * (values[:, column] - still)
@@ -55,6 +59,29 @@ def with_edited_curves(motion: Motion, units: Timeline[Unit], edits: Sequence[Pi
     weights = [column for channel, column in channels if channel.unit == WEIGHT and channel.name in edited]
     values[:, weights] = np.clip(values[:, weights], 0, 1)
     return replace(motion, values=values)
+
+
+def check_drawn(edit: DrawnCurve, *, is_weight: bool) -> None:
+    """Raise InputError if values that are drawn are not possible; ``is_weight``: whether the curve is 0 to 1."""
+    if is_weight and not 0 <= min(edit.values) <= max(edit.values) <= 1:
+        raise InputError(
+            f"{edit.channel} is drawn between {min(edit.values):g} and {max(edit.values):g}, required 0 to 1"
+        )
+
+
+def _drawn_change(curve: Curve, edit: DrawnCurve, motion: Motion) -> Curve:
+    """Return what is to be added to a curve so that it is as drawn, and goes over into that smoothly [shape=(T,)]."""
+    from scipy.interpolate import PchipInterpolator
+
+    time_s = motion.time_s
+    inside = np.flatnonzero((time_s >= edit.start_s - 1e-9) & (time_s <= edit.end_s + 1e-9))
+    if not len(inside):
+        return np.zeros(len(curve))
+    drawn_s = np.linspace(edit.start_s, edit.end_s, len(edit.values))
+    lacking = PchipInterpolator(drawn_s, edit.values)(time_s[inside]) - curve[inside]
+    nearest = np.clip(np.arange(len(curve)), inside[0], inside[-1]) - inside[0]
+    change: Curve = lacking[nearest] * span_weight(time_s, time_s[inside[0]], time_s[inside[-1]], PIN_REACH_S)
+    return change
 
 
 def bend_through_pins(values: Curve, pins: Sequence[tuple[int, int, float]], reach: int) -> None:
@@ -94,6 +121,15 @@ def with_gain(generation: Generation, gain: Gain) -> Generation:
     weight = span_weight(motion.time_s, gain.start_s, gain.end_s, GAIN_EDGE_S)
     larger = intensified(generation, gain.factor)
     return _blended(generation, larger, weight)
+
+
+def with_held(generation: Generation, hold: Hold) -> Generation:
+    """Return a generation whose mouth stays for a time as it is at the start of it, and goes over into that."""
+    motion = generation.motion
+    frame = min(round(hold.start_s * motion.rate_hz), len(motion.values) - 1)
+    still = replace(motion, values=np.broadcast_to(motion.values[frame], motion.values.shape))
+    weight = span_weight(motion.time_s, hold.start_s, hold.end_s, LOCK_EDGE_S)
+    return _blended(generation, replace(generation, motion=still), weight)
 
 
 def with_locked(generation: Generation, locked: Generation, start_s: float, end_s: float) -> Generation:

@@ -16,7 +16,7 @@ from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.rest import rest_frames
 from lipmotion.errors import InputError
 from lipmotion.kernels.sequences.holds import best_holds
-from lipmotion.types import EYE_DISTANCE, WEIGHT, Gain, Generation, Motion, Pin, Span, StateTrace, Timeline, Unit
+from lipmotion.types import EYE_DISTANCE, WEIGHT, CurveEdit, Generation, Motion, Pin, Span, StateTrace, Timeline, Unit
 from lipmotion.types.delivery import Delivery as Delivery  # noqa: PLC0414 (part of this module's interface)
 from lipmotion.types.generation import ReducedVariance
 from lipmotion.units import is_silent
@@ -71,10 +71,10 @@ def moved_in_time(generation: Generation, delivery: Delivery) -> Generation:
     )
 
 
-def _moved_edits(edits: Sequence[Pin | Gain], by_s: float, end_s: float) -> Iterator[Pin | Gain]:
-    """Yield pins and gains so many seconds later; pins that are then outside 0 to ``end_s`` are left out."""
+def _moved_edits(edits: Sequence[CurveEdit], by_s: float, end_s: float) -> Iterator[CurveEdit]:
+    """Yield edits of curves so many seconds later; pins that are then outside 0 to ``end_s`` are left out."""
     for edit in edits:
-        if isinstance(edit, Gain):
+        if not isinstance(edit, Pin):
             yield replace(edit, start_s=edit.start_s + by_s, end_s=edit.end_s + by_s)
         elif 0 <= edit.time_s + by_s <= end_s:
             yield replace(edit, time_s=edit.time_s + by_s)

@@ -37,6 +37,7 @@ from lipmotion.cli.verbs import (
     info,
     render,
     speak,
+    studio,
     study,
     train,
     words,
@@ -44,7 +45,7 @@ from lipmotion.cli.verbs import (
 from lipmotion.errors import ExportError
 
 VERBS = (
-    *(animate, batch, speak, render, edit, explain, cues, words, corpus, train, adapt, face),
+    *(animate, batch, speak, render, edit, studio, explain, cues, words, corpus, train, adapt, face),
     *(character, addon, evaluate, compare, experiment, study, info, cite),
     *(doctor, completion),
 )

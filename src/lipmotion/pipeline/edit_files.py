@@ -10,7 +10,7 @@ from typing import Any
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.export.motion.document import parse_units, unit_rows
-from lipmotion.pipeline.edits import FORMS, Edits, MoodStep
+from lipmotion.pipeline.edits import FORMS, Edits, MoodStep, Step
 from lipmotion.pipeline.job import Request, located
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.outputs.scenes import sound_reference
@@ -20,7 +20,7 @@ from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.storage.files import read_text_file, whole_file
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.storage.toml_text import read_toml
-from lipmotion.types import Outlook, Timeline, Unit
+from lipmotion.types import Generation, Outlook, Timeline, Unit
 
 LOG = logging.getLogger("lipmotion")
 FORMAT, VERSION = "lipmotion.edits", 1
@@ -38,12 +38,32 @@ class EditFile:
     named   : the recording and what else the file says of it (``HELD``)
     units   : its phones in time before the edits, so that no recogniser changes what they mean; None: not known
     outlook : what to expect of the motion; None: not known
+    undone  : edits that were taken back and can be made again, the last one that was taken back first
     """
 
     edits: Edits = field(default_factory=Edits)
     named: Request = field(default_factory=Request)
     units: Timeline[Unit] | None = None
     outlook: Outlook | None = None
+    undone: tuple[Step, ...] = ()
+
+    def undo(self, count: int = 1) -> EditFile:
+        """Return the file with its last edits taken back. Raises InputError: there are fewer."""
+        steps = self.edits.steps
+        if not 0 <= count <= len(steps):
+            raise InputError(f"{count} edits to take back, required 0 to {len(steps)}: the number of edits")
+        kept = len(steps) - count
+        return replace(self, edits=Edits(steps[:kept]), undone=(*steps[kept:], *self.undone))
+
+    def redo(self, count: int = 1) -> EditFile:
+        """Return the file with edits made again that were taken back. Raises InputError: there are fewer."""
+        if not 0 <= count <= len(self.undone):
+            raise InputError(f"{count} edits to make again, required 0 to {len(self.undone)}: the number taken back")
+        return replace(self, edits=Edits(self.edits.steps + self.undone[:count]), undone=self.undone[count:])
+
+    def then(self, *edits: str | Step) -> EditFile:
+        """Return the file with some more edits; what was taken back is gone. Raises InputError: as ``Edits.then``."""
+        return replace(self, edits=self.edits.then(*edits), undone=()) if edits else self
 
     def session(self, asked: SpeechRequest | None = None, *, model: Model | None = None, **more: Any) -> Session:
         """Return a session of the recording; or of a given request, with the phones of the file if it has none.
@@ -70,11 +90,15 @@ def begun(asked: Request) -> EditFile:
 
     Its phones are recognised or aligned now. Raises as ``animate``.
     """
-    session = Session(read_request(asked), model=load_model(asked.model))
+    return begun_with(asked, Session(read_request(asked), model=load_model(asked.model)))[0]
+
+
+def begun_with(asked: Request, session: Session) -> tuple[EditFile, Generation]:
+    """Return the file of ``begun`` for a session of a request, and its motion."""
     named = Request(**{name: getattr(asked, name) for name in HELD})
     generation = session.generated()
     moods = (MoodStep(key.label, key.time_s) for key in generation.moods)  # of tags in the words, which are not held
-    return EditFile(Edits(tuple(moods)), named, session.units(), generation.outlook)
+    return EditFile(Edits(tuple(moods)), named, session.units(), generation.outlook), generation
 
 
 def edit_file(edits: EditFile | Edits | str | Path | None) -> EditFile:
@@ -126,17 +150,23 @@ def _suffix(path: Path) -> str:
 
 
 def _content(members: dict[str, Any], folder: Path) -> EditFile:
-    known = {"format", "version", *HELD, "steps", "units", "recognised", "outlook"}
+    known = {"format", "version", *HELD, "steps", "undone", "units", "recognised", "outlook"}
     if unknown := sorted(set(members) - known):
         raise InputError(f"unknown member {unknown[0]!r}; required some of: {', '.join(sorted(known))}")
-    steps, outlook = members.get("steps", []), members.get("outlook")
-    if not isinstance(steps, list) or not all(isinstance(step, str) for step in steps):
-        raise InputError(f"the steps are {shortened(repr(steps))}, required a list of sentences: {FORMS[0]!r}")
+    steps, undone = (_sentences(members, name) for name in ("steps", "undone"))
+    outlook = members.get("outlook")
     named = located(Request.parsed({name: members[name] for name in HELD if name in members}), folder)
     units = parse_units(members["units"], members.get("recognised", ())) if "units" in members else None
     if outlook is not None:
         outlook = Outlook(**{"voice": None} | outlook | {"advice": tuple(outlook["advice"])})
-    return EditFile(Edits().then(*steps), named, units, outlook)
+    return EditFile(Edits().then(*steps), named, units, outlook, Edits().then(*undone).steps)
+
+
+def _sentences(members: dict[str, Any], name: str) -> list[str]:
+    found = members.get(name, [])
+    if not isinstance(found, list) or not all(isinstance(step, str) for step in found):
+        raise InputError(f"the {name} are {shortened(repr(found))}, required a list of sentences: {FORMS[0]!r}")
+    return found
 
 
 def write_edits(file: EditFile, path: str | Path) -> None:
@@ -150,6 +180,8 @@ def write_edits(file: EditFile, path: str | Path) -> None:
         if value != getattr(usual, name):
             members[name] = sound_reference(value, path) if isinstance(value, Path) else value
     members["steps"] = list(file.edits.sentences)
+    if file.undone:
+        members["undone"] = list(map(str, file.undone))
     if file.units is not None:
         members |= unit_rows(file.units)
     if file.outlook is not None:

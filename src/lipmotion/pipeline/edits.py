@@ -6,18 +6,36 @@ import re
 from abc import abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import lru_cache
 from typing import Any, ClassVar, get_type_hints
 
 from lipmotion.errors import InputError, shortened
-from lipmotion.types import Gain, Pin, Span, Timeline, Unit
+from lipmotion.types import CurveEdit, DrawnCurve, Gain, Hold, Pin, Span, Timeline, Unit
 from lipmotion.types.delivery import Delivery
 from lipmotion.types.moods import MoodKey, in_time, moods_of, text_of
 from lipmotion.types.staging import Staging
-from lipmotion.units import PHONES, unknown_phone_message
+from lipmotion.units import PHONES, is_silent, unknown_phone_message
 
 LEAST_PHONE_S = 0.01
 """Shortest phone that an edit may leave."""
-_READ = {int: (r"\d+", int), float: (r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", float), str: (r"\S+", str)}
+
+
+class Text(str):
+    """Several words of a sentence."""
+
+    __slots__ = ()
+
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+Numbers = tuple[float, ...]
+_READ: dict[Any, tuple[str, Any]] = {
+    int: (r"\d+", int),
+    float: (_NUMBER, float),
+    str: (r"\S+", str),
+    Text: (r"\S.*?", lambda text: Text(" ".join(text.split()))),
+    Numbers: (rf"{_NUMBER}(?:\s+{_NUMBER})*", lambda text: tuple(map(float, text.split()))),
+}
+"""How the values of fields are written, and what reads them."""
 
 
 @dataclass(frozen=True)
@@ -35,16 +53,25 @@ class Step:
 
         Raises InputError: a value is not allowed.
         """
-        types = get_type_hints(cls)
-        pattern = re.sub(r"\\{(\w+)\\}", lambda name: f"({_READ[types[name[1]]][0]})", re.escape(cls.form))
-        found = re.fullmatch(pattern.replace(r"\ ", r"\s+"), sentence.strip())
+        pattern, readers = _pattern(cls.form, cls)  # type: ignore[arg-type] # a class can be hashed
+        found = pattern.fullmatch(sentence.strip())
         if found is None:
             return None
-        names = re.findall(r"{(\w+)}", cls.form)
-        return cls(**{name: _READ[types[name]][1](text) for name, text in zip(names, found.groups(), strict=True)})
+        return cls(**{name: read(text) for (name, read), text in zip(readers.items(), found.groups(), strict=True)})
+
+
+@lru_cache
+def _pattern(form: str, kind: Any) -> tuple[re.Pattern[str], dict[str, Any]]:
+    """Return the pattern of a kind of sentence, and what reads its values, by the names of the fields."""
+    types = get_type_hints(kind)
+    pattern = re.sub(r"\\{(\w+)\\}", lambda name: f"({_READ[types[name[1]]][0]})", re.escape(form))
+    names = re.findall(r"{(\w+)}", form)
+    return re.compile(pattern.replace(r"\ ", r"\s+")), {name: _READ[types[name]][1] for name in names}
 
 
 def _written(value: object) -> str:
+    if isinstance(value, tuple):
+        return " ".join(map(_written, value))
     return repr(value) if isinstance(value, float) else str(value)
 
 
@@ -165,6 +192,28 @@ class PhoneInserted(PhoneStep):
         return with_span(units, [Span(self.start_s, min(self.end_s, last_s), _known(self.phone))])
 
 
+@dataclass(frozen=True)
+class PhoneSplit(PhoneStep):
+    """A phone becomes two of the same kind; either can then be another one."""
+
+    form: ClassVar[str] = "split phone {number} at {time_s}"
+    number: int
+    time_s: float
+
+    def applied(self, units: Timeline[Unit]) -> Timeline[Unit]:  # noqa: D102
+        place = self._index(units, self.number)
+        whole = units[place]
+        least_s, most_s = whole.start_s + LEAST_PHONE_S, whole.end_s - LEAST_PHONE_S
+        if not least_s - 1e-9 <= self.time_s <= most_s + 1e-9:
+            raise InputError(
+                f"{str(self)!r}: the phone lasts from {whole.start_s:.3f} to {whole.end_s:.3f} s, required a time at "
+                f"least {LEAST_PHONE_S} s within"
+            )
+        label = replace(whole.label, confidence=None)
+        parts = (Span(whole.start_s, self.time_s, label), Span(self.time_s, whole.end_s, label))
+        return Timeline((*units.spans[:place], *parts, *units.spans[place + 1 :]))
+
+
 def with_span(units: Timeline[Unit], spans: Sequence[Span[Unit]]) -> Timeline[Unit]:
     """Return phones in time with others in place of what was said from their start to their end."""
     start_s, end_s = spans[0].start_s, spans[-1].end_s
@@ -182,16 +231,49 @@ class WordIs(Step):
     word: str
 
 
+@dataclass(frozen=True)
+class WordSaid(Step):
+    """Another word is said in the same time, with these phones, which are aligned with the sound there."""
+
+    form: ClassVar[str] = "word {number} is {word} said {phones}"
+    number: int
+    word: str
+    phones: Text
+
+    def __post_init__(self) -> None:
+        for phone in self.phones.split():
+            if _known(phone) and is_silent(phone):
+                raise InputError(f"{str(self)!r}: a word has no silence in it; say two words")
+
+
+@dataclass(frozen=True)
+class WordsSaid(Step):
+    """Other words are said from one time to another; their phones are aligned with the sound there."""
+
+    form: ClassVar[str] = "say {words} from {start_s} to {end_s}"
+    words: Text
+    start_s: float
+    end_s: float
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.start_s < self.end_s:
+            raise InputError(f"{str(self)!r}: required an end after the start")
+
+
+WordStep = WordIs | WordSaid | WordsSaid
+"""Edits of words, whose phones are aligned with the sound."""
+
+
 class CurveStep(Step):
-    """An edit of values: a pin or a gain."""
+    """An edit of values: a pin, a gain, what is drawn or held."""
 
     def __post_init__(self) -> None:
         self.edit  # noqa: B018 # checks the values
 
     @property
     @abstractmethod
-    def edit(self) -> Pin | Gain:
-        """The pin or gain."""
+    def edit(self) -> CurveEdit | Hold:
+        """The edit as a value."""
 
 
 @dataclass(frozen=True)
@@ -241,6 +323,36 @@ class CurveGainStep(CurveStep):
 
 
 @dataclass(frozen=True)
+class DrawStep(CurveStep):
+    """A channel or a curve takes values at equal distances from one time to another, as they were drawn."""
+
+    form: ClassVar[str] = "draw {channel} {values} from {start_s} to {end_s}"
+    channel: str
+    values: Numbers
+    start_s: float
+    end_s: float
+
+    @property
+    def edit(self) -> DrawnCurve:
+        """The drawn stretch."""
+        return DrawnCurve(self.start_s, self.end_s, self.channel, self.values)
+
+
+@dataclass(frozen=True)
+class HoldStep(CurveStep):
+    """The whole mouth stays for a time as it is at the start of it."""
+
+    form: ClassVar[str] = "hold from {start_s} to {end_s}"
+    start_s: float
+    end_s: float
+
+    @property
+    def edit(self) -> Hold:
+        """The held stretch."""
+        return Hold(self.start_s, self.end_s)
+
+
+@dataclass(frozen=True)
 class LockStep(Step):
     """The motion in a span stays as it is with the edits before this one, whatever comes after."""
 
@@ -252,8 +364,8 @@ class LockStep(Step):
         if not self.start_s < self.end_s:
             raise InputError(f"{str(self)!r}: required an end after the start")
 
-    def holds(self, edit: Pin | Gain) -> bool:
-        """Return whether a pin or all of a gain lies in the locked span."""
+    def holds(self, edit: CurveEdit | Hold) -> bool:
+        """Return whether a pin, or all of another edit of values, lies in the locked span."""
         if isinstance(edit, Pin):
             return self.covers(edit.time_s, edit.time_s)
         return self.start_s <= edit.start_s and edit.end_s <= self.end_s
@@ -354,8 +466,8 @@ def _names(kind: type[Any]) -> tuple[str, ...]:
 
 
 STEPS: tuple[type[Step], ...] = (
-    WordIs, PhoneIs, PhoneBegins, PhoneEnds, PhoneRemoved, PhoneInserted,
-    PinStep, GainStep, CurveGainStep, LockStep, UnlockStep, MoodStep, SetStep,
+    WordIs, WordSaid, WordsSaid, PhoneIs, PhoneBegins, PhoneEnds, PhoneSplit, PhoneRemoved, PhoneInserted,
+    PinStep, GainStep, CurveGainStep, DrawStep, HoldStep, LockStep, UnlockStep, MoodStep, SetStep,
 )  # fmt: skip
 """All edits that a sentence can state."""
 FORMS = tuple(re.sub(r"{(\w+?)(?:_s)?}", lambda name: name[1].upper(), step.form) for step in STEPS)

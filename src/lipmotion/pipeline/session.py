@@ -18,7 +18,14 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from lipmotion.articulation.curve_edits import pinned_frame, with_edited_curves, with_gain, with_locked
+from lipmotion.articulation.curve_edits import (
+    check_drawn,
+    pinned_frame,
+    with_edited_curves,
+    with_gain,
+    with_held,
+    with_locked,
+)
 from lipmotion.articulation.pauses import with_pauses
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
 from lipmotion.articulation.symmetry import symmetrical
@@ -37,8 +44,11 @@ from lipmotion.pipeline.edits import (
     LockStep,
     PhoneStep,
     Step,
+    Text,
     UnlockStep,
-    WordIs,
+    WordSaid,
+    WordsSaid,
+    WordStep,
     locks,
     with_span,
 )
@@ -65,14 +75,18 @@ from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.types import (
     WEIGHT,
     Constraints,
+    CurveEdit,
+    DrawnCurve,
     Gain,
     Generation,
+    Hold,
     Monitor,
     Motion,
     Outlook,
     Pin,
     Progress,
     Prosody,
+    Span,
     Speech,
     SpeechKnowledge,
     Timeline,
@@ -80,7 +94,7 @@ from lipmotion.types import (
     frame_of,
     silent_monitor,
 )
-from lipmotion.units import words_in_time
+from lipmotion.units import Lexicon, words_in_time, words_of
 from lipmotion.units.mood_tags import moods_in_time
 
 KeptT = TypeVar("KeptT")
@@ -97,22 +111,30 @@ LATE_S = 0.1
 """Seconds by which times of edits may lie after the end; editing programs round times."""
 KEPT = 4
 """Results that each stage keeps: the last ones that were asked for."""
+ALIGNED = 1000
+"""Words of edits whose phones are kept."""
 INTERACTIVE = 3
 """A session that generates motion for the third time will do so often: kernels are loaded that pay then."""
 NO_EDITS = Edits()
+UnitStep = PhoneStep | WordStep | LockStep | UnlockStep
+"""Edits that change phones, or keep others from changing them."""
 
 
 class _Kept(Generic[KeptT]):
     """The last results of a stage, by what they depend on."""
 
-    def __init__(self) -> None:
+    def __init__(self, most: int = KEPT) -> None:
+        self._most = most
         self._results: OrderedDict[Hashable, KeptT] = OrderedDict()
+
+    def __contains__(self, key: Hashable) -> bool:
+        return key in self._results
 
     def once(self, key: Hashable, make: Callable[[], KeptT]) -> KeptT:
         """Return the result for a key, made if it is not kept."""
         if key not in self._results:
             self._results[key] = make()
-            while len(self._results) > KEPT:
+            while len(self._results) > self._most:
                 self._results.popitem(last=False)
         self._results.move_to_end(key)
         return self._results[key]
@@ -129,6 +151,7 @@ class Session:
     curves    : names of further curves that outputs will have: controls of a rig, blendshapes of a character
     outlook   : what to expect of the motion, where it is known; None: it follows from the speech
     lasts_s   : duration of the recording that was edited, in seconds: another one is refused; None: not known
+    audio     : the sound of the recording, where it has been read already; None: it is read when it is needed
     A session may be used by several threads, one at a time; several sessions do not disturb one another.
     Raises InputError: the model knows no such speaker.  Raises ModelFormatError: as ``load_model``.
 
@@ -150,6 +173,7 @@ class Session:
         curves: Iterable[str] = (),
         outlook: Outlook | None = None,
         lasts_s: float | None = None,
+        audio: AnalysedAudio | None = None,
     ) -> None:
         self.request: SpeechRequest = in_language(request_of(speech))
         self.model = model if isinstance(model, Model) else load_model(model)
@@ -158,12 +182,13 @@ class Session:
         self._meanwhile = meanwhile
         self._understood: _Kept[UnderstoodSpeech] = _Kept()
         self._units: _Kept[Timeline[Unit]] = _Kept()
+        self._aligned: _Kept[list[Span[Unit]]] = _Kept(ALIGNED)
         self._moved: _Kept[Generation] = _Kept()
         self._generated: _Kept[Generation] = _Kept()
         self._delivered: _Kept[Generation] = _Kept()
         self._faces: _Kept[DrawsSingly] = _Kept()
         self._drawn: _Kept[DrawnMotion[Any]] = _Kept()
-        self._lasts_s, self._motions = lasts_s, 0
+        self._lasts_s, self._motions, self._given_audio = lasts_s, 0, audio
         self._one_at_a_time = RLock()
 
     def units(self, edits: Edits = NO_EDITS) -> Timeline[Unit]:
@@ -232,24 +257,25 @@ class Session:
     @cached_property
     def _recording(self) -> UnderstoodSpeech:
         """The speech without edits."""
-        self._speaker  # noqa: B018 # what is refused is refused before the long work
+        self.speaker  # noqa: B018 # what is refused is refused before the long work
         request = self.request
-        if self._lasts_s is not None:
-            if abs(self._audio.duration_s - self._lasts_s) > LATE_S:
-                raise InputError(
-                    f"the recording lasts {self._audio.duration_s:.2f} s, the edited one {self._lasts_s:.2f} s: the "
-                    "edits are of another recording; make some of this one: lipmotion edit FILE --of RECORDING"
-                )
+        if self._lasts_s is not None and abs(self._audio.duration_s - self._lasts_s) > LATE_S:
+            raise InputError(
+                f"the recording lasts {self._audio.duration_s:.2f} s, the edited one {self._lasts_s:.2f} s: the "
+                "edits are of another recording; make some of this one: lipmotion edit FILE --of RECORDING"
+            )
+        if self._lasts_s is not None or self._given_audio is not None:
             request = replace(request, recording=self._audio)
         return understood_speech(self.model, request, self._work, self._monitor)
 
     @cached_property
-    def _speaker(self) -> SpeakerMap | None:
+    def speaker(self) -> SpeakerMap | None:
+        """The map onto the person whose motion is generated; None: the model knows one person."""
         return person_of(self.model, self.request)
 
     @cached_property
     def _audio(self) -> AnalysedAudio:
-        return analysed(audio_of(self.request))
+        return self._given_audio or analysed(audio_of(self.request))
 
     @cached_property
     def _prosody(self) -> Prosody:
@@ -258,39 +284,55 @@ class Session:
 
     def _edited_units(self, steps: tuple[Step, ...]) -> Timeline[Unit]:
         """Return the phones in time after some edits; each edit sees those that the ones before it left."""
-        ours = tuple(step for step in steps if isinstance(step, PhoneStep | WordIs | LockStep | UnlockStep))
-        while ours and isinstance(ours[-1], LockStep | UnlockStep):
-            ours = ours[:-1]
-        if not ours:
-            return self._recording.speech.units
-        return self._units.once(ours, lambda: self._changed_units(ours))
+        ours = tuple(step for step in steps if isinstance(step, UnitStep))
+        done = next((count for count in range(len(ours), 0, -1) if ours[:count] in self._units), 0)
+        units = self._units.once(ours[:done], lambda: self._recording.speech.units)
+        for count in range(done + 1, len(ours) + 1):
+            units = self._changed_units(units, ours[:count])
+        return self._units.once(ours, lambda: units)
 
-    def _changed_units(self, ours: tuple[PhoneStep | WordIs | LockStep | UnlockStep, ...]) -> Timeline[Unit]:
-        before, step = self._edited_units(ours[:-1]), ours[-1]
+    def _changed_units(self, before: Timeline[Unit], ours: tuple[UnitStep, ...]) -> Timeline[Unit]:
+        """Return phones in time after the last of some edits; ``before``: after the others."""
+        step = ours[-1]
         if isinstance(step, LockStep | UnlockStep):
             return before
-        after = self._reworded(before, step) if isinstance(step, WordIs) else step.applied(before)
+        after = step.applied(before) if isinstance(step, PhoneStep) else self._reworded(before, step)
         changed = {*before} ^ {*after}
         for lock in locks(ours).values():
             if any(lock.covers(span.start_s, span.end_s) for span in changed):
                 raise InputError(f"{str(step)!r} changes what is locked ({str(lock)!r}); take the lock out first")
         return after
 
-    def _reworded(self, units: Timeline[Unit], step: WordIs) -> Timeline[Unit]:
-        """Return phones in time with another word in the time of one, aligned with the sound there."""
-        words = [span for span in words_in_time(units) if span.label]
-        if not 1 <= step.number <= len(words):
-            found = f"1 to {len(words)}" if words else "words: give a transcript, or edit phones"
-            raise InputError(f"{str(step)!r}: there is no word {step.number}, required {found}")
-        where = words[step.number - 1]
+    def _reworded(self, units: Timeline[Unit], step: WordStep) -> Timeline[Unit]:
+        """Return phones in time with other words in the time of some, aligned with the sound there."""
+        if isinstance(step, WordsSaid):
+            start_s, end_s, said = step.start_s, min(step.end_s, units[-1].end_s), step.words
+            where = f"{start_s:.2f} to {end_s:.2f} s"
+        else:
+            words = [span for span in words_in_time(units) if span.label]
+            if not 1 <= step.number <= len(words):
+                found = f"1 to {len(words)}" if words else "words: give a transcript, or edit phones"
+                raise InputError(f"{str(step)!r}: there is no word {step.number}, required {found}")
+            there = words[step.number - 1]
+            start_s, end_s, said = there.start_s, there.end_s, Text(step.word)
+            where = f"{start_s:.2f} to {end_s:.2f} s, where {there.label!r} was"
+        phones = step.phones if isinstance(step, WordSaid) else ""
         try:
-            said = aligned_within(self.model, self.request, self._audio, step.word, where.start_s, where.end_s)
+            spans = self._aligned.once((said, phones, start_s, end_s), lambda: self._said(step, said, start_s, end_s))
         except AlignmentError as error:
             raise InputError(
-                f"{str(step)!r}: does not fit into {where.start_s:.2f} to {where.end_s:.2f} s, where {where.label!r} "
-                f"was ({error}); make room with 'phone N ends TIME' first"
+                f"{str(step)!r}: does not fit into {where} ({error}); make room with 'phone N ends TIME' first"
             ) from error
-        return with_span(units, said)
+        return with_span(units, spans)
+
+    def _said(self, step: WordStep, said: str, start_s: float, end_s: float) -> list[Span[Unit]]:
+        """Return the phones in time of words that a step says. Raises AlignmentError: they do not fit in there."""
+        request = self.request
+        if isinstance(step, WordSaid):
+            own = {word: (tuple(step.phones.split()),) for word in words_of(said)}
+            request = replace(request, lexicon=Lexicon((request.lexicon or Lexicon()).user | own))
+        pauses = isinstance(step, WordsSaid)
+        return aligned_within(self.model, request, self._audio, said, start_s, end_s, pauses=pauses)
 
     def _edited_speech(self, steps: tuple[Step, ...]) -> UnderstoodSpeech:
         plain, units = self._recording, self._edited_units(steps)
@@ -324,9 +366,11 @@ class Session:
         for edit in edits:
             if isinstance(edit, Gain) and not edit.channel:
                 generation = with_gain(generation, edit)
-        curves = [edit for edit in edits if edit.channel and edit not in modelled]
+            elif isinstance(edit, Hold):
+                generation = with_held(generation, edit)
+        curves = [edit for edit in edits if not isinstance(edit, Hold) and edit.channel and edit not in modelled]
         if any(not edit.channel for edit in edits):
-            curves = [*modelled, *curves]  # a gain has moved their values
+            curves = [*modelled, *curves]  # a gain or a held pose has moved their values
         asked = [edit.channel for edit in curves if edit.channel in GESTURES]
         if asked:
             generation = with_motion(generation, with_gestures(generation.motion, generation.units, asked))
@@ -336,11 +380,14 @@ class Session:
             self._check_edit(edit, motion)
         return replace(generation, motion=motion, curve_edits=others)
 
-    def _check_edit(self, edit: Pin | Gain, motion: Motion) -> None:
+    def _check_edit(self, edit: CurveEdit | Hold, motion: Motion) -> None:
         """Raise InputError if an edit is of no curve that is known, or of no time of the recording."""
         known = (*motion.names, *GESTURES, *KNOWN_CURVES, *self._curves)
         if edit.channel and edit.channel not in known:
-            what, lower = "pin" if isinstance(edit, Pin) else "change", {name.lower(): name for name in known}
+            what, lower = (
+                {Pin: "pin", DrawnCurve: "draw"}.get(type(edit), "change"),
+                {name.lower(): name for name in known},
+            )
             near = get_close_matches(edit.channel.lower(), lower, 1)
             others = ", ".join(name for name in (*motion.names, *GESTURES) if not LIP_POINT.fullmatch(name))
             named = shortened(repr(edit.channel)) + (f" (is it {lower[near[0]]}?)" if near else "")
@@ -352,10 +399,13 @@ class Session:
         if isinstance(edit, Pin):
             pinned_frame(edit, motion, is_weight=edit.channel in WEIGHTS)
         elif not 0 <= edit.start_s <= edit.end_s <= last_s + LATE_S:
-            raise InputError(f"gain from {edit.start_s} to {edit.end_s} s, required times from 0 to {last_s:.2f} s")
+            kind = {DrawnCurve: "draw", Hold: "hold"}.get(type(edit), "gain")
+            raise InputError(f"{kind} from {edit.start_s} to {edit.end_s} s, required times from 0 to {last_s:.2f} s")
+        if isinstance(edit, DrawnCurve):
+            check_drawn(edit, is_weight=edit.channel in WEIGHTS)
 
     def _phone_steps(self, steps: tuple[Step, ...]) -> tuple[Step, ...]:
-        return tuple(step for step in steps if isinstance(step, PhoneStep | WordIs))
+        return tuple(step for step in steps if isinstance(step, PhoneStep | WordStep))
 
     def _is_modelled(self, channel: str, steps: tuple[Step, ...]) -> bool:
         """Return whether the model generates a channel as it is."""
@@ -373,7 +423,7 @@ class Session:
         if self._motions == INTERACTIVE:
             expect_more()
         self._monitor(Progress("moving the mouth", 0, 1, UNDERSTANDING))
-        generation = generation_of(self.request, self._speaker, self.model, understood, Constraints(pins))
+        generation = generation_of(self.request, self.speaker, self.model, understood, Constraints(pins))
         self._monitor(Progress("moving the mouth", 1, 1, 1.0))
         return generation if self._outlook is None else replace(generation, outlook=self._outlook)
 

@@ -7,7 +7,6 @@ every request. No part of an address is ever used as a path of a file: names are
 from __future__ import annotations
 
 import asyncio
-import logging
 from collections.abc import Mapping
 from functools import lru_cache, partial
 from importlib.resources import files
@@ -16,14 +15,12 @@ from typing import Any
 
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
-from starlette.requests import ClientDisconnect, Request
+from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Route
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from lipmotion.errors import ExportError, InputError
+from lipmotion.errors import InputError
 from lipmotion.export.web_page import coloured
-from lipmotion.storage.json_text import from_json
 from lipmotion.study.answers import HIGHEST_MOS, HIGHEST_RANK, MOS, PAIRED
 from lipmotion.study.limits import RateLimit
 from lipmotion.study.manifest import VIDEOS, Study, StudyTrial
@@ -31,11 +28,9 @@ from lipmotion.study.questions import ASKED, POINTS, SCALES
 from lipmotion.study.store import StudyStore, rater_name
 from lipmotion.study.submission import submitted_sheet
 from lipmotion.study.trials import questions_of, trials_of
+from lipmotion.web.bodies import json_of
+from lipmotion.web.replies import ERRORS, FRESH, SecurityHeaders
 
-LOG = logging.getLogger("lipmotion")
-LARGEST_BODY_BYTES = 1 << 14
-BODY_S = 10.0
-"""How long the body of a request may take to arrive."""
 PAGE = {
     "": ("study.html", "text/html; charset=utf-8"),
     "study.css": ("study.css", "text/css; charset=utf-8"),
@@ -44,22 +39,11 @@ PAGE = {
     "icon.svg": ("icon.svg", "image/svg+xml"),
 }
 """Files of the page, which are in the package, by their addresses."""
-HEADERS = {
-    "content-security-policy": "default-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'; "
-    "object-src 'none'",
-    "x-content-type-options": "nosniff",
-    "referrer-policy": "no-referrer",
-    "x-frame-options": "DENY",
-    "cross-origin-resource-policy": "same-origin",
-    "cross-origin-opener-policy": "same-origin",
-    "permissions-policy": "camera=(), microphone=(), geolocation=()",
-}
 ANSWER_HZ, ANSWER_BURST = 5.0, 60
 """Requests a second of one rater: nobody judges videos faster."""
 JOIN_HZ, JOIN_BURST = 5.0, 200
 """New raters a second, of all addresses together: a class that begins at once fits in."""
 WELL_KEPT = {"cache-control": "private, max-age=86400, immutable"}
-FRESH = {"cache-control": "no-store"}
 
 
 def study_application(study: Study, videos: Mapping[str, Path], store: StudyStore) -> Starlette:
@@ -90,13 +74,9 @@ def study_application(study: Study, videos: Mapping[str, Path], store: StudyStor
     ]
     application = Starlette(
         routes=routes,
-        exception_handlers={
-            HTTPException: _refused,
-            InputError: partial(_failed, 422),
-            ExportError: partial(_failed, 503),
-        },
+        exception_handlers=ERRORS,
     )
-    application.add_middleware(_SecurityHeaders)
+    application.add_middleware(SecurityHeaders)
     return application
 
 
@@ -118,7 +98,7 @@ class _Desk:
 
     async def joined(self, request: Request) -> Response:
         """A new rater, who has agreed to take part."""
-        if await _content(request) != {"agrees": True}:
+        if await json_of(request) != {"agrees": True}:
             raise InputError('required {"agrees": true}')
         if not self._joins.allows():
             raise HTTPException(429, "too many raters join at the same time; try again", {"retry-after": "2"})
@@ -133,7 +113,7 @@ class _Desk:
     async def answered(self, request: Request) -> Response:
         """The answers to the next trial, or again those to one that was answered; replied to once they are stored."""
         rater = self._rater(request)
-        sheet = submitted_sheet(self._study, self._trials(rater), rater, await _content(request))
+        sheet = submitted_sheet(self._study, self._trials(rater), rater, await json_of(request))
         following = self._store.next_trial(rater)
         if sheet.trial > following:
             raise HTTPException(409, f"trial {sheet.trial} comes after trial {following}")
@@ -175,58 +155,6 @@ class _Desk:
 
     def _addresses(self, trial: StudyTrial) -> list[str]:
         return [f"/{VIDEOS}/{video.file}" for video in self._study.shown(trial)]
-
-
-class _SecurityHeaders:
-    """Adds headers to every reply, of errors too."""
-
-    def __init__(self, application: ASGIApp) -> None:
-        self._application = application
-        self._headers = [(name.encode(), value.encode()) for name, value in HEADERS.items()]
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        async def secured(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                message = {**message, "headers": [*message.get("headers", ()), *self._headers]}
-            await send(message)
-
-        await self._application(scope, receive, secured)
-
-
-async def _content(request: Request) -> Any:
-    """Return the JSON that a request brings. Raises HTTPException: something else, too much, or too slowly."""
-    if request.headers.get("content-type", "").partition(";")[0].strip().lower() != "application/json":
-        raise HTTPException(415, "required application/json")  # which no other site's page can send unasked
-    try:
-        body = await asyncio.wait_for(_body(request), BODY_S)
-        return from_json(body.decode("utf-8"))
-    except (TimeoutError, asyncio.TimeoutError) as error:
-        raise HTTPException(408, "the request came too slowly") from error
-    except ClientDisconnect as error:
-        raise HTTPException(400, "the request broke off") from error
-    except ValueError as error:
-        raise HTTPException(400, "not JSON in UTF-8") from error
-
-
-async def _body(request: Request) -> bytes:
-    body = b""
-    async for part in request.stream():
-        body += part
-        if len(body) > LARGEST_BODY_BYTES:
-            raise HTTPException(413, f"required at most {LARGEST_BODY_BYTES} bytes", {"connection": "close"})
-    return body
-
-
-async def _refused(_: Request, error: Exception) -> Response:
-    status, headers = getattr(error, "status_code", 400), getattr(error, "headers", None)
-    return JSONResponse({"error": str(getattr(error, "detail", ""))}, status, {**FRESH, **(headers or {})})
-
-
-async def _failed(status: int, _: Request, error: Exception) -> Response:
-    if isinstance(error, ExportError):
-        LOG.warning("%s", error)
-        return JSONResponse({"error": "cannot be stored now; try again"}, status, FRESH)
-    return JSONResponse({"error": str(error)}, status, FRESH)
 
 
 def _packaged(name: str, kind: str) -> tuple[bytes, str]:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from numbers import Real
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -168,6 +169,59 @@ LARGEST_GAIN = 3.0
 
 
 @dataclass(frozen=True)
+class DrawnCurve:
+    """Values that a curve takes over a stretch, as somebody has drawn them.
+
+    start_s, end_s : seconds; before and after them the curve goes over into them within 0.1 s
+    channel : name of a channel or curve
+    values  : at equal distances from the start to the end, in the unit of the channel
+    Raises InputError: fewer than 2 values, or more than ``MOST_DRAWN``; no numbers; or an end that is not after the
+    start.
+
+    >>> DrawnCurve(1.0, 1.5, "opening", (0.0, 0.1, 0.0)).channel
+    'opening'
+    """
+
+    start_s: float
+    end_s: float
+    channel: str
+    values: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if not 2 <= len(self.values) <= MOST_DRAWN or not all(map(math.isfinite, self.values)):
+            raise InputError(f"{len(self.values)} values are drawn, required 2 to {MOST_DRAWN} finite numbers")
+        _check_stretch(self.start_s, self.end_s)
+
+
+MOST_DRAWN = 10_000
+
+
+@dataclass(frozen=True)
+class Hold:
+    """The whole mouth stays for a time as it is at the start; it goes over into that within 0.05 s.
+
+    start_s, end_s : seconds
+    Raises InputError: an end that is not after the start.
+    """
+
+    start_s: float
+    end_s: float
+    channel: ClassVar[str] = ""
+
+    def __post_init__(self) -> None:
+        _check_stretch(self.start_s, self.end_s)
+
+
+CurveEdit = Pin | Gain | DrawnCurve
+"""Changes of one curve, or of all curves of the mouth."""
+
+
+def _check_stretch(start_s: float, end_s: float) -> None:
+    if not start_s < end_s:
+        raise InputError(f"from {start_s:g} to {end_s:g} s, required an end after the start")
+
+
+@dataclass(frozen=True)
 class Constraints:
     """Values that generated motion must take exactly.
 
@@ -280,7 +334,7 @@ class Generation:
     trace  : the state of the model in every frame
     outlook : how well the model knew words and voice (None: not from ``animate``)
     stepped : channels of held poses, which change at once: formats that can say so do
-    curve_edits : pins and gains of curves that follow from the motion, as ``jawOpen``, wherever these are made
+    curve_edits : edits of curves that follow from the motion, as ``jawOpen``, wherever these are made
     moods  : what the words say of the mood, over time, in the order of their times
     about  : corpus, licence and attribution of the model, by name, as ``Model.about``; empty: not from ``animate``
     knowledge : of voice and phones, from which ``confidence`` follows (None: not from ``animate``)
@@ -299,7 +353,7 @@ class Generation:
     trace: StateTrace
     outlook: Outlook | None = None
     stepped: tuple[str, ...] = ()
-    curve_edits: tuple[Pin | Gain, ...] = ()
+    curve_edits: tuple[CurveEdit, ...] = ()
     moods: tuple[MoodKey, ...] = ()
     about: Mapping[str, Any] = field(default_factory=dict)
     knowledge: SpeechKnowledge | None = None

@@ -115,6 +115,48 @@ def test_another_word_is_aligned_where_it_was(session: Session) -> None:
         session.units(edited("word 99 is mama"))
 
 
+def test_a_phone_is_split_and_words_are_said_otherwise(session: Session) -> None:
+    plain = session.units()
+    third = plain[2]
+    middle_s = round((third.start_s + third.end_s) / 2, 3)
+    split = session.units(edited(f"split phone 3 at {middle_s}", "phone 4 is m"))
+    assert phones(split) == [*phones(plain)[:3], "m", *phones(plain)[3:]]
+    assert split[2].end_s == split[3].start_s == middle_s
+    with pytest.raises(InputError, match="required a time at least"):
+        session.units(edited(f"split phone 3 at {third.start_s}"))
+    word = next(span.label.word for span in plain if span.label.word)
+    said = session.units(edited(f"word 1 is {word} said m aa m"))
+    assert [span.label.phone for span in said if span.label.word == word][:3] == ["m", "aa", "m"]
+    last_s = plain[-1].end_s
+    other = session.units(edited(f"say mama mama from 0 to {last_s:.3f}"))
+    assert {span.label.word for span in other} - {""} == {"mama"}
+    assert other[0].start_s == 0
+    assert other[-1].end_s == pytest.approx(last_s, abs=1e-3)
+
+
+def test_what_is_drawn_and_held_is_so_and_the_rest_joins_smoothly(session: Session) -> None:
+    plain = session.generated()
+    found = session.generated(edited("draw opening 0.1 0.2 0.1 from 0.8 to 1.0", "draw jawOpen 0 1 from 1.5 to 1.6"))
+    assert found.motion["opening"][[80, 90, 100]] == pytest.approx([0.1, 0.2, 0.1])
+    change = found.motion["opening"] - plain.motion["opening"]
+    assert np.abs(np.diff(change[60:81])).max() < 0.5 * np.abs(change[80]) + 0.01  # no jump
+    assert not change[:69].any()
+    arkit = curves_of(found.motion, found.units, "arkit", edits=found.curve_edits)["jawOpen"]
+    assert arkit[[150, 160]] == pytest.approx([0, 1])
+    held = session.generated(edited("hold from 0.8 to 1.0")).motion.values
+    assert np.array_equal(held[80:101], np.broadcast_to(plain.motion.values[80], held[80:101].shape))
+    assert np.array_equal(held[:75], plain.motion.values[:75])
+    with pytest.raises(InputError, match="required 0 to 1"):
+        session.generated(edited("draw jawOpen 0 1.2 from 1.5 to 1.6"))
+    with pytest.raises(InputError, match="cannot draw 'jaw'"):
+        session.generated(edited("draw jaw 0 1 from 1.5 to 1.6"))
+
+
+def test_a_thousand_edits_of_phones_are_no_deeper_than_one(session: Session) -> None:
+    edits = Edits().then(*(f"phone {2 + n % 3} is {'pbm'[n % 3]}" for n in range(1200)))
+    assert phones(session.units(edits))[1:4] == ["p", "b", "m"]
+
+
 def test_pins_hold_for_channels_and_curves(session: Session, tmp_path: Path) -> None:
     edits = edited(
         "pin opening 0.1 at 0.8", "pin jawOpen 0.7 at 1.2", "gain 1.5 from 0.5 to 1.0", "pin viseme_PP 0.4 at 1.5"

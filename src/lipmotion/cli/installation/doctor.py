@@ -26,6 +26,7 @@ EXTRAS = {
     "network": "the recurrent network of 'experiment xieliu2007'",
     "cluster": "'batch --cluster'",
     "study": "the page of 'study serve'",
+    "studio": "the page of 'studio'",
 }
 """What each extra of the package brings."""
 PHONES = (("sil", 0.3), ("m", 0.09), ("aa", 0.16), ("m", 0.09), ("ax", 0.1), ("sil", 0.3))

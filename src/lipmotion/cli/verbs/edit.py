@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 
 from lipmotion.cli.arguments.declared import add_options, part_of
 from lipmotion.cli.arguments.options import add_machine_readable
@@ -32,7 +31,6 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.cli.terminal.progress import reporting
     from lipmotion.errors import InputError
     from lipmotion.pipeline.edit_files import begun, read_edits, write_edits
-    from lipmotion.pipeline.edits import Edits
     from lipmotion.units import words_in_time
 
     with reporting(options) as report:
@@ -42,14 +40,11 @@ def run(options: argparse.Namespace) -> None:
             raise InputError(f"{options.file}: exists; add edits without --of, or delete it to begin again")
         asked = part_of(options, Request(), recording=options.of)
         file = begun(asked) if options.of is not None else read_edits(options.file)
-        before = file.edits.steps
-        if not 0 <= options.undo <= len(before):
-            raise InputError(f"--undo {options.undo}, required 0 to {len(before)}: the number of edits")
-        edits = Edits(before[: len(before) - options.undo]).then(*options.sentences)
-        session = file.session()
+        after = file.undo(options.undo).then(*options.sentences)
+        session, edits = file.session(), after.edits
         units = session.generated(edits).units if edits.steps else session.units()
-        if options.of is not None or edits.steps != before:
-            write_edits(replace(file, edits=edits), options.file)
+        if options.of is not None or options.undo or options.sentences:
+            write_edits(after, options.file)
         lines = [f"{number:4} {sentence}" for number, sentence in enumerate(edits.sentences, 1)]
         if options.list:
             lines.append("")

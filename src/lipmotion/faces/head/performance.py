@@ -35,18 +35,20 @@ def head_poses(
     fps: float,
     staging: Staging | None = None,
     prosody: Prosody | None = None,
+    frames: slice = slice(None),
 ) -> list[CharacterPose]:
     """Return the pose of every video frame, frame n at ``n / fps`` seconds, to the end of the motion.
 
     staging : seed, and what moves on its own; None: everything moves
     prosody : of the speech, for accents of brows and head; None: they follow the opening
+    frames  : those whose poses are returned
     Raises InputError: as ``spoken_mouth``.
     """
     mouth = spoken_mouth(motion, units, fps)
-    return posed(mouth, alive(np.arange(len(mouth.gap)) / fps, motion, units, staging, prosody))
+    return posed(mouth, alive(np.arange(len(mouth.gap)) / fps, motion, units, staging, prosody), frames)
 
 
-def posed(mouth: SpokenMouth, moved: Liveliness) -> list[CharacterPose]:
+def posed(mouth: SpokenMouth, moved: Liveliness, frames: slice = slice(None)) -> list[CharacterPose]:
     """Return the poses that show a mouth, and eyes, brows and head, one a frame."""
     mouth = mouth.with_corners(moved.unit(12), moved.unit(15))
     gap, change = mouth.gap, mouth.width - 1
@@ -78,11 +80,11 @@ def posed(mouth: SpokenMouth, moved: Liveliness) -> list[CharacterPose]:
         "shut": moved.lids,
         "brows": moved.brows,
     }
-    rows = np.stack(list(curves.values()), axis=1).tolist()
+    rows = np.stack(list(curves.values()), axis=1)[frames].tolist()
     return [
         CharacterPose(**dict(zip(curves, row, strict=True)), mood=mood, gaze=(across, up), turn=(yaw, pitch, roll))
         for row, mood, (across, up), (yaw, pitch, roll) in zip(
-            rows, moved.upper_face, moved.gaze.tolist(), moved.turn.tolist(), strict=True
+            rows, moved.upper_face[frames], moved.gaze[frames].tolist(), moved.turn[frames].tolist(), strict=True
         )
     ]
 

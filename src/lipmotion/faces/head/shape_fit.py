@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,28 +35,45 @@ def mouth_weights(figure: Figure, mesh: Mesh, poses: Sequence[CharacterPose]) ->
     mesh : of this figure, from ``head_mesh``
     The middles of the lips are apart as in the pose.
     """
-    names = [name for name in mesh.shape_names if not name.startswith(_NOT_OF_LIPS)]
-    fixed = {name: np.array([getattr(pose, field) for pose in poses], float) for name, field in FROM_POSE.items()}
-    moved = mesh.displacements(np.arange(len(figure.skin.rest)))
-    rows = {name: _rows(figure, moved[mesh.shape_names.index(name)]) for name in (*names, *FROM_POSE)}
-    matrix = np.stack([rows[name] for name in names])
-    # of targets only what the shapes span counts, so they are projected at once: (T, S) numbers, not (T, vertices)
-    spanned, triangle = np.linalg.qr(matrix.T)
-    rest = figure.skin.places(REST)
-    targets, gap = np.empty((len(poses), spanned.shape[1])), np.empty(len(poses))
-    for number, pose in enumerate(poses):
-        change = figure.skin.places(pose) - rest
-        targets[number], gap[number] = _rows(figure, change) @ spanned, lip_gap(figure, change)
-    for name, curve in fixed.items():
-        targets -= np.outer(curve, rows[name] @ spanned)
-    weights = bounded_curves(triangle.T, targets, COSTS)
-    jaw, close = names.index("jawOpen"), names.index("mouthClose")
-    weights[:, close] = np.minimum(weights[:, close], weights[:, jaw])
-    parting = np.array([lip_gap(figure, moved[mesh.shape_names.index(name)]) for name in names])
-    shapes = FaceShapes(tuple(names), tuple(names), np.zeros((len(names), 0, 3)), parting, "arkit")
-    kept = [name for name in names if not name.startswith(PARTING)]
-    weights = with_gap(with_gap(weights, shapes, gap, kept), shapes, gap)
-    return dict(zip(names, weights.T, strict=True)) | fixed
+    return _mouth_fit(figure, mesh).weights(poses)
+
+
+class _MouthFit:
+    """What weights of any poses are fitted with: the displacements of the shapes around the mouth."""
+
+    def __init__(self, figure: Figure, mesh: Mesh) -> None:
+        self._figure = figure
+        names = [name for name in mesh.shape_names if not name.startswith(_NOT_OF_LIPS)]
+        moved = mesh.displacements(np.arange(len(figure.skin.rest)))
+        rows = {name: _rows(figure, moved[mesh.shape_names.index(name)]) for name in (*names, *FROM_POSE)}
+        # of targets only what the shapes span counts, so they are projected at once: (T, S) numbers, not (T, vertices)
+        self._spanned, self._triangle = np.linalg.qr(np.stack([rows[name] for name in names]).T)
+        self._fixed = {name: rows[name] @ self._spanned for name in FROM_POSE}
+        self._rest = figure.skin.places_without_lids(REST)
+        parting = np.array([lip_gap(figure, moved[mesh.shape_names.index(name)]) for name in names])
+        self._shapes = FaceShapes(tuple(names), tuple(names), np.zeros((len(names), 0, 3)), parting, "arkit")
+
+    def weights(self, poses: Sequence[CharacterPose]) -> dict[str, Real]:
+        """Return the weights of ``mouth_weights``."""
+        names, spanned = self._shapes.names, self._spanned
+        fixed = {name: np.array([getattr(pose, field) for pose in poses], float) for name, field in FROM_POSE.items()}
+        targets, gap = np.empty((len(poses), spanned.shape[1])), np.empty(len(poses))
+        for number, pose in enumerate(poses):
+            change = self._figure.skin.places_without_lids(pose) - self._rest
+            targets[number], gap[number] = _rows(self._figure, change) @ spanned, lip_gap(self._figure, change)
+        for name, curve in fixed.items():
+            targets -= np.outer(curve, self._fixed[name])
+        weights = bounded_curves(self._triangle.T, targets, COSTS)
+        jaw, close = names.index("jawOpen"), names.index("mouthClose")
+        weights[:, close] = np.minimum(weights[:, close], weights[:, jaw])
+        kept = [name for name in names if not name.startswith(PARTING)]
+        weights = with_gap(with_gap(weights, self._shapes, gap, kept), self._shapes, gap)
+        return dict(zip(names, weights.T, strict=True)) | fixed
+
+
+@lru_cache(maxsize=2)
+def _mouth_fit(figure: Figure, mesh: Mesh) -> _MouthFit:
+    return _MouthFit(figure, mesh)
 
 
 def lip_gap(figure: Figure, moved: Real) -> float:

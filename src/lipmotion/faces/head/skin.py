@@ -154,6 +154,11 @@ class Skin:
 
     def places(self, pose: CharacterPose) -> Real:
         """Return the places of all vertices [shape=(V, 3)], the head not turned."""
+        left = self.lids_of_eye.rings(pose).reshape(-1, 3)
+        return np.concatenate([self.places_without_lids(pose), left, left * [-1, 1, 1]])
+
+    def places_without_lids(self, pose: CharacterPose) -> Real:
+        """Return the first of the places of ``places``: all but the lids of the eyes, which come last."""
         points = section_points(pose, self.base_z)
         lips = lip_surface(points)
         moved = lips[0] - self._contour
@@ -165,8 +170,7 @@ class Skin:
         face += (CHEEKS_SPREAD * pose.spread - CHEEKS_ROUND * pose.roundness) * self._cheeks
         face += CHEEKS_RAISED * pose.mood.cheek * self._cheeks + NOSE_LIFT * pose.mood.sneer * self._nose
         face[:COLUMNS] = lips[0]
-        left = self.lids_of_eye.rings(pose).reshape(-1, 3)
-        return np.concatenate([face, lips[1:].reshape(-1, 3), left, left * [-1, 1, 1]])
+        return np.concatenate([face, lips[1:].reshape(-1, 3)])
 
 
 def _cheeks(fill: Real, count: int) -> Real:

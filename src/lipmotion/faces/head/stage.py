@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.faces.head.figure import Figure
+from lipmotion.faces.head.head_blendshapes import head_mesh
 from lipmotion.faces.head.pose import CharacterPose
+from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.meshes.rendering.rasteriser import Camera, Canvas, flat
 
 CENTRE = (0.0, -0.03)
@@ -20,6 +22,12 @@ PICTURE_HEIGHT = 3.35
 def figure() -> Figure:
     """Return the character, made once in a process."""
     return Figure()
+
+
+@cache
+def mesh_of_figure(*, moods: bool = False) -> Mesh:
+    """Return the character as a mesh with blendshapes, of ``head_mesh``, made once in a process."""
+    return head_mesh(figure(), moods=moods)
 
 
 def camera_for(width: int, height: int) -> Camera:

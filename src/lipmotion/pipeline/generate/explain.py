@@ -11,15 +11,12 @@ from typing import Any
 from lipmotion.engines.base import explain_by_trace
 from lipmotion.errors import InputError
 from lipmotion.kernels.threads import one_thread
+from lipmotion.pipeline.edits import Edits
 from lipmotion.pipeline.generate.generation_for import explanation_for
-from lipmotion.pipeline.generate.transfer import person_of
-from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.session import generation_of
-from lipmotion.pipeline.understand.language import in_language
+from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.session import NO_EDITS, Session
 from lipmotion.pipeline.understand.request import SpeechInput, request_of
-from lipmotion.pipeline.understand.understood_speech import audio_of, understood_speech
 from lipmotion.printable import printable
-from lipmotion.speech.features.mfcc import frame_count
 from lipmotion.types import (
     FRAME_RATE_HZ,
     ChainStates,
@@ -37,7 +34,6 @@ SHOWN_CHANNELS = 6
 """Largest number of channels in a text; points are left out if there are other channels."""
 
 
-@one_thread()
 def explain(
     speech: SpeechInput,
     *,
@@ -58,20 +54,25 @@ def explain(
     >>> first.state, second.frame
     ('rest', 100)
     """
-    chosen = model if isinstance(model, Model) else load_model(model)
-    request = in_language(request_of(speech, transcript))
-    audio = audio_of(request)
-    times = [at] if isinstance(at, int | float) else at
-    count = frame_count(audio.samples)
-    frames = [_frame(time_s, count) for time_s in times]
-    person = person_of(chosen, request)
-    understood = understood_speech(chosen, replace(request, recording=audio))
-    generation = generation_of(request, person, chosen, understood)
-    by_engine = chosen.engine.explain(chosen.learned, understood.speech, frames)
+    session = Session(request_of(speech, transcript), model=model)
+    return explain_session(session, NO_EDITS, [at] if isinstance(at, int | float) else at)
+
+
+@one_thread()
+def explain_session(session: Session, edits: Edits, times: Sequence[float]) -> tuple[Explanation, ...]:
+    """Return what determined the frames nearest to some times, in seconds, of a session's motion with some edits.
+
+    Of what pins, gains and locks change it says nothing: it is what the model did with the phones.
+    Raises InputError: a time lies outside the recording; else as ``Session.generated``.
+    """
+    speech, person = session.understood(edits).speech, session.speaker
+    frames = [_frame(time_s, len(speech.features.values)) for time_s in times]
+    generation = session.generated(edits)
+    by_engine = session.model.engine.explain(session.model.learned, speech, frames)
     if by_engine is None:
         found = [explain_by_trace(generation, frame) for frame in frames]
     else:
-        found = [explanation_for(person, explanation, understood.speech) for explanation in by_engine]
+        found = [explanation_for(person, explanation, speech) for explanation in by_engine]
     if generation.confidence is None:
         return tuple(found)
     return tuple(replace(each, confidence=float(generation.confidence[each.frame])) for each in found)

@@ -27,7 +27,7 @@ from lipmotion.meshes.model.other_shapes import CLOSED
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, arkit_name
 from lipmotion.pipeline.outputs.living_curves import living_curves
 from lipmotion.storage.files import whole_file
-from lipmotion.types import WEIGHT, Channel, Gain, Generation, Motion, Pin, Prosody, Timeline, Unit
+from lipmotion.types import WEIGHT, Channel, CurveEdit, Generation, Motion, Prosody, Timeline, Unit
 
 ARKIT, WHOLE_FACE, VOWELS = "arkit", "face", "vowels"
 LIVING_SETS = (WHOLE_FACE, VOWELS)
@@ -60,7 +60,7 @@ def curves_of(
     *,
     staging: Staging | None = None,
     prosody: Prosody | None = None,
-    edits: Sequence[Pin | Gain] = (),
+    edits: Sequence[CurveEdit] = (),
 ) -> Motion:
     """Return motion as curves that drive a character.
 
@@ -89,7 +89,7 @@ def rig_sources(
     *,
     staging: Staging | None = None,
     prosody: Prosody | None = None,
-    edits: Sequence[Pin | Gain] = (),
+    edits: Sequence[CurveEdit] = (),
 ) -> dict[str, NDArray[np.float64]]:
     """Return the curves that controls of a rig may follow, by their names [each shape=(T,)].
 
@@ -108,7 +108,7 @@ def rig_sources(
 
 
 def edited_weights(
-    weights: Motion, units: Timeline[Unit], edits: Sequence[Pin | Gain], known: Mapping[str, str] | None = None
+    weights: Motion, units: Timeline[Unit], edits: Sequence[CurveEdit], known: Mapping[str, str] | None = None
 ) -> Motion:
     """Return weights of a character with pins and gains, which name its blendshapes as it does or as ``known``.
 

@@ -149,8 +149,13 @@ def plan(path: str | Path, settings: OutputSettings) -> Output:
     taking = [kind for kind in kinds if kind.takes(Path(path), settings)]
     if taking:
         return max(taking, key=length)(Path(path), settings)
-    suffixes = " ".join(suffix for kind in kinds for suffix in kind.suffixes(settings))
+    suffixes = " ".join(output_suffixes(settings))
     raise ExportError(f"{path}: unknown format {Path(path).suffix!r}; required one of: {suffixes}")
+
+
+def output_suffixes(settings: OutputSettings) -> tuple[str, ...]:
+    """Return the ends of names of all outputs, as messages list them."""
+    return tuple(suffix for kind in _kinds() for suffix in kind.suffixes(settings))
 
 
 def checked_outputs(paths: Iterable[str | Path], settings: OutputSettings) -> list[Output]:

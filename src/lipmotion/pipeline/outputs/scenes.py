@@ -39,6 +39,8 @@ GLTF, USD = ".glb", ".usda"
 SCENE_SUFFIXES = (GLTF, USD)
 KEPT = (GLTF, ".vrm")
 """Suffixes of files of characters that are kept as they are, with an animation more."""
+MARGIN = 10
+"""Frames before and after those that are wanted alone, within which weights settle."""
 METRES = 0.09
 """The distance between the outer eye corners of the 3D head, in metres."""
 
@@ -59,11 +61,15 @@ class SceneOutput(Output):
         return lambda: write_scene(self.path, performance.once(delivered_scene), sound=performance.sound_file)
 
 
-def delivered_scene(performance: Performance) -> Scene:
-    """Return the scene of a face as it is delivered; held poses are those of the mouth."""
+def delivered_scene(performance: Performance, frames: slice | None = None) -> Scene:
+    """Return the scene of a face as it is delivered; held poses are those of the mouth.
+
+    frames : the only ones that it is to have, which differ by less than 0.01 from those of the whole; None: all
+    """
     settings, delivery = performance.settings, performance.settings.delivery
     moved = with_drawn_channels(delivered(performance.generation, delivery))
-    scene = settings.face.scene(moved, settings, performance.once(recorded_prosody))
+    part = None if delivery.hold_ms else frames
+    scene = settings.face.scene(moved, settings, performance.once(recorded_prosody), part)
     thinning = Thinning(delivery.key_tolerance, tuple(closed_times(moved)) if delivery.key_tolerance else ())
     scene = replace(scene, sound_s=delivery.offset_ms / 1000, thinning=thinning)
     weights = scene.weights
@@ -112,34 +118,48 @@ def head_scene(
     *,
     staging: Staging | None = None,
     prosody: Prosody | None = None,
+    frames: slice | None = None,
 ) -> Scene:
     """Return the 3D head of ``--face head`` with its animation: what its videos show, as weights of blendshapes.
 
     rate_hz : keys a second; None: those of the motion
     staging, prosody : as of videos; size and background do not count
+    frames  : as of ``delivered_scene``
     The mesh is in metres. Raises InputError: the motion has no channel ``opening``.
     """
     from lipmotion.faces.head.figure import PIVOT
-    from lipmotion.faces.head.head_blendshapes import head_mesh
     from lipmotion.faces.head.performance import head_poses
     from lipmotion.faces.head.shape_fit import mouth_weights
-    from lipmotion.faces.head.stage import figure
+    from lipmotion.faces.head.stage import figure, mesh_of_figure
 
     motion, hertz = generation.motion, rate_hz or generation.motion.rate_hz
-    poses = head_poses(motion, generation.units, hertz, staging, prosody)
-    character = figure()
-    living = living_curves(motion, generation.units, staging, prosody, len(poses), hertz)
-    mesh = head_mesh(character, moods=any(map(is_mood, motion.names)) or any(pose.mood != CALM for pose in poses))
-    curves = mouth_weights(character, mesh, poses) | {name: living[name].astype(np.float64) for name in living.names}
-    names = [name for name in mesh.shape_names if name in curves]
-    weights = Motion(
-        np.stack([curves[name] for name in names], axis=1), hertz, tuple(Channel(name, WEIGHT) for name in names)
+    around, kept = _around(frames)
+    poses = head_poses(motion, generation.units, hertz, staging, prosody, around)
+    character, mesh = (
+        figure(),
+        mesh_of_figure(moods=any(map(is_mood, motion.names)) or any(pose.mood != CALM for pose in poses)),
     )
-    weights = edited_weights(weights, generation.units, generation.curve_edits)
+    count = len(frame_times(len(motion.values), motion.rate_hz, hertz))
+    living = living_curves(motion, generation.units, staging, prosody, count, hertz)
+    curves = mouth_weights(character, mesh, poses)
+    curves |= {name: living[name].astype(np.float64)[around] for name in living.names}
+    names = [name for name in mesh.shape_names if name in curves]
+    table, channels = np.zeros((count, len(names))), tuple(Channel(name, WEIGHT) for name in names)
+    table[around] = np.stack([curves[name] for name in names], axis=1)
+    weights = edited_weights(Motion(table, hertz, channels), generation.units, generation.curve_edits)
+    weights = replace(weights, values=weights.values[around][kept])
     shapes = tuple(Blendshape(each.name, each.rows, METRES * each.displacements) for each in mesh.shapes)
     scaled = replace(mesh, vertices=METRES * mesh.vertices, shapes=shapes)
-    turn = HeadTurn(METRES * PIVOT, character.turning(), head_quaternions(np.stack([pose.turn for pose in poses])))
-    return Scene(scaled, weights, turn, split=False)
+    turns = head_quaternions(np.stack([pose.turn for pose in poses]))[kept]
+    return Scene(scaled, weights, HeadTurn(METRES * PIVOT, character.turning(), turns), split=False)
+
+
+def _around(frames: slice | None) -> tuple[slice, slice]:
+    """Return the frames that are computed for some, None: all; and which of them these are."""
+    if frames is None:
+        return slice(None), slice(None)
+    first = max(frames.start - MARGIN, 0)
+    return slice(first, frames.stop + MARGIN), slice(frames.start - first, frames.stop - first)
 
 
 def character_scene(
@@ -149,11 +169,13 @@ def character_scene(
     *,
     staging: Staging | None = None,
     prosody: Prosody | None = None,
+    frames: slice | None = None,
 ) -> Scene:
     """Return the user's own character with its animation; eyes and brows move where it has ARKit's blendshapes.
 
     rate_hz : keys a second; None: those of the motion. A closure between two keys is at the nearer one
     staging, prosody : seed, and what moves on its own
+    frames  : as of ``delivered_scene``; all are computed
     Raises InputError: the character has no blendshapes, or the motion has no channel ``opening``.
     """
     motion, units = generation.motion, generation.units
@@ -168,7 +190,7 @@ def character_scene(
     channels = weights.channels + tuple(Channel(name, WEIGHT) for name in beside)
     hertz = rate_hz or motion.rate_hz
     rows = in_pictures(table, mouth.contact, motion.rate_hz, frame_times(len(table), motion.rate_hz, hertz))
-    return Scene(character.mesh, Motion(rows, hertz, channels), original=character.file)
+    return Scene(character.mesh, Motion(rows[frames or slice(None)], hertz, channels), original=character.file)
 
 
 def check_sound_name(path: Path, sound: Path) -> None:

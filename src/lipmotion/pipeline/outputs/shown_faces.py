@@ -70,9 +70,14 @@ class ShownFace(ABC):
     def write_video(self, path: Path, performance: Performance) -> None:
         """Write a video, or pictures. Raises InputError: the motion lacks channels. Raises ExportError: as writers."""
 
-    def scene(self, generation: Generation, settings: OutputSettings, prosody: Prosody | None) -> Scene:
-        """Return the character of files for 3D programs, with its animation: the 3D head, where it is no mesh."""
-        return head_scene(generation, settings.rate_hz, staging=settings.staging, prosody=prosody)
+    def scene(
+        self, generation: Generation, settings: OutputSettings, prosody: Prosody | None, frames: slice | None = None
+    ) -> Scene:
+        """Return the character of files for 3D programs, with its animation: the 3D head, where it is no mesh.
+
+        frames : as of ``delivered_scene``
+        """
+        return head_scene(generation, settings.rate_hz, staging=settings.staging, prosody=prosody, frames=frames)
 
     def other_person(self, model: Model, speaker: str = "") -> FilmedFace | None:  # noqa: ARG002
         """Return the person onto whose face the motion of a model must be mapped; None: it stays as it is.
@@ -119,8 +124,13 @@ class ShownCharacter(ShownDrawing):
         super().__init__(face)
         self.character: DrivenCharacter = face.character
 
-    def scene(self, generation: Generation, settings: OutputSettings, prosody: Prosody | None) -> Scene:  # noqa: D102
-        return character_scene(generation, self.character, settings.rate_hz, staging=settings.staging, prosody=prosody)
+    def scene(  # noqa: D102
+        self, generation: Generation, settings: OutputSettings, prosody: Prosody | None, frames: slice | None = None
+    ) -> Scene:
+        staging = settings.staging
+        return character_scene(
+            generation, self.character, settings.rate_hz, staging=staging, prosody=prosody, frames=frames
+        )
 
 
 class ShownCutOut(ShownFace):

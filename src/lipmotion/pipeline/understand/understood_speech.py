@@ -156,12 +156,20 @@ def known_voice(
 
 
 def aligned_within(
-    model: Model, request: SpeechRequest, audio: AnalysedAudio, word: str, start_s: float, end_s: float
+    model: Model,
+    request: SpeechRequest,
+    audio: AnalysedAudio,
+    word: str,
+    start_s: float,
+    end_s: float,
+    *,
+    pauses: bool = False,
 ) -> list[Span[Unit]]:
-    """Return the phones in time of a word that is said from ``start_s`` to ``end_s``, by forced alignment there.
+    """Return the phones in time of words that are said from ``start_s`` to ``end_s``, by forced alignment there.
 
-    audio : the recording of the request
-    Raises AlignmentError: the word does not fit in there.
+    audio  : the recording of the request
+    pauses : whether silence before and after the words stays; else the first and the last phone take its time
+    Raises AlignmentError: the words do not fit in there.
     """
     installed = request.recogniser in INSTALLED_RECOGNISERS
     phones = cached_recogniser(model.phones, "auto" if installed else request.recogniser, model.adaptation)
@@ -175,9 +183,9 @@ def aligned_within(
     if stop > len(audio.samples) // HOP:
         raise AlignmentError(f"the recording ends at {audio.duration_s:.2f} s")
     spans = list(phones.align(piece, piece.mfcc(), words, lexicon).shifted(start_s))
-    while len(spans) > 1 and is_silent(spans[0].label.phone):
+    while not pauses and len(spans) > 1 and is_silent(spans[0].label.phone):
         del spans[0]
-    while len(spans) > 1 and is_silent(spans[-1].label.phone):
+    while not pauses and len(spans) > 1 and is_silent(spans[-1].label.phone):
         del spans[-1]
     spans[0], spans[-1] = replace(spans[0], start_s=start_s), replace(spans[-1], end_s=end_s)
     return spans

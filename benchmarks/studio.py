@@ -1,0 +1,252 @@
+"""The studio measured: how long an edit takes, kills, hostile requests, a thousand edits and back.
+
+python benchmarks/studio.py times RECORDING [SECONDS ...]     processor time from an edit to the weights of the head
+python benchmarks/studio.py kills RECORDING [--count 100]     of the server; forks: of a process that edits
+python benchmarks/studio.py hostile RECORDING [--count 2000]
+python benchmarks/studio.py undo RECORDING [--count 1000]
+
+Recordings are repeated, or cut, to the seconds. Times are of the processor, in one process, without the network and the
+browser: a minute of the clock on a machine that does other work says nothing.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import resource
+import shutil
+import signal
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from random import Random
+from typing import Any, NoReturn
+
+import numpy as np
+
+ROOT = Path(__file__).parents[1]
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "src")]
+
+from lipmotion.export.sound import write_sound  # noqa: E402
+from lipmotion.faces.registry import face_named  # noqa: E402
+from lipmotion.kernels.choice import expect_more  # noqa: E402
+from lipmotion.pipeline.edit_files import EditFile, read_edits, write_edits  # noqa: E402
+from lipmotion.pipeline.edits import step_of  # noqa: E402
+from lipmotion.pipeline.job import Request  # noqa: E402
+from lipmotion.pipeline.model import load_model  # noqa: E402
+from lipmotion.pipeline.outputs.shown_faces import shown_face  # noqa: E402
+from lipmotion.speech.sound.audio_files import read_audio  # noqa: E402
+from lipmotion.storage.json_text import as_json  # noqa: E402
+from lipmotion.studio.folder import opened_folder  # noqa: E402
+from lipmotion.studio.line import OpenLine  # noqa: E402
+from lipmotion.studio.understanding import open_line, understand_line  # noqa: E402
+from lipmotion.types import Audio, Timeline  # noqa: E402
+from studio.attack import attacked  # noqa: E402
+from studio.served import lost_edits, random_edit, served  # noqa: E402
+
+RECOGNISED_S = 100.0
+"""In longer recordings phones are repeated, not recognised."""
+EDITS, FEW_EDITS = 40, 10
+"""Edits of which the time is taken, after some that load what they need; of longer recordings fewer."""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("what", choices=WHAT)
+    parser.add_argument("recording", type=Path)
+    parser.add_argument("seconds", type=float, nargs="*")
+    parser.add_argument("--count", type=int, default=0)
+    parser.add_argument("--seed", type=int, default=5)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        sound = Path(shutil.copy(options.recording, name))
+        print(json.dumps(WHAT[options.what](sound, options), indent=1))
+
+
+def opened(sound: Path) -> OpenLine:
+    """Return a line of a new project, open."""
+    model = load_model()
+    with opened_folder(sound) as folder:
+        line = folder.line(1)
+        return open_line(folder, line, model, understand_line(folder, line, model))
+
+
+def times(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
+    return {f"{seconds:g} s": times_of(sound, seconds) for seconds in options.seconds or (10.0,)}
+
+
+def times_of(sound: Path, seconds: float) -> dict[str, Any]:
+    """Return milliseconds of the processor from an edit to what the page shows of it, and to a first picture."""
+    whole = read_audio(sound)
+    samples = np.tile(whole.samples, int(np.ceil(seconds / whole.duration_s)))[: round(seconds * whole.rate_hz)]
+    part = sound.with_name(f"part-{seconds:g}.wav")
+    write_sound(part, Audio(samples, whole.rate_hz))
+    expect_more()
+    found: dict[str, Any] = {}
+    if seconds <= RECOGNISED_S:
+        started_s = time.process_time()
+        line = opened(part)
+        found["until it is open, s"] = round(time.process_time() - started_s, 2)
+    else:
+        line = repeated(sound, part, whole.duration_s, seconds)
+    head = shown_face("head")
+    for _ in range(4):  # loads what edits and faces need
+        timed_edit(line, f"phone 3 is {'pm'[line.revision % 2]}")
+        line.weights(head, slice(0, 20))
+    if seconds <= RECOGNISED_S:
+        found |= {"the head, all of it, s": round(timed(lambda: line.weights(head)) / 1000, 2)}
+    found |= {"a picture of the woman, s": round(timed(lambda: line.picture(1.0, face_named("woman"))) / 1000, 2)}
+    chance, parts = Random(3), []  # noqa: S311
+    while len(parts) < (EDITS if seconds <= RECOGNISED_S else FEW_EDITS):
+        phones = line.state()["phones"]
+        number = chance.randrange(2, len(phones) - 1)
+        changed, edit_ms = timed_edit(line, phone_edit(chance, phones, number))
+        if changed:
+            state_ms = timed(lambda: as_json(line.state()))
+            frames = slice(round(changed["start_s"] * 100), round(changed["end_s"] * 100) + 1)
+            weights_ms = timed(lambda frames=frames: line.weights(head, frames))
+            parts.append(
+                (edit_ms, state_ms, weights_ms, edit_ms + state_ms + weights_ms, 10 * (frames.stop - frames.start))
+            )
+    names = ("motion, and the file of edits", "state", "weights of the head where it moved", "together", "moved, ms")
+    for name, column in zip(names, zip(*parts, strict=True), strict=True):
+        found[name] = [round(float(np.percentile(column, share)), 1) for share in (50, 95)]
+    return found | {"memory, MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024}
+
+
+def repeated(sound: Path, part: Path, each_s: float, seconds: float) -> OpenLine:
+    """Return the line of a recording that is repeated, open, with the phones of the recording again and again."""
+    units = opened(sound).file.units
+    assert units is not None
+    spans = [span for n in range(int(seconds / each_s)) for span in units.shifted(n * each_s)]
+    spans[-1] = replace(spans[-1], end_s=seconds)
+    with opened_folder(part) as folder:
+        line, model = folder.line(1), load_model()
+        folder.edits(line).parent.mkdir(exist_ok=True)
+        write_edits(EditFile(named=Request(part), units=Timeline(tuple(spans))), folder.edits(line))
+        return open_line(folder, line, model)
+
+
+def phone_edit(chance: Random, phones: list[dict[str, Any]], number: int) -> str:
+    """Return an edit that changes a phone, or moves its end by 10 ms."""
+    if chance.random() < 0.5:
+        return f"phone {number + 1} is {chance.choice('p m f aa iy uw'.split())}"
+    end_s, middle_s = phones[number]["end_s"], (phones[number]["start_s"] + phones[number]["end_s"]) / 2
+    return f"phone {number + 1} ends {max(end_s - 0.01, middle_s):.3f}"
+
+
+def timed(do: Callable[[], object]) -> float:
+    """Return milliseconds of the processor that something takes."""
+    started_s = time.process_time()
+    do()
+    return 1000 * (time.process_time() - started_s)
+
+
+def timed_edit(line: OpenLine, step: str) -> tuple[dict[str, float] | None, float]:
+    """Return what an edit moved, None: nothing, or it was refused; and the milliseconds that it took."""
+    started_s = time.process_time()
+    try:
+        changed = line.edited(line.revision, (step,))["changed"]
+    except ValueError:
+        changed = None
+    return changed, 1000 * (time.process_time() - started_s)
+
+
+def kills(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
+    errors = sound.with_name("errors.txt")
+    found = lost_edits(sound, None, errors, options.count or 100, 2.0, options.seed)
+    return found | {"tracebacks": errors.read_text(encoding="utf-8").count("Traceback")}
+
+
+def forks(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
+    """Kill a process that edits a line as fast as it can, again and again; compare the file with what it said.
+
+    The process is a copy of this one, in which the line is open: so a hundred kills take seconds.
+    """
+    line, chance, count = opened(sound), Random(options.seed), options.count or 100  # noqa: S311
+    found = {"kills": 0, "acknowledged": 0, "last edit lost": 0, "lost": 0}
+    while found["kills"] < count:
+        reading, writing = os.pipe()
+        child = os.fork()
+        if not child:
+            edit_for_ever(line, Random(options.seed + found["kills"]), writing)  # noqa: S311
+        os.close(writing)
+        time.sleep(chance.uniform(0.1, 2.5))
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+        with os.fdopen(reading, encoding="utf-8") as file:
+            told = [json.loads(row) for row in file.read().splitlines(keepends=True) if row.endswith("\n")]
+        line.file = replace(read_edits(line.path), named=line.file.named)
+        steps = list(line.file.edits.sentences)
+        done = [each["done"] for each in told if "done" in each]
+        found["kills"] += 1
+        found["acknowledged"] += len(done)
+        if told and steps != (done or [told[0]["before"]])[-1]:
+            found["last edit lost" if steps == told[-1].get("tried") else "lost"] += 1
+    found["last edit written, not acknowledged"] = found.pop("last edit lost")
+    return found
+
+
+def edit_for_ever(line: OpenLine, chance: Random, writing: int) -> NoReturn:
+    """Make random edits, and write what was tried and what was done into a pipe."""
+
+    def tell(**told: list[str]) -> None:
+        os.write(writing, f"{json.dumps(told)}\n".encode())
+
+    tell(before=list(line.file.edits.sentences))
+    while True:
+        steps = list(line.file.edits.sentences)
+        with suppress(ValueError):
+            if len(steps) > 20:
+                tell(tried=[])
+                line.undone(line.revision, len(steps))
+            else:
+                step = random_edit(chance, line.state()["phones"])
+                tell(tried=[*steps, str(step_of(step))])
+                line.edited(line.revision, (step,))
+            tell(done=list(line.file.edits.sentences))
+
+
+def hostile(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
+    errors, count = sound.with_name("errors.txt"), options.count or 2000
+    with served(sound, errors) as server:
+        server.ready()
+        statuses = attacked(server, sound.parent, count)
+        server.ready()
+        server.kill()
+    tracebacks = errors.read_text(encoding="utf-8").count("Traceback")
+    return {"requests": count, "statuses": sorted(statuses), "foreign files": 0, "tracebacks": tracebacks}
+
+
+def undo(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
+    """Make random edits, then take all back; after a restart, too. Raises AssertionError: not the first bytes."""
+    count, line, chance, refused = options.count or 1000, opened(sound), Random(9), 0  # noqa: S311
+    first = line.numbers("delivered").values.tobytes()
+    started_s = time.process_time()
+    while line.revision < count:
+        try:
+            line.edited(line.revision, (random_edit(chance, line.state()["phones"]),))
+        except ValueError:
+            refused += 1
+    edits_s = time.process_time() - started_s
+    last = line.numbers("delivered").values.tobytes()
+    started_s = time.process_time()
+    again = OpenLine(read_edits(line.path), line.path, line.recording, line.model, line.audio)
+    opened_s = time.process_time() - started_s
+    assert again.numbers("delivered").values.tobytes() == last
+    while again.state()["undo"]:
+        again.undone(again.revision, 1)
+    assert again.numbers("delivered").values.tobytes() == first
+    times_s = {"edits_s": round(edits_s, 1), "opened_again_s": round(opened_s, 1)}
+    return {"edits": count, "refused": refused, "undone": "the first bytes", **times_s}
+
+
+WHAT = {"times": times, "kills": kills, "forks": forks, "hostile": hostile, "undo": undo}
+
+if __name__ == "__main__":
+    main()

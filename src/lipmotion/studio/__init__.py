@@ -1,0 +1,1 @@
+"""The studio: a page on which motion is seen, edited, approved and handed over (docs/studio.md)."""

@@ -1,0 +1,255 @@
+"""A line that is open: its session, its edits with their history, and what the page shows of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError, LipMotionError
+from lipmotion.export.video import write_mp4
+from lipmotion.faces.base import Face
+from lipmotion.pipeline.edit_files import EditFile, write_edits
+from lipmotion.pipeline.edits import Step
+from lipmotion.pipeline.generate.explain import explain_session, explanation_text
+from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.outputs.drawn_video import DRAWN_HZ, read_sound
+from lipmotion.pipeline.outputs.output import OutputSettings, Performance
+from lipmotion.pipeline.outputs.scenes import delivered_scene
+from lipmotion.pipeline.outputs.shown_faces import ShownFace
+from lipmotion.speech.features.analysed_audio import AnalysedAudio
+from lipmotion.studio.meshes import with_turn
+from lipmotion.types import Audio, Channel, Explanation, Generation, Motion, Timeline, Unit
+from lipmotion.units import is_silent, words_in_time
+
+LEAST_MOVE = 5e-4
+"""Frames whose values differ by less, in the units of the channels, have not moved: 0.03 mm of a mouth."""
+MOST_SHOWN_DOUBTS = 200
+LONGEST_VIDEO_S = 60.0
+CONFIDENCE = (Channel("confidence", "share"),)
+
+
+class RevisionError(LipMotionError):
+    """An edit was made of a state that is not the last one: another tab was first."""
+
+
+class OpenLine:
+    """A line that is open, for one thread at a time.
+
+    file    : its edits; what is written at each change
+    path    : where they are written
+    audio   : the sound, which has been read
+    revision : how often the edits have changed since the line was opened
+    Raises as ``EditFile.session``.
+    """
+
+    def __init__(self, file: EditFile, path: Path, recording: Path, model: Model, audio: AnalysedAudio) -> None:
+        self.file, self.path, self.recording, self.model, self.audio = file, path, recording, model, audio
+        self.revision = 0
+        self.session = file.session(model=model, audio=audio)
+        self.session.generated(file.edits)
+
+    @property
+    def generation(self) -> Generation:
+        """The motion with all edits, but for its delivery."""
+        return self.session.generated(self.file.edits)
+
+    @property
+    def last_s(self) -> float:
+        """The end of the last phone, in seconds."""
+        return self.generation.units[-1].end_s
+
+    def edited(self, revision: int, steps: tuple[str | Step, ...], instead: int = 0) -> dict[str, Any]:
+        """Make some edits; return what moved. Nothing has changed where one is refused.
+
+        instead : so many of the last edits are taken back first, for good
+        Raises RevisionError: the edits are no longer those of the revision. InputError: an edit is refused.
+        """
+        self._check(revision)
+        return self._changed(self.file.undo(instead).then(*steps) if steps else self.file.undo(instead))
+
+    def undone(self, revision: int, count: int) -> dict[str, Any]:
+        """Take back the last edits; return what moved. Raises as ``edited``."""
+        self._check(revision)
+        return self._changed(self.file.undo(count))
+
+    def redone(self, revision: int, count: int) -> dict[str, Any]:
+        """Make edits again that were taken back; return what moved. Raises as ``edited``."""
+        self._check(revision)
+        return self._changed(self.file.redo(count))
+
+    def _check(self, revision: int) -> None:
+        if revision != self.revision:
+            raise RevisionError("the line has been changed elsewhere: in another tab, or by a request before")
+
+    def _changed(self, file: EditFile) -> dict[str, Any]:
+        """Go over to other edits: compute, then write, then keep them."""
+        before = self.session.delivered(self.file.edits).motion
+        after = self.session.delivered(file.edits).motion
+        if file.edits.steps != self.file.edits.steps or file.undone != self.file.undone:
+            write_edits(file, self.path)
+            self.file, self.revision = file, self.revision + 1
+        return {"changed": moved_stretch(before, after)}
+
+    def state(self) -> dict[str, Any]:
+        """Return what the page shows of the line, but for what the project says of it."""
+        generation = self.generation
+        motion, units = generation.motion, generation.units
+        outlook = generation.outlook
+        return {
+            "revision": self.revision,
+            "duration_s": self.audio.duration_s,
+            "rate_hz": motion.rate_hz,
+            "frames": len(motion.values),
+            "words": word_rows(units),
+            "phones": phone_rows(units),
+            "channels": [{"name": channel.name, "unit": channel.unit} for channel in motion.channels],
+            "steps": list(self.file.edits.sentences),
+            "undo": len(self.file.edits.steps),
+            "redo": len(self.file.undone),
+            "warnings": list(outlook.advice) if outlook else [],
+        }
+
+    def numbers(self, of: str) -> Motion:
+        """Return the numbers of a kind: ``motion``, ``delivered``, ``deviation`` or ``confidence``."""
+        generation = self.generation
+        if of == "delivered":
+            return self.session.delivered(self.file.edits).motion
+        if of == "deviation":
+            return replace(generation.motion, values=np.sqrt(np.maximum(generation.variance, 0)))
+        if of == "confidence":
+            return Motion(confidence_of(generation)[:, None], generation.motion.rate_hz, CONFIDENCE)
+        return generation.motion
+
+    def weights(self, face: ShownFace, frames: slice | None = None) -> Motion:
+        """Return the weights of a face's morph targets, and its head's turn, as its ``.glb`` holds them.
+
+        frames : which of them are computed alone; None: all
+        """
+        found = with_turn(delivered_scene(self.performance(face), frames))
+        return found if frames is None or len(found.values) == frames.stop - frames.start else _cut(found, frames)
+
+    def performance(self, face: ShownFace) -> Performance:
+        """Return the motion with what outputs need of it."""
+        edits = self.file.edits
+        settings = OutputSettings(face, self.recording, staging=edits.staging(), delivery=edits.delivery())
+        return Performance(self.generation, settings, self.audio, None, self.model)
+
+    def picture(self, time_s: float, face: str | Face) -> NDArray[np.uint8]:
+        """Return the picture of a drawn face at a time. Raises InputError: as ``Session.picture``."""
+        return self.session.picture(time_s, self.file.edits, face=face)
+
+    def write_video(self, path: Path, start_s: float, end_s: float, face: str | Face) -> None:
+        """Write a stretch as a video of a drawn face. Raises InputError: as ``picture``; or it is too long, or none."""
+        last_s = min(end_s, self.audio.duration_s)
+        if not 0 < last_s - start_s <= LONGEST_VIDEO_S:
+            raise InputError(f"{start_s} to {end_s} s, required a stretch of at most {LONGEST_VIDEO_S:g} s")
+        first, last = round(start_s * DRAWN_HZ), int((len(self.generation.motion.values) - 1) / 100 * DRAWN_HZ + 1e-9)
+        frames = range(first, max(min(round(last_s * DRAWN_HZ), last), first) + 1)
+        sound = read_sound(self.recording)
+        part = slice(*(round(time_s * sound.rate_hz) for time_s in (first / DRAWN_HZ, last_s)))
+        pictures = (self.picture(number / DRAWN_HZ, face) for number in frames)
+        write_mp4(path, pictures, fps=DRAWN_HZ, audio=Audio(sound.samples[part], sound.rate_hz))
+
+    def why(self, time_s: float) -> dict[str, Any]:
+        """Return what determined the motion at a time. Raises InputError: a time outside the recording."""
+        (found,) = explain_session(self.session, self.file.edits, [time_s])
+        return why_document(found)
+
+    def doubts(self) -> list[dict[str, Any]]:
+        """Return the phones, by their confidence, the least sure first."""
+        return doubts_of(self.generation)
+
+
+def _cut(motion: Motion, frames: slice) -> Motion:
+    return replace(motion, values=motion.values[frames])
+
+
+def moved_stretch(before: Motion, after: Motion) -> dict[str, float] | None:
+    """Return from when to when two motions differ; None: nowhere."""
+    if before.values.shape != after.values.shape or before.names != after.names:
+        return {"start_s": 0.0, "end_s": float(max(len(before.values), len(after.values)) / after.rate_hz)}
+    moved = np.flatnonzero((np.abs(before.values - after.values) > LEAST_MOVE).any(axis=1))
+    if not len(moved):
+        return None
+    return {"start_s": float(moved[0] / after.rate_hz), "end_s": float(moved[-1] / after.rate_hz)}
+
+
+def phone_rows(units: Timeline[Unit]) -> list[dict[str, Any]]:
+    """Return phones in time as objects of JSON."""
+    return [
+        {
+            "label": span.label.phone or span.label.unit,
+            "start_s": span.start_s,
+            "end_s": span.end_s,
+            "word": span.label.word,
+            "confidence": span.label.confidence,
+        }
+        for span in units
+    ]
+
+
+def word_rows(units: Timeline[Unit]) -> list[dict[str, Any]]:
+    """Return the words of phones in time as objects of JSON, with the numbers of their phones, from 1."""
+    rows, first, spans = [], 0, list(units)
+    for word in words_in_time(units):
+        last = first
+        while last + 1 < len(spans) and spans[last + 1].start_s < word.end_s - 1e-9:
+            last += 1
+        if word.label:
+            times = {"start_s": word.start_s, "end_s": word.end_s}
+            rows.append({"label": word.label, **times, "first": first + 1, "last": last + 1})
+        first = last + 1
+    return rows
+
+
+def confidence_of(generation: Generation) -> NDArray[np.float64]:
+    """Return how sure each frame is; 1 where it is not known."""
+    found = generation.confidence
+    return np.ones(len(generation.motion.values)) if found is None else found
+
+
+def doubts_of(generation: Generation) -> list[dict[str, Any]]:
+    """Return the phones that are said, by the mean confidence of their frames, the least sure first."""
+    sure, hertz = confidence_of(generation), generation.motion.rate_hz
+    rows = []
+    for number, span in enumerate(generation.units, 1):
+        frames = sure[int(span.start_s * hertz) : max(int(span.end_s * hertz), int(span.start_s * hertz) + 1)]
+        if len(frames) and not is_silent(span.label.phone):
+            time_s = (span.start_s + span.end_s) / 2
+            rows.append({"time_s": time_s, "confidence": float(frames.mean()), "phone": number})
+    return sorted(rows, key=lambda row: row["confidence"])[:MOST_SHOWN_DOUBTS]
+
+
+def doubt_of(generation: Generation) -> float:
+    """Return the mean doubt of a line's speech, 0 to 1; of a line without speech 1."""
+    rows = doubts_of(generation)
+    return 1.0 - float(np.mean([row["confidence"] for row in rows])) if rows else 1.0
+
+
+def why_document(found: Explanation) -> dict[str, Any]:
+    """Return an explanation as the page shows it."""
+    span = found.span
+    shares = [share for regression in found.regressions for share in regression.shares]
+    shares = shares or [state for chain in found.chains for state in chain.states]
+    return {
+        "time_s": found.time_s,
+        "frame": found.frame,
+        "state": found.state,
+        "phone": span.label.phone if span else "",
+        "word": span.label.word if span else "",
+        "unit": span.label.unit if span else "",
+        "start_s": span.start_s if span else None,
+        "end_s": span.end_s if span else None,
+        "experts": [{"name": share.name, "share": share.probability} for share in shares],
+        "confidence": found.confidence,
+        "text": explanation_text(found),
+    }
+
+
+def transcript_step(text: str, start_s: float, end_s: float) -> str:
+    """Return the edit that says other words in a stretch."""
+    return f"say {' '.join(text.split())} from {start_s:.3f} to {end_s:.3f}"

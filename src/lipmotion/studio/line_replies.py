@@ -1,0 +1,212 @@
+"""What is replied to requests for one line (docs/extend/studio.md)."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+from starlette.requests import Request
+from starlette.responses import FileResponse, Response
+
+from lipmotion.errors import InputError
+from lipmotion.storage.json_text import as_json
+from lipmotion.studio.access import Access
+from lipmotion.studio.asked import content_of, seconds, stretch, text, texts, whole
+from lipmotion.studio.line import OpenLine, RevisionError, transcript_step
+from lipmotion.studio.sound_pictures import as_png, log_mel_picture, peaks
+from lipmotion.studio.studio import Studio
+from lipmotion.types import FRAME_RATE_HZ, Motion
+from lipmotion.web.replies import FRESH, json_bytes
+
+MOST_STEPS = 1000
+MOST_COLUMNS = 20_000
+LONGEST_TRANSCRIPT = 100_000
+NUMBERS = ("motion", "delivered", "deviation", "confidence")
+Changed = dict[str, Any]
+
+
+class LineReplies:
+    """Replies to requests for one line; what a line does is done in its own thread."""
+
+    def __init__(self, studio: Studio, access: Access) -> None:
+        self._studio, self._access, self._desk = studio, access, studio.desk
+
+    async def line(self, request: Request) -> Response:
+        """The state of a line; it is opened, and understood if it is new."""
+        number = self._number(request)
+        if self._desk.opened(number).line is None:
+            return self._waiting(number)
+        return await self._state_after(number, lambda _: {})
+
+    async def edits(self, request: Request) -> Response:
+        """Edits to be made."""
+        content = await content_of(request)
+        steps, revision = texts(content, "steps", most=MOST_STEPS), whole(content, "revision")
+        instead, number = whole(content, "instead", 0), self._number(request)
+        said = self._studio.with_pronunciations(steps)
+        return await self._state_after(number, lambda line: line.edited(revision, said, instead))
+
+    async def undo(self, request: Request) -> Response:
+        """Edits to be taken back."""
+        content = await content_of(request)
+        revision, count = whole(content, "revision"), whole(content, "count", 1, least=1)
+        return await self._state_after(self._number(request), lambda line: line.undone(revision, count))
+
+    async def redo(self, request: Request) -> Response:
+        """Edits to be made again."""
+        content = await content_of(request)
+        revision, count = whole(content, "revision"), whole(content, "count", 1, least=1)
+        return await self._state_after(self._number(request), lambda line: line.redone(revision, count))
+
+    async def transcript(self, request: Request) -> Response:
+        """Words of a line, or of a stretch of it."""
+        content, number = await content_of(request), self._number(request)
+        said = text(content, "text", longest=LONGEST_TRANSCRIPT)
+        is_part = "start_s" in content or "end_s" in content
+        if not is_part and not self._studio.summary(number).count:
+            await self._studio.say(number, said)
+            return self._waiting(number)
+        revision = whole(content, "revision")
+        start_s, end_s = seconds(content, "start_s", 0.0), seconds(content, "end_s", 1e6)
+
+        def changed(line: OpenLine) -> Changed:
+            return line.edited(revision, (transcript_step(said, start_s, min(end_s, line.last_s)),))
+
+        return await self._state_after(number, changed)
+
+    async def sound(self, request: Request) -> Response:
+        """The sound as it is played."""
+        number = self._number(request)
+        path = await self._desk.beside(lambda: self._studio.played(number))
+        return FileResponse(path, media_type="audio/wav", headers=FRESH)
+
+    async def peaks(self, request: Request) -> Response:
+        """The extremes of the sound."""
+        query = request.query_params
+        columns = whole(query, "columns", 1000, least=1, most=MOST_COLUMNS)
+
+        def found(line: OpenLine) -> bytes:
+            last_s = line.audio.duration_s
+            start_s, end_s = seconds(query, "start_s", 0.0), min(seconds(query, "end_s", last_s), last_s)
+            if not start_s < end_s:
+                raise InputError(f"{start_s} to {end_s} s is no part of 0 to {last_s:.2f} s")
+            return as_json(peaks(line.audio, columns, start_s, end_s)).encode()
+
+        return await self._json(request, found)
+
+    async def spectrogram(self, request: Request) -> Response:
+        """The spectrogram as a picture."""
+        query = request.query_params
+
+        def found(line: OpenLine) -> bytes:
+            picture = line.audio.once("studio spectrogram", lambda: log_mel_picture(line.audio))
+            return as_png(picture[:, stretch(query, FRAME_RATE_HZ, picture.shape[1])])
+
+        return Response(await self._desk.at(self._number(request), found), media_type="image/png", headers=FRESH)
+
+    async def motion(self, request: Request) -> Response:
+        """Numbers of the motion."""
+        query = request.query_params
+        of = text(query, "of", "motion")
+        if of not in NUMBERS:
+            raise InputError(f"of is {of!r}, required one of: {', '.join(NUMBERS)}")
+
+        def found(line: OpenLine) -> Response:
+            motion = line.numbers(of)
+            frames = stretch(query, motion.rate_hz, len(motion.values))
+            return _numbers(replace(motion, values=motion.values[frames]), frames.start, {})
+
+        return await self._desk.at(self._number(request), found)
+
+    async def weights(self, request: Request) -> Response:
+        """The weights of a face's morph targets."""
+        query = request.query_params
+        name = text(query, "face", "head")
+
+        def found(line: OpenLine) -> Response:
+            delivered = line.numbers("delivered")
+            frames = stretch(query, delivered.rate_hz, len(delivered.values))
+            is_part = frames.stop - frames.start < len(delivered.values)
+            motion = line.weights(self._studio.faces.shown(name), frames if is_part else None)
+            mesh = self._studio.faces.mesh_name(name, delivered)
+            return _numbers(motion, frames.start, {"x-lipmotion-mesh": quote(mesh)})
+
+        return await self._desk.at(self._number(request), found)
+
+    async def picture(self, request: Request) -> Response:
+        """A picture of a drawn face."""
+        time_s, face = seconds(request.query_params, "time"), text(request.query_params, "face", "woman")
+        shown = self._studio.drawn(face)
+        found = await self._desk.at(self._number(request), lambda line: as_png(line.picture(time_s, shown)))
+        return Response(found, media_type="image/png", headers=FRESH)
+
+    async def video(self, request: Request) -> Response:
+        """A video of a stretch."""
+        content = await content_of(request)
+        start_s, end_s = seconds(content, "start_s"), seconds(content, "end_s")
+        shown = self._studio.drawn(text(content, "face", "woman"))
+
+        def found(line: OpenLine) -> bytes:
+            with tempfile.TemporaryDirectory(prefix="lipmotion-studio-") as folder:
+                path = Path(folder) / "stretch.mp4"
+                line.write_video(path, start_s, end_s, shown)
+                return path.read_bytes()
+
+        return Response(await self._desk.at(self._number(request), found), media_type="video/mp4", headers=FRESH)
+
+    async def why(self, request: Request) -> Response:
+        """What determined a frame."""
+        time_s = seconds(request.query_params, "time")
+        return await self._json(request, lambda line: as_json(line.why(time_s)).encode())
+
+    async def doubts(self, request: Request) -> Response:
+        """The phones, the least sure first."""
+        return await self._json(request, lambda line: as_json(line.doubts()).encode())
+
+    def _number(self, request: Request) -> int:
+        """Return the number of a line. Raises HTTPException: there is none of that number."""
+        return self._studio.number(str(request.path_params["number"]))
+
+    async def _json(self, request: Request, found: Callable[[OpenLine], bytes]) -> Response:
+        return json_bytes(await self._desk.at(self._number(request), found))
+
+    async def _state_after(self, number: int, do: Callable[[OpenLine], Changed]) -> Response:
+        """Return the state of a line after something was done, and what that returns."""
+
+        def done(line: OpenLine) -> Response:
+            try:
+                changed, status = do(line), 200
+            except RevisionError as error:
+                changed, status = {"error": str(error)}, 409
+            state = self._studio.line_document(number) | {"media": self._media(number)} | line.state()
+            return json_bytes(
+                as_json({**changed, "state": state} if status == 409 else state | changed).encode(), status
+            )
+
+        return await self._desk.at(number, done)
+
+    def _waiting(self, number: int) -> Response:
+        """Return what is said of a line that is not ready."""
+        document = self._studio.line_document(number) | {"media": self._media(number)}
+        return json_bytes(as_json(document).encode())
+
+    def _media(self, number: int) -> dict[str, str]:
+        return {
+            name: self._access.with_key(f"/api/lines/{number}/{path}")
+            for name, path in (("sound", "sound.wav"), ("spectrogram", "spectrogram"))
+        }
+
+
+def _numbers(motion: Motion, first: int, more: dict[str, str]) -> Response:
+    headers = {
+        "x-lipmotion-names": as_json(list(motion.names), ensure_ascii=True),
+        "x-lipmotion-rate": f"{motion.rate_hz:g}",
+        "x-lipmotion-first": str(first),
+    }
+    content = np.ascontiguousarray(motion.values, "<f4").tobytes()
+    return Response(content, headers=FRESH | headers | more, media_type="application/octet-stream")

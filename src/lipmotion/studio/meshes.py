@@ -1,0 +1,95 @@
+"""Faces of the page: meshes with morph targets as ``.glb``, and the numbers that move them."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from lipmotion.articulation.expression import is_mood, with_moods
+from lipmotion.errors import InputError, shortened
+from lipmotion.faces.mesh import MeshFace
+from lipmotion.faces.registry import FACES
+from lipmotion.meshes.fitting.driven import driven_character
+from lipmotion.meshes.model.file_limits import Budget
+from lipmotion.meshes.model.scene import Scene
+from lipmotion.pipeline.outputs.output import OutputSettings
+from lipmotion.pipeline.outputs.scenes import KEPT, head_scene, write_scene
+from lipmotion.pipeline.outputs.shown_faces import ShownFace, shown_face
+from lipmotion.types import FRAME_RATE_HZ, Channel, Generation, Motion, StateTrace, Timeline
+from lipmotion.types.moods import MOODS, MoodKey
+
+HEAD, HEAD_OF_MOODS = "head", "head-moods"
+"""The 3D head, and the same with the shapes of moods: motion that has moods moves the second one."""
+TURN = tuple(f"head.rotation.{axis}" for axis in "xyzw")
+"""Names of the numbers of a quaternion that turns the head."""
+
+
+class Faces:
+    """The faces of a project, by their names: those that are built in, and its own characters.
+
+    characters : paths of characters by their names
+    """
+
+    def __init__(self, characters: dict[str, Path]) -> None:
+        self._characters = characters
+        self._shown: dict[str, ShownFace] = {}
+        self._meshes: dict[str, bytes] = {}
+
+    @property
+    def names(self) -> dict[str, bool]:
+        """The names of all faces, and whether each is a mesh."""
+        return {name: name == HEAD for name in FACES.names} | dict.fromkeys(self._characters, True)
+
+    def shown(self, name: str) -> ShownFace:
+        """Return a face. Raises InputError: there is none of that name, or its file cannot be read."""
+        if name not in self.names:
+            raise InputError(f"no face {shortened(repr(name))}; required one of: {', '.join(self.names)}")
+        if name not in self._shown:
+            own = self._characters.get(name)
+            self._shown[name] = shown_face(name if own is None else MeshFace(driven_character(own)))
+        return self._shown[name]
+
+    def mesh_name(self, name: str, motion: Motion) -> str:
+        """Return the name of the mesh that a motion's weights are of."""
+        return HEAD_OF_MOODS if name == HEAD and any(map(is_mood, motion.names)) else name
+
+    def mesh(self, name: str) -> bytes:
+        """Return the ``.glb`` of a face at rest. Raises InputError: there is none of that name, or it is no mesh."""
+        if name not in self._meshes:
+            self._meshes[name] = self._written(name)
+        return self._meshes[name]
+
+    def _written(self, name: str) -> bytes:
+        own = self._characters.get(name)
+        if own is not None and own.suffix.lower() in KEPT:
+            return Budget().file_bytes(own, "character")
+        if own is not None:
+            scene = self.shown(name).scene(_still(), OutputSettings(self.shown(name)), None)
+        elif name in (HEAD, HEAD_OF_MOODS):
+            scene = head_scene(_still(*((MoodKey(0.0, MOODS[0]),) if name == HEAD_OF_MOODS else ())))
+        else:
+            raise InputError(f"no mesh {shortened(repr(name))}; required one of: {HEAD}, {HEAD_OF_MOODS}")
+        with tempfile.TemporaryDirectory(prefix="lipmotion-studio-") as folder:
+            path = Path(folder) / "face.glb"
+            write_scene(path, scene)
+            return path.read_bytes()
+
+
+def _still(*keys: MoodKey) -> Generation:
+    """Return a frame of a closed mouth, with the channels of moods."""
+    closed = Motion(np.zeros((1, 1)), FRAME_RATE_HZ, (Channel("opening"),))
+    motion = with_moods(closed, keys) if keys else closed
+    return Generation(motion, np.zeros(motion.values.shape), Timeline(()), StateTrace(("",), np.zeros(1, np.intp)))
+
+
+def with_turn(scene: Scene) -> Motion:
+    """Return the weights of a scene, and the quaternion of its head, where it turns."""
+    weights = scene.weights
+    if weights is None:
+        raise InputError("the face has no morph targets; choose the head, or a character with blendshapes")
+    if scene.turn is None:
+        return weights
+    values = np.concatenate([weights.values, scene.turn.rotations], axis=1)
+    return Motion(values, weights.rate_hz, weights.channels + tuple(map(Channel, TURN)))

@@ -1,0 +1,154 @@
+// The place of the face: a character in WebGL, or pictures of a drawn face, or a video of a span.
+
+import { choice, made, onDrag, textButton, iconButton } from "../dom.js";
+import { TEXT, filled } from "../strings.js";
+import { Head } from "./head.js";
+
+export class Stage {
+  /**
+   * @param {HTMLElement} place
+   * @param {import("../studio.js").Studio} studio
+   */
+  constructor(place, studio) {
+    this.studio = studio;
+    this.store = studio.store;
+    /** @type {Head | null} */ this.head = null;
+    this.isWebgl = true;
+    this.loaded = ""; // name of the character in WebGL
+    this.asked = false; // a picture is on its way
+    this.wanted = false; // and another one is wanted
+    this.solid = made("canvas", { className: "head", tabIndex: 0, role: "img", "aria-label": TEXT.faceLabel });
+    this.drawn = made("canvas", { className: "drawn", width: 640, height: 640, hidden: true, role: "img", "aria-label": TEXT.faceLabel });
+    this.film = made("video", { controls: true, loop: true, hidden: true });
+    this.note = made("p", { className: "note", hidden: true });
+    this.views = made("div", { className: "views", role: "group", "aria-label": TEXT.show },
+      ...Object.entries(TEXT.views).map(([name, text]) => textButton(text, () => this.head?.look(name))));
+    this.faces = made("div", { className: "faces" });
+    this.filmButton = iconButton("film", TEXT.film, () => this.toggleFilm());
+    place.append(this.solid, this.drawn, this.film, this.note, made("div", { className: "over" }, this.views, this.faces, this.filmButton));
+    onDrag(this.solid, {
+      start: (event) => { this.from = [event.clientX, event.clientY]; },
+      move: (event) => {
+        this.head?.turnBy(event.clientX - this.from[0], event.clientY - this.from[1]);
+        this.from = [event.clientX, event.clientY];
+      },
+      end: () => {},
+    });
+    this.solid.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      this.head?.nearer(Math.exp(event.deltaY / 600));
+    }, { passive: false });
+    this.solid.addEventListener("keydown", (event) => {
+      if (event.ctrlKey || event.altKey || event.shiftKey || !this.head?.press(event.key)) return;
+      event.preventDefault();
+      event.stopPropagation();
+    });
+    new ResizeObserver(() => this.head?.draw()).observe(this.solid);
+    this.store.on(["project", "face"], () => this.offer());
+    this.store.on(["face", "project", "mesh"], () => this.change());
+    this.store.on(["weights", "time_s", "line", "other", "comparing"], () => this.show());
+  }
+
+  get isSolid() { return Boolean(this.store.project?.forms.faces.find(({ name }) => name === this.store.face)?.mesh) && this.isWebgl; }
+
+  offer() {
+    const faces = this.store.project?.forms.faces ?? [];
+    this.faces.replaceChildren(choice(faces.map(({ name, title }) => [name, title ?? name]), this.store.face,
+      (face) => this.store.set({ face, mesh: "" }), { "aria-label": TEXT.face, id: "face" }));
+  }
+
+  async change() {
+    if (!this.store.project) return;
+    this.leaveFilm();
+    if (this.isSolid && this.head === null) {
+      try {
+        this.head = new Head(this.solid);
+      } catch {
+        this.isWebgl = false;
+        this.say(TEXT.noWebgl);
+        const other = this.store.project.forms.faces.find(({ mesh }) => !mesh);
+        if (other) this.store.set({ face: other.name, mesh: "" });
+      }
+    }
+    this.solid.hidden = this.views.hidden = !this.isSolid;
+    this.drawn.hidden = this.isSolid;
+    const mesh = this.store.mesh || this.store.face;
+    if (this.isSolid && this.loaded !== mesh) {
+      this.loaded = mesh;
+      try {
+        await this.head.load(await this.studio.server.bytes(`faces/${encodeURIComponent(mesh)}.glb`));
+        this.say("");
+      } catch (error) {
+        this.say(filled(TEXT.noFace, { reason: error.message }));
+      }
+    }
+    this.show();
+    this.loadedFor ??= this.store.face;
+    if (this.isSolid && this.loadedFor !== this.store.face) {
+      this.loadedFor = this.store.face;
+      this.store.set({ weights: null });
+      this.studio.weights.change(null);
+    }
+  }
+
+  say(text) {
+    this.note.textContent = text;
+    this.note.hidden = !text;
+  }
+
+  show() {
+    const { weights, other, comparing, time_s, line } = this.store;
+    if (this.isSolid && this.head) {
+      if (weights && !this.studio.weights.known(time_s)) return; // the pose before stays until it is known
+      this.head.pose(comparing && other ? other.weights : weights, time_s);
+      this.studio.measured();
+    } else if (line && !this.drawn.hidden) this.picture();
+  }
+
+  /** Draw the picture of the time; while one is on its way, only the newest other one is asked for. */
+  async picture() {
+    if (this.asked) { this.wanted = true; return; }
+    this.asked = true;
+    const { lineId, time_s, face } = this.store;
+    try {
+      const picture = await this.studio.server.picture(`lines/${lineId}/picture?time=${time_s.toFixed(3)}&face=${encodeURIComponent(face)}`);
+      this.drawn.width = picture.width;
+      this.drawn.height = picture.height;
+      this.drawn.getContext("2d").drawImage(picture, 0, 0);
+      this.say("");
+      this.studio.measured();
+    } catch (error) {
+      this.say(filled(TEXT.noFace, { reason: error.message }));
+    }
+    this.asked = false;
+    if (this.wanted) {
+      this.wanted = false;
+      this.picture();
+    }
+  }
+
+  async toggleFilm() {
+    if (!this.film.hidden) return this.leaveFilm();
+    const { span, lineId, face } = this.store;
+    const { start_s, end_s } = span ?? { start_s: 0, end_s: this.studio.player.duration_s };
+    this.say(TEXT.filmMaking);
+    try {
+      const reply = await this.studio.server.send(`lines/${lineId}/video`, { start_s, end_s, face });
+      this.film.src = URL.createObjectURL(await reply.blob());
+      this.film.hidden = false;
+      this.filmButton.title = TEXT.backToFace;
+      this.say("");
+      await this.film.play().catch(() => {});
+    } catch (error) {
+      this.say(error.message);
+    }
+  }
+
+  leaveFilm() {
+    if (this.film.hidden) return;
+    this.film.pause();
+    this.film.hidden = true;
+    this.filmButton.title = TEXT.film;
+    URL.revokeObjectURL(this.film.src);
+  }
+}

@@ -1,0 +1,73 @@
+// What the page knows. Whoever shows a part of it is told when that part changes.
+
+export class Store {
+  #listeners = [];
+  #told = new Set();
+  #waiting = false;
+
+  constructor() {
+    /** @type {any} */ this.project = null; // as the server says
+    /** @type {any[]} */ this.lines = [];
+    /** @type {any} */ this.line = null; // state of the open line
+    this.lineId = "";
+    /** @type {any} */ this.sound = null; // samples of the open line
+    /** @type {any} */ this.motion = null;
+    /** @type {any} */ this.deviation = null;
+    /** @type {any} */ this.confidence = null;
+    /** @type {any} */ this.weights = null;
+    /** @type {any} */ this.other = null; // curves and weights of the version it is compared with
+    /** @type {any[]} */ this.doubts = [];
+    /** @type {{kind: "phone" | "word" | "curve", index: number, channel?: string} | null} */ this.selected = null;
+    /** @type {{start_s: number, end_s: number} | null} */ this.span = null;
+    this.time_s = 0;
+    this.comparing = false; // whether the other version is shown
+    /** @type {any} */ this.progress = null; // of the open line
+    this.tool = "select";
+    this.channels = ["opening", "width", "outer"];
+    this.saving = 0;
+    this.unsaved = false;
+    this.tab = "edit";
+    this.message = { text: "", kind: "" };
+    this.playing = false;
+    this.looping = false;
+    this.speed = 1;
+    this.face = "head";
+    this.mesh = ""; // name of the character that the weights move; empty: that of the face
+  }
+
+  /** Change some of it; listeners run once, after the code that runs now. */
+  set(changes) {
+    for (const [name, value] of Object.entries(changes)) {
+      if (this[name] === value) continue;
+      this[name] = value;
+      this.#told.add(name);
+    }
+    if (this.#told.size && !this.#waiting) {
+      this.#waiting = true;
+      queueMicrotask(() => this.#tell());
+    }
+  }
+
+  /** The curves that have one of a name: the motion, or the weights of the face; null: neither. */
+  curvesOf(name, { motion, weights } = this) { return [motion, weights].find((curves) => curves && curves.column(name) >= 0) ?? null; }
+
+  /** Run `act` whenever one of some parts has changed, and now. */
+  on(names, act) {
+    this.#listeners.push([names, act]);
+    act();
+  }
+
+  #tell() {
+    const told = this.#told;
+    this.#told = new Set();
+    this.#waiting = false;
+    for (const [names, act] of this.#listeners) {
+      if (!names.some((name) => told.has(name))) continue;
+      try {
+        act();
+      } catch (error) {
+        reportError(error); // the others are told all the same
+      }
+    }
+  }
+}

@@ -1,0 +1,484 @@
+// The studio: one page over the lines of a project. What it shows comes from the server; what it changes are sentences.
+
+import { showExport, showKeys } from "./dialogs.js";
+import { bothButton, icon, iconButton, made, textButton } from "./dom.js";
+import { Curves } from "./curves.js";
+import { Stage } from "./face/stage.js";
+import { Weights } from "./face/weights.js";
+import { added } from "./files.js";
+import { listen } from "./keys.js";
+import { Panel } from "./panel/panel.js";
+import { Queue } from "./queue/queue.js";
+import { say } from "./sentences.js";
+import { Refused, Server } from "./server.js";
+import { Player } from "./sound/player.js";
+import { samplesOf } from "./sound/samples.js";
+import { Store } from "./store.js";
+import { TEXT, filled } from "./strings.js";
+import { Timeline } from "./timeline/timeline.js";
+import { Transport } from "./transport.js";
+
+const PAGE_OF_LINES = 1000, POLL_MS = 300, DOUBTFUL = 0.7, MOST_DOUBTS = 12, CALM_MS = 5000, NUDGE_MS = 250;
+/** Of a line that is not ready. */
+const NOTHING = { words: [], phones: [], channels: [], steps: [], undo: 0, redo: 0 };
+
+export class Studio {
+  constructor() {
+    this.server = new Server(location.hash.slice(1));
+    this.store = new Store();
+    this.player = new Player(this.store);
+    /** @type {Promise<any>} */ this.edits = Promise.resolve();
+    this.left = false; // whether tabulators go on past the timeline
+    this.askedAt = this.editedAt = 0; // when the edit was asked for whose motion is on its way, or is shown next
+    this.build();
+    listen(this);
+  }
+
+  build() {
+    const { store } = this, part = (tag, id, properties = {}) => made(tag, { id, ...properties });
+    const queue = part("nav", "queue", { "aria-label": TEXT.lines }), face = part("section", "stage", { "aria-label": TEXT.face });
+    const panel = part("aside", "panel", { "aria-label": TEXT.places.panel }), transport = part("div", "transport", { role: "toolbar", "aria-label": TEXT.play });
+    const timeline = part("section", "timeline", { className: "timeline", "aria-label": TEXT.places.stage });
+    this.message = part("p", "message", { role: "status" });
+    this.state = part("p", "saved");
+    this.title = part("h1", "title");
+    this.cover = part("div", "cover", { hidden: true });
+    const picker = made("input", { type: "file", multiple: true, accept: "audio/*,video/*,.txt", hidden: true, "aria-label": TEXT.open, onchange: () => this.add([...picker.files]) });
+    const header = made("header", {}, iconButton("lines", TEXT.hideLines, () => document.body.classList.toggle("without-queue"), { id: "hide-lines" }), this.title,
+      bothButton("plus", TEXT.open, () => picker.click(), { id: "open" }), picker,
+      bothButton("out", TEXT.export, () => showExport(this), { id: "export" }), textButton("?", () => this.help(), { id: "help", title: TEXT.help, "aria-label": TEXT.help }));
+    const places = made("nav", { id: "places", "aria-label": TEXT.show }, ...["lines", "stage", "panel"].map((name) => textButton(TEXT.places[name],
+      () => this.showPlace(name), { id: `place-${name}` })));
+    document.body.append(header, made("main", {}, queue, face, panel, transport, timeline, this.cover), made("footer", {}, this.message, this.state), places,
+      made("datalist", { id: "phones-known" }));
+    this.showPlace("stage");
+    this.queue = new Queue(queue, this);
+    this.weights = new Weights(this);
+    this.stage = new Stage(face, this);
+    this.timeline = new Timeline(timeline, this);
+    this.transport = new Transport(transport, this);
+    this.panel = new Panel(panel, this);
+    store.on(["message"], () => {
+      this.message.textContent = store.message.text;
+      this.message.className = store.message.kind;
+    });
+    store.on(["saving", "unsaved", "line"], () => {
+      this.state.textContent = store.saving ? TEXT.saving : store.unsaved ? TEXT.notSaved : store.line ? TEXT.saved : "";
+    });
+    store.on(["project", "line"], () => {
+      this.title.textContent = [store.project?.name, store.line?.name].filter(Boolean).join(" / ") || TEXT.studio;
+      document.title = store.line ? `${store.line.name} · ${TEXT.studio}` : TEXT.studio;
+    });
+    store.on(["lines", "line", "project", "progress"], () => this.coverUp());
+    for (const name of ["dragenter", "dragover"]) addEventListener(name, (event) => { event.preventDefault(); document.body.classList.add("dropping"); });
+    addEventListener("dragleave", (event) => { if (!event.relatedTarget) document.body.classList.remove("dropping"); });
+    addEventListener("drop", async (event) => {
+      event.preventDefault();
+      document.body.classList.remove("dropping");
+      this.add(event.dataTransfer);
+    });
+    addEventListener("beforeunload", (event) => { if (store.saving) event.preventDefault(); });
+  }
+
+  showPlace(name) {
+    document.body.dataset.place = name;
+    for (const button of document.querySelectorAll("#places button")) button.setAttribute("aria-pressed", String(button.id === `place-${name}`));
+  }
+
+  /** Say something in the status line. */
+  say(text, kind = "") { this.store.set({ message: { text, kind } }); }
+
+  refuse(error) {
+    if (error.name === "AbortError") return;
+    this.say(error.status === 401 ? TEXT.noToken : error.message, "bad");
+    if (!(error instanceof Refused)) throw error;
+  }
+
+  async start() {
+    try {
+      await this.listed();
+      const first = this.store.lines.find(({ status }) => status === "ready") ?? this.store.lines[0];
+      if (first) await this.open(first.id);
+    } catch (error) {
+      this.refuse(error);
+    }
+    this.poll();
+  }
+
+  /** Read the lines of the project, a page after another. */
+  async listed() {
+    const lines = [];
+    let page;
+    do {
+      page = await this.server.read(`project?from=${lines.length}&count=${PAGE_OF_LINES}`);
+      lines.push(...page.lines);
+    } while (page.lines.length && lines.length < page.count);
+    if (!this.store.project) {
+      document.getElementById("phones-known").replaceChildren(...page.forms.phones.map(({ name }) => made("option", { value: name })));
+      this.store.set({ face: page.forms.faces.find(({ mesh }) => mesh)?.name ?? page.forms.faces[0]?.name });
+    }
+    this.store.set({ project: page, lines });
+  }
+
+  /** Ask for what the server does by itself, more often while a line is made. */
+  async poll() {
+    let pause_ms = CALM_MS;
+    try {
+      const { lines, revision } = await this.server.read("progress");
+      const before = this.store.lines.map(({ id, status }) => `${id} ${status}`).join();
+      if (lines.length || revision !== this.store.project?.revision) {
+        const states = new Map(lines.map((line) => [line.id, line]));
+        const changed = this.store.lines.some(({ id, status }) => states.has(id) && states.get(id).status !== status);
+        if (changed || revision !== this.store.project?.revision) await this.listed();
+        this.store.set({ progress: states.get(this.store.lineId) ?? null });
+        if (lines.some(({ status }) => status === "waiting" || status === "working")) pause_ms = POLL_MS;
+      }
+      const open = this.store.lines.find(({ id }) => id === this.store.lineId);
+      if (open && this.store.line && open.status !== this.store.line.status && before) await this.open(open.id, true);
+    } catch (error) {
+      if (error instanceof Refused) this.refuse(error);
+      else throw error;
+    }
+    clearTimeout(this.polling);
+    this.polling = setTimeout(() => this.poll(), pause_ms);
+  }
+
+  /** Ask soon, and often. */
+  wake() {
+    clearTimeout(this.polling);
+    this.polling = setTimeout(() => this.poll(), POLL_MS);
+  }
+
+  /** Show another line. */
+  async open(id, again = false) {
+    if (id === this.store.lineId && !again) return;
+    this.player.stop();
+    this.weights.forget();
+    this.store.set({ lineId: id, line: null, sound: null, motion: null, deviation: null, confidence: null, weights: null, other: null, comparing: false, doubts: [], selected: null, span: null, time_s: 0, progress: null });
+    try {
+      const line = { ...NOTHING, ...(await this.server.read(`lines/${id}`)) };
+      if (id !== this.store.lineId) return;
+      if (line.status !== "ready") this.wake();
+      this.store.set({ line });
+      const sound = this.server.bytes(`lines/${id}/sound.wav`).then((buffer) => {
+        if (id !== this.store.lineId) return;
+        this.player.load(buffer);
+        this.store.set({ sound: samplesOf(buffer) });
+      });
+      await Promise.all([sound, line.status === "ready" && this.moved(id, null)]);
+    } catch (error) {
+      if (id === this.store.lineId) this.refuse(error);
+    }
+  }
+
+  /** Read curves of a line again; `changed`: only this stretch of them, null: all. The weights of the face follow. */
+  async moved(id, changed) {
+    const { store, server } = this, stretch = changed ? `&start_s=${changed.start_s}&end_s=${changed.end_s}` : "";
+    const following = this.weights.change(changed);
+    const read = async (of, before) => {
+      const part = (await server.curves(`lines/${id}/motion?of=${of}${stretch}`)).only(store.channels);
+      if (!changed) return part;
+      return before?.holds(part) ? before.patched(part) : (await server.curves(`lines/${id}/motion?of=${of}`)).only(store.channels);
+    };
+    const [motion, deviation, confidence] = await Promise.all([
+      read("motion", store.motion), read("deviation", store.deviation), changed ? store.confidence : server.curves(`lines/${id}/motion?of=confidence`)]);
+    if (id !== store.lineId) return;
+    store.set({ motion, deviation, confidence });
+    this.doubted(id);
+    if (!changed) await following;
+  }
+
+  async doubted(id) {
+    const doubts = await this.server.read(`lines/${id}/doubts`).catch(() => []), { phones } = this.store.line ?? { phones: [] };
+    if (id !== this.store.lineId) return;
+    const spans = doubts.filter(({ confidence }) => confidence < DOUBTFUL).slice(0, MOST_DOUBTS).map(({ time_s, confidence, phone }) => {
+      const place = phones.findIndex(({ end_s }) => end_s > time_s), { start_s = time_s, end_s = time_s } = phones[place] ?? {};
+      return { start_s, end_s, confidence, place, text: filled(TEXT.doubtOf, { phone: phones[place]?.label ?? phone, share: Math.round(100 * confidence) }) };
+    });
+    this.store.set({ doubts: spans });
+  }
+
+  /** Choose which curves are shown. */
+  async showCurves(channels) {
+    this.store.set({ channels });
+    try {
+      if (this.store.line?.status === "ready") await this.moved(this.store.lineId, null);
+    } catch (error) {
+      this.refuse(error);
+    }
+  }
+
+  /** Make edits; one after another, each with the revision that the one before left. Returns whether they were made. */
+  edit(steps, instead = 0) {
+    return this.request("edits", { steps, ...(instead ? { instead } : {}) }, filled(TEXT.changed, { what: steps[0] ?? "" }));
+  }
+
+  undo() { return this.store.line?.undo ? this.request("undo", {}, TEXT.undone) : this.say(TEXT.nothingToUndo); }
+
+  redo() { return this.store.line?.redo ? this.request("redo", {}, TEXT.redone) : this.say(TEXT.nothingToRedo); }
+
+  async realign(text) {
+    const { span } = this.store;
+    await this.request("transcript", { text, ...(span ?? {}) }, TEXT.aligned);
+  }
+
+  request(kind, content, done) {
+    const id = this.store.lineId;
+    this.store.set({ saving: this.store.saving + 1 });
+    const reply = this.edits.then(() => this.requested(id, kind, content, done)).finally(() => this.store.set({ saving: this.store.saving - 1 }));
+    this.edits = reply.catch(() => {});
+    return reply;
+  }
+
+  async requested(id, kind, content, done) {
+    if (id !== this.store.lineId || !this.store.line) return false;
+    const asked_ms = performance.now();
+    try {
+      const state = await this.server.told(`lines/${id}/${kind}`, { revision: this.store.line.revision, ...content });
+      if (id !== this.store.lineId) return true;
+      if (state.status && state.status !== "ready") return this.open(id, true);
+      this.take(state);
+      this.say(done);
+      this.store.set({ unsaved: false });
+      this.askedAt = asked_ms;
+      if (state.changed) await this.moved(id, state.changed);
+      return true;
+    } catch (error) {
+      if (error instanceof Refused && error.status === 409 && error.state) {
+        this.take(error.state);
+        await this.moved(id, null);
+        this.say(TEXT.elsewhere, "bad");
+      } else {
+        if (error.status === 0) this.store.set({ unsaved: true });
+        this.refuse(error);
+      }
+      return false;
+    }
+  }
+
+  /** Take a new state of the open line. */
+  take(line) {
+    const { selected, lines, span, line: before } = this.store, list = selected && line[`${selected.kind}s`];
+    const was = selected && before?.[`${selected.kind}s`]?.[selected.index], is = list?.[selected.index];
+    const follows = was && is && span && span.start_s === was.start_s && span.end_s === was.end_s;
+    const listed = lines.map((each) => (each.id === line.id ? { ...each, edits: line.steps.length, exported: each.exported === "yes" ? "changed" : each.exported } : each));
+    this.store.set({ line, lines: listed, ...(list && !is ? { selected: null } : {}),
+      ...(follows ? { span: { start_s: is.start_s, end_s: is.end_s } } : {}) });
+  }
+
+  /** The face that is drawn next is that after the last edit. */
+  faceComes() {
+    this.editedAt = this.askedAt;
+    this.askedAt = 0;
+  }
+
+  /** The face has been drawn: how long after the edit is kept with the measures of the page. */
+  measured() {
+    if (!this.editedAt) return;
+    performance.measure("edit to face", { start: this.editedAt, end: performance.now() });
+    this.editedAt = 0;
+  }
+
+  /** Select a phone or a word, and its time. */
+  choose(kind, index) {
+    this.left = false;
+    const span = this.store.line?.[`${kind}s`][index];
+    if (!span) return;
+    this.store.set({ selected: { kind, index }, span: { start_s: span.start_s, end_s: span.end_s }, tab: this.store.tab === "why" ? "why" : "edit" });
+    if (!this.store.playing) this.player.seek(span.start_s);
+    this.timeline.reveal(span.start_s, span.end_s);
+  }
+
+  extendTo(kind, index) {
+    const span = this.store.line[`${kind}s`][index], now = this.store.span;
+    this.store.set({ span: { start_s: Math.min(span.start_s, now.start_s), end_s: Math.max(span.end_s, now.end_s) } });
+  }
+
+  chooseCurve(channel) { this.store.set({ selected: { kind: "curve", index: this.store.channels.indexOf(channel), channel }, tab: "edit" }); }
+
+  /** The next or previous phone or word, by the key of tabulators; past the last one the focus goes on. */
+  tab(event) {
+    const target = /** @type {HTMLElement} */ (event.target), { line, selected, time_s } = this.store;
+    if (!line?.phones?.length || !target.closest(".timeline") || (this.left && !selected)) return;
+    const kind = selected?.kind === "word" ? "word" : "phone", spans = line[`${kind}s`];
+    const here = selected?.kind === kind ? selected.index + (event.shiftKey ? -1 : 1) : Math.max(spans.findIndex(({ end_s }) => end_s > time_s), 0);
+    if (here < 0 || here >= spans.length) return;
+    event.preventDefault();
+    this.choose(kind, here);
+    this.timeline.scroller.focus({ preventScroll: true });
+  }
+
+  changeTier(up) {
+    const { line, selected } = this.store;
+    if (!line) return;
+    const holds = (span, { start_s, end_s }) => span.start_s <= (start_s + end_s) / 2 && span.end_s > (start_s + end_s) / 2;
+    if (up && selected?.kind === "phone") this.choose("word", line.words.findIndex((word) => holds(word, line.phones[selected.index])));
+    if (!up && selected?.kind === "word") this.choose("phone", line.phones.findIndex((phone) => holds(line.words[selected.index], phone)));
+  }
+
+  type() {
+    const { selected } = this.store;
+    if (!selected || selected.kind === "curve") return this.focusOn("curve-value");
+    const span = this.store.line[`${selected.kind}s`][selected.index];
+    this.timeline.reveal(span.start_s, span.end_s);
+    this.timeline.drawNow();
+    this.timeline[`${selected.kind}s`].type(selected.index);
+  }
+
+  relabel(kind, index, label) { return this.edit([kind === "word" ? say.word(index + 1, label) : say.phone(index + 1, label)]); }
+
+  withPhone(act) {
+    const { selected } = this.store;
+    if (selected?.kind === "phone") act(selected.index);
+    else this.say(TEXT.needsPhone, "bad");
+  }
+
+  /** Split a phone at the playhead, or else in its middle: the second half can then be made another one. */
+  async split(index) {
+    const { start_s, end_s } = this.store.line.phones[index], { time_s } = this.store;
+    const inside = time_s > start_s + 0.01 && time_s < end_s - 0.01;
+    if (await this.edit([say.split(index + 1, inside ? time_s : (start_s + end_s) / 2)])) this.choose("phone", index + 1);
+  }
+
+  async merge(index) {
+    if (await this.edit([say.remove(index + 2)])) this.choose("phone", index);
+  }
+
+  async removePhone(index) {
+    if (await this.edit([say.remove(index + 1)])) this.choose("phone", Math.max(index - 1, 0));
+  }
+
+  /** Lock the selection, or hold the pose of its beginning. */
+  over(sentence) {
+    const { span } = this.store;
+    if (!span) return this.say(TEXT.needsSpan, "bad");
+    return this.edit([sentence(span.start_s, span.end_s)]);
+  }
+
+  /** Move a border of the selected phone by frames; presses in quick succession are one edit. */
+  nudge(side, frames) {
+    this.withPhone((index) => {
+      const tier = this.timeline.phones, before = side === "end" ? index : index - 1;
+      if (before < 0 || before + 1 >= this.store.line.phones.length) return;
+      const from_s = tier.dragged?.before === before ? tier.dragged.time_s : this.store.line.phones[before].end_s;
+      tier.drag(before, from_s + frames / this.store.line.rate_hz);
+      clearTimeout(this.nudging);
+      this.nudging = setTimeout(() => tier.drop(), NUDGE_MS);
+    });
+  }
+
+  /** The time of the frame at the playhead. */
+  get frameTime() {
+    const rate = this.store.line?.rate_hz ?? 100;
+    return Math.round(this.store.time_s * rate) / rate;
+  }
+
+  step(frames) {
+    this.player.stop();
+    this.player.seek(this.frameTime + frames / (this.store.line?.rate_hz ?? 100));
+    this.timeline.reveal(this.store.time_s);
+  }
+
+  markSpan(isStart) {
+    const { span, time_s } = this.store, end_s = span && span.end_s > time_s ? span.end_s : this.player.duration_s;
+    if (isStart) return this.store.set({ span: { start_s: time_s, end_s } });
+    return this.store.set({ span: { start_s: span && span.start_s < time_s ? span.start_s : 0, end_s: time_s } });
+  }
+
+  /** Leave a field for the timeline; there, clear the selection; then tabulators go on to what follows the timeline. */
+  leave() {
+    if (document.activeElement instanceof HTMLElement && document.activeElement !== this.timeline.scroller) return this.timeline.scroller.focus({ preventScroll: true });
+    this.left = !this.store.selected;
+    return this.store.set({ selected: null, span: null, tool: "select" });
+  }
+
+  goTo({ start_s, end_s, place }) {
+    this.timeline.reveal(start_s, end_s);
+    if (place >= 0) return this.choose("phone", place);
+    return this.player.seek(start_s);
+  }
+
+  /** Go to the next doubt in time, or the previous one. */
+  jump(direction) {
+    const doubts = [...this.store.doubts].sort((a, b) => direction * (a.start_s - b.start_s)), { time_s } = this.store;
+    const next = doubts.find(({ start_s }) => direction * (start_s - time_s) > 1e-3) ?? doubts[0];
+    if (next) this.goTo(next);
+    else this.say(TEXT.noDoubts);
+  }
+
+  focusOn(id) {
+    this.store.set({ tab: "edit" });
+    queueMicrotask(() => document.getElementById(id)?.focus());
+  }
+
+  async mark(mark) {
+    const { lineId, lines } = this.store, line = lines.find(({ id }) => id === lineId);
+    if (!line) return;
+    try {
+      const changed = await this.server.told(`lines/${lineId}/mark`, { mark: line.mark === mark ? "none" : mark });
+      this.store.set({ lines: this.store.lines.map((each) => (each.id === lineId ? changed : each)) });
+    } catch (error) {
+      this.refuse(error);
+    }
+  }
+
+  async keepPronunciation(word, phones) {
+    try {
+      await this.server.told("lexicon", { word, phones });
+      this.say(filled(TEXT.kept, { word, phones: phones.join(" ") }));
+    } catch (error) {
+      this.refuse(error);
+    }
+  }
+
+  /** Keep the motion as it is now, to compare with later; or keep nothing. */
+  compare(kept) {
+    const { motion, weights, line } = this.store;
+    if (!kept || !motion) return this.store.set({ other: null, comparing: false });
+    const copy = weights && new Curves(weights.names, weights.rate_hz, weights.values.slice());
+    return this.store.set({ other: { steps: line.steps.length, motion, weights: copy } });
+  }
+
+  async add(dropped) {
+    try {
+      const first = await added(dropped, this);
+      await this.listed();
+      if (first) await this.open(first.id);
+    } catch (error) {
+      this.refuse(error);
+    }
+  }
+
+  help() { showKeys(); }
+
+  /** What covers the face and the timeline while there is nothing to show there. */
+  coverUp() {
+    const { project, lines, line, lineId, progress } = this.store, { cover } = this;
+    const listed = lines.find(({ id }) => id === lineId), status = line?.status ?? listed?.status;
+    cover.hidden = !project || Boolean(lines.length && (status === "ready" || !status));
+    if (cover.hidden) return;
+    if (!lines.length) {
+      cover.replaceChildren(icon("plus"), made("h2", { textContent: TEXT.empty }), made("p", { textContent: TEXT.emptyHint }),
+        textButton(TEXT.open, () => document.getElementById("open").click(), { className: "main" }));
+    } else if (status === "failed") {
+      cover.replaceChildren(made("h2", { textContent: TEXT.failed }), made("p", { className: "bad", textContent: line?.error ?? listed?.error ?? "" }),
+        textButton(TEXT.tryAgain, async () => {
+          try {
+            await this.server.told("understand", { lines: [lineId] });
+            await this.listed();
+            await this.open(lineId, true);
+          } catch (error) {
+            this.refuse(error);
+          }
+        }));
+    } else {
+      const told = progress ?? line?.progress ?? {};
+      cover.replaceChildren(made("h2", { textContent: told.stage ? filled(TEXT.working, { what: told.stage }) : TEXT.waiting }),
+        made("progress", { value: told.share ?? 0, max: 1, "aria-label": TEXT.states.working }));
+    }
+  }
+}
+
+const studio = new Studio();
+Object.assign(globalThis, { studio }); // for the console, and for tests
+studio.start();

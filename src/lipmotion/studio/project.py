@@ -1,0 +1,152 @@
+"""Projects as values: the lines that are worked on, what was decided of them, and what was exported."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields, replace
+from typing import Any
+
+from lipmotion.errors import InputError
+from lipmotion.extensions import installed_version
+from lipmotion.pipeline.batch.lines import BatchLine, check_names
+
+FORMAT, VERSION = "lipmotion.project", 1
+NO_MARK, APPROVED, REDO = MARKS = ("none", "approved", "redo")
+MOST_LINES = 100_000
+EDITS_SUFFIX = "edits.json"
+"""How files of edits end, after the name of the line and a dot."""
+
+
+@dataclass(frozen=True)
+class ExportRecord:
+    """What was exported of a line.
+
+    preset  : the preset that was used; empty: files were chosen
+    files   : digest of each file (SHA-256), by its path from the folder of the project
+    edits   : path of the file of edits that the files were made from: a copy, which gives the same files again
+    steps   : digest of the edits as they were
+    model   : digest of the model
+    version : of lipmotion
+    """
+
+    preset: str
+    files: Mapping[str, str]
+    edits: str
+    steps: str
+    model: str
+    version: str
+
+
+@dataclass(frozen=True)
+class ProjectLine:
+    """A recording that is worked on.
+
+    number     : of the line in the project; never used again
+    name       : path of its files without suffix, with ``/`` between folders; unique
+    sound      : path of the recording from the folder of the project, or absolute
+    sha256     : digest of the recording
+    transcript : its words, where they were given here; empty: those of a file beside it, or it is recognised
+    duration_s : of the sound; None: not known yet
+    doubt      : how unsure the motion of its speech is, 0 to 1; None: not known yet
+    mark       : one of ``MARKS``
+    exports    : in their order
+    """
+
+    number: int
+    name: str
+    sound: str
+    sha256: str
+    transcript: str = ""
+    duration_s: float | None = None
+    doubt: float | None = None
+    mark: str = NO_MARK
+    exports: tuple[ExportRecord, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.mark not in MARKS:
+            raise InputError(f"the mark is {self.mark!r}, required one of: {', '.join(MARKS)}")
+        if type(self.number) is not int or self.number < 1:
+            raise InputError(f"the line {self.name!r} has the number {self.number!r}, required 1 or more")
+
+
+@dataclass(frozen=True)
+class Project:
+    """The lines that are worked on, by their numbers.
+
+    model      : path of the model from the folder of the project; empty: the one that ships
+    language, recogniser : of new lines, as of ``SpeechRequest``
+    preset     : that was used last for an export
+    characters : paths of characters, by their names
+    next_number : of the next line
+    """
+
+    lines: Mapping[int, ProjectLine] = field(default_factory=dict)
+    model: str = ""
+    language: str = "en"
+    recogniser: str = "auto"
+    preset: str = ""
+    characters: Mapping[str, str] = field(default_factory=dict)
+    next_number: int = 1
+
+    def with_lines(self, lines: Sequence[ProjectLine]) -> Project:
+        """Return the project with lines that are new, or in place of those of their numbers."""
+        together = {**self.lines, **{line.number: line for line in lines}}
+        return replace(self, lines=together, next_number=max([self.next_number, *(n.number + 1 for n in lines)]))
+
+    def without_line(self, number: int) -> Project:
+        """Return the project without a line."""
+        return replace(self, lines={key: line for key, line in self.lines.items() if key != number})
+
+
+def check_lines(project: Project) -> None:
+    """Raise InputError or ExportError if two lines have one name, or one lies outside the folder of the project."""
+    if len(project.lines) > MOST_LINES:
+        raise InputError(f"{len(project.lines)} lines, required at most {MOST_LINES} in a project; divide it")
+    check_names((BatchLine(line.name, line.sound) for line in project.lines.values()), (EDITS_SUFFIX,))
+
+
+def project_document(project: Project) -> dict[str, Any]:
+    """Return a project as an object of JSON."""
+    rows = [_without_usual(line) for line in project.lines.values()]
+    settings = {each.name: getattr(project, each.name) for each in fields(project) if each.name != "lines"}
+    made_by = {"lipmotion": installed_version()}
+    return {"format": FORMAT, "version": VERSION, "made_by": made_by, **settings, "lines": rows}
+
+
+def _without_usual(line: ProjectLine) -> dict[str, Any]:
+    usual = {each.name: each.default for each in fields(line)}
+    values = {each.name: getattr(line, each.name) for each in fields(line)}
+    kept = {name: value for name, value in values.items() if value != usual[name]}
+    return kept | ({"exports": [asdict(each) for each in line.exports]} if line.exports else {})
+
+
+def project_from(content: Any) -> Project:
+    """Return the project of an object of JSON. Raises InputError, ExportError: it is none, or of a later version."""
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise InputError(f'not a project: required "format": "{FORMAT}"')
+    if content.get("version") != VERSION:
+        raise InputError(f"a project of version {content.get('version')!r}, required {VERSION}; update lipmotion")
+    given = {name: value for name, value in content.items() if name not in ("format", "version", "made_by", "lines")}
+    try:
+        lines = [_line(row) for row in content.get("lines", ())]
+        if len({line.number for line in lines}) < len(lines):
+            raise ValueError("two lines of one number")
+        project = Project({line.number: line for line in lines}, **given)
+        if not all(isinstance(text, str) for text in (project.model, project.preset, *project.characters.values())):
+            raise ValueError("a path or a name that is no text")
+        project = replace(project, next_number=int(project.next_number)).with_lines(lines)
+    except InputError:
+        raise
+    except (TypeError, ValueError, KeyError, AttributeError) as error:
+        raise InputError(f"not a project that can be read ({error})") from error
+    check_lines(project)
+    return project
+
+
+def _line(row: Any) -> ProjectLine:
+    texts = {name: row[name] for name in ("name", "sound", "sha256", "transcript", "mark") if name in row}
+    if not all(isinstance(text, str) for text in texts.values()):
+        raise ValueError(f"a text of the line {row.get('number')} is none")
+    numbers = {name: None if row.get(name) is None else float(row[name]) for name in ("duration_s", "doubt")}
+    exports = tuple(ExportRecord(**each) for each in row.get("exports", ()))
+    return ProjectLine(**{**row, **numbers, "exports": exports})

@@ -1,0 +1,67 @@
+"""Serving of the studio over HTTP, for this machine alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+from secrets import token_urlsafe
+from threading import Thread
+
+from lipmotion.pipeline.outputs.scenes import sound_reference
+from lipmotion.web.listening import HOST, check_installed, listening, serve
+
+TOKEN_BYTES = 24
+NAMES = (HOST, "localhost")
+"""What browsers on this machine may call the server."""
+
+
+def serve_studio(
+    source: Path | None = None,
+    *,
+    out: Path | None = None,
+    model: Path | None = None,
+    characters: Mapping[str, Path] | None = None,
+    port: int = 0,
+    started: Callable[[str], object] | None = None,
+) -> None:
+    """Let a project be worked on in a browser of this machine, until the process is stopped.
+
+    source     : a recording, a folder or a list of recordings, or a project; None: an empty project
+    out        : folder of a new project; None: beside the source
+    model      : of the project from now on; None: as it is
+    characters : further ones of the project, by their names
+    port       : 0: any that is free
+    started    : called with the address of the page, which holds a token, once it can be opened
+    Raises InputError: no such file, no project that can be read, or the port is taken. ExportError: another process
+    works on the project. MissingDependencyError: a package of the extra ``studio`` is not installed.
+    """
+    check_installed("the studio", "studio")
+    from lipmotion.studio.access import Access
+    from lipmotion.studio.application import studio_application
+    from lipmotion.studio.folder import PROJECT, opened_folder
+    from lipmotion.studio.studio import Studio
+
+    with listening(HOST, port) as place, opened_folder(source, out) as folder:
+        file = folder.path.absolute() / PROJECT
+        own = {name: sound_reference(path.absolute(), file) for name, path in (characters or {}).items()}
+        chosen = sound_reference(model.absolute(), file) if model else folder.project.model
+        if own or model:
+            folder.change(lambda now: replace(now, characters={**now.characters, **own}, model=chosen))
+        token = token_urlsafe(TOKEN_BYTES)
+        hosts = frozenset(f"{name}:{place.getsockname()[1]}" for name in NAMES)
+        with closing(Studio(folder)) as studio:
+            Thread(target=_prepare, name="prepare", daemon=True).start()
+            application = studio_application(studio, Access(token, hosts))
+            serve(application, place, started=lambda address: started(f"{address}#{token}") if started else None)
+
+
+def _prepare() -> None:
+    """Load what the first edit will need, while the page is opened."""
+    from lipmotion.faces.head.stage import mesh_of_figure
+    from lipmotion.kernels.choice import expect_more, numba_works
+
+    expect_more()
+    numba_works()
+    mesh_of_figure()

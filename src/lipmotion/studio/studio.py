@@ -1,0 +1,325 @@
+"""The studio: a project, the lines of it that are at work, its faces, what is exported."""
+
+from __future__ import annotations
+
+import logging
+import os
+import shutil
+import tempfile
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, fields, replace
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+from uuid import uuid4
+
+from starlette.exceptions import HTTPException
+
+from lipmotion.errors import InputError, LipMotionError, shortened
+from lipmotion.export.sound import write_sound
+from lipmotion.extensions import installed_version
+from lipmotion.faces.base import Face
+from lipmotion.pipeline.edit_files import read_edits, write_edits
+from lipmotion.pipeline.edits import FORMS, Step, Text, WordIs, WordSaid, step_of
+from lipmotion.pipeline.job import Job, Outputs
+from lipmotion.pipeline.model import Model, load_model, shipped_path
+from lipmotion.pipeline.opened_job import opened
+from lipmotion.pipeline.outputs.curve_sets import SHAPE_SETS
+from lipmotion.pipeline.outputs.drawn_video import read_sound
+from lipmotion.storage.files import TEMPORARY, made_folders, read_text_file, sha256_of
+from lipmotion.storage.json_text import from_json
+from lipmotion.studio.desk import NEW, READY, WAITING, WORKING, Desk, NotReadyError, Work
+from lipmotion.studio.folder import EXPORTS, ProjectFolder
+from lipmotion.studio.meshes import Faces
+from lipmotion.studio.presets import PRESETS, Preset, suffixes
+from lipmotion.studio.project import EDITS_SUFFIX, MARKS, ExportRecord, ProjectLine
+from lipmotion.types.configuration import ANY, kind_of
+from lipmotion.types.delivery import Delivery
+from lipmotion.types.moods import MANNERS, MOODS
+from lipmotion.types.staging import Staging
+from lipmotion.units import PHONES, is_silent
+
+LOG = logging.getLogger("lipmotion")
+ORDERS = ("", "doubt")
+
+
+@dataclass(frozen=True)
+class EditsSummary:
+    """What the list of lines says of edits: how many there are, and a digest of their sentences."""
+
+    count: int
+    digest: str
+
+
+class Studio:
+    """A project that is open.
+
+    folder : the project
+    model  : None: as the project says
+    """
+
+    def __init__(self, folder: ProjectFolder, model: Model | None = None) -> None:
+        self.folder = folder
+        file = _model_file(folder)
+        self.model = model or load_model(file)
+        self.desk = Desk(folder, self.model)
+        places = {name: Path(os.path.normpath(folder.path / file)) for name, file in folder.project.characters.items()}
+        self.faces = Faces(places)
+        self._sounds = Path(tempfile.mkdtemp(prefix="lipmotion-studio-"))
+        self._exporting: dict[str, int] | None = None
+        self._summaries: dict[int, tuple[int, EditsSummary]] = {}
+        self._model_digest = sha256_of(file or shipped_path())
+
+    def close(self) -> None:
+        """Write what is not written, and remove what was kept for this run alone."""
+        self.desk.close()
+        shutil.rmtree(self._sounds, ignore_errors=True)
+
+    def number(self, given: str) -> int:
+        """Return the number of a line that an address gives. Raises HTTPException: there is no such line."""
+        number = int(given) if given.isascii() and given.isdecimal() and len(given) < 10 else 0
+        if number not in self.folder.project.lines:
+            raise HTTPException(404, "no such line")
+        return number
+
+    def listed(self, first: int, count: int, *, order: str = "", status: str = "", mark: str = "") -> dict[str, Any]:
+        """Return the project, and so many of its lines from one on, for the list.
+
+        order  : ``doubt``: what is least sure first; empty: that of the project
+        status, mark : only lines with these; empty: all
+        """
+        if order not in ORDERS:
+            raise InputError(f"order is {shortened(repr(order))}, required doubt, or nothing")
+        lines = [
+            line
+            for line in self.folder.project.lines.values()
+            if (not mark or line.mark == mark) and (not status or self.desk.status(line.number) == status)
+        ]
+        if order == "doubt":
+            lines.sort(key=lambda line: -1.0 if line.doubt is None else line.doubt, reverse=True)
+        return {
+            "name": self.folder.path.absolute().name,
+            "folder": str(self.folder.path.absolute()),
+            "revision": self.folder.revision,
+            "count": len(lines),
+            "from": first,
+            "lines": [self.row(line.number) for line in lines[first : first + count]],
+            "forms": self.forms(),
+            "version": installed_version(),
+            "model": {"name": self.model.about.get("name", ""), "engine": self.model.engine.name},
+        }
+
+    def row(self, number: int) -> dict[str, Any]:
+        """Return what the list says of a line."""
+        line, summary = self.folder.line(number), self.summary(number)
+        changed = bool(line.exports) and line.exports[-1].steps != summary.digest
+        return {
+            "id": number,
+            "name": line.name,
+            "status": self.desk.status(number),
+            "mark": line.mark,
+            "doubt": line.doubt,
+            "duration_s": line.duration_s,
+            "edits": summary.count,
+            "exported": "changed" if changed else "yes" if line.exports else "no",
+            "error": self.desk.error(number),
+        }
+
+    def line_document(self, number: int) -> dict[str, Any]:
+        """Return what is said of a line, ready or not."""
+        line, work = self.folder.line(number), self.desk.work(number)
+        known: dict[str, Any] = {"id": number, "name": line.name, "mark": line.mark, "transcript": line.transcript}
+        if work is None:
+            return known | {"status": self.desk.status(number), "progress": None, "error": ""}
+        status = WORKING if work.status == READY and work.line is None else work.status
+        return known | {"status": status, "progress": _progress(work), "error": work.error}
+
+    def progress(self) -> dict[str, Any]:
+        """Return which lines wait, or are at work, or were until a short while ago."""
+        works = self.desk.at_work()
+        lines = [{"id": work.number, "status": work.status, **_progress(work), "error": work.error} for work in works]
+        waiting = sum(work.status == WAITING for work in works)
+        return {"lines": lines, "waiting": waiting, "revision": self.folder.revision, "export": self._exporting}
+
+    def forms(self) -> dict[str, Any]:
+        """Return what can be chosen, from the registries and configurations."""
+        return {
+            "phones": [{"name": phone, "silent": is_silent(phone)} for phone in PHONES],
+            "moods": list(MOODS),
+            "manners": list(MANNERS),
+            "faces": [{"name": name, "title": name, "mesh": mesh} for name, mesh in self.faces.names.items()],
+            "curve_sets": list(SHAPE_SETS),
+            "presets": [
+                {"name": each.name, "title": each.title, "files": list(each.files)} for each in PRESETS.values()
+            ],
+            "preset": self.folder.project.preset,
+            "suffixes": list(suffixes()),
+            "edit_forms": list(FORMS),
+            "controls": list(_controls()),
+            "marks": list(MARKS),
+        }
+
+    def summary(self, number: int) -> EditsSummary:
+        """Return what is said of a line's edits; none, where it is not understood yet."""
+        path = self.folder.edits(self.folder.line(number))
+        try:
+            changed = path.stat().st_mtime_ns
+        except OSError:
+            return EditsSummary(0, digest_of(()))
+        if self._summaries.get(number, (0,))[0] != changed:
+            try:
+                steps = from_json(read_text_file(path, "edits")).get("steps", [])
+                self._summaries[number] = (changed, EditsSummary(len(steps), digest_of(map(str, steps))))
+            except (ValueError, AttributeError, TypeError):  # damaged: it is said once the line is opened
+                self._summaries[number] = (changed, EditsSummary(0, ""))
+        return self._summaries[number][1]
+
+    def understand(self, numbers: Sequence[int] | None) -> int:
+        """Let lines be understood; None: all that are new. Returns how many wait. Raises HTTPException: no such."""
+        known = self.folder.project.lines
+        if numbers is not None and not set(numbers) <= known.keys():
+            raise HTTPException(404, "no such line")
+        return self.desk.queue(known if numbers is None else numbers)
+
+    @contextmanager
+    def arriving(self) -> Iterator[Path]:
+        """Give the path of a file that something dropped is written to; afterwards it is gone."""
+        path = self.folder.path / f"{TEMPORARY}{uuid4().hex}"
+        try:
+            yield path
+        finally:
+            path.unlink(missing_ok=True)
+
+    def with_pronunciations(self, sentences: Sequence[str]) -> tuple[str | Step, ...]:
+        """Return edits that say words of the project's lexicon with their phones, which then stand in the edits.
+
+        Raises InputError: a sentence is no edit.
+        """
+        steps = [step_of(sentence) for sentence in sentences]
+        if not any(isinstance(step, WordIs) for step in steps):
+            return tuple(steps)
+        own = self.folder.lexicon().user
+        return tuple(
+            WordSaid(step.number, step.word, Text(" ".join(own[step.word.lower()][0])))
+            if isinstance(step, WordIs) and step.word.lower() in own
+            else step
+            for step in steps
+        )
+
+    async def say(self, number: int, transcript: str) -> None:
+        """Let a line be understood again, with its words; without any, they are recognised.
+
+        Raises NotReadyError: it is being understood.
+        """
+        if self.desk.status(number) in (WAITING, WORKING):
+            raise NotReadyError
+        edits, work = self.folder.edits(self.folder.line(number)), self.desk.work(number)
+        if work is not None and work.line is not None:
+            await self.desk.at(number, lambda _: edits.unlink(missing_ok=True))
+        edits.unlink(missing_ok=True)
+        self.folder.change_line(number, lambda line: replace(line, transcript=transcript.strip()))
+        self.desk.forget(number)
+        self.desk.opened(number)
+
+    def mark(self, number: int, mark: str) -> None:
+        """Mark a line. Raises InputError: no such mark."""
+        self.folder.change_line(number, lambda line: replace(line, mark=mark))
+
+    def remove(self, number: int) -> None:
+        """Take a line out of the project; its files stay where they are."""
+        self.desk.forget(number)
+        self.folder.change(lambda project: project.without_line(number))
+
+    def drawn(self, name: str) -> str | Face:
+        """Return a face that pictures can be drawn of. Raises InputError: there is none of that name."""
+        shown = self.faces.shown(name)
+        return getattr(shown, "face", name)
+
+    def played(self, number: int) -> Path:
+        """Return the path of a line's sound as it is played. Raises InputError: it cannot be read."""
+        path = self._sounds / f"{number}.wav"
+        if not path.exists():
+            write_sound(path, read_sound(self.folder.sound(self.folder.line(number))))
+        return path
+
+    def export(self, number: int, preset: Preset) -> dict[str, Any]:
+        """Write files of a line, and record what was written from which edits; return their paths.
+
+        Raises InputError: it is not understood yet. ExportError: a file cannot be written. Others as ``Job.run``.
+        """
+        line = self.folder.line(number)
+        if self.desk.status(number) in (NEW, WAITING, WORKING) and not self.folder.edits(line).exists():
+            raise InputError(f"{line.name}: is not understood yet; open it first")
+        out = self.folder.path / EXPORTS
+        copy = out / f"{line.name}.{EDITS_SUFFIX}"
+        files = tuple(str(out / f"{line.name}{suffix}") for suffix in preset.files)
+        file = replace(read_edits(self.folder.edits(line)), undone=())
+        with made_folders([copy.parent]):
+            write_edits(file, copy)
+            request = replace(file.named, recording=self.folder.sound(line), edits=copy)
+            outputs = Outputs(files, curves=preset.curves, fps=preset.fps)
+            opened(Job(request, outputs)).run(lambda: self.model)
+        digests = {Path(path).relative_to(self.folder.path).as_posix(): sha256_of(Path(path)) for path in files}
+        record = ExportRecord(
+            preset.name,
+            digests,
+            copy.relative_to(self.folder.path).as_posix(),
+            digest_of(file.edits.sentences),
+            self._model_digest,
+            installed_version(),
+        )
+        self.folder.change_line(number, lambda now: _with_export(now, record))
+        return {"id": number, "files": list(digests), "edits": record.edits}
+
+    def export_several(self, numbers: Sequence[int], preset: Preset) -> dict[str, Any]:
+        """Write files of several lines, as ``export``; what fails is told, and the others are written."""
+        exported, failed = [], []
+        try:
+            for done, number in enumerate(numbers):
+                self._exporting = {"done": done, "count": len(numbers)}
+                try:
+                    exported.append(self.export(number, preset))
+                except LipMotionError as error:
+                    failed.append({"id": number, "error": str(error)})
+        finally:
+            self._exporting = None
+        self.folder.change(lambda project: replace(project, preset=preset.name or project.preset))
+        return {"exported": exported, "failed": failed}
+
+
+def digest_of(sentences: Iterable[str]) -> str:
+    """Return the digest of edits, by their sentences.
+
+    >>> digest_of(["phone 2 is p"])[:8]
+    '2a0d1f5a'
+    """
+    return sha256("\n".join(sentences).encode("utf-8", "surrogatepass")).hexdigest()
+
+
+def _with_export(line: ProjectLine, record: ExportRecord) -> ProjectLine:
+    """Return a line with one export more; of those with the same files only the last one is kept."""
+    kept = tuple(each for each in line.exports if set(each.files) != set(record.files))
+    return replace(line, exports=(*kept, record))
+
+
+def _progress(work: Work) -> dict[str, Any]:
+    return {"stage": work.stage, "share": round(work.share, 3)}
+
+
+def _controls() -> Iterator[dict[str, Any]]:
+    """Yield what edits can set of delivery and staging."""
+    for part in (Delivery, Staging):
+        for each in fields(part):
+            rule = each.metadata.get("rule", ANY)
+            told = {"name": each.name, "kind": kind_of(each).__name__, "usual": each.default}
+            yield told | {"least": rule.least, "most": rule.most, "help": each.metadata.get("help", "")}
+
+
+def _model_file(folder: ProjectFolder) -> Path | None:
+    """Return the file of a project's model; None: the one that ships, with a warning where the project's is gone."""
+    file = folder.model_file
+    if file is not None and not file.exists():
+        LOG.warning("%s: the model of the project is not there; the one that ships is used", file)
+        return None
+    return file

@@ -1,0 +1,74 @@
+"""Recordings of a project to files of edits: words and phones are found, and stand in the file from then on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from lipmotion.errors import InputError
+from lipmotion.pipeline.edit_files import begun_with, read_edits, write_edits
+from lipmotion.pipeline.job import Request
+from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.session import Session
+from lipmotion.pipeline.understand.read_request import read_request
+from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.storage.files import sha256_of
+from lipmotion.studio.folder import ProjectFolder
+from lipmotion.studio.line import OpenLine, doubt_of
+from lipmotion.studio.project import ProjectLine
+from lipmotion.types import Monitor, silent_monitor
+
+
+def read_sound_of(folder: ProjectFolder, line: ProjectLine) -> AnalysedAudio:
+    """Return the sound of a line. Raises InputError: it is not there, cannot be read, or is another one by now."""
+    path = folder.sound(line)
+    if sha256_of(path) != line.sha256:
+        raise InputError(
+            f"{path}: is another recording than when it became a line of this project; put the old one back, or add "
+            "the new one under another name"
+        )
+    return analysed(read_audio(path))
+
+
+def understand_line(
+    folder: ProjectFolder, line: ProjectLine, model: Model, monitor: Monitor = silent_monitor
+) -> AnalysedAudio:
+    """Find words and phones of a line, and write them as its file of edits; return its sound.
+
+    The project's lexicon is not named there: what it says of later words stands in the edits that say them.
+    Its words: those that were given, else those of a file beside the recording; else they are recognised.
+    Raises InputError, AlignmentError: the recording or its words are not usable. ExportError: it cannot be written.
+    """
+    audio, project = read_sound_of(folder, line), folder.project
+    named = Request(
+        folder.sound(line),
+        model=folder.model_file,
+        lexicon=folder.lexicon_file,
+        language=project.language,
+        recogniser=project.recogniser,
+    )
+    request = read_request(named, words_beside=not line.transcript)
+    if line.transcript:
+        request = replace(request, transcript=line.transcript)
+    session = Session(request, model=model, monitor=monitor, audio=audio)
+    file, generation = begun_with(replace(named, lexicon=None), session)
+    path = folder.edits(line)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_edits(file, path)
+    duration_s, doubt = audio.duration_s, doubt_of(generation)
+    folder.change_line(line.number, lambda now: replace(now, duration_s=duration_s, doubt=doubt), save=False)
+    return audio
+
+
+def open_line(folder: ProjectFolder, line: ProjectLine, model: Model, audio: AnalysedAudio | None = None) -> OpenLine:
+    """Return a line that has been understood, open.
+
+    audio : its sound, where it has been read
+    Raises InputError: its sound or its file of edits cannot be read, or belongs to another recording.
+    """
+    file = read_edits(folder.edits(line))
+    recording = folder.sound(line)
+    named = replace(file.named, recording=recording, model=folder.model_file)
+    return OpenLine(
+        replace(file, named=named), folder.edits(line), recording, model, audio or read_sound_of(folder, line)
+    )

@@ -1,0 +1,71 @@
+"""Replies of pages that lipmotion serves: the headers of all of them, and those to errors."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from lipmotion.errors import ExportError, LipMotionError
+
+LOG = logging.getLogger("lipmotion")
+HEADERS = {
+    "content-security-policy": "default-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'; "
+    "object-src 'none'",
+    "x-content-type-options": "nosniff",
+    "referrer-policy": "no-referrer",
+    "x-frame-options": "DENY",
+    "cross-origin-resource-policy": "same-origin",
+    "cross-origin-opener-policy": "same-origin",
+    "permissions-policy": "camera=(), microphone=(), geolocation=()",
+}
+FRESH = {"cache-control": "no-store"}
+
+
+class SecurityHeaders:
+    """Adds headers to every reply, of errors too."""
+
+    def __init__(self, application: ASGIApp, headers: Mapping[str, str] = HEADERS) -> None:
+        self._application = application
+        self._headers = [(name.encode(), value.encode()) for name, value in headers.items()]
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on."""
+
+        async def secured(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                message = {**message, "headers": [*message.get("headers", ()), *self._headers]}
+            await send(message)
+
+        await self._application(scope, receive, secured)
+
+
+async def _refused(_: Request, error: Exception) -> Response:
+    status, headers = getattr(error, "status_code", 400), getattr(error, "headers", None)
+    return JSONResponse({"error": str(getattr(error, "detail", ""))}, status, {**FRESH, **(headers or {})})
+
+
+async def _failed(status: int, _: Request, error: Exception) -> Response:
+    if isinstance(error, ExportError):
+        LOG.warning("%s", error)
+        return JSONResponse({"error": "cannot be stored now; try again"}, status, FRESH)
+    return JSONResponse({"error": str(error)}, status, FRESH)
+
+
+ERRORS: dict[type[Exception], Callable[[Request, Any], Any]] = {
+    HTTPException: _refused,
+    LipMotionError: partial(_failed, 422),
+    ExportError: partial(_failed, 503),
+}
+"""What is replied to errors that are raised on purpose: JSON, ``{"error": text}``."""
+
+
+def json_bytes(content: bytes, status: int = 200) -> Response:
+    """Return JSON that is encoded already as a reply."""
+    return Response(content, status, FRESH, "application/json")

@@ -1,0 +1,23 @@
+"""``lipmotion studio``: what it refuses before it begins."""
+
+from __future__ import annotations
+
+import socket
+from pathlib import Path
+
+import pytest
+
+from cli.conftest import RunCommand, is_one_error
+from lipmotion.storage.files import locked
+
+pytest.importorskip("uvicorn", reason="the extra 'studio' is not installed")
+
+
+def test_what_the_studio_refuses(here: Path, run: RunCommand) -> None:
+    assert is_one_error(run("studio", "nothing.wav"), 3)
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        assert is_one_error(run("studio", "--port", taken.getsockname()[1], "-o", "project"), 3)
+    with locked(here / "project"):  # as by another studio
+        assert is_one_error(run("studio", "-o", "project"), 7)
+    (here / "project" / "project.json").write_text("{}", encoding="utf-8")
+    assert is_one_error(run("studio", "project"), 3)

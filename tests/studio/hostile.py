@@ -1,0 +1,158 @@
+"""Hostile requests to a studio, the same every time: wrong paths, methods, bodies, headers and tokens."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from random import Random
+
+from lipmotion.studio.access import TOKEN_HEADER
+from study.hostile import Hostile
+
+FOREIGN = "nobody may read this"
+LINES = ("1", "2", "0", "-1", "01", "1.0", "9" * 500, "../1", "%2e%2e", "1/../../foreign", "é", "1%00", "true")
+LINE_PARTS = (
+    "",
+    "/edits",
+    "/undo",
+    "/redo",
+    "/transcript",
+    "/mark",
+    "/export",
+    "/video",
+    "/sound.wav",
+    "/peaks",
+    "/spectrogram",
+    "/motion",
+    "/weights",
+    "/picture",
+    "/why",
+    "/doubts",
+    "/../../project.json",
+    "/edits/../../../foreign.txt",
+    "/remove/x",
+)
+PATHS = (
+    "/",
+    "/../project.json",
+    "/project.json",
+    "/studio.html",
+    "/vendor/../../project.json",
+    "//etc/passwd",
+    "/%2e%2e/%2e%2e/etc/passwd",
+    "/page/studio.html",
+    "/edits/line.edits.json",
+    "/sounds/line.wav",
+    "/lexicon.txt",
+    "/foreign.txt",
+    "/api",
+    "/api/",
+    "/api/project",
+    "/api/progress",
+    "/api/lexicon",
+    "/api/export",
+    "/api/understand",
+    "/api/faces/../../foreign.txt.glb",
+    "/api/faces/head.glb/..",
+    "/api/faces/%2e%2e%2fforeign.glb",
+    "/api/faces/portrait.glb",
+    "/api/lines?name=../../foreign.txt",
+    "/api/lines?name=%00.wav",
+    "/api/lines?name=" + "a" * 600 + ".wav",
+    "/static",
+    "/" + "a/" * 500,
+    "/%ff%fe",
+    "/api/lines/1/sound.wav?key=0",
+    "/application.py",
+)
+QUERIES = (
+    "",
+    "?time=nan",
+    "?time=-1",
+    "?time=1e999",
+    "?time=0.5&face=../../foreign",
+    "?face=/etc/passwd",
+    "?columns=0",
+    "?columns=1e9",
+    "?columns=-5",
+    "?start_s=2&end_s=1",
+    "?of=__class__",
+    "?from=-1",
+    "?count=99999999",
+    "?word=" + "a" * 90,
+    "?word=%00",
+    "?word=a%20b",
+    "?order=;drop",
+    "?key=",
+    "?key=é",
+    "?" + "a=1&" * 900,
+    "?time=" + "1" * 5000,
+    "?end_s=0.5&start_s=0.4",
+)
+BODIES = (
+    b"",
+    b"{",
+    b"null",
+    b"[]",
+    b"[" * 5000,
+    b'"' * 100,
+    b"\xff\xfe\x00",
+    b'{"revision": NaN}',
+    b'{"a": ' * 3000,
+    b"x" * 20_000,
+    b"1" * 4400,
+    *(
+        json.dumps(each).encode()
+        for each in (
+            {"revision": 0, "steps": ["phone 999999999999999999999 is p"]},
+            {"revision": 0, "steps": ["pin opening 1e308 at 0.5", "gain 3 from 0 to 1"]},
+            {"revision": 0, "steps": ["say " + "a " * 900 + "from 0 to 1"]},
+            {"revision": 0, "steps": ["draw opening " + "1 " * 990 + "from 0 to 1e300"]},
+            {"revision": 0, "steps": ["set background ../../foreign.txt"]},
+            {"revision": 0, "steps": ["phone 1 is p"] * 1001},
+            {"revision": 0, "steps": [["phone 1 is p"]], "instead": -1},
+            {"revision": 10**400, "count": 10**400},
+            {"revision": "0", "steps": "phone 1 is p"},
+            {"revision": 0, "count": -1},
+            {"mark": "../../foreign"},
+            {"mark": ["approved"]},
+            {"text": "\ud800", "revision": 0, "start_s": 0, "end_s": 1},
+            {"text": "mama", "revision": 0, "start_s": 1e300, "end_s": -1},
+            {"preset": "../x"},
+            {"files": ["/../../foreign.txt", ".csv"]},
+            {"files": [".csv/../../../foreign"]},
+            {"files": [".%05d.png"]},
+            {"preset": 3, "only": {}},
+            {"lines": [99]},
+            {"lines": "some"},
+            {"word": "a", "phones": ["../x"]},
+            {"word": "\n# a\nb", "phones": ["b"]},
+            {"start_s": 0, "end_s": 1e9, "face": "head"},
+            {"start_s": 0.2, "end_s": 0.1, "face": "/etc/passwd"},
+        )
+    ),
+)
+METHODS = ("GET", "GET", "POST", "POST", "POST", "PUT", "DELETE", "HEAD", "OPTIONS", "PATCH", "TRACE", "LOCK")
+RANGES = ("bytes=0-", "bytes=-1", "bytes=5-1", "bytes=9999999-", "bytes=a-b", "lines=1-2", "bytes=" + "0-1," * 900)
+TOKENS = ("{token}",) * 6 + ("", "x", "é", "' OR 1=1 --", "a" * 6000, "\t{token}")
+HOSTS = ("{host}",) * 8 + ("example.org", "127.0.0.1", "", "{host}.example.org")
+
+
+def hostile_requests(count: int, host: str, token: str) -> Iterator[Hostile]:
+    """Yield requests that no page sends; ``host`` and ``token`` are valid ones."""
+    chance = Random(31)
+    for _ in range(count):
+        path = chance.choice(PATHS)
+        if chance.random() < 0.7:
+            path = f"/api/lines/{chance.choice(('1', '1', '1', *LINES))}{chance.choice(LINE_PARTS)}"
+        if "?" not in path:
+            path += chance.choice(QUERIES)
+        kind = chance.choice(("application/json",) * 4 + ("text/plain", "", "application/json; charset=utf-16"))
+        headers = {"content-type": kind, "range": chance.choice(RANGES)}
+        headers["host"] = chance.choice(HOSTS).replace("{host}", host)
+        headers[TOKEN_HEADER] = chance.choice(TOKENS).replace("{token}", token)
+        if chance.random() < 0.15:
+            headers["origin"] = chance.choice(("http://example.org", "null", f"http://{host}", "é"))
+        if chance.random() < 0.1:
+            headers["x-lipmotion-transcript"] = chance.choice(("%ff%fe", "a" * 5000, "%00", "../../foreign.txt"))
+        yield Hostile(chance.choice(METHODS), path, chance.choice(BODIES), headers)

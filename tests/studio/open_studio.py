@@ -1,0 +1,60 @@
+"""A studio with one line of the toy's speech, which requests are sent to in this process."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from lipmotion.pipeline.model import Model
+from lipmotion.studio.access import TOKEN_HEADER, Access
+from lipmotion.studio.application import studio_application
+from lipmotion.studio.folder import ProjectFolder, opened_folder
+from lipmotion.studio.studio import Studio
+from study.asgi import Application, Reply, ask
+
+HOST, TOKEN = "127.0.0.1:8000", "a-token"
+PATIENCE_S = 120.0
+
+
+class OpenStudio(NamedTuple):
+    """A studio, and the application that shows it."""
+
+    folder: ProjectFolder
+    studio: Studio
+    application: Application
+
+    def ask(self, path: str, content: Any = None, **headers: str) -> Reply:
+        """Return the reply to a request of the page."""
+        sent = {"host": HOST, TOKEN_HEADER: TOKEN} | {name.replace("_", "-"): value for name, value in headers.items()}
+        return ask(self.application, path, content, headers=sent)
+
+    def ready(self, number: int = 1) -> dict[str, Any]:
+        """Return the state of a line once it is understood."""
+        ends_s = time.monotonic() + PATIENCE_S
+        while time.monotonic() < ends_s:
+            state = self.ask(f"/api/lines/{number}").content
+            if state["status"] not in ("waiting", "working"):
+                return dict(state)
+            time.sleep(0.02)
+        raise AssertionError(f"line {number} is not ready after {PATIENCE_S} s")
+
+    def edit(self, *steps: str, **more: Any) -> Reply:
+        """Return the reply to edits of the first line as it is."""
+        revision = self.ready()["revision"]
+        return self.ask("/api/lines/1/edits", {"revision": revision, "steps": list(steps), **more})
+
+
+@contextmanager
+def open_studio(speech: Path, transcript: str, model: Model, folder: Path) -> Iterator[OpenStudio]:
+    """Give a studio of a recording that is copied into a folder."""
+    folder.mkdir(exist_ok=True)
+    sound = folder / "line.wav"
+    if not sound.exists():
+        shutil.copy(speech, sound)
+        sound.with_suffix(".txt").write_text(transcript, encoding="utf-8")
+    with opened_folder(sound) as opened, closing(Studio(opened, model)) as studio:
+        yield OpenStudio(opened, studio, studio_application(studio, Access(TOKEN, frozenset({HOST}))))

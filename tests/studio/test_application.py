@@ -1,0 +1,284 @@
+"""The studio's application: a line from its sound to an export, and whoever asks for something else."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.meshes.files.gltf_weights import read_gltf_motion
+from lipmotion.pipeline.edit_files import read_edits
+from lipmotion.pipeline.edits import FORMS
+from lipmotion.pipeline.model import Model
+from lipmotion.testing.toy import ToySentence
+
+pytest.importorskip("starlette", reason="the extra 'studio' is not installed")
+
+from lipmotion.studio.access import TOKEN_HEADER, Access
+from lipmotion.studio.folder import opened_folder
+from lipmotion.studio.studio import Studio
+from studio.open_studio import HOST, TOKEN, OpenStudio, open_studio
+
+
+@pytest.fixture(scope="module")
+def place(
+    toy_speech: Path, toy_sentence: ToySentence, toy_model: Model, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[OpenStudio]:
+    folder = tmp_path_factory.mktemp("studio")
+    with open_studio(toy_speech, " ".join(toy_sentence.words), toy_model, folder) as opened:
+        yield opened
+
+
+@pytest.fixture
+def studio(place: OpenStudio) -> OpenStudio:
+    """The same studio, its line without edits."""
+    state = place.ready()
+    if state["undo"]:
+        place.ask("/api/lines/1/undo", {"revision": state["revision"], "count": state["undo"]})
+    return place
+
+
+def test_an_edit_is_made_stored_and_taken_back(studio: OpenStudio) -> None:
+    before = studio.ready()
+    reply = studio.edit("phone 3 is p", "pin opening 0.1 at 1.0")
+    state = reply.content
+    assert (reply.status, state["undo"], state["phones"][2]["label"]) == (200, 2, "p")
+    assert 0 < state["changed"]["start_s"] < before["phones"][2]["end_s"]
+    stored = read_edits(studio.folder.edits(studio.folder.line(1)))
+    assert stored.edits.sentences == ("phone 3 is p", "pin opening 0.1 at 1.0")
+    undone = studio.ask("/api/lines/1/undo", {"revision": state["revision"], "count": 2}).content
+    assert (undone["phones"], undone["redo"]) == (before["phones"], 2)
+    assert list(map(str, read_edits(studio.folder.edits(studio.folder.line(1))).undone)) == state["steps"]
+    redone = studio.ask("/api/lines/1/redo", {"revision": undone["revision"]}).content
+    assert (redone["steps"], redone["redo"]) == (["phone 3 is p"], 1)
+
+
+def test_while_something_is_dragged_each_edit_replaces_the_one_before(studio: OpenStudio) -> None:
+    end_s = studio.ready()["phones"][2]["end_s"]
+    for way_s in (0.01, 0.02):
+        state = studio.edit(f"phone 3 ends {end_s - way_s:.3f}", instead=0 if way_s == 0.01 else 1).content
+    assert state["steps"] == [f"phone 3 ends {end_s - 0.02:.3f}"]
+    assert state["redo"] == 0
+
+
+def test_two_tabs_do_not_overwrite_one_another(studio: OpenStudio) -> None:
+    first = studio.ready()
+    assert studio.edit("phone 3 is p").status == 200
+    late = studio.ask("/api/lines/1/edits", {"revision": first["revision"], "steps": ["phone 3 is m"]})
+    assert (late.status, late.content["state"]["steps"]) == (409, ["phone 3 is p"])
+
+
+@pytest.mark.parametrize(
+    ("content", "status"),
+    [
+        ({"revision": None, "steps": ["phone 3 is p"]}, 422),
+        ({"steps": ["phone 99 is p"]}, 422),
+        ({"steps": ["jump"]}, 422),
+        ({"steps": "phone 3 is p"}, 422),
+        ({"steps": [], "instead": 1}, 422),
+        ([], 422),
+        (b"{", 400),
+        (b" " * (1 << 21), 413),
+    ],
+)
+def test_edits_that_are_refused_change_nothing(studio: OpenStudio, content: object, status: int) -> None:
+    before = studio.ready()
+    if isinstance(content, dict):
+        content = {"revision": before["revision"]} | content
+    reply = studio.ask("/api/lines/1/edits", content)
+    assert (reply.status, list(reply.content)) == (status, ["error"])
+    assert studio.ready() == before
+
+
+def test_words_are_corrected_where_they_are_said(studio: OpenStudio) -> None:
+    word = studio.ready()["words"][0]
+    content = {
+        "text": " mama ",
+        "start_s": word["start_s"],
+        "end_s": word["end_s"],
+        "revision": studio.ready()["revision"],
+    }
+    state = studio.ask("/api/lines/1/transcript", content).content
+    assert "mama" in [found["label"] for found in state["words"]]
+    assert state["words"][1:] == studio.ready()["words"][1:]
+    assert state["steps"][0].startswith("say mama from")
+
+
+def test_numbers_are_those_of_the_motion(studio: OpenStudio) -> None:
+    state = studio.ready()
+    reply = studio.ask("/api/lines/1/motion?start_s=0.5&end_s=1.0")
+    names = json.loads(reply.headers["x-lipmotion-names"])
+    found = np.frombuffer(reply.body, "<f4").reshape(-1, len(names))
+    work = studio.studio.desk.work(1)
+    assert work is not None
+    assert work.line is not None
+    assert names == [channel["name"] for channel in state["channels"]]
+    assert found == pytest.approx(work.line.generation.motion.values[50:101], abs=1e-6)
+    assert reply.headers["x-lipmotion-first"] == "50"
+    sure = np.frombuffer(studio.ask("/api/lines/1/motion?of=confidence").body, "<f4")
+    assert len(sure) == state["frames"]
+    assert 0 <= sure.min() <= sure.max() <= 1
+    assert studio.ask("/api/lines/1/motion?of=nothing").status == 422
+    assert studio.ask("/api/lines/1/motion?start_s=99").status == 422
+
+
+def test_the_sound_is_seen_and_played(studio: OpenStudio) -> None:
+    state = studio.ready()
+    peaks = studio.ask("/api/lines/1/peaks?columns=50").content
+    assert len(peaks["lowest"]) == len(peaks["highest"]) == 50
+    assert min(peaks["lowest"]) < 0 < max(peaks["highest"])
+    picture = studio.ask(state["media"]["spectrogram"])
+    assert picture.body[:8] == b"\x89PNG\r\n\x1a\n"
+    assert int.from_bytes(picture.body[16:20], "big") == state["frames"]
+    part = studio.ask(state["media"]["sound"], range="bytes=0-3")
+    assert (part.status, part.body) == (206, b"RIFF")
+
+
+def test_why_and_doubts(studio: OpenStudio) -> None:
+    doubts = studio.ask("/api/lines/1/doubts").content
+    assert [row["confidence"] for row in doubts] == sorted(row["confidence"] for row in doubts)
+    why = studio.ask(f"/api/lines/1/why?time={doubts[0]['time_s']}").content
+    assert why["phone"] == studio.ready()["phones"][doubts[0]["phone"] - 1]["label"]
+    assert why["confidence"] == pytest.approx(doubts[0]["confidence"], abs=0.5)
+    assert "phone" in why["text"]
+    assert studio.ask("/api/lines/1/why?time=1000").status == 422
+
+
+def test_a_line_is_marked_exported_and_then_changed(studio: OpenStudio) -> None:
+    assert studio.ask("/api/lines/1/mark", {"mark": "approved"}).content["mark"] == "approved"
+    assert studio.ask("/api/lines/1/mark", {"mark": "perhaps"}).status == 422
+    studio.edit("phone 3 is p")
+    done = studio.ask("/api/export", {"files": [".csv"], "only": "approved"}).content
+    assert (done["exported"][0]["files"], done["failed"]) == (["exports/line.csv"], [])
+    record = studio.folder.line(1).exports[-1]
+    assert read_edits(studio.folder.path / record.edits).edits.sentences == ("phone 3 is p",)
+    assert studio.studio.row(1)["exported"] == "yes"
+    studio.edit("phone 3 is m")
+    assert studio.studio.row(1)["exported"] == "changed"
+    wrongs: tuple[dict[str, object], ...] = (
+        {"files": ["/../x.csv"]},
+        {"files": []},
+        {"preset": "x"},
+        {"preset": "arkit", "only": "some"},
+    )
+    for wrong in wrongs:
+        assert studio.ask("/api/export", wrong).status == 422
+
+
+def test_pronunciations_are_offered_and_kept(studio: OpenStudio) -> None:
+    tear = studio.ask("/api/lexicon?word=Tear").content
+    assert ["t", "eh", "r"] in tear["pronunciations"]
+    kept = studio.ask("/api/lexicon", {"word": "zenodo", "phones": ["z", "eh", "n", "ow"]}).content
+    assert (kept["own"], kept["pronunciations"]) == (True, [["z", "eh", "n", "ow"]])
+    assert studio.folder.lexicon().pronunciations("zenodo") == (("z", "eh", "n", "ow"),)
+    assert studio.edit("word 1 is zenodo").content["steps"] == ["word 1 is zenodo said z eh n ow"]
+    for wrong in ({"word": "a b", "phones": ["b"]}, {"word": "a", "phones": ["B!"]}, {"word": "a", "phones": []}):
+        assert studio.ask("/api/lexicon", wrong).status == 422
+
+
+def test_lists_and_forms_follow_from_the_registries(studio: OpenStudio) -> None:
+    found = studio.ask("/api/project?from=0&count=5&order=doubt").content
+    assert [row["name"] for row in found["lines"]] == ["line"]
+    assert found["lines"][0]["duration_s"] == pytest.approx(studio.ready()["duration_s"])
+    assert found["forms"]["edit_forms"] == list(FORMS)
+    assert {face["name"] for face in found["forms"]["faces"] if face["mesh"]} == {"head"}
+    assert studio.ask("/api/project?mark=redo").content["count"] == 0
+    assert studio.ask("/api/project?order=name").status == 422
+    assert studio.ask("/api/progress").content["waiting"] == 0
+
+
+def test_only_the_page_itself_with_the_token_gets_an_answer(studio: OpenStudio) -> None:
+    assert studio.ask("/api/project", **{TOKEN_HEADER: "other"}).status == 401
+    assert studio.ask("/api/project", host="example.org").status == 403
+    assert studio.ask("/api/project", origin="http://example.org").status == 403
+    assert studio.ask("/api/project", origin=f"http://{HOST}").status == 200
+    assert studio.ask("/api/project", sec_fetch_site="cross-site").status == 403
+    access = Access(TOKEN, frozenset({HOST}))
+    keyed = access.with_key("/api/lines/1/sound.wav")
+    assert studio.ask(keyed, **{TOKEN_HEADER: ""}).status == 200
+    assert studio.ask(keyed.replace("sound.wav", "spectrogram"), **{TOKEN_HEADER: ""}).status == 401
+    for path in (
+        "/api/lines/2",
+        "/api/lines/0",
+        "/api/lines/1e3",
+        f"/api/lines/{'9' * 5000}",
+        "/project.json",
+        "/../x",
+    ):
+        assert studio.ask(path).status == 404
+    assert studio.ask("/api/faces/portrait.glb").status == 404
+
+
+def test_what_is_dropped_is_read_by_the_same_readers(studio: OpenStudio) -> None:
+    for name in ("../../speech.txt", "speech", ""):
+        assert studio.ask(f"/api/lines?name={name}", b"RIFF").status == 422
+    reply = studio.ask("/api/lines?name=../no%20sound.wav", b"no sound", x_lipmotion_transcript="mama%20papa")
+    assert (reply.status, reply.content["name"]) == (201, "no sound")
+    state = studio.ready(reply.content["id"])
+    assert (state["status"], "recording" in state["error"], state["transcript"]) == ("failed", True, "mama papa")
+    assert (studio.folder.path / "sounds" / "no sound.wav").read_bytes() == b"no sound"
+    assert studio.ask(f"/api/lines/{reply.content['id']}/doubts").status == 422
+    assert studio.ask(f"/api/lines/{reply.content['id']}/remove", {}).status == 200
+    assert studio.ask("/api/project").content["count"] == 1
+
+
+def test_a_project_outlives_its_model(
+    tmp_path: Path, toy_model: Model, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    asked: list[Path | None] = []
+
+    def loaded(path: Path | None) -> Model:
+        asked.append(path)
+        return toy_model
+
+    monkeypatch.setattr("lipmotion.studio.studio.load_model", loaded)
+    with opened_folder(None, tmp_path / "project") as folder:
+        folder.change(lambda project: replace(project, model="../gone.lipmotion"))
+        with closing(Studio(folder)):
+            assert asked == [None]
+    assert "the model of the project is not there" in caplog.text
+
+
+@pytest.mark.long
+def test_lines_that_are_not_used_are_closed_and_open_again_as_they_were(
+    studio: OpenStudio, toy_speech: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("lipmotion.studio.desk.MOST_OPEN", 1)
+    studio.edit("phone 3 is p")
+    reply = studio.ask("/api/lines?name=other.wav", toy_speech.read_bytes())
+    other = reply.content["id"]
+    assert studio.ready(other)["status"] == "ready"
+    assert studio.studio.desk.work(1) is None
+    again = studio.ready()
+    assert (again["steps"], again["revision"]) == (["phone 3 is p"], 0)
+    assert studio.studio.desk.work(other) is None
+    assert studio.ask("/api/understand", {"lines": "all"}).content["waiting"] == 0
+    assert studio.ask("/api/understand", {"lines": [99]}).status == 404
+    said = studio.ask(f"/api/lines/{other}/transcript", {"text": "mama"}).content
+    assert said["status"] in ("waiting", "working")
+    assert {word["label"] for word in studio.ready(other)["words"]} == {"mama"}
+    assert studio.ask(f"/api/lines/{other}/remove", {}).status == 200
+
+
+@pytest.mark.long
+def test_the_weights_of_the_page_are_those_of_the_file(studio: OpenStudio) -> None:
+    studio.edit("phone 3 is p", "pin jawOpen 0.7 at 1.0")
+    reply = studio.ask("/api/lines/1/weights?face=head")
+    names = json.loads(reply.headers["x-lipmotion-names"])
+    weights = np.frombuffer(reply.body, "<f4").reshape(-1, len(names))
+    done = studio.ask("/api/lines/1/export", {"preset": "web"}).content
+    read, _ = read_gltf_motion(studio.folder.path / done["exported"][0]["files"][0])
+    for name in read.names:
+        if name in names:
+            assert weights[:, names.index(name)] == pytest.approx(read[name], abs=1e-5)
+    part = np.frombuffer(studio.ask("/api/lines/1/weights?face=head&start_s=0.8&end_s=1.2").body, "<f4")
+    assert part.reshape(-1, len(names)) == pytest.approx(weights[80:121], abs=0.01)
+    assert studio.ask(f"/api/faces/{reply.headers['x-lipmotion-mesh']}.glb").body[:4] == b"glTF"
+    video = studio.ask("/api/lines/1/video", {"start_s": 0.5, "end_s": 0.7})
+    assert video.headers["content-type"] == "video/mp4"
+    assert studio.ask("/api/lines/1/picture?time=0.5").body[:4] == b"\x89PNG"

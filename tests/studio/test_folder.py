@@ -1,0 +1,107 @@
+"""Folders of projects: what is added, dropped and changed is there again; one process at a time."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from lipmotion.errors import ExportError, InputError
+from lipmotion.export.sound import write_sound
+from lipmotion.studio.folder import PROJECT, ProjectFolder, folder_for, opened_folder
+from lipmotion.studio.project import ExportRecord, Project, ProjectLine, project_document, project_from
+from lipmotion.testing.toy import ToySentence
+
+LINE = {"number": 1, "name": "a", "sound": "a.wav", "sha256": "0"}
+RECORD = ExportRecord("arkit", {"exports/a.livelink.csv": "1"}, "exports/a.edits.json", "2", "3", "0.1.0")
+
+
+@pytest.fixture
+def lines(tmp_path: Path, toy_sentence: ToySentence) -> Path:
+    folder = tmp_path / "lines"
+    (folder / "inner").mkdir(parents=True)
+    for name in ("b.wav", "a.wav", "inner/a.wav"):
+        write_sound(folder / name, toy_sentence.audio)
+    return folder
+
+
+def test_a_project_is_there_again(lines: Path) -> None:
+    with opened_folder(lines) as folder:
+        assert [line.name for line in folder.project.lines.values()] == ["a", "b", "inner/a"]
+        for content in ("sound", "other"):
+            (folder.path / content).write_text(content, encoding="utf-8")
+        number = folder.drop("C:\\over there\\..\\A.WAV", folder.path / "sound", "hello")
+        assert folder.line(number).name == "C__over there_.._A"
+        assert folder.drop("a.wav", folder.path / "other", "") == number + 1
+        folder.change_line(1, lambda line: replace(line, mark="approved", exports=(RECORD,)))
+        folder.add_pronunciation("tear", ("t", "eh", "r"))
+        folder.add_pronunciation("tear", ("t", "ih", "r"))
+        project = folder.project
+    assert folder.path == lines.with_name("lines.studio")
+    with opened_folder(folder.path) as again:
+        assert again.project == project
+        assert again.lexicon().user == {"tear": (("t", "ih", "r"), ("t", "eh", "r"))}
+        assert again.line(number + 1).sound == "sounds/a-2.wav"
+    with opened_folder(lines) as once_more:  # nothing is added twice
+        assert once_more.project == project
+    document = json.loads((folder.path / PROJECT).read_text(encoding="utf-8"))
+    assert document["lines"][0]["sound"] == "../lines/a.wav"
+
+
+def test_a_second_one_is_told(lines: Path) -> None:
+    with opened_folder(lines), pytest.raises(ExportError, match="another lipmotion"), opened_folder(lines):
+        pass
+
+
+def test_the_folder_of_a_project(tmp_path: Path, lines: Path) -> None:
+    assert folder_for(lines / "a.wav") == lines / "a.studio"
+    assert folder_for(lines, tmp_path / "x") == tmp_path / "x"
+    with pytest.raises(InputError, match="no such file"):
+        folder_for(tmp_path / "nothing")
+
+
+def test_what_cannot_be_written_is_not_kept(lines: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with opened_folder(lines) as folder:
+        before = folder.project
+
+        def refuse() -> None:
+            raise ExportError("the disk is full")
+
+        monkeypatch.setattr(folder, "save", refuse)
+        with pytest.raises(ExportError):
+            folder.change_line(1, lambda line: replace(line, mark="redo"))
+        assert folder.project == before
+        monkeypatch.undo()
+
+
+def test_a_project_is_what_its_document_says() -> None:
+    project = Project({1: ProjectLine(1, "a", "a.wav", "0", "hello", 1.5, 0.25, "redo", (RECORD,))}, preset="arkit")
+    assert project_from(json.loads(json.dumps(project_document(project)))) == replace(project, next_number=2)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"format": "other"},
+        {"version": 2},
+        {"lines": [LINE, LINE]},
+        {"lines": [LINE, LINE | {"number": 2}]},
+        {"lines": [LINE | {"name": "../a"}]},
+        {"lines": [LINE | {"mark": "perhaps"}]},
+        {"lines": [LINE | {"number": "1"}]},
+        {"lines": [LINE | {"sound": 3}]},
+        {"lines": [LINE | {"unknown": 3}]},
+        {"lines": 3},
+        {"model": 3},
+        {"characters": []},
+        {"more": 1},
+    ],
+)
+def test_documents_that_are_refused(tmp_path: Path, change: dict[str, object]) -> None:
+    document = project_document(Project()) | {"lines": [LINE]}
+    assert list(project_from(document).lines) == [1]
+    (tmp_path / PROJECT).write_text(json.dumps(document | change), encoding="utf-8")
+    with pytest.raises((InputError, ExportError)):
+        ProjectFolder(tmp_path)
