@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from lipmotion.types.timeline import Span, Timeline, Unit
     from lipmotion.types.transcript import TimedTranscript, TimedWord, TranscriptLine, in_order
     from lipmotion.types.utterance import Track, Utterance
+    from lipmotion.types.voice_event import VoiceEvent
 
 __all__ = [
     "ENERGY_FEATURE",
@@ -101,6 +102,7 @@ __all__ = [
     "TranscriptLine",
     "Unit",
     "Utterance",
+    "VoiceEvent",
     "check_curves",
     "check_magnitude",
     "frame_of",
@@ -116,7 +118,7 @@ __all__ = [
 
 _MODULES = (
     *("configuration", "delivery", "staging", "audio", "features", "timeline", "motion", "confidence"),
-    *("generation", "progress", "explanation", "parallel_map", "prosody", "transcript", "utterance"),
+    *("generation", "progress", "explanation", "parallel_map", "prosody", "transcript", "utterance", "voice_event"),
 )
 """Where the names are looked for, in this order."""
 
