@@ -27,6 +27,8 @@ BREATH_GAP, BREATH_S = 0.03, 0.04
 """The lips are parted by this, in eye distances, for a breath, so long before a phrase that begins with open lips."""
 LEAST_BREATH_S: Final = 0.4
 """Pauses in which a breath is taken last at least so long."""
+INHALING_GAP = 0.05
+"""The lips are parted by this for a breath that is heard, as GRID speaker 1 does (docs/expression.md)."""
 LAUGH_GAP, LAUGH_SHARE = 0.14, 0.4
 """In laughter the lips are parted by the first length in the loudest call, by this share of it between calls."""
 CALL_S, HEARD_EDGE_S = 0.05, 0.08
@@ -143,7 +145,7 @@ def _heard(events: Sequence[VoiceEvent], time_s: Curve) -> Curve:
             continue
         near = slice(*np.searchsorted(time_s, (event.start_s - HEARD_EDGE_S, event.end_s + HEARD_EDGE_S)))
         inside = np.minimum(time_s[near] - event.start_s, event.end_s - time_s[near]) + HEARD_EDGE_S
-        gap = _risen(inside / (2 * HEARD_EDGE_S)) * (BREATH_GAP if event.kind == BREATH else LAUGH_GAP)
+        gap = _risen(inside / (2 * HEARD_EDGE_S)) * (INHALING_GAP if event.kind == BREATH else LAUGH_GAP)
         if event.kind == LAUGHTER:
             calls = [loud * np.exp(-np.square((time_s[near] - call_s) / CALL_S) / 2) for call_s, loud in event.calls]
             gap *= LAUGH_SHARE + (1 - LAUGH_SHARE) * np.max(calls, axis=0, initial=0)

@@ -51,7 +51,7 @@ SHOUT_SEMITONES, SHOUT_TILT_DB, SHOUT_DB = (4.0, 8.0), (3.0, 7.0), (4.0, 8.0)
 begins, and where it is one. The least of the three counts."""
 LEAST_VOICED = 15
 """Frames without which a phrase has no pitch."""
-BREATH_S, BREATH_PAUSE_S = (0.16, 0.9), 0.25
+BREATH_S, BREATH_PAUSE_S = (0.16, 1.2), 0.25
 """Least and most duration of a breath, and the least one of the pause that it is in."""
 BREATH_RISE_DB = (7.0, 15.0)
 """A breath is so much louder from 1 to 7.6 kHz than the quiet around it: where it begins, and where it is clear."""
