@@ -29,7 +29,7 @@ LEAST_BREATH_S: Final = 0.4
 """Pauses in which a breath is taken last at least so long."""
 INHALING_GAP = 0.05
 """The lips are parted by this for a breath that is heard, as GRID speaker 1 does (docs/expression.md)."""
-LAUGH_GAP, LAUGH_SHARE = 0.14, 0.4
+LAUGH_GAP, LAUGH_SHARE = 0.18, 0.4
 """In laughter the lips are parted by the first length in the loudest call, by this share of it between calls."""
 CALL_S, HEARD_EDGE_S = 0.05, 0.08
 """How long a call of laughter opens the mouth (a standard deviation); laughter and breaths that are heard part the lips

@@ -105,8 +105,8 @@ class Request(Configuration):
         "heard",
         Rule(choices=get_args(Manner)),
         later=True,
-        help="heard: laughter, breaths, whispered and shouted phrases move the mouth (default); asked: only what a mood "
-        "says",
+        help="heard: laughter, breaths, whispered and shouted phrases move the mouth (default); asked: what --mood says "
+        "alone",
     )
     asymmetry: float = option(
         0.0,

@@ -15,7 +15,8 @@ class VoiceEvent:
     kind     : ``LAUGHTER`` (a bout), ``BREATH`` (drawn in, in a pause), ``WHISPER`` or ``SHOUT`` (a phrase)
     strength : 0 to 1: how sure laughter and whispering are; of a breath, how far it stands out of the noise of the
                recording; of a shout, how far it is from the recording's other phrases
-    calls    : of laughter, the time in seconds of each "ha", and its loudness beside the loudest one, 0 to 1
+    calls    : of laughter, the time in seconds of each "ha", and its loudness beside the loudest one, 0 to 1: half of
+               it 10 dB lower
     """
 
     start_s: float

@@ -122,8 +122,8 @@ def _laughs(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeli
         start_s, end_s = bout.first / FRAME_RATE_HZ, bout.end / FRAME_RATE_HZ
         said_s = sum(max(min(span.end_s, end_s) - max(span.start_s, start_s), 0.0) for span in words)
         if said_s <= MOST_WORD_SHARE * (end_s - start_s):
-            levels = 10 ** ((np.array(bout.levels_db) - max(bout.levels_db)) / 20)
-            calls = zip((np.array(bout.calls) / FRAME_RATE_HZ).tolist(), levels.tolist(), strict=True)
+            loudness = 2 ** ((np.array(bout.levels_db) - max(bout.levels_db)) / 10)
+            calls = zip((np.array(bout.calls) / FRAME_RATE_HZ).tolist(), loudness.tolist(), strict=True)
             yield VoiceEvent(start_s, end_s, LAUGHTER, bout.probability, tuple(calls))
 
 
