@@ -105,8 +105,7 @@ class Request(Configuration):
         "heard",
         Rule(choices=get_args(Manner)),
         later=True,
-        help="heard: laughter, breaths, whispered and shouted phrases move the mouth (default); asked: what --mood says "
-        "alone",
+        help="heard: laughter, breaths, whispers and shouts in the sound move the mouth (default); asked: none does",
     )
     asymmetry: float = option(
         0.0,
