@@ -7,6 +7,8 @@ words, so that the sound alone decides. Each group is divided by its people, the
 ``speech:2`` the first two): by the first halves the limits were chosen, the second halves are held out.
 --corpus, --align : a prepared corpus, and its words in time (.align of GRID): how far tracked lips are apart in breaths
 that are heard, and in the same place before the words of other sentences.
+--model : also the correlation of generated and tracked openings of the sentences with such breaths, without and with
+them.
 """
 
 from __future__ import annotations
@@ -21,6 +23,9 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion.corpora.store import Corpus
+from lipmotion.pipeline.generate.animate import animate
+from lipmotion.pipeline.model import load_model
+from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.speech.features.voice_events import voice_events
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import levels_db, spoken_spans
@@ -38,6 +43,7 @@ def main() -> None:
     parser.add_argument("groups", nargs="*", metavar="NAME[:LETTERS]=FOLDER")
     parser.add_argument("--corpus", type=Path)
     parser.add_argument("--align", type=Path)
+    parser.add_argument("--model", type=Path)
     options = parser.parse_args()
     logging.disable(logging.WARNING)
     for group in options.groups:
@@ -48,7 +54,8 @@ def main() -> None:
             ours = [path for path in paths if half_of(path.name[: int(letters or 4)]) == half]
             print(json.dumps({"group": name, "half": ("chosen", "held out")[half], **heard(ours)}), flush=True)
     if options.corpus:
-        print(json.dumps({"group": str(options.corpus.name), **breaths_seen(options.corpus, options.align)}))
+        corpus = Corpus.open(options.corpus)
+        print(json.dumps({"group": options.corpus.name, **breaths_seen(corpus, options.align, options.model)}))
 
 
 def half_of(person: str) -> int:
@@ -89,10 +96,9 @@ def sounding(audio: Audio) -> Timeline[Unit]:
     return Timeline((*spans, Span(at_s, max(audio.duration_s, at_s), Unit("sil", confidence=0.0))))
 
 
-def breaths_seen(folder: Path, align: Path) -> dict[str, object]:
+def breaths_seen(corpus: Corpus, align: Path, model: Path | None) -> dict[str, object]:
     """Return how many breaths are heard before the words of sentences, and how far the lips are apart then."""
-    corpus = Corpus.open(folder)
-    breaths, plain = [], []
+    breaths, plain, named = [], [], []
     for split in ("train", "val"):
         for name in corpus.names(split):
             utterance = corpus.utterance(name)
@@ -103,6 +109,7 @@ def breaths_seen(folder: Path, align: Path) -> dict[str, object]:
             curve = (track.time_s - begins_s, track["opening"].astype(float))
             breaths += [(event.start_s - begins_s, event.end_s - begins_s, curve) for event in before[-1:]]
             plain += [] if before else [curve]
+            named += [name] if before else []
     rows = []
     for first_s, last_s, curve in breaths:
         others = [opening_in(other, first_s, last_s) for other in plain if other[0][0] <= first_s]
@@ -114,7 +121,20 @@ def breaths_seen(folder: Path, align: Path) -> dict[str, object]:
         "opening": round(float(np.nanmean(seen[:, 0])), 3),
         "elsewhere": round(float(np.nanmean(seen[:, 1])), 3),
         "more open": int((seen[:, 0] > seen[:, 1]).sum()),
+        "ACC": {manner: acc(corpus, named, model, manner) for manner in ("asked", "heard") if model},
     }
+
+
+def acc(corpus: Corpus, names: list[str], model: Path, manner: str) -> float:
+    """Return the mean correlation of generated and tracked openings of some sentences, by sound alone."""
+    loaded, found = load_model(model), []
+    for name in names:
+        utterance = corpus.utterance(name)
+        track = utterance.track.motion
+        made = animate(SpeechRequest(utterance.audio, manner=manner), model=loaded).motion
+        generated = np.interp(track.time_s, made.time_s, made["opening"])
+        found.append(np.corrcoef(generated, track["opening"])[0, 1])
+    return round(float(np.mean(found)), 4)
 
 
 def opening_in(curve: tuple[np.ndarray, np.ndarray], first_s: float, last_s: float) -> float:
