@@ -17,7 +17,7 @@ import argparse
 import hashlib
 import json
 import logging
-from collections import Counter
+from collections import Counter, defaultdict
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +26,8 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.speech.features.f0 import log_f0
+from lipmotion.speech.features.spectrum import band_centres, log_bands
 from lipmotion.speech.features.voice_events import voice_events
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import levels_db, spoken_spans
@@ -56,6 +58,7 @@ def main() -> None:
     if options.corpus:
         corpus = Corpus.open(options.corpus)
         print(json.dumps({"group": options.corpus.name, **breaths_seen(corpus, options.align, options.model)}))
+        print(json.dumps({"group": options.corpus.name, **dials(corpus, options.align)}))
 
 
 def half_of(person: str) -> int:
@@ -137,6 +140,31 @@ def acc(corpus: Corpus, names: list[str], model: Path, manner: str) -> float:
     return round(float(np.mean(found)), 4)
 
 
+def dials(corpus: Corpus, align: Path) -> dict[str, object]:
+    """Return how loudness, brightness and pitch of a word correlate with its opening and width, against its like."""
+    words = defaultdict[str, list[list[float]]](list)
+    for name in corpus.names("train"):
+        utterance = corpus.utterance(name)
+        track, centres = utterance.track.motion, band_centres()
+        powers, pitch = np.exp(log_bands(utterance.audio.samples).astype(float)), log_f0(utterance.audio)
+        for span in words_in_time(align / f"{name}.align"):
+            inside = (track.time_s >= span.start_s - 0.04) & (track.time_s < span.end_s + 0.04)
+            frames = slice(round(span.start_s * 100), min(round(span.end_s * 100), len(pitch)))
+            voiced = np.isfinite(pitch[frames])
+            if span.label.phone == "sil" or voiced.sum() < 4 or inside.sum() < 3:
+                continue
+            spoken = powers[frames][voiced]
+            high, low = spoken[:, (centres >= 1000) & (centres < 4500)].sum(), spoken[:, centres < 1000].sum()
+            seen = track["opening"][inside].max(), np.ptp(track["width"][inside])
+            voice = np.log(spoken.sum(axis=1).mean()), np.log(high / low), np.median(pitch[frames][voiced])
+            words[span.label.word].append([float(value) for value in (*seen, *voice)])
+    rows = np.vstack([np.array(same) - np.mean(same, axis=0) for same in words.values() if len(same) >= 8])
+    found = np.corrcoef(rows.T)[:2, 2:].round(2).tolist()
+    names = ("loudness", "brightness", "pitch")
+    curves = zip(("opening", "range of the width"), found, strict=True)
+    return {"words": len(rows)} | {curve: dict(zip(names, row, strict=True)) for curve, row in curves}
+
+
 def opening_in(curve: tuple[np.ndarray, np.ndarray], first_s: float, last_s: float) -> float:
     """Return the mean opening of a track between two times; NaN where it has none."""
     inside = (curve[0] >= first_s) & (curve[0] < last_s)
@@ -147,7 +175,8 @@ def words_in_time(path: Path) -> Timeline[Unit]:
     """Return a vowel for each word of an .align file, and its silences."""
     rows = (line.split() for line in path.read_text(encoding="ascii").splitlines())
     times = ((int(first) / ALIGN_HZ, int(last) / ALIGN_HZ, word) for first, last, word in rows)
-    return Timeline(tuple(Span(a, b, Unit("sil" if word in ("sil", "sp") else "aa")) for a, b, word in times))
+    phones = ((a, b, "sil" if word in ("sil", "sp") else "aa", word) for a, b, word in times)
+    return Timeline(tuple(Span(a, b, Unit(phone, word=word)) for a, b, phone, word in phones))
 
 
 if __name__ == "__main__":
