@@ -40,8 +40,9 @@ PHRASE_PAUSE_S, LEAST_PHRASE_S, LEAST_VOWELS = 0.25, 0.6, 2
 """Phrases are divided by such pauses, and judged from so much speech, and so many vowels, on."""
 LOUD_DB = 20.0
 """The frames of a phrase that are at most so far under its loudest are judged."""
-LEAST_SNR_DB = 12.0
-"""Whispering is judged in phrases that are so much louder than the quiet of the recording: noise hides a voice."""
+LEAST_SNR_DB, BELOW_LOUDEST_DB = 12.0, 20.0
+"""Whispering is judged in phrases whose loudest frames are so much louder than the quiet of the recording, as noise hides
+a voice; and half of whose frames are at most so far under its loudest ones: beside these no F0 is found in quiet ones."""
 WHISPERED_SHARES = (0.12, 0.24)
 """A phrase is whispered up to the first share of voiced frames, and not from the second one on."""
 LEAST_PHRASES = 5
@@ -148,11 +149,11 @@ def _phrases(units: Timeline[Unit]) -> list[tuple[float, float]]:
 
 def _whispers(level_db: Curve, voiced: Voiced, phrases: Sequence[tuple[float, float]]) -> Iterator[VoiceEvent]:
     """Yield the phrases without a voice."""
-    quiet_db = float(np.percentile(level_db, 10))
+    quiet_db, most_db = np.percentile(level_db, (10, 99))
     for start_s, end_s in phrases:
         frames = _frames(start_s, end_s)
-        loudest_db = float(np.percentile(level_db[frames], 95)) if len(level_db[frames]) else quiet_db
-        if loudest_db - quiet_db < LEAST_SNR_DB:
+        middle_db, loudest_db = np.percentile(level_db[frames], (50, 95)) if len(level_db[frames]) else (quiet_db,) * 2
+        if loudest_db - quiet_db < LEAST_SNR_DB or middle_db - most_db < -BELOW_LOUDEST_DB:
             continue
         share = float(voiced[frames][level_db[frames] > loudest_db - LOUD_DB].mean())
         strength = _risen(-share, (-WHISPERED_SHARES[1], -WHISPERED_SHARES[0]))
