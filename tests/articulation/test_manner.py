@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from lipmotion.articulation.manner import FACTORS, with_manners
+from lipmotion.articulation.manner import FACTORS, with_heard, with_manners
 from lipmotion.articulation.mouth import spoken_mouth
-from lipmotion.types import Generation, StateTrace
-from lipmotion.types.moods import MANNERS, PLAIN, moods_of
+from lipmotion.types import Generation, StateTrace, VoiceEvent
+from lipmotion.types.moods import MANNERS, PLAIN, moods_of, text_of
+from lipmotion.types.voice_event import BREATH, LAUGHTER, SHOUT, WHISPER
 from meshes.speech import motion, units
 
 
@@ -40,3 +41,18 @@ def test_a_manner_holds_until_the_next_and_moods_do_not_count(generation: Genera
     assert change[115] > 0
     assert change[-20:].max() == 0
     assert with_manners(generation, moods_of("happy")) is generation
+
+
+@pytest.mark.parametrize(
+    ("asked", "shown"),
+    [
+        ("", "whisper:0.5 at 1, plain at 2, happy at 3, neutral at 4, shout:0.8 at 5, plain at 6"),
+        ("sad", "sad at 0, whisper:0.5 at 1, plain at 2, shout:0.8 at 5, plain at 6"),
+        ("plain", "plain at 0, happy at 3, neutral at 4"),
+        ("mumble at 1, angry at 2", "mumble at 1, angry at 2"),
+    ],
+)
+def test_what_is_heard_is_shown_where_nothing_of_its_kind_is_asked_for(asked: str, shown: str) -> None:
+    kinds = ((1, WHISPER, 0.5), (3, LAUGHTER, 0.9), (4.5, BREATH, 1), (5, SHOUT, 0.8))
+    events = [VoiceEvent(start_s, start_s + 1, kind, strength) for start_s, kind, strength in kinds]
+    assert text_of(with_heard(moods_of(asked), events)) == shown

@@ -9,6 +9,9 @@ from lipmotion.articulation.contact import CLOSED_OPENING
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.articulation.pauses import (
     BREATH_GAP,
+    INHALING_GAP,
+    LAUGH_GAP,
+    LAUGH_SHARE,
     NATURAL,
     OPENING_S,
     REST,
@@ -16,7 +19,8 @@ from lipmotion.articulation.pauses import (
     with_pauses,
     without_short_pauses,
 )
-from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
+from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit, VoiceEvent
+from lipmotion.types.voice_event import BREATH, LAUGHTER
 
 TIME_S = np.arange(301) / 100
 
@@ -89,3 +93,38 @@ def test_short_pauses_are_shared_by_the_phones_beside_them():
     assert shared[3].end_s == pytest.approx(2.075)
     assert shared[4].start_s == pytest.approx(2.075)
     assert shared[2] == LINE[2]
+
+
+LAUGH = VoiceEvent(0.4, 1.4, LAUGHTER, 0.9, ((0.5, 1.0), (0.7, 0.5), (1.3, 0.5)))
+QUIET = said((0, 2.0, "sil"), (2.0, 2.6, "aa"), (2.6, 3.0, "sil"))
+
+
+def test_a_breath_that_is_heard_parts_the_lips_and_they_close_after_it():
+    opening = with_pauses(generation(QUIET), REST, events=[VoiceEvent(0.8, 1.2, BREATH, 1.0)]).motion["opening"]
+    assert opening[90:111] == pytest.approx(INHALING_GAP)
+    assert opening[[60, 140]].max() <= CLOSED_OPENING
+    assert np.abs(np.diff(opening[60:140])).max() < 0.01
+
+
+def test_laughter_opens_the_mouth_with_its_calls_and_leaves_speech_alone():
+    moved = with_pauses(generation(QUIET), REST, events=[LAUGH]).motion
+    opening = moved["opening"]
+    assert opening[50] == pytest.approx(LAUGH_GAP, rel=0.02)
+    assert opening[100] == pytest.approx(LAUGH_SHARE * LAUGH_GAP, rel=0.02)
+    assert opening[100] < opening[70] < opening[50]
+    assert opening[160] <= CLOSED_OPENING
+    assert opening[210:250] == pytest.approx(0.1)
+    speaking = with_pauses(generation(LINE), REST, events=[LAUGH]).motion["opening"]
+    assert speaking[45:95] == pytest.approx(0.1)
+
+
+def test_what_opens_with_the_mouth_in_speech_opens_with_it_in_laughter():
+    plain = generation(QUIET)
+    values = plain.motion.values.copy()
+    values[:, 0] = np.where((TIME_S > 2.1) & (TIME_S < 2.5), 0.2, 0.0)
+    values[:, 1] = 0.6 - 0.5 * values[:, 0]
+    moving = Generation(Motion(values, 100.0, plain.motion.channels), plain.spread, QUIET, plain.trace)
+    moved = with_pauses(moving, REST, events=[LAUGH]).motion
+    assert moved["width"][50] == pytest.approx(0.6 - 0.5 * moved["opening"][50], abs=1e-6)
+    natural = with_pauses(moving, NATURAL, events=[LAUGH])
+    assert natural is moving

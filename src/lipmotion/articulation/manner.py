@@ -1,10 +1,10 @@
-"""Manners of speaking: how far the mouth moves in whispered, shouted and mumbled speech.
+"""Manners of speaking: how far the mouth moves in whispered, shouted and mumbled speech; and moods that are heard.
 
 Sources: P. Edwards, C. Landreth, E. Fiume and K. Singh, "JALI: an animator-centric viseme model for expressive lip
 synchronization", ACM Transactions on Graphics 35(4), 2016, whose two dials are low for mumbled and high for shouted
 speech; R. Schulman, "Articulatory dynamics of loud and normal speech", Journal of the Acoustical Society of America 85,
-1989: jaw and lips move further in loud speech. Deviations: one factor for jaw and lips; a manner is asked for, and not
-detected; the factors are ours, set by eye.
+1989: jaw and lips move further in loud speech. Deviations: one factor for jaw and lips; the factors are ours, set by
+eye.
 """
 
 from __future__ import annotations
@@ -14,11 +14,33 @@ from itertools import pairwise
 from typing import Final
 
 from lipmotion.articulation.curve_edits import with_gain
-from lipmotion.types import Gain, Generation
-from lipmotion.types.moods import PLAIN, MoodKey
+from lipmotion.types import Gain, Generation, VoiceEvent
+from lipmotion.types.moods import NEUTRAL, PLAIN, MoodKey, in_time
+from lipmotion.types.voice_event import LAUGHTER, SHOUT, WHISPER
 
 FACTORS: Final = {PLAIN: 1.0, "whisper": 0.85, "shout": 1.5, "mumble": 0.5}
 """How large the movements of the mouth are in each manner, beside those of plain speech."""
+
+LAUGHING: Final = "happy"
+"""The mood of a face that laughs: cheeks and corners of the lips are raised; ``articulation.pauses`` opens the jaw."""
+
+
+def with_heard(asked: Sequence[MoodKey], events: Sequence[VoiceEvent]) -> tuple[MoodKey, ...]:
+    """Return moods and manners over time: those that are asked for, or else those that are heard.
+
+    asked  : where it has a mood, no other is heard; where it has a manner, no manner
+    events : laughter is a mood; phrases that are whispered or shouted have this manner, as far as they are strong
+    """
+    manner_of = {LAUGHTER: False, WHISPER: True, SHOUT: True}
+    keys = list(asked)
+    for event in events:
+        is_manner = manner_of.get(event.kind)
+        if is_manner is None or any(key.is_manner == is_manner for key in asked):
+            continue
+        named, usual = (event.kind, PLAIN) if is_manner else (LAUGHING, NEUTRAL)
+        strength = event.strength if is_manner else 1.0
+        keys += [MoodKey(event.start_s, named, strength), MoodKey(event.end_s, usual)]
+    return in_time(keys)
 
 
 def with_manners(generation: Generation, keys: Sequence[MoodKey]) -> Generation:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import CLOSED_OPENING
 from lipmotion.articulation.rest import rest_frames
-from lipmotion.types import EYE_DISTANCE, Generation, Motion, Span, Timeline, Unit
+from lipmotion.types import EYE_DISTANCE, Generation, Motion, Span, Timeline, Unit, VoiceEvent
+from lipmotion.types.voice_event import BREATH, LAUGHTER
 from lipmotion.units import closing_phones, is_silent
 
 Curve = NDArray[np.float64]
@@ -26,6 +27,13 @@ BREATH_GAP, BREATH_S = 0.03, 0.04
 """The lips are parted by this, in eye distances, for a breath, so long before a phrase that begins with open lips."""
 LEAST_BREATH_S: Final = 0.4
 """Pauses in which a breath is taken last at least so long."""
+INHALING_GAP = 0.05
+"""The lips are parted by this for a breath that is heard, as GRID speaker 1 does (docs/expression.md)."""
+LAUGH_GAP, LAUGH_SHARE = 0.18, 0.4
+"""In laughter the lips are parted by the first length in the loudest call, by this share of it between calls."""
+CALL_S, HEARD_EDGE_S = 0.05, 0.08
+"""How long a call of laughter opens the mouth (a standard deviation); laughter and breaths that are heard part the lips
+so long before, and let them close so long after."""
 PINNED_S: Final = 0.15
 """Within this time of a pin the motion stays as it is."""
 
@@ -82,11 +90,14 @@ def without_short_pauses(units: Timeline[Unit]) -> Timeline[Unit]:
     return Timeline(tuple(kept))
 
 
-def with_pauses(generation: Generation, style: str, pinned_s: Sequence[float] = ()) -> Generation:
+def with_pauses(
+    generation: Generation, style: str, pinned_s: Sequence[float] = (), events: Sequence[VoiceEvent] = ()
+) -> Generation:
     """Return generated motion whose mouth is in its rest pose in pauses, with closed lips.
 
     style    : ``rest``; or ``natural``, which leaves the motion as it is
     pinned_s : times of pins, around which the motion stays as it is
+    events   : breaths and laughter that are heard: the mouth opens for them, where it rests else
     Before phrases after a longer pause the lips part for a breath. The motion may have any channels; without phones it
     stays as it is.
     """
@@ -105,6 +116,9 @@ def with_pauses(generation: Generation, style: str, pinned_s: Sequence[float] = 
     if "opening" in motion.names and motion.channels[motion.column("opening")].unit == EYE_DISTANCE:
         column = motion.column("opening")
         values[:, column] = np.maximum(values[:, column], _breaths(units, time_s) * (weight < 1))
+        if events:
+            lacking = np.maximum(_heard(events, time_s) * weight - values[:, column], 0)
+            values += lacking[:, None] * _with_opening(motion)
     return replace(generation, motion=Motion(values, motion.rate_hz, motion.channels))
 
 
@@ -121,6 +135,35 @@ def _breaths(units: Timeline[Unit], time_s: Curve) -> Curve:
             share = np.clip(1 - np.abs(time_s[near] - end_s + BREATH_S) / (OPENING_S - BREATH_S), 0, 1)
             least[near] = np.maximum(least[near], BREATH_GAP * share * share * (3 - 2 * share))
     return least
+
+
+def _heard(events: Sequence[VoiceEvent], time_s: Curve) -> Curve:
+    """Return the least opening for what is heard in pauses, in eye distances [shape=(T,)]; 0 away from it."""
+    least = np.zeros(len(time_s))
+    for event in events:
+        if event.kind not in (BREATH, LAUGHTER):
+            continue
+        near = slice(*np.searchsorted(time_s, (event.start_s - HEARD_EDGE_S, event.end_s + HEARD_EDGE_S)))
+        inside = np.minimum(time_s[near] - event.start_s, event.end_s - time_s[near]) + HEARD_EDGE_S
+        gap = _risen(inside / (2 * HEARD_EDGE_S)) * (INHALING_GAP if event.kind == BREATH else LAUGH_GAP)
+        if event.kind == LAUGHTER:
+            calls = [loud * np.exp(-np.square((time_s[near] - call_s) / CALL_S) / 2) for call_s, loud in event.calls]
+            gap *= LAUGH_SHARE + (1 - LAUGH_SHARE) * np.max(calls, axis=0, initial=0)
+        least[near] = np.maximum(least[near], gap)
+    return least
+
+
+def _with_opening(motion: Motion) -> Curve:
+    """Return by how much each channel changes with the opening, on average over a motion [shape=(P,)].
+
+    A motion that hardly opens the mouth says nothing of that: the opening changes alone, and with it the outer lips.
+    """
+    values = motion.values.astype(np.float64)
+    centred = values - values.mean(axis=0)
+    opening = centred[:, motion.column("opening")]
+    if float(opening.std()) >= 0.2 * BREATH_GAP:
+        return np.asarray(opening @ centred / (opening @ opening))
+    return np.array([float(name in ("opening", "outer")) for name in motion.names])
 
 
 def _risen(share: Curve) -> Curve:

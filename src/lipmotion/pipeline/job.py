@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 PartT = TypeVar("PartT", bound=Configuration)
 Pauses = Literal["rest", "natural"]
+Manner = Literal["heard", "asked"]
+HEARD, ASKED = get_args(Manner)
 Jaw = Literal["motion", "energy", "none"]
 Overlay = Literal["inset", "mouth"]
 Refinement = Literal["steady", "paper"]
@@ -98,6 +100,12 @@ class Request(Configuration):
         "rest",
         Rule(choices=get_args(Pauses)),
         help="rest: lips close softly in pauses (default); natural: as people do, who breathe and hold a sound",
+    )
+    manner: Manner = option(
+        "heard",
+        Rule(choices=get_args(Manner)),
+        later=True,
+        help="heard: laughter, breaths, whispers and shouts in the sound move the mouth (default); asked: none does",
     )
     asymmetry: float = option(
         0.0,

@@ -444,8 +444,9 @@ def generation_of(
     pinned_s = [pin.time_s for pin in constraints.pins] if constraints else []
     if request.onto is None:
         generation = replace(generation, motion=symmetrical(generation.motion, request.asymmetry))
-    paused = with_pauses(generation, request.pauses, pinned_s)
+    paused = with_pauses(generation, request.pauses, pinned_s, understood.events)
     speech, fit = understood.speech, understood.fit
     knowledge = SpeechKnowledge(speech.voice, float(np.mean(speech.confidence)), fit.share if fit else 1.0)
     moods = moods_in_time(understood.tags, speech.units)
-    return replace(paused, moods=moods, outlook=outlook_of(request, understood), about=model.about, knowledge=knowledge)
+    told = replace(paused, moods=moods, events=understood.events, about=model.about, knowledge=knowledge)
+    return replace(told, outlook=outlook_of(request, understood))

@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     from lipmotion.types.timeline import Span, Timeline, Unit
     from lipmotion.types.transcript import TimedTranscript, TimedWord, TranscriptLine, in_order
     from lipmotion.types.utterance import Track, Utterance
+    from lipmotion.types.voice_event import VoiceEvent
 
 __all__ = [
     "ENERGY_FEATURE",
@@ -107,6 +108,7 @@ __all__ = [
     "TranscriptLine",
     "Unit",
     "Utterance",
+    "VoiceEvent",
     "check_curves",
     "check_magnitude",
     "frame_of",
@@ -122,7 +124,7 @@ __all__ = [
 
 _MODULES = (
     *("configuration", "delivery", "staging", "audio", "features", "timeline", "motion", "confidence"),
-    *("generation", "progress", "explanation", "parallel_map", "prosody", "transcript", "utterance"),
+    *("generation", "progress", "explanation", "parallel_map", "prosody", "transcript", "utterance", "voice_event"),
 )
 """Where the names are looked for, in this order."""
 

@@ -18,6 +18,7 @@ from lipmotion.types.features import Features, TokenPosteriors
 from lipmotion.types.moods import MoodKey
 from lipmotion.types.motion import Motion, between_frames
 from lipmotion.types.timeline import Timeline, Unit
+from lipmotion.types.voice_event import VoiceEvent
 
 KeptT = TypeVar("KeptT")
 
@@ -336,6 +337,7 @@ class Generation:
     stepped : channels of held poses, which change at once: formats that can say so do
     curve_edits : edits of curves that follow from the motion, as ``jawOpen``, wherever these are made
     moods  : what the words say of the mood, over time, in the order of their times
+    events : what is heard in the voice beside words; manners and moods of them are shown where none is asked for
     about  : corpus, licence and attribution of the model, by name, as ``Model.about``; empty: not from ``animate``
     knowledge : of voice and phones, from which ``confidence`` follows (None: not from ``animate``)
 
@@ -355,6 +357,7 @@ class Generation:
     stepped: tuple[str, ...] = ()
     curve_edits: tuple[CurveEdit, ...] = ()
     moods: tuple[MoodKey, ...] = ()
+    events: tuple[VoiceEvent, ...] = ()
     about: Mapping[str, Any] = field(default_factory=dict)
     knowledge: SpeechKnowledge | None = None
 

@@ -18,7 +18,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     sentence = "'phone 12 ends 1.24', 'word 3 is blue', 'pin jawOpen 0.1 at 1.2', ... (docs/edit.md)"
     parser.add_argument("sentences", nargs="*", metavar="EDIT", help=sentence)
     add_input(parser, "--of", what="recording", metavar="RECORDING", help="begin a file of edits of this recording")
-    known = ("transcript", "lexicon", "language", "model", "recogniser", "speaker", "pauses", "asymmetry")
+    known = ("transcript", "lexicon", "language", "model", "recogniser", "speaker", "pauses", "manner", "asymmetry")
     add_options(parser, Request, *known)
     parser.add_argument("--undo", type=int, default=0, metavar="N", help="take back the last N edits first")
     parser.add_argument("--list", action="store_true", help="print the edits, and the phones with their numbers")

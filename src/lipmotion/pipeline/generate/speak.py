@@ -18,6 +18,7 @@ from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.generate.corpus_voice import speak_from_corpus
 from lipmotion.pipeline.generate.generation_for import speaker_map
+from lipmotion.pipeline.job import ASKED
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.understand.request import Onto, SpeechRequest
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
@@ -118,6 +119,7 @@ def speak(  # noqa: PLR0913
         onto_speaker=onto_speaker,
         pauses=pauses,
         asymmetry=asymmetry,
+        manner=ASKED,
     )
     return SpokenText(sound, _tagged(animate(request, model=loaded, constraints=constraints), tags))
 

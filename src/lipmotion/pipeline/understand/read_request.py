@@ -43,6 +43,7 @@ def read_request(request: Request, *, words_beside: bool = False) -> SpeechReque
         onto=request.onto,
         onto_speaker=request.onto_speaker,
         pauses=request.pauses,
+        manner=request.manner,
         asymmetry=request.asymmetry,
     )
 

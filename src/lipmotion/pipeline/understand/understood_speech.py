@@ -16,6 +16,7 @@ from lipmotion.engines import Animator
 from lipmotion.errors import AlignmentError, InputError, MissingDependencyError
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.pipeline.generate.prior import with_prior
+from lipmotion.pipeline.job import HEARD
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.transcribe import read_transcript, transcribe, warn_of_guesses
@@ -23,6 +24,7 @@ from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import HOP
 from lipmotion.speech.features.speaker_similarity import speaker_similarity
+from lipmotion.speech.features.voice_events import voice_events, without_laughter
 from lipmotion.speech.recognition.agreement import TranscriptFit
 from lipmotion.speech.recognition.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
 from lipmotion.speech.recognition.network.posteriors import token_posteriors
@@ -51,6 +53,7 @@ from lipmotion.types import (
     Timeline,
     TranscriptLine,
     Unit,
+    VoiceEvent,
     frames_of,
     silent_monitor,
 )
@@ -81,6 +84,7 @@ class UnderstoodSpeech:
     range_db    : decibels between the loud and the quiet moments of the recording
     fit         : of the transcript; None where there was none, or it was not compared with the sound
     tags        : the moods that tags in the transcript ask for
+    events      : what is heard in the voice beside words; empty: nothing, or it was not asked for
     """
 
     speech: Speech
@@ -88,6 +92,7 @@ class UnderstoodSpeech:
     range_db: float
     fit: TranscriptFit | None = None
     tags: tuple[MoodTag, ...] = ()
+    events: tuple[VoiceEvent, ...] = ()
 
     @property
     def speech_s(self) -> float:
@@ -121,12 +126,23 @@ def understood_speech(
     audio = analysed(audio_of(request))
     monitor(Progress("recognising phones", 0, 1, 0.02))
     understood = _understood(model, request, audio, _reported(each, audio.duration_s, monitor))
-    if understood.is_without_speech:
+    if request.manner == HEARD:
+        understood = _heard(understood, audio)
+    if understood.is_without_speech and not understood.events:
         LOG.warning("no speech found in the recording: the mouth rests; give a recording in which something is said")
     speech, found = understood.speech, understood.recognition
     voice = known_voice(model.phones, audio, speech, found, given=request.units is not None)
     speech = replace(with_prior(model.prior, speech), voice=voice)
     return replace(understood, speech=speech)
+
+
+def _heard(understood: UnderstoodSpeech, audio: AnalysedAudio) -> UnderstoodSpeech:
+    """Return understood speech with what is heard beside words; phones that were recognised in laughter are silence."""
+    events = voice_events(audio, understood.speech.units)
+    units = without_laughter(understood.speech.units, events)
+    changed = units != understood.speech.units
+    speech = with_units(understood.speech, units) if changed else understood.speech
+    return replace(understood, speech=speech, events=events)
 
 
 def prepare_search(request: SpeechRequest) -> None:

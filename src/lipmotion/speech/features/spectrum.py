@@ -25,7 +25,7 @@ def spectrum(audio: Audio, warp: float = 1.0) -> NDArray[np.float32]:
     whole spectrum, so that bands without speech stay small.
     Raises InputError: as ``mfcc``.
     """
-    powers = log_mel(checked_samples(audio), _filters(warp))
+    powers = log_bands(checked_samples(audio), warp)
     powers = np.maximum(powers, powers.max() - np.float32(DYNAMIC_RANGE_DB / 10 * np.log(10)))
     powers -= powers.mean(axis=0, dtype=float).astype(np.float32)
     squares = np.square(powers).mean(axis=0, dtype=float)
@@ -33,9 +33,25 @@ def spectrum(audio: Audio, warp: float = 1.0) -> NDArray[np.float32]:
     return powers
 
 
+def log_bands(samples: NDArray[np.float32], warp: float = 1.0) -> NDArray[np.float32]:
+    """Return the natural log power in ``SPECTRUM_BANDS`` mel bands, not normalised [shape=(T, 40)]; as ``spectrum``."""
+    return log_mel(samples, _filters(warp))
+
+
+@cache
+def band_centres() -> NDArray[np.float64]:
+    """Return the frequencies in Hz at which the bands of ``log_bands`` are most sensitive [shape=(40,)]."""
+    hertz = np.arange(SPEECH_RATE_HZ / 2 + 1)
+    return np.interp(_edges()[1:-1], mel(hertz), hertz)
+
+
+def _edges() -> NDArray[np.float64]:
+    """Return where the bands begin, are most sensitive, and end, in mel [shape=(42,)]."""
+    return np.linspace(mel(np.array(LOWEST_HZ)), mel(np.array(HIGHEST_HZ)), SPECTRUM_BANDS + 2)
+
+
 @cache
 def _filters(warp: float) -> NDArray[np.float32]:
     """Return triangular filters, equally spaced in mel, of warped frequencies [shape=(257, 40)]."""
     bins = mel(warped(np.arange(FFT_SIZE // 2 + 1) * SPEECH_RATE_HZ / FFT_SIZE, warp))
-    edges = np.linspace(mel(np.array(LOWEST_HZ)), mel(np.array(HIGHEST_HZ)), SPECTRUM_BANDS + 2)
-    return triangles(bins, edges).astype(np.float32)
+    return triangles(bins, _edges()).astype(np.float32)

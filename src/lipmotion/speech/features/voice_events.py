@@ -1,0 +1,264 @@
+"""Voice events: what a sound says beside words: laughter, breaths in pauses, phrases that are whispered or shouted.
+
+Everything but where phones are follows from the sound. Each rule is strict: an event that is not there is worse than
+one that is missed.
+
+Sources: whispering, which has no voice, R. W. Morris and M. A. Clements, "Reconstruction of speech from whispers",
+Medical Engineering & Physics 24, 2002; shouting, which is louder, higher, and has more energy at high frequencies, H.
+Traunmueller and A. Eriksson, "Acoustic effects of variation in vocal effort by men, women, and children", Journal of
+the Acoustical Society of America 107, 2000; breaths, D. Ruinskiy and Y. Lavner, "An effective algorithm for automatic
+detection and exact demarcation of breath sounds in speech and song signals", IEEE Transactions on Audio, Speech and
+Language Processing 15, 2007; laughter as ``features.laughter`` says. The limits are ours, chosen on recordings
+(docs/expression.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
+from lipmotion.speech.features.f0 import log_f0
+from lipmotion.speech.features.laughter import laughter
+from lipmotion.speech.features.mfcc import HOP
+from lipmotion.speech.features.spectrum import band_centres, log_bands
+from lipmotion.types import FRAME_RATE_HZ, Audio, Timeline, Unit, VoiceEvent
+from lipmotion.types.voice_event import BREATH, LAUGHTER, SHOUT, WHISPER
+from lipmotion.units import VOWELS, is_silent
+
+Curve = NDArray[np.float64]
+Voiced = NDArray[np.bool_]
+
+SMOOTHING_FRAMES = 2.0
+"""Standard deviation of the window that levels are smoothed with."""
+WORD_CONFIDENCE, MOST_WORD_SHARE = 0.5, 0.2
+"""Phones of this confidence, and those that are known, are words; in laughter they have at most this share."""
+PHRASE_PAUSE_S, LEAST_PHRASE_S, LEAST_VOWELS = 0.25, 0.6, 2
+"""Phrases are divided by such pauses, and judged from so much speech, and so many vowels, on."""
+LOUD_DB = 20.0
+"""The frames of a phrase that are at most so far under its loudest are judged."""
+LEAST_SNR_DB, BELOW_LOUDEST_DB = 12.0, 20.0
+"""Whispering is judged in phrases whose loudest frames are so much louder than the quiet of the recording, as noise hides
+a voice; and half of whose frames are at most so far under its loudest ones: beside these no F0 is found in quiet ones."""
+WHISPERED_SHARES = (0.12, 0.24)
+"""A phrase is whispered up to the first share of voiced frames, and not from the second one on."""
+LEAST_PHRASES = 5
+"""A shout is one beside the other phrases of a recording: at least so many."""
+SHOUT_SEMITONES, SHOUT_TILT_DB, SHOUT_DB = (4.0, 8.0), (3.0, 7.0), (4.0, 8.0)
+"""How much higher, brighter (1 to 4.5 kHz beside what is lower) and louder than the median phrase a shout is: where it
+begins, and where it is one. The least of the three counts."""
+LEAST_VOICED = 15
+"""Frames without which a phrase has no pitch."""
+BREATH_S, BREATH_PAUSE_S = (0.16, 1.2), 0.25
+"""Least and most duration of a breath, and the least one of the pause that it is in."""
+BREATH_RISE_DB = (7.0, 15.0)
+"""A breath is so much louder from 1 to 7.6 kHz than the quiet around it: where it begins, and where it is clear."""
+BREATH_EDGE_DB, BREATH_EDGE_FRAMES = 6.0, 12
+"""It rises and falls by so much within so many frames beside it."""
+BREATH_FROM_SPEECH = (7, 4)
+"""Frames from the last voiced one before a breath, and to the first one after it: nearer is the end of a phone."""
+BREATH_LEVEL_DB = -12.0
+"""The level of a breath beside the loud frames of the recording is at most this."""
+BREATH_TILT_DB = (-8.0, 6.0)
+"""Level from 3.5 to 7.6 kHz beside that from 1 to 3.5 kHz: s and sh are brighter."""
+BREATH_LOW_DB = -4.0
+"""Level under 1 kHz beside that from 1 to 3.5 kHz, at most: rumble and plosives have more."""
+QUIET_REACH_S = 2.0
+"""The quiet around a pause is looked for so far beside it."""
+
+
+def voice_events(audio: Audio, units: Timeline[Unit]) -> tuple[VoiceEvent, ...]:
+    """Return what is heard in a recording beside words, in the order of time; events of a kind do not overlap.
+
+    audio : at 16 kHz
+    units : the phones in time
+    Raises InputError: as ``speech.features.mfcc`` says.
+    """
+    audio = analysed(audio)
+    level_db, voiced, pitch = smoothed_level_db(audio), *_voice(audio)
+    laughs = tuple(_laughs(audio, level_db, voiced, units))
+    phrases = [phrase for phrase in _phrases(units) if not any(_overlap_s(phrase, laugh) > 0 for laugh in laughs)]
+    found = [
+        *laughs,
+        *_breaths(audio, level_db, voiced, units),
+        *_whispers(level_db, voiced, phrases),
+        *_shouts(audio, level_db, pitch, phrases),
+    ]
+    return tuple(sorted(found, key=lambda event: event.start_s))
+
+
+def without_laughter(units: Timeline[Unit], events: Sequence[VoiceEvent]) -> Timeline[Unit]:
+    """Return recognised phones in time in which laughter is silence; known phones stay."""
+    laughs = [event for event in events if event.kind == LAUGHTER]
+    spans = []
+    for span in units:
+        inside_s = sum(_overlap_s((span.start_s, span.end_s), laugh) for laugh in laughs)
+        is_word = span.label.confidence is None or inside_s < span.duration_s / 2
+        spans.append(span if is_word else replace(span, label=Unit("sil", confidence=span.label.confidence)))
+    return Timeline(tuple(spans))
+
+
+DB = 10 / np.log(10)
+"""Decibels of a natural logarithm of power."""
+
+
+def smoothed_level_db(audio: Audio) -> Curve:
+    """Return the smoothed level of every frame of a recording [shape=(T,)], decibels of any reference."""
+    return _smoothed(analysed(audio).log_energy.astype(np.float64) * DB)
+
+
+def _voice(audio: AnalysedAudio) -> tuple[Voiced, Curve]:
+    """Return whether each frame is voiced, and its pitch in semitones, NaN where it is not [each shape=(T,)]."""
+    pitch = log_f0(audio).astype(np.float64) * 12 / np.log(2)
+    return np.isfinite(pitch), pitch
+
+
+def _laughs(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeline[Unit]) -> Iterator[VoiceEvent]:
+    """Yield laughter where hardly any words are known or confirmed."""
+    words = [span for span in units if not is_silent(span.label.phone) and _is_sure(span.label)]
+    for bout in laughter(audio.samples, level_db, voiced):
+        start_s, end_s = bout.first / FRAME_RATE_HZ, bout.end / FRAME_RATE_HZ
+        said_s = sum(max(min(span.end_s, end_s) - max(span.start_s, start_s), 0.0) for span in words)
+        if said_s <= MOST_WORD_SHARE * (end_s - start_s):
+            loudness = 2 ** ((np.array(bout.levels_db) - max(bout.levels_db)) / 10)
+            calls = zip((np.array(bout.calls) / FRAME_RATE_HZ).tolist(), loudness.tolist(), strict=True)
+            yield VoiceEvent(start_s, end_s, LAUGHTER, bout.probability, tuple(calls))
+
+
+def _is_sure(unit: Unit) -> bool:
+    return unit.confidence is None or unit.confidence >= WORD_CONFIDENCE
+
+
+def _phrases(units: Timeline[Unit]) -> list[tuple[float, float]]:
+    """Return start and end, in seconds, of the phrases that are long enough to be judged."""
+    found: list[tuple[float, float, float, int]] = []
+    for span in units:
+        if is_silent(span.label.phone):
+            continue
+        vowel = int(span.label.phone in VOWELS)
+        if found and span.start_s - found[-1][1] < PHRASE_PAUSE_S:
+            start_s, _, said_s, vowels = found[-1]
+            found[-1] = start_s, span.end_s, said_s + span.duration_s, vowels + vowel
+        else:
+            found.append((span.start_s, span.end_s, span.duration_s, vowel))
+    return [each[:2] for each in found if each[2] >= LEAST_PHRASE_S and each[3] >= LEAST_VOWELS]
+
+
+def _whispers(level_db: Curve, voiced: Voiced, phrases: Sequence[tuple[float, float]]) -> Iterator[VoiceEvent]:
+    """Yield the phrases without a voice."""
+    quiet_db, most_db = np.percentile(level_db, (10, 99))
+    for start_s, end_s in phrases:
+        frames = _frames(start_s, end_s)
+        middle_db, loudest_db = np.percentile(level_db[frames], (50, 95)) if len(level_db[frames]) else (quiet_db,) * 2
+        if loudest_db - quiet_db < LEAST_SNR_DB or middle_db - most_db < -BELOW_LOUDEST_DB:
+            continue
+        share = float(voiced[frames][level_db[frames] > loudest_db - LOUD_DB].mean())
+        strength = _risen(-share, (-WHISPERED_SHARES[1], -WHISPERED_SHARES[0]))
+        if strength > 0:
+            yield VoiceEvent(start_s, end_s, WHISPER, strength)
+
+
+def _shouts(
+    audio: AnalysedAudio, level_db: Curve, pitch: Curve, phrases: Sequence[tuple[float, float]]
+) -> Iterator[VoiceEvent]:
+    """Yield the phrases that are higher, brighter and louder than the others."""
+    rows, judged = [], []
+    high = (band_centres() >= 1000) & (band_centres() < 4500)
+    low = band_centres() < 1000
+    for start_s, end_s in phrases:
+        frames = _frames(start_s, end_s)
+        voiced = np.flatnonzero(np.isfinite(pitch[frames]))
+        if len(voiced) < LEAST_VOICED:
+            continue
+        levels = level_db[frames][voiced]
+        loud = voiced[levels > np.median(levels) - 6]
+        powers = np.exp(_bands(audio, frames)[loud])
+        tilt_db = DB * np.median(np.log(powers[:, high].sum(axis=1)) - np.log(powers[:, low].sum(axis=1)))
+        rows.append((np.median(pitch[frames][voiced]), tilt_db, DB * np.log(np.mean(np.exp(levels / DB)))))
+        judged.append((start_s, end_s))
+    if len(rows) < LEAST_PHRASES:
+        return
+    beyond = np.array(rows) - np.median(rows, axis=0)
+    for (start_s, end_s), values in zip(judged, beyond.tolist(), strict=True):
+        limits = (SHOUT_SEMITONES, SHOUT_TILT_DB, SHOUT_DB)
+        strength = min(_risen(value, limit) for value, limit in zip(values, limits, strict=True))
+        if strength > 0:
+            yield VoiceEvent(start_s, end_s, SHOUT, strength)
+
+
+def _breaths(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeline[Unit]) -> Iterator[VoiceEvent]:
+    """Yield the breaths that are heard in pauses."""
+    loud_db, spoken = float(np.percentile(level_db, 95)), np.flatnonzero(voiced)
+    for start_s, end_s in _silences(units):
+        pause, reach = _frames(start_s, end_s), round(QUIET_REACH_S * FRAME_RATE_HZ)
+        around = slice(max(pause.start - reach, 0), min(pause.stop + reach, len(level_db)))
+        for begin, end, rise_db in _noises(_bands(audio, around), voiced[around]):
+            first, stop = begin + around.start, end + around.start
+            if first < pause.start or stop > pause.stop or level_db[first:stop].max() - loud_db > BREATH_LEVEL_DB:
+                continue
+            place = int(np.searchsorted(spoken, first))
+            before = first - spoken[place - 1] if place else np.inf
+            after = spoken[place] - stop if place < len(spoken) else np.inf
+            if before >= BREATH_FROM_SPEECH[0] and after >= BREATH_FROM_SPEECH[1]:
+                strength = _risen(rise_db, BREATH_RISE_DB)
+                yield VoiceEvent(first / FRAME_RATE_HZ, stop / FRAME_RATE_HZ, BREATH, strength)
+
+
+def _silences(units: Timeline[Unit]) -> list[tuple[float, float]]:
+    """Return start and end, in seconds, of the stretches without phones that are long enough for a breath."""
+    ends_s = [0.0, *(span.end_s for span in units if not is_silent(span.label.phone))]
+    starts_s = [*(span.start_s for span in units if not is_silent(span.label.phone))]
+    starts_s.append(max((span.end_s for span in units), default=0.0))
+    pairs = zip(ends_s, starts_s, strict=True)
+    return [(start_s, end_s) for start_s, end_s in pairs if end_s - start_s >= BREATH_PAUSE_S]
+
+
+def _noises(bands: NDArray[np.float32], voiced: Voiced) -> Iterator[tuple[int, int, float]]:
+    """Yield first frame, the one after the last, and rise in decibels of noise that is as a breath's."""
+    from scipy.ndimage import percentile_filter
+
+    powers, centres = np.exp(bands.astype(np.float64)), band_centres()
+    low, middle, high = (
+        powers[:, (centres >= least) & (centres < most)].mean(axis=1)
+        for least, most in ((0, 1000), (1000, 3500), (3500, 7600))
+    )
+    level = _smoothed(DB * np.log(powers[:, centres >= 1000].mean(axis=1)))
+    quiet = percentile_filter(level, 8, size=2 * round(QUIET_REACH_S * FRAME_RATE_HZ) + 1, mode="nearest")
+    edges = np.flatnonzero(np.diff(np.r_[False, (level > quiet + BREATH_RISE_DB[0]) & ~voiced, False]))
+    for first, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        if not BREATH_S[0] <= (stop - first) / FRAME_RATE_HZ <= BREATH_S[1]:
+            continue
+        run, top_db = slice(first, stop), level[first:stop].max()
+        left = level[max(first - BREATH_EDGE_FRAMES, 0) : first + 1].min()
+        right = level[stop - 1 : stop + BREATH_EDGE_FRAMES].min()
+        tilt_db = DB * np.log(high[run].mean() / middle[run].mean())
+        low_db = DB * np.log(low[run].mean() / middle[run].mean())
+        shaped = BREATH_TILT_DB[0] <= tilt_db <= BREATH_TILT_DB[1] and low_db <= BREATH_LOW_DB
+        if shaped and top_db - max(left, right) >= BREATH_EDGE_DB:
+            yield first, stop, float(np.max(level[run] - quiet[run]))
+
+
+def _bands(audio: AnalysedAudio, frames: slice) -> NDArray[np.float32]:
+    """Return ``log_bands`` of a range of frames, computed of these alone [shape=(N, 40)]."""
+    return log_bands(audio.samples[frames.start * HOP : max(frames.stop - 1, frames.start) * HOP])
+
+
+def _frames(start_s: float, end_s: float) -> slice:
+    return slice(round(start_s * FRAME_RATE_HZ), round(end_s * FRAME_RATE_HZ))
+
+
+def _smoothed(curve: Curve) -> Curve:
+    from scipy.ndimage import gaussian_filter1d
+
+    return np.asarray(gaussian_filter1d(curve, SMOOTHING_FRAMES, mode="nearest"))
+
+
+def _risen(value: float, limits: tuple[float, float]) -> float:
+    return float(np.clip((value - limits[0]) / (limits[1] - limits[0]), 0, 1))
+
+
+def _overlap_s(span: tuple[float, float], event: VoiceEvent) -> float:
+    return max(min(span[1], event.end_s) - max(span[0], event.start_s), 0.0)
