@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from lipmotion.appearance.frame_descriptors import FrameDescriptors
-from lipmotion.appearance.looping import BUSY_S, FADE_FRAMES, JUMP_LIMIT, LoopOrder, loop_order
+from lipmotion.appearance.looping import BUSY_S, JUMP_LIMIT, LoopOrder, fade_frames, loop_order
 from lipmotion.errors import InputError
 
 RATE_HZ = 25.0
+FADE_FRAMES = fade_frames(RATE_HZ)
 
 
 def background(path, blinks=(), noise: float = 0.02) -> FrameDescriptors:

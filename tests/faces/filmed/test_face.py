@@ -37,7 +37,9 @@ CODED = ("appearance/mouths", "appearance/jaws", "background/data")
 def small(filmed_face: FilmedFace) -> FilmedFace:
     """A face with few candidates, which is written and read in no time."""
     whole, few = filmed_face.appearance, slice(8)
-    candidates = {name: getattr(whole, name)[few] for name in ("mouths", "mouth_codes", "jaws", "jaw_codes")}
+    candidates = {
+        name: getattr(whole, name)[few] for name in ("mouths", "mouth_codes", "mouth_distances", "jaws", "jaw_codes")
+    }
     return replace(filmed_face, appearance=replace(whole, **candidates))
 
 

@@ -25,7 +25,7 @@ from lipmotion.pipeline.outputs.shown_faces import shown_face
 from lipmotion.pipeline.outputs.write import write
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.testing.toy import ToySentence, toy_motion
-from lipmotion.types import Audio, Channel, Item, Motion, Progress
+from lipmotion.types import Audio, Channel, Item, Motion, Progress, Timeline
 from speech.sounds import tone, write_sound
 from testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH
 
@@ -98,7 +98,7 @@ def test_the_jaw_follows_what_it_is_told(filmed_face: FilmedFace, brief: Motion,
 
 def test_the_refinement_as_printed(filmed_face: FilmedFace, brief: Motion) -> None:
     """Eqs. 14-16 of Xie & Liu 2007, colour by colour, of the mean of three pictures."""
-    codes = face_codes(filmed_face, brief, 5, 25.0)
+    codes = face_codes(filmed_face, brief, Timeline(()), 5, 25.0)
     options = replace(AS_PRINTED, noise=False)
     made = np.stack(list(Stitcher(filmed_face.appearance, options).mouths(codes))).astype(float)
     space, mouths = filmed_face.appearance.mouth, filmed_face.appearance.mouths
