@@ -69,6 +69,42 @@ def test_motion_becomes_the_mouth_that_was_drawn(appearance: Appearance, unseen:
     assert codes.chin_px == pytest.approx(toy_chin_px(unseen), abs=1.5)
 
 
+def test_mouths_are_as_wide_as_the_motion(appearance: Appearance, unseen: Motion) -> None:
+    """A regression alone draws them to the mean; a person's own recorded mouths are the limit."""
+    column = unseen.column("width")
+    half = {"narrow": np.percentile(appearance.mouth_distances[:, 1], 5), "wide": 9.0}
+    shown = {}
+    for name, width in half.items():
+        values = unseen.values.copy()
+        values[:, column] = width
+        shown[name] = appearance.of_motion(Motion(values, 25.0, unseen.channels)).mouth
+    ends = {name: appearance.mouth_distances[:, 1].argsort()[part] for name, part in
+            (("narrow", slice(20)), ("wide", slice(-20, None)))}  # fmt: skip
+    for name, other in (("narrow", "wide"), ("wide", "narrow")):
+        likeness = [
+            np.linalg.norm(shown[name][:, None] - appearance.mouth_codes[ends[end]], axis=2).min(axis=1).mean()
+            for end in (name, other)
+        ]
+        assert likeness[0] < likeness[1], name
+
+
+def test_a_closure_shows_a_recorded_mouth_that_is_closed(appearance: Appearance, unseen: Motion) -> None:
+    contact = np.zeros(len(unseen.values))
+    contact[[9, 13]], contact[10:13] = 0.5, 1.0
+    values = unseen.values.copy()
+    values[10:13, unseen.column("opening")] = 0.0
+    motion = Motion(values, 25.0, unseen.channels)
+    mixed, closed = appearance.of_motion(motion).mouth, appearance.of_motion(motion, contact).mouth
+    apart = np.linalg.norm(appearance.mouth_codes - closed[11], axis=1)
+    assert apart.min() < 1e-3 * np.linalg.norm(closed[11])
+    assert appearance.mouth_distances[apart.argmin(), 0] < 0.01
+    assert closed[10:12] == pytest.approx(closed[11:13], abs=1e-3)
+    assert closed[9] == pytest.approx((mixed[9] + closed[11]) / 2, abs=1e-2)
+    assert np.array_equal(closed[14:], mixed[14:])
+    pause = appearance.of_motion(motion, np.ones(len(values))).mouth  # too long for a closure
+    assert np.array_equal(pause, mixed)
+
+
 def test_pictures_of_the_mouth_in_any_light(appearance: Appearance, unseen: Motion) -> None:
     drawn = toy_lower_faces(unseen, noise=0)[MOUTH]
     dim = relit(drawn, np.tile([0.6, 0.7, 0.9], (len(drawn), 1)))

@@ -17,16 +17,16 @@ Array = NDArray[np.float64]
 Numbers = NDArray[np.intp]
 Kind = Literal["turn", "jump"]
 
-JUMP_LIMIT = 3.0
+JUMP_LIMIT = 2.5
 """No jump is made between frames that differ by more than this many times the difference of ordinary neighbours, what
 a cross-fade spreads over its frames being counted a frame."""
 LEAST_RUN_S = 0.8
 """Frames are shown one after the other for at least so long between two joins, where the background is long enough."""
 USUAL_RUN_S = 4.0
 """A run of this length costs as much as a join at which everything moves as usual; longer ones cost less."""
-CHOICE_COST_RANGE = 1.5
+CHOICE_COST_RANGE = 1.0
 """Joins whose cost exceeds the least one by less than this are chosen by chance, so that no rhythm is seen."""
-FADE_S = 0.4
+FADE_S = 0.56
 """Time over which a jump is cross-faded; the head moves from one place to the other in it."""
 REPEAT_COST, REPEAT_S = 4.0, 10.0
 """What going to frames that were just shown costs, and in which time it falls to 1/e of this."""
