@@ -100,8 +100,8 @@ def describe_frames(frames: Iterable[NDArray[np.uint8]], face_to_image: Array) -
     points = np.array([[-45.0, 0, 1], [45, 0, 1], [0, 76, 1]]).T
     place = (face_to_image @ points).reshape(len(whole), 6)
     shown = (np.stack(whole) * ~lower).reshape(len(whole), -1)
-    levels = (rows.astype(np.float64) for rows in (shown, np.stack(face), np.stack(eyes)))
-    return FrameDescriptors(*levels, place)
+    alike, eye_levels = np.stack(face).astype(np.float64), np.stack(eyes).astype(np.float64)
+    return FrameDescriptors(shown.astype(np.float64), alike, eye_levels, place)
 
 
 def row_distances(rows: Array) -> Array:

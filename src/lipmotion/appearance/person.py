@@ -179,23 +179,26 @@ class Appearance:
         """Return mixtures of recorded mouths [shape=(T, 90)] that look as predicted and are as open and as wide as the
         motion, as far as this person has been; in closures, recorded mouths that are closed.
         """
-        if self.mouth_distances is None:
+        measured = self.mouth_distances
+        if measured is None:
             return drawn_to_recorded(predicted, self.mouth_codes)
-        middle, least, most = (of(self.mouth_distances, axis=0) for of in (np.mean, np.min, np.max))
-        weights = DISTANCE_WEIGHTS / np.maximum(self.mouth_distances.std(axis=0), LEAST_DEVIATION)
+        middle = measured.mean(axis=0)
         wanted = middle + DISTANCE_GAINS * (channel_values(motion, LIP_DISTANCES) - middle)
-        wanted = np.clip(wanted, least, most)
-        pairs = ((predicted, wanted), (self.mouth_codes, self.mouth_distances))
+        wanted = np.clip(wanted, measured.min(axis=0), measured.max(axis=0))
+        weights = DISTANCE_WEIGHTS / np.maximum(measured.std(axis=0), LEAST_DEVIATION)
         sought, recorded = (
-            np.concatenate([codes, ((d - middle) * weights).astype(np.float32)], axis=1) for codes, d in pairs
+            np.concatenate([codes, ((distances - middle) * weights).astype(np.float32)], axis=1)
+            for codes, distances in ((predicted, wanted), (self.mouth_codes, measured))
         )
         mouths = drawn_to_recorded(sought, recorded)[:, : predicted.shape[1]]
-        for first, stop in () if contact is None else _closures(contact, motion.rate_hz):
-            closed = self.mouth_distances[:, 0] <= max(wanted[first:stop, 0].max(), self.mouth_distances[:, 0].min())
-            distances = squared_distances(sought[first:stop], recorded).mean(axis=0)
-            pressed = self.mouth_codes[np.argmin(np.where(closed, distances, np.inf))]
+        if contact is None:
+            return mouths
+        for first, stop in _closures(contact, motion.rate_hz):
+            closed = measured[:, 0] <= max(wanted[first:stop, 0].max(), measured[:, 0].min())
+            apart = squared_distances(sought[first:stop], recorded).mean(axis=0)
+            pressed = self.mouth_codes[np.argmin(np.where(closed, apart, np.inf))]
             around = slice(max(first - 1, 0), stop + 1)
-            mouths[around] += np.float32(contact[around, None]) * (pressed - mouths[around])
+            mouths[around] += contact[around, None].astype(np.float32) * (pressed - mouths[around])
         return mouths
 
     def of_mouths(self, mouths: Pictures) -> FaceCodes:
