@@ -1,67 +1,97 @@
 """Joins of a background that is shown longer than it is: how much larger the steps there are than ordinary ones.
 
-    python benchmarks/looping.py [--corpora ../shared/corpora] [--clips 4] [--seconds 120] [--sheet FOLDER] [VIDEO ...]
+    python benchmarks/looping.py [--corpora ../shared/corpora] [--clips 4] [--seconds 120] [--sheet FOLDER]
+        [--face FILE.face ...] [VIDEO ...]
 
-Prints a JSON object a video: its joins, their costs, and mean absolute differences of the frames shown at joins in all
-pixels, relative to the median of neighbours; ``ordinary`` is the largest of neighbours that are no join. ``--sheet``:
-the four frames before and after some joins of each video, to look at.
+Prints a JSON object a video, or the background of a face: its joins, their costs, and mean absolute differences of the
+frames shown at joins in all pixels, relative to the median of neighbours; ``ordinary`` is the largest of neighbours
+that are no join. ``new in 10 s``: how many seconds of footage are seen in ten seconds, mean; ``seen again after``: the
+median time after which a frame is shown again, s. ``--sheet``: eight frames around some joins of each video, to look
+at.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+from functools import partial
+from itertools import pairwise
 from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.appearance.frame_descriptors import describe_frames
-from lipmotion.appearance.looping import FADE_FRAMES, LoopOrder, loop_order
-from lipmotion.vision.footage import footage_frames, track_footage
+from lipmotion.appearance.looping import LoopOrder, fade_frames
+from lipmotion.faces.filmed.face import load_face
+from lipmotion.pipeline.film.background import BackgroundSequence, chin_px, placed_maps, stored_sequence
+from lipmotion.vision.footage import footage_groups, track_footage
 from lipmotion.vision.frames import VideoSpan
 
 LONGEST = VideoSpan(0, 20)
+WINDOW_S = 10
 Frames = list[NDArray[np.uint8]]
 
 
 def main() -> None:
-    """Print one JSON object a video."""
+    """Print one JSON object a background."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--corpora", type=Path, default=Path("../shared/corpora"))
     parser.add_argument("--clips", type=int, default=4)
     parser.add_argument("--seconds", type=float, default=120)
     parser.add_argument("--sheet", type=Path)
+    parser.add_argument("--face", type=Path, action="append", default=[])
     parser.add_argument("videos", nargs="*", type=Path)
     options = parser.parse_args()
     grid = options.corpora / "grid-s1"
-    names = (grid / "val.txt").read_text().split()[: options.clips]
-    for path in (*(grid / "clips" / f"{name}.mkv" for name in names), *options.videos):
-        footage = track_footage(path, LONGEST)
-        frames = list(footage_frames(footage))
-        descriptors = describe_frames(frames, footage.face_to_image)
-        count = round(options.seconds * footage.rate_hz)
-        order = loop_order(descriptors, count, footage.rate_hz, usable=footage.track.seen, cuts=footage.cuts)
-        print(json.dumps({"video": path.stem, "frames": len(frames), **figures(frames, order)}), flush=True)
+    names = (grid / "val.txt").read_text().split()[: options.clips] if options.clips else []
+    videos = (*(grid / "clips" / f"{name}.mkv" for name in names), *options.videos)
+    backgrounds = {path.stem: filmed(path) for path in videos}
+    backgrounds |= {path.stem: stored_sequence(load_face(path).background) for path in options.face}
+    for name, sequence in backgrounds.items():
+        count = round(options.seconds * sequence.rate_hz)
+        order = sequence.order(sequence.groups(), count)
+        frames = [each.frame for each in sequence.frames(count, sequence.rate_hz)]
+        values = figures(sequence, frames, order)
+        print(json.dumps({"video": name, "frames": len(sequence.chin_px), **values}), flush=True)
         if options.sheet:
-            cv2.imwrite(str(options.sheet / f"{path.stem}.png"), sheet(frames, order)[:, :, ::-1])
+            cv2.imwrite(str(options.sheet / f"{name}.png"), sheet(frames, order)[:, :, ::-1])
 
 
-def figures(frames: Frames, order: LoopOrder) -> dict[str, float]:
-    """Return the figures of one order."""
-    steps = np.array([difference(frames[n - 1], frames[n]) for n in range(1, len(frames))])
-    usual = float(np.median(steps[steps > 0]))
-    found: dict[str, float] = {"ordinary": round(steps.max() / usual, 2)}
-    for kind in ("turn", "jump"):
+def filmed(path: Path) -> BackgroundSequence:
+    """Return the beginning of a video as a background."""
+    footage = track_footage(path, LONGEST)
+    groups, maps = partial(footage_groups, footage), placed_maps(footage)
+    return BackgroundSequence(groups, footage.rate_hz, maps, chin_px(footage), footage.track.seen, footage.cuts)
+
+
+def figures(sequence: BackgroundSequence, frames: Frames, order: LoopOrder) -> dict[str, float]:
+    """Return the figures of one order, whose frames are given as they are shown."""
+    fade = fade_frames(sequence.rate_hz)
+    steps = np.array([difference(first, other) for first, other in pairwise(frames)])
+    reach = {"turn": 1, "jump": fade // 2 + 1}
+    at = {
+        kind: {n for join in order.joins if join.kind == kind for n in range(join.at - near, join.at + near)}
+        for kind, near in reach.items()
+    }
+    ordinary = np.delete(steps, [n - 1 for n in at["turn"] | at["jump"] if 0 < n <= len(steps)])
+    usual = float(np.median(ordinary))
+    found: dict[str, float] = {"ordinary": round(ordinary.max() / usual, 2)}
+    for kind, near in at.items():
         joins = [join for join in order.joins if join.kind == kind]
         found[f"{kind}s"] = len(joins)
         if joins:
-            at = {n for join in joins for n in range(join.at - FADE_FRAMES, join.at + FADE_FRAMES)}
-            near = [difference(shown(frames, order, n - 1), shown(frames, order, n)) for n in at if 0 < n < len(order)]
             found[f"{kind} cost"] = round(max(join.cost for join in joins), 2)
-            found[f"{kind} step"] = round(max(near) / usual, 2)
-    return found
+            found[f"{kind} step"] = round(max(steps[n - 1] for n in near if 0 < n <= len(steps)) / usual, 2)
+    window = round(WINDOW_S * sequence.rate_hz)
+    starts = range(0, max(1, len(order) - window), round(sequence.rate_hz))
+    new = np.mean([len(set(order.first[n : n + window].tolist())) for n in starts]) / sequence.rate_hz
+    shown = np.lexsort((np.arange(len(order)), order.first))
+    after = np.diff(shown)[np.diff(order.first[shown]) == 0]
+    return found | {
+        "new in 10 s": round(float(new), 1),
+        "seen again after": round(float(np.median(after)) / sequence.rate_hz, 1) if len(after) else float("inf"),
+    }
 
 
 def difference(first: NDArray[np.uint8], other: NDArray[np.uint8]) -> float:
@@ -69,21 +99,13 @@ def difference(first: NDArray[np.uint8], other: NDArray[np.uint8]) -> float:
     return float(np.abs(first.astype(np.int16) - other).mean())
 
 
-def shown(frames: Frames, order: LoopOrder, at: int) -> NDArray[np.uint8]:
-    """Return a frame as it is shown."""
-    weight = order.weight[at]
-    blend = (1 - weight) * frames[order.first[at]] + weight * frames[order.second[at]]
-    rounded: NDArray[np.uint8] = np.rint(blend).astype(np.uint8)
-    return rounded
-
-
 def sheet(frames: Frames, order: LoopOrder) -> NDArray[np.uint8]:
     """Return the frames around up to four turns and four jumps, a row each."""
     rows = []
     for kind in ("turn", "jump"):
         for join in [join for join in order.joins if join.kind == kind][:4]:
-            near = np.clip(np.arange(join.at - 4, join.at + 4), 0, len(order) - 1)
-            rows.append(np.hstack([cv2.resize(shown(frames, order, int(n)), (180, 144)) for n in near]))
+            near = np.clip(np.arange(join.at - 8, join.at + 8, 2), 0, len(order) - 1)
+            rows.append(np.hstack([cv2.resize(frames[int(n)], (180, 144)) for n in near]))
     return np.vstack(rows) if rows else np.zeros((1, 1, 3), np.uint8)
 
 

@@ -34,6 +34,13 @@ def appearance(filmed_face: FilmedFace) -> Appearance:
 
 
 @pytest.fixture(scope="module")
+def distances(appearance: Appearance) -> np.ndarray:
+    """Opening, width and outer lips of the candidates."""
+    assert appearance.mouth_distances is not None
+    return appearance.mouth_distances
+
+
+@pytest.fixture(scope="module")
 def footage() -> FootagePictures:
     return toy_footage_pictures()
 
@@ -67,6 +74,44 @@ def test_motion_becomes_the_mouth_that_was_drawn(appearance: Appearance, unseen:
     dark = [(mouths < 90).all(axis=3).sum(axis=(1, 2)) for mouths in (shown, drawn)]
     assert np.corrcoef(dark)[0, 1] > 0.95  # the mouth opens when it should
     assert codes.chin_px == pytest.approx(toy_chin_px(unseen), abs=1.5)
+
+
+def test_mouths_are_as_wide_as_the_motion(appearance: Appearance, distances: np.ndarray, unseen: Motion) -> None:
+    """A regression alone draws them to the mean; a person's own recorded mouths are the limit."""
+    column = unseen.column("width")
+    asked = {"narrow": np.percentile(distances[:, 1], 5), "wide": 9.0}
+    shown = {}
+    for name, width in asked.items():
+        values = unseen.values.copy()
+        values[:, column] = width
+        shown[name] = appearance.of_motion(Motion(values, 25.0, unseen.channels)).mouth
+    order = distances[:, 1].argsort()
+    ends = {"narrow": order[:20], "wide": order[-20:]}
+    for name, other in (("narrow", "wide"), ("wide", "narrow")):
+        likeness = [
+            np.linalg.norm(shown[name][:, None] - appearance.mouth_codes[ends[end]], axis=2).min(axis=1).mean()
+            for end in (name, other)
+        ]
+        assert likeness[0] < likeness[1], name
+
+
+def test_a_closure_shows_a_recorded_mouth_that_is_closed(
+    appearance: Appearance, distances: np.ndarray, unseen: Motion
+) -> None:
+    contact = np.zeros(len(unseen.values))
+    contact[[9, 13]], contact[10:13] = 0.5, 1.0
+    values = unseen.values.copy()
+    values[10:13, unseen.column("opening")] = 0.0
+    motion = Motion(values, 25.0, unseen.channels)
+    mixed, closed = appearance.of_motion(motion).mouth, appearance.of_motion(motion, contact).mouth
+    apart = np.linalg.norm(appearance.mouth_codes - closed[11], axis=1)
+    assert apart.min() < 1e-3 * np.linalg.norm(closed[11])
+    assert distances[apart.argmin(), 0] < 0.01
+    assert closed[10:12] == pytest.approx(closed[11:13], abs=1e-3)
+    assert closed[9] == pytest.approx((mixed[9] + closed[11]) / 2, abs=1e-2)
+    assert np.array_equal(closed[14:], mixed[14:])
+    pause = appearance.of_motion(motion, np.ones(len(values))).mouth  # too long for a closure
+    assert np.array_equal(pause, mixed)
 
 
 def test_pictures_of_the_mouth_in_any_light(appearance: Appearance, unseen: Motion) -> None:

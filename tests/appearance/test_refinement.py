@@ -168,3 +168,6 @@ def test_edges_become_steeper_in_lightness_alone() -> None:
     assert np.abs(sharp - edge)[:, :, [0, -1]].max() == 0
     assert np.abs(sharpened(edge, 0.5, 2).astype(int) - edge)[:, :, 6].max() > np.abs(sharp - edge)[:, :, 6].max()
     assert sharpened(edge, 0, 1) is edge
+    lips = np.repeat(np.repeat(edge[:, :1], 56, axis=1), 3, axis=2)
+    gained = np.abs(sharpened(lips, 0.5, 1).astype(int) - lips).max(axis=(0, 2, 3))
+    assert gained[28] > 1.2 * gained[0]  # the lips are in the middle

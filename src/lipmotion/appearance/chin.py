@@ -72,17 +72,20 @@ def _moved(picture: Pictures, chin_px: float, drops: Array, scale: int) -> Pictu
     """Return one picture whose columns are moved down by ``drops`` [shape=(W,)] at the chin."""
     down = (np.arange(len(picture)) + 0.5) / scale + CORNER[1]
     tip = chin_px + drops  # where the tip is afterwards
-    above = _rise(down[:, None], STILL_PX, tip - ABOVE_PX)
-    below = 1 - _rise(down[:, None], tip + BELOW_PX, tip + BELOW_PX + NECK_PX)
-    position = np.arange(len(picture))[:, None] - scale * drops * above * below
+    moved = np.flatnonzero((down > STILL_PX) & (down < tip.max() + BELOW_PX + NECK_PX))
+    above = _rise(down[moved, None], STILL_PX, tip - ABOVE_PX)
+    below = 1 - _rise(down[moved, None], tip + BELOW_PX, tip + BELOW_PX + NECK_PX)
+    position = moved[:, None] - scale * drops * above * below
     first = np.floor(position).astype(np.intp)
     part = (position - first).astype(np.float32)
-    result = np.zeros(picture.shape, np.float32)
-    column = np.arange(picture.shape[1])
+    levels = np.zeros((*part.shape, picture.shape[2]), np.float32)
+    column, pixels = np.arange(picture.shape[1]), picture.reshape(-1, picture.shape[2])
     for tap in range(-1, 3):
         rows = np.clip(first + tap, 0, len(picture) - 1)
-        result += _weight(np.abs(part - tap))[:, :, None] * picture[rows, column]
-    return np.clip(np.rint(result), 0, 255).astype(np.uint8)
+        levels += _weight(np.abs(part - tap))[:, :, None] * pixels.take(rows * picture.shape[1] + column, axis=0)
+    result = picture.copy()
+    result[moved] = np.clip(np.rint(levels), 0, 255)
+    return result
 
 
 def _rise(values: Array, start: Array | float, stop: Array | float) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 
 Array = NDArray[np.float64]
+Floats = NDArray[np.floating[Any]]
 Scenes = Sequence[tuple[int, int]]
 
 FRAME_CELLS = 32
@@ -46,24 +48,25 @@ class FrameDescriptors:
     def __len__(self) -> int:
         return len(self.whole)
 
-    def standardised(self, scenes: Scenes) -> Array:
+    def part(self, start: int, stop: int) -> FrameDescriptors:
+        """Return the descriptors of frames from ``start`` (included) to ``stop`` (excluded)."""
+        return FrameDescriptors(*(rows[start:stop] for rows in (self.whole, self.face, self.eyes, self.place)))
+
+    def standardised(self, scenes: Scenes, fade: int = 1) -> Array:
         """Return rows whose distances count in ordinary differences: that of neighbours has a median of about 1.
 
         scenes : first frame of each part without a cut, and the one after its last
+        fade   : frames over which the whole frame and the place of the face change from one to another; the upper face
+                 is aligned, and counts as it is
         Whole frame, upper face and place of the face have the same weight [shape=(T, A + B + 6)].
         """
         groups = [
-            rows / max(_ordinary(rows, scenes), least * np.sqrt(rows.shape[1]))
-            for rows, least in zip((self.whole, self.face, self.place), LEAST_ORDINARY, strict=True)
+            rows / (frames * max(_ordinary(rows, scenes), least * np.sqrt(rows.shape[1])))
+            for rows, least, frames in zip(
+                (self.whole, self.face, self.place), LEAST_ORDINARY, (fade, 1, fade), strict=True
+            )
         ]
         return np.concatenate(groups, axis=1) / np.sqrt(len(groups))
-
-    def distances(self, scenes: Scenes) -> Array:
-        """Return the distance between every two frames, in ordinary differences [shape=(T, T)]."""
-        rows = self.standardised(scenes)
-        rows = rows - rows.mean(axis=0)
-        power = np.square(rows).sum(axis=1)
-        return np.sqrt(np.maximum(power[:, None] + power - 2 * rows @ rows.T, 0))
 
 
 def describe_frames(frames: Iterable[NDArray[np.uint8]], face_to_image: Array) -> FrameDescriptors:
@@ -85,7 +88,7 @@ def describe_frames(frames: Iterable[NDArray[np.uint8]], face_to_image: Array) -
             )
         if not size:
             size, cell = frame.shape, max(1, round(max(frame.shape[:2]) / FRAME_CELLS))
-        grey = frame[:, :, 1].astype(np.float64)  # green, of which a camera has most pixels
+        grey = frame[:, :, 1].astype(np.float32)  # green, of which a camera has most pixels
         thumbnail = _cells(grey, cell)
         hidden = _inside(face_to_image[n], LOWER_FACE, thumbnail.shape, cell)
         lower = hidden if lower is None else lower | hidden
@@ -96,8 +99,16 @@ def describe_frames(frames: Iterable[NDArray[np.uint8]], face_to_image: Array) -
         raise InputError(f"{len(whole)} frames with {len(face_to_image)} maps, required as many, at least one")
     points = np.array([[-45.0, 0, 1], [45, 0, 1], [0, 76, 1]]).T
     place = (face_to_image @ points).reshape(len(whole), 6)
-    shown = np.stack(whole) * ~lower
-    return FrameDescriptors(shown.reshape(len(whole), -1), np.stack(face), np.stack(eyes), place)
+    shown = (np.stack(whole) * ~lower).reshape(len(whole), -1)
+    alike, eye_levels = np.stack(face).astype(np.float64), np.stack(eyes).astype(np.float64)
+    return FrameDescriptors(shown.astype(np.float64), alike, eye_levels, place)
+
+
+def row_distances(rows: Array) -> Array:
+    """Return the distance between every two rows, such as of ``FrameDescriptors.standardised`` [shape=(T, T)]."""
+    rows = rows - rows.mean(axis=0)
+    power = np.square(rows).sum(axis=1)
+    return np.sqrt(np.maximum(power[:, None] + power - 2 * rows @ rows.T, 0))
 
 
 def _ordinary(rows: Array, scenes: Scenes) -> float:
@@ -107,15 +118,18 @@ def _ordinary(rows: Array, scenes: Scenes) -> float:
     return float(np.median(different)) if len(different) else 0.0
 
 
-def _cells(grey: Array, cell: int) -> Array:
+def _cells(grey: Floats, cell: int) -> Floats:
     """Return means of square cells; pixels beyond the last whole cell are left out."""
     height, width = (side // cell for side in grey.shape)
     if not height or not width:
         return grey.mean(keepdims=True)
-    return grey[: height * cell, : width * cell].reshape(height, cell, width, cell).mean(axis=(1, 3))
+    if cell == 1:
+        return grey
+    rows = grey[: height * cell, : width * cell].reshape(height, cell, -1).sum(axis=1)
+    return rows.reshape(height, width, cell).sum(axis=2) / cell**2
 
 
-def _sampled(grey: Array, to_image: Array, box: tuple[float, float, float, float], step: float) -> Array:
+def _sampled(grey: Floats, to_image: Array, box: tuple[float, float, float, float], step: float) -> Floats:
     """Return a region of the aligned face on a grid, each sample the mean of about its part [shape=(N,)]."""
     left, top, right, bottom = box
     scale = float(np.sqrt(abs(np.linalg.det(to_image[:, :2]))))
@@ -126,7 +140,7 @@ def _sampled(grey: Array, to_image: Array, box: tuple[float, float, float, float
     return _between(small, rows, columns)
 
 
-def _between(image: Array, rows: Array, columns: Array) -> Array:
+def _between(image: Floats, rows: Array, columns: Array) -> Floats:
     """Return bilinear samples of a picture; outside it is as at its edge."""
     height, width = image.shape
     rows, columns = np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)

@@ -65,16 +65,18 @@ def face_shape(jaw_half_width: float, chin_px: Array) -> FaceShape:
     return FaceShape(half, float(np.clip(highest - MARGIN_PX, LEAST_BOTTOM_PX, CORNER[1] + HEIGHT - 4.0)))
 
 
-def region_map(face_to_frame: Array, scale: int) -> Array:
-    """Return the affine maps from a pixel of a lower-face picture to its position in the frame.
+def region_map(face_to_frame: Array, scale: float, corner: tuple[float, float] = CORNER) -> Array:
+    """Return the affine maps from a pixel of a picture of the lower face, or of another part, to its position in the
+    frame.
 
     face_to_frame : maps from px of the face to those of the frame [shape=(..., 2, 3)], of
                     ``vision.mouth_pictures.face_to_image``
     scale         : samples a pixel
+    corner        : upper left corner of the part, px of the face
     Pixel (0, 0) is a centre. Returns an array of the same shape.
     """
     turn = face_to_frame[..., :2]
-    first = np.array(CORNER) + 0.5 / scale
+    first = np.array(corner) + 0.5 / scale
     return np.concatenate([turn / scale, (face_to_frame[..., 2] - 0.5 + turn @ first)[..., None]], axis=-1)
 
 

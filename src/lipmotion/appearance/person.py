@@ -19,6 +19,7 @@ from lipmotion.appearance.candidates import (
     drawn_to_recorded,
     make_candidates,
     recorded_details,
+    squared_distances,
 )
 from lipmotion.appearance.eigenlips import COMPONENTS, Eigenlips, enlarged, fit_eigenlips
 from lipmotion.appearance.lower_face import (
@@ -30,7 +31,7 @@ from lipmotion.appearance.lower_face import (
     relit,
     replaced_part,
 )
-from lipmotion.appearance.motion_map import MotionMap, fit_motion_map
+from lipmotion.appearance.motion_map import LEAST_DEVIATION, MotionMap, channel_values, fit_motion_map
 from lipmotion.appearance.refinement import RefinementOptions, Refiner
 from lipmotion.errors import InputError
 from lipmotion.stats.pca import evenly_spaced
@@ -53,6 +54,15 @@ PICTURES_PER_BLOCK = 256
 """Pictures that are projected at a time."""
 EDGE_PX = 3
 """The jaw's pictures are its own so far beyond the part that is replaced: cloning reads its edge."""
+LIP_DISTANCES = ("opening", "width", "outer")
+"""Channels in which the mixture of recorded mouths is to be like the motion."""
+DISTANCE_GAINS = np.array([1.0, 1.1, 1.0])
+"""How much further from their middle they are sought: trackers measure so much less width in the mixtures."""
+DISTANCE_WEIGHTS = np.array([800.0, 1600.0, 800.0])
+"""What one standard deviation of each among the candidates counts, beside the eigenlips, grey levels: the regression
+alone shows two thirds of the width's deviation (docs/results/video.md)."""
+LONGEST_CLOSURE_S = 0.3
+"""A closure that lasts no longer shows one recorded mouth; in pauses mouths are mixed, as they live on."""
 MOUTH_RIDGE = 1e-3
 """Ridge of the regression of the jaw on the mouth, as a share of the variance of the mouth."""
 
@@ -108,6 +118,7 @@ class Appearance:
     mouth       : eigenlips of the mouth region, 72 × 56 px
     mouths      : recorded mouths, the candidates of refinement [shape=(N, 56 · scale, 72 · scale, 3)], uint8
     mouth_codes : their eigenlips [shape=(N, 90)]
+    mouth_distances : their ``LIP_DISTANCES``, eye distances [shape=(N, 3)]; None in files of before
     jaw         : principal components of the lower face, 128 × 128 px, whose mouth is always the mean one
     jaws        : recorded lower faces, the candidates of the jaw [shape=(M, 128 · scale, 128 · scale, 3)], uint8
     jaw_codes   : their components [shape=(M, 3·K)]
@@ -125,6 +136,7 @@ class Appearance:
     mouth: Eigenlips
     mouths: Pictures
     mouth_codes: Floats
+    mouth_distances: Array | None
     jaw: Eigenlips
     jaws: Pictures
     jaw_codes: Floats
@@ -152,15 +164,42 @@ class Appearance:
         """Return what makes pictures of the lower face from components of the jaw."""
         return Refiner(enlarged(self.jaw, self.scale), self.jaw_candidates, options)
 
-    def of_motion(self, motion: Motion) -> FaceCodes:
+    def of_motion(self, motion: Motion, contact: Array | None = None) -> FaceCodes:
         """Return the lower face for motion of tracked points.
 
+        contact : how near the lips are to touching, 0 to 1, at which they touch [shape=(T,)]; None: as they are mixed
         Raises InputError: the motion has not the channels of ``from_motion``, or values that are not finite.
         """
         values = self.from_motion.predict(motion)
         count = self.mouth_codes.shape[1]
-        mouth = drawn_to_recorded(values[:, :count], self.mouth_codes)
+        mouth = self._recorded_mouths(values[:, :count], motion, contact)
         return FaceCodes(mouth, values[:, count:-1], values[:, -1])
+
+    def _recorded_mouths(self, predicted: Floats, motion: Motion, contact: Array | None) -> Floats:
+        """Return mixtures of recorded mouths [shape=(T, 90)] that look as predicted and are as open and as wide as the
+        motion, as far as this person has been; in closures, recorded mouths that are closed.
+        """
+        measured = self.mouth_distances
+        if measured is None:
+            return drawn_to_recorded(predicted, self.mouth_codes)
+        middle = measured.mean(axis=0)
+        wanted = middle + DISTANCE_GAINS * (channel_values(motion, LIP_DISTANCES) - middle)
+        wanted = np.clip(wanted, measured.min(axis=0), measured.max(axis=0))
+        weights = DISTANCE_WEIGHTS / np.maximum(measured.std(axis=0), LEAST_DEVIATION)
+        sought, recorded = (
+            np.concatenate([codes, ((distances - middle) * weights).astype(np.float32)], axis=1)
+            for codes, distances in ((predicted, wanted), (self.mouth_codes, measured))
+        )
+        mouths = drawn_to_recorded(sought, recorded)[:, : predicted.shape[1]]
+        if contact is None:
+            return mouths
+        for first, stop in _closures(contact, motion.rate_hz):
+            closed = measured[:, 0] <= max(wanted[first:stop, 0].max(), measured[:, 0].min())
+            apart = squared_distances(sought[first:stop], recorded).mean(axis=0)
+            pressed = self.mouth_codes[np.argmin(np.where(closed, apart, np.inf))]
+            around = slice(max(first - 1, 0), stop + 1)
+            mouths[around] += contact[around, None].astype(np.float32) * (pressed - mouths[around])
+        return mouths
 
     def of_mouths(self, mouths: Pictures) -> FaceCodes:
         """Return the lower face for pictures of the mouth [shape=(T, 56, 72, 3)], uint8, in any light."""
@@ -175,6 +214,12 @@ class Appearance:
         """
         values = (levels_db[:, None] * self.from_sound[1] + self.from_sound[0]).astype(np.float32)
         return FaceCodes(codes.mouth, values[:, :-1], values[:, -1])
+
+
+def _closures(contact: Array, rate_hz: float) -> list[tuple[int, int]]:
+    """Return the closures of at most ``LONGEST_CLOSURE_S``: the first frame of each, and the one after its last."""
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], contact >= 1, [False]]))).reshape(-1, 2)
+    return [(first, stop) for first, stop in ends.tolist() if stop - first <= max(1, LONGEST_CLOSURE_S * rate_hz)]
 
 
 def learn_appearance(footage: FootagePictures) -> Appearance:
@@ -198,6 +243,7 @@ def learn_appearance(footage: FootagePictures) -> Appearance:
     )
     chosen = _undamaged(mouth, mouths, codes, choose_candidates(codes, CANDIDATES))
     chosen_jaws = choose_candidates(jaw_codes, JAW_CANDIDATES)
+    names = [channel.name for channel in footage.channels]
 
     def recorded(frames: Index) -> Pictures:
         if footage.scale == 1:
@@ -214,6 +260,7 @@ def learn_appearance(footage: FootagePictures) -> Appearance:
         mouth,
         np.ascontiguousarray(recorded(chosen)[(slice(None), *mouth_part(footage.scale))]),
         codes[chosen],
+        footage.motion[chosen][:, [names.index(name) for name in LIP_DISTANCES]],
         jaw,
         _jaw_alone(chosen_faces, chosen_faces.mean(axis=0, dtype=np.float32), footage.shape),
         jaw_codes[chosen_jaws],

@@ -51,6 +51,7 @@ def appearance_arrays(appearance: Appearance) -> dict[str, NDArray[Any]]:
         "jaw_codes": appearance.jaw_codes,
         "from_mouth": appearance.from_mouth,
         "from_sound": appearance.from_sound,
+        **({} if appearance.mouth_distances is None else {"mouth_distances": appearance.mouth_distances}),
     }
 
 
@@ -79,6 +80,7 @@ def appearance_from_arrays(arrays: Arrays) -> Appearance:
             mouth,
             _decoded(stored["mouths"], len(stored["mouth_codes"]), MOUTH_HEIGHT * scale, MOUTH_WIDTH * scale),
             stored["mouth_codes"],
+            stored.arrays.get("mouth_distances"),
             jaw,
             _decoded(stored["jaws"], len(stored["jaw_codes"]), HEIGHT * scale, WIDTH * scale),
             stored["jaw_codes"],
@@ -95,6 +97,7 @@ APPEARANCE = {
     "light": ArraySpec(np.float64, "3", 1, 255),
     "mouths": ArraySpec(np.uint8, "A", 0, 255),
     "mouth_codes": ArraySpec(np.float32, "N C", -LARGEST_COEFFICIENT, LARGEST_COEFFICIENT),
+    "mouth_distances": ArraySpec(np.float64, "N 3", -100, 100, optional=True),
     "jaws": ArraySpec(np.uint8, "B", 0, 255),
     "jaw_codes": ArraySpec(np.float32, "M K", -LARGEST_COEFFICIENT, LARGEST_COEFFICIENT),
     "from_mouth": ArraySpec(np.float32, "F J", -LARGEST_COEFFICIENT, LARGEST_COEFFICIENT),

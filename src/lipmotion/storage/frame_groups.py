@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 Frame = NDArray[np.uint8]
 ReadFrames = Callable[[int, int], Iterable[Frame]]
 
-MOST_DECODED_BYTES = 48 * 2**20
+MOST_DECODED_BYTES = 160 * 2**20
 """Decoded frames that are kept, bytes; those of two groups are kept however large they are."""
 
 

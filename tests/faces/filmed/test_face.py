@@ -37,7 +37,9 @@ CODED = ("appearance/mouths", "appearance/jaws", "background/data")
 def small(filmed_face: FilmedFace) -> FilmedFace:
     """A face with few candidates, which is written and read in no time."""
     whole, few = filmed_face.appearance, slice(8)
-    candidates = {name: getattr(whole, name)[few] for name in ("mouths", "mouth_codes", "jaws", "jaw_codes")}
+    candidates = {
+        name: getattr(whole, name)[few] for name in ("mouths", "mouth_codes", "mouth_distances", "jaws", "jaw_codes")
+    }
     return replace(filmed_face, appearance=replace(whole, **candidates))
 
 
@@ -192,6 +194,8 @@ CHANGES: dict[str, tuple[dict[str, np.ndarray], str]] = {
     "other frames": ({"background/face_to_frame": np.ones((49, 2, 3))}, r"face_to_frame of shape \(49, 2, 3\)"),
     "an odd size": ({"background/size": np.array([287, 224])}, "frames of odd sizes"),
     "huge frames": ({"background/size": np.array([9000, 9000])}, "frames of 9000 × 9000 pixels"),
+    "cuts not in order": ({"background/cuts": np.array([20, 10])}, r"cuts \[20, 10\] of a background of 50 frames"),
+    "a late cut": ({"background/cuts": np.array([50])}, r"cuts \[50\]"),
     "no rate": ({"background/rate_hz": np.array(0.0)}, "rate_hz holds 0 to 0"),
     "more frames": ({"background/count": np.array(51)}, "50 frames, required 51"),
     "a slow sound": ({"take0/sound_rate_hz": np.array(100)}, "sound_rate_hz holds 100 to 100"),
@@ -200,6 +204,17 @@ CHANGES: dict[str, tuple[dict[str, np.ndarray], str]] = {
     "no basis": ({"appearance/mouth/basis": np.ones((3, 30, 4032), np.float32)}, "basis"),
     "small mouths": ({"appearance/mouth/size": np.array([28, 144])}, r"pictures of the mouth of \(28, 144\) px"),
 }
+
+
+def test_faces_of_before(arrays: dict[str, np.ndarray], header: dict[str, object], tmp_path: Path) -> None:
+    """Without the distances of candidates, and with a background of one part."""
+    former = {name: array for name, array in arrays.items() if not name.endswith(("/mouth_distances", "/cuts"))}
+    path = tmp_path / "former.face"
+    assert not refusal(path, header, former)
+    face = load_face(path)
+    assert (face.appearance.mouth_distances, face.background.cuts) == (None, ())
+    save_face(face, path)
+    assert len(face.appearance.of_motion(load_face(path).takes[0].motion)) > 0
 
 
 def test_arrays_that_do_not_fit_together(

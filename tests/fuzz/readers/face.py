@@ -33,7 +33,9 @@ def seeds(_: Good) -> list[Files]:
 def _small() -> bytes:
     face = toy_face(3)
     whole = face.appearance
-    few = {name: getattr(whole, name)[FEW] for name in ("mouths", "mouth_codes", "jaws", "jaw_codes")}
+    few = {
+        name: getattr(whole, name)[FEW] for name in ("mouths", "mouth_codes", "mouth_distances", "jaws", "jaw_codes")
+    }
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "a.face"
         save_face(replace(face, appearance=replace(whole, **few), takes=face.takes[:1]), path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -56,6 +57,20 @@ def test_any_length(sequence: BackgroundSequence) -> None:
     moves = [np.abs(a.face_to_frame - b.face_to_frame).max() for a, b in pairwise(shown)]
     assert max(moves) < 3
     assert len({each.frame.tobytes() for each in shown}) > 25
+
+
+def test_heads_lie_upon_one_another_where_a_frame_fades(sequence: BackgroundSequence) -> None:
+    """A head in two places is shown once, between them, and not twice."""
+    (first,) = sequence.frames(1, 25.0)
+    moved, place = np.roll(first.frame, (4, 6), axis=(0, 1)), first.face_to_frame.copy()
+    place[:, 2] += (6, 4)
+    half = background._mixed(first, replace(first, frame=moved, face_to_frame=place), 0.5)
+    assert half.face_to_frame == pytest.approx((first.face_to_frame + place) / 2)
+    x, y = half.face_to_frame[:, 2].round().astype(int)
+    face = slice(y - 20, y + 20), slice(x - 30, x + 30)
+    wanted = np.roll(first.frame, (2, 3), axis=(0, 1)).astype(int)[face]
+    faded = ((first.frame.astype(int) + moved) / 2)[face]
+    assert np.abs(half.frame[face] - wanted).mean() < 0.25 * np.abs(faded - wanted).mean()
 
 
 def test_any_rate(sequence: BackgroundSequence) -> None:

@@ -74,19 +74,14 @@ def test_parts_show_the_face_without_a_cut() -> None:
     assert parts == [(0, 100), (110, 305), (305, 500), (500, 749), (749, 998)]
 
 
-def test_short_parts_are_tried_only_if_there_are_no_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    tried = []
-
-    def blemish(part: tuple[Footage, int, int]) -> float:
-        tried.append(part[1:])
-        raise StopIteration
-
+def test_short_parts_are_compared_only_if_there_are_no_others() -> None:
     seen = np.ones(400, bool)
-    seen[np.r_[50:60, 110:120]] = False
-    monkeypatch.setattr(background, "_blemish", blemish)
-    for frames, expected in ((seen, (120, 260)), (seen[:170], (0, 50))):
-        monkeypatch.setattr(background, "MOST_BACKGROUND_S", 6.0)
-        tried.clear()
-        with pytest.raises(StopIteration):
-            background.best_background([footage(frames)])
-        assert tried == [expected]
+    seen[np.r_[50:60, 110:120, 260:270]] = False
+    for frames, expected in ((seen, [(120, 260), (270, 400)]), (seen[:170], [(0, 50), (60, 110), (120, 170)])):
+        assert [part[1:] for part in background._compared([footage(frames)])] == expected
+
+
+def test_parts_are_of_one_size() -> None:
+    """That of most of the footage."""
+    small, large = footage(np.ones(100, bool)), replace(footage(np.ones(160, bool)), size=(4, 4))
+    assert [part[0] for part in background._compared([small, large, small])] == [small, small]

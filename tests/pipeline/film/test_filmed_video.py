@@ -25,7 +25,7 @@ from lipmotion.pipeline.outputs.shown_faces import shown_face
 from lipmotion.pipeline.outputs.write import write
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.testing.toy import ToySentence, toy_motion
-from lipmotion.types import Audio, Channel, Item, Motion, Progress
+from lipmotion.types import Audio, Channel, Item, Motion, Progress, Span, Timeline, Unit
 from speech.sounds import tone, write_sound
 from testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH
 
@@ -96,9 +96,18 @@ def test_the_jaw_follows_what_it_is_told(filmed_face: FilmedFace, brief: Motion,
         film_of(filmed_face, brief, options=FilmOptions(jaw="energy"))
 
 
+def test_lips_close_in_p_b_and_m(filmed_face: FilmedFace) -> None:
+    """Also where the motion leaves them apart."""
+    parted = toy_motion(Timeline((Span(0.0, 0.8, Unit("ax")),)), 100.0)
+    said = Timeline((Span(0.0, 0.3, Unit("ax")), Span(0.3, 0.42, Unit("b")), Span(0.42, 0.8, Unit("ax"))))
+    closed, apart = (dark(list(film_of(filmed_face, parted, units=units).frames)) for units in (said, None))
+    assert closed[8:10].min() == 0
+    assert min(apart[8:10].min(), closed[4]) > 20
+
+
 def test_the_refinement_as_printed(filmed_face: FilmedFace, brief: Motion) -> None:
     """Eqs. 14-16 of Xie & Liu 2007, colour by colour, of the mean of three pictures."""
-    codes = face_codes(filmed_face, brief, 5, 25.0)
+    codes = face_codes(filmed_face, brief, Timeline(()), 5, 25.0)
     options = replace(AS_PRINTED, noise=False)
     made = np.stack(list(Stitcher(filmed_face.appearance, options).mouths(codes))).astype(float)
     space, mouths = filmed_face.appearance.mouth, filmed_face.appearance.mouths

@@ -17,6 +17,7 @@ from lipmotion.storage.archive import UNREADABLE, read_archive, read_archive_hea
 from lipmotion.storage.coded_video import STORED_VIDEO, StoredVideo, stored_video_arrays, stored_video_from_arrays
 from lipmotion.storage.files import check_source
 from lipmotion.storage.schema import (
+    LARGEST_NUMBER,
     POSITIVE,
     Arrays,
     ArraySpec,
@@ -42,11 +43,13 @@ class StoredBackground:
     video         : T frames, of even height and width
     face_to_frame : affine maps from px of the face to px of the frame [shape=(T, 2, 3)]
     chin_px       : how far the tip of the chin is below the eyes in each frame, px of the face [shape=(T,)]
+    cuts          : frames at which another part of the footage begins, rising
     """
 
     video: StoredVideo
     face_to_frame: Array
     chin_px: Array
+    cuts: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +117,7 @@ def save_face(face: FilmedFace, path: str | Path) -> None:
     arrays = {f"appearance/{name}": array for name, array in appearance_arrays(face.appearance).items()}
     arrays |= {f"background/{name}": array for name, array in stored_video_arrays(background.video).items()}
     arrays |= {"background/face_to_frame": background.face_to_frame, "background/chin_px": background.chin_px}
+    arrays |= {"background/cuts": np.array(background.cuts, np.intp)}
     for number, take in enumerate(takes):
         arrays |= {
             f"take{number}/sound": np.rint(np.clip(take.sound.samples, -1, 1) * FULL_SCALE).astype(np.int16),
@@ -183,6 +187,7 @@ MOST_TAKES = 1000
 BACKGROUND = {
     "face_to_frame": ArraySpec(np.float64, "T 2 3", -1e5, 1e5),
     "chin_px": ArraySpec(np.float64, "T", 0, 1000),
+    "cuts": ArraySpec(np.intp, "c", 1, LARGEST_NUMBER, optional=True),
 }
 """The arrays of a background, beside those of its video."""
 TAKE = {
@@ -202,7 +207,10 @@ def _background(arrays: Arrays) -> StoredBackground:
     maps = stored["face_to_frame"]
     if (np.abs(np.linalg.det(maps[:, :, :2])) < LEAST_DETERMINANT).any() or any(length % 2 for length in video.size):
         raise ValueError("flat places of the face, or frames of odd sizes")
-    return StoredBackground(video, maps, stored["chin_px"])
+    cuts = stored.arrays.get("cuts", np.zeros(0, np.intp))
+    if (np.diff(cuts) < 1).any() or (cuts >= len(video)).any():
+        raise ValueError(f"cuts {cuts.tolist()} of a background of {len(video)} frames")
+    return StoredBackground(video, maps, stored["chin_px"], tuple(cuts.tolist()))
 
 
 LEAST_DETERMINANT = 1e-6

@@ -5,22 +5,22 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from itertools import pairwise
+from functools import cache, partial
+from itertools import chain, pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.appearance.frame_descriptors import describe_frames
+from lipmotion.appearance.frame_descriptors import FrameDescriptors, describe_frames, row_distances
 from lipmotion.appearance.identity import SAME_PERSON_LIKENESS, face_signature, likeness
-from lipmotion.appearance.looping import LoopOrder, loop_order, scenes_of
+from lipmotion.appearance.looping import JUMP_LIMIT, LoopOrder, fade_frames, loop_order, scenes_of
 from lipmotion.appearance.lower_face import HEIGHT as REGION_HEIGHT
 from lipmotion.appearance.lower_face import WIDTH as REGION_WIDTH
 from lipmotion.appearance.lower_face import region_map
 from lipmotion.appearance.mouth_region import CORNER, EYE_DISTANCE_PX, HEIGHT
 from lipmotion.appearance.person import Appearance
-from lipmotion.appearance.placing import cut
+from lipmotion.appearance.placing import cut, feather, inverse_map
 from lipmotion.faces.filmed.face import StoredBackground
 from lipmotion.faces.filmed.renderer import Background
 from lipmotion.stats.pca import evenly_spaced
@@ -32,16 +32,22 @@ from lipmotion.vision.steadying import REGISTERED_NOISE_PX, registered_maps, ste
 
 LOG = logging.getLogger("lipmotion")
 
-MOST_BACKGROUND_S = 10.0
-"""Longest background that is kept in the file of a face."""
+MOST_BACKGROUND_S, MOST_PART_S = 20.0, 10.0
+"""Longest background that is kept in the file of a face, and the longest part of it."""
 HEAD_PX = -75.0, -80.0, 75.0, 150.0
 """Left, top, right and bottom of a head, px of the face, from the point between the eyes."""
 CHIN = "y_152"
 """The tip of the chin."""
 SMOOTHING_FRAMES = 0.7
 """Standard deviation of the smoothing of its place, frames: the tracker trembles."""
-MOST_PARTS = 12
+ALIGNED_PX = -125.0, -135.0, 125.0, 155.0
+"""The part around a head in which heads are laid upon one another where one frame fades into another."""
+ALIGNED_EDGE_PX = 25.0
+"""Width of the edge of that part."""
+MOST_PARTS = 24
 """Parts of the footage that are tried as backgrounds."""
+COMPARED_STEP = 3
+"""Every so many frames of them are compared."""
 SHOWN_S = 60.0
 """How long they are shown then."""
 SHORT_S, SHORT_COST = 3.0, 2.0
@@ -123,28 +129,77 @@ class BackgroundSequence:
 
 
 def best_background(footages: Sequence[Footage]) -> StoredBackground:
-    """Return the part of some footage that can be shown for a minute with the least visible join.
+    """Return the parts of some footage that can be shown one after the other with the least visible joins.
 
-    ``MOST_PARTS`` parts, spread evenly, are compared. They last at most ``MOST_BACKGROUND_S``, show the face in all
-    frames, and have no cut. Parts much shorter than ``SHORT_S`` are compared only if there are no longer ones.
+    ``MOST_PARTS`` parts of one size, spread evenly, are compared. They last at most ``MOST_PART_S``, show the face in
+    all frames, and have no cut. Parts much shorter than ``SHORT_S`` are compared only if there are no longer ones. The
+    first is the one that could best be shown alone for a minute; each next one has a frame that is most like one of
+    those before, up to ``MOST_BACKGROUND_S`` and as long as jumps lead there.
     """
-    parts = [part for footage in footages for part in _parts(footage)]
-    least_s = COMPARED_SHARE * min(SHORT_S, max(map(_duration_s, parts)))
-    parts = [part for part in parts if _duration_s(part) >= least_s]
-    tried = [parts[number] for number in evenly_spaced(MOST_PARTS, len(parts))]
-    footage, start, stop = min(tried, key=_blemish)
-    height, width = (length // 2 * 2 for length in footage.size)
-    frames = (frame[:height, :width] for frame in footage_frames(footage, start, stop))
-    video = encode_video(frames, footage.rate_hz)
-    return StoredBackground(video, placed_maps(footage)[start:stop], chin_px(footage)[start:stop])
+    chosen = _joined(_compared(footages))
+    height, width = (length // 2 * 2 for length in chosen[0][0].size)
+    frames = (frame[:height, :width] for part in chosen for frame in footage_frames(*part))
+    video = encode_video(frames, chosen[0][0].rate_hz)
+    maps, chins = (
+        np.concatenate([of(footage)[start:stop] for footage, start, stop in chosen]) for of in (placed_maps, chin_px)
+    )
+    return StoredBackground(video, maps, chins, tuple(start for start, _ in _spans(chosen)[1:]))
 
 
 _Part = tuple[Footage, int, int]
 
 
+def _compared(footages: Sequence[Footage]) -> list[_Part]:
+    """Return the parts that are compared."""
+    parts = _of_one_size([part for footage in footages for part in _parts(footage)])
+    least_s = COMPARED_SHARE * min(SHORT_S, max(map(_duration_s, parts)))
+    parts = [part for part in parts if _duration_s(part) >= least_s]
+    return [parts[number] for number in evenly_spaced(MOST_PARTS, len(parts))]
+
+
+def _of_one_size(parts: Sequence[_Part]) -> list[_Part]:
+    """Return the parts whose pictures have the size and rate of most of the footage."""
+
+    def kind(part: _Part) -> tuple[tuple[int, int], float]:
+        return part[0].size, part[0].rate_hz
+
+    lengths = {each: sum(_duration_s(part) for part in parts if kind(part) == each) for each in map(kind, parts)}
+    longest = max(lengths, key=lambda each: lengths[each])
+    return [part for part in parts if kind(part) == longest]
+
+
+def _spans(parts: Sequence[_Part]) -> list[tuple[int, int]]:
+    """Return the first frame of each part, and the one after its last, where they follow one another."""
+    return list(pairwise(np.cumsum([0, *(stop - start for _, start, stop in parts)]).tolist()))
+
+
+def _joined(parts: Sequence[_Part]) -> list[_Part]:
+    """Return the parts that are shown, the best one first."""
+    rate_hz, scenes = parts[0][0].rate_hz, _spans(parts)
+    shown = chain.from_iterable(footage_frames(*part) for part in parts)
+    maps = np.concatenate([footage.face_to_image[start:stop] for footage, start, stop in parts])
+    descriptors = describe_frames(shown, maps)
+    blemishes = [_blemish(descriptors.part(*scene), rate_hz) for scene in scenes]
+    part_of = np.repeat(np.arange(len(parts)), [stop - start for start, stop in scenes])[::COMPARED_STEP]
+    distances = row_distances(descriptors.standardised(scenes, fade_frames(rate_hz))[::COMPARED_STEP])
+    chosen = [int(np.argmin(blemishes))]
+    while True:
+        nearest = distances[np.isin(part_of, chosen)].min(axis=0)
+        left_s = MOST_BACKGROUND_S - sum(_duration_s(parts[number]) for number in chosen)
+        apart = {
+            number: float(nearest[part_of == number].min())
+            for number in range(len(parts))
+            if number not in chosen and _duration_s(parts[number]) <= left_s
+        }
+        best = min(apart, key=lambda number: apart[number], default=-1)
+        if best < 0 or apart[best] > JUMP_LIMIT:
+            return [parts[number] for number in chosen]
+        chosen.append(best)
+
+
 def _parts(footage: Footage) -> list[_Part]:
     """Return the parts of some footage that show the face without a cut: first frame, and the one after the last."""
-    longest = max(1, round(MOST_BACKGROUND_S * footage.rate_hz))
+    longest = max(1, round(MOST_PART_S * footage.rate_hz))
     parts = []
     for first, last in scenes_of(_usable(footage), footage.cuts):
         count = -(-(last - first) // longest)
@@ -167,20 +222,19 @@ def _usable(footage: Footage) -> NDArray[np.bool_]:
     return usable
 
 
-def _blemish(part: _Part) -> float:
+def _blemish(descriptors: FrameDescriptors, rate_hz: float) -> float:
     """Return how visible the worst join is if a part is shown for a minute; short ones are worse."""
-    footage, start, stop = part
-    descriptors = describe_frames(footage_frames(footage, start, stop), footage.face_to_image[start:stop])
-    order = loop_order(descriptors, round(SHOWN_S * footage.rate_hz), footage.rate_hz)
+    order = loop_order(descriptors, round(SHOWN_S * rate_hz), rate_hz)
     worst = max((join.cost for join in order.joins), default=0.0)
-    return worst + SHORT_COST * max(0.0, 1 - _duration_s(part) / SHORT_S)
+    return worst + SHORT_COST * max(0.0, 1 - len(descriptors) / rate_hz / SHORT_S)
 
 
 def stored_sequence(background: StoredBackground) -> BackgroundSequence:
     """Return the background in the file of a face."""
     video = background.video
     usable = np.ones(len(video), bool)
-    return BackgroundSequence(video.groups, video.rate_hz, background.face_to_frame, background.chin_px, usable)
+    maps, chins = background.face_to_frame, background.chin_px
+    return BackgroundSequence(video.groups, video.rate_hz, maps, chins, usable, background.cuts)
 
 
 def open_background(path: Path, appearance: Appearance | None = None, *, in_time: bool = False) -> BackgroundSequence:
@@ -226,8 +280,44 @@ def placed_maps(footage: Footage) -> NDArray[np.float64]:
 
 
 def _mixed(one: Background, other: Background, weight: float) -> Background:
-    """Return a frame between two, of which the second has some weight."""
-    frame = np.rint((1 - weight) * one.frame + weight * other.frame).astype(np.uint8)
-    place = (1 - weight) * one.face_to_frame + weight * other.face_to_frame
-    chin_px = (1 - weight) * one.chin_px + weight * other.chin_px
-    return Background(frame, place, chin_px, one.has_face and other.has_face)
+    """Return a frame between two, of which the second has some weight; its head is at a place between theirs."""
+    share = round(256 * weight)
+    levels = np.uint16(256 - share) * one.frame + np.uint16(share) * other.frame
+    frame = ((levels + np.uint16(128)) >> np.uint16(8)).astype(np.uint8)
+    between = (1 - weight) * one.face_to_frame + weight * other.face_to_frame
+    has_face = one.has_face and other.has_face
+    if has_face:
+        rows, columns, edge = _aligned_part(between, frame.shape)
+        corner = np.array([columns.start, rows.start]) + 0.5
+        back = inverse_map(between)
+        heads = []
+        for each in (one, other):
+            turn = each.face_to_frame[:, :2] @ back[:, :2]
+            start = turn @ corner + each.face_to_frame[:, :2] @ back[:, 2] + each.face_to_frame[:, 2] - 0.5
+            heads.append(cut(each.frame, np.column_stack([turn, start]), edge.shape))
+        part = frame[rows, columns]
+        aligned = heads[0] + np.float32(weight) * (heads[1] - heads[0])
+        part[...] = np.clip(np.rint(part + edge[..., None] * (aligned - part)), 0, 255)
+    return Background(frame, between, (1 - weight) * one.chin_px + weight * other.chin_px, has_face)
+
+
+def _aligned_part(
+    face_to_frame: NDArray[np.float64], shape: tuple[int, ...]
+) -> tuple[slice, slice, NDArray[np.float32]]:
+    """Return the rows and columns of ``ALIGNED_PX`` in a frame, and the weights of their pixels [shape=(h, w)]."""
+    scale = max(1, round(4 * float(np.sqrt(abs(np.linalg.det(face_to_frame[:, :2])))))) / 4
+    edge = _aligned_edge(scale)
+    left, top = (round(at + scale * by) for at, by in zip(face_to_frame[:, 2].tolist(), ALIGNED_PX[:2], strict=True))
+    rows, columns = (
+        slice(min(max(first, 0), length), min(max(first + wide, 0), length))
+        for first, wide, length in ((top, edge.shape[0], shape[0]), (left, edge.shape[1], shape[1]))
+    )
+    return rows, columns, edge[rows.start - top : rows.stop - top, columns.start - left : columns.stop - left]
+
+
+@cache
+def _aligned_edge(scale: float) -> NDArray[np.float32]:
+    """Return the weights of ``ALIGNED_PX`` with some samples a px of the face [shape=(h, w)]."""
+    left, top, right, bottom = ALIGNED_PX
+    height, width = round((bottom - top) * scale), round((right - left) * scale)
+    return feather(np.ones((height, width), bool), max(1.0, ALIGNED_EDGE_PX * scale))

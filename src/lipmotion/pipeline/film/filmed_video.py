@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from lipmotion.appearance.eigenlips import Eigenlips
 from lipmotion.appearance.person import FaceCodes
+from lipmotion.articulation.contact import FULL_DEFICIT_GAP, closed_lips, gap_in, in_pictures, opening_of
 from lipmotion.errors import InputError
 from lipmotion.export.inset import inset_box, with_inset
 from lipmotion.export.synthetic_mark import mark_frames, mark_metadata
@@ -26,7 +27,7 @@ from lipmotion.pipeline.model import Model
 from lipmotion.speech.sound.pauses import levels_db_at
 from lipmotion.storage.files import check_source
 from lipmotion.storage.media import has_video
-from lipmotion.types import GREY, Audio, Monitor, Motion, silent_monitor
+from lipmotion.types import GREY, Audio, Monitor, Motion, Timeline, Unit, silent_monitor
 from lipmotion.types.progress import with_reports
 from lipmotion.vision.footage import untracked_frames
 
@@ -84,13 +85,14 @@ class Film:
 
 
 @one_thread()
-def film_of(
+def film_of(  # noqa: PLR0913
     face: FilmedFace,
     motion: Motion,
     *,
     speech: Path | None = None,
     sound: Audio | None = None,
     model: Model | None = None,
+    units: Timeline[Unit] | None = None,
     fps: float | None = None,
     options: FilmOptions = FILM,
 ) -> Film:
@@ -101,6 +103,7 @@ def film_of(
     speech    : the video of the speech, for an overlay
     sound     : for a jaw that follows the energy
     model     : that generated the motion; needed where the motion is eigenlips
+    units     : the phones in time, of which p, b and m close the lips; None: they are not known
     fps       : frames a second; None, and with an overlay: those of the footage
     Frame n shows the time n / fps; the last one is at or before the end of the motion. Frames are made a few at a time.
     Raises InputError: motion without the channels that the face needs, no sound for ``energy``, a background in which
@@ -108,16 +111,17 @@ def film_of(
     """
     check_film(options, speech)
     eigenlips = model.eigenlips if model is not None else None
+    said = motion, Timeline(()) if units is None else units
     if options.overlay == "inset" and speech is not None:
         frames, rate_hz = untracked_frames(speech)
-        codes = _codes(face, motion, sound, rate_hz, eigenlips, options)
+        codes = _codes(face, said, sound, rate_hz, eigenlips, options)
         mouths = Stitcher(face.appearance, options.stitching).mouths(codes)
         first, frames = _first_of(_even(frames), speech)
         covered = inset_box((first.shape[0], first.shape[1]), face.appearance.mouths.shape[1:3])
         return Film(with_inset(frames, mouths), len(codes), rate_hz, covered)
     background = _background(face, options, speech)
     rate_hz = background.rate_hz if fps is None or options.overlay is not None else fps
-    codes = _codes(face, motion, sound, rate_hz, eigenlips, options)
+    codes = _codes(face, said, sound, rate_hz, eigenlips, options)
     has_jaw = options.jaw != "none" and options.overlay is None
     stitcher = Stitcher(face.appearance, options.stitching if has_jaw else replace(options.stitching, jaw=False))
     frames = stitcher.stitch(codes, background.frames(len(codes), rate_hz))
@@ -126,7 +130,7 @@ def film_of(
 
 def _codes(
     face: FilmedFace,
-    motion: Motion,
+    said: tuple[Motion, Timeline[Unit]],
     sound: Audio | None,
     rate_hz: float,
     eigenlips: Eigenlips | None,
@@ -135,8 +139,9 @@ def _codes(
     """Return what the lower face is like in every frame of a video."""
     if not 0 < rate_hz < float("inf"):
         raise InputError(f"the frame rate is {rate_hz}, required more than 0")
+    motion, units = said
     count = int(np.floor((len(motion.values) - 1) / motion.rate_hz * rate_hz + 1e-9)) + 1
-    codes = face_codes(face, motion, count, rate_hz, eigenlips)
+    codes = face_codes(face, motion, units, count, rate_hz, eigenlips)
     if options.jaw == "energy":
         codes = face.appearance.with_jaw_of_sound(codes, _levels(sound, count, rate_hz))
     return codes
@@ -151,15 +156,21 @@ def _background(face: FilmedFace, options: FilmOptions, speech: Path | None) -> 
 
 
 def face_codes(
-    face: FilmedFace, motion: Motion, count: int, rate_hz: float, eigenlips: Eigenlips | None = None
+    face: FilmedFace,
+    motion: Motion,
+    units: Timeline[Unit],
+    count: int,
+    rate_hz: float,
+    eigenlips: Eigenlips | None = None,
 ) -> FaceCodes:
     """Return what the lower face is like in ``count`` frames at the rate of a video.
 
+    units : the phones in time; in every p, b and m the lips touch (``contact.closed_lips``)
     Raises InputError: motion without the channels that the face needs.
     """
-    shown = Motion(motion.at(np.arange(count) / rate_hz), rate_hz, motion.channels)
+    shown, contact = _with_contact(motion, units, count, rate_hz)
     if eigenlips is None or not all(channel in shown.channels for channel in eigenlips.channels):
-        return face.appearance.of_motion(shown)
+        return face.appearance.of_motion(shown, contact)
     values = shown.values[:, [shown.column(channel.name) for channel in eigenlips.channels]]
     starts = range(0, count, BATCH)
     parts = [face.appearance.of_mouths(eigenlips.restore(values[start : start + BATCH])) for start in starts]
@@ -167,6 +178,24 @@ def face_codes(
     if all(channel.unit == GREY for channel in shown.channels):
         return FaceCodes(mouth, jaw, chin_px)
     return replace(face.appearance.of_motion(shown), mouth=mouth)  # points tell the jaw better
+
+
+def _with_contact(
+    motion: Motion, units: Timeline[Unit], count: int, rate_hz: float
+) -> tuple[Motion, NDArray[np.float64] | None]:
+    """Return motion in pictures, closed where the lips touch, and how near they are to that, 0 to 1 [shape=(T,)].
+
+    None where the motion has no ``opening``.
+    """
+    time_s = np.arange(count) / rate_hz
+    values = motion.at(time_s)
+    if "opening" not in motion.names or not np.isfinite(motion.values).all():
+        return Motion(values, rate_hz, motion.channels), None
+    gap = closed_lips(gap_in(motion), motion, units)
+    gap = in_pictures(gap, gap == 0, motion.rate_hz, time_s)
+    column = motion.column("opening")
+    values[:, column] = np.minimum(values[:, column], opening_of(gap))
+    return Motion(values, rate_hz, motion.channels), 1 - np.clip(gap / FULL_DEFICIT_GAP, 0, 1)
 
 
 def _fields(codes: FaceCodes) -> tuple[Floats, Floats, Floats]:

@@ -200,12 +200,14 @@ class ShownPerson(ShownFace):
 
     def write_video(self, path: Path, performance: Performance) -> None:  # noqa: D102
         settings, played = performance.settings, performance.once(sound_track)
+        seen = performance.once(_seen)
         film = film_of(
             self.face,
-            performance.once(_seen).motion,
+            seen.motion,
             speech=settings.recording,
             sound=played,
             model=performance.model,
+            units=seen.units,
             fps=settings.fps,
             options=settings.film,
         )
