@@ -99,13 +99,14 @@ def with_given(moved: Liveliness, given: Mapping[str, Array]) -> Liveliness:
     if not moves_by_itself("gaze", given):
         gaze = given_gaze(given)
     of_mood = eye_and_brow_weights(moved)
+    added = {unit: np.clip(moved.unit(unit) + units.get(unit, 0), 0, 1) for unit in {*moved.units, *units}}
     return replace(
         moved,
         lids=np.clip(moved.lids + of_both("eyeBlink"), 0, 1),
         brows=moved.brows + FULL_BROW_RISE * raised,
         gaze=gaze,
         turn=turn,
-        units={**moved.units} | {unit: np.clip(moved.unit(unit) + curve, 0, 1) for unit, curve in units.items()},
+        units={unit: curve for unit, curve in added.items() if unit in moved.units or curve.any()},
         given={
             name: curve if name.startswith("eyeLook") else np.clip(of_mood.get(name, 0) + curve, 0, 1)
             for name, curve in given.items()
