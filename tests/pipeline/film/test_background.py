@@ -129,6 +129,7 @@ def test_the_best_background_is_one_part(video: ToyVideo, monkeypatch: pytest.Mo
     """Of at most some seconds, without cuts, in which the face is seen."""
     monkeypatch.setattr(background, "registered_maps", lambda footage: footage.face_to_image)
     monkeypatch.setattr(background, "MOST_BACKGROUND_S", 1.0)
+    monkeypatch.setattr(background, "MOST_PART_S", 1.0)
     best = best_background([footage_of(video)])
     assert 20 <= len(best.video) <= 25
     assert len(best.video) == len(best.chin_px) == len(best.face_to_frame)
