@@ -1,4 +1,4 @@
-"""How well laughter, breaths, whispering and shouting are heard, and whether breaths that are heard are seen.
+"""How well laughter, breaths, whispering and shouting are detected, and whether breaths that are detected are seen.
 
     python benchmarks/voice_events.py laughing=FOLDER speech:2=FOLDER --corpus build/grid-s1 --align FOLDER
 
@@ -6,7 +6,7 @@ A group is a folder of recordings. Phones are not recognised: stretches between 
 words, so that the sound alone decides. Each group is divided by its people, the first four letters of names (of
 ``speech:2`` the first two): by the first halves the limits were chosen, the second halves are held out.
 --corpus, --align : a prepared corpus, and its words in time (.align of GRID): how far tracked lips are apart in breaths
-that are heard, and in the same place before the words of other sentences.
+that are detected, and in the same place before the words of other sentences.
 --model : also the correlation of generated and tracked openings of the sentences with such breaths, without and with
 them.
 """
@@ -54,7 +54,7 @@ def main() -> None:
         paths = sorted(path for path in Path(folder).rglob("*") if path.suffix.lower() in SOUNDS)
         for half in (0, 1):
             ours = [path for path in paths if half_of(path.name[: int(letters or 4)]) == half]
-            print(json.dumps({"group": name, "half": ("chosen", "held out")[half], **heard(ours)}), flush=True)
+            print(json.dumps({"group": name, "half": ("chosen", "held out")[half], **detected(ours)}), flush=True)
     if options.corpus:
         corpus = Corpus.open(options.corpus)
         print(json.dumps({"group": options.corpus.name, **breaths_seen(corpus, options.align, options.model)}))
@@ -66,8 +66,8 @@ def half_of(person: str) -> int:
     return int(hashlib.md5(person.encode(), usedforsecurity=False).hexdigest(), 16) % 2
 
 
-def heard(paths: list[Path]) -> dict[str, object]:
-    """Return the number and the seconds of recordings, and in how many of them each kind of event is heard."""
+def detected(paths: list[Path]) -> dict[str, object]:
+    """Return the number and the seconds of recordings, and in how many of them each kind of event is detected."""
     seconds, phrases, kinds, events = 0.0, 0, Counter[str](), Counter[str]()
     for path in paths:
         audio = read_audio(path)
@@ -100,7 +100,7 @@ def sounding(audio: Audio) -> Timeline[Unit]:
 
 
 def breaths_seen(corpus: Corpus, align: Path, model: Path | None) -> dict[str, object]:
-    """Return how many breaths are heard before the words of sentences, and how far the lips are apart then."""
+    """Return how many breaths are detected before the words of sentences, and how far the lips are apart then."""
     breaths, plain, named = [], [], []
     for split in ("train", "val"):
         for name in corpus.names(split):
@@ -124,7 +124,7 @@ def breaths_seen(corpus: Corpus, align: Path, model: Path | None) -> dict[str, o
         "opening": round(float(np.nanmean(seen[:, 0])), 3),
         "elsewhere": round(float(np.nanmean(seen[:, 1])), 3),
         "more open": int((seen[:, 0] > seen[:, 1]).sum()),
-        "ACC": {manner: acc(corpus, named, model, manner) for manner in ("asked", "heard") if model},
+        "ACC": {manner: acc(corpus, named, model, manner) for manner in ("asked", "detected") if model},
     }
 
 

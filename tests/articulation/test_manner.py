@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lipmotion.articulation.manner import FACTORS, with_heard, with_manners
+from lipmotion.articulation.manner import FACTORS, with_detected, with_manners
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.types import Generation, StateTrace, VoiceEvent
 from lipmotion.types.moods import MANNERS, PLAIN, moods_of, text_of
@@ -52,7 +52,7 @@ def test_a_manner_holds_until_the_next_and_moods_do_not_count(generation: Genera
         ("mumble at 1, angry at 2", "mumble at 1, angry at 2"),
     ],
 )
-def test_what_is_heard_is_shown_where_nothing_of_its_kind_is_asked_for(asked: str, shown: str) -> None:
+def test_what_is_detected_is_shown_where_nothing_of_its_kind_is_asked_for(asked: str, shown: str) -> None:
     kinds = ((1, WHISPER, 0.5), (3, LAUGHTER, 0.9), (4.5, BREATH, 1), (5, SHOUT, 0.8))
     events = [VoiceEvent(start_s, start_s + 1, kind, strength) for start_s, kind, strength in kinds]
-    assert text_of(with_heard(moods_of(asked), events)) == shown
+    assert text_of(with_detected(moods_of(asked), events)) == shown

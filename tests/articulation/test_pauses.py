@@ -99,7 +99,7 @@ LAUGH = VoiceEvent(0.4, 1.4, LAUGHTER, 0.9, ((0.5, 1.0), (0.7, 0.5), (1.3, 0.5))
 QUIET = said((0, 2.0, "sil"), (2.0, 2.6, "aa"), (2.6, 3.0, "sil"))
 
 
-def test_a_breath_that_is_heard_parts_the_lips_and_they_close_after_it():
+def test_a_breath_that_is_detected_parts_the_lips_and_they_close_after_it():
     opening = with_pauses(generation(QUIET), REST, events=[VoiceEvent(0.8, 1.2, BREATH, 1.0)]).motion["opening"]
     assert opening[90:111] == pytest.approx(INHALING_GAP)
     assert opening[[60, 140]].max() <= CLOSED_OPENING

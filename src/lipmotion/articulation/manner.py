@@ -1,4 +1,4 @@
-"""Manners of speaking: how far the mouth moves in whispered, shouted and mumbled speech; and moods that are heard.
+"""Manners of speaking: how far the mouth moves in whispered, shouted and mumbled speech; and moods that are detected.
 
 Sources: P. Edwards, C. Landreth, E. Fiume and K. Singh, "JALI: an animator-centric viseme model for expressive lip
 synchronization", ACM Transactions on Graphics 35(4), 2016, whose two dials are low for mumbled and high for shouted
@@ -25,10 +25,10 @@ LAUGHING: Final = "happy"
 """The mood of a face that laughs: cheeks and corners of the lips are raised; ``articulation.pauses`` opens the jaw."""
 
 
-def with_heard(asked: Sequence[MoodKey], events: Sequence[VoiceEvent]) -> tuple[MoodKey, ...]:
-    """Return moods and manners over time: those that are asked for, or else those that are heard.
+def with_detected(asked: Sequence[MoodKey], events: Sequence[VoiceEvent]) -> tuple[MoodKey, ...]:
+    """Return moods and manners over time: those that are asked for, or else those that are detected.
 
-    asked  : where it has a mood, no other is heard; where it has a manner, no manner
+    asked  : where it has a mood, no other is detected; where it has a manner, no manner
     events : laughter is a mood; phrases that are whispered or shouted have this manner, as far as they are strong
     """
     manner_of = {LAUGHTER: False, WHISPER: True, SHOUT: True}

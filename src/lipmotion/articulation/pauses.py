@@ -28,12 +28,12 @@ BREATH_GAP, BREATH_S = 0.03, 0.04
 LEAST_BREATH_S: Final = 0.4
 """Pauses in which a breath is taken last at least so long."""
 INHALING_GAP = 0.05
-"""The lips are parted by this for a breath that is heard, as GRID speaker 1 does (docs/expression.md)."""
+"""The lips are parted by this for a breath that is detected, as GRID speaker 1 does (docs/expression.md)."""
 LAUGH_GAP, LAUGH_SHARE = 0.18, 0.4
 """In laughter the lips are parted by the first length in the loudest call, by this share of it between calls."""
-CALL_S, HEARD_EDGE_S = 0.05, 0.08
-"""How long a call of laughter opens the mouth (a standard deviation); laughter and breaths that are heard part the lips
-so long before, and let them close so long after."""
+CALL_S, EVENT_EDGE_S = 0.05, 0.08
+"""How long a call of laughter opens the mouth (a standard deviation); laughter and breaths part the lips so long before,
+and let them close so long after."""
 PINNED_S: Final = 0.15
 """Within this time of a pin the motion stays as it is."""
 
@@ -97,7 +97,7 @@ def with_pauses(
 
     style    : ``rest``; or ``natural``, which leaves the motion as it is
     pinned_s : times of pins, around which the motion stays as it is
-    events   : breaths and laughter that are heard: the mouth opens for them, where it rests else
+    events   : breaths and laughter that are detected: the mouth opens for them, where it rests else
     Before phrases after a longer pause the lips part for a breath. The motion may have any channels; without phones it
     stays as it is.
     """
@@ -117,7 +117,7 @@ def with_pauses(
         column = motion.column("opening")
         values[:, column] = np.maximum(values[:, column], _breaths(units, time_s) * (weight < 1))
         if events:
-            lacking = np.maximum(_heard(events, time_s) * weight - values[:, column], 0)
+            lacking = np.maximum(_detected(events, time_s) * weight - values[:, column], 0)
             values += lacking[:, None] * _with_opening(motion)
     return replace(generation, motion=Motion(values, motion.rate_hz, motion.channels))
 
@@ -137,15 +137,15 @@ def _breaths(units: Timeline[Unit], time_s: Curve) -> Curve:
     return least
 
 
-def _heard(events: Sequence[VoiceEvent], time_s: Curve) -> Curve:
-    """Return the least opening for what is heard in pauses, in eye distances [shape=(T,)]; 0 away from it."""
+def _detected(events: Sequence[VoiceEvent], time_s: Curve) -> Curve:
+    """Return the least opening for what is detected in pauses, in eye distances [shape=(T,)]; 0 away from it."""
     least = np.zeros(len(time_s))
     for event in events:
         if event.kind not in (BREATH, LAUGHTER):
             continue
-        near = slice(*np.searchsorted(time_s, (event.start_s - HEARD_EDGE_S, event.end_s + HEARD_EDGE_S)))
-        inside = np.minimum(time_s[near] - event.start_s, event.end_s - time_s[near]) + HEARD_EDGE_S
-        gap = _risen(inside / (2 * HEARD_EDGE_S)) * (INHALING_GAP if event.kind == BREATH else LAUGH_GAP)
+        near = slice(*np.searchsorted(time_s, (event.start_s - EVENT_EDGE_S, event.end_s + EVENT_EDGE_S)))
+        inside = np.minimum(time_s[near] - event.start_s, event.end_s - time_s[near]) + EVENT_EDGE_S
+        gap = _risen(inside / (2 * EVENT_EDGE_S)) * (INHALING_GAP if event.kind == BREATH else LAUGH_GAP)
         if event.kind == LAUGHTER:
             calls = [loud * np.exp(-np.square((time_s[near] - call_s) / CALL_S) / 2) for call_s, loud in event.calls]
             gap *= LAUGH_SHARE + (1 - LAUGH_SHARE) * np.max(calls, axis=0, initial=0)

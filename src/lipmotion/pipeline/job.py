@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 PartT = TypeVar("PartT", bound=Configuration)
 Pauses = Literal["rest", "natural"]
-Manner = Literal["heard", "asked"]
-HEARD, ASKED = get_args(Manner)
+Manner = Literal["detected", "asked"]
+DETECTED, ASKED = get_args(Manner)
 Jaw = Literal["motion", "energy", "none"]
 Overlay = Literal["inset", "mouth"]
 Refinement = Literal["steady", "paper"]
@@ -102,10 +102,10 @@ class Request(Configuration):
         help="rest: lips close softly in pauses (default); natural: as people do, who breathe and hold a sound",
     )
     manner: Manner = option(
-        "heard",
+        "detected",
         Rule(choices=get_args(Manner)),
         later=True,
-        help="heard: laughter, breaths, whispers and shouts in the sound move the mouth (default); asked: none does",
+        help="detected: laughter, breaths, whispers and shouts in the sound move the mouth (default); asked: none does",
     )
     asymmetry: float = option(
         0.0,

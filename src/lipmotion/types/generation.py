@@ -337,7 +337,7 @@ class Generation:
     stepped : channels of held poses, which change at once: formats that can say so do
     curve_edits : edits of curves that follow from the motion, as ``jawOpen``, wherever these are made
     moods  : what the words say of the mood, over time, in the order of their times
-    events : what is heard in the voice beside words; manners and moods of them are shown where none is asked for
+    events : what is detected in the voice beside words; manners and moods of them are shown where none is asked for
     about  : corpus, licence and attribution of the model, by name, as ``Model.about``; empty: not from ``animate``
     knowledge : of voice and phones, from which ``confidence`` follows (None: not from ``animate``)
 

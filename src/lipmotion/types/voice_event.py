@@ -1,4 +1,4 @@
-"""Events of a voice beside its words: what is heard of laughter, breath and effort."""
+"""Events of a voice beside its words: what is detected of laughter, breath and effort."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ LAUGHTER, BREATH, WHISPER, SHOUT = "laughter", "breath", "whisper", "shout"
 
 @dataclass(frozen=True)
 class VoiceEvent:
-    """Something heard in a voice beside its words (``speech.features.voice_events``).
+    """Something detected in a voice beside its words (``speech.features.voice_events``).
 
     start_s, end_s : seconds
     kind     : ``LAUGHTER`` (a bout), ``BREATH`` (drawn in, in a pause), ``WHISPER`` or ``SHOUT`` (a phrase)

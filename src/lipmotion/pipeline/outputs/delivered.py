@@ -16,7 +16,7 @@ from lipmotion.articulation.delivery import (
     moved_in_time,
 )
 from lipmotion.articulation.expression import is_mood, with_moods
-from lipmotion.articulation.manner import with_heard, with_manners
+from lipmotion.articulation.manner import with_detected, with_manners
 from lipmotion.articulation.phone_targets import with_gestures
 from lipmotion.meshes.fitting.blendshape_motion import is_of_blendshapes, with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
@@ -31,11 +31,11 @@ def delivered(generation: Generation, delivery: Delivery) -> Generation:
     """Return generated motion with its mood, intensity, anticipation and offset; held poses come last (``held``).
 
     Moods of the delivery at time 0 are those before the first one of the generation, and later ones are added to these;
-    without any, motion keeps the moods that it has. So do manners of speaking. Moods and manners that are heard count
-    where none is asked for.
+    without any, motion keeps the moods that it has. So do manners of speaking. Where none is asked for, those that are
+    detected count.
     Raises InputError: the offset leaves nothing.
     """
-    keys = with_heard(in_time((*delivery.moods, *generation.moods)), generation.events)
+    keys = with_detected(in_time((*delivery.moods, *generation.moods)), generation.events)
     larger = _larger(with_manners(generation, keys), delivery.intensity)
     if not all(key.is_manner for key in keys):
         moods = with_moods(larger.motion, keys)

@@ -10,7 +10,7 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError, shortened
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.motion.speaker_maps import SpeakerMap
-from lipmotion.pipeline.job import HEARD, Request
+from lipmotion.pipeline.job import DETECTED, Request
 from lipmotion.pipeline.model import Model
 from lipmotion.types import Audio, TimedTranscript, Timeline, Unit
 from lipmotion.types.configuration import check_value
@@ -48,7 +48,7 @@ class SpeechRequest:
     onto_speaker : which person, where the corpus or the other model has several
     pauses     : ``rest``: lips close softly in pauses from 0.25 s, and part no earlier than 0.12 s before a phrase;
                  ``natural``: the mouth does in pauses what the model learned
-    manner     : ``heard``: the mouth opens for laughter and breaths that are heard, and moves as far as whispered and
+    manner     : ``detected``: the mouth opens for laughter and breaths in the sound, and moves as far as whispered and
                  shouted phrases ask for, unless a mood or a manner is asked for (docs/expression.md); ``asked``: not
     asymmetry  : 0 to 1: the share that is left of the difference between both sides of the speaker's own mouth, in the
                  lip and jaw points; the mouth of another person (``onto``) stays as it is
@@ -70,7 +70,7 @@ class SpeechRequest:
     onto_speaker: str = ""
     pauses: str = REST
     asymmetry: float = 0.0
-    manner: str = HEARD
+    manner: str = DETECTED
 
     def __post_init__(self) -> None:
         for each in fields(Request):

@@ -16,7 +16,7 @@ from lipmotion.engines import Animator
 from lipmotion.errors import AlignmentError, InputError, MissingDependencyError
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.pipeline.generate.prior import with_prior
-from lipmotion.pipeline.job import HEARD
+from lipmotion.pipeline.job import DETECTED
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.transcribe import read_transcript, transcribe, warn_of_guesses
@@ -84,7 +84,7 @@ class UnderstoodSpeech:
     range_db    : decibels between the loud and the quiet moments of the recording
     fit         : of the transcript; None where there was none, or it was not compared with the sound
     tags        : the moods that tags in the transcript ask for
-    events      : what is heard in the voice beside words; empty: nothing, or it was not asked for
+    events      : what is detected in the voice beside words; empty: nothing, or it was not asked for
     """
 
     speech: Speech
@@ -126,8 +126,8 @@ def understood_speech(
     audio = analysed(audio_of(request))
     monitor(Progress("recognising phones", 0, 1, 0.02))
     understood = _understood(model, request, audio, _reported(each, audio.duration_s, monitor))
-    if request.manner == HEARD:
-        understood = _heard(understood, audio)
+    if request.manner == DETECTED:
+        understood = _detected(understood, audio)
     if understood.is_without_speech and not understood.events:
         LOG.warning("no speech found in the recording: the mouth rests; give a recording in which something is said")
     speech, found = understood.speech, understood.recognition
@@ -136,8 +136,8 @@ def understood_speech(
     return replace(understood, speech=speech)
 
 
-def _heard(understood: UnderstoodSpeech, audio: AnalysedAudio) -> UnderstoodSpeech:
-    """Return understood speech with what is heard beside words; phones that were recognised in laughter are silence."""
+def _detected(understood: UnderstoodSpeech, audio: AnalysedAudio) -> UnderstoodSpeech:
+    """Return understood speech with its voice events; phones that were recognised in laughter are silence."""
     events = voice_events(audio, understood.speech.units)
     units = without_laughter(understood.speech.units, events)
     changed = units != understood.speech.units

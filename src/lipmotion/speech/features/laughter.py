@@ -30,7 +30,7 @@ EDGE_FRAMES = 5
 VOICED_SHARES = (0.15, 0.75)
 """Share of the frames of a bout that is voiced; with less it is a cough, or clicks of tongue or teeth."""
 WEIGHTS = (14.8, 0.122, -7.09, -2.93, 3.85, -16.5)
-"""Of likeness, depth, voiced share, voiced gaps, log number of calls, and a constant, in the log odds of laughter."""
+"""The log odds of laughter: the sum of these times likeness, depth, voiced share, voiced gaps, log calls, and 1."""
 LEAST_PROBABILITY = 0.7
 
 

@@ -41,8 +41,8 @@ PHRASE_PAUSE_S, LEAST_PHRASE_S, LEAST_VOWELS = 0.25, 0.6, 2
 LOUD_DB = 20.0
 """The frames of a phrase that are at most so far under its loudest are judged."""
 LEAST_SNR_DB, BELOW_LOUDEST_DB = 12.0, 20.0
-"""Whispering is judged in phrases whose loudest frames are so much louder than the quiet of the recording, as noise hides
-a voice; and half of whose frames are at most so far under its loudest ones: beside these no F0 is found in quiet ones."""
+"""Whispering is judged in phrases whose loudest frames are so much louder than the quiet of the recording, as noise
+hides a voice; and half of whose frames are at most so far under its loudest ones, beside which no F0 is found."""
 WHISPERED_SHARES = (0.12, 0.24)
 """A phrase is whispered up to the first share of voiced frames, and not from the second one on."""
 LEAST_PHRASES = 5
@@ -71,7 +71,7 @@ QUIET_REACH_S = 2.0
 
 
 def voice_events(audio: Audio, units: Timeline[Unit]) -> tuple[VoiceEvent, ...]:
-    """Return what is heard in a recording beside words, in the order of time; events of a kind do not overlap.
+    """Return what is detected in a recording beside words, in the order of time; events of a kind do not overlap.
 
     audio : at 16 kHz
     units : the phones in time
@@ -190,7 +190,7 @@ def _shouts(
 
 
 def _breaths(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeline[Unit]) -> Iterator[VoiceEvent]:
-    """Yield the breaths that are heard in pauses."""
+    """Yield the breaths that are detected in pauses."""
     loud_db, spoken = float(np.percentile(level_db, 95)), np.flatnonzero(voiced)
     for start_s, end_s in _silences(units):
         pause, reach = _frames(start_s, end_s), round(QUIET_REACH_S * FRAME_RATE_HZ)

@@ -1,4 +1,4 @@
-"""What is heard beside words, from the sound to the motion that files hold."""
+"""What is detected beside words, from the sound to the motion that files hold."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def request_with_laughter() -> SpeechRequest:
     return SpeechRequest(audio, units=said(audio.duration_s, (0.5, 1.5)))
 
 
-def test_a_face_laughs_where_laughter_is_heard(toy_model: Model, request_with_laughter: SpeechRequest):
+def test_a_face_laughs_where_laughter_is_detected(toy_model: Model, request_with_laughter: SpeechRequest):
     laughing = animate(request_with_laughter, model=toy_model)
     (event,) = laughing.events
     assert event.kind == LAUGHTER
@@ -36,7 +36,7 @@ def test_a_face_laughs_where_laughter_is_heard(toy_model: Model, request_with_la
     assert "mood_happy" not in delivered(laughing, Delivery(mood="neutral")).motion.names
 
 
-def test_what_is_heard_changes_nothing_where_it_is_not_asked_for(
+def test_what_is_detected_changes_nothing_where_it_is_not_asked_for(
     toy_model: Model, request_with_laughter: SpeechRequest
 ):
     plain = animate(replace(request_with_laughter, manner="asked"), model=toy_model)
