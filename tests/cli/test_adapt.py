@@ -35,6 +35,7 @@ def test_it_is_the_function_of_the_same_name(
     assert run("animate", toy_speech, "--model", "voice.lipmotion", "-o", "m.json").code == 0
 
 
+@pytest.mark.long
 def test_what_cannot_be_adapted_to(run: RunCommand, here: Path, toy_model_file: Path, tmp_path: Path) -> None:
     silent = sound(tmp_path / "silent.wav", np.zeros(32_000))
     (tmp_path / "text.wav").write_bytes(b"words")

@@ -23,6 +23,7 @@ def test_the_addon_is_written_or_one_line_says_why_not(run: RunCommand, here: Pa
     assert zipfile.is_zipfile(here / "a.zip")
 
 
+@pytest.mark.long
 def test_scenes_takes_and_scripts_are_written_without_a_character(
     run: RunCommand, here: Path, basics: tuple[object, ...]
 ) -> None:

@@ -86,6 +86,7 @@ def test_a_terminal_gets_a_bar(capsys: pytest.CaptureFixture[str], monkeypatch: 
     assert "lipmotion: warning: skipped b: no face\\nanywhere\n" in err
 
 
+@pytest.mark.long
 def test_training_for_a_program(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
     done = run("train", toy_corpus.path, "-o", "m.lipmotion", "--from", "none", "--machine-readable")
     assert (done.code, done.err) == (0, [])

@@ -47,6 +47,7 @@ def test_what_was_left_out_is_said(run: RunCommand, toy_corpus: Corpus, here: Pa
     assert warning.startswith("lipmotion: warning: skipped toy02: ")
 
 
+@pytest.mark.long
 def test_speakers_are_chosen(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
     corpus = Corpus.create(here / "corpus")
     for name, speaker in zip(toy_corpus.names("train"), ("anna", "anna", "ben", "ben", "carl"), strict=False):

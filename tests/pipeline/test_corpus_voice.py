@@ -27,6 +27,7 @@ def selection_model(toy_corpus: Corpus) -> Model:
     return train(toy_corpus, selection=Selection(None), engine=engine, recogniser=small)[0]
 
 
+@pytest.mark.long
 def test_a_recorded_sentence_is_said_by_its_recording(toy_corpus: Corpus, selection_model: Model) -> None:
     name = toy_corpus.names()[0]
     utterance = toy_corpus.utterance(name)

@@ -72,6 +72,7 @@ def opening(model: Model, sentence: ToySentence, speaker: str = "") -> np.ndarra
     return animate(request(sentence, speaker), model=model).motion["opening"]
 
 
+@pytest.mark.long
 def test_each_person_moves_as_far_as_they_do(model: Model, toy_sentence: ToySentence) -> None:
     assert model.speakers is not None
     assert model.speakers.names == ("anna", "ben")
@@ -208,6 +209,7 @@ def captured(utterance: Utterance, channels: tuple[Channel, ...]) -> Utterance:
     return replace(with_motion(utterance, values, channels), speaker="captured")
 
 
+@pytest.mark.long
 def test_channels_that_all_have_are_trained_on(
     people: Corpus, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -108,6 +108,7 @@ def test_variance_and_pins_and_explanations_are_of_the_person(
     assert explanation.motion["opening"].value == pytest.approx(mapped.motion["opening"][90], abs=1e-9)
 
 
+@pytest.mark.long
 def test_a_person_of_the_model_onto_another(two_model: Model, toy_sentence: ToySentence, ben: Corpus) -> None:
     """Whoever of the model's people speaks, the motion is in ben's place and range."""
     people = [animate(request(toy_sentence, ben, speaker=name), model=two_model).motion for name in ("", "anna", "ben")]

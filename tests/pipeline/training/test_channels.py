@@ -117,6 +117,7 @@ def test_pictures_of_two_sizes_are_refused(utterances: list[Utterance]) -> None:
         train_eigenlips([utterances[0], small])
 
 
+@pytest.mark.long
 def test_a_model_of_pictures_draws_mouths_it_has_not_seen(models: dict[str, Path], toy_corpus: Corpus) -> None:
     """Saved, loaded, and asked for the mouth of a sentence of the test list."""
     model = load_model(models[EIGENLIPS])

@@ -97,6 +97,7 @@ def test_stopped_after_any_event(corpus: Corpus, work: Path, tmp_path: Path, mon
             path.unlink()
 
 
+@pytest.mark.long
 def test_stopped_again_and_again(corpus: Corpus, work: Path, tmp_path: Path) -> None:
     """Every run gets some steps further than the one before."""
     stops = 0
@@ -129,6 +130,7 @@ def test_another_job_starts_over(corpus: Corpus, work: Path, tmp_path: Path, wha
     assert content(train(corpus, **options, run=Run(work=work))[0], tmp_path) == expected  # type: ignore[arg-type]
 
 
+@pytest.mark.long
 def test_a_damaged_checkpoint_is_not_used(corpus: Corpus, work: Path, tmp_path: Path) -> None:
     whole = content(run(corpus, work), tmp_path)
     for name in ("phones", "labels-0"):

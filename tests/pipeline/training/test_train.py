@@ -37,6 +37,7 @@ def corpus_of(utterances: Iterable[Utterance], folder: Path) -> Corpus:
     return corpus
 
 
+@pytest.mark.long
 def test_other_lists_all_and_given_names(toy_corpus: Corpus, tmp_path: Path) -> None:
     assert train(toy_corpus, selection=Selection("val"), recogniser=SMALL)[1].used == ("toy08", "toy09")
     few = corpus_of([toy_corpus.utterance(name) for name in ("toy10", "toy02", "toy03")], tmp_path)
@@ -52,6 +53,7 @@ def test_other_lists_all_and_given_names(toy_corpus: Corpus, tmp_path: Path) -> 
         train(toy_corpus, selection=Selection(names=("toy00", "toy99")))
 
 
+@pytest.mark.long
 def test_untranscribed_utterances_are_recognised_and_used(
     toy_corpus: Corpus, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -126,6 +128,7 @@ def test_a_transcript_that_does_not_fit_is_skipped_and_reported(toy_corpus: Corp
     assert model.about["utterances"] == 3
 
 
+@pytest.mark.long
 def test_without_any_transcript_the_shipped_phones_are_used(
     toy_corpus: Corpus,
     toy_model: Model,

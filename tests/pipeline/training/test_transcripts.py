@@ -36,6 +36,7 @@ def messages(caplog: pytest.LogCaptureFixture) -> list[str]:
     return [record.getMessage() for record in caplog.records]
 
 
+@pytest.mark.long
 def test_training_names_the_transcripts_of_something_else_and_what_has_none(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -41,6 +41,7 @@ def penalised(listed: Chains, groups) -> Chains:
     return replace(listed, groups=(replace(groups[0], mixtures=speech), *groups[1:]))
 
 
+@pytest.mark.long
 def test_posteriors_and_paths_are_those_of_the_listed_product():
     for seed, seen in ((0, True), (1, False)):
         listed, free = both(seed)
