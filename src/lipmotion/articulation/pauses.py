@@ -32,7 +32,7 @@ INHALING_GAP = 0.05
 LAUGH_GAP, LAUGH_SHARE = 0.18, 0.4
 """In laughter the lips are parted by the first length in the loudest call, by this share of it between calls."""
 CALL_S, EVENT_EDGE_S = 0.05, 0.08
-"""How long a call of laughter opens the mouth (a standard deviation); laughter and breaths part the lips so long before,
+"""How long a call of laughter opens the mouth (a standard deviation); laughter and breaths part the lips so long before
 and let them close so long after."""
 PINNED_S: Final = 0.15
 """Within this time of a pin the motion stays as it is."""
