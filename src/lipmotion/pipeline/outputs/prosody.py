@@ -9,6 +9,7 @@ import numpy as np
 
 from lipmotion.articulation.delivery import Delivery
 from lipmotion.pipeline.outputs.output import Performance
+from lipmotion.speech.features.analysed_audio import AnalysedAudio
 from lipmotion.speech.features.mfcc import WINDOW
 from lipmotion.speech.features.prosody import prosody_of
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ, read_audio
@@ -19,11 +20,16 @@ from lipmotion.types import Audio, Prosody
 def prosody_of_speech(speech: str | Path | Audio) -> Prosody:
     """Return loudness and pitch of a recording or a sound, for movements of brows and head.
 
-    A sound that is shorter than one frame of speech is followed by silence.
+    A sound that is shorter than one frame of speech is followed by silence. One that keeps its features keeps this.
 
     Raises InputError: the recording cannot be read.
     """
-    sound = speech if isinstance(speech, Audio) else read_audio(Path(speech), SPEECH_RATE_HZ, warn=False)
+    if isinstance(speech, AnalysedAudio):
+        return speech.once("prosody", lambda: _prosody(speech))
+    return _prosody(speech if isinstance(speech, Audio) else read_audio(Path(speech), SPEECH_RATE_HZ, warn=False))
+
+
+def _prosody(sound: Audio) -> Prosody:
     ratio = Fraction(SPEECH_RATE_HZ, int(sound.rate_hz))
     samples = sound.samples.astype(np.float32)
     if ratio.numerator == 1:
