@@ -45,6 +45,7 @@ export class Stage {
     });
     new ResizeObserver(() => this.head?.draw()).observe(this.solid);
     this.store.on(["project", "face"], () => this.offer());
+    this.store.on(["face", "lineId"], () => this.leaveFilm());
     this.store.on(["face", "project", "mesh"], () => this.change());
     this.store.on(["weights", "time_s", "line", "other", "comparing"], () => this.show());
   }
@@ -59,7 +60,6 @@ export class Stage {
 
   async change() {
     if (!this.store.project) return;
-    this.leaveFilm();
     if (this.isSolid && this.head === null) {
       try {
         this.head = new Head(this.solid);
