@@ -175,6 +175,7 @@ def test_warnings_are_status_lines_too(run: RunCommand, basics: tuple[object, ..
     assert logging.getLogger().handlers == handlers
 
 
+@pytest.mark.long
 def test_other_processes_can_read_it(run_outside: RunCommand, basics: tuple[object, ...]) -> None:
     """As an add-on runs it: the output is ASCII, whatever the encoding of the terminal."""
     done = run_outside(*basics, "-f", "json", "--machineReadable", encoding="ascii")

@@ -32,6 +32,7 @@ def test_the_figures_are_those_of_the_function(
     assert [path.name for path in here.iterdir()] == ["figures.json"]
 
 
+@pytest.mark.long
 def test_other_lists(run: RunCommand, toy_corpus: Corpus, toy_model_file: Path) -> None:
     assert run("evaluate", toy_model_file, toy_corpus.path, "--split", "val").out[0].startswith("split val: 2 clips")
 

@@ -81,6 +81,7 @@ def test_build_for_a_program(run: RunCommand, tracker: Path, here: Path) -> None
     assert (here / "anna.face").is_file()
 
 
+@pytest.mark.long
 def test_what_cannot_be_built(run: RunCommand, tracker: Path, here: Path) -> None:
     video = tracker / "toy00.mp4"
     before = video.read_bytes()

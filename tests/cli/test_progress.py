@@ -152,6 +152,7 @@ CLOSED = "standard {} is closed"
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="streams are closed as POSIX shells do")
+@pytest.mark.long
 def test_streams_that_are_closed(toy_speech: Path, toy_model_file: Path, here: Path) -> None:
     """No file that is opened takes the number of a standard stream."""
     own = shlex.join([str(toy_speech), "--model", str(toy_model_file), "--recogniser", "own"])

@@ -35,6 +35,7 @@ def test_all_of_a_corpus(run: RunCommand, toy_corpus: Corpus, here: Path) -> Non
     assert load_model(here / "all.lipmotion").about["split"] == "all"
 
 
+@pytest.mark.long
 def test_what_was_left_out_is_said(run: RunCommand, toy_corpus: Corpus, here: Path) -> None:
     corpus = Corpus.create(here / "corpus")
     for name in toy_corpus.names("train")[:4]:

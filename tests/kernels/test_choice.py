@@ -55,6 +55,7 @@ assert banded.generate(np.ones((4, 3, 2)), np.ones((4, 3, 2)))[0].shape == (4, 2
         "import lipmotion; lipmotion.animate('examples/welcome.flac')",
     ],
 )
+@pytest.mark.long
 def test_numba_stays_away_from_small_work(code, pytestconfig):
     code += "\nimport sys; sys.exit('numba' in sys.modules)"
     run_child([sys.executable, "-c", code], folder=pytestconfig.rootpath, check=True)

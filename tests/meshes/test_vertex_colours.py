@@ -101,6 +101,7 @@ def test_colours_that_do_not_fit_are_refused(tmp_path, change, message):
         _read(tmp_path, content, binary)
 
 
+@pytest.mark.long
 def test_colours_of_the_head_come_back_from_its_own_file(tmp_path):
     head = head_mesh(figure())
     write_glb(tmp_path / "head.glb", head)

@@ -57,6 +57,7 @@ def test_damaged_arrays_of_an_engine(name: str, toy_sentence: ToySentence, reque
     assert harmless < refusals / 4
 
 
+@pytest.mark.long
 def test_damaged_arrays_of_all_other_parts(pictured_model: Model) -> None:
     model = pictured_model
     assert model.eigenlips is not None

@@ -80,6 +80,7 @@ def is_like_ben(model: Model, sentence: ToySentence, onto: Onto, **more: str) ->
         assert mapped.motion["opening"][frames].min() == pytest.approx(OFFSET[0], abs=0.02)
 
 
+@pytest.mark.long
 def test_onto_the_person_of_a_corpus(toy_model: Model, toy_sentence: ToySentence, ben: Corpus) -> None:
     is_like_ben(toy_model, toy_sentence, ben.path)
 
@@ -177,6 +178,7 @@ def test_a_map_is_kept_in_a_model(toy_model: Model, toy_sentence: ToySentence, b
             with_person(known, name, person)
 
 
+@pytest.mark.long
 def test_a_person_joins_those_of_a_model(two_model: Model, toy_sentence: ToySentence, ben: Corpus) -> None:
     person = map_onto(two_model, ben)
     known = with_person(two_model, "other", person)

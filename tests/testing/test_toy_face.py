@@ -46,6 +46,7 @@ def test_the_mouth_opens_and_the_chin_drops_as_far_as_they_should(motion: Motion
     assert tips == pytest.approx(toy_chin_px(motion), abs=1.0)
 
 
+@pytest.mark.long
 def test_the_same_every_time() -> None:
     first, again = toy_footage_pictures(3), toy_footage_pictures(3)
     assert all(np.array_equal(one, other) for one, other in zip(first.clips, again.clips, strict=True))

@@ -87,6 +87,7 @@ def test_the_outputs_are_those_of_animate(sounds: Path, settings: Job, tmp_path:
     assert rows["one"]["closures_heard"] >= rows["one"]["closures_made"] >= 1
 
 
+@pytest.mark.long
 def test_the_face_of_another_person_is_mapped_onto_once(
     filmed_face: FilmedFace, toy_model: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -187,6 +188,7 @@ def test_silence_can_have_every_form_that_speech_can(settings: Job) -> None:
     one_line.check_line_job(replace(settings, outputs=Outputs(curves="face", rate_hz=30.0)))
 
 
+@pytest.mark.long
 def test_files_that_refer_to_the_sound(sounds: Path, settings: Job, tmp_path: Path) -> None:
     """The outputs are written under other names first; what they refer to is found from where they end."""
     out = tmp_path / "out"

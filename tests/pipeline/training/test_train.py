@@ -106,6 +106,7 @@ def test_labelled_and_transcribed_utterances_together(toy_corpus: Corpus, tmp_pa
     assert np.mean([span.label.phone in recognised for span in truth.phones]) > 0.8
 
 
+@pytest.mark.long
 def test_one_speaker(toy_corpus: Corpus, tmp_path: Path) -> None:
     names = ("anna", "ben", "ben", "anna", "anna")
     corpus = corpus_of([replace(u, speaker=n) for u, n in zip(some(toy_corpus), names, strict=True)], tmp_path)
@@ -116,6 +117,7 @@ def test_one_speaker(toy_corpus: Corpus, tmp_path: Path) -> None:
         train(corpus, selection=Selection(speakers=["carl"]))
 
 
+@pytest.mark.long
 def test_a_transcript_that_does_not_fit_is_skipped_and_reported(toy_corpus: Corpus, tmp_path: Path) -> None:
     utterances = some(toy_corpus)
     utterances[1] = replace(utterances[1], words=("five",) * 100)
@@ -144,6 +146,7 @@ def test_without_any_transcript_the_shipped_phones_are_used(
     assert "no transcripts in the corpus: its phones are recognised by the shipped model" in caplog.text
 
 
+@pytest.mark.long
 def test_guessed_words_are_reported(toy_corpus: Corpus, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     names = {"papa": "pahpa", "mama": "mahma"}
     utterances = [replace(u, words=tuple(names.get(w, w) for w in u.words or ())) for u in some(toy_corpus, 4)]
@@ -226,6 +229,7 @@ def test_the_training_list_is_used_and_gives_the_same_model(
     assert (model.about["split"], model.about["utterances"]) == ("train", 8)
 
 
+@pytest.mark.long
 def test_configurations_are_used_and_every_stage_is_reported(toy_corpus: Corpus) -> None:
     steps: list[str] = []
     engine = engine_named("trajectory", {"states": 3})

@@ -138,6 +138,7 @@ def learned(before: Mixtures, density: int, gamma: np.ndarray, x: np.ndarray, fl
     return total / total.sum(), means, variances
 
 
+@pytest.mark.long
 def test_a_step_is_that_of_the_split_model() -> None:
     """Speech of the first stage and of other speakers: the same utterance, with weights 1 and 49."""
     chains, own = trained(), three_frames()
