@@ -43,7 +43,9 @@ LIMIT_S = 120.0
 FRAME_S = 1 / 60
 CLOSED = "document.querySelector('dialog').close()"
 FAILED = "{ ...studio.store.line, status: 'failed', error: 'no speech' }"
-READY = "return Boolean(globalThis.studio?.store.weights && studio.stage.head?.character && !studio.store.saving)"
+READY = """const store = globalThis.studio?.store, line = store?.line;
+return Boolean(line?.status === "ready" && line.id === store.lineId && store.weights && !store.saving &&
+  studio.stage.head?.character);"""
 
 
 @dataclass(frozen=True)

@@ -131,7 +131,7 @@ def test_every_array_is_needed(arrays: dict[str, np.ndarray], header: dict[str, 
         for name in arrays
         if "missing" not in refusal(tmp_path / "a.face", header, {key: arrays[key] for key in arrays if key != name})
     ]
-    assert read == []
+    assert read == ["appearance/mouth_distances", "background/cuts"]  # which older faces have not
 
 
 def test_every_array_is_declared(arrays: dict[str, np.ndarray]) -> None:
