@@ -18,6 +18,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
@@ -68,6 +69,10 @@ BREATH_LOW_DB = -4.0
 """Level under 1 kHz beside that from 1 to 3.5 kHz, at most: rumble and plosives have more."""
 QUIET_REACH_S = 2.0
 """The quiet around a pause is looked for so far beside it."""
+QUIET_SHARE = 0.08
+"""Share of the frames around one that are at most as loud as the quiet there."""
+BLOCK_FRAMES = 2000
+"""Frames whose surroundings are in memory at once."""
 
 
 def voice_events(audio: Audio, units: Timeline[Unit]) -> tuple[VoiceEvent, ...]:
@@ -218,15 +223,13 @@ def _silences(units: Timeline[Unit]) -> list[tuple[float, float]]:
 
 def _noises(bands: NDArray[np.float32], voiced: Voiced) -> Iterator[tuple[int, int, float]]:
     """Yield first frame, the one after the last, and rise in decibels of noise that is as a breath's."""
-    from scipy.ndimage import percentile_filter
-
     powers, centres = np.exp(bands.astype(np.float64)), band_centres()
     low, middle, high = (
         powers[:, (centres >= least) & (centres < most)].mean(axis=1)
         for least, most in ((0, 1000), (1000, 3500), (3500, 7600))
     )
     level = _smoothed(DB * np.log(powers[:, centres >= 1000].mean(axis=1)))
-    quiet = percentile_filter(level, 8, size=2 * round(QUIET_REACH_S * FRAME_RATE_HZ) + 1, mode="nearest")
+    quiet = _quiet(level)
     edges = np.flatnonzero(np.diff(np.r_[False, (level > quiet + BREATH_RISE_DB[0]) & ~voiced, False]))
     for first, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         if not BREATH_S[0] <= (stop - first) / FRAME_RATE_HZ <= BREATH_S[1]:
@@ -241,6 +244,15 @@ def _noises(bands: NDArray[np.float32], voiced: Voiced) -> Iterator[tuple[int, i
             yield first, stop, float(np.max(level[run] - quiet[run]))
 
 
+def _quiet(level: Curve) -> Curve:
+    """Return the level that ``QUIET_SHARE`` of the frames around each frame do not pass [shape=(T,)]."""
+    reach = round(QUIET_REACH_S * FRAME_RATE_HZ)
+    windows = sliding_window_view(np.pad(level, reach, "edge"), 2 * reach + 1)
+    rank = int(QUIET_SHARE * windows.shape[1])
+    blocks = (windows[first : first + BLOCK_FRAMES] for first in range(0, len(windows), BLOCK_FRAMES))
+    return np.concatenate([np.partition(block, rank, axis=1)[:, rank] for block in blocks])
+
+
 def _bands(audio: AnalysedAudio, frames: slice) -> NDArray[np.float32]:
     """Return ``log_bands`` of a range of frames, computed of these alone [shape=(N, 40)]."""
     return log_bands(audio.samples[frames.start * HOP : max(frames.stop - 1, frames.start) * HOP])
@@ -251,9 +263,9 @@ def _frames(start_s: float, end_s: float) -> slice:
 
 
 def _smoothed(curve: Curve) -> Curve:
-    from scipy.ndimage import gaussian_filter1d
-
-    return np.asarray(gaussian_filter1d(curve, SMOOTHING_FRAMES, mode="nearest"))
+    reach = round(4 * SMOOTHING_FRAMES)
+    window = np.exp(-0.5 * (np.arange(-reach, reach + 1) / SMOOTHING_FRAMES) ** 2)
+    return np.convolve(np.pad(curve, reach, "edge"), window / window.sum(), "valid")
 
 
 def _risen(value: float, limits: tuple[float, float]) -> float:
