@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -27,8 +26,8 @@ from study.browser import (
     TAB,
     UP,
     Browser,
-    axe_script,
     browser,
+    check_screen,
 )
 
 pytest.importorskip("uvicorn", reason="the extra 'studio' is not installed")
@@ -238,7 +237,7 @@ def test_ten_thousand_lines_scroll(page: Page) -> None:
 
 
 def test_every_screen(page: Page) -> None:
-    window, axe, folder = page.window, axe_script(), os.environ.get("LIPMOTION_SCREENS")
+    window = page.window
     states: tuple[tuple[str, str], ...] = (
         ("phone", "studio.choose('phone', 8); studio.showPlace('panel')"),
         ("word", "studio.choose('word', 3)"),
@@ -259,13 +258,7 @@ def test_every_screen(page: Page) -> None:
         for name, act in states:
             window.run(act)
             window.run_until_done("setTimeout(arguments[0], 100)")
-            if folder:
-                window.picture(Path(folder) / f"{name}-{width}-{scheme}.png")
-            assert window.run("return document.documentElement.scrollWidth") <= width, (name, width)
-            if axe:
-                window.run(axe)
-                found = window.run_until_done("axe.run().then(arguments[0])")["violations"]
-                assert [(each["id"], each["nodes"][0]["html"]) for each in found] == [], (name, width, scheme)
+            check_screen(window, name, width, scheme)
     window.show_as(1200, 900)
 
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 import base64
 import http.client
 import json
+import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -133,6 +135,23 @@ def browser(folder: Path, *more_switches: str) -> Iterator[Browser]:
             webdriver(port, "DELETE", f"/session/{session}")
 
 
+def check_screen(window: Browser, name: str, width: int, scheme: str) -> None:
+    """Check a page as it is shown: no scrolling to the side, and nothing that axe-core finds.
+
+    name, width, scheme : for messages, and for the name of its picture, which is kept in the folder of the environment
+                          variable ``LIPMOTION_SCREENS``, if there is one
+    """
+    axe, folder = axe_script(), os.environ.get("LIPMOTION_SCREENS")
+    if folder:
+        window.picture(Path(folder) / f"{name}-{width}-{scheme}.png")
+    assert window.run("return document.documentElement.scrollWidth") <= width, (name, width)
+    if axe:
+        window.run(axe)
+        found = window.run_until_done("axe.run().then(arguments[0])")["violations"]
+        assert [(each["id"], each["nodes"][0]["html"]) for each in found] == [], (name, width, scheme)
+
+
+@cache
 def axe_script() -> str | None:
     """Return the script of axe-core, which finds what keeps people out of a page; None: it is not installed."""
     found = find_spec("axe_core_python")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from hashlib import sha256
@@ -17,7 +16,7 @@ from lipmotion.study.answers import MOS, PAIRED, RANKING, Answer
 from lipmotion.study.collected import collected_answers
 from lipmotion.study.manifest import VIDEOS, Study, StudyVideo
 from lipmotion.types import Audio
-from study.browser import BROWSER, DRIVER, ENTER, LEFT, MISSING, RIGHT, SPACE, Browser, axe_script, browser
+from study.browser import BROWSER, DRIVER, ENTER, LEFT, MISSING, RIGHT, SPACE, Browser, browser, check_screen
 from study.served import Server, served
 from study.small_study import CONDITIONS, planned
 
@@ -98,20 +97,10 @@ def answers(tmp_path: Path) -> list[Answer]:
 
 
 def look(window: Browser, name: str) -> None:
-    """Check a page on every screen: no scrolling to the side, and nothing that axe-core finds.
-
-    The pictures are kept in the folder of the environment variable ``LIPMOTION_SCREENS``, if there is one.
-    """
-    axe, folder = axe_script(), os.environ.get("LIPMOTION_SCREENS")
+    """Check a page on every screen."""
     for width, height, scheme in SCREENS:
         window.show_as(width, height, scheme, mobile=width < 600)
-        if folder:
-            window.picture(Path(folder) / f"{name}-{width}-{scheme}.png")
-        assert window.run("return document.documentElement.scrollWidth") <= width, (name, width)
-        if axe:
-            window.run(axe)
-            found = window.run_until_done("axe.run().then(arguments[0])")["violations"]
-            assert [(each["id"], each["nodes"][0]["html"]) for each in found] == [], (name, width, scheme)
+        check_screen(window, name, width, scheme)
     window.show_as(1200, 900)
 
 

@@ -53,15 +53,11 @@ class LineReplies:
 
     async def undo(self, request: Request) -> Response:
         """Edits to be taken back."""
-        content = await content_of(request)
-        revision, count = whole(content, "revision"), whole(content, "count", 1, least=1)
-        return await self._state_after(self._number(request), lambda line: line.undone(revision, count))
+        return await self._stepped(request, OpenLine.undone)
 
     async def redo(self, request: Request) -> Response:
         """Edits to be made again."""
-        content = await content_of(request)
-        revision, count = whole(content, "revision"), whole(content, "count", 1, least=1)
-        return await self._state_after(self._number(request), lambda line: line.redone(revision, count))
+        return await self._stepped(request, OpenLine.redone)
 
     async def transcript(self, request: Request) -> Response:
         """Words of a line, or of a stretch of it."""
@@ -174,6 +170,12 @@ class LineReplies:
 
     async def _json(self, request: Request, found: Callable[[OpenLine], bytes]) -> Response:
         return json_bytes(await self._desk.at(self._number(request), found))
+
+    async def _stepped(self, request: Request, step: Callable[[OpenLine, int, int], Changed]) -> Response:
+        """Return the state of a line after so many of its edits were taken back, or made again."""
+        content = await content_of(request)
+        revision, count = whole(content, "revision"), whole(content, "count", 1, least=1)
+        return await self._state_after(self._number(request), lambda line: step(line, revision, count))
 
     async def _state_after(self, number: int, do: Callable[[OpenLine], Changed]) -> Response:
         """Return the state of a line after something was done, and what that returns."""
