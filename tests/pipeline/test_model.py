@@ -46,6 +46,13 @@ def test_saved_and_loaded_it_moves_the_same(toy_model: Model, toy_model_file: Pa
     assert np.abs(before.motion.values - after.motion.values).max() < 0.02
 
 
+def test_shown_in_a_notebook_it_is_a_line_and_not_its_arrays(toy_model: Model) -> None:
+    shown = repr(toy_model)
+    assert "array(" not in shown
+    assert "trajectory" in shown.lower()
+    assert "licence" in shown
+
+
 def test_after_one_save_nothing_changes_any_more(toy_model_file: Path, toy_speech: Path, tmp_path: Path) -> None:
     once = load_model(toy_model_file)
     save_model(once, tmp_path / "again.lipmotion")

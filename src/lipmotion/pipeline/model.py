@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -47,14 +47,14 @@ class Model:
     ('trajectory', 'geometry', True)
     """
 
-    phones: UnitHmm
+    phones: UnitHmm = field(repr=False)
     engine: Engine[Any]
-    learned: Any
+    learned: Any = field(repr=False)
     about: Mapping[str, Any]
-    adaptation: Adaptation | None = None
-    eigenlips: Eigenlips | None = None
-    prior: Model | None = None
-    speakers: SpeakerMaps | None = None
+    adaptation: Adaptation | None = field(default=None, repr=False)
+    eigenlips: Eigenlips | None = field(default=None, repr=False)
+    prior: Model | None = field(default=None, repr=False)
+    speakers: SpeakerMaps | None = field(default=None, repr=False)
 
     @property
     def visual(self) -> str:
