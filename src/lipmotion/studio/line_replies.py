@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import io
 import tempfile
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 import numpy as np
+from numpy.typing import NDArray
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 
@@ -18,14 +19,13 @@ from lipmotion.storage.json_text import as_json
 from lipmotion.studio.access import Access
 from lipmotion.studio.asked import content_of, seconds, stretch, text, texts, whole
 from lipmotion.studio.line import OpenLine, RevisionError, transcript_step
-from lipmotion.studio.sound_pictures import as_png, log_mel_picture, peaks
 from lipmotion.studio.studio import Studio
-from lipmotion.types import FRAME_RATE_HZ, Motion
+from lipmotion.types import Motion
 from lipmotion.web.replies import FRESH, json_bytes
 
 MOST_STEPS = 1000
-MOST_COLUMNS = 20_000
 LONGEST_TRANSCRIPT = 100_000
+LONGEST_NAMES = 10_000
 NUMBERS = ("motion", "delivered", "deviation", "confidence")
 Changed = dict[str, Any]
 
@@ -81,41 +81,20 @@ class LineReplies:
         path = await self._desk.beside(lambda: self._studio.played(number))
         return FileResponse(path, media_type="audio/wav", headers=FRESH)
 
-    async def peaks(self, request: Request) -> Response:
-        """The extremes of the sound."""
-        query = request.query_params
-        columns = whole(query, "columns", 1000, least=1, most=MOST_COLUMNS)
-
-        def found(line: OpenLine) -> bytes:
-            last_s = line.audio.duration_s
-            start_s, end_s = seconds(query, "start_s", 0.0), min(seconds(query, "end_s", last_s), last_s)
-            if not start_s < end_s:
-                raise InputError(f"{start_s} to {end_s} s is no part of 0 to {last_s:.2f} s")
-            return as_json(peaks(line.audio, columns, start_s, end_s)).encode()
-
-        return await self._json(request, found)
-
-    async def spectrogram(self, request: Request) -> Response:
-        """The spectrogram as a picture."""
-        query = request.query_params
-
-        def found(line: OpenLine) -> bytes:
-            picture = line.audio.once("studio spectrogram", lambda: log_mel_picture(line.audio))
-            return as_png(picture[:, stretch(query, FRAME_RATE_HZ, picture.shape[1])])
-
-        return Response(await self._desk.at(self._number(request), found), media_type="image/png", headers=FRESH)
-
     async def motion(self, request: Request) -> Response:
         """Numbers of the motion."""
         query = request.query_params
-        of = text(query, "of", "motion")
+        of, names = text(query, "of", "motion"), set(text(query, "names", "", longest=LONGEST_NAMES).split(",")) - {""}
         if of not in NUMBERS:
             raise InputError(f"of is {of!r}, required one of: {', '.join(NUMBERS)}")
 
         def found(line: OpenLine) -> Response:
             motion = line.numbers(of)
             frames = stretch(query, motion.rate_hz, len(motion.values))
-            return _numbers(replace(motion, values=motion.values[frames]), frames.start, {})
+            chosen = [n for n, name in enumerate(motion.names) if not names or name in names]
+            channels = tuple(motion.channels[n] for n in chosen)
+            values = motion.values[frames][:, chosen]
+            return _numbers(Motion(values, motion.rate_hz, channels), frames.start, {})
 
         return await self._desk.at(self._number(request), found)
 
@@ -138,7 +117,7 @@ class LineReplies:
         """A picture of a drawn face."""
         time_s, face = seconds(request.query_params, "time"), text(request.query_params, "face", "woman")
         shown = self._studio.drawn(face)
-        found = await self._desk.at(self._number(request), lambda line: as_png(line.picture(time_s, shown)))
+        found = await self._desk.at(self._number(request), lambda line: _as_png(line.picture(time_s, shown)))
         return Response(found, media_type="image/png", headers=FRESH)
 
     async def video(self, request: Request) -> Response:
@@ -198,10 +177,15 @@ class LineReplies:
         return json_bytes(as_json(document).encode())
 
     def _media(self, number: int) -> dict[str, str]:
-        return {
-            name: self._access.with_key(f"/api/lines/{number}/{path}")
-            for name, path in (("sound", "sound.wav"), ("spectrogram", "spectrogram"))
-        }
+        return {"sound": self._access.with_key(f"/api/lines/{number}/sound.wav")}
+
+
+def _as_png(picture: NDArray[np.uint8]) -> bytes:
+    from PIL import Image
+
+    file = io.BytesIO()
+    Image.fromarray(picture).save(file, format="PNG", compress_level=3)
+    return file.getvalue()
 
 
 def _numbers(motion: Motion, first: int, more: dict[str, str]) -> Response:

@@ -175,10 +175,10 @@ export class Studio {
   async moved(id, changed) {
     const { store, server } = this, stretch = changed ? `&start_s=${changed.start_s}&end_s=${changed.end_s}` : "";
     const following = this.weights.change(changed);
+    const names = encodeURIComponent(store.channels.join()), asked = async (of, part) => (await server.curves(`lines/${id}/motion?of=${of}&names=${names}${part}`)).only(store.channels);
     const read = async (of, before) => {
-      const part = (await server.curves(`lines/${id}/motion?of=${of}${stretch}`)).only(store.channels);
-      if (!changed) return part;
-      return before?.holds(part) ? before.patched(part) : (await server.curves(`lines/${id}/motion?of=${of}`)).only(store.channels);
+      const part = await asked(of, stretch);
+      return !changed || before?.holds(part) ? (changed ? before.patched(part) : part) : asked(of, "");
     };
     const [motion, deviation, confidence] = await Promise.all([
       read("motion", store.motion), read("deviation", store.deviation), changed ? store.confidence : server.curves(`lines/${id}/motion?of=confidence`)]);
