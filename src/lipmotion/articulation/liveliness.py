@@ -331,9 +331,7 @@ def _gaze(time_s: Curve, end_s: float, spoken: list[tuple[float, float]], rng: n
         moments.append(at)
         targets.append(target)
         at += stay
-    steps = np.array(targets)
-    moved = np.zeros((len(time_s), 2)) + steps[0]
-    for moment, change in zip(moments[1:], np.diff(steps, axis=0), strict=True):
-        share = np.clip((time_s - moment) / SACCADE_S, 0, 1)
-        moved += (share * share * (3 - 2 * share))[:, None] * change
-    return moved
+    steps, begun_s = np.array(targets), np.array(moments)
+    last = np.maximum(np.searchsorted(begun_s, time_s, "right") - 1, 0)  # every fixation is longer than a movement
+    before, share = steps[np.maximum(last - 1, 0)], np.clip((time_s - begun_s[last]) / SACCADE_S, 0, 1)
+    return np.asarray(before + (share * share * (3 - 2 * share))[:, None] * (steps[last] - before))

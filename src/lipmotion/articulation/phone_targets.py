@@ -145,17 +145,20 @@ def with_gestures(motion: Motion, units: Timeline[Unit], names: Collection[str] 
 
 def _curve(name: str, units: Timeline[Unit], time_s: Curve) -> Curve:
     default, targets = _TARGETS[name]
-    weighted, weights = np.full(len(time_s), 1e-6 * default.begin), np.full(len(time_s), 1e-6)
-    for span, closing in zip(units, closing_phones(units), strict=True):
-        target = targets.get(LIP_CLOSING[0] if closing else span.label.phone, default)
-        first, last = np.searchsorted(
-            time_s, (span.start_s - REACH * target.width_s, span.end_s + REACH * target.width_s)
-        )
-        if first < last:
-            time = time_s[first:last]
-            outside = np.maximum(np.maximum(span.start_s - time, time - span.end_s), 0) / target.width_s
-            dominance = target.dominance * np.exp(-outside * outside)
-            share = np.clip((time - span.start_s) / max(span.duration_s, 1e-9), 0, 1)
-            weighted[first:last] += dominance * (target.begin + share * (target.end - target.begin))
-            weights[first:last] += dominance
-    return np.clip(weighted / weights, 0, 1)
+    closing = closing_phones(units)
+    found = [
+        targets.get(LIP_CLOSING[0] if closes else span.label.phone, default)
+        for span, closes in zip(units, closing, strict=True)
+    ]
+    begin, end, strength, width_s = np.array([(t.begin, t.end, t.dominance, t.width_s) for t in found]).reshape(-1, 4).T
+    start_s, end_s = np.array([(span.start_s, span.end_s) for span in units]).reshape(-1, 2).T
+    first, stop = (np.searchsorted(time_s, edge_s) for edge_s in (start_s - REACH * width_s, end_s + REACH * width_s))
+    of = np.repeat(np.arange(len(found)), stop - first)
+    frames = np.arange(len(of)) - np.repeat(np.cumsum(stop - first) - stop, stop - first)
+    time = time_s[frames]
+    outside = np.maximum(np.maximum(start_s[of] - time, time - end_s[of]), 0) / width_s[of]
+    dominance = strength[of] * np.exp(-outside * outside)
+    share = np.clip((time - start_s[of]) / np.maximum(end_s - start_s, 1e-9)[of], 0, 1)
+    asked = dominance * (begin[of] + share * (end - begin)[of])
+    weighted = 1e-6 * default.begin + np.bincount(frames, asked, len(time_s))
+    return np.clip(weighted / (1e-6 + np.bincount(frames, dominance, len(time_s))), 0, 1)

@@ -18,7 +18,7 @@ from lipmotion.pipeline.session import Session
 from lipmotion.pipeline.understand.read_request import read_request
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.storage.files import read_text_file, whole_file
-from lipmotion.storage.json_text import as_json, from_json
+from lipmotion.storage.json_text import as_json_rows, from_json
 from lipmotion.storage.toml_text import read_toml
 from lipmotion.types import Generation, Outlook, Timeline, Unit
 
@@ -186,7 +186,7 @@ def write_edits(file: EditFile, path: str | Path) -> None:
         members |= unit_rows(file.units)
     if file.outlook is not None:
         members["outlook"] = {name: value for name, value in asdict(file.outlook).items() if value is not None}
-    text = _as_toml(members) if kind == TOML else as_json(members, indent=1) + "\n"
+    text = _as_toml(members) if kind == TOML else as_json_rows(members)
     with whole_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 

@@ -17,7 +17,7 @@ from lipmotion.errors import InputError
 from lipmotion.pipeline.batch.lines import is_recording, read_lines
 from lipmotion.pipeline.outputs.scenes import sound_reference
 from lipmotion.storage.files import locked, read_text_file, sha256_of, whole_file
-from lipmotion.storage.json_text import as_json, from_json
+from lipmotion.storage.json_text import as_json_rows, from_json
 from lipmotion.studio.project import EDITS_SUFFIX, Project, ProjectLine, check_lines, project_document, project_from
 from lipmotion.units import Lexicon
 
@@ -85,12 +85,9 @@ class ProjectFolder:
     def save(self) -> None:
         """Write the project. Raises ExportError: it cannot be written."""
         with self._lock:
-            document = project_document(self.project)
-            rows = document.pop("lines")
-            head = as_json(document, indent=1, ensure_ascii=False).removesuffix("\n}")
-            listed = ",\n".join(f"  {as_json(row, ensure_ascii=False)}" for row in rows)
+            text = as_json_rows(project_document(self.project), ensure_ascii=False)
             with whole_file(self.path / PROJECT) as temporary:
-                temporary.write_text(f'{head},\n "lines": [\n{listed}\n ]\n}}\n', encoding="utf-8")
+                temporary.write_text(text, encoding="utf-8")
 
     def add(self, source: Path) -> list[int]:
         """Add a recording, or those of a folder or a list, which stay where they are; return the new lines' numbers.
