@@ -14,7 +14,7 @@ targets are ours, set by eye, and those of diphthongs change within the phone.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -130,7 +130,10 @@ def gesture_curves(units: Timeline[Unit], time_s: Curve, names: Collection[str] 
     names  : of ``GESTURES``, or ``OVAL``
     Without phones, ``teeth`` is that of speech, and all others are 0.
     """
-    return {name: _curve(name, units, time_s) for name in names}
+    closing = closing_phones(units)
+    phones = [LIP_CLOSING[0] if closes else span.label.phone for span, closes in zip(units, closing, strict=True)]
+    edges_s = np.array([(span.start_s, span.end_s) for span in units]).reshape(-1, 2).T
+    return {name: _curve(name, phones, edges_s, time_s) for name in names}
 
 
 def with_gestures(motion: Motion, units: Timeline[Unit], names: Collection[str] = GESTURES) -> Motion:
@@ -143,15 +146,12 @@ def with_gestures(motion: Motion, units: Timeline[Unit], names: Collection[str] 
     return Motion(values, motion.rate_hz, (*motion.channels, *(Channel(name, WEIGHT) for name in curves)))
 
 
-def _curve(name: str, units: Timeline[Unit], time_s: Curve) -> Curve:
+def _curve(name: str, phones: Sequence[str], edges_s: Curve, time_s: Curve) -> Curve:
+    """Return a channel; ``edges_s``: begin and end of the phones [shape=(2, N)]."""
     default, targets = _TARGETS[name]
-    closing = closing_phones(units)
-    found = [
-        targets.get(LIP_CLOSING[0] if closes else span.label.phone, default)
-        for span, closes in zip(units, closing, strict=True)
-    ]
+    found = [targets.get(phone, default) for phone in phones]
     begin, end, strength, width_s = np.array([(t.begin, t.end, t.dominance, t.width_s) for t in found]).reshape(-1, 4).T
-    start_s, end_s = np.array([(span.start_s, span.end_s) for span in units]).reshape(-1, 2).T
+    start_s, end_s = edges_s
     first, stop = (np.searchsorted(time_s, edge_s) for edge_s in (start_s - REACH * width_s, end_s + REACH * width_s))
     of = np.repeat(np.arange(len(found)), stop - first)
     frames = np.arange(len(of)) - np.repeat(np.cumsum(stop - first) - stop, stop - first)

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import re
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from difflib import get_close_matches
 from functools import cached_property
@@ -52,6 +53,7 @@ from lipmotion.pipeline.edits import (
     locks,
     with_span,
 )
+from lipmotion.pipeline.excerpts import excerpt_of_change, sketched, speech_within
 from lipmotion.pipeline.generate.generation_for import generate_for
 from lipmotion.pipeline.generate.outlook import outlook_of
 from lipmotion.pipeline.generate.prior import with_prior
@@ -116,6 +118,8 @@ ALIGNED = 1000
 INTERACTIVE = 3
 """A session that generates motion for the third time will do so often: kernels are loaded that pay then."""
 NO_EDITS = Edits()
+MotionKey = tuple[tuple[Step, ...], tuple[Pin, ...]]
+"""Edits of phones and words, and pins that the model takes: what the engine's motion depends on."""
 UnitStep = PhoneStep | WordStep | LockStep | UnlockStep
 """Edits that change phones, or keep others from changing them."""
 
@@ -190,6 +194,25 @@ class Session:
         self._drawn: _Kept[DrawnMotion[Any]] = _Kept()
         self._lasts_s, self._motions, self._given_audio = lasts_s, 0, audio
         self._one_at_a_time = RLock()
+        self._sketching = False
+        self._last: tuple[MotionKey, Generation] | None = None
+        self._sketches: _Kept[Generation | None] = _Kept()
+        self._excerpts: _Kept[Generation] = _Kept()
+        self._parts: _Kept[UnderstoodSpeech] = _Kept()
+
+    @contextmanager
+    def sketching(self) -> Iterator[None]:
+        """Within it, motion is the last one with what an edit changes around it, where that is not far.
+
+        It is for long recordings, whose face then follows an edit at once; it differs from the motion that is made
+        whole by less than a face shows (docs/studio.md). Deviations, states and names of units stay those of before.
+        """
+        with self._one_at_a_time:
+            before, self._sketching = self._sketching, True
+            try:
+                yield
+            finally:
+                self._sketching = before
 
     def units(self, edits: Edits = NO_EDITS) -> Timeline[Unit]:
         """Return the phones in time with the edits of words and phones.
@@ -213,7 +236,8 @@ class Session:
     def delivered(self, edits: Edits = NO_EDITS) -> Generation:
         """Return the motion as files hold it: with its intensity, anticipation and offset (docs/controls.md)."""
         with self._one_at_a_time, one_thread():
-            return self._delivered.once(edits.steps, lambda: delivered(self.generated(edits), edits.delivery()))
+            key = (edits.steps, self._sketching)
+            return self._delivered.once(key, lambda: delivered(self.generated(edits), edits.delivery()))
 
     def picture(
         self, time_s: float, edits: Edits = NO_EDITS, *, face: str | Face = "portrait", fps: float = DRAWN_HZ
@@ -237,7 +261,7 @@ class Session:
                 seen = shown(self.generated(edits), delivery, fps)
                 return self._faces.once((face, staging, delivery), staged).drawn(seen.motion, seen.units, fps=fps)
 
-            pictures = self._drawn.once((edits.steps, face, fps), drawn)
+            pictures = self._drawn.once((edits.steps, face, fps, self._sketching), drawn)
             frame = frame_of(time_s, len(pictures), fps)
             if frame is None:
                 raise InputError(f"{time_s} s lies outside the video (0 to {(len(pictures) - 1) / fps:.2f} s)")
@@ -297,8 +321,9 @@ class Session:
         if isinstance(step, LockStep | UnlockStep):
             return before
         after = step.applied(before) if isinstance(step, PhoneStep) else self._reworded(before, step)
-        changed = {*before} ^ {*after}
-        for lock in locks(ours).values():
+        held = locks(ours).values()
+        changed = {*before} ^ {*after} if held else ()
+        for lock in held:
             if any(lock.covers(span.start_s, span.end_s) for span in changed):
                 raise InputError(f"{str(step)!r} changes what is locked ({str(lock)!r}); take the lock out first")
         return after
@@ -356,7 +381,7 @@ class Session:
         return generation
 
     def _after(self, steps: tuple[Step, ...]) -> Generation:
-        return self._generated.once(steps, lambda: self._with_locks(steps))
+        return self._generated.once((steps, self._sketching), lambda: self._with_locks(steps))
 
     def _with_curves(self, steps: tuple[Step, ...]) -> Generation:
         """Return the motion after some edits without locks: the engine's, then gains and what bends single curves."""
@@ -415,7 +440,38 @@ class Session:
         return channel in motion.names and motion.channels[motion.column(channel)].unit == WEIGHT
 
     def _with_pins(self, phone_steps: tuple[Step, ...], pins: tuple[Pin, ...]) -> Generation:
-        return self._moved.once((phone_steps, pins), lambda: self._generation(phone_steps, pins))
+        key = (phone_steps, pins)
+        if self._sketching and key not in self._moved:
+            sketch = self._sketches.once(key, lambda: self._sketch(phone_steps, pins))
+            if sketch is not None:
+                return sketch
+        return self._moved.once(key, lambda: self._generation(phone_steps, pins))
+
+    def _sketch(self, phone_steps: tuple[Step, ...], pins: tuple[Pin, ...]) -> Generation | None:
+        """Return the last motion with what has changed since; None: it must be made whole."""
+        if self._last is None:
+            return None
+        (steps_before, pins_before), whole = self._last
+        units = self._edited_units(steps_before), self._edited_units(phone_steps)
+        excerpt = excerpt_of_change(*units, {*pins} ^ {*pins_before}, len(whole.motion.values))
+        if excerpt is None or len(units[0]) != len(whole.units):
+            return None
+        start, stop = excerpt.frames.start, excerpt.frames.stop
+
+        def made(phones: Timeline[Unit], constraints: Constraints) -> Generation:
+            def generation() -> Generation:
+                part = self._parts.once((start, stop), lambda: speech_within(self._recording, excerpt.frames))
+                spoken = replace(part, speech=self._spoken(part.speech, phones))
+                return generation_of(self.request, self.speaker, self.model, spoken, constraints)
+
+            return self._excerpts.once((start, stop, phones, constraints), generation)
+
+        try:
+            sketch = sketched(whole, excerpt, units, (pins_before, pins), made)
+            self._last = (phone_steps, pins), sketch
+            return sketch
+        except InputError:  # a pin that is refused: the whole says its time
+            return None
 
     def _generation(self, phone_steps: tuple[Step, ...], pins: tuple[Pin, ...]) -> Generation:
         understood = self._edited_speech(phone_steps)
@@ -425,7 +481,10 @@ class Session:
         self._monitor(Progress("moving the mouth", 0, 1, UNDERSTANDING))
         generation = generation_of(self.request, self.speaker, self.model, understood, Constraints(pins))
         self._monitor(Progress("moving the mouth", 1, 1, 1.0))
-        return generation if self._outlook is None else replace(generation, outlook=self._outlook)
+        if self._outlook is not None:
+            generation = replace(generation, outlook=self._outlook)
+        self._last = (phone_steps, pins), generation
+        return generation
 
 
 def generation_of(

@@ -6,7 +6,8 @@ import json
 import math
 import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from typing import Any, NoReturn
 
 from lipmotion.errors import ExportError
@@ -22,14 +23,19 @@ def as_json(content: Any, **options: Any) -> str:
     nested too deeply.
     """
     try:
-        text = json.dumps(content, allow_nan=False, **options)
+        text = _encoder(**options)(content)
         if SURROGATE.search(text):  # JSON that was read may contain one, escaped
-            text = json.dumps(content, allow_nan=False, **options | {"ensure_ascii": True})
+            text = _encoder(**options | {"ensure_ascii": True})(content)
         return text
     except ValueError as error:
         raise ExportError(f"cannot be written as JSON ({error}): every number must be finite") from error
     except RecursionError as error:
         raise ExportError("cannot be written as JSON: lists and objects are nested too deeply") from error
+
+
+@cache
+def _encoder(**options: Any) -> Callable[[Any], str]:
+    return json.JSONEncoder(allow_nan=False, **options).encode
 
 
 def as_json_rows(content: Mapping[str, Any], *, ensure_ascii: bool = True) -> str:
@@ -51,11 +57,20 @@ def as_json_rows(content: Mapping[str, Any], *, ensure_ascii: bool = True) -> st
     members = []
     for name, value in content.items():
         if isinstance(value, list | tuple) and value:
-            rows = ",\n  ".join(as_json(row, ensure_ascii=ensure_ascii) for row in value)
-            members.append(f"{as_json(name)}: [\n  {rows}\n ]")
+            members.append(f"{as_json(name)}: [\n  {_rows(value, ensure_ascii=ensure_ascii)}\n ]")
         else:
             members.append(f"{as_json(name)}: {as_json(value, ensure_ascii=ensure_ascii)}")
     return "{\n " + ",\n ".join(members) + "\n}\n"
+
+
+def _rows(rows: Sequence[Any], *, ensure_ascii: bool) -> str:
+    """Return the members of a list, a line each; of long lists of lists or of objects at once, which is faster."""
+    for kind, between in ((list, "], ["), (dict, "}, {")):
+        if all(type(row) is kind for row in rows):
+            text = as_json(rows, ensure_ascii=ensure_ascii)[1:-1]
+            if text.count(between) == len(rows) - 1:  # it stands nowhere within a row
+                return text.replace(between, between.replace(" ", "\n  "))
+    return ",\n  ".join(as_json(row, ensure_ascii=ensure_ascii) for row in rows)
 
 
 def nan_as_null(content: Any) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,8 @@ from lipmotion.units import is_silent, words_in_time
 LEAST_MOVE = 5e-4
 """Frames whose values differ by less, in the units of the channels, have not moved: 0.03 mm of a mouth."""
 MOST_SHOWN_DOUBTS = 200
+LONG_S = 30.0
+"""In longer lines an edit moves the mouth around it at once; the whole motion is made when it is asked for."""
 LONGEST_VIDEO_S = 60.0
 CONFIDENCE = (Channel("confidence", "share"),)
 
@@ -43,19 +46,36 @@ class OpenLine:
     path    : where they are written
     audio   : the sound, which has been read
     revision : how often the edits have changed since the line was opened
+    settled  : whether the motion is that of the whole line, as files get it; else only what lies around the last edits
+               has been made since
     Raises as ``EditFile.session``.
     """
 
     def __init__(self, file: EditFile, path: Path, recording: Path, model: Model, audio: AnalysedAudio) -> None:
         self.file, self.path, self.recording, self.model, self.audio = file, path, recording, model, audio
-        self.revision = 0
+        self.revision, self.settled = 0, True
         self.session = file.session(model=model, audio=audio)
         self.session.generated(file.edits)
 
     @property
     def generation(self) -> Generation:
         """The motion with all edits, but for its delivery."""
-        return self.session.generated(self.file.edits)
+        with self._view():
+            return self.session.generated(self.file.edits)
+
+    @property
+    def _delivered(self) -> Motion:
+        with self._view():
+            return self.session.delivered(self.file.edits).motion
+
+    def _view(self) -> AbstractContextManager[None]:
+        return nullcontext() if self.settled else self.session.sketching()
+
+    def settle(self, revision: int) -> dict[str, Any]:
+        """Make the whole motion, where it is not yet; return what moved. Raises RevisionError: as ``edited``."""
+        self._check(revision)
+        before, self.settled = self._delivered, True
+        return {"changed": moved_stretch(before, self._delivered)}
 
     @property
     def last_s(self) -> float:
@@ -87,8 +107,10 @@ class OpenLine:
 
     def _changed(self, file: EditFile) -> dict[str, Any]:
         """Go over to other edits: compute, then write, then keep them."""
-        before = self.session.delivered(self.file.edits).motion
-        after = self.session.delivered(file.edits).motion
+        before, settled = self._delivered, self.audio.duration_s <= LONG_S
+        with nullcontext() if settled else self.session.sketching():
+            after = self.session.delivered(file.edits).motion
+        self.settled = settled
         if file.edits.steps != self.file.edits.steps or file.undone != self.file.undone:
             write_edits(file, self.path)
             self.file, self.revision = file, self.revision + 1
@@ -101,6 +123,7 @@ class OpenLine:
         outlook = generation.outlook
         return {
             "revision": self.revision,
+            "settled": self.settled,
             "duration_s": self.audio.duration_s,
             "rate_hz": motion.rate_hz,
             "frames": len(motion.values),
@@ -117,7 +140,7 @@ class OpenLine:
         """Return the numbers of a kind: ``motion``, ``delivered``, ``deviation`` or ``confidence``."""
         generation = self.generation
         if of == "delivered":
-            return self.session.delivered(self.file.edits).motion
+            return self._delivered
         if of == "deviation":
             return replace(generation.motion, values=np.sqrt(np.maximum(generation.variance, 0)))
         if of == "confidence":
@@ -140,7 +163,8 @@ class OpenLine:
 
     def picture(self, time_s: float, face: str | Face) -> NDArray[np.uint8]:
         """Return the picture of a drawn face at a time. Raises InputError: as ``Session.picture``."""
-        return self.session.picture(time_s, self.file.edits, face=face)
+        with self._view():
+            return self.session.picture(time_s, self.file.edits, face=face)
 
     def write_video(self, path: Path, start_s: float, end_s: float, face: str | Face) -> None:
         """Write a stretch as a video of a drawn face. Raises InputError: as ``picture``; or it is too long, or none."""
@@ -156,7 +180,8 @@ class OpenLine:
 
     def why(self, time_s: float) -> dict[str, Any]:
         """Return what determined the motion at a time. Raises InputError: a time outside the recording."""
-        (found,) = explain_session(self.session, self.file.edits, [time_s])
+        with self._view():
+            (found,) = explain_session(self.session, self.file.edits, [time_s])
         return why_document(found)
 
     def doubts(self) -> list[dict[str, Any]]:
@@ -172,7 +197,8 @@ def moved_stretch(before: Motion, after: Motion) -> dict[str, float] | None:
     """Return from when to when two motions differ; None: nowhere."""
     if before.values.shape != after.values.shape or before.names != after.names:
         return {"start_s": 0.0, "end_s": float(max(len(before.values), len(after.values)) / after.rate_hz)}
-    moved = np.flatnonzero((np.abs(before.values - after.values) > LEAST_MOVE).any(axis=1))
+    other = np.flatnonzero((before.values != after.values).any(axis=1))
+    moved = other[(np.abs(before.values[other] - after.values[other]) > LEAST_MOVE).any(axis=1)]
     if not len(moved):
         return None
     return {"start_s": float(moved[0] / after.rate_hz), "end_s": float(moved[-1] / after.rate_hz)}

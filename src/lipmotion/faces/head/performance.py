@@ -35,17 +35,15 @@ def head_poses(
     fps: float,
     staging: Staging | None = None,
     prosody: Prosody | None = None,
-    frames: slice = slice(None),
 ) -> list[CharacterPose]:
     """Return the pose of every video frame, frame n at ``n / fps`` seconds, to the end of the motion.
 
     staging : seed, and what moves on its own; None: everything moves
     prosody : of the speech, for accents of brows and head; None: they follow the opening
-    frames  : those whose poses are returned
     Raises InputError: as ``spoken_mouth``.
     """
     mouth = spoken_mouth(motion, units, fps)
-    return posed(mouth, alive(np.arange(len(mouth.gap)) / fps, motion, units, staging, prosody), frames)
+    return posed(mouth, alive(np.arange(len(mouth.gap)) / fps, motion, units, staging, prosody))
 
 
 def posed(mouth: SpokenMouth, moved: Liveliness, frames: slice = slice(None)) -> list[CharacterPose]:

@@ -14,13 +14,14 @@ from lipmotion.articulation.delivery import closed_times
 from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.liveliness import CALM
 from lipmotion.articulation.mouth import frame_times, spoken_mouth
-from lipmotion.faces.base import Staging
+from lipmotion.faces.base import Staging, alive
 from lipmotion.meshes.files.gltf_animator import write_animated_gltf
 from lipmotion.meshes.files.gltf_writer import write_gltf_scene
 from lipmotion.meshes.files.usd_text import asset
 from lipmotion.meshes.files.usd_writer import write_usda
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
+from lipmotion.meshes.fitting.eyes_and_brows import eye_and_brow_weights
 from lipmotion.meshes.model.head_angles import head_quaternions
 from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.mesh import Blendshape
@@ -128,23 +129,23 @@ def head_scene(
     The mesh is in metres. Raises InputError: the motion has no channel ``opening``.
     """
     from lipmotion.faces.head.figure import PIVOT
-    from lipmotion.faces.head.performance import head_poses
+    from lipmotion.faces.head.performance import posed
     from lipmotion.faces.head.shape_fit import mouth_weights
     from lipmotion.faces.head.stage import figure, mesh_of_figure
 
     motion, hertz = generation.motion, rate_hz or generation.motion.rate_hz
     around, kept = _around(frames)
-    poses = head_poses(motion, generation.units, hertz, staging, prosody, around)
+    times_s = frame_times(len(motion.values), motion.rate_hz, hertz)
+    moved = alive(times_s, motion, generation.units, staging, prosody)
+    poses = posed(spoken_mouth(motion, generation.units, hertz), moved, around)
     character, mesh = (
         figure(),
         mesh_of_figure(moods=any(map(is_mood, motion.names)) or any(pose.mood != CALM for pose in poses)),
     )
-    count = len(frame_times(len(motion.values), motion.rate_hz, hertz))
-    living = living_curves(motion, generation.units, staging, prosody, count, hertz)
     curves = mouth_weights(character, mesh, poses)
-    curves |= {name: living[name].astype(np.float64)[around] for name in living.names}
+    curves |= {name: curve[around] for name, curve in eye_and_brow_weights(moved).items()}
     names = [name for name in mesh.shape_names if name in curves]
-    table, channels = np.zeros((count, len(names))), tuple(Channel(name, WEIGHT) for name in names)
+    table, channels = np.zeros((len(times_s), len(names))), tuple(Channel(name, WEIGHT) for name in names)
     table[around] = np.stack([curves[name] for name in names], axis=1)
     weights = edited_weights(Motion(table, hertz, channels), generation.units, generation.curve_edits)
     weights = replace(weights, values=weights.values[around][kept])
