@@ -16,6 +16,7 @@ LINE_PARTS = (
     "/edits",
     "/undo",
     "/redo",
+    "/settle",
     "/transcript",
     "/mark",
     "/export",

@@ -26,9 +26,9 @@ from lipmotion.types import (
     Unit,
 )
 
-MARGIN_S = 4.0
-"""So far before and after an edit the motion is computed; motion half a second from an edit hardly depends on it."""
-GRID_S = 5.0
+MARGIN_S = 2.5
+"""So far before and after an edit the motion is computed; motion a second from an edit hardly depends on it."""
+GRID_S = 2.0
 """Excerpts begin and end at multiples of this, so that those of edits that are near to one another are the same."""
 LONGEST_S = 40.0
 """Motion whose edits lie further apart is made whole."""
@@ -66,7 +66,7 @@ class Excerpt:
 def excerpt_of_change(
     before: Timeline[Unit], after: Timeline[Unit], pins: Collection[Pin], frames: int
 ) -> Excerpt | None:
-    """Return the excerpt outside of which motion is the same; None: it is too long, or nothing has changed.
+    """Return the excerpt outside of which motion is the same; None: it is too long, outside, or nothing has changed.
 
     pins   : that are there before or after, but not both
     frames : of the recording at 100 Hz
@@ -80,7 +80,7 @@ def excerpt_of_change(
         return None
     start = GRID_S * math.floor(max(min(times_s) - MARGIN_S, 0) / GRID_S)
     end = GRID_S * math.ceil((max(times_s) + MARGIN_S) / GRID_S)
-    if end - start > LONGEST_S:
+    if end - start > LONGEST_S or start * FRAME_RATE_HZ >= frames:
         return None
     return Excerpt(slice(round(start * FRAME_RATE_HZ), min(round(end * FRAME_RATE_HZ) + 1, frames)), (first, last))
 

@@ -52,6 +52,7 @@ def studio_application(studio: Studio, access: Access) -> Starlette:
         post(f"{one}/edits", lines.edits),
         post(f"{one}/undo", lines.undo),
         post(f"{one}/redo", lines.redo),
+        post(f"{one}/settle", lines.settle),
         post(f"{one}/transcript", lines.transcript),
         post(f"{one}/mark", project.mark),
         post(f"{one}/remove", project.remove),

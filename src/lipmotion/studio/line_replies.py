@@ -59,6 +59,11 @@ class LineReplies:
         """Edits to be made again."""
         return await self._stepped(request, OpenLine.redone)
 
+    async def settle(self, request: Request) -> Response:
+        """The whole motion to be made, after edits of a long line."""
+        revision = whole(await content_of(request), "revision")
+        return await self._state_after(self._number(request), lambda line: line.settle(revision))
+
     async def transcript(self, request: Request) -> Response:
         """Words of a line, or of a stretch of it."""
         content, number = await content_of(request), self._number(request)

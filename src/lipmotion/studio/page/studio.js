@@ -18,7 +18,7 @@ import { TEXT, filled } from "./strings.js";
 import { Timeline } from "./timeline/timeline.js";
 import { Transport } from "./transport.js";
 
-const PAGE_OF_LINES = 1000, POLL_MS = 300, DOUBTFUL = 0.7, MOST_DOUBTS = 12, CALM_MS = 5000, NUDGE_MS = 250;
+const PAGE_OF_LINES = 1000, POLL_MS = 300, DOUBTFUL = 0.7, MOST_DOUBTS = 12, CALM_MS = 5000, NUDGE_MS = 250, SETTLE_MS = 1500;
 /** Of a line that is not ready. */
 const NOTHING = { words: [], phones: [], channels: [], steps: [], undo: 0, redo: 0 };
 
@@ -159,6 +159,7 @@ export class Studio {
       const line = { ...NOTHING, ...(await this.server.read(`lines/${id}`)) };
       if (id !== this.store.lineId) return;
       if (line.status !== "ready") this.wake();
+      this.settleSoon(line);
       this.store.set({ line });
       const sound = this.server.bytes(`lines/${id}/sound.wav`).then((buffer) => {
         if (id !== this.store.lineId) return;
@@ -222,7 +223,15 @@ export class Studio {
     await this.request("transcript", { text, ...(span ?? {}) }, TEXT.aligned);
   }
 
+  /** After edits of a long line, which moved the mouth around them alone, let the whole motion be made. */
+  settleSoon({ id, settled }) {
+    clearTimeout(this.settling);
+    if (settled !== false) return;
+    this.settling = setTimeout(() => { this.edits = this.edits.then(() => this.requested(id, "settle", {}, "")).catch(() => {}); }, SETTLE_MS);
+  }
+
   request(kind, content, done) {
+    clearTimeout(this.settling);
     const id = this.store.lineId;
     this.store.set({ saving: this.store.saving + 1 });
     const reply = this.edits.then(() => this.requested(id, kind, content, done)).finally(() => this.store.set({ saving: this.store.saving - 1 }));
@@ -238,7 +247,7 @@ export class Studio {
       if (id !== this.store.lineId) return true;
       if (state.status && state.status !== "ready") return this.open(id, true);
       this.take(state);
-      this.say(done);
+      if (done) this.say(done);
       this.store.set({ unsaved: false });
       this.askedAt = asked_ms;
       if (state.changed) await this.moved(id, state.changed);
@@ -262,6 +271,7 @@ export class Studio {
     const was = selected && before?.[`${selected.kind}s`]?.[selected.index], is = list?.[selected.index];
     const follows = was && is && span && span.start_s === was.start_s && span.end_s === was.end_s;
     const listed = lines.map((each) => (each.id === line.id ? { ...each, edits: line.steps.length, exported: each.exported === "yes" ? "changed" : each.exported } : each));
+    this.settleSoon(line);
     this.store.set({ line, lines: listed, ...(list && !is ? { selected: null } : {}),
       ...(follows ? { span: { start_s: is.start_s, end_s: is.end_s } } : {}) });
   }
