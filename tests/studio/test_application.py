@@ -16,6 +16,7 @@ from lipmotion.pipeline.edit_files import read_edits
 from lipmotion.pipeline.edits import FORMS
 from lipmotion.pipeline.model import Model
 from lipmotion.testing.toy import ToySentence
+from lipmotion.units import Lexicon
 
 pytest.importorskip("starlette", reason="the extra 'studio' is not installed")
 
@@ -45,6 +46,7 @@ def studio(place: OpenStudio) -> OpenStudio:
 
 def test_an_edit_is_made_stored_and_taken_back(studio: OpenStudio) -> None:
     before = studio.ready()
+    assert before["transcript"] == (studio.folder.path.parent / "line.txt").read_text(encoding="utf-8")
     reply = studio.edit("phone 3 is p", "pin opening 0.1 at 1.0")
     state = reply.content
     assert (reply.status, state["undo"], state["phones"][2]["label"]) == (200, 2, "p")
@@ -127,15 +129,22 @@ def test_numbers_are_those_of_the_motion(studio: OpenStudio) -> None:
     assert studio.ask("/api/lines/1/motion?start_s=99").status == 422
 
 
-def test_the_sound_is_seen_and_played(studio: OpenStudio) -> None:
-    state = studio.ready()
-    peaks = studio.ask("/api/lines/1/peaks?columns=50").content
-    assert len(peaks["lowest"]) == len(peaks["highest"]) == 50
-    assert min(peaks["lowest"]) < 0 < max(peaks["highest"])
-    picture = studio.ask(state["media"]["spectrogram"])
-    assert picture.body[:8] == b"\x89PNG\r\n\x1a\n"
-    assert int.from_bytes(picture.body[16:20], "big") == state["frames"]
-    part = studio.ask(state["media"]["sound"], range="bytes=0-3")
+def test_curves_that_are_asked_for_come_alone(studio: OpenStudio) -> None:
+    state, (all_of_it, some) = (
+        studio.ready(),
+        (studio.ask(f"/api/lines/1/motion{q}") for q in ("", "?names=width,opening")),
+    )
+    names = [channel["name"] for channel in state["channels"]]
+    whole = np.frombuffer(all_of_it.body, "<f4").reshape(-1, len(names))
+    found = np.frombuffer(some.body, "<f4").reshape(-1, 2)
+    assert json.loads(some.headers["x-lipmotion-names"]) == ["width", "opening"]
+    assert found == pytest.approx(whole[:, [names.index("width"), names.index("opening")]])
+    refused = studio.ask("/api/lines/1/motion?names=opening,jump")
+    assert (refused.status, "'jump'" in refused.content["error"]) == (422, True)
+
+
+def test_the_sound_is_played(studio: OpenStudio) -> None:
+    part = studio.ask(studio.ready()["media"]["sound"], range="bytes=0-3")
     assert (part.status, part.body) == (206, b"RIFF")
 
 
@@ -176,7 +185,15 @@ def test_pronunciations_are_offered_and_kept(studio: OpenStudio) -> None:
     kept = studio.ask("/api/lexicon", {"word": "zenodo", "phones": ["z", "eh", "n", "ow"]}).content
     assert (kept["own"], kept["pronunciations"]) == (True, [["z", "eh", "n", "ow"]])
     assert studio.folder.lexicon().pronunciations("zenodo") == (("z", "eh", "n", "ow"),)
-    assert studio.edit("word 1 is zenodo").content["steps"] == ["word 1 is zenodo said z eh n ow"]
+    state = studio.edit("word 1 is zenodo").content
+    assert state["steps"] == ["word 1 is zenodo said z eh n ow"]
+    state = studio.ask("/api/lines/1/undo", {"revision": state["revision"]}).content
+    part = {"start_s": 0.0, "end_s": state["words"][0]["end_s"], "revision": state["revision"]}
+    said = studio.ask("/api/lines/1/transcript", {"text": "zenodo mamaqu", **part}).content
+    assert [step.partition(" with ")[2] for step in said["steps"]] == ["zenodo z eh n ow"]
+    assert said["guessed"] == [{"word": "mamaqu", "phones": list(Lexicon().pronunciations("mamaqu")[0])}]
+    at_work = [phone["label"] for phone in said["phones"] if phone["word"] == "zenodo"]
+    assert at_work == ["z", "eh", "n", "ow"]
     for wrong in ({"word": "a b", "phones": ["b"]}, {"word": "a", "phones": ["B!"]}, {"word": "a", "phones": []}):
         assert studio.ask("/api/lexicon", wrong).status == 422
 
@@ -201,7 +218,7 @@ def test_only_the_page_itself_with_the_token_gets_an_answer(studio: OpenStudio) 
     access = Access(TOKEN, frozenset({HOST}))
     keyed = access.with_key("/api/lines/1/sound.wav")
     assert studio.ask(keyed, **{TOKEN_HEADER: ""}).status == 200
-    assert studio.ask(keyed.replace("sound.wav", "spectrogram"), **{TOKEN_HEADER: ""}).status == 401
+    assert studio.ask(keyed.replace("sound.wav", "doubts"), **{TOKEN_HEADER: ""}).status == 401
     for path in (
         "/api/lines/2",
         "/api/lines/0",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import tempfile
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,22 +11,22 @@ from typing import Any
 from urllib.parse import quote
 
 import numpy as np
+from numpy.typing import NDArray
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, shortened
 from lipmotion.storage.json_text import as_json
 from lipmotion.studio.access import Access
 from lipmotion.studio.asked import content_of, seconds, stretch, text, texts, whole
 from lipmotion.studio.line import OpenLine, RevisionError, transcript_step
-from lipmotion.studio.sound_pictures import as_png, log_mel_picture, peaks
 from lipmotion.studio.studio import Studio
-from lipmotion.types import FRAME_RATE_HZ, Motion
+from lipmotion.types import Motion
 from lipmotion.web.replies import FRESH, json_bytes
 
 MOST_STEPS = 1000
-MOST_COLUMNS = 20_000
 LONGEST_TRANSCRIPT = 100_000
+LONGEST_NAMES = 20_000
 NUMBERS = ("motion", "delivered", "deviation", "confidence")
 Changed = dict[str, Any]
 
@@ -71,7 +72,8 @@ class LineReplies:
         start_s, end_s = seconds(content, "start_s", 0.0), seconds(content, "end_s", 1e6)
 
         def changed(line: OpenLine) -> Changed:
-            return line.edited(revision, (transcript_step(said, start_s, min(end_s, line.last_s)),))
+            step = transcript_step(said, start_s, min(end_s, line.last_s))
+            return line.edited(revision, self._studio.with_pronunciations([step]))
 
         return await self._state_after(number, changed)
 
@@ -81,39 +83,17 @@ class LineReplies:
         path = await self._desk.beside(lambda: self._studio.played(number))
         return FileResponse(path, media_type="audio/wav", headers=FRESH)
 
-    async def peaks(self, request: Request) -> Response:
-        """The extremes of the sound."""
-        query = request.query_params
-        columns = whole(query, "columns", 1000, least=1, most=MOST_COLUMNS)
-
-        def found(line: OpenLine) -> bytes:
-            last_s = line.audio.duration_s
-            start_s, end_s = seconds(query, "start_s", 0.0), min(seconds(query, "end_s", last_s), last_s)
-            if not start_s < end_s:
-                raise InputError(f"{start_s} to {end_s} s is no part of 0 to {last_s:.2f} s")
-            return as_json(peaks(line.audio, columns, start_s, end_s)).encode()
-
-        return await self._json(request, found)
-
-    async def spectrogram(self, request: Request) -> Response:
-        """The spectrogram as a picture."""
-        query = request.query_params
-
-        def found(line: OpenLine) -> bytes:
-            picture = line.audio.once("studio spectrogram", lambda: log_mel_picture(line.audio))
-            return as_png(picture[:, stretch(query, FRAME_RATE_HZ, picture.shape[1])])
-
-        return Response(await self._desk.at(self._number(request), found), media_type="image/png", headers=FRESH)
-
     async def motion(self, request: Request) -> Response:
         """Numbers of the motion."""
         query = request.query_params
         of = text(query, "of", "motion")
         if of not in NUMBERS:
             raise InputError(f"of is {of!r}, required one of: {', '.join(NUMBERS)}")
+        names = text(query, "names", longest=LONGEST_NAMES).split(",") if "names" in query else None
 
         def found(line: OpenLine) -> Response:
             motion = line.numbers(of)
+            motion = motion if names is None else _only(motion, names)
             frames = stretch(query, motion.rate_hz, len(motion.values))
             return _numbers(replace(motion, values=motion.values[frames]), frames.start, {})
 
@@ -186,6 +166,7 @@ class LineReplies:
             except RevisionError as error:
                 changed, status = {"error": str(error)}, 409
             state = self._studio.line_document(number) | {"media": self._media(number)} | line.state()
+            state["transcript"] = state["transcript"] or line.transcript
             return json_bytes(
                 as_json({**changed, "state": state} if status == 409 else state | changed).encode(), status
             )
@@ -198,10 +179,26 @@ class LineReplies:
         return json_bytes(as_json(document).encode())
 
     def _media(self, number: int) -> dict[str, str]:
-        return {
-            name: self._access.with_key(f"/api/lines/{number}/{path}")
-            for name, path in (("sound", "sound.wav"), ("spectrogram", "spectrogram"))
-        }
+        return {"sound": self._access.with_key(f"/api/lines/{number}/sound.wav")}
+
+
+def _only(motion: Motion, names: list[str]) -> Motion:
+    """Return some channels of a motion, in the order of their names. Raises InputError: it has none of a name."""
+    for name in names:
+        if name not in motion.names:
+            raise InputError(f"names: there is no {shortened(repr(name))}, required some of: {', '.join(motion.names)}")
+    columns = list(map(motion.column, names))
+    channels = tuple(motion.channels[column] for column in columns)
+    return replace(motion, values=motion.values[:, columns], channels=channels)
+
+
+def as_png(picture: NDArray[np.uint8]) -> bytes:
+    """Return a picture [shape=(H, W, 3)] as PNG."""
+    from PIL import Image
+
+    file = io.BytesIO()
+    Image.fromarray(np.ascontiguousarray(picture)).save(file, format="PNG", compress_level=3)
+    return file.getvalue()
 
 
 def _numbers(motion: Motion, first: int, more: dict[str, str]) -> Response:

@@ -101,6 +101,7 @@ export const TEXT = {
   transcript: "Words of the line",
   align: "Align anew",
   aligned: "The words are aligned anew.",
+  guessed: "Done. Not in the lexicon, and said by rule: {words}. Choose such a word to say it otherwise.",
   settings: "How the motion is delivered",
   delivery: {
     intensity: "Intensity", anticipation_ms: "Anticipation, ms", offset_ms: "Offset, ms", min_hold_ms: "Shortest hold, ms", stepped: "Held poses",

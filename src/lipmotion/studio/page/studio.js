@@ -11,6 +11,7 @@ import { Panel } from "./panel/panel.js";
 import { Queue } from "./queue/queue.js";
 import { say } from "./sentences.js";
 import { Refused, Server } from "./server.js";
+import { ShownCurves } from "./shown_curves.js";
 import { Player } from "./sound/player.js";
 import { samplesOf } from "./sound/samples.js";
 import { Store } from "./store.js";
@@ -54,6 +55,7 @@ export class Studio {
     this.showPlace("stage");
     this.queue = new Queue(queue, this);
     this.weights = new Weights(this);
+    this.curves = new ShownCurves(this);
     this.stage = new Stage(face, this);
     this.timeline = new Timeline(timeline, this);
     this.transport = new Transport(transport, this);
@@ -173,17 +175,9 @@ export class Studio {
 
   /** Read curves of a line again; `changed`: only this stretch of them, null: all. The weights of the face follow. */
   async moved(id, changed) {
-    const { store, server } = this, stretch = changed ? `&start_s=${changed.start_s}&end_s=${changed.end_s}` : "";
     const following = this.weights.change(changed);
-    const read = async (of, before) => {
-      const part = (await server.curves(`lines/${id}/motion?of=${of}${stretch}`)).only(store.channels);
-      if (!changed) return part;
-      return before?.holds(part) ? before.patched(part) : (await server.curves(`lines/${id}/motion?of=${of}`)).only(store.channels);
-    };
-    const [motion, deviation, confidence] = await Promise.all([
-      read("motion", store.motion), read("deviation", store.deviation), changed ? store.confidence : server.curves(`lines/${id}/motion?of=confidence`)]);
-    if (id !== store.lineId) return;
-    store.set({ motion, deviation, confidence });
+    await this.curves.change(id, changed);
+    if (id !== this.store.lineId) return;
     this.doubted(id);
     if (!changed) await following;
   }
@@ -202,7 +196,7 @@ export class Studio {
   async showCurves(channels) {
     this.store.set({ channels });
     try {
-      if (this.store.line?.status === "ready") await this.moved(this.store.lineId, null);
+      if (this.store.line?.status === "ready") await this.curves.fill(this.store.lineId);
     } catch (error) {
       this.refuse(error);
     }
@@ -238,7 +232,8 @@ export class Studio {
       if (id !== this.store.lineId) return true;
       if (state.status && state.status !== "ready") return this.open(id, true);
       this.take(state);
-      this.say(done);
+      const guessed = (state.guessed ?? []).map(({ word, phones }) => `${word} (${phones.join(" ")})`).join(", ");
+      this.say(guessed ? filled(TEXT.guessed, { words: guessed }) : done);
       this.store.set({ unsaved: false });
       this.askedAt = asked_ms;
       if (state.changed) await this.moved(id, state.changed);
