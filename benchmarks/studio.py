@@ -1,12 +1,13 @@
 """The studio measured: how long an edit takes, kills, hostile requests, a thousand edits and back.
 
 python benchmarks/studio.py times RECORDING [SECONDS ...]     processor time from an edit to the weights of the head
+python benchmarks/studio.py browser RECORDING [SECONDS ...] [--count 20]  from a key to the moved face in real browsers
 python benchmarks/studio.py kills RECORDING [--count 100]     of the server; forks: of a process that edits
 python benchmarks/studio.py hostile RECORDING [--count 2000]
 python benchmarks/studio.py undo RECORDING [--count 1000]
 
 Recordings are repeated, or cut, to the seconds. Times are of the processor, in one process, without the network and the
-browser: a minute of the clock on a machine that does other work says nothing.
+browser: a minute of the clock on a machine that does other work says nothing. ``browser`` gives both.
 """
 
 from __future__ import annotations
@@ -82,10 +83,7 @@ def times(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
 
 def times_of(sound: Path, seconds: float) -> dict[str, Any]:
     """Return milliseconds of the processor from an edit to what the page shows of it, and to a first picture."""
-    whole = read_audio(sound)
-    samples = np.tile(whole.samples, int(np.ceil(seconds / whole.duration_s)))[: round(seconds * whole.rate_hz)]
-    part = sound.with_name(f"part-{seconds:g}.wav")
-    write_sound(part, Audio(samples, whole.rate_hz))
+    part, each_s = lasting(sound, seconds)
     expect_more()
     found: dict[str, Any] = {}
     if seconds <= RECOGNISED_S:
@@ -93,7 +91,7 @@ def times_of(sound: Path, seconds: float) -> dict[str, Any]:
         line = opened(part)
         found["until it is open, s"] = round(time.process_time() - started_s, 2)
     else:
-        line = repeated(sound, part, whole.duration_s, seconds)
+        line = repeated(sound, part, each_s, seconds)
     head = shown_face("head")
     for _ in range(4):  # loads what edits and faces need
         timed_edit(line, f"phone 3 is {'pm'[line.revision % 2]}")
@@ -117,6 +115,38 @@ def times_of(sound: Path, seconds: float) -> dict[str, Any]:
     for name, column in zip(names, zip(*parts, strict=True), strict=True):
         found[name] = [round(float(np.percentile(column, share)), 1) for share in (50, 95)]
     return found | {"memory, MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024}
+
+
+def lasting(sound: Path, seconds: float) -> tuple[Path, float]:
+    """Return a recording that is repeated, or cut, to some seconds, and how long it was."""
+    whole = read_audio(sound)
+    samples = np.tile(whole.samples, int(np.ceil(seconds / whole.duration_s)))[: round(seconds * whole.rate_hz)]
+    part = sound.with_name(f"part-{seconds:g}.wav")
+    write_sound(part, Audio(samples, whole.rate_hz))
+    return part, whole.duration_s
+
+
+def in_browsers(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
+    """Measure the page in the browsers that there are."""
+    from studio_browser import measured_page, settled_load
+
+    from study.firefox import BOTH
+
+    found: dict[str, Any] = {}
+    for seconds in options.seconds or (10.0,):
+        part, each_s = lasting(sound, seconds)
+        if seconds > RECOGNISED_S:
+            repeated(sound, part, each_s, seconds)
+        for choice in BOTH:
+            with served(part, sound.with_name("errors.txt")) as server:
+                state = server.ready()
+                if state["undo"]:  # what the browser before has typed
+                    server.ask("/api/lines/1/undo", {"revision": state["revision"], "count": state["undo"]})
+                name, load = f"{seconds:g} s, {choice.id}", settled_load()
+                folder = sound.with_name(f"home-{choice.id}-{seconds:g}")
+                page = measured_page(choice.values[0], server, folder, options.count or 20)
+                found[name] = {"before": load} | page | {"after": settled_load()}
+    return found
 
 
 def repeated(sound: Path, part: Path, each_s: float, seconds: float) -> OpenLine:
@@ -159,8 +189,13 @@ def timed_edit(line: OpenLine, step: str) -> tuple[dict[str, float] | None, floa
 
 def kills(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
     errors = sound.with_name("errors.txt")
-    found = lost_edits(sound, None, errors, options.count or 100, 2.0, options.seed)
+    found = lost_edits(sound, None, errors, options.count or 100, 2.0, options.seed, told)
     return found | {"tracebacks": errors.read_text(encoding="utf-8").count("Traceback")}
+
+
+def told(found: dict[str, int]) -> None:
+    """Print what was found so far: kills of a server take minutes."""
+    print(json.dumps(found), file=sys.stderr, flush=True)
 
 
 def forks(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
@@ -246,7 +281,7 @@ def undo(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
     return {"edits": count, "refused": refused, "undone": "the first bytes", **times_s}
 
 
-WHAT = {"times": times, "kills": kills, "forks": forks, "hostile": hostile, "undo": undo}
+WHAT = {"times": times, "browser": in_browsers, "kills": kills, "forks": forks, "hostile": hostile, "undo": undo}
 
 if __name__ == "__main__":
     main()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import http.client
 import json
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from random import Random
@@ -113,11 +113,18 @@ class Editor:
 
 
 def lost_edits(
-    project: Path, model: Path | None, errors: Path, kills: int, each_s: float, seed: int = 5
+    project: Path,
+    model: Path | None,
+    errors: Path,
+    kills: int,
+    each_s: float,
+    seed: int = 5,
+    report: Callable[[dict[str, int]], object] = lambda _: None,
 ) -> dict[str, int]:
     """Kill a studio again and again while its line is edited; return what was acknowledged, and what was lost.
 
     each_s : how long it is edited, at most, between two kills
+    report : is called with what was found so far, after each kill
     """
     editor, chance = Editor(seed), Random(seed)
     found = {"kills": 0, "acknowledged": 0, "lost": 0}
@@ -134,6 +141,7 @@ def lost_edits(
                     found["acknowledged"] += editor.edit(server) == 200
             server.kill()
         found["kills"] += 1
+        report(found)
     return found
 
 

@@ -16,9 +16,11 @@ from lipmotion.pipeline.edit_files import read_edits
 from lipmotion.pipeline.edits import FORMS
 from lipmotion.pipeline.model import Model
 from lipmotion.testing.toy import ToySentence
+from lipmotion.units import Lexicon
 
 pytest.importorskip("starlette", reason="the extra 'studio' is not installed")
 
+from lipmotion.studio import line as line_module
 from lipmotion.studio.access import TOKEN_HEADER, Access
 from lipmotion.studio.folder import opened_folder
 from lipmotion.studio.studio import Studio
@@ -45,6 +47,7 @@ def studio(place: OpenStudio) -> OpenStudio:
 
 def test_an_edit_is_made_stored_and_taken_back(studio: OpenStudio) -> None:
     before = studio.ready()
+    assert before["transcript"] == (studio.folder.path.parent / "line.txt").read_text(encoding="utf-8")
     reply = studio.edit("phone 3 is p", "pin opening 0.1 at 1.0")
     state = reply.content
     assert (reply.status, state["undo"], state["phones"][2]["label"]) == (200, 2, "p")
@@ -120,11 +123,6 @@ def test_numbers_are_those_of_the_motion(studio: OpenStudio) -> None:
     assert names == [channel["name"] for channel in state["channels"]]
     assert found == pytest.approx(work.line.generation.motion.values[50:101], abs=1e-6)
     assert reply.headers["x-lipmotion-first"] == "50"
-    some = studio.ask("/api/lines/1/motion?start_s=0.5&end_s=1.0&names=width,nothing,opening")
-    chosen = json.loads(some.headers["x-lipmotion-names"])
-    assert sorted(chosen) == ["opening", "width"]
-    columns = [names.index(name) for name in chosen]
-    assert np.frombuffer(some.body, "<f4").reshape(-1, 2) == pytest.approx(found[:, columns])
     sure = np.frombuffer(studio.ask("/api/lines/1/motion?of=confidence").body, "<f4")
     assert len(sure) == state["frames"]
     assert 0 <= sure.min() <= sure.max() <= 1
@@ -132,9 +130,40 @@ def test_numbers_are_those_of_the_motion(studio: OpenStudio) -> None:
     assert studio.ask("/api/lines/1/motion?start_s=99").status == 422
 
 
+def test_of_a_long_line_the_whole_motion_is_made_when_it_is_asked_for(
+    studio: OpenStudio, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert studio.ready()["settled"]
+    monkeypatch.setattr(line_module, "LONG_S", 0.0)
+    state = studio.edit("phone 3 is p").content
+    assert not state["settled"]
+    work = studio.studio.desk.work(1)
+    assert work is not None
+    assert work.line is not None
+    assert studio.ask("/api/lines/1/settle", {"revision": state["revision"] + 1}).status == 409
+    state = studio.ask("/api/lines/1/settle", {"revision": state["revision"]}).content
+    assert state["settled"]
+    whole = work.line.session.generated(work.line.file.edits).motion.values
+    found = np.frombuffer(studio.ask("/api/lines/1/motion").body, "<f4").reshape(whole.shape)
+    assert found == pytest.approx(whole, abs=1e-6)
+
+
+def test_curves_that_are_asked_for_come_alone(studio: OpenStudio) -> None:
+    state, (all_of_it, some) = (
+        studio.ready(),
+        (studio.ask(f"/api/lines/1/motion{q}") for q in ("", "?names=width,opening")),
+    )
+    names = [channel["name"] for channel in state["channels"]]
+    whole = np.frombuffer(all_of_it.body, "<f4").reshape(-1, len(names))
+    found = np.frombuffer(some.body, "<f4").reshape(-1, 2)
+    assert json.loads(some.headers["x-lipmotion-names"]) == ["width", "opening"]
+    assert found == pytest.approx(whole[:, [names.index("width"), names.index("opening")]])
+    refused = studio.ask("/api/lines/1/motion?names=opening,jump")
+    assert (refused.status, "'jump'" in refused.content["error"]) == (422, True)
+
+
 def test_the_sound_is_played(studio: OpenStudio) -> None:
-    state = studio.ready()
-    part = studio.ask(state["media"]["sound"], range="bytes=0-3")
+    part = studio.ask(studio.ready()["media"]["sound"], range="bytes=0-3")
     assert (part.status, part.body) == (206, b"RIFF")
 
 
@@ -175,7 +204,15 @@ def test_pronunciations_are_offered_and_kept(studio: OpenStudio) -> None:
     kept = studio.ask("/api/lexicon", {"word": "zenodo", "phones": ["z", "eh", "n", "ow"]}).content
     assert (kept["own"], kept["pronunciations"]) == (True, [["z", "eh", "n", "ow"]])
     assert studio.folder.lexicon().pronunciations("zenodo") == (("z", "eh", "n", "ow"),)
-    assert studio.edit("word 1 is zenodo").content["steps"] == ["word 1 is zenodo said z eh n ow"]
+    state = studio.edit("word 1 is zenodo").content
+    assert state["steps"] == ["word 1 is zenodo said z eh n ow"]
+    state = studio.ask("/api/lines/1/undo", {"revision": state["revision"]}).content
+    part = {"start_s": 0.0, "end_s": state["words"][0]["end_s"], "revision": state["revision"]}
+    said = studio.ask("/api/lines/1/transcript", {"text": "zenodo mamaqu", **part}).content
+    assert [step.partition(" with ")[2] for step in said["steps"]] == ["zenodo z eh n ow"]
+    assert said["guessed"] == [{"word": "mamaqu", "phones": list(Lexicon().pronunciations("mamaqu")[0])}]
+    at_work = [phone["label"] for phone in said["phones"] if phone["word"] == "zenodo"]
+    assert at_work == ["z", "eh", "n", "ow"]
     for wrong in ({"word": "a b", "phones": ["b"]}, {"word": "a", "phones": ["B!"]}, {"word": "a", "phones": []}):
         assert studio.ask("/api/lexicon", wrong).status == 422
 
@@ -200,7 +237,7 @@ def test_only_the_page_itself_with_the_token_gets_an_answer(studio: OpenStudio) 
     access = Access(TOKEN, frozenset({HOST}))
     keyed = access.with_key("/api/lines/1/sound.wav")
     assert studio.ask(keyed, **{TOKEN_HEADER: ""}).status == 200
-    assert studio.ask(keyed.replace("sound.wav", "motion"), **{TOKEN_HEADER: ""}).status == 401
+    assert studio.ask(keyed.replace("sound.wav", "doubts"), **{TOKEN_HEADER: ""}).status == 401
     for path in (
         "/api/lines/2",
         "/api/lines/0",

@@ -4,37 +4,21 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from children import LIPMOTION, child, wait_until
-from study.browser import (
-    BROWSER,
-    CONTROL,
-    DELETE,
-    DRIVER,
-    ENTER,
-    ESCAPE,
-    MISSING,
-    RIGHT,
-    SHIFT,
-    SPACE,
-    TAB,
-    UP,
-    Browser,
-    browser,
-    check_screen,
-)
+from lipmotion.meshes.files.gltf_weights import read_gltf_motion
+from study.browser import CONTROL, DELETE, ENTER, ESCAPE, RIGHT, SHIFT, SPACE, TAB, UP, Browser, check_screen
+from study.firefox import BOTH, Opens
 
 pytest.importorskip("uvicorn", reason="the extra 'studio' is not installed")
-pytestmark = [
-    pytest.mark.long,
-    pytest.mark.skipif(BROWSER is None or DRIVER is None, reason=MISSING),
-]
+pytestmark = pytest.mark.long
 WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
 SCREENS = ((1440, 900, "light"), (900, 800, "dark"), (320, 640, "light"), (320, 640, "dark"))
 WEBGL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--autoplay-policy=no-user-gesture-required")
@@ -49,9 +33,13 @@ return Boolean(line?.status === "ready" && line.id === store.lineId && store.wei
 
 @dataclass(frozen=True)
 class Page:
-    """A window with the page of a studio."""
+    """A window with the page of a studio.
+
+    project : its folder
+    """
 
     window: Browser
+    project: Path
 
     def of(self, expression: str) -> Any:
         """Return what an expression of the page gives."""
@@ -78,7 +66,9 @@ class Page:
 
     def choose(self, number: int) -> None:
         """Click a phone, numbered from 1."""
-        self.window.click(f'.phones [data-index="{number - 1}"]')
+        selector = f'.phones [data-index="{number - 1}"]'
+        wait_until(lambda: self.of(f"Boolean(document.querySelector({selector!r}))"), LIMIT_S)
+        self.window.click(selector)
 
     def edit(self, act: Callable[[], object], sentence: str) -> None:
         """Act, and expect one more edit; ``sentence`` is a pattern of it."""
@@ -101,15 +91,21 @@ def served(folder: Path, *source: Path) -> Iterator[str]:
         yield found[0]
 
 
-@pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
-    folder = tmp_path_factory.mktemp("studio")
+@contextmanager
+def shown(opens: Opens, folder: Path) -> Iterator[Page]:
+    """Give the page of a studio of one recording, in a browser."""
     (folder / "home").mkdir()
-    with served(folder / "project", WELCOME) as address, browser(folder / "home", *WEBGL) as window:
+    with served(folder / "project", WELCOME) as address, opens(folder / "home", *WEBGL) as window:
         window.open(address)
-        found = Page(window)
-        found.ready()
-        yield found
+        page = Page(window, folder / "project")
+        page.ready()
+        yield page
+
+
+@pytest.fixture(scope="module", params=BOTH)
+def page(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+    with shown(request.param, tmp_path_factory.mktemp("studio")) as page:
+        yield page
 
 
 def test_each_edit_by_pointer_and_keys(page: Page) -> None:
@@ -164,26 +160,24 @@ def test_sound_and_face_are_in_step(page: Page) -> None:
     page.window.press(ESCAPE, ESCAPE)
     page.window.run(
         """const { head } = studio.stage, posed = head.pose.bind(head);
-        globalThis.offsets = [];
+        window.offsets = [];
         head.pose = (weights, time_s) => {
-          if (studio.store.playing) offsets.push(studio.player.audio.currentTime - time_s);
+          if (studio.store.playing) window.offsets.push(studio.player.audio.currentTime - time_s);
           posed(weights, time_s);
         };"""
     )
     page.window.press(SPACE)
-    wait_until(lambda: page.of("offsets.length") > 5, LIMIT_S)
+    wait_until(lambda: page.of("window.offsets.length") > 5, LIMIT_S)
     page.window.press(SPACE)
     assert page.of("studio.player.audio.paused")
-    assert max(map(abs, page.of("offsets"))) <= FRAME_S
+    assert max(map(abs, page.of("window.offsets"))) <= FRAME_S
 
 
-def test_a_dropped_line_is_read_corrected_and_exported(tmp_path: Path) -> None:
+@pytest.mark.parametrize("opens", BOTH)
+def test_a_dropped_line_is_read_corrected_and_exported(opens: Opens, tmp_path: Path) -> None:
     said = WELCOME.with_suffix(".txt").read_text(encoding="utf-8")
-    (tmp_path / "home").mkdir()
-    with served(tmp_path / "project", WELCOME) as address, browser(tmp_path / "home", *WEBGL) as window:
-        window.open(address)
-        page = Page(window)
-        page.ready()
+    with shown(opens, tmp_path) as page:
+        window = page.window
         window.run(
             """studio.server.bytes(`lines/${studio.store.lineId}/sound.wav`).then((sound) => studio.add(
               [new File([sound], "second.wav"), new File([arguments[0]], "second.txt")]));""",
@@ -205,6 +199,49 @@ def test_a_dropped_line_is_read_corrected_and_exported(tmp_path: Path) -> None:
         window.click("#export-approved")
         wait_until(lambda: "Written" in window.text("dialog"), LIMIT_S)
         wait_until(lambda: page.of("studio.store.lines.at(-1).exported") == "yes", LIMIT_S)
+
+
+def test_the_weights_of_the_page_are_those_of_the_exported_file(page: Page) -> None:
+    page.choose(9)
+    page.edit(lambda: page.window.press(ENTER, *"aa", ENTER), "phone 9 is aa")
+    page.edit(lambda: page.window.press("f"), r"hold from \S+ to \S+")
+    wait_until(lambda: page.of("studio.weights.exact"), LIMIT_S)
+    names, frames = page.of("[studio.store.weights.names, studio.store.weights.frames]")
+    values = np.array(page.of("[...studio.store.weights.values]")).reshape(frames, len(names))
+    page.window.run_until_done(
+        """const done = arguments[0], { server, store } = studio;
+        server.told(`lines/${store.lineId}/export`, { preset: "web" }).then(() => done());"""
+    )
+    read, _ = read_gltf_motion(page.project / "exports" / "welcome.glb")
+    shared = [name for name in read.names if name in names]
+    assert len(shared) > 20
+    assert "jawOpen" in shared
+    for name in shared:
+        assert values[:, names.index(name)] == pytest.approx(read[name], abs=1e-5), name
+
+
+def test_only_curves_that_are_shown_are_asked_for(page: Page) -> None:
+    asked = """return performance.getEntriesByType("resource").map(({ name }) => new URL(name))
+      .filter(({ pathname }) => pathname.endsWith("/motion"))
+      .map(({ searchParams }) => `${searchParams.get("of")} ${searchParams.get("names")}`)"""
+    page.window.run("performance.clearResourceTimings()")
+    first = page.of("studio.store.line.channels.find(({ name }) => !studio.store.channels.includes(name)).name")
+    page.window.run("studio.showCurves([...studio.store.channels, arguments[0]])", first)
+    wait_until(lambda: page.of(f"studio.store.motion.column({first!r})") == 3, LIMIT_S)
+    assert sorted(page.window.run(asked)) == [f"deviation {first}", f"motion {first}"]
+    shown = page.of("Array.from(studio.store.motion.values).filter((_, place) => place % 4 === 3)")
+    whole = page.window.run_until_done(
+        """const [name, done] = arguments, { server, store } = studio;
+        server.curves(`lines/${store.lineId}/motion`).then((all) =>
+          done(Array.from({ length: all.frames }, (_, n) => all.value(n, all.column(name)))));""",
+        first,
+    )
+    assert shown == whole
+    page.window.run("studio.showCurves(['opening'])")
+    wait_until(lambda: page.of("studio.store.motion.names") == ["opening"], LIMIT_S)
+    assert page.of("[studio.store.motion.values.length, studio.store.deviation.values.length]") == [len(shown)] * 2
+    page.window.run("studio.showCurves(['opening', 'width', 'outer'])")
+    wait_until(lambda: page.of("studio.store.motion.names.length") == 3, LIMIT_S)
 
 
 def test_what_another_window_did_is_shown(page: Page) -> None:
@@ -262,21 +299,21 @@ def test_every_screen(page: Page) -> None:
     window.show_as(1200, 900)
 
 
-def test_a_killed_studio_has_every_edit(tmp_path: Path) -> None:
+@pytest.mark.parametrize("opens", BOTH)
+def test_a_killed_studio_has_every_edit(opens: Opens, tmp_path: Path) -> None:
     (tmp_path / "home").mkdir()
-    with ExitStack() as stack:
-        window = stack.enter_context(browser(tmp_path / "home", *WEBGL))
-        shown = Page(window)
+    with opens(tmp_path / "home", *WEBGL) as window:
+        page = Page(window, tmp_path / "project")
         with served(tmp_path / "project", WELCOME) as address:
             window.open(address)
-            shown.ready()
-            shown.choose(3)
-            shown.edit(lambda: window.press("s"), r"split phone 3 at \S+")
-            steps = shown.steps
+            page.ready()
+            page.choose(3)
+            page.edit(lambda: window.press("s"), r"split phone 3 at \S+")
+            steps = page.steps
         window.open("about:blank")
         with served(tmp_path / "project") as address:
             window.open(address)
-            shown.ready()
-            assert shown.steps == steps
+            page.ready()
+            assert page.steps == steps
             window.press_together(CONTROL, "z")
-            wait_until(lambda: shown.steps == [], LIMIT_S)
+            wait_until(lambda: page.steps == [], LIMIT_S)

@@ -16,15 +16,13 @@ from lipmotion.study.answers import MOS, PAIRED, RANKING, Answer
 from lipmotion.study.collected import collected_answers
 from lipmotion.study.manifest import VIDEOS, Study, StudyVideo
 from lipmotion.types import Audio
-from study.browser import BROWSER, DRIVER, ENTER, LEFT, MISSING, RIGHT, SPACE, Browser, browser, check_screen
+from study.browser import ENTER, LEFT, RIGHT, SPACE, Browser, check_screen
+from study.firefox import BOTH, Opens
 from study.served import Server, served
 from study.small_study import CONDITIONS, planned
 
 pytest.importorskip("uvicorn", reason="the extra 'study' is not installed")
-pytestmark = [
-    pytest.mark.long,
-    pytest.mark.skipif(BROWSER is None or DRIVER is None, reason=MISSING),
-]
+pytestmark = [pytest.mark.long, pytest.mark.parametrize("opens", BOTH)]
 SCREENS = ((1200, 900, "light"), (1200, 900, "dark"), (320, 640, "light"), (320, 640, "dark"))
 LIMIT_S = 60.0
 
@@ -45,11 +43,11 @@ def shown_study(folder: Path, kind: str) -> Study:
 
 
 @contextmanager
-def at_work(tmp_path: Path, kind: str) -> Iterator[tuple[Browser, Server, Study]]:
+def at_work(opens: Opens, tmp_path: Path, kind: str) -> Iterator[tuple[Browser, Server, Study]]:
     """Give a browser, and the server of a study."""
     study = shown_study(tmp_path / "study", kind)
     (tmp_path / "home").mkdir()
-    with served(tmp_path / "study", tmp_path / "errors.txt") as server, browser(tmp_path / "home") as window:
+    with served(tmp_path / "study", tmp_path / "errors.txt") as server, opens(tmp_path / "home") as window:
         window.open(f"http://127.0.0.1:{server.port}/")
         wait_for(window, "welcome")
         yield window, server, study
@@ -104,8 +102,8 @@ def look(window: Browser, name: str) -> None:
     window.show_as(1200, 900)
 
 
-def test_pairs_by_keys(tmp_path: Path) -> None:
-    with at_work(tmp_path, PAIRED) as (window, _, study):
+def test_pairs_by_keys(opens: Opens, tmp_path: Path) -> None:
+    with at_work(opens, tmp_path, PAIRED) as (window, _, study):
         look(window, "welcome")
         window.click("#agree")
         wait_for(window, "guide")
@@ -127,8 +125,8 @@ def test_pairs_by_keys(tmp_path: Path) -> None:
     assert all(row.plays == 2 and row.seconds >= 0.9 for row in rows)
 
 
-def test_opinions_by_keys(tmp_path: Path) -> None:
-    with at_work(tmp_path, MOS) as (window, _, study):
+def test_opinions_by_keys(opens: Opens, tmp_path: Path) -> None:
+    with at_work(opens, tmp_path, MOS) as (window, _, study):
         join(window)
         look(window, "opinions")
         take_part(window, study, lambda: window.press("1", "2", "3", "4", "5"))
@@ -136,10 +134,10 @@ def test_opinions_by_keys(tmp_path: Path) -> None:
     assert values == {"smoothness": "1", "closure": "2", "protrusion": "3", "turning": "4", "overall": "5"}
 
 
-def test_a_ranking_by_sliders(tmp_path: Path) -> None:
+def test_a_ranking_by_sliders(opens: Opens, tmp_path: Path) -> None:
     moves = """for (const [n, input] of [...document.querySelectorAll('input[type=range]')].entries()) {
         input.value = 20 * n; input.dispatchEvent(new Event('input', { bubbles: true })); }"""
-    with at_work(tmp_path, RANKING) as (window, _, study):
+    with at_work(opens, tmp_path, RANKING) as (window, _, study):
         join(window)
         look(window, "ranking")
         window.press(SPACE)
@@ -153,10 +151,10 @@ def test_a_ranking_by_sliders(tmp_path: Path) -> None:
     assert {row.condition for row in counted} == {*CONDITIONS, "anchor"}
 
 
-def test_an_answer_outlives_the_server_and_the_page(tmp_path: Path) -> None:
+def test_an_answer_outlives_the_server_and_the_page(opens: Opens, tmp_path: Path) -> None:
     """The server is killed before an answer comes; the page keeps it, sends it again, and also after a reload."""
     with ExitStack() as stack:
-        window, server, _ = stack.enter_context(at_work(tmp_path, PAIRED))
+        window, server, _ = stack.enter_context(at_work(opens, tmp_path, PAIRED))
         join(window)
         answer(window, lambda: window.press("1"))
         link = window.run("return location.href")

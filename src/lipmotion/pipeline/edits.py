@@ -241,9 +241,19 @@ class WordSaid(Step):
     phones: Text
 
     def __post_init__(self) -> None:
-        for phone in self.phones.split():
-            if _known(phone) and is_silent(phone):
-                raise InputError(f"{str(self)!r}: a word has no silence in it; say two words")
+        _check_said(self, self.phones.split())
+
+    @property
+    def own(self) -> dict[str, tuple[str, ...]]:
+        """The phones of the word."""
+        return {self.word: tuple(self.phones.split())}
+
+
+def _check_said(step: Step, phones: Sequence[str]) -> None:
+    """Raise InputError unless phones are those of a word that an edit says."""
+    for phone in phones:
+        if _known(phone) and is_silent(phone):
+            raise InputError(f"{str(step)!r}: a word has no silence in it; say two words")
 
 
 @dataclass(frozen=True)
@@ -260,7 +270,31 @@ class WordsSaid(Step):
             raise InputError(f"{str(self)!r}: required an end after the start")
 
 
-WordStep = WordIs | WordSaid | WordsSaid
+@dataclass(frozen=True)
+class WordsSaidSo(Step):
+    """Other words are said from one time to another, some of them with these phones: ``zoe z ow iy, qi k iy``."""
+
+    form: ClassVar[str] = "say {words} from {start_s} to {end_s} with {pronunciations}"
+    words: Text
+    start_s: float
+    end_s: float
+    pronunciations: Text
+
+    def __post_init__(self) -> None:
+        WordsSaid(self.words, self.start_s, self.end_s)  # checks the times
+        for word, phones in self.own.items():
+            if not phones:
+                raise InputError(f"{str(self)!r}: {shortened(repr(word))} has no phones; required WORD PHONES, WORD …")
+            _check_said(self, phones)
+
+    @property
+    def own(self) -> dict[str, tuple[str, ...]]:
+        """The phones of words, by word."""
+        parts = (part.split() for part in self.pronunciations.split(","))
+        return {word: tuple(phones) for word, *phones in filter(None, parts)}
+
+
+WordStep = WordIs | WordSaid | WordsSaid | WordsSaidSo
 """Edits of words, whose phones are aligned with the sound."""
 
 
@@ -466,7 +500,7 @@ def _names(kind: type[Any]) -> tuple[str, ...]:
 
 
 STEPS: tuple[type[Step], ...] = (
-    WordIs, WordSaid, WordsSaid, PhoneIs, PhoneBegins, PhoneEnds, PhoneSplit, PhoneRemoved, PhoneInserted,
+    WordIs, WordSaid, WordsSaid, WordsSaidSo, PhoneIs, PhoneBegins, PhoneEnds, PhoneSplit, PhoneRemoved, PhoneInserted,
     PinStep, GainStep, CurveGainStep, DrawStep, HoldStep, LockStep, UnlockStep, MoodStep, SetStep,
 )  # fmt: skip
 """All edits that a sentence can state."""

@@ -49,6 +49,7 @@ from lipmotion.pipeline.edits import (
     UnlockStep,
     WordSaid,
     WordsSaid,
+    WordsSaidSo,
     WordStep,
     locks,
     with_span,
@@ -96,7 +97,7 @@ from lipmotion.types import (
     frame_of,
     silent_monitor,
 )
-from lipmotion.units import Lexicon, words_in_time, words_of
+from lipmotion.units import Lexicon, Pronunciation, words_in_time, words_of
 from lipmotion.units.mood_tags import moods_in_time
 
 KeptT = TypeVar("KeptT")
@@ -330,7 +331,7 @@ class Session:
 
     def _reworded(self, units: Timeline[Unit], step: WordStep) -> Timeline[Unit]:
         """Return phones in time with other words in the time of some, aligned with the sound there."""
-        if isinstance(step, WordsSaid):
+        if isinstance(step, WordsSaid | WordsSaidSo):
             start_s, end_s, said = step.start_s, min(step.end_s, units[-1].end_s), step.words
             where = f"{start_s:.2f} to {end_s:.2f} s"
         else:
@@ -341,9 +342,9 @@ class Session:
             there = words[step.number - 1]
             start_s, end_s, said = there.start_s, there.end_s, Text(step.word)
             where = f"{start_s:.2f} to {end_s:.2f} s, where {there.label!r} was"
-        phones = step.phones if isinstance(step, WordSaid) else ""
+        own = tuple(own_pronunciations(step).items())
         try:
-            spans = self._aligned.once((said, phones, start_s, end_s), lambda: self._said(step, said, start_s, end_s))
+            spans = self._aligned.once((said, own, start_s, end_s), lambda: self._said(step, said, start_s, end_s))
         except AlignmentError as error:
             raise InputError(
                 f"{str(step)!r}: does not fit into {where} ({error}); make room with 'phone N ends TIME' first"
@@ -352,11 +353,10 @@ class Session:
 
     def _said(self, step: WordStep, said: str, start_s: float, end_s: float) -> list[Span[Unit]]:
         """Return the phones in time of words that a step says. Raises AlignmentError: they do not fit in there."""
-        request = self.request
-        if isinstance(step, WordSaid):
-            own = {word: (tuple(step.phones.split()),) for word in words_of(said)}
-            request = replace(request, lexicon=Lexicon((request.lexicon or Lexicon()).user | own))
-        pauses = isinstance(step, WordsSaid)
+        request, pauses = self.request, isinstance(step, WordsSaid | WordsSaidSo)
+        if own := own_pronunciations(step):
+            lexicon = request.lexicon or Lexicon()
+            request = replace(request, lexicon=replace(lexicon, user=lexicon.user | own))
         return aligned_within(self.model, request, self._audio, said, start_s, end_s, pauses=pauses)
 
     def _edited_speech(self, steps: tuple[Step, ...]) -> UnderstoodSpeech:
@@ -485,6 +485,12 @@ class Session:
             generation = replace(generation, outlook=self._outlook)
         self._last = (phone_steps, pins), generation
         return generation
+
+
+def own_pronunciations(step: Step) -> dict[str, tuple[Pronunciation, ...]]:
+    """Return the pronunciations that an edit brings along, by word, as a lexicon holds them."""
+    own = step.own if isinstance(step, WordSaid | WordsSaidSo) else {}
+    return {word: (phones,) for given, phones in own.items() for word in words_of(given)}
 
 
 def generation_of(

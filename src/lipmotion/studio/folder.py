@@ -16,9 +16,11 @@ from pathlib import Path
 from lipmotion.errors import InputError
 from lipmotion.pipeline.batch.lines import is_recording, read_lines
 from lipmotion.pipeline.outputs.scenes import sound_reference
+from lipmotion.speech.voices.pronunciations import LanguageLexicon
 from lipmotion.storage.files import locked, read_text_file, sha256_of, whole_file
 from lipmotion.storage.json_text import as_json_rows, from_json
 from lipmotion.studio.project import EDITS_SUFFIX, Project, ProjectLine, check_lines, project_document, project_from
+from lipmotion.types.languages import AUTO, ENGLISH
 from lipmotion.units import Lexicon
 
 PROJECT, SOUNDS, EDITS, EXPORTS, LEXICON = "project.json", "sounds", "edits", "exports", "lexicon.txt"
@@ -146,8 +148,10 @@ class ProjectFolder:
         return file if file.is_file() else None
 
     def lexicon(self) -> Lexicon:
-        """Return the project's own pronunciations, ahead of those of the dictionary. Raises InputError: unreadable."""
-        return Lexicon.from_file(self.lexicon_file) if self.lexicon_file else Lexicon()
+        """Return the project's own pronunciations, ahead of those of its language. Raises InputError: unreadable."""
+        own = Lexicon.from_file(self.lexicon_file) if self.lexicon_file else Lexicon()
+        language = self.project.language
+        return own if language in (ENGLISH, AUTO) else LanguageLexicon(own.user, language)
 
     def add_pronunciation(self, word: str, phones: tuple[str, ...]) -> None:
         """Write a pronunciation into the project's lexicon, ahead of earlier ones. Raises ExportError: cannot be."""

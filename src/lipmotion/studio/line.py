@@ -14,17 +14,19 @@ from lipmotion.errors import InputError, LipMotionError
 from lipmotion.export.video import write_mp4
 from lipmotion.faces.base import Face
 from lipmotion.pipeline.edit_files import EditFile, write_edits
-from lipmotion.pipeline.edits import Step
+from lipmotion.pipeline.edits import Step, WordIs, WordSaid, WordStep, step_of
 from lipmotion.pipeline.generate.explain import explain_session, explanation_text
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.drawn_video import DRAWN_HZ, read_sound
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance
 from lipmotion.pipeline.outputs.scenes import delivered_scene
 from lipmotion.pipeline.outputs.shown_faces import ShownFace
+from lipmotion.pipeline.session import own_pronunciations
+from lipmotion.pipeline.understand.transcribe import guesses
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
 from lipmotion.studio.meshes import with_turn
 from lipmotion.types import Audio, Channel, Explanation, Generation, Motion, Timeline, Unit
-from lipmotion.units import is_silent, words_in_time
+from lipmotion.units import Lexicon, Pronunciation, is_silent, words_in_time, words_of
 
 LEAST_MOVE = 5e-4
 """Frames whose values differ by less, in the units of the channels, have not moved: 0.03 mm of a mouth."""
@@ -33,6 +35,8 @@ LONG_S = 30.0
 """In longer lines an edit moves the mouth around it at once; the whole motion is made when it is asked for."""
 LONGEST_VIDEO_S = 60.0
 CONFIDENCE = (Channel("confidence", "share"),)
+WITH_TRANSCRIPT = ("transcript", "mapped transcript")
+"""Where the words of an ``Outlook`` come from if they were given: for the line, or in a file beside the recording."""
 
 
 class RevisionError(LipMotionError):
@@ -89,7 +93,26 @@ class OpenLine:
         Raises RevisionError: the edits are no longer those of the revision. InputError: an edit is refused.
         """
         self._check(revision)
-        return self._changed(self.file.undo(instead).then(*steps) if steps else self.file.undo(instead))
+        changed = self._changed(self.file.undo(instead).then(*steps) if steps else self.file.undo(instead))
+        return changed | {"guessed": self._guessed(steps)}
+
+    def _guessed(self, steps: tuple[str | Step, ...]) -> list[dict[str, Any]]:
+        """Return the words of edits whose pronunciation is a guess, with it, as objects of JSON."""
+        lexicon = self.session.request.lexicon or Lexicon()
+        found: dict[str, Pronunciation] = {}
+        for step in map(step_of, map(str, steps)):
+            if isinstance(step, WordStep):
+                own, text = own_pronunciations(step), step.word if isinstance(step, WordIs | WordSaid) else step.words
+                found |= guesses([word for word in words_of(text) if word not in own], lexicon)
+        return [{"word": word, "phones": list(phones)} for word, phones in found.items()]
+
+    @property
+    def transcript(self) -> str:
+        """The words that the phones were aligned with, before the edits; empty: they were recognised, or none given."""
+        outlook, units = self.file.outlook, self.file.units
+        if outlook is None or units is None or outlook.words not in WITH_TRANSCRIPT:
+            return ""
+        return " ".join(span.label for span in words_in_time(units) if span.label)
 
     def undone(self, revision: int, count: int) -> dict[str, Any]:
         """Take back the last edits; return what moved. Raises as ``edited``."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, shortened
 from lipmotion.storage.json_text import as_json
 from lipmotion.studio.access import Access
 from lipmotion.studio.asked import content_of, seconds, stretch, text, texts, whole
@@ -25,7 +26,7 @@ from lipmotion.web.replies import FRESH, json_bytes
 
 MOST_STEPS = 1000
 LONGEST_TRANSCRIPT = 100_000
-LONGEST_NAMES = 10_000
+LONGEST_NAMES = 20_000
 NUMBERS = ("motion", "delivered", "deviation", "confidence")
 Changed = dict[str, Any]
 
@@ -76,7 +77,8 @@ class LineReplies:
         start_s, end_s = seconds(content, "start_s", 0.0), seconds(content, "end_s", 1e6)
 
         def changed(line: OpenLine) -> Changed:
-            return line.edited(revision, (transcript_step(said, start_s, min(end_s, line.last_s)),))
+            step = transcript_step(said, start_s, min(end_s, line.last_s))
+            return line.edited(revision, self._studio.with_pronunciations([step]))
 
         return await self._state_after(number, changed)
 
@@ -89,17 +91,16 @@ class LineReplies:
     async def motion(self, request: Request) -> Response:
         """Numbers of the motion."""
         query = request.query_params
-        of, names = text(query, "of", "motion"), set(text(query, "names", "", longest=LONGEST_NAMES).split(",")) - {""}
+        of = text(query, "of", "motion")
         if of not in NUMBERS:
             raise InputError(f"of is {of!r}, required one of: {', '.join(NUMBERS)}")
+        names = text(query, "names", longest=LONGEST_NAMES).split(",") if "names" in query else None
 
         def found(line: OpenLine) -> Response:
             motion = line.numbers(of)
+            motion = motion if names is None else _only(motion, names)
             frames = stretch(query, motion.rate_hz, len(motion.values))
-            chosen = [n for n, name in enumerate(motion.names) if not names or name in names]
-            channels = tuple(motion.channels[n] for n in chosen)
-            values = motion.values[frames][:, chosen]
-            return _numbers(Motion(values, motion.rate_hz, channels), frames.start, {})
+            return _numbers(replace(motion, values=motion.values[frames]), frames.start, {})
 
         return await self._desk.at(self._number(request), found)
 
@@ -122,7 +123,7 @@ class LineReplies:
         """A picture of a drawn face."""
         time_s, face = seconds(request.query_params, "time"), text(request.query_params, "face", "woman")
         shown = self._studio.drawn(face)
-        found = await self._desk.at(self._number(request), lambda line: _as_png(line.picture(time_s, shown)))
+        found = await self._desk.at(self._number(request), lambda line: as_png(line.picture(time_s, shown)))
         return Response(found, media_type="image/png", headers=FRESH)
 
     async def video(self, request: Request) -> Response:
@@ -170,6 +171,7 @@ class LineReplies:
             except RevisionError as error:
                 changed, status = {"error": str(error)}, 409
             state = self._studio.line_document(number) | {"media": self._media(number)} | line.state()
+            state["transcript"] = state["transcript"] or line.transcript
             return json_bytes(
                 as_json({**changed, "state": state} if status == 409 else state | changed).encode(), status
             )
@@ -185,11 +187,22 @@ class LineReplies:
         return {"sound": self._access.with_key(f"/api/lines/{number}/sound.wav")}
 
 
-def _as_png(picture: NDArray[np.uint8]) -> bytes:
+def _only(motion: Motion, names: list[str]) -> Motion:
+    """Return some channels of a motion, in the order of their names. Raises InputError: it has none of a name."""
+    for name in names:
+        if name not in motion.names:
+            raise InputError(f"names: there is no {shortened(repr(name))}, required some of: {', '.join(motion.names)}")
+    columns = list(map(motion.column, names))
+    channels = tuple(motion.channels[column] for column in columns)
+    return replace(motion, values=motion.values[:, columns], channels=channels)
+
+
+def as_png(picture: NDArray[np.uint8]) -> bytes:
+    """Return a picture [shape=(H, W, 3)] as PNG."""
     from PIL import Image
 
     file = io.BytesIO()
-    Image.fromarray(picture).save(file, format="PNG", compress_level=3)
+    Image.fromarray(np.ascontiguousarray(picture)).save(file, format="PNG", compress_level=3)
     return file.getvalue()
 
 

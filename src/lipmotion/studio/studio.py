@@ -6,7 +6,7 @@ import logging
 import os
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from hashlib import sha256
@@ -21,7 +21,7 @@ from lipmotion.export.sound import write_sound
 from lipmotion.extensions import installed_version
 from lipmotion.faces.base import Face
 from lipmotion.pipeline.edit_files import read_edits, write_edits
-from lipmotion.pipeline.edits import FORMS, Step, Text, WordIs, WordSaid, step_of
+from lipmotion.pipeline.edits import FORMS, Step, Text, WordIs, WordSaid, WordsSaid, WordsSaidSo, step_of
 from lipmotion.pipeline.job import Job, Outputs
 from lipmotion.pipeline.model import Model, load_model, shipped_path
 from lipmotion.pipeline.opened_job import opened
@@ -38,7 +38,7 @@ from lipmotion.types.configuration import ANY, kind_of
 from lipmotion.types.delivery import Delivery
 from lipmotion.types.moods import MANNERS, MOODS
 from lipmotion.types.staging import Staging
-from lipmotion.units import PHONES, is_silent
+from lipmotion.units import PHONES, Pronunciation, is_silent, words_of
 
 LOG = logging.getLogger("lipmotion")
 ORDERS = ("", "doubt")
@@ -197,15 +197,10 @@ class Studio:
         Raises InputError: a sentence is no edit.
         """
         steps = [step_of(sentence) for sentence in sentences]
-        if not any(isinstance(step, WordIs) for step in steps):
+        if not any(isinstance(step, WordIs | WordsSaid) for step in steps):
             return tuple(steps)
         own = self.folder.lexicon().user
-        return tuple(
-            WordSaid(step.number, step.word, Text(" ".join(own[step.word.lower()][0])))
-            if isinstance(step, WordIs) and step.word.lower() in own
-            else step
-            for step in steps
-        )
+        return tuple(_pronounced(step, own) for step in steps)
 
     async def say(self, number: int, transcript: str) -> None:
         """Let a line be understood again, with its words; without any, they are recognised.
@@ -295,6 +290,18 @@ def digest_of(sentences: Iterable[str]) -> str:
     '2a0d1f5a'
     """
     return sha256("\n".join(sentences).encode("utf-8", "surrogatepass")).hexdigest()
+
+
+def _pronounced(step: Step, own: Mapping[str, Sequence[Pronunciation]]) -> Step:
+    """Return an edit of words with the phones of those that a lexicon has; other edits as they are."""
+    if isinstance(step, WordIs):
+        words = words_of(step.word)
+        phones = [phone for word in words if word in own for phone in own[word][0]]
+        return WordSaid(step.number, step.word, Text(" ".join(phones))) if own.keys() >= {*words} else step
+    if isinstance(step, WordsSaid):
+        said = [f"{word} {' '.join(own[word][0])}" for word in dict.fromkeys(words_of(step.words)) if word in own]
+        return WordsSaidSo(step.words, step.start_s, step.end_s, Text(", ".join(said))) if said else step
+    return step
 
 
 def _with_export(line: ProjectLine, record: ExportRecord) -> ProjectLine:

@@ -20,10 +20,18 @@ from lipmotion.speech.recognition.transcript_evidence import DOUBTFUL_LOSS, tran
 from lipmotion.speech.voices.pronunciations import LanguageLexicon
 from lipmotion.storage.files import read_text_file
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features, TimedTranscript, Timeline, Unit
-from lipmotion.units import Lexicon, check_words
+from lipmotion.units import Lexicon, Pronunciation, check_words
 from lipmotion.units.length_limits import LARGEST_TRANSCRIPT_BYTES
 
-__all__ = ["Transcription", "phones_in_time", "read_plain_text", "read_transcript", "transcribe", "warn_of_guesses"]
+__all__ = [
+    "Transcription",
+    "guesses",
+    "phones_in_time",
+    "read_plain_text",
+    "read_transcript",
+    "transcribe",
+    "warn_of_guesses",
+]
 LOG = logging.getLogger("lipmotion")
 MOST_WARNINGS = 20
 """Largest number of guessed pronunciations that are reported one by one."""
@@ -153,14 +161,18 @@ def is_other_language(words: Sequence[str], lexicon: Lexicon) -> bool:
     return len({*unknown}) >= LEAST_FOREIGN and len(unknown) >= FOREIGN_SHARE * len(words)
 
 
+def guesses(words: Sequence[str], lexicon: Lexicon) -> dict[str, Pronunciation]:
+    """Return the first ``MOST_WARNINGS`` words whose pronunciation is a guess, with it."""
+    unknown = [word for word in dict.fromkeys(words) if not lexicon.known(word)]
+    return {word: lexicon.pronunciations(word)[0] for word in unknown[:MOST_WARNINGS]}
+
+
 def warn_of_guesses(words: Sequence[str], lexicon: Lexicon) -> None:
     """Log a warning for every word whose pronunciation is a guess; after ``MOST_WARNINGS``, for how many more."""
+    for word, guessed in guesses(words, lexicon).items():
+        told = map(shortened, (word, " ".join(guessed)))
+        LOG.warning("%r is not in the dictionary; read as %r; a lexicon file can say better", *told)
     unknown = [word for word in dict.fromkeys(words) if not lexicon.known(word)]
-    for word in unknown[:MOST_WARNINGS]:
-        guessed = " ".join(lexicon.pronunciations(word)[0])
-        LOG.warning(
-            "%r is not in the dictionary; read as %r; a lexicon file can say better", *map(shortened, (word, guessed))
-        )
     if len(unknown) > MOST_WARNINGS:
         LOG.warning(
             "%d more words are not in the dictionary; a lexicon file can say better", len(unknown) - MOST_WARNINGS

@@ -48,6 +48,19 @@ export class Curves {
     return new Curves(kept, this.rate_hz, values, this.first);
   }
 
+  /** These curves, and others of as many frames. */
+  and(others) {
+    if (!others.names.length) return this;
+    if (!this.names.length) return others;
+    const names = [...this.names, ...others.names], values = new Float32Array(this.frames * names.length);
+    for (let frame = 0; frame < this.frames; frame++) {
+      for (const [part, from] of [[this, 0], [others, this.names.length]]) {
+        values.set(part.values.subarray(frame * part.names.length, (frame + 1) * part.names.length), frame * names.length + from);
+      }
+    }
+    return new Curves(names, this.rate_hz, values);
+  }
+
   /** Whether other curves are a part of these: the same names and rate, within their frames. */
   holds(part) {
     return part.rate_hz === this.rate_hz && part.first + part.frames <= this.frames && String(part.names) === String(this.names);

@@ -43,6 +43,10 @@ export const KEYS = [
   { key: ["e"], group: "look", shown: ["E", "⇧ E"], help: "doubt", act: (studio) => studio.jump(1) },
   { key: ["w"], group: "look", shown: ["W"], help: "why", act: ({ store }) => store.set({ tab: "why" }) },
   { key: ["a", "r"], group: "queue", shown: ["A", "R"], help: "approve", act: (studio, { key }) => studio.mark(key === "a" ? "approved" : "redo") },
+  { key: ["a", "r"], shift: true, group: "queue", shown: ["⇧ A", "⇧ R"], help: "approveNext", act: async (studio, { key }) => {
+    await studio.mark(key === "a" ? "approved" : "redo");
+    studio.queue.step(1);
+  } },
   { key: ["n", "p"], group: "queue", shown: ["N", "P"], help: "nextLine", act: ({ queue }, { key }) => queue.step(key === "n" ? 1 : -1) },
   { key: ["?"], group: "look", shown: ["?"], help: "help", act: (studio) => studio.help() },
 ];

@@ -101,6 +101,7 @@ export const TEXT = {
   transcript: "Words of the line",
   align: "Align anew",
   aligned: "The words are aligned anew.",
+  guessed: "Done. Not in the lexicon, and said by rule: {words}. Choose such a word to say it otherwise.",
   settings: "How the motion is delivered",
   delivery: {
     intensity: "Intensity", anticipation_ms: "Anticipation, ms", offset_ms: "Offset, ms", min_hold_ms: "Shortest hold, ms", stepped: "Held poses",
@@ -139,6 +140,8 @@ export const TEXT = {
   changed: "Done: {what}",
   undone: "Undone.",
   redone: "Made again.",
+  notOpen: "The line is not open yet.",
+  wouldHelp: "What would help: {what}.",
   nothingToUndo: "There is nothing to undo.",
   nothingToRedo: "There is nothing to redo.",
   needsSpan: "Select a stretch first: drag over the sound, or click a phone.",
@@ -167,7 +170,7 @@ export const HELP = {
   splitPhone: "split the phone at the playhead",
   mergePhone: "join with the next phone",
   removePhone: "remove the phone",
-  insertPhone: "insert a phone in the selection",
+  insertPhone: "insert a phone in the selection: choose it, Enter",
   moveEnd: "move the end of the phone by a frame",
   moveStart: "move its beginning by a frame",
   pinValue: "value of the curve at the playhead",
@@ -184,6 +187,7 @@ export const HELP = {
   doubt: "next, previous doubt",
   why: "why",
   approve: "approve, redo this line",
+  approveNext: "the same, and go to the next line",
   nextLine: "next, previous line",
   help: "these keys",
 };

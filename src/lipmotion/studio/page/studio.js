@@ -11,6 +11,7 @@ import { Panel } from "./panel/panel.js";
 import { Queue } from "./queue/queue.js";
 import { say } from "./sentences.js";
 import { Refused, Server } from "./server.js";
+import { ShownCurves } from "./shown_curves.js";
 import { Player } from "./sound/player.js";
 import { samplesOf } from "./sound/samples.js";
 import { Store } from "./store.js";
@@ -54,6 +55,7 @@ export class Studio {
     this.showPlace("stage");
     this.queue = new Queue(queue, this);
     this.weights = new Weights(this);
+    this.curves = new ShownCurves(this);
     this.stage = new Stage(face, this);
     this.timeline = new Timeline(timeline, this);
     this.transport = new Transport(transport, this);
@@ -174,17 +176,9 @@ export class Studio {
 
   /** Read curves of a line again; `changed`: only this stretch of them, null: all. The weights of the face follow. */
   async moved(id, changed) {
-    const { store, server } = this, stretch = changed ? `&start_s=${changed.start_s}&end_s=${changed.end_s}` : "";
     const following = this.weights.change(changed);
-    const names = encodeURIComponent(store.channels.join()), asked = async (of, part) => (await server.curves(`lines/${id}/motion?of=${of}&names=${names}${part}`)).only(store.channels);
-    const read = async (of, before) => {
-      const part = await asked(of, stretch);
-      return !changed || before?.holds(part) ? (changed ? before.patched(part) : part) : asked(of, "");
-    };
-    const [motion, deviation, confidence] = await Promise.all([
-      read("motion", store.motion), read("deviation", store.deviation), changed ? store.confidence : server.curves(`lines/${id}/motion?of=confidence`)]);
-    if (id !== store.lineId) return;
-    store.set({ motion, deviation, confidence });
+    await this.curves.change(id, changed);
+    if (id !== this.store.lineId) return;
     this.doubted(id);
     if (!changed) await following;
   }
@@ -203,20 +197,29 @@ export class Studio {
   async showCurves(channels) {
     this.store.set({ channels });
     try {
-      if (this.store.line?.status === "ready") await this.moved(this.store.lineId, null);
+      if (this.store.line?.status === "ready") await this.curves.fill(this.store.lineId);
     } catch (error) {
       this.refuse(error);
     }
   }
 
   /** Make edits; one after another, each with the revision that the one before left. Returns whether they were made. */
-  edit(steps, instead = 0) {
-    return this.request("edits", { steps, ...(instead ? { instead } : {}) }, filled(TEXT.changed, { what: steps[0] ?? "" }));
+  edit(steps) { return this.request("edits", { steps }, filled(TEXT.changed, { what: steps[0] ?? "" })); }
+
+  /** Where a dragged border is: each edit takes the place of the one before; all others wait for the last one. */
+  dragged(steps, instead) {
+    return this.sending(this.requested(this.store.lineId, "edits", { steps, ...(instead ? { instead } : {}) }, filled(TEXT.changed, { what: steps[0] ?? "" })));
   }
 
-  undo() { return this.store.line?.undo ? this.request("undo", {}, TEXT.undone) : this.say(TEXT.nothingToUndo); }
+  undo() { return this.stepped("undo", TEXT.undone, TEXT.nothingToUndo); }
 
-  redo() { return this.store.line?.redo ? this.request("redo", {}, TEXT.redone) : this.say(TEXT.nothingToRedo); }
+  redo() { return this.stepped("redo", TEXT.redone, TEXT.nothingToRedo); }
+
+  stepped(kind, done, nothing) {
+    const { line, saving } = this.store;
+    if (line?.status !== "ready") return this.say(TEXT.notOpen);
+    return line[kind] || saving ? this.request(kind, {}, done) : this.say(nothing);
+  }
 
   async realign(text) {
     const { span } = this.store;
@@ -232,11 +235,17 @@ export class Studio {
 
   request(kind, content, done) {
     clearTimeout(this.settling);
-    const id = this.store.lineId;
-    this.store.set({ saving: this.store.saving + 1 });
-    const reply = this.edits.then(() => this.requested(id, kind, content, done)).finally(() => this.store.set({ saving: this.store.saving - 1 }));
+    const id = this.store.lineId, { phones } = this.timeline;
+    phones.drop();
+    const reply = this.sending(Promise.all([phones.settled, this.edits]).then(() => this.requested(id, kind, content, done)));
     this.edits = reply.catch(() => {});
     return reply;
+  }
+
+  /** Show that something is being saved until it is. */
+  sending(reply) {
+    this.store.set({ saving: this.store.saving + 1 });
+    return reply.finally(() => this.store.set({ saving: this.store.saving - 1 }));
   }
 
   async requested(id, kind, content, done) {
@@ -247,7 +256,8 @@ export class Studio {
       if (id !== this.store.lineId) return true;
       if (state.status && state.status !== "ready") return this.open(id, true);
       this.take(state);
-      if (done) this.say(done);
+      const guessed = (state.guessed ?? []).map(({ word, phones }) => `${word} (${phones.join(" ")})`).join(", ");
+      if (guessed || done) this.say(guessed ? filled(TEXT.guessed, { words: guessed }) : done);
       this.store.set({ unsaved: false });
       this.askedAt = asked_ms;
       if (state.changed) await this.moved(id, state.changed);
@@ -419,6 +429,17 @@ export class Studio {
   focusOn(id) {
     this.store.set({ tab: "edit" });
     queueMicrotask(() => document.getElementById(id)?.focus());
+  }
+
+  /** Let lines be understood, after those that wait already. */
+  async understand(lines) {
+    try {
+      await this.server.told("understand", { lines });
+      await this.listed();
+      this.wake();
+    } catch (error) {
+      this.refuse(error);
+    }
   }
 
   async mark(mark) {

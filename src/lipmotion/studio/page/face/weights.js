@@ -72,9 +72,11 @@ export class Weights {
     const { number, store, studio } = this, stretch = `&start_s=${first * PORTION_S}&end_s=${stop * PORTION_S}`;
     const { weights: part, mesh } = await studio.server.weights(this.address() + stretch);
     if (number !== this.number || !this.held) return;
-    const frames = Math.max(Math.ceil(store.line.duration_s * part.rate_hz) + 1, part.first + part.frames);
-    const fits = store.weights && String(store.weights.names) === String(part.names) && store.weights.frames >= frames;
-    const values = fits ? store.weights.values : new Float32Array(frames * part.names.length).fill(NaN);
+    const frames = Math.max(store.line.frames, part.first + part.frames), before = store.weights;
+    const isSame = before && String(before.names) === String(part.names), fits = isSame && before.frames >= frames;
+    const values = fits ? before.values : new Float32Array(frames * part.names.length).fill(NaN);
+    if (isSame && !fits) values.set(before.values);
+    if (!isSame) this.held.fill(0); // nothing is known of other weights
     values.set(part.values, part.first * part.names.length);
     this.held.fill(1, first, stop);
     if (this.known(store.time_s)) studio.faceComes();

@@ -111,6 +111,12 @@ function spanPart(studio, { start_s, end_s }) {
   const factor = made("input", { id: "gain", type: "range", min: "0", max: String(MOST_GAIN), step: "0.05", value: "1", "aria-label": TEXT.gain,
     oninput: () => { shown.textContent = Number(factor.value).toFixed(2); } });
   const phone = choice(phoneChoices(project), "ah", () => {}, { id: "insert-phone", "aria-label": TEXT.insertPhone });
+  const insert = () => studio.edit([say.insert(phone.value, start_s, end_s)]);
+  phone.addEventListener("keydown", (event) => {
+    if (event.key !== "Enter") return;
+    event.preventDefault();
+    insert();
+  });
   const locked = placed(line.steps).locks.find((lock) => lock.start_s < end_s && lock.end_s > start_s);
   return section(`${TEXT.span} ${start_s.toFixed(2)} – ${end_s.toFixed(2)} s`,
     row(labelled(`${TEXT.gain}: ${channel || TEXT.wholeMouth}`, factor, shown),
@@ -118,7 +124,7 @@ function spanPart(studio, { start_s, end_s }) {
     row(locked ? textButton(TEXT.unlock, () => studio.edit([say.unlock(locked.start_s, locked.end_s)]), { id: "unlock" })
       : textButton(TEXT.lock, () => studio.over(say.lock), { id: "lock", title: TEXT.lockOf }),
     textButton(TEXT.hold, () => studio.over(say.hold), { id: "hold", title: TEXT.holdOf }),
-    phone, textButton(TEXT.insert, () => studio.edit([say.insert(phone.value, start_s, end_s)]), { id: "insert" })));
+    phone, textButton(TEXT.insert, insert, { id: "insert" })));
 }
 
 function moodPart(studio) {
@@ -132,6 +138,6 @@ function moodPart(studio) {
 function transcriptPart(studio) {
   const { line } = studio.store, words = (!line.steps.length && line.transcript) || line.words.map(({ label }) => label).join(" ");
   const field = made("textarea", { id: "transcript", rows: 3, value: words, "aria-label": TEXT.transcript });
-  const warnings = (line.warnings ?? []).map((text) => made("p", { className: "warning", textContent: text }));
+  const warnings = (line.warnings ?? []).map((text) => made("p", { className: "hint", textContent: filled(TEXT.wouldHelp, { what: text }) }));
   return section(TEXT.transcript, ...warnings, field, row(textButton(TEXT.align, () => studio.realign(field.value), { id: "align" })));
 }

@@ -4,7 +4,7 @@ import { choice, icon, inNextFrame, made, textButton } from "../dom.js";
 import { clock } from "../timeline/sound_tracks.js";
 import { TEXT, filled } from "../strings.js";
 
-const ROW_PX = 30, BEYOND = 6, DOUBT_FULL = 1;
+const ROW_PX = 30, BEYOND = 6, DOUBT_FULL = 1, AHEAD = 5;
 const ORDERS = {
   order: null,
   doubt: (a, b) => (b.doubt ?? -1) - (a.doubt ?? -1),
@@ -53,6 +53,7 @@ export class Queue {
     new ResizeObserver(this.draw).observe(this.view);
     this.store.on(["lines"], () => this.sort());
     this.store.on(["lineId"], () => { this.reveal(); this.draw(); });
+    this.store.on(["line"], () => { if (this.store.line?.status === "ready") this.ahead(); });
   }
 
   sort() {
@@ -73,6 +74,12 @@ export class Queue {
     if (!this.lines.length) return;
     const place = Math.min(Math.max(this.place() + distance, 0), this.lines.length - 1);
     this.studio.open(this.lines[place].id);
+  }
+
+  /** Let the next lines be understood while this one is worked on. */
+  ahead() {
+    const place = this.place(), next = place < 0 ? [] : this.lines.slice(place + 1, place + 1 + AHEAD).filter(({ status }) => status === "new");
+    if (next.length) this.studio.understand(next.map(({ id }) => id));
   }
 
   reveal() {

@@ -4,7 +4,7 @@ import { made, onDrag } from "../dom.js";
 import { say } from "../sentences.js";
 import { TEXT, filled } from "../strings.js";
 
-const LEAST_PX = 3, LABEL_PX = 11, LEAST_BORDER_PX = 3, LEAST_PHONE_S = 0.01, SURE = 0.5;
+const LEAST_PX = 3, LABEL_PX = 6, NARROW_PX = 13, LEAST_BORDER_PX = 3, LEAST_PHONE_S = 0.01, SURE = 0.5;
 
 /** A finger needs more room; a border leaves half of a short phone to the phone. */
 const BORDER_PX = matchMedia("(pointer: coarse)").matches ? 19 : 9;
@@ -63,6 +63,7 @@ export class Tier {
     button.style.transform = `translateX(${this.timeline.x(span.start_s)}px)`;
     button.style.width = `${wide}px`;
     button.classList.toggle("selected", isSelected);
+    button.classList.toggle("narrow", wide < NARROW_PX);
     button.classList.toggle("silent", span.label === "sil" || span.label === "sp");
     button.classList.toggle("doubtful", span.confidence !== null && span.confidence < SURE);
     button.setAttribute("aria-pressed", isSelected);
@@ -114,7 +115,7 @@ export class Tier {
     const { phones } = this.store.line, least = phones[before].start_s + LEAST_PHONE_S, most = phones[before + 1].end_s - LEAST_PHONE_S;
     if (this.dragged?.before !== before || this.dragged.dropped) {
       this.drop();
-      this.dragged = { before, time_s: null, sent_s: null, loop: null, earlier: this.settled, dropped: false };
+      this.dragged = { before, time_s: null, sent_s: null, loop: null, earlier: Promise.all([this.settled, this.timeline.studio.edits]), dropped: false };
     }
     this.dragged.time_s = Number(Math.min(Math.max(time_s, least), most).toFixed(3));
     this.borders.get(before)?.classList.add("dragged");
@@ -129,7 +130,7 @@ export class Tier {
       await dragged.earlier;
       while (dragged.time_s !== dragged.sent_s) {
         const { before, time_s } = dragged;
-        if (!await this.timeline.studio.edit([say.ends(before + 1, time_s)], dragged.sent_s === null ? 0 : 1)) break;
+        if (!await this.timeline.studio.dragged([say.ends(before + 1, time_s)], dragged.sent_s === null ? 0 : 1)) break;
         dragged.sent_s = time_s;
       }
     };
@@ -152,7 +153,7 @@ export class Tier {
     dragged.dropped = true;
     dragged.time_s = dragged.sent_s; // no more is sent
     this.leave(dragged);
-    this.settled = this.sent(dragged).then(() => dragged.sent_s !== null && this.timeline.studio.edit([], 1));
+    this.settled = this.sent(dragged).then(() => dragged.sent_s !== null && this.timeline.studio.dragged([], 1));
   }
 
   leave(dragged) {

@@ -162,7 +162,7 @@ export class Timeline {
       move: (event) => {
         if (Math.abs(event.clientX - from_x) < LEAST_SPAN_PX && !event.shiftKey) return;
         const now_s = this.timeOf(event);
-        this.store.set({ span: { start_s: Math.min(from_s, now_s), end_s: Math.max(from_s, now_s) } });
+        this.store.set({ span: { start_s: Math.min(from_s, now_s), end_s: Math.max(from_s, now_s) }, selected: null });
       },
       end: (event) => {
         if (Math.abs(event.clientX - from_x) >= LEAST_SPAN_PX || event.shiftKey) return;
