@@ -14,7 +14,7 @@ import pytest
 
 from children import LIPMOTION, child, wait_until
 from lipmotion.meshes.files.gltf_weights import read_gltf_motion
-from study.browser import CONTROL, DELETE, ENTER, ESCAPE, RIGHT, SHIFT, SPACE, TAB, UP, Browser, check_screen
+from study.browser import CONTROL, DELETE, ENTER, ESCAPE, RIGHT, SHIFT, SPACE, TAB, UP, WINDOW_S, Browser, check_screen
 from study.firefox import BOTH, Opens
 
 pytest.importorskip("uvicorn", reason="the extra 'studio' is not installed")
@@ -84,7 +84,7 @@ class Page:
 def served(folder: Path, *source: Path) -> Iterator[str]:
     """Give the address of a studio over a project in a folder."""
     command = [*LIPMOTION, "studio", *(source or [folder]), *(["-o", folder] if source else []), "--no-browser"]
-    with child(command) as process:
+    with child(command, limit_s=WINDOW_S) as process:
         line = process.stdout.readline() if process.stdout else ""
         found = re.search(r"http://127\.0\.0\.1:\d+/#\S+", line)
         assert found, line
@@ -194,7 +194,7 @@ def test_a_dropped_line_is_read_corrected_and_exported(opens: Opens, tmp_path: P
         window.press(ESCAPE, ESCAPE, "a")
         wait_until(lambda: page.of("studio.store.lines.at(-1).mark") == "approved", LIMIT_S)
         window.run("document.getElementById('transcript').value += ' now'")
-        page.edit(lambda: window.click("#align"), r"say please .* now from \S+ to \S+")
+        page.edit(lambda: window.click("#align"), r"say please .* now from \S+ to \S+ with speak s p iy k s")
         window.click("#export")
         window.click("#export-approved")
         wait_until(lambda: "Written" in window.text("dialog"), LIMIT_S)

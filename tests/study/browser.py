@@ -24,6 +24,8 @@ MISSING = "no Chromium with its driver: apt install chromium chromium-driver"
 SPACE, ENTER, LEFT, RIGHT = " ", "\ue007", "\ue012", "\ue014"
 ESCAPE, TAB, SHIFT, CONTROL, UP, DELETE = "\ue00c", "\ue004", "\ue008", "\ue009", "\ue013", "\ue017"
 """Keys, as WebDriver names them."""
+WINDOW_S = 3600.0
+"""A window may stay open that long: all tests of a page share one."""
 
 
 class Browser:
@@ -117,7 +119,7 @@ def webdriver(port: int, method: str, path: str, content: Any = None) -> Any:
 def browser(folder: Path, *more_switches: str) -> Iterator[Browser]:
     """Give a browser with a profile of its own in a folder."""
     variables = environment(HOME=str(folder))
-    with child([DRIVER, "--port=0"], variables=variables, stdout=PIPE, stderr=NOWHERE) as driver:
+    with child([DRIVER, "--port=0"], variables=variables, stdout=PIPE, stderr=NOWHERE, limit_s=WINDOW_S) as driver:
         line = ""
         while "on port" not in line or "successfully" not in line:
             line = driver.stdout.readline() if driver.stdout else ""

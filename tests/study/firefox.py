@@ -20,7 +20,7 @@ from typing import Any
 import pytest
 
 from children import NOWHERE, child, environment, wait_until
-from study.browser import BROWSER, DRIVER, MISSING, Browser, browser
+from study.browser import BROWSER, DRIVER, MISSING, WINDOW_S, Browser, browser
 
 PROGRAM = next(filter(None, map(shutil.which, ("firefox-esr", "firefox"))), None)
 SCREEN = shutil.which("Xvfb")
@@ -139,11 +139,13 @@ def firefox(folder: Path, *switches: str) -> Iterator[Browser]:
     ]
     size = {"MOZ_HEADLESS_WIDTH": "1200", "MOZ_HEADLESS_HEIGHT": "1000"}
     with ExitStack() as stack:
-        screen = stack.enter_context(child([SCREEN, "-displayfd", 1, "-nolisten", "tcp"], stderr=NOWHERE))
+        screen = stack.enter_context(
+            child([SCREEN, "-displayfd", 1, "-nolisten", "tcp"], stderr=NOWHERE, limit_s=WINDOW_S)
+        )
         number = screen.stdout.readline().strip() if screen.stdout else ""
         assert number, "the screen ended"
         variables = environment(HOME=str(folder), DISPLAY=f":{number}", **size)
-        stack.enter_context(child(command, variables=variables, stdout=NOWHERE, stderr=NOWHERE))
+        stack.enter_context(child(command, variables=variables, stdout=NOWHERE, stderr=NOWHERE, limit_s=WINDOW_S))
         told = profile / "MarionetteActivePort"
         wait_until(lambda: told.exists() and told.read_text(encoding="utf-8").strip(), START_S)
         port = int(told.read_text(encoding="utf-8"))
