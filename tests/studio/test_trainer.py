@@ -13,44 +13,27 @@ import pytest
 
 from children import wait_until
 from lipmotion.corpora.store import Corpus
-from lipmotion.export.motion import write_motion
-from lipmotion.export.sound import write_sound
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.testing.toy import ToySentence, toy_motion, toy_sentences
+from lipmotion.testing.toy import ToySentence
 
 pytest.importorskip("starlette", reason="the extra 'studio' is not installed")
 
 from lipmotion.studio.trainer import TRAINING, Trainer
 from lipmotion.studio.training import TrainingOptions, TrainingOrder, carry_out, divided_names
 from studio.open_studio import OpenStudio, open_studio
+from studio.toy_recordings import SENTENCES, write_recordings
 
-SENTENCES = 4
 OPTIONS = {"prior": False}
 
 
-def write_recordings(folder: Path) -> Path:
-    """Write toy sentences as sounds with their motion and words, one of them for the test list; and one without sound."""
-    folder.mkdir()
-    for sentence in toy_sentences(SENTENCES):
-        write_sound(folder / f"{sentence.name}.wav", sentence.audio)
-        write_motion(folder / f"{sentence.name}.csv", toy_motion(sentence.units, 100.0))
-        (folder / f"{sentence.name}.txt").write_text(" ".join(sentence.words), encoding="utf-8")
-    (folder / "empty.wav").touch()
-    (folder / "empty.csv").write_text("time_s,opening\n0,0\n", encoding="utf-8")
-    names = [f"toy{number:02d}" for number in range(SENTENCES)]
-    (folder / "train.txt").write_text("\n".join([*names[:-1], "empty"]), encoding="utf-8")
-    (folder / "test.txt").write_text(names[-1], encoding="utf-8")
-    return folder
-
-
 @pytest.fixture
-def studio(
-    toy_speech: Path, toy_sentence: ToySentence, toy_model: Model, tmp_path: Path
-) -> Iterator[OpenStudio]:
+def studio(toy_speech: Path, toy_sentence: ToySentence, toy_model: Model, tmp_path: Path) -> Iterator[OpenStudio]:
     """A studio with a line, and a folder of recordings that a voice can be trained on."""
     recordings = write_recordings(tmp_path / "recordings")
     with open_studio(toy_speech, " ".join(toy_sentence.words), toy_model, tmp_path / "studio") as opened:
-        opened.folder.change(lambda project: replace(project, recordings=os.path.relpath(recordings, opened.folder.path)))
+        opened.folder.change(
+            lambda project: replace(project, recordings=os.path.relpath(recordings, opened.folder.path))
+        )
         yield opened
 
 
@@ -137,22 +120,25 @@ def test_what_is_stopped_or_killed_goes_on(studio: OpenStudio) -> None:
     assert not list((studio.folder.path / "voices").glob("*.unfinished"))
 
 
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [
-        ({"kind": "song", "name": "a"}, "voice or face"),
-        ({"kind": "voice", "name": "a", "lines": [1]}, "no video of this project"),
-        ({"kind": "voice", "name": "a", "lines": "all"}, "required a list of numbers"),
-        ({"kind": "voice", "name": "a", "options": {"engine": "../x"}}, "engine"),
-        ({"kind": "voice", "name": "a", "options": {"path": "/etc"}}, "no option 'path'"),
-        ({"kind": "voice", "name": "a", "options": []}, "options"),
-        ({"kind": "voice", "name": "a" * 300}, "at most 200"),
-    ],
-)
-def test_what_cannot_be_made_is_refused(studio: OpenStudio, content: dict[str, Any], said: str) -> None:
-    reply = studio.ask("/api/training", content)
-    assert (reply.status, said in reply.content["error"]) == (422, True), reply.content
+REFUSED: list[tuple[dict[str, Any], str]] = [
+    ({"kind": "song", "name": "a"}, "voice or face"),
+    ({"kind": "voice", "name": "a", "lines": [1]}, "no video of this project"),
+    ({"kind": "voice", "name": "a", "lines": "all"}, "required a list of numbers"),
+    ({"kind": "voice", "name": "a", "options": {"engine": "../x"}}, "engine"),
+    ({"kind": "voice", "name": "a", "options": {"path": "/etc"}}, "no option 'path'"),
+    ({"kind": "voice", "name": "a", "options": []}, "options"),
+    ({"kind": "voice", "name": "a" * 300}, "at most 200"),
+]
+
+
+def test_what_cannot_be_made_is_refused(studio: OpenStudio) -> None:
+    for content, said in REFUSED:
+        reply = studio.ask("/api/training", content)
+        assert (reply.status, said in reply.content["error"]) == (422, True), reply.content
     assert studio.ask("/api/training").content["job"] is None
+    studio.folder.change(lambda project: replace(project, recordings=""))
+    reply = studio.ask("/api/training", {"kind": "face", "name": "a"})
+    assert (reply.status, "--recordings" in reply.content["error"]) == (422, True)
     assert not (studio.folder.path / TRAINING).exists()
 
 

@@ -7,7 +7,7 @@ import os
 import shutil
 import threading
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from multiprocessing.connection import Connection
@@ -93,7 +93,9 @@ class Trainer:
 
     def videos(self) -> list[ProjectLine]:
         """Return the lines of the project that are videos."""
-        return [line for line in self._folder.project.lines.values() if Path(line.sound).suffix.lower() in VIDEO_SUFFIXES]
+        return [
+            line for line in self._folder.project.lines.values() if Path(line.sound).suffix.lower() in VIDEO_SUFFIXES
+        ]
 
     def made(self, kind: str) -> dict[str, Path]:
         """Return the files of the voices or the faces of the project by their names."""
@@ -155,7 +157,9 @@ class Trainer:
                 raise
             self._begun_s, self._first_share = time.monotonic(), None
             self._process, pipe = begun_apart(carry_out, order)
-            self._thread = threading.Thread(target=self._follow, args=(self._process, pipe), name="training", daemon=True)
+            self._thread = threading.Thread(
+                target=self._follow, args=(self._process, pipe), name="training", daemon=True
+            )
             self._thread.start()
 
     def _order(self, wanted: Wanted) -> TrainingOrder:
@@ -166,8 +170,8 @@ class Trainer:
             raise InputError(f"line {missing[0]} is no video of this project; choose among its videos")
         if not wanted.lines and project.recordings is None:
             raise InputError(
-                "no recordings are chosen; choose lines that are videos, or give a folder: lipmotion studio --recordings "
-                "FOLDER"
+                "no recordings are chosen; choose lines that are videos, or give a folder: lipmotion studio "
+                "--recordings FOLDER"
             )
         chosen = [videos[number] for number in wanted.lines]
         lines = tuple(LearnedLine(project.sound(line).absolute(), line.name, line.transcript) for line in chosen)

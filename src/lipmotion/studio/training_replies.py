@@ -61,7 +61,9 @@ class TrainingReplies:
     def _document(self) -> dict[str, Any]:
         project, trainer = self._studio.folder, self._trainer
         videos, used = trainer.videos(), project.project.model
-        listed = [{"id": line.number, "name": line.name, "duration_s": line.duration_s} for line in videos[:MOST_LISTED]]
+        listed = [
+            {"id": line.number, "name": line.name, "duration_s": line.duration_s} for line in videos[:MOST_LISTED]
+        ]
         voices = [{"name": name, "used": path == used} for name, path in self._studio.voices().items()]
         return {
             "job": trainer.document(),
