@@ -19,7 +19,7 @@ from lipmotion.testing.toy import ToySentence
 pytest.importorskip("starlette", reason="the extra 'studio' is not installed")
 
 from lipmotion.studio.trainer import TRAINING, Trainer
-from lipmotion.studio.training import TrainingOptions, TrainingOrder, carry_out, divided_names
+from lipmotion.studio.training import TrainingOrder, VoiceOptions, carry_out, divided_names
 from studio.open_studio import OpenStudio, open_studio
 from studio.toy_recordings import SENTENCES, write_recordings
 
@@ -153,7 +153,7 @@ def test_videos_of_the_project_are_gathered_with_their_words(tmp_path: Path) -> 
         LearnedLine(tmp_path / "take.mp4", "a-take", "so typed"),
         LearnedLine(tmp_path / "other.mp4", "other", ""),
     )
-    order = TrainingOrder("voice", tmp_path / "me.lipmotion", tmp_path / "work", lines, TrainingOptions(), None, 1)
+    order = TrainingOrder("voice", tmp_path / "me.lipmotion", tmp_path / "work", lines, VoiceOptions(), None, 1)
     with _gathered(order) as place:
         found = {path.name: path.read_text(encoding="utf-8") for path in place.iterdir()}
     assert found == {

@@ -23,7 +23,7 @@ from lipmotion.storage.files import UNFINISHED, read_text_file, whole_file, work
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.studio.folder import ProjectFolder, plain_name
 from lipmotion.studio.project import ProjectLine
-from lipmotion.studio.training import FACE, KINDS, VOICE, LearnedLine, TrainingOptions, TrainingOrder, carry_out
+from lipmotion.studio.training import FACE, KINDS, VOICE, LearnedLine, TrainingOrder, VoiceOptions, carry_out
 
 LOG = logging.getLogger("lipmotion")
 TRAINING, STATE = "training", "state.json"
@@ -45,7 +45,7 @@ class Wanted:
     kind   : ``voice`` or ``face``
     name   : of what is made
     lines  : numbers of the lines that are learned from; none: the folder of recordings is
-    options : values of ``TrainingOptions`` by name
+    options : values of ``VoiceOptions`` by name
     """
 
     kind: str
@@ -102,7 +102,7 @@ class Trainer:
         folder, suffix = PLACES[kind]
         return {path.stem: path for path in sorted((self._folder.path / folder).glob(f"*{suffix}")) if _is_whole(path)}
 
-    def begin(self, kind: str, name: str, lines: Sequence[int], options: TrainingOptions) -> None:
+    def begin(self, kind: str, name: str, lines: Sequence[int], options: VoiceOptions) -> None:
         """Begin to make a voice or a face.
 
         name  : of its file, which is made one that is free
@@ -181,7 +181,7 @@ class Trainer:
             place / wanted.file,
             place / TRAINING,
             lines or (project.recordings or place).absolute(),
-            TrainingOptions.stored(wanted.options),
+            VoiceOptions.stored(wanted.options),
             project.lexicon_file and project.lexicon_file.absolute(),
             max((os.cpu_count() or 2) - 1, 1),  # the page needs one
         )
@@ -253,7 +253,7 @@ class Trainer:
                 return None, {}
             given, told = found["wanted"], found["told"]
             wanted = Wanted(given["kind"], plain_name(given["name"]), tuple(map(int, given["lines"])), given["options"])
-            TrainingOptions.stored(wanted.options)
+            VoiceOptions.stored(wanted.options)
             if wanted.kind not in KINDS or told["state"] not in (WORKING, DONE, FAILED, STOPPED, INTERRUPTED):
                 return None, {}
             state = INTERRUPTED if told["state"] == WORKING else told["state"]

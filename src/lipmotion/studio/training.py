@@ -41,7 +41,7 @@ Tell = Callable[[Mapping[str, Any]], None]
 
 
 @dataclass(frozen=True)
-class TrainingOptions(Configuration):
+class VoiceOptions(Configuration):
     """How a voice is trained.
 
     engine   : the method that learns
@@ -80,7 +80,7 @@ class TrainingOrder:
     target: Path
     work: Path
     source: Path | tuple[LearnedLine, ...]
-    options: TrainingOptions
+    options: VoiceOptions
     lexicon: Path | None
     workers: int
 
@@ -192,7 +192,7 @@ def _voice(order: TrainingOrder, recordings: Path, monitor: Monitor) -> dict[str
 def divided_names(corpus: Corpus, names: Sequence[str], *, held_out: bool) -> tuple[list[str], list[str]]:
     """Return which of some utterances are learned from, and which show how good the voice is.
 
-    held_out : as of ``TrainingOptions``
+    held_out : as of ``VoiceOptions``
     """
     names = sorted(names)
     if not held_out:
@@ -226,8 +226,8 @@ def _face(order: TrainingOrder, recordings: Path, monitor: Monitor) -> dict[str,
     return {"facts": face.summary}
 
 
-def check_options(given: Mapping[str, Any]) -> TrainingOptions:
+def check_options(given: Mapping[str, Any]) -> VoiceOptions:
     """Return the options that a request gives. Raises InputError: unknown, or a value that is not allowed."""
     if not isinstance(given, Mapping):
         raise InputError("options is no object of names and values")
-    return TrainingOptions.parsed(given)
+    return VoiceOptions.parsed(given)

@@ -13,7 +13,7 @@ from lipmotion.studio.asked import content_of, text
 from lipmotion.studio.project import MOST_LINES
 from lipmotion.studio.studio import Studio
 from lipmotion.studio.trainer import MOST_LISTED
-from lipmotion.studio.training import FACE, VOICE, TrainingOptions, check_options
+from lipmotion.studio.training import FACE, VOICE, VoiceOptions, check_options
 from lipmotion.types.configuration import kind_of
 from lipmotion.web.replies import FRESH
 
@@ -73,7 +73,7 @@ class TrainingReplies:
             "count": len(videos),
             "recordings": project.recordings.name if project.recordings else "",
             "kinds": [VOICE, FACE],
-            "options": [_option(each) for each in fields(TrainingOptions)],
+            "options": [_option(each) for each in fields(VoiceOptions)],
         }
 
 
