@@ -229,7 +229,7 @@ def plain_name(given: str, usual: str = "line") -> str:
     """Return a name that the page gives as the name of a file: letters, digits and a few signs; ``usual``: of none.
 
     >>> plain_name("../Anna's take"), plain_name("..", "voice")
-    ("Anna_s take", 'voice')
+    ('Anna_s take', 'voice')
     """
     plain = re.sub(r"[^\w .+()-]", "_", unicodedata.normalize("NFC", given)).strip(" ._")
     return plain[:LONGEST_NAME] or usual
