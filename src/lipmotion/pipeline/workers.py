@@ -125,6 +125,29 @@ def _begun(
         yield from results
 
 
+def begun_apart(
+    function: Callable[[ItemT, Callable[[Any], None]], None], item: ItemT
+) -> tuple[BaseProcess, pipes.Connection[Any, Any]]:
+    """Begin work in a process of its own, which may start workers; return the process, and the end of its pipe.
+
+    function : called there with the item, and with a function that sends what it is given through the pipe
+    The pipe ends with the process. The process and its workers end at its ``kill``, which is delayed by nothing, and
+    when this process ends, for whatever reason; signals are not for it.
+    """
+    context = multiprocessing.get_context("spawn")
+    here, there = context.Pipe(duplex=False)
+    process = context.Process(target=_apart, args=(there, function, item))
+    with _signals_delayed():
+        process.start()
+    there.close()
+    return process, here
+
+
+def _apart(end: Any, function: Callable[[Any, Callable[[Any], None]], None], item: Any) -> None:
+    _begin_below()
+    function(item, end.send)
+
+
 @contextmanager
 def _worker() -> Iterator[Any]:
     """Start a worker process; provide this process's end of the pipe to it."""
@@ -214,8 +237,7 @@ def _handled_by(handler: Callable[[int, Any], None]) -> dict[int, Any]:
 
 def _work(end: Any) -> None:
     """Apply the functions that come through the pipe to their items, until the pipe ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # where signals cannot be delayed
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    _begin_below()
     with one_thread():
         while True:
             try:
@@ -227,6 +249,12 @@ def _work(end: Any) -> None:
             except Exception as error:
                 outcome = False, error
             end.send(outcome)
+
+
+def _begin_below() -> None:
+    """Leave Ctrl-C to the process that started this one, and end with it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # where signals cannot be delayed
+    threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
 def _end_with_parent() -> None:

@@ -19,6 +19,7 @@ from lipmotion.studio.line_replies import LineReplies
 from lipmotion.studio.page_files import page_files
 from lipmotion.studio.project_replies import ProjectReplies
 from lipmotion.studio.studio import Studio
+from lipmotion.studio.training_replies import TrainingReplies
 from lipmotion.web.replies import ERRORS, FRESH, HEADERS, SecurityHeaders
 
 PAGE_POLICY = HEADERS["content-security-policy"] + (
@@ -32,7 +33,7 @@ def studio_application(studio: Studio, access: Access) -> Starlette:
 
     access : the token, and the addresses that the server has
     """
-    lines, project = LineReplies(studio, access), ProjectReplies(studio)
+    lines, project, training = LineReplies(studio, access), ProjectReplies(studio), TrainingReplies(studio)
     page = page_files()
 
     async def packaged(request: Request) -> Response:
@@ -68,6 +69,11 @@ def studio_application(studio: Studio, access: Access) -> Starlette:
         Route("/api/faces/{name}.glb", project.mesh),
         Route("/api/lexicon", project.pronunciations),
         post("/api/lexicon", project.pronounce),
+        Route("/api/training", training.training),
+        post("/api/training", training.begin),
+        post("/api/training/stop", training.stop),
+        post("/api/training/again", training.again),
+        post("/api/voice", training.voice),
         Route("/", packaged),
         Route("/{name:path}", packaged),
     ]

@@ -165,6 +165,22 @@ class Desk:
             _close(work)
             self._no_longer_waits(work)
 
+    def use(self, model: Model) -> None:
+        """Go over to another model: lines that are open are opened with it, once they are wanted again.
+
+        Edits that are on their way are made and written before that.
+        """
+        self.model = model
+        for number, work in list(self._works.items()):
+            if work.line is None or work.thread is None:
+                continue
+            if work.users:
+                work.line = None
+                work.thread.submit(self._open, work)
+            else:
+                _close(work)
+                del self._works[number]
+
     def _no_longer_waits(self, work: Work) -> None:
         with suppress(ValueError):
             self._waiting.remove(work)
@@ -195,8 +211,12 @@ class Desk:
 
     def _open(self, work: Work) -> None:
         def opening() -> None:
-            audio = self._understand(work)
-            work.line = open_line(self.folder, self.folder.line(work.number), self.model, audio)
+            audio, line = self._understand(work), self.folder.line(work.number)
+            model = self.model
+            work.line = open_line(self.folder, line, model, audio)
+            while model is not self.model:  # another one is used since
+                model = self.model
+                work.line = open_line(self.folder, line, model, audio)
 
         self._run(work, opening)
 

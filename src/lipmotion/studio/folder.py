@@ -124,7 +124,7 @@ class ProjectFolder:
             raise InputError(f"{name!r} is no name of a recording; required one as speech.wav, speech.flac, take.mp4")
         with self._lock:
             taken = {_key(line.name) for line in self.project.lines.values()}
-            stem = _free(_clean(Path(name).stem), taken)
+            stem = _free(plain_name(Path(name).stem), taken)
             folder = self.path / SOUNDS
             folder.mkdir(exist_ok=True)
             file = folder / f"{stem}{Path(name).suffix.lower()}"
@@ -135,6 +135,12 @@ class ProjectFolder:
             check_lines(self.project.with_lines([line]))
             self.change(lambda project: project.with_lines([line]))
             return number
+
+    @property
+    def recordings(self) -> Path | None:
+        """The folder of recordings that voices may be trained on; None: none was given."""
+        given = self.project.recordings
+        return Path(os.path.normpath(self.path / given)) if given else None
 
     @property
     def model_file(self) -> Path | None:
@@ -220,7 +226,11 @@ def _free(name: str, taken: set[str]) -> str:
     return found
 
 
-def _clean(stem: str) -> str:
-    """Return the name of a dropped file as the name of a line: letters, digits and a few signs."""
-    plain = re.sub(r"[^\w .+()-]", "_", unicodedata.normalize("NFC", stem)).strip(" ._")
-    return plain[:LONGEST_NAME] or "line"
+def plain_name(given: str, usual: str = "line") -> str:
+    """Return a name that the page gives as the name of a file: letters, digits and a few signs; ``usual``: of none.
+
+    >>> plain_name("../Anna's take"), plain_name("..", "voice")
+    ('Anna_s take', 'voice')
+    """
+    plain = re.sub(r"[^\w .+()-]", "_", unicodedata.normalize("NFC", given)).strip(" ._")
+    return plain[:LONGEST_NAME] or usual

@@ -77,6 +77,8 @@ class Project:
     language, recogniser : of new lines, as of ``SpeechRequest``
     preset     : that was used last for an export
     characters : paths of characters, by their names
+    recordings : path of a folder of recordings that a voice or a face can be made of; empty: none
+    given_model : path of the model that was used before one that was trained here; empty: the one that ships
     next_number : of the next line
     """
 
@@ -86,6 +88,8 @@ class Project:
     recogniser: str = "auto"
     preset: str = ""
     characters: Mapping[str, str] = field(default_factory=dict)
+    recordings: str = ""
+    given_model: str = ""
     next_number: int = 1
 
     def with_lines(self, lines: Sequence[ProjectLine]) -> Project:
@@ -132,7 +136,8 @@ def project_from(content: Any) -> Project:
         if len({line.number for line in lines}) < len(lines):
             raise ValueError("two lines of one number")
         project = Project({line.number: line for line in lines}, **given)
-        if not all(isinstance(text, str) for text in (project.model, project.preset, *project.characters.values())):
+        paths = (project.model, project.given_model, project.recordings, *project.characters.values())
+        if not all(isinstance(text, str) for text in (project.preset, *paths)):
             raise ValueError("a path or a name that is no text")
         project = replace(project, next_number=int(project.next_number)).with_lines(lines)
     except InputError:

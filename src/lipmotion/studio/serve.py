@@ -9,6 +9,7 @@ from pathlib import Path
 from secrets import token_urlsafe
 from threading import Thread
 
+from lipmotion.errors import InputError
 from lipmotion.pipeline.outputs.scenes import sound_reference
 from lipmotion.web.listening import HOST, check_installed, listening, serve
 
@@ -23,6 +24,7 @@ def serve_studio(
     out: Path | None = None,
     model: Path | None = None,
     characters: Mapping[str, Path] | None = None,
+    recordings: Path | None = None,
     port: int = 0,
     started: Callable[[str], object] | None = None,
 ) -> None:
@@ -32,12 +34,15 @@ def serve_studio(
     out        : folder of a new project; None: beside the source
     model      : of the project from now on; None: as it is
     characters : further ones of the project, by their names
+    recordings : folder of recordings that a voice or a face can be made of; None: as it is
     port       : 0: any that is free
     started    : called with the address of the page, which holds a token, once it can be opened
     Raises InputError: no such file, no project that can be read, or the port is taken. ExportError: another process
     works on the project. MissingDependencyError: a package of the extra ``studio`` is not installed.
     """
     check_installed("the studio", "studio")
+    if recordings is not None and not recordings.is_dir():
+        raise InputError(f"{recordings}: no such folder; give a folder of videos of one person")
     from lipmotion.studio.access import Access
     from lipmotion.studio.application import studio_application
     from lipmotion.studio.folder import PROJECT, opened_folder
@@ -47,8 +52,10 @@ def serve_studio(
         file = folder.path.absolute() / PROJECT
         own = {name: sound_reference(path.absolute(), file) for name, path in (characters or {}).items()}
         chosen = sound_reference(model.absolute(), file) if model else folder.project.model
-        if own or model:
-            folder.change(lambda now: replace(now, characters={**now.characters, **own}, model=chosen))
+        spoken = sound_reference(recordings.absolute(), file) if recordings else folder.project.recordings
+        if own or model or recordings:
+            together = {**folder.project.characters, **own}
+            folder.change(lambda now: replace(now, characters=together, model=chosen, recordings=spoken))
         token = token_urlsafe(TOKEN_BYTES)
         hosts = frozenset(f"{name}:{place.getsockname()[1]}" for name in NAMES)
         with closing(Studio(folder)) as studio:

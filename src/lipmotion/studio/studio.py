@@ -33,7 +33,9 @@ from lipmotion.studio.desk import NEW, READY, WAITING, WORKING, Desk, NotReadyEr
 from lipmotion.studio.folder import EXPORTS, ProjectFolder
 from lipmotion.studio.meshes import Faces
 from lipmotion.studio.presets import PRESETS, Preset, suffixes
-from lipmotion.studio.project import EDITS_SUFFIX, MARKS, ExportRecord, ProjectLine
+from lipmotion.studio.project import EDITS_SUFFIX, MARKS, ExportRecord, Project, ProjectLine
+from lipmotion.studio.trainer import VOICES, Trainer
+from lipmotion.studio.training import VOICE
 from lipmotion.types.configuration import ANY, kind_of
 from lipmotion.types.delivery import Delivery
 from lipmotion.types.moods import MANNERS, MOODS
@@ -70,9 +72,11 @@ class Studio:
         self._exporting: dict[str, int] | None = None
         self._summaries: dict[int, tuple[int, EditsSummary]] = {}
         self._model_digest = sha256_of(file or shipped_path())
+        self.trainer = Trainer(folder)
 
     def close(self) -> None:
         """Write what is not written, and remove what was kept for this run alone."""
+        self.trainer.close()
         self.desk.close()
         shutil.rmtree(self._sounds, ignore_errors=True)
 
@@ -113,7 +117,8 @@ class Studio:
     def row(self, number: int) -> dict[str, Any]:
         """Return what the list says of a line."""
         line, summary = self.folder.line(number), self.summary(number)
-        changed = bool(line.exports) and line.exports[-1].steps != summary.digest
+        made = (summary.digest, self._model_digest)
+        changed = bool(line.exports) and (line.exports[-1].steps, line.exports[-1].model) != made
         return {
             "id": number,
             "name": line.name,
@@ -140,7 +145,45 @@ class Studio:
         works = self.desk.at_work()
         lines = [{"id": work.number, "status": work.status, **_progress(work), "error": work.error} for work in works]
         waiting = sum(work.status == WAITING for work in works)
-        return {"lines": lines, "waiting": waiting, "revision": self.folder.revision, "export": self._exporting}
+        told = {"lines": lines, "waiting": waiting, "revision": self.folder.revision, "export": self._exporting}
+        return told | {"training": self.trainer.short_document()}
+
+    def voices(self) -> dict[str, str]:
+        """Return the models that the project may use by name, as paths from its folder; of the one that ships empty.
+
+        The names are those of files; that of the one that ships is empty.
+        """
+        project = self.folder.project
+        own = {name: path.relative_to(self.folder.path).as_posix() for name, path in self.trainer.made(VOICE).items()}
+        others = [path for path in (project.given_model, project.model) if path and path not in own.values()]
+        return {"": ""} | {Path(path).name: path for path in others} | own
+
+    def voice_model(self, name: str) -> tuple[str, Model, str]:
+        """Return path, model and digest of a voice. Raises InputError: none of that name. Others as ``load_model``."""
+        known = self.voices()
+        if name not in known:
+            raise InputError(f"no voice {shortened(repr(name))}; required one of: {', '.join(filter(None, known))}")
+        file = Path(os.path.normpath(self.folder.path / known[name])) if known[name] else None
+        return known[name], load_model(file), sha256_of(file or shipped_path())
+
+    def use_voice(self, path: str, model: Model, digest: str) -> None:
+        """Let another model move the lines of the project, from now on; their phones and edits stay.
+
+        path : from the folder of the project; empty: the one that ships
+        Raises ExportError: the project cannot be written.
+        """
+
+        def with_model(project: Project) -> Project:
+            given = project.model if self.is_given(project.model) else project.given_model
+            return replace(project, model=path, given_model=given)
+
+        self.folder.change(with_model)
+        self.model, self._model_digest = model, digest
+        self.desk.use(model)
+
+    def is_given(self, path: str) -> bool:
+        """Return whether a model was given, and not trained here."""
+        return bool(path) and not path.startswith(f"{VOICES}/")
 
     def forms(self) -> dict[str, Any]:
         """Return what can be chosen, from the registries and configurations."""

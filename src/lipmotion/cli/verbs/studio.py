@@ -20,6 +20,8 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add_input(parser, "--model", what="model", metavar="FILE", help=model)
     character = "your own character, as a face of the project: FILE.glb .vrm .obj (repeatable)"
     add_input(parser, "--character", what="character", action="append", default=[], metavar="FILE", help=character)
+    recordings = "folder of videos that a voice or a face can be made of on the page (docs/studio.md)"
+    add_input(parser, "--recordings", what="folder of recordings", metavar="FOLDER", help=recordings)
     parser.add_argument("--port", type=int, default=0, help="0: any that is free (default: 0)")
     parser.add_argument("--no-browser", action="store_true", help="print the address, and open no browser")
     parser.set_defaults(run=run)
@@ -38,5 +40,5 @@ def run(options: argparse.Namespace) -> None:
             webbrowser.open(address)
 
     characters: dict[str, Path] = {path.stem: path for path in options.character}
-    given = {"out": options.output, "model": options.model, "port": options.port}
+    given = {"out": options.output, "model": options.model, "port": options.port, "recordings": options.recordings}
     serve_studio(options.source, characters=characters, started=started, **given)

@@ -4,7 +4,7 @@ import { choice, labelled, made, textButton } from "./dom.js";
 import { HELP, TEXT, filled } from "./strings.js";
 import { KEYS } from "./keys.js";
 
-function dialog(title, ...children) {
+export function dialog(title, ...children) {
   const shown = made("dialog", { "aria-label": title }, made("div", { className: "bar" }, made("h2", { textContent: title }),
     textButton(TEXT.close, () => shown.close(), { className: "close" })), ...children);
   shown.addEventListener("close", () => shown.remove());

@@ -22,6 +22,7 @@ export class Store {
     this.time_s = 0;
     this.comparing = false; // whether the other version is shown
     /** @type {any} */ this.progress = null; // of the open line
+    /** @type {any} */ this.training = {}; // how far a voice or a face is
     this.tool = "select";
     this.channels = ["opening", "width", "outer"];
     this.saving = 0;

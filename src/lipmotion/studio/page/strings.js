@@ -149,6 +149,57 @@ export const TEXT = {
   drawing: "Draw on: drag over a curve; a click pins a value.",
 };
 
+/** One's own voice and face. */
+export const OWN = {
+  open: "Own voice …",
+  openWorking: "Own voice: {share}",
+  title: "Your own voice and face",
+  about: "A minute or more of video of one person who talks, seen from the front, becomes a voice: how this person's mouth moves. Or a face: what it looks like. Whose they are must have agreed.",
+  kinds: { voice: "The voice", face: "The face" },
+  states: {
+    working: "{what} “{name}” is being made", done: "{what} “{name}” is ready", failed: "{what} “{name}” could not be made",
+    stopped: "{what} “{name}” was stopped", interrupted: "{what} “{name}” was interrupted: the studio ended meanwhile",
+  },
+  progress: "How far it is",
+  leftSeconds: "about {count} s left",
+  leftMinutes: "about {count} min left",
+  stop: "Stop",
+  again: "Go on",
+  skipped: "{name} is not used: {reason}",
+  notes: "What else there is to know ({count})",
+  facts: { learned: "learned from", kept: "kept back", skipped: "not used", file: "file" },
+  learned: "{learned} recordings, {minutes} minutes in all",
+  columns: ["Recordings kept back", "Opening", "All curves"],
+  conditions: { "audio only": "from the sound alone", "with transcript": "with its words" },
+  unmeasured: "No recordings were kept back (there are fewer than ten, or they were not to be), so it is not known how good the voice is.",
+  inFull: "All figures (ACC: correlation with the recorded motion, at most 1)",
+  use: "Use this voice in this project",
+  isUsed: "This project uses this voice",
+  useFace: "The face lies in the folder of the project. It speaks in a video: lipmotion animate SPEECH --face {file} -o said.mp4",
+  newOne: "Make a new one",
+  noRecordings: "There are no videos in this project. Drop some on this page, or start the studio with a folder of them: lipmotion studio --recordings FOLDER",
+  name: "Name",
+  namePlaceholder: "of the person",
+  source: "Learn from",
+  folder: "the folder {name}",
+  lines: "videos of this project",
+  more: "and {count} more, which can be used by giving their folder: lipmotion studio --recordings FOLDER",
+  add: "Add videos",
+  noneTicked: "No video is ticked; tick one or more.",
+  optionsTitle: "How a voice is trained",
+  options: { engine: "Method", prior: "Stand on the model that ships (for less than eight minutes of video)", held_out: "Keep some recordings back, which show how good the voice is" },
+  engines: {
+    trajectory: "trajectory: smooth curves, the usual one", coupled: "coupled: chains of states of speech and lips", joint: "joint: one model of speech and motion",
+    selection: "selection: recorded motion, chosen and joined",
+  },
+  begin: { voice: "Train a voice", face: "Build a face" },
+  usedTitle: "In use",
+  voice: "Voice of this project",
+  shipped: "the one that ships",
+  usedHint: "Another voice moves the mouths of all lines otherwise; words, phones and edits stay. Choose the one before, and all is as it was.",
+  faces: "Faces of this project: {files}",
+};
+
 /** Names of groups of keys, and what each key does. */
 export const HELP = {
   listen: "Listen and move",

@@ -7,6 +7,7 @@ import { Stage } from "./face/stage.js";
 import { Weights } from "./face/weights.js";
 import { added } from "./files.js";
 import { listen } from "./keys.js";
+import { followOwn, showOwn } from "./own.js";
 import { Panel } from "./panel/panel.js";
 import { Queue } from "./queue/queue.js";
 import { say } from "./sentences.js";
@@ -15,11 +16,11 @@ import { ShownCurves } from "./shown_curves.js";
 import { Player } from "./sound/player.js";
 import { samplesOf } from "./sound/samples.js";
 import { Store } from "./store.js";
-import { TEXT, filled } from "./strings.js";
+import { OWN, TEXT, filled } from "./strings.js";
 import { Timeline } from "./timeline/timeline.js";
 import { Transport } from "./transport.js";
 
-const PAGE_OF_LINES = 1000, POLL_MS = 300, DOUBTFUL = 0.7, MOST_DOUBTS = 12, CALM_MS = 5000, NUDGE_MS = 250, SETTLE_MS = 1500;
+const PAGE_OF_LINES = 1000, POLL_MS = 300, DOUBTFUL = 0.7, MOST_DOUBTS = 12, CALM_MS = 5000, OWN_MS = 1000, NUDGE_MS = 250, SETTLE_MS = 1500;
 /** Of a line that is not ready. */
 const NOTHING = { words: [], phones: [], channels: [], steps: [], undo: 0, redo: 0 };
 
@@ -45,8 +46,9 @@ export class Studio {
     this.title = part("h1", "title");
     this.cover = part("div", "cover", { hidden: true });
     const picker = made("input", { type: "file", multiple: true, accept: "audio/*,video/*,.txt", hidden: true, "aria-label": TEXT.open, onchange: () => this.add([...picker.files]) });
+    const own = bothButton("person", OWN.open, () => showOwn(this), { id: "own" });
     const header = made("header", {}, iconButton("lines", TEXT.hideLines, () => document.body.classList.toggle("without-queue"), { id: "hide-lines" }), this.title,
-      bothButton("plus", TEXT.open, () => picker.click(), { id: "open" }), picker,
+      bothButton("plus", TEXT.open, () => picker.click(), { id: "open" }), picker, own,
       bothButton("out", TEXT.export, () => showExport(this), { id: "export" }), textButton("?", () => this.help(), { id: "help", title: TEXT.help, "aria-label": TEXT.help }));
     const places = made("nav", { id: "places", "aria-label": TEXT.show }, ...["lines", "stage", "panel"].map((name) => textButton(TEXT.places[name],
       () => this.showPlace(name), { id: `place-${name}` })));
@@ -60,6 +62,7 @@ export class Studio {
     this.timeline = new Timeline(timeline, this);
     this.transport = new Transport(transport, this);
     this.panel = new Panel(panel, this);
+    followOwn(own, this);
     store.on(["message"], () => {
       this.message.textContent = store.message.text;
       this.message.className = store.message.kind;
@@ -126,7 +129,8 @@ export class Studio {
   async poll() {
     let pause_ms = CALM_MS;
     try {
-      const { lines, revision } = await this.server.read("progress");
+      const { lines, revision, training } = await this.server.read("progress");
+      this.store.set({ training });
       const before = this.store.lines.map(({ id, status }) => `${id} ${status}`).join();
       if (lines.length || revision !== this.store.project?.revision) {
         const states = new Map(lines.map((line) => [line.id, line]));
@@ -135,6 +139,7 @@ export class Studio {
         this.store.set({ progress: states.get(this.store.lineId) ?? null });
         if (lines.some(({ status }) => status === "waiting" || status === "working")) pause_ms = POLL_MS;
       }
+      if (training.state === "working") pause_ms = Math.min(pause_ms, OWN_MS);
       const open = this.store.lines.find(({ id }) => id === this.store.lineId);
       if (open && this.store.line && open.status !== this.store.line.status && before) await this.open(open.id, true);
     } catch (error) {

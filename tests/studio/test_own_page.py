@@ -1,0 +1,63 @@
+"""A voice of one's own in a real browser: trained on toy recordings, its report read, the voice used and taken back."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from children import wait_until
+from study.browser import BROWSER, DRIVER, MISSING, browser, check_screen
+
+pytest.importorskip("uvicorn", reason="the extra 'studio' is not installed")
+
+from lipmotion.studio.folder import opened_folder
+from studio.test_page import LIMIT_S, SCREENS, WEBGL, WELCOME, Page, served
+from studio.toy_recordings import SENTENCES, write_recordings
+
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(BROWSER is None or DRIVER is None, reason=MISSING),
+]
+
+
+def test_a_voice_is_trained_and_used_from_the_page(tmp_path: Path) -> None:
+    project = tmp_path / "project"
+    recordings = os.path.relpath(write_recordings(tmp_path / "recordings"), project)
+    (tmp_path / "home").mkdir()
+    with opened_folder(WELCOME, project) as folder:
+        folder.change(lambda now: replace(now, recordings=recordings))
+    with served(project) as address, browser(tmp_path / "home", *WEBGL) as window:
+        window.open(address)
+        page = Page(window)
+        page.ready()
+        window.click("#own")
+        wait_until(lambda: window.text("#own-form"), LIMIT_S)
+        window.run("const name = document.getElementById('own-name'); name.value = 'me'; name.oninput()")
+        window.run("document.getElementById('own-prior').checked = false")
+        window.click("#own-voice")
+        wait_until(lambda: "%" in window.text("#own-job"), LIMIT_S)
+        window.run("location.reload()")  # the work goes on, and is told
+        page.ready()
+        assert "Own voice" in window.text("#own")
+        window.click("#own")
+        wait_until(lambda: "is ready" in window.text("#own-job") or "could not" in window.text("#own-job"))
+        report = window.text("#own-job")
+        for told in (f"{SENTENCES - 1} recordings", "voices/me.lipmotion", "from the sound alone", "empty is not used"):
+            assert told in report
+        motion = "studio.store.motion.values.slice(0, 300).join()"
+        before = page.of(motion)
+        window.click("#own-use")
+        wait_until(lambda: "uses this voice" in window.text("#own-job"), LIMIT_S)
+        page.ready()
+        assert page.of(motion) != before
+        for width, height, scheme in SCREENS:
+            window.show_as(width, height, scheme, mobile=width < 600)
+            check_screen(window, "own", width, scheme)
+        window.show_as(1200, 900)
+        window.run("const used = document.getElementById('own-choice'); used.value = ''; used.onchange()")
+        wait_until(lambda: "Use this voice" in window.text("#own-job"), LIMIT_S)
+        page.ready()
+        assert page.of(motion) == before

@@ -1,0 +1,190 @@
+"""Voices that are trained from the page: of toy recordings, in a process of its own, measured, used and taken back."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from children import wait_until
+from lipmotion.corpora.store import Corpus
+from lipmotion.pipeline.model import Model, load_model
+from lipmotion.testing.toy import ToySentence
+
+pytest.importorskip("starlette", reason="the extra 'studio' is not installed")
+
+from lipmotion.studio.trainer import TRAINING, Trainer
+from lipmotion.studio.training import TrainingOrder, VoiceOptions, carry_out, divided_names
+from studio.open_studio import OpenStudio, open_studio
+from studio.toy_recordings import SENTENCES, write_recordings
+
+OPTIONS = {"prior": False}
+
+
+@pytest.fixture
+def studio(toy_speech: Path, toy_sentence: ToySentence, toy_model: Model, tmp_path: Path) -> Iterator[OpenStudio]:
+    """A studio with a line, and a folder of recordings that a voice can be trained on."""
+    recordings = write_recordings(tmp_path / "recordings")
+    with open_studio(toy_speech, " ".join(toy_sentence.words), toy_model, tmp_path / "studio") as opened:
+        opened.folder.change(
+            lambda project: replace(project, recordings=os.path.relpath(recordings, opened.folder.path))
+        )
+        yield opened
+
+
+def job(studio: OpenStudio) -> dict[str, Any]:
+    return dict(studio.ask("/api/training").content["job"])
+
+
+def ended(studio: OpenStudio) -> dict[str, Any]:
+    """Return how what is made has ended, once it has."""
+    wait_until(lambda: job(studio)["state"] != "working" and studio.studio.trainer._thread is None)
+    return job(studio)
+
+
+@pytest.mark.long
+def test_a_voice_is_trained_measured_used_and_taken_back(studio: OpenStudio) -> None:
+    state = studio.ready()
+    studio.edit("phone 3 is p")
+    studio.ask("/api/lines/1/export", {"files": [".csv"]})
+    before = studio.ask("/api/lines/1/motion").body
+    begun = studio.ask("/api/training", {"kind": "voice", "name": "../Me", "options": OPTIONS})
+    assert (begun.status, begun.content["job"]["state"], begun.content["job"]["name"]) == (201, "working", "Me")
+    refused = studio.ask("/api/training", {"kind": "face", "name": "me"})
+    assert (refused.status, "wait for it" in refused.content["error"]) == (422, True)
+    shares = set()
+
+    def watched() -> bool:
+        told = studio.ask("/api/progress").content["training"]
+        shares.add(told["share"])
+        assert studio.ask("/api/lines/1/why?time=0.5").status == 200  # the page is answered meanwhile
+        return bool(told["state"] != "working")
+
+    wait_until(watched)
+    told = ended(studio)
+    assert told["error"] == ""
+    assert len(shares) > 2
+    report = told["report"]
+    assert (report["learned"], report["kept_back"], report["skipped"]) == (SENTENCES - 1, 1, 1)
+    assert [each["name"] for each in told["skipped"]] == ["empty"]
+    assert {row["condition"] for row in report["figures"]} == {"audio only", "with transcript"}
+    assert "split given names: 1 clips" in report["table"]
+    assert [path.name for path in (studio.folder.path / "voices").iterdir()] == ["Me.lipmotion"]
+    assert load_model(studio.folder.path / report["file"]).about["utterances"] == SENTENCES - 1
+
+    assert studio.ask("/api/voice", {"voice": "../Me"}).status == 422
+    used = studio.ask("/api/voice", {"voice": "Me"}).content["voices"]
+    assert [voice["name"] for voice in used if voice["used"]] == ["Me"]
+    after = studio.ready()
+    assert (after["steps"], after["phones"][4:]) == (["phone 3 is p"], state["phones"][4:])
+    assert studio.ask("/api/lines/1/motion").body != before
+    assert studio.studio.row(1)["exported"] == "changed"
+    assert studio.folder.project.model == "voices/Me.lipmotion"
+
+
+@pytest.mark.long
+def test_what_is_stopped_or_killed_goes_on(studio: OpenStudio) -> None:
+    assert studio.ask("/api/training/again", {}).status == 422
+    studio.ask("/api/training", {"kind": "voice", "name": "me", "options": OPTIONS})
+    wait_until(lambda: job(studio)["share"] > 0)
+    assert studio.ask("/api/training/stop", {}).content["job"]["state"] == "stopped"
+    assert studio.ask("/api/training/again", {}).content["job"]["state"] == "working"
+    wait_until(lambda: job(studio)["share"] > 0.6)  # the recordings are prepared
+    process = studio.studio.trainer._process
+    assert process is not None
+    assert process.pid is not None
+    os.kill(process.pid, signal.SIGKILL)
+    told = ended(studio)
+    assert (told["state"], "run it again" in told["error"]) == ("failed", True)
+    assert not (studio.folder.path / told["file"]).exists()
+
+    studio.ask("/api/training/again", {})
+    wait_until(lambda: job(studio)["share"] > 0.6)
+    studio.studio.trainer.close()  # as where the studio ends meanwhile
+    found = Trainer(studio.folder)  # as where it is opened again
+    document = found.document()
+    assert document is not None
+    assert (document["state"], document["name"]) == ("interrupted", "me")
+    kept = Corpus.open(studio.folder.path / TRAINING / "corpus").names()
+    assert set(kept) == {f"toy{number:02d}" for number in range(SENTENCES)}
+    found.again()
+    wait_until(lambda: not found.is_working and found._thread is None)
+    document = found.document()
+    assert document is not None
+    assert (document["state"], document["report"]["file"]) == ("done", "voices/me.lipmotion")
+    assert not list((studio.folder.path / "voices").glob("*.unfinished"))
+
+
+REFUSED: list[tuple[dict[str, Any], str]] = [
+    ({"kind": "song", "name": "a"}, "voice or face"),
+    ({"kind": "voice", "name": "a", "lines": [1]}, "no video of this project"),
+    ({"kind": "voice", "name": "a", "lines": "all"}, "required a list of numbers"),
+    ({"kind": "voice", "name": "a", "options": {"engine": "../x"}}, "engine"),
+    ({"kind": "voice", "name": "a", "options": {"path": "/etc"}}, "no option 'path'"),
+    ({"kind": "voice", "name": "a", "options": []}, "options"),
+    ({"kind": "voice", "name": "a" * 300}, "at most 200"),
+]
+
+
+def test_what_cannot_be_made_is_refused(studio: OpenStudio) -> None:
+    for content, said in REFUSED:
+        reply = studio.ask("/api/training", content)
+        assert (reply.status, said in reply.content["error"]) == (422, True), reply.content
+    assert studio.ask("/api/training").content["job"] is None
+    studio.folder.change(lambda project: replace(project, recordings=""))
+    reply = studio.ask("/api/training", {"kind": "face", "name": "a"})
+    assert (reply.status, "--recordings" in reply.content["error"]) == (422, True)
+    assert not (studio.folder.path / TRAINING).exists()
+
+
+def test_videos_of_the_project_are_gathered_with_their_words(tmp_path: Path) -> None:
+    """What the readers refuse is told as a sentence, and nothing is left of what was gathered."""
+    from lipmotion.studio.training import LearnedLine, _gathered
+
+    for name in ("take.mp4", "take.srt", "other.mp4"):
+        (tmp_path / name).write_text(name, encoding="utf-8")
+    lines = (
+        LearnedLine(tmp_path / "take.mp4", "a/take", ""),
+        LearnedLine(tmp_path / "take.mp4", "a-take", "so typed"),
+        LearnedLine(tmp_path / "other.mp4", "other", ""),
+    )
+    order = TrainingOrder("voice", tmp_path / "me.lipmotion", tmp_path / "work", lines, VoiceOptions(), None, 1)
+    with _gathered(order) as place:
+        found = {path.name: path.read_text(encoding="utf-8") for path in place.iterdir()}
+    assert found == {
+        "a-take.mp4": "take.mp4",
+        "a-take.srt": "take.srt",
+        "a-take-2.mp4": "take.mp4",
+        "a-take-2.txt": "so typed",
+        "other.mp4": "other.mp4",
+    }
+    told: list[Any] = []
+    carry_out(order, told.append)
+    assert list(told[-1]) == ["error"]
+    assert not order.target.exists()
+    assert not any(path.is_file() for path in order.work.glob("recordings/**/*"))
+
+
+def test_some_recordings_are_kept_back(toy_corpus: Corpus) -> None:
+    names = toy_corpus.names()
+    assert divided_names(toy_corpus, names, held_out=False) == (sorted(names), [])
+    learned, kept_back = divided_names(toy_corpus, names, held_out=True)
+    assert (learned, kept_back) == (sorted(toy_corpus.names("train")), sorted(toy_corpus.names("test")))
+    without_list = [name for name in names if name not in kept_back]
+    assert divided_names(toy_corpus, without_list, held_out=True) == (without_list[:-1], without_list[-1:])
+    assert divided_names(toy_corpus, without_list[:9], held_out=True) == (without_list[:9], [])
+
+
+def test_a_state_that_cannot_be_understood_is_none(tmp_path: Path) -> None:
+    from lipmotion.studio.folder import ProjectFolder
+
+    folder = ProjectFolder(tmp_path)
+    (tmp_path / TRAINING).mkdir()
+    for text in ("", "[]", "{}", '{"format": "lipmotion.training", "version": 1, "wanted": {"kind": "x"}}'):
+        (tmp_path / TRAINING / "state.json").write_text(text, encoding="utf-8")
+        assert Trainer(folder).document() is None
