@@ -23,6 +23,7 @@ def serve_studio(
     out: Path | None = None,
     model: Path | None = None,
     characters: Mapping[str, Path] | None = None,
+    against: Path | None = None,
     port: int = 0,
     started: Callable[[str], object] | None = None,
 ) -> None:
@@ -31,13 +32,15 @@ def serve_studio(
     source     : a recording, a folder or a list of recordings, or a project; None: an empty project
     out        : folder of a new project; None: beside the source
     model      : of the project from now on; None: as it is
-    characters : further ones of the project, by their names
+    characters : further ones of the project, and filmed faces, by their names
+    against    : a model with which the project's is compared on the page; None: none
     port       : 0: any that is free
     started    : called with the address of the page, which holds a token, once it can be opened
     Raises InputError: no such file, no project that can be read, or the port is taken. ExportError: another process
     works on the project. MissingDependencyError: a package of the extra ``studio`` is not installed.
     """
     check_installed("the studio", "studio")
+    from lipmotion.pipeline.model import load_model
     from lipmotion.studio.access import Access
     from lipmotion.studio.application import studio_application
     from lipmotion.studio.folder import PROJECT, opened_folder
@@ -49,9 +52,10 @@ def serve_studio(
         chosen = sound_reference(model.absolute(), file) if model else folder.project.model
         if own or model:
             folder.change(lambda now: replace(now, characters={**now.characters, **own}, model=chosen))
+        other = load_model(against) if against else None
         token = token_urlsafe(TOKEN_BYTES)
         hosts = frozenset(f"{name}:{place.getsockname()[1]}" for name in NAMES)
-        with closing(Studio(folder)) as studio:
+        with closing(Studio(folder, against=other)) as studio:
             Thread(target=_prepare, name="prepare", daemon=True).start()
             application = studio_application(studio, Access(token, hosts))
             serve(application, place, started=lambda address: started(f"{address}#{token}") if started else None)

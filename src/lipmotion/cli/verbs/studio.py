@@ -20,6 +20,10 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add_input(parser, "--model", what="model", metavar="FILE", help=model)
     character = "your own character, as a face of the project: FILE.glb .vrm .obj (repeatable)"
     add_input(parser, "--character", what="character", action="append", default=[], metavar="FILE", help=character)
+    face = "a filmed face, as a face of the project: FILE.face (repeatable)"
+    add_input(parser, "--face", what="face", action="append", default=[], metavar="FILE", help=face)
+    against = "another model, whose motion is compared with the project's on the page"
+    add_input(parser, "--against", what="model", metavar="FILE", help=against)
     parser.add_argument("--port", type=int, default=0, help="0: any that is free (default: 0)")
     parser.add_argument("--no-browser", action="store_true", help="print the address, and open no browser")
     parser.set_defaults(run=run)
@@ -37,6 +41,6 @@ def run(options: argparse.Namespace) -> None:
         if not options.no_browser:
             webbrowser.open(address)
 
-    characters: dict[str, Path] = {path.stem: path for path in options.character}
-    given = {"out": options.output, "model": options.model, "port": options.port}
+    characters: dict[str, Path] = {path.stem: path for path in (*options.character, *options.face)}
+    given = {"out": options.output, "model": options.model, "port": options.port, "against": options.against}
     serve_studio(options.source, characters=characters, started=started, **given)
