@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import io
 import json
+import shutil
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
+import av
 import numpy as np
 import pytest
 
+from lipmotion.export.video import write_mp4
 from lipmotion.meshes.files.gltf_weights import read_gltf_motion
 from lipmotion.pipeline.edit_files import read_edits
 from lipmotion.pipeline.edits import FORMS
 from lipmotion.pipeline.model import Model
+from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence
 from lipmotion.units import Lexicon
 
@@ -22,8 +27,10 @@ pytest.importorskip("starlette", reason="the extra 'studio' is not installed")
 
 from lipmotion.studio import line as line_module
 from lipmotion.studio.access import TOKEN_HEADER, Access
+from lipmotion.studio.application import studio_application
 from lipmotion.studio.folder import opened_folder
 from lipmotion.studio.studio import Studio
+from lipmotion.studio.votes import read_votes
 from studio.open_studio import HOST, TOKEN, OpenStudio, open_studio
 
 
@@ -318,3 +325,65 @@ def test_the_weights_of_the_page_are_those_of_the_file(studio: OpenStudio) -> No
     video = studio.ask("/api/lines/1/video", {"start_s": 0.5, "end_s": 0.7})
     assert video.headers["content-type"] == "video/mp4"
     assert studio.ask("/api/lines/1/picture?time=0.5").body[:4] == b"\x89PNG"
+
+
+@pytest.mark.long
+def test_a_filmed_face_the_real_video_and_another_model(
+    tmp_path: Path,
+    toy_speech: Path,
+    toy_sentence: ToySentence,
+    toy_model: Model,
+    coupled_model: Model,
+    filmed_face_file: Path,
+) -> None:
+    sound = tmp_path / "line.wav"
+    shutil.copy(toy_speech, sound)
+    sound.with_suffix(".txt").write_text(" ".join(toy_sentence.words), encoding="utf-8")
+    pictures = [np.full((32, 48, 3), 60 + 4 * number, np.uint8) for number in range(20)]
+    write_mp4(sound.with_suffix(".mp4"), pictures, fps=25, audio=read_audio(sound))
+    with opened_folder(sound) as opened:
+        opened.change(lambda now: replace(now, characters={"toy": str(filmed_face_file)}))
+        with closing(Studio(opened, toy_model, coupled_model)) as running:
+            studio = OpenStudio(opened, running, studio_application(running, Access(TOKEN, frozenset({HOST}))))
+            _compared(studio)
+            assert _film(studio) == (video_frames(0.2, 0.6), "video/mp4")
+            address = studio.ready()["media"]["video"]
+            part = studio.ask(address, range="bytes=4-7", **{TOKEN_HEADER: ""})
+            assert (part.status, part.body, part.headers["content-type"]) == (206, b"ftyp", "video/mp4")
+            assert studio.ask(address.partition("?")[0], **{TOKEN_HEADER: ""}).status == 401
+            sound.with_suffix(".mp4").unlink()
+            assert studio.ask(address).status == 404
+
+
+def video_frames(start_s: float, end_s: float) -> int:
+    """The pictures of the toy's film from one time to another, both shown."""
+    return round(end_s * 25) - round(start_s * 25) + 1
+
+
+def _film(studio: OpenStudio) -> tuple[int, str]:
+    refused = studio.ask("/api/lines/1/picture?time=0.5&face=toy")
+    assert (refused.status, "video" in refused.content["error"]) == (422, True)
+    assert studio.ask("/api/faces/toy.glb").status == 404
+    reply = studio.ask("/api/lines/1/video", {"start_s": 0.2, "end_s": 0.6, "face": "toy"})
+    with av.open(io.BytesIO(reply.body)) as film:
+        assert len(film.streams.audio) == 1
+        return sum(1 for _ in film.decode(video=0)), reply.headers["content-type"]
+
+
+def _compared(studio: OpenStudio) -> None:
+    studio.ready()
+    plain, other = (studio.ask(f"/api/lines/1/motion{query}").body for query in ("", "?by=other"))
+    assert (len(plain) > 0, plain == other) == (True, False)
+    assert studio.edit("pin opening 0.3 at 0.5").status == 200
+    edited = studio.ask("/api/lines/1/motion?by=other")
+    names = json.loads(edited.headers["x-lipmotion-names"])
+    shown = np.frombuffer(edited.body, "<f4").reshape(-1, len(names))
+    assert shown[50, names.index("opening")] == pytest.approx(0.3, abs=1e-5)
+    assert studio.ask("/api/lines/1/motion?by=../x").status == 422
+    shown_names = ["now", "the model b"]
+    for better in ("now", "the model b", "now"):
+        votes = studio.ask("/api/lines/1/votes", {"shown": shown_names, "better": better})
+    assert votes.content == {"votes": {"now": 2, "the model b": 1}}
+    assert [vote.better for vote in read_votes(studio.folder.path / "votes.json")] == ["now", "the model b", "now"]
+    assert studio.ask("/api/lines/1/votes", {"shown": shown_names, "better": "another"}).status == 422
+    assert studio.ask("/api/lines/1/votes", {"shown": ["now", "now"], "better": ""}).status == 422

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,11 +14,16 @@ import numpy as np
 import pytest
 
 from children import LIPMOTION, child, wait_until
+from lipmotion.export.video import write_mp4
 from lipmotion.meshes.files.gltf_weights import read_gltf_motion
+from lipmotion.pipeline.model import shipped_path
+from lipmotion.speech.sound.audio_files import read_audio
 from study.browser import CONTROL, DELETE, ENTER, ESCAPE, RIGHT, SHIFT, SPACE, TAB, UP, WINDOW_S, Browser, check_screen
 from study.firefox import BOTH, Opens
 
 pytest.importorskip("uvicorn", reason="the extra 'studio' is not installed")
+from lipmotion.studio.votes import read_votes
+
 pytestmark = pytest.mark.long
 WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
 SCREENS = ((1440, 900, "light"), (900, 800, "dark"), (320, 640, "light"), (320, 640, "dark"))
@@ -81,8 +87,8 @@ class Page:
 
 
 @contextmanager
-def served(folder: Path, *source: Path) -> Iterator[str]:
-    """Give the address of a studio over a project in a folder."""
+def served(folder: Path, *source: Path | str) -> Iterator[str]:
+    """Give the address of a studio over a project in a folder; what follows a source are options."""
     command = [*LIPMOTION, "studio", *(source or [folder]), *(["-o", folder] if source else []), "--no-browser"]
     with child(command, limit_s=WINDOW_S) as process:
         line = process.stdout.readline() if process.stdout else ""
@@ -317,3 +323,46 @@ def test_a_killed_studio_has_every_edit(opens: Opens, tmp_path: Path) -> None:
             assert page.steps == steps
             window.press_together(CONTROL, "z")
             wait_until(lambda: page.steps == [], LIMIT_S)
+
+
+@pytest.mark.parametrize("opens", BOTH[:1])
+def test_the_real_video_beside_and_comparisons(opens: Opens, tmp_path: Path, filmed_face_file: Path) -> None:
+    (tmp_path / "home").mkdir()
+    sound = Path(shutil.copy(WELCOME, tmp_path))
+    pictures = (np.full((64, 96, 3), 40 + number % 200, np.uint8) for number in range(100))
+    write_mp4(sound.with_suffix(".mp4"), pictures, fps=25, audio=read_audio(sound))
+    options = ("--against", shipped_path(), "--face", filmed_face_file)
+    with served(tmp_path / "project", sound, *options) as address, opens(tmp_path / "home", *WEBGL) as window:
+        window.open(address)
+        page = Page(window, tmp_path / "project")
+        page.ready()
+        window.press("x")
+        wait_until(lambda: page.of("document.querySelector('.recorded').readyState") >= 2, LIMIT_S)
+        window.run("studio.player.seek(1.23)")
+        wait_until(lambda: page.of("!document.querySelector('.recorded').seeking"), LIMIT_S)
+        assert abs(page.of("document.querySelector('.recorded').currentTime") - 1.23) <= 1 / 25
+        window.click("#tab-history")
+        window.click("#compare-model")
+        wait_until(lambda: page.of("Boolean(studio.store.other?.weights)"), LIMIT_S)
+        window.click("#compare-sides")
+        assert page.of("studio.stage.head.pair.length") == 2
+        for width, height, scheme in SCREENS:
+            window.show_as(width, height, scheme, mobile=width < 600)
+            window.run("studio.showPlace('panel')")
+            window.run_until_done("setTimeout(arguments[0], 100)")
+            check_screen(window, "compared", width, scheme)
+        window.show_as(1440, 900, "light", mobile=False)
+        window.run("studio.store.set({ span: { start_s: 0.5, end_s: 0.8 } })")
+        window.click("#compare-blind")
+        assert not page.of("studio.store.sideBySide")
+        wait_until(lambda: page.of("studio.store.blind.asked"), LIMIT_S)
+        wait_until(lambda: not page.of("document.getElementById('blind-better-A').disabled"), LIMIT_S)
+        window.click("#blind-better-A")
+        wait_until(lambda: "A was" in window.text("#blind-told"), LIMIT_S)
+        (vote,) = read_votes(tmp_path / "project" / "votes.json")
+        assert vote.better == vote.shown[0]
+        assert vote.shown[0] in window.text("#blind-told").partition(", B was")[0]
+        window.run("studio.store.set({ face: 'toy', mesh: '' })")
+        wait_until(lambda: "filmed" in window.text("#stage .note"), LIMIT_S)
+        check_screen(window, "filmed", 1440, "light")
+        assert [each for each in window.problems() if each.startswith("SEVERE") and "favicon" not in each] == []

@@ -141,5 +141,5 @@ def sketched(
     units, pins : before and after the change
     made        : returns the motion of phones and pins of the excerpt
     """
-    parts = (made(excerpt.within(some), excerpt.pinned(held)) for some, held in zip(units, pins, strict=True))
-    return with_excerpt(whole, *parts, excerpt, units[1])
+    before, after = (made(excerpt.within(some), excerpt.pinned(held)) for some, held in zip(units, pins, strict=True))
+    return with_excerpt(whole, before, after, excerpt, units[1])

@@ -60,6 +60,8 @@ def studio_application(studio: Studio, access: Access) -> Starlette:
         post(f"{one}/export", project.export_line),
         post(f"{one}/video", lines.video),
         Route(f"{one}/sound.wav", lines.sound),
+        Route(f"{one}/recorded", lines.recorded),
+        post(f"{one}/votes", lines.vote),
         Route(f"{one}/motion", lines.motion),
         Route(f"{one}/weights", lines.weights),
         Route(f"{one}/picture", lines.picture),

@@ -20,10 +20,12 @@ from lipmotion.speech.voices.pronunciations import LanguageLexicon
 from lipmotion.storage.files import locked, read_text_file, sha256_of, whole_file
 from lipmotion.storage.json_text import as_json_rows, from_json
 from lipmotion.studio.project import EDITS_SUFFIX, Project, ProjectLine, check_lines, project_document, project_from
+from lipmotion.studio.votes import Vote, read_votes, votes_text
 from lipmotion.types.languages import AUTO, ENGLISH
 from lipmotion.units import Lexicon
 
 PROJECT, SOUNDS, EDITS, EXPORTS, LEXICON = "project.json", "sounds", "edits", "exports", "lexicon.txt"
+VOTES = "votes.json"
 SUFFIX = ".studio"
 """How the folder of a project ends, beside the recording or the folder of recordings that it was made of."""
 UNTITLED = Path(f"untitled{SUFFIX}")
@@ -158,6 +160,14 @@ class ProjectFolder:
         own = Lexicon.from_file(self.lexicon_file) if self.lexicon_file else Lexicon()
         language = self.project.language
         return own if language in (ENGLISH, AUTO) else LanguageLexicon(own.user, language)
+
+    def add_vote(self, vote: Vote) -> tuple[Vote, ...]:
+        """Write a vote behind those that were cast before; return all. Raises InputError, ExportError: not possible."""
+        with self._lock:
+            votes = (*read_votes(self.path / VOTES), vote)
+            with whole_file(self.path / VOTES) as temporary:
+                temporary.write_text(votes_text(votes), encoding="utf-8")
+            return votes
 
     def add_pronunciation(self, word: str, phones: tuple[str, ...]) -> None:
         """Write a pronunciation into the project's lexicon, ahead of earlier ones. Raises ExportError: cannot be."""

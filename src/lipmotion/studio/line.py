@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -13,15 +14,18 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError, LipMotionError
 from lipmotion.export.video import write_mp4
 from lipmotion.faces.base import Face
+from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.pipeline.edit_files import EditFile, write_edits
 from lipmotion.pipeline.edits import Step, WordIs, WordSaid, WordStep, step_of
+from lipmotion.pipeline.film.filmed_video import write_film
 from lipmotion.pipeline.generate.explain import explain_session, explanation_text
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.drawn_video import DRAWN_HZ, read_sound
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance
 from lipmotion.pipeline.outputs.scenes import delivered_scene
-from lipmotion.pipeline.outputs.shown_faces import ShownFace
+from lipmotion.pipeline.outputs.shown_faces import ShownFace, ShownPerson
 from lipmotion.pipeline.session import own_pronunciations
+from lipmotion.pipeline.understand.read_request import read_request
 from lipmotion.pipeline.understand.transcribe import guesses
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
 from lipmotion.studio.meshes import with_turn
@@ -49,17 +53,39 @@ class OpenLine:
     file    : its edits; what is written at each change
     path    : where they are written
     audio   : the sound, which has been read
+    onto    : the person onto whose face the motion is mapped; None: it stays as it is
     revision : how often the edits have changed since the line was opened
     settled  : whether the motion is that of the whole line, as files get it; else only what lies around the last edits
                has been made since
     Raises as ``EditFile.session``.
     """
 
-    def __init__(self, file: EditFile, path: Path, recording: Path, model: Model, audio: AnalysedAudio) -> None:
+    def __init__(
+        self,
+        file: EditFile,
+        path: Path,
+        recording: Path,
+        model: Model,
+        audio: AnalysedAudio,
+        onto: FilmedFace | None = None,
+    ) -> None:
         self.file, self.path, self.recording, self.model, self.audio = file, path, recording, model, audio
         self.revision, self.settled = 0, True
-        self.session = file.session(model=model, audio=audio)
+        self._others: dict[tuple[int, int], OpenLine] = {}
+        asked = replace(read_request(file.named), onto=onto) if onto is not None else None
+        self.session = file.session(asked, model=model, audio=audio)
         self.session.generated(file.edits)
+
+    def moved_by(self, model: Model, onto: FilmedFace | None) -> OpenLine:
+        """Return the line with its edits as another model moves it, or mapped onto another person; it is only read.
+
+        Raises InputError: the model cannot make an edit, or there is no such person.
+        """
+        key = id(model), id(onto)
+        if key not in self._others:
+            self._others[key] = OpenLine(self.file, self.path, self.recording, model, self.audio, onto)
+        self._others[key].file = self.file
+        return self._others[key]
 
     @property
     def generation(self) -> Generation:
@@ -191,15 +217,34 @@ class OpenLine:
 
     def write_video(self, path: Path, start_s: float, end_s: float, face: str | Face) -> None:
         """Write a stretch as a video of a drawn face. Raises InputError: as ``picture``; or it is too long, or none."""
+        count = int((len(self.generation.motion.values) - 1) / 100 * DRAWN_HZ + 1e-9) + 1
+        frames, sound = self._stretch(start_s, end_s, count, DRAWN_HZ)
+        pictures = (self.picture(number / DRAWN_HZ, face) for number in frames)
+        write_mp4(path, pictures, fps=DRAWN_HZ, audio=sound)
+
+    def write_film(self, path: Path, start_s: float, end_s: float, person: ShownPerson) -> None:
+        """Write a stretch as a video of a filmed face: its pictures are those of the video of the whole line.
+
+        Raises InputError: as ``write_video``, or edits ask for what a filmed face cannot do.
+        """
+        performance = self.performance(person)
+        person.check(performance.settings)
+        person.check_video(path, performance.settings)
+        film = person.film(performance)
+        frames, sound = self._stretch(start_s, end_s, film.count, film.rate_hz)
+        part = replace(film, frames=islice(film.frames, frames.start, frames.stop), count=len(frames))
+        write_film(path, part, sound, mark=performance.settings.film.mark)
+
+    def _stretch(self, start_s: float, end_s: float, count: int, rate_hz: float) -> tuple[range, Audio]:
+        """Return which frames of a video show a stretch, and their sound. Raises InputError: too long, or none."""
         last_s = min(end_s, self.audio.duration_s)
         if not 0 < last_s - start_s <= LONGEST_VIDEO_S:
             raise InputError(f"{start_s} to {end_s} s, required a stretch of at most {LONGEST_VIDEO_S:g} s")
-        first, last = round(start_s * DRAWN_HZ), int((len(self.generation.motion.values) - 1) / 100 * DRAWN_HZ + 1e-9)
-        frames = range(first, max(min(round(last_s * DRAWN_HZ), last), first) + 1)
+        first = min(round(start_s * rate_hz), count - 1)
         sound = read_sound(self.recording)
-        part = slice(*(round(time_s * sound.rate_hz) for time_s in (first / DRAWN_HZ, last_s)))
-        pictures = (self.picture(number / DRAWN_HZ, face) for number in frames)
-        write_mp4(path, pictures, fps=DRAWN_HZ, audio=Audio(sound.samples[part], sound.rate_hz))
+        part = slice(*(round(time_s * sound.rate_hz) for time_s in (first / rate_hz, last_s)))
+        last = max(min(round(last_s * rate_hz), count - 1), first)
+        return range(first, last + 1), Audio(sound.samples[part], sound.rate_hz)
 
     def why(self, time_s: float) -> dict[str, Any]:
         """Return what determined the motion at a time. Raises InputError: a time outside the recording."""

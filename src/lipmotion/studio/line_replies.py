@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import tempfile
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -16,11 +17,13 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 
 from lipmotion.errors import InputError, shortened
+from lipmotion.pipeline.outputs.shown_faces import ShownPerson
 from lipmotion.storage.json_text import as_json
 from lipmotion.studio.access import Access
 from lipmotion.studio.asked import content_of, seconds, stretch, text, texts, whole
 from lipmotion.studio.line import OpenLine, RevisionError, transcript_step
 from lipmotion.studio.studio import Studio
+from lipmotion.studio.votes import LONGEST_NAME, Vote
 from lipmotion.types import Motion
 from lipmotion.web.replies import FRESH, json_bytes
 
@@ -88,6 +91,22 @@ class LineReplies:
         path = await self._desk.beside(lambda: self._studio.played(number))
         return FileResponse(path, media_type="audio/wav", headers=FRESH)
 
+    async def recorded(self, request: Request) -> Response:
+        """The real video, as browsers play it."""
+        number = self._number(request)
+        path, kind = await self._desk.beside(lambda: self._studio.played_video(number))
+        return FileResponse(path, media_type=kind, headers=FRESH)
+
+    async def vote(self, request: Request) -> Response:
+        """Which of two motions somebody found better."""
+        number, content = self._number(request), await content_of(request)
+        shown = texts(content, "shown", most=2, longest=LONGEST_NAME)
+        better, edits = text(content, "better", longest=LONGEST_NAME), self._studio.summary(number).digest
+        vote = Vote(self._studio.folder.line(number).name, shown, better, edits)
+        found = await self._desk.beside(lambda: self._studio.folder.add_vote(vote))
+        counts = Counter(each.better for each in found if sorted(each.shown) == sorted(shown))
+        return json_bytes(as_json({"votes": counts}).encode())
+
     async def motion(self, request: Request) -> Response:
         """Numbers of the motion."""
         query = request.query_params
@@ -96,8 +115,10 @@ class LineReplies:
             raise InputError(f"of is {of!r}, required one of: {', '.join(NUMBERS)}")
         names = text(query, "names", longest=LONGEST_NAMES).split(",") if "names" in query else None
 
+        by = text(query, "by", "")
+
         def found(line: OpenLine) -> Response:
-            motion = line.numbers(of)
+            motion = self._studio.line_as(line, by).numbers(of)
             motion = motion if names is None else _only(motion, names)
             frames = stretch(query, motion.rate_hz, len(motion.values))
             return _numbers(replace(motion, values=motion.values[frames]), frames.start, {})
@@ -107,9 +128,10 @@ class LineReplies:
     async def weights(self, request: Request) -> Response:
         """The weights of a face's morph targets."""
         query = request.query_params
-        name = text(query, "face", "head")
+        name, by = text(query, "face", "head"), text(query, "by", "")
 
-        def found(line: OpenLine) -> Response:
+        def found(given: OpenLine) -> Response:
+            line = self._studio.line_as(given, by)
             delivered = line.numbers("delivered")
             frames = stretch(query, delivered.rate_hz, len(delivered.values))
             is_part = frames.stop - frames.start < len(delivered.values)
@@ -121,21 +143,30 @@ class LineReplies:
 
     async def picture(self, request: Request) -> Response:
         """A picture of a drawn face."""
-        time_s, face = seconds(request.query_params, "time"), text(request.query_params, "face", "woman")
-        shown = self._studio.drawn(face)
-        found = await self._desk.at(self._number(request), lambda line: as_png(line.picture(time_s, shown)))
-        return Response(found, media_type="image/png", headers=FRESH)
+        query = request.query_params
+        time_s, shown = seconds(query, "time"), self._studio.drawn(text(query, "face", "woman"))
+        by = text(query, "by", "")
+
+        def found(line: OpenLine) -> bytes:
+            return as_png(self._studio.line_as(line, by).picture(time_s, shown))
+
+        return Response(await self._desk.at(self._number(request), found), media_type="image/png", headers=FRESH)
 
     async def video(self, request: Request) -> Response:
         """A video of a stretch."""
         content = await content_of(request)
         start_s, end_s = seconds(content, "start_s"), seconds(content, "end_s")
-        shown = self._studio.drawn(text(content, "face", "woman"))
+        name, by = text(content, "face", "woman"), text(content, "by", "")
 
-        def found(line: OpenLine) -> bytes:
+        def found(given: OpenLine) -> bytes:
+            shown = self._studio.faces.shown(name)
+            line = self._studio.line_as(given, by, name)
             with tempfile.TemporaryDirectory(prefix="lipmotion-studio-") as folder:
                 path = Path(folder) / "stretch.mp4"
-                line.write_video(path, start_s, end_s, shown)
+                if isinstance(shown, ShownPerson):
+                    line.write_film(path, start_s, end_s, shown)
+                else:
+                    line.write_video(path, start_s, end_s, self._studio.drawn(name))
                 return path.read_bytes()
 
         return Response(await self._desk.at(self._number(request), found), media_type="video/mp4", headers=FRESH)
@@ -184,7 +215,10 @@ class LineReplies:
         return json_bytes(as_json(document).encode())
 
     def _media(self, number: int) -> dict[str, str]:
-        return {"sound": self._access.with_key(f"/api/lines/{number}/sound.wav")}
+        parts = {"sound": "sound.wav"}
+        if self._studio.video_of(number) is not None:
+            parts["video"] = "recorded"
+        return {name: self._access.with_key(f"/api/lines/{number}/{path}") for name, path in parts.items()}
 
 
 def _only(motion: Motion, names: list[str]) -> Motion:

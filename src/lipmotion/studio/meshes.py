@@ -9,6 +9,7 @@ import numpy as np
 
 from lipmotion.articulation.expression import is_mood, with_moods
 from lipmotion.errors import InputError, shortened
+from lipmotion.faces.filmed.face import SUFFIX
 from lipmotion.faces.mesh import MeshFace
 from lipmotion.faces.registry import FACES
 from lipmotion.meshes.fitting.driven import driven_character
@@ -27,9 +28,9 @@ TURN = tuple(f"head.rotation.{axis}" for axis in "xyzw")
 
 
 class Faces:
-    """The faces of a project, by their names: those that are built in, and its own characters.
+    """The faces of a project, by their names: those that are built in, its own characters and filmed faces.
 
-    characters : paths of characters by their names
+    characters : paths of characters and of filmed faces by their names
     """
 
     def __init__(self, characters: dict[str, Path]) -> None:
@@ -40,7 +41,12 @@ class Faces:
     @property
     def names(self) -> dict[str, bool]:
         """The names of all faces, and whether each is a mesh."""
-        return {name: name == HEAD for name in FACES.names} | dict.fromkeys(self._characters, True)
+        own = {name: not self.is_filmed(name) for name in self._characters}
+        return {name: name == HEAD for name in FACES.names} | own
+
+    def is_filmed(self, name: str) -> bool:
+        """Return whether a face is a filmed one, which is shown as a video alone."""
+        return name in self._characters and self._characters[name].suffix.lower() == SUFFIX
 
     def shown(self, name: str) -> ShownFace:
         """Return a face. Raises InputError: there is none of that name, or its file cannot be read."""
@@ -48,7 +54,8 @@ class Faces:
             raise InputError(f"no face {shortened(repr(name))}; required one of: {', '.join(self.names)}")
         if name not in self._shown:
             own = self._characters.get(name)
-            self._shown[name] = shown_face(name if own is None else MeshFace(driven_character(own)))
+            found = name if own is None else own if self.is_filmed(name) else MeshFace(driven_character(own))
+            self._shown[name] = shown_face(found)
         return self._shown[name]
 
     def mesh_name(self, name: str, motion: Motion) -> str:
@@ -63,6 +70,8 @@ class Faces:
 
     def _written(self, name: str) -> bytes:
         own = self._characters.get(name)
+        if self.is_filmed(name):
+            raise InputError(f"{name} is a filmed face, and no mesh; ask for a video of it")
         if own is not None and own.suffix.lower() in KEPT:
             return Budget().file_bytes(own, "character")
         if own is not None:

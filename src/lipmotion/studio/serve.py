@@ -18,13 +18,14 @@ NAMES = (HOST, "localhost")
 """What browsers on this machine may call the server."""
 
 
-def serve_studio(
+def serve_studio(  # noqa: PLR0913
     source: Path | None = None,
     *,
     out: Path | None = None,
     model: Path | None = None,
     characters: Mapping[str, Path] | None = None,
     recordings: Path | None = None,
+    against: Path | None = None,
     port: int = 0,
     started: Callable[[str], object] | None = None,
 ) -> None:
@@ -33,8 +34,9 @@ def serve_studio(
     source     : a recording, a folder or a list of recordings, or a project; None: an empty project
     out        : folder of a new project; None: beside the source
     model      : of the project from now on; None: as it is
-    characters : further ones of the project, by their names
+    characters : further ones of the project, and filmed faces, by their names
     recordings : folder of recordings that a voice or a face can be made of; None: as it is
+    against    : a model with which the project's is compared on the page; None: none
     port       : 0: any that is free
     started    : called with the address of the page, which holds a token, once it can be opened
     Raises InputError: no such file, no project that can be read, or the port is taken. ExportError: another process
@@ -43,6 +45,7 @@ def serve_studio(
     check_installed("the studio", "studio")
     if recordings is not None and not recordings.is_dir():
         raise InputError(f"{recordings}: no such folder; give a folder of videos of one person")
+    from lipmotion.pipeline.model import load_model
     from lipmotion.studio.access import Access
     from lipmotion.studio.application import studio_application
     from lipmotion.studio.folder import PROJECT, opened_folder
@@ -56,9 +59,10 @@ def serve_studio(
         if own or model or recordings:
             together = {**folder.project.characters, **own}
             folder.change(lambda now: replace(now, characters=together, model=chosen, recordings=spoken))
+        other = load_model(against) if against else None
         token = token_urlsafe(TOKEN_BYTES)
         hosts = frozenset(f"{name}:{place.getsockname()[1]}" for name in NAMES)
-        with closing(Studio(folder)) as studio:
+        with closing(Studio(folder, against=other)) as studio:
             Thread(target=_prepare, name="prepare", daemon=True).start()
             application = studio_application(studio, Access(token, hosts))
             serve(application, place, started=lambda address: started(f"{address}#{token}") if started else None)

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from hashlib import sha256
 from pathlib import Path
+from threading import Lock
 from typing import Any
 from uuid import uuid4
 
@@ -31,9 +32,11 @@ from lipmotion.storage.files import TEMPORARY, made_folders, read_text_file, sha
 from lipmotion.storage.json_text import from_json
 from lipmotion.studio.desk import NEW, READY, WAITING, WORKING, Desk, NotReadyError, Work
 from lipmotion.studio.folder import EXPORTS, ProjectFolder
+from lipmotion.studio.line import OpenLine
 from lipmotion.studio.meshes import Faces
 from lipmotion.studio.presets import PRESETS, Preset, suffixes
 from lipmotion.studio.project import EDITS_SUFFIX, MARKS, ExportRecord, Project, ProjectLine
+from lipmotion.studio.recorded_videos import MP4, played_as, video_of, write_playable
 from lipmotion.studio.trainer import VOICES, Trainer
 from lipmotion.studio.training import VOICE
 from lipmotion.types.configuration import ANY, kind_of
@@ -44,6 +47,8 @@ from lipmotion.units import PHONES, Pronunciation, is_silent, words_of
 
 LOG = logging.getLogger("lipmotion")
 ORDERS = ("", "doubt")
+OTHER = "other"
+"""What requests call the model that the project's is compared with."""
 
 
 @dataclass(frozen=True)
@@ -59,10 +64,13 @@ class Studio:
 
     folder : the project
     model  : None: as the project says
+    against : a model with which its motion is compared; None: there is none
     """
 
-    def __init__(self, folder: ProjectFolder, model: Model | None = None) -> None:
-        self.folder = folder
+    def __init__(self, folder: ProjectFolder, model: Model | None = None, against: Model | None = None) -> None:
+        self.folder, self.against = folder, against
+        self._videos: dict[Path, Path | None] = {}
+        self._writing_video = Lock()
         file = _model_file(folder)
         self.model = model or load_model(file)
         self.desk = Desk(folder, self.model)
@@ -191,7 +199,11 @@ class Studio:
             "phones": [{"name": phone, "silent": is_silent(phone)} for phone in PHONES],
             "moods": list(MOODS),
             "manners": list(MANNERS),
-            "faces": [{"name": name, "title": name, "mesh": mesh} for name, mesh in self.faces.names.items()],
+            "faces": [
+                {"name": name, "title": name, "mesh": mesh, "filmed": self.faces.is_filmed(name)}
+                for name, mesh in self.faces.names.items()
+            ],
+            "against": self.against.about.get("name") or self.against.engine.name if self.against else None,
             "curve_sets": list(SHAPE_SETS),
             "presets": [
                 {"name": each.name, "title": each.title, "files": list(each.files)} for each in PRESETS.values()
@@ -270,7 +282,9 @@ class Studio:
         self.folder.change(lambda project: project.without_line(number))
 
     def drawn(self, name: str) -> str | Face:
-        """Return a face that pictures can be drawn of. Raises InputError: there is none of that name."""
+        """Return a face of which pictures are drawn. Raises InputError: there is none of that name, or a filmed one."""
+        if self.faces.is_filmed(name):
+            raise InputError("a filmed face is made as a video, not picture by picture; make the video of a selection")
         shown = self.faces.shown(name)
         return getattr(shown, "face", name)
 
@@ -280,6 +294,43 @@ class Studio:
         if not path.exists():
             write_sound(path, read_sound(self.folder.sound(self.folder.line(number))))
         return path
+
+    def video_of(self, number: int) -> Path | None:
+        """Return the path of a line's real video; None: there is none."""
+        recording = self.folder.sound(self.folder.line(number))
+        if recording not in self._videos:
+            self._videos[recording] = video_of(recording)
+        return self._videos[recording]
+
+    def played_video(self, number: int) -> tuple[Path, str]:
+        """Return the path of a line's real video as browsers play it, and its media type.
+
+        Raises HTTPException: it has none. InputError: it cannot be read.
+        """
+        video = self.video_of(number)
+        if video is None or not video.is_file():
+            raise HTTPException(404, "the line has no video")
+        kind = played_as(video)
+        if kind is not None:
+            return video, kind
+        path = self._sounds / f"{number}.mp4"
+        with self._writing_video:
+            if not path.exists():
+                write_playable(video, self.folder.sound(self.folder.line(number)), path)
+        return path, MP4
+
+    def line_as(self, line: OpenLine, by: str, face: str = "") -> OpenLine:
+        """Return an open line as the other model moves it, or mapped onto the person of a filmed face.
+
+        by   : ``OTHER``: the model it is compared with; empty: the project's
+        face : the name of the face that is shown
+        Raises InputError: there is no other model, or it cannot make an edit.
+        """
+        if by not in ("", OTHER) or (by and self.against is None):
+            raise InputError(f"by is {shortened(repr(by))}, required nothing, or {OTHER} after studio --against FILE")
+        model = self.against if by and self.against else self.model
+        onto = self.faces.shown(face).other_person(model, line.file.named.speaker) if face else None
+        return line if model is self.model and onto is None else line.moved_by(model, onto)
 
     def export(self, number: int, preset: Preset) -> dict[str, Any]:
         """Write files of a line, and record what was written from which edits; return their paths.

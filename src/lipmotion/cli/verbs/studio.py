@@ -22,6 +22,10 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add_input(parser, "--character", what="character", action="append", default=[], metavar="FILE", help=character)
     recordings = "folder of videos that a voice or a face can be made of on the page (docs/studio.md)"
     add_input(parser, "--recordings", what="folder of recordings", metavar="FOLDER", help=recordings)
+    face = "a filmed face, as a face of the project: FILE.face (repeatable)"
+    add_input(parser, "--face", what="face", action="append", default=[], metavar="FILE", help=face)
+    against = "another model, whose motion is compared with the project's on the page"
+    add_input(parser, "--against", what="model", metavar="FILE", help=against)
     parser.add_argument("--port", type=int, default=0, help="0: any that is free (default: 0)")
     parser.add_argument("--no-browser", action="store_true", help="print the address, and open no browser")
     parser.set_defaults(run=run)
@@ -39,6 +43,7 @@ def run(options: argparse.Namespace) -> None:
         if not options.no_browser:
             webbrowser.open(address)
 
-    characters: dict[str, Path] = {path.stem: path for path in options.character}
-    given = {"out": options.output, "model": options.model, "port": options.port, "recordings": options.recordings}
+    characters: dict[str, Path] = {path.stem: path for path in (*options.character, *options.face)}
+    given = {"out": options.output, "model": options.model, "port": options.port}
+    given |= {"recordings": options.recordings, "against": options.against}
     serve_studio(options.source, characters=characters, started=started, **given)

@@ -17,7 +17,15 @@ from lipmotion.faces.mesh import MeshFace
 from lipmotion.faces.registry import FACES, face_named, is_drawings, staged_face
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.scene import Scene
-from lipmotion.pipeline.film.filmed_video import RENDERING, check_film, film_of, person_shown, refuse_film, write_film
+from lipmotion.pipeline.film.filmed_video import (
+    RENDERING,
+    Film,
+    check_film,
+    film_of,
+    person_shown,
+    refuse_film,
+    write_film,
+)
 from lipmotion.pipeline.outputs.cues import check_cue_options, cues
 from lipmotion.pipeline.outputs.delivered import shown
 from lipmotion.pipeline.outputs.drawn_video import (
@@ -199,19 +207,23 @@ class ShownPerson(ShownFace):
             LOG.warning("%s: a filmed face has the mood of its footage; not shown: %s", path, ", ".join(asked))
 
     def write_video(self, path: Path, performance: Performance) -> None:  # noqa: D102
-        settings, played = performance.settings, performance.once(sound_track)
-        seen = performance.once(_seen)
-        film = film_of(
+        settings = performance.settings
+        film, sound = self.film(performance), performance.once(sound_track)
+        write_film(path, film, sound, mark=settings.film.mark, monitor=performance.monitor)
+
+    def film(self, performance: Performance) -> Film:
+        """Return the video, which is made while it is read. Raises InputError: the motion lacks channels."""
+        settings, seen = performance.settings, performance.once(_seen)
+        return film_of(
             self.face,
             seen.motion,
             speech=settings.recording,
-            sound=played,
+            sound=performance.once(sound_track),
             model=performance.model,
             units=seen.units,
             fps=settings.fps,
             options=settings.film,
         )
-        write_film(path, film, played, mark=settings.film.mark, monitor=performance.monitor)
 
     def other_person(self, model: Model, speaker: str = "") -> FilmedFace | None:  # noqa: D102
         return person_shown(model, self.face, speaker)

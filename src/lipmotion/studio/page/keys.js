@@ -41,6 +41,7 @@ export const KEYS = [
   { key: ["0"], group: "look", shown: ["0"], help: "whole", act: ({ timeline }) => timeline.fit() },
   { key: ["z"], group: "look", shown: ["Z"], help: "selection", act: ({ timeline, store }) => store.span && timeline.show(store.span) },
   { key: ["e"], group: "look", shown: ["E", "⇧ E"], help: "doubt", act: (studio) => studio.jump(1) },
+  { key: ["x"], group: "look", shown: ["X"], help: "besideFace", act: ({ stage }) => stage.recorded.toggle() },
   { key: ["w"], group: "look", shown: ["W"], help: "why", act: ({ store }) => store.set({ tab: "why" }) },
   { key: ["a", "r"], group: "queue", shown: ["A", "R"], help: "approve", act: (studio, { key }) => studio.mark(key === "a" ? "approved" : "redo") },
   { key: ["a", "r"], shift: true, group: "queue", shown: ["⇧ A", "⇧ R"], help: "approveNext", act: async (studio, { key }) => {

@@ -2,7 +2,7 @@
 
 import { showExport, showKeys } from "./dialogs.js";
 import { bothButton, icon, iconButton, made, textButton } from "./dom.js";
-import { Curves } from "./curves.js";
+import { Comparison } from "./compare/comparison.js";
 import { Stage } from "./face/stage.js";
 import { Weights } from "./face/weights.js";
 import { added } from "./files.js";
@@ -61,6 +61,7 @@ export class Studio {
     this.stage = new Stage(face, this);
     this.timeline = new Timeline(timeline, this);
     this.transport = new Transport(transport, this);
+    this.comparison = new Comparison(this);
     this.panel = new Panel(panel, this);
     followOwn(own, this);
     store.on(["message"], () => {
@@ -161,7 +162,7 @@ export class Studio {
     if (id === this.store.lineId && !again) return;
     this.player.stop();
     this.weights.forget();
-    this.store.set({ lineId: id, line: null, sound: null, motion: null, deviation: null, confidence: null, weights: null, other: null, comparing: false, doubts: [], selected: null, span: null, time_s: 0, progress: null });
+    this.store.set({ lineId: id, line: null, sound: null, motion: null, deviation: null, confidence: null, weights: null, other: null, comparing: false, sideBySide: false, blind: null, doubts: [], selected: null, span: null, time_s: 0, progress: null });
     try {
       const line = { ...NOTHING, ...(await this.server.read(`lines/${id}`)) };
       if (id !== this.store.lineId) return;
@@ -465,14 +466,6 @@ export class Studio {
     } catch (error) {
       this.refuse(error);
     }
-  }
-
-  /** Keep the motion as it is now, to compare with later; or keep nothing. */
-  compare(kept) {
-    const { motion, weights, line } = this.store;
-    if (!kept || !motion) return this.store.set({ other: null, comparing: false });
-    const copy = weights && new Curves(weights.names, weights.rate_hz, weights.values.slice());
-    return this.store.set({ other: { steps: line.steps.length, motion, weights: copy } });
   }
 
   async add(dropped) {

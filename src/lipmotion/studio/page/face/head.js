@@ -52,10 +52,18 @@ export class Head {
   /**
    * Show weights at a time.
    * @param {import("../curves.js").Curves | null} weights
+   * @param {import("../curves.js").Curves | null} other  is shown beside them, at the right
    */
-  pose(weights, time_s) {
+  pose(weights, time_s, other = null) {
     this.shown_s = time_s;
+    this.pair = other && [weights, other];
     if (!this.character) return;
+    this.move(weights, time_s);
+    this.draw();
+  }
+
+  /** Move the character. */
+  move(weights, time_s) {
     if (weights?.names !== this.named) {
       this.named = weights?.names;
       this.columns = this.turned = null;
@@ -68,7 +76,6 @@ export class Head {
       for (const [place, column] of this.columns[n]) mesh.morphTargetInfluences[place] = weights.at(time_s, column);
     });
     for (const [node, columns] of this.turned) node.quaternion.set(...columns.map((column) => weights.at(time_s, column))).normalize();
-    this.draw();
   }
 
   /** Nodes that turn, with the columns of their quaternions: `head.rotation.x` to `.w`. */
@@ -129,13 +136,19 @@ export class Head {
     }
     const size = box.getSize(new Vector3()), middle = box.getCenter(new Vector3());
     middle.y = box.min.y + this.height * size.y;
-    const across = Math.max(size.y, size.x / Math.min(width / height, 1)) * 1.12 * this.distance;
+    const part = width / (this.pair ? 2 : 1), across = Math.max(size.y, size.x / Math.min(part / height, 1)) * 1.12 * this.distance;
     const away = across / (2 * Math.tan((FIELD_DEG * Math.PI) / 360));
-    camera.aspect = width / height;
+    camera.aspect = part / height;
     camera.updateProjectionMatrix();
     const near = Math.cos(this.tilt) * away;
     camera.position.set(middle.x + Math.sin(this.turn) * near, middle.y + Math.sin(this.tilt) * away, middle.z + Math.cos(this.turn) * near);
     camera.lookAt(middle);
-    renderer.render(this.scene, camera);
+    renderer.setScissorTest(Boolean(this.pair));
+    (this.pair ?? [null]).forEach((weights, n) => {
+      if (weights) this.move(weights, this.shown_s);
+      renderer.setViewport(n * part, 0, part, height);
+      renderer.setScissor(n * part, 0, part, height);
+      renderer.render(this.scene, camera);
+    });
   }
 }

@@ -3,6 +3,7 @@
 import { choice, made, onDrag, textButton, iconButton } from "../dom.js";
 import { TEXT, filled } from "../strings.js";
 import { Head } from "./head.js";
+import { Recorded } from "./recorded.js";
 
 export class Stage {
   /**
@@ -25,7 +26,8 @@ export class Stage {
       ...Object.entries(TEXT.views).map(([name, text]) => textButton(text, () => this.head?.look(name))));
     this.faces = made("div", { className: "faces" });
     this.filmButton = iconButton("film", TEXT.film, () => this.toggleFilm());
-    place.append(this.solid, this.drawn, this.film, this.note, made("div", { className: "over" }, this.views, this.faces, this.filmButton));
+    this.recorded = new Recorded(place, studio);
+    place.append(this.solid, this.drawn, this.film, this.note, made("div", { className: "over" }, this.views, this.faces, this.recorded.button, this.filmButton));
     onDrag(this.solid, {
       start: (event) => { this.from = [event.clientX, event.clientY]; },
       move: (event) => {
@@ -47,10 +49,12 @@ export class Stage {
     this.store.on(["project", "face"], () => this.offer());
     this.store.on(["face", "lineId"], () => this.leaveFilm());
     this.store.on(["face", "project", "mesh"], () => this.change());
-    this.store.on(["weights", "time_s", "line", "other", "comparing"], () => this.show());
+    this.store.on(["weights", "time_s", "line", "other", "comparing", "sideBySide"], () => this.show());
   }
 
-  get isSolid() { return Boolean(this.store.project?.forms.faces.find(({ name }) => name === this.store.face)?.mesh) && this.isWebgl; }
+  get form() { return this.store.project?.forms.faces.find(({ name }) => name === this.store.face); }
+
+  get isSolid() { return Boolean(this.form?.mesh) && this.isWebgl; }
 
   offer() {
     const faces = this.store.project?.forms.faces ?? [];
@@ -71,7 +75,9 @@ export class Stage {
       }
     }
     this.solid.hidden = this.views.hidden = !this.isSolid;
-    this.drawn.hidden = this.isSolid;
+    this.drawn.hidden = this.isSolid || Boolean(this.form?.filmed);
+    if (this.form?.filmed) this.say(TEXT.filmed);
+    else if (this.note.textContent === TEXT.filmed) this.say("");
     const mesh = this.store.mesh || this.store.face;
     if (this.isSolid && this.loaded !== mesh) {
       this.loaded = mesh;
@@ -97,10 +103,10 @@ export class Stage {
   }
 
   show() {
-    const { weights, other, comparing, time_s, line } = this.store;
+    const { weights, other, comparing, sideBySide, time_s, line } = this.store;
     if (this.isSolid && this.head) {
       if (weights && !this.studio.weights.known(time_s)) return; // the pose before stays until it is known
-      this.head.pose(comparing && other ? other.weights : weights, time_s);
+      this.head.pose(comparing && other?.weights ? other.weights : weights, time_s, sideBySide ? other?.weights : null);
       this.studio.measured();
     } else if (line && !this.drawn.hidden) this.picture();
   }
@@ -109,9 +115,9 @@ export class Stage {
   async picture() {
     if (this.asked) { this.wanted = true; return; }
     this.asked = true;
-    const { lineId, time_s, face } = this.store;
+    const { lineId, time_s, face, other, comparing } = this.store, by = comparing && other ? other.by : "";
     try {
-      const picture = await this.studio.server.picture(`lines/${lineId}/picture?time=${time_s.toFixed(3)}&face=${encodeURIComponent(face)}`);
+      const picture = await this.studio.server.picture(`lines/${lineId}/picture?time=${time_s.toFixed(3)}&face=${encodeURIComponent(face)}&by=${by}`);
       this.drawn.width = picture.width;
       this.drawn.height = picture.height;
       this.drawn.getContext("2d").drawImage(picture, 0, 0);

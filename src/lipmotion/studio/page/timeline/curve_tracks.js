@@ -59,7 +59,7 @@ export class CurveTracks {
   }
 
   drawRow(name, row, pins, locks) {
-    const { timeline, store, store: { deviation, selected, comparing, other } } = this, motion = store.curvesOf(name), its = other && store.curvesOf(name, other), { height } = row, colour = colours();
+    const { timeline, store, store: { deviation, selected, other, blind } } = this, hidden = blind && !blind.told, comparing = store.comparing && !hidden, motion = store.curvesOf(name), its = other && !hidden && store.curvesOf(name, other), { height } = row, colour = colours();
     const pen = cleared(row.canvas, timeline.width, height), isSelected = selected?.kind === "curve" && selected.channel === name;
     row.element.classList.toggle("selected", isSelected);
     row.label.setAttribute("aria-pressed", isSelected);

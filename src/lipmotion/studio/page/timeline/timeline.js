@@ -55,7 +55,7 @@ export class Timeline {
       this.sized();
     });
     const { store } = this;
-    store.on(["line", "sound", "motion", "deviation", "confidence", "weights", "channels", "selected", "tool", "other", "comparing"], this.draw);
+    store.on(["line", "sound", "motion", "deviation", "confidence", "weights", "channels", "selected", "tool", "other", "comparing", "blind"], this.draw);
     store.on(["span"], () => this.place());
     store.on(["time_s"], () => this.followPlayhead());
   }

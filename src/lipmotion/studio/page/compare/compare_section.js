@@ -1,0 +1,35 @@
+// The part of the panel that compares: with what, how, and a blind comparison.
+
+import { made, textButton } from "../dom.js";
+import { row, section } from "../panel/panel.js";
+import { TEXT, filled } from "../strings.js";
+
+export function compareSection(studio) {
+  const { store, comparison } = studio, { other, project, blind } = store, against = project?.forms.against;
+  const kept = [textButton(TEXT.compareKeep, () => comparison.keep(), { id: "compare-keep" }),
+    against && textButton(filled(TEXT.compareModel, { name: against }), () => comparison.withModel(), { id: "compare-model" })].filter(Boolean);
+  return section(TEXT.compare, other && made("p", { className: "hint", textContent: filled(TEXT.comparedWith, { name: other.name }) }),
+    row(...kept), other && row(...(blind && !blind.told ? blindButtons(studio) : [
+      held(studio), textButton(TEXT.sideBySide, () => comparison.toggleSides(), { id: "compare-sides", disabled: !other.weights, "aria-pressed": String(store.sideBySide) }),
+      textButton(TEXT.blind, () => comparison.blind(), { id: "compare-blind", disabled: !other.weights }),
+      textButton(TEXT.compareStop, () => comparison.stop(), { id: "compare-stop" })])),
+    blind && made("p", { id: "blind-told", className: "hint", textContent: blind.told || filled(TEXT.blindAsk, { what: "AB"[blind.place] }) }));
+}
+
+function held({ store }) {
+  const hold = textButton(TEXT.compareShow, () => {}, { id: "compare-hold" }), show = (comparing) => () => store.set({ comparing });
+  for (const [name, comparing] of [["pointerdown", true], ["pointerup", false], ["pointerleave", false], ["blur", false]]) hold.addEventListener(name, show(comparing));
+  hold.addEventListener("keydown", (event) => { if (event.key === " ") { event.preventDefault(); event.stopPropagation(); show(true)(); } });
+  hold.addEventListener("keyup", show(false));
+  return hold;
+}
+
+function blindButtons({ comparison, store: { blind } }) {
+  const once = { disabled: !blind.asked };
+  return [
+    ...["A", "B"].map((name, place) => textButton(filled(TEXT.blindPlay, { name }), () => comparison.play(place), { id: `blind-play-${name}`, ...once })),
+    ...["A", "B"].map((name, place) => textButton(filled(TEXT.blindBetter, { name }), () => comparison.vote(place), { id: `blind-better-${name}`, ...once })),
+    textButton(TEXT.blindNeither, () => comparison.vote(null), { id: "blind-neither", ...once }),
+    textButton(TEXT.compareStop, () => comparison.stop(), { id: "compare-stop" }),
+  ];
+}

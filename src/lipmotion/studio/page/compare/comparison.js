@@ -1,0 +1,90 @@
+// The other motion: a version that was kept, or that of the other model; and blind comparisons with it.
+
+import { Curves } from "../curves.js";
+import { TEXT, filled } from "../strings.js";
+
+export class Comparison {
+  /** @param {import("../studio.js").Studio} studio */
+  constructor(studio) {
+    this.studio = studio;
+    this.store = studio.store;
+    this.store.on(["line", "face"], () => this.renew());
+    this.store.on(["playing", "time_s"], () => this.heard());
+  }
+
+  /** Keep the motion as it is now, to compare with later. */
+  keep() {
+    const { motion, weights, line, face } = this.store;
+    if (!motion) return;
+    const copy = weights && new Curves(weights.names, weights.rate_hz, weights.values.slice());
+    this.show({ by: "", face, name: line.steps.length ? filled(TEXT.afterEdit, { number: line.steps.length }) : TEXT.withoutEdits, motion, weights: copy });
+  }
+
+  /** Compare with the motion that the other model makes of the same edits. */
+  async withModel() {
+    const { store, studio: { server } } = this, { lineId, line, face, project } = store;
+    const address = `lines/${lineId}`, isMesh = project.forms.faces.find(({ name }) => name === face)?.mesh;
+    try {
+      const [motion, moved] = await Promise.all([server.curves(`${address}/motion?by=other`),
+        isMesh && server.weights(`${address}/weights?by=other&face=${encodeURIComponent(face)}`)]);
+      if (lineId !== store.lineId || face !== store.face) return;
+      this.show({ by: "other", revision: line.revision, face, name: filled(TEXT.modelNamed, { name: project.forms.against }), motion, weights: moved ? moved.weights : null });
+    } catch (error) {
+      this.studio.refuse(error);
+    }
+  }
+
+  show(other) { this.store.set({ other, comparing: false, ...(other.by === this.store.other?.by && this.store.blind === null ? {} : { blind: null, sideBySide: false }) }); }
+
+  stop() { this.store.set({ other: null, comparing: false, sideBySide: false, blind: null }); }
+
+  /** After an edit the other model moves the mouth by it, too; the weights of a version are of the face it was kept with. */
+  renew() {
+    const { other, line, face } = this.store;
+    if (!other || line?.status !== "ready" || (line.revision === other.revision && face === other.face)) return;
+    if (other.by) this.withModel();
+    else if (face !== other.face) this.show({ ...other, face, weights: null });
+  }
+
+  toggleSides() { this.store.set({ sideBySide: !this.store.sideBySide, comparing: false }); }
+
+  /** Play the two, one after the other, in an order that is not told. */
+  blind() {
+    const order = Math.random() < 0.5 ? [false, true] : [true, false];
+    this.store.set({ sideBySide: false, looping: false, blind: { order, place: 0, asked: false, told: "" } });
+    this.play(0, false);
+  }
+
+  /** Play the first or the second one, 0 or 1. */
+  play(place, alone = true) {
+    const { blind, span } = this.store;
+    this.store.set({ blind: { ...blind, place, asked: alone || blind.asked }, comparing: blind.order[place] });
+    this.studio.player.seek(span?.start_s ?? 0);
+    this.studio.player.play();
+  }
+
+  /** The end of the first is followed by the second; then it is asked. */
+  heard() {
+    const { blind, playing, span, time_s } = this.store, { player } = this.studio;
+    if (!blind || blind.told) return;
+    if (playing && span && time_s >= span.end_s) return player.stop();
+    const ended = !playing && time_s >= (span?.end_s ?? player.duration_s) - 0.02;
+    if (!ended || blind.asked) return;
+    if (blind.place === 0) this.play(1, false);
+    else this.store.set({ blind: { ...blind, asked: true } });
+  }
+
+  /** Keep which was better: 0, 1, or null: neither; and tell what was what. */
+  async vote(place) {
+    const { blind, other, lineId } = this.store, names = blind.order.map((isOther) => (isOther ? other.name : TEXT.now));
+    try {
+      const { votes } = await this.studio.server.told(`lines/${lineId}/votes`, { shown: names, better: place === null ? "" : names[place] });
+      this.studio.player.stop();
+      const told = filled(TEXT.blindTold, { a: names[0], b: names[1], now: votes[TEXT.now] ?? 0, other: votes[other.name] ?? 0, neither: votes[""] ?? 0, name: other.name });
+      this.store.set({ blind: { ...blind, told }, comparing: false });
+      this.studio.say(told);
+    } catch (error) {
+      this.studio.refuse(error);
+    }
+  }
+}
