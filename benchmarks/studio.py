@@ -146,6 +146,7 @@ def in_browsers(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
                 folder = sound.with_name(f"home-{choice.id}-{seconds:g}")
                 page = measured_page(choice.values[0], server, folder, options.count or 20)
                 found[name] = {"before": load} | page | {"after": settled_load()}
+                told({name: found[name]})
     return found
 
 
@@ -193,8 +194,8 @@ def kills(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
     return found | {"tracebacks": errors.read_text(encoding="utf-8").count("Traceback")}
 
 
-def told(found: dict[str, int]) -> None:
-    """Print what was found so far: kills of a server take minutes."""
+def told(found: dict[str, Any]) -> None:
+    """Print what was found so far: kills of a server, and browsers, take minutes."""
     print(json.dumps(found), file=sys.stderr, flush=True)
 
 
