@@ -119,7 +119,7 @@ class Own {
   report({ kind, report, file, name }) {
     const rows = kind === "voice"
       ? [[OWN.facts.learned, filled(OWN.learned, report)], [OWN.facts.kept, String(report.kept_back)], [OWN.facts.skipped, String(report.skipped)]]
-      : Object.entries(report.facts);
+      : Object.entries(report.facts).filter(([, value]) => value);
     const facts = made("dl", {}, ...[...rows, [OWN.facts.file, file]].flatMap(([label, value]) => [made("dt", { textContent: label }), made("dd", { textContent: value })]));
     if (kind !== "voice") return [facts, paragraph(filled(OWN.useFace, { file }), { className: "hint" })];
     const used = this.told.voices.some((voice) => voice.used && voice.name === name);
