@@ -31,7 +31,7 @@ def test_a_voice_is_trained_and_used_from_the_page(tmp_path: Path) -> None:
         folder.change(lambda now: replace(now, recordings=recordings))
     with served(project) as address, browser(tmp_path / "home", *WEBGL) as window:
         window.open(address)
-        page = Page(window)
+        page = Page(window, project)
         page.ready()
         window.click("#own")
         wait_until(lambda: window.text("#own-form"), LIMIT_S)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -31,32 +32,38 @@ class Faces:
     """The faces of a project, by their names: those that are built in, its own characters and filmed faces.
 
     characters : paths of characters and of filmed faces by their names
+    made       : returns those of filmed faces that were built here, which may become more
     """
 
-    def __init__(self, characters: dict[str, Path]) -> None:
-        self._characters = characters
-        self._shown: dict[str, ShownFace] = {}
+    def __init__(self, characters: Mapping[str, Path], made: Callable[[], Mapping[str, Path]] = dict) -> None:
+        self._given, self._made = characters, made
+        self._shown: dict[tuple[str, int], ShownFace] = {}
         self._meshes: dict[str, bytes] = {}
+
+    @property
+    def _characters(self) -> dict[str, Path]:
+        return {**self._made(), **self._given}
 
     @property
     def names(self) -> dict[str, bool]:
         """The names of all faces, and whether each is a mesh."""
-        own = {name: not self.is_filmed(name) for name in self._characters}
+        own = {name: path.suffix.lower() != SUFFIX for name, path in self._characters.items()}
         return {name: name == HEAD for name in FACES.names} | own
 
     def is_filmed(self, name: str) -> bool:
         """Return whether a face is a filmed one, which is shown as a video alone."""
-        return name in self._characters and self._characters[name].suffix.lower() == SUFFIX
+        return self._characters.get(name, Path(name)).suffix.lower() == SUFFIX
 
     def shown(self, name: str) -> ShownFace:
         """Return a face. Raises InputError: there is none of that name, or its file cannot be read."""
         if name not in self.names:
             raise InputError(f"no face {shortened(repr(name))}; required one of: {', '.join(self.names)}")
-        if name not in self._shown:
-            own = self._characters.get(name)
+        own = self._characters.get(name)
+        key = name, own.stat().st_mtime_ns if own is not None and own.exists() else 0  # a face may be built anew
+        if key not in self._shown:
             found = name if own is None else own if self.is_filmed(name) else MeshFace(driven_character(own))
-            self._shown[name] = shown_face(found)
-        return self._shown[name]
+            self._shown[key] = shown_face(found)
+        return self._shown[key]
 
     def mesh_name(self, name: str, motion: Motion) -> str:
         """Return the name of the mesh that a motion's weights are of."""

@@ -38,7 +38,7 @@ from lipmotion.studio.presets import PRESETS, Preset, suffixes
 from lipmotion.studio.project import EDITS_SUFFIX, MARKS, ExportRecord, Project, ProjectLine
 from lipmotion.studio.recorded_videos import MP4, played_as, video_of, write_playable
 from lipmotion.studio.trainer import VOICES, Trainer
-from lipmotion.studio.training import VOICE
+from lipmotion.studio.training import FACE, VOICE
 from lipmotion.types.configuration import ANY, kind_of
 from lipmotion.types.delivery import Delivery
 from lipmotion.types.moods import MANNERS, MOODS
@@ -75,12 +75,12 @@ class Studio:
         self.model = model or load_model(file)
         self.desk = Desk(folder, self.model)
         places = {name: Path(os.path.normpath(folder.path / file)) for name, file in folder.project.characters.items()}
-        self.faces = Faces(places)
+        self.trainer = Trainer(folder)
+        self.faces = Faces(places, lambda: self.trainer.made(FACE))
         self._sounds = Path(tempfile.mkdtemp(prefix="lipmotion-studio-"))
         self._exporting: dict[str, int] | None = None
         self._summaries: dict[int, tuple[int, EditsSummary]] = {}
         self._model_digest = sha256_of(file or shipped_path())
-        self.trainer = Trainer(folder)
 
     def close(self) -> None:
         """Write what is not written, and remove what was kept for this run alone."""

@@ -121,7 +121,7 @@ class Own {
       ? [[OWN.facts.learned, filled(OWN.learned, report)], [OWN.facts.kept, String(report.kept_back)], [OWN.facts.skipped, String(report.skipped)]]
       : Object.entries(report.facts).filter(([, value]) => value);
     const facts = made("dl", {}, ...[...rows, [OWN.facts.file, file]].flatMap(([label, value]) => [made("dt", { textContent: label }), made("dd", { textContent: value })]));
-    if (kind !== "voice") return [facts, paragraph(filled(OWN.useFace, { file }), { className: "hint" })];
+    if (kind !== "voice") return [facts, made("div", { className: "row" }, textButton(OWN.show, () => this.showFace(name), { id: "own-show", className: "main" }))];
     const used = this.told.voices.some((voice) => voice.used && voice.name === name);
     const figures = report.figures ? made("table", {},
       made("thead", {}, made("tr", {}, ...OWN.columns.map((textContent) => made("th", { scope: "col", textContent })))),
@@ -131,6 +131,12 @@ class Own {
     return [facts, figures,
       report.table ? made("details", {}, made("summary", { textContent: OWN.inFull }), made("pre", { tabIndex: 0, textContent: report.table })) : null,
       made("div", { className: "row" }, textButton(used ? OWN.isUsed : OWN.use, () => this.use(name), { id: "own-use", className: "main", disabled: used }))];
+  }
+
+  async showFace(face) {
+    await this.studio.listed();
+    this.studio.store.set({ face, mesh: "" });
+    this.shown.close();
   }
 
   async use(voice) {

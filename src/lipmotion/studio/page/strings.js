@@ -190,7 +190,7 @@ export const OWN = {
   inFull: "All figures (ACC: correlation with the recorded motion, at most 1)",
   use: "Use this voice in this project",
   isUsed: "This project uses this voice",
-  useFace: "The face lies in the folder of the project. It speaks in a video: lipmotion animate SPEECH --face {file} -o said.mp4",
+  show: "Show this face",
   newOne: "Make a new one",
   noRecordings: "There are no videos in this project. Drop some on this page, or start the studio with a folder of them: lipmotion studio --recordings FOLDER",
   name: "Name",
