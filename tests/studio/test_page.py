@@ -172,11 +172,31 @@ def test_sound_and_face_are_in_step(page: Page) -> None:
           posed(weights, time_s);
         };"""
     )
+    page.window.run("studio.store.set({ looping: true, span: { start_s: 0.2, end_s: 2 } })")  # it never ends by itself
     page.window.press(SPACE)
     wait_until(lambda: page.of("window.offsets.length") > 5, LIMIT_S)
     page.window.press(SPACE)
     assert page.of("studio.player.audio.paused")
+    page.window.run("studio.store.set({ looping: false, span: null })")
     assert max(map(abs, page.of("window.offsets"))) <= FRAME_S
+
+
+def test_an_edit_waits_for_a_border_that_is_on_its_way(page: Page) -> None:
+    """It neither takes the place of the border's last place nor is lost; and the face stays known everywhere."""
+    wait_until(lambda: page.of("studio.weights.exact"), LIMIT_S)
+    before, ends_s = page.steps, page.of("studio.store.line.phones[4].end_s")
+    page.window.run(
+        """const tier = studio.timeline.phones, ends_s = arguments[0];
+        tier.drag(4, ends_s - 0.01);
+        setTimeout(() => { tier.drag(4, ends_s - 0.02); tier.drop(); studio.edit(["pin opening 0.02 at 4.5"]); }, 5);""",
+        ends_s,
+    )
+    page.wait_for_steps(len(before) + 2)
+    assert page.steps[-2:] == [f"phone 5 ends {ends_s - 0.02:.3f}", "pin opening 0.02 at 4.5"]
+    assert page.of("studio.store.weights.values.every(Number.isFinite)")
+    page.window.press_together(CONTROL, "z")
+    page.window.press_together(CONTROL, "z")
+    page.wait_for_steps(len(before))
 
 
 @pytest.mark.parametrize("opens", BOTH)
