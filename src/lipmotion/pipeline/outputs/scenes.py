@@ -135,9 +135,10 @@ def head_scene(
 
     motion, hertz = generation.motion, rate_hz or generation.motion.rate_hz
     around, kept = _around(frames)
+    mouth = spoken_mouth(motion, generation.units, hertz)
     times_s = frame_times(len(motion.values), motion.rate_hz, hertz)
     moved = alive(times_s, motion, generation.units, staging, prosody)
-    poses = posed(spoken_mouth(motion, generation.units, hertz), moved, around)
+    poses = posed(mouth, moved, around)
     character, mesh = (
         figure(),
         mesh_of_figure(moods=any(map(is_mood, motion.names)) or any(pose.mood != CALM for pose in poses)),
