@@ -188,7 +188,11 @@ def test_an_edit_waits_for_a_border_that_is_on_its_way(page: Page) -> None:
     page.window.run(
         """const tier = studio.timeline.phones, ends_s = arguments[0];
         tier.drag(4, ends_s - 0.01);
-        setTimeout(() => { tier.drag(4, ends_s - 0.02); tier.drop(); studio.edit(["pin opening 0.02 at 4.5"]); }, 5);""",
+        setTimeout(() => {
+          tier.drag(4, ends_s - 0.02);
+          tier.drop();
+          studio.edit(["pin opening 0.02 at 4.5"]);
+        }, 5);""",
         ends_s,
     )
     page.wait_for_steps(len(before) + 2)
