@@ -271,17 +271,14 @@ class WordsSaid(Step):
 
 
 @dataclass(frozen=True)
-class WordsSaidSo(Step):
+class WordsSaidSo(WordsSaid):
     """Other words are said from one time to another, some of them with these phones: ``zoe z ow iy, qi k iy``."""
 
     form: ClassVar[str] = "say {words} from {start_s} to {end_s} with {pronunciations}"
-    words: Text
-    start_s: float
-    end_s: float
     pronunciations: Text
 
     def __post_init__(self) -> None:
-        WordsSaid(self.words, self.start_s, self.end_s)  # checks the times
+        super().__post_init__()
         for word, phones in self.own.items():
             if not phones:
                 raise InputError(f"{str(self)!r}: {shortened(repr(word))} has no phones; required WORD PHONES, WORD …")
@@ -294,7 +291,7 @@ class WordsSaidSo(Step):
         return {word: tuple(phones) for word, *phones in filter(None, parts)}
 
 
-WordStep = WordIs | WordSaid | WordsSaid | WordsSaidSo
+WordStep = WordIs | WordSaid | WordsSaid
 """Edits of words, whose phones are aligned with the sound."""
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -45,9 +45,14 @@ class Excerpt:
     frames: slice
     kept: tuple[int, int]
 
+    @property
+    def _times_s(self) -> tuple[float, float]:
+        """The times of the first and the last frame."""
+        return self.frames.start / FRAME_RATE_HZ, (self.frames.stop - 1) / FRAME_RATE_HZ
+
     def within(self, units: Timeline[Unit]) -> Timeline[Unit]:
         """Return the phones in these frames, cut at the ends, with times from the first of them."""
-        first_s, last_s = self.frames.start / FRAME_RATE_HZ, (self.frames.stop - 1) / FRAME_RATE_HZ
+        first_s, last_s = self._times_s
         return Timeline(
             tuple(
                 Span(max(span.start_s, first_s) - first_s, min(span.end_s, last_s) - first_s, span.label)
@@ -58,7 +63,7 @@ class Excerpt:
 
     def pinned(self, pins: Collection[Pin]) -> Constraints:
         """Return the pins in these frames, with times from the first of them."""
-        first_s, last_s = self.frames.start / FRAME_RATE_HZ, (self.frames.stop - 1) / FRAME_RATE_HZ
+        first_s, last_s = self._times_s
         inside = [pin for pin in pins if first_s <= pin.time_s <= last_s]
         return Constraints(tuple(replace(pin, time_s=pin.time_s - first_s) for pin in inside))
 
@@ -127,19 +132,3 @@ def with_excerpt(
     spans = (*named[:first], *units.spans[first : len(units) - last], *named[len(named) - last :])
     motion = Motion(values, whole.motion.rate_hz, whole.motion.channels)
     return replace(whole, motion=motion, units=Timeline(spans))
-
-
-def sketched(
-    whole: Generation,
-    excerpt: Excerpt,
-    units: tuple[Timeline[Unit], Timeline[Unit]],
-    pins: tuple[Collection[Pin], Collection[Pin]],
-    made: Callable[[Timeline[Unit], Constraints], Generation],
-) -> Generation:
-    """Return the motion after a change, computed around it alone.
-
-    units, pins : before and after the change
-    made        : returns the motion of phones and pins of the excerpt
-    """
-    before, after = (made(excerpt.within(some), excerpt.pinned(held)) for some, held in zip(units, pins, strict=True))
-    return with_excerpt(whole, before, after, excerpt, units[1])

@@ -54,7 +54,7 @@ from lipmotion.pipeline.edits import (
     locks,
     with_span,
 )
-from lipmotion.pipeline.excerpts import excerpt_of_change, sketched, speech_within
+from lipmotion.pipeline.excerpts import Excerpt, excerpt_of_change, speech_within, with_excerpt
 from lipmotion.pipeline.generate.generation_for import generate_for
 from lipmotion.pipeline.generate.outlook import outlook_of
 from lipmotion.pipeline.generate.prior import with_prior
@@ -205,8 +205,8 @@ class Session:
     def sketching(self) -> Iterator[None]:
         """Within it, motion is the last one with what an edit changes around it, where that is not far.
 
-        It is for long recordings, whose face then follows an edit at once; it differs from the motion that is made
-        whole by less than a face shows (docs/studio.md). Deviations, states and names of units stay those of before.
+        It is for long recordings, whose face then follows an edit at once; it differs a little from the motion that is
+        made whole (docs/studio.md). Deviations, states and names of units stay those of before.
         """
         with self._one_at_a_time:
             before, self._sketching = self._sketching, True
@@ -331,7 +331,7 @@ class Session:
 
     def _reworded(self, units: Timeline[Unit], step: WordStep) -> Timeline[Unit]:
         """Return phones in time with other words in the time of some, aligned with the sound there."""
-        if isinstance(step, WordsSaid | WordsSaidSo):
+        if isinstance(step, WordsSaid):
             start_s, end_s, said = step.start_s, min(step.end_s, units[-1].end_s), step.words
             where = f"{start_s:.2f} to {end_s:.2f} s"
         else:
@@ -353,7 +353,7 @@ class Session:
 
     def _said(self, step: WordStep, said: str, start_s: float, end_s: float) -> list[Span[Unit]]:
         """Return the phones in time of words that a step says. Raises AlignmentError: they do not fit in there."""
-        request, pauses = self.request, isinstance(step, WordsSaid | WordsSaidSo)
+        request, pauses = self.request, isinstance(step, WordsSaid)
         if own := own_pronunciations(step):
             lexicon = request.lexicon or Lexicon()
             request = replace(request, lexicon=replace(lexicon, user=lexicon.user | own))
@@ -456,22 +456,25 @@ class Session:
         excerpt = excerpt_of_change(*units, {*pins} ^ {*pins_before}, len(whole.motion.values))
         if excerpt is None or len(units[0]) != len(whole.units):
             return None
-        start, stop = excerpt.frames.start, excerpt.frames.stop
-
-        def made(phones: Timeline[Unit], constraints: Constraints) -> Generation:
-            def generation() -> Generation:
-                part = self._parts.once((start, stop), lambda: speech_within(self._recording, excerpt.frames))
-                spoken = replace(part, speech=self._spoken(part.speech, phones))
-                return generation_of(self.request, self.speaker, self.model, spoken, constraints)
-
-            return self._excerpts.once((start, stop, phones, constraints), generation)
-
         try:
-            sketch = sketched(whole, excerpt, units, (pins_before, pins), made)
-            self._last = (phone_steps, pins), sketch
-            return sketch
+            parts = [self._of_excerpt(excerpt, *held) for held in zip(units, (pins_before, pins), strict=True)]
         except InputError:  # a pin that is refused: the whole says its time
             return None
+        sketch = with_excerpt(whole, parts[0], parts[1], excerpt, units[1])
+        self._last = (phone_steps, pins), sketch
+        return sketch
+
+    def _of_excerpt(self, excerpt: Excerpt, units: Timeline[Unit], pins: tuple[Pin, ...]) -> Generation:
+        """Return the motion in the frames of an excerpt alone. Raises InputError: a pin is refused."""
+        place, phones = (excerpt.frames.start, excerpt.frames.stop), excerpt.within(units)
+        constraints = excerpt.pinned(pins)
+
+        def generation() -> Generation:
+            part = self._parts.once(place, lambda: speech_within(self._recording, excerpt.frames))
+            spoken = replace(part, speech=self._spoken(part.speech, phones))
+            return generation_of(self.request, self.speaker, self.model, spoken, constraints)
+
+        return self._excerpts.once((place, phones, constraints), generation)
 
     def _generation(self, phone_steps: tuple[Step, ...], pins: tuple[Pin, ...]) -> Generation:
         understood = self._edited_speech(phone_steps)

@@ -98,8 +98,10 @@ class OpenLine:
         with self._view():
             return self.session.delivered(self.file.edits).motion
 
-    def _view(self) -> AbstractContextManager[None]:
-        return nullcontext() if self.settled else self.session.sketching()
+    def _view(self, *, settled: bool | None = None) -> AbstractContextManager[None]:
+        """Return what motion is asked for within; ``settled``: None: as it is."""
+        whole = self.settled if settled is None else settled
+        return nullcontext() if whole else self.session.sketching()
 
     def settle(self, revision: int) -> dict[str, Any]:
         """Make the whole motion, where it is not yet; return what moved. Raises RevisionError: as ``edited``."""
@@ -157,7 +159,7 @@ class OpenLine:
     def _changed(self, file: EditFile) -> dict[str, Any]:
         """Go over to other edits: compute, then write, then keep them."""
         before, settled = self._delivered, self.audio.duration_s <= LONG_S
-        with nullcontext() if settled else self.session.sketching():
+        with self._view(settled=settled):
             after = self.session.delivered(file.edits).motion
         self.settled = settled
         if file.edits.steps != self.file.edits.steps or file.undone != self.file.undone:

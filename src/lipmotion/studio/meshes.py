@@ -37,7 +37,7 @@ class Faces:
 
     def __init__(self, characters: Mapping[str, Path], made: Callable[[], Mapping[str, Path]] = dict) -> None:
         self._given, self._made = characters, made
-        self._shown: dict[tuple[str, int], ShownFace] = {}
+        self._shown: dict[str, ShownFace] = {}
         self._meshes: dict[str, bytes] = {}
 
     @property
@@ -52,18 +52,18 @@ class Faces:
 
     def is_filmed(self, name: str) -> bool:
         """Return whether a face is a filmed one, which is shown as a video alone."""
-        return self._characters.get(name, Path(name)).suffix.lower() == SUFFIX
+        own = self._characters.get(name)
+        return own is not None and own.suffix.lower() == SUFFIX
 
     def shown(self, name: str) -> ShownFace:
         """Return a face. Raises InputError: there is none of that name, or its file cannot be read."""
-        if name not in self.names:
-            raise InputError(f"no face {shortened(repr(name))}; required one of: {', '.join(self.names)}")
-        own = self._characters.get(name)
-        key = name, own.stat().st_mtime_ns if own is not None and own.exists() else 0  # a face may be built anew
-        if key not in self._shown:
+        if name not in self._shown:
+            if name not in self.names:
+                raise InputError(f"no face {shortened(repr(name))}; required one of: {', '.join(self.names)}")
+            own = self._characters.get(name)
             found = name if own is None else own if self.is_filmed(name) else MeshFace(driven_character(own))
-            self._shown[key] = shown_face(found)
-        return self._shown[key]
+            self._shown[name] = shown_face(found)
+        return self._shown[name]
 
     def mesh_name(self, name: str, motion: Motion) -> str:
         """Return the name of the mesh that a motion's weights are of."""

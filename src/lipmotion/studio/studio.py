@@ -392,7 +392,7 @@ def _pronounced(step: Step, own: Mapping[str, Sequence[Pronunciation]]) -> Step:
         words = words_of(step.word)
         phones = [phone for word in words if word in own for phone in own[word][0]]
         return WordSaid(step.number, step.word, Text(" ".join(phones))) if own.keys() >= {*words} else step
-    if isinstance(step, WordsSaid):
+    if type(step) is WordsSaid:  # and not one that brings phones along
         said = [f"{word} {' '.join(own[word][0])}" for word in dict.fromkeys(words_of(step.words)) if word in own]
         return WordsSaidSo(step.words, step.start_s, step.end_s, Text(", ".join(said))) if said else step
     return step

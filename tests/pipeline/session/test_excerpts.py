@@ -21,7 +21,7 @@ from lipmotion.types import Audio, Generation, Pin, Span, Timeline, Unit
 TIMES = 12
 """How often the sentence is said in the long recording."""
 UNSEEN = 0.01
-"""Differences of the opening that no face shows, in eye distances: a sixth of a millimetre in ten."""
+"""Most by which the opening may be off until the whole is made, in eye distances: 0.6 mm."""
 
 
 @pytest.fixture(scope="module")

@@ -163,8 +163,11 @@ def is_other_language(words: Sequence[str], lexicon: Lexicon) -> bool:
 
 def guesses(words: Sequence[str], lexicon: Lexicon) -> dict[str, Pronunciation]:
     """Return the first ``MOST_WARNINGS`` words whose pronunciation is a guess, with it."""
-    unknown = [word for word in dict.fromkeys(words) if not lexicon.known(word)]
-    return {word: lexicon.pronunciations(word)[0] for word in unknown[:MOST_WARNINGS]}
+    return {word: lexicon.pronunciations(word)[0] for word in _unknown(words, lexicon)[:MOST_WARNINGS]}
+
+
+def _unknown(words: Sequence[str], lexicon: Lexicon) -> list[str]:
+    return [word for word in dict.fromkeys(words) if not lexicon.known(word)]
 
 
 def warn_of_guesses(words: Sequence[str], lexicon: Lexicon) -> None:
@@ -172,8 +175,6 @@ def warn_of_guesses(words: Sequence[str], lexicon: Lexicon) -> None:
     for word, guessed in guesses(words, lexicon).items():
         told = map(shortened, (word, " ".join(guessed)))
         LOG.warning("%r is not in the dictionary; read as %r; a lexicon file can say better", *told)
-    unknown = [word for word in dict.fromkeys(words) if not lexicon.known(word)]
-    if len(unknown) > MOST_WARNINGS:
-        LOG.warning(
-            "%d more words are not in the dictionary; a lexicon file can say better", len(unknown) - MOST_WARNINGS
-        )
+    more = len(_unknown(words, lexicon)) - MOST_WARNINGS
+    if more > 0:
+        LOG.warning("%d more words are not in the dictionary; a lexicon file can say better", more)
