@@ -176,7 +176,7 @@ def _of_head_scene(generation: Generation, fps: float) -> Mask:
     character = figure()
     mesh = head_mesh(character, moods=any(map(is_mood, generation.motion.names)))
     moved = mesh.displacements(np.arange(len(character.skin.rest)))
-    parting = {name: lip_gap(character, moved[number]) for number, name in enumerate(mesh.shape_names)}
+    parting = dict(zip(mesh.shape_names, lip_gap(moved[:, character.skin.lip_rows()]), strict=True))
     return np.asarray(sum(parting[name] * weights[name] for name in weights.names) < TOUCHING_GAP)
 
 

@@ -7,6 +7,8 @@ the mouth to the throat.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
@@ -78,8 +80,9 @@ _FULL = np.where(SIDE > 0, _BOW, _LOWER_BOW)
 
 
 def section_points(pose: CharacterPose, base_z: Real) -> Real:
-    """Return the eight points of the cross-section of every column [shape=(8, COLUMNS, 3)].
+    """Return the eight points of the cross-section of every column [shape=(8, COLUMNS, 3); stacked: (T, 8, ...)].
 
+    pose   : one, or several of ``pose.stacked``
     base_z : depth of the skin under the outer contour at rest [shape=(COLUMNS,)]
     The fifth point is where the lips meet; the first is the contour, where the skin begins.
     """
@@ -90,7 +93,7 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
     drop = pose.gap - rise
     middle = _between(pose)
     squeeze = _squeeze(pose)
-    rounded = _ENVELOPE ** (1 + min(2 * pose.roundness, 1.0))
+    rounded = _ENVELOPE ** (1 + np.minimum(2 * pose.roundness, 1.0))
     belly = rounded + squeeze * (1 - rounded)
     hole, contour = _opening(pose)
     inner_y = middle + np.where(upper, rise, -drop) * hole
@@ -135,25 +138,25 @@ def section_points(pose: CharacterPose, base_z: Real) -> Real:
             behind - 0.01,
         ),
     ]
-    return np.stack([np.stack(row, axis=1) for row in rows])
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-3)
 
 
-def _meeting(pose: CharacterPose, base_z: Real, inwards: float) -> Real:
-    """Return how far forward the lips meet, at places that much nearer to the middle [shape=(COLUMNS,)]."""
+def _meeting(pose: CharacterPose, base_z: Real, inwards: Any) -> Real:
+    """Return how far forward the lips meet, at places that much nearer to the middle [shape=(..., COLUMNS)]."""
     across = inwards * ACROSS
     between = np.interp(across, ACROSS[:_UPPER_COLUMNS], 0.5 * (base_z[:_UPPER_COLUMNS] + _opposite(base_z)))
     curved = ARCH * REST_HALF_WIDTH**2 * (pose.width**2 - 1)
     return np.asarray(between + pose.protrusion - (0.45 * pose.protrusion + curved) * across**2)
 
 
-def closed_share(pose: CharacterPose, apart: float = SEAM_GAP) -> float:
-    """Return how nearly the lips are closed: 1 where they touch, 0 from a gap of ``apart`` on."""
-    share = min(max(1 - pose.gap / apart, 0.0), 1.0)
+def closed_share(pose: CharacterPose, apart: float = SEAM_GAP) -> Any:
+    """Return how nearly the lips are closed: 1 where they touch, 0 from a gap of ``apart`` on [shape of the gap]."""
+    share = np.minimum(np.maximum(1 - pose.gap / apart, 0.0), 1.0)
     return share * share * (3 - 2 * share)
 
 
 def _between(pose: CharacterPose) -> Real:
-    """Return the height of the line between the lips, closed, at every column [shape=(COLUMNS,)]."""
+    """Return the height of the line between the lips, closed, at every column [shape=(..., COLUMNS)]."""
     line = (1 - pose.roundness - 0.6 * pose.spread) * _LINE
     lowered = 0.22 * pose.gap * (1 - 0.6 * pose.spread) * (1 - 0.75 * pose.roundness)
     at_rest = REST_SMILE * closed_share(pose, SMILE_GAP) * (1 - pose.press) * (1 - pose.roundness) * (1 - pose.tuck)
@@ -168,7 +171,7 @@ def _opposite(base_z: Real) -> Real:
 
 
 def _opening(pose: CharacterPose) -> tuple[Real, Real]:
-    """Return the shapes of hole and outer contour, 1 in the middle, 0 at the corners [shape=(COLUMNS,), both].
+    """Return the shapes of hole and outer contour, 1 in the middle, 0 at the corners [shape=(..., COLUMNS), both].
 
     A round mouth has an elliptic hole that ends before the corners; a spread one is a slot with a flat edge.
     """
@@ -181,26 +184,26 @@ def _opening(pose: CharacterPose) -> tuple[Real, Real]:
     return hole, contour
 
 
-def _squeeze(pose: CharacterPose) -> float:
-    """Return how much nearer to the middle the inner edge of the lips lies than the corners, 0 to 1."""
+def _squeeze(pose: CharacterPose) -> Any:
+    """Return how much nearer to the middle the inner edge of the lips is than the corners, 0 to 1 [shape of the gap]."""
     hole = (HOLE_WIDTH[0] + HOLE_WIDTH[1] * pose.gap) / (REST_HALF_WIDTH * pose.width)
-    as_ring = max(1 - hole, 0.0) * (1 - 0.6 * pose.press) * (1 - LINE_SHARE * closed_share(pose, RING_GAP))
+    as_ring = np.maximum(1 - hole, 0.0) * (1 - 0.6 * pose.press) * (1 - LINE_SHARE * closed_share(pose, RING_GAP))
     return as_ring * pose.roundness + OVAL_SQUEEZE * pose.oval * (1 - pose.roundness)
 
 
 def _rounded(pose: CharacterPose) -> Real:
-    """Return how much fuller the lips are near the corners of a round mouth [shape=(COLUMNS,)]."""
+    """Return how much fuller the lips are near the corners of a round mouth [shape=(..., COLUMNS)]."""
     return 1 + pose.roundness * 0.35 * ACROSS**2 * _ENVELOPE
 
 
 def lip_surface(points: Real) -> Real:
-    """Return the places of lips and wall of the mouth [shape=(RINGS, COLUMNS, 3)] from ``section_points``."""
-    front = np.einsum("rp,pcx->rcx", _SECTION, points)
-    last = front[-1]
-    throat = last.mean(axis=0) * np.array([0, 1, 0]) + np.array([0, 0, 0])
+    """Return the places of lips and wall of the mouth [shape=(..., RINGS, COLUMNS, 3)] from ``section_points``."""
+    front = np.einsum("rp,...pcx->...rcx", _SECTION, points)
+    last = front[..., -1, :, :]
+    middle = last.mean(axis=-2, keepdims=True)
     wall = []
     for inward, back in _WALL:
-        ring = last + inward * (throat - last) * np.array([1, 1, 0])
-        ring[:, 2] = last[:, 2] + back + inward * (last[:, 2].mean() - last[:, 2])
+        ring = last + inward * (middle * [0, 1, 1] - last)
+        ring[..., 2] += back
         wall.append(ring)
-    return np.concatenate([front, np.stack(wall)])
+    return np.concatenate([front, np.stack(wall, axis=-3)], axis=-3)

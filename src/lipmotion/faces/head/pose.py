@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from lipmotion.articulation.liveliness import CALM, UpperFace
 
@@ -52,3 +55,12 @@ class CharacterPose(NamedTuple):
     mood: UpperFace = CALM
     gaze: tuple[float, float] = (0.0, 0.0)
     turn: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+def stacked(poses: Sequence[CharacterPose]) -> CharacterPose:
+    """Return poses as one whose numbers are columns [shape=(T, 1)]: for what is computed for many at once."""
+    rows = list(zip(*poses, strict=True))
+    of_mood = CharacterPose._fields.index("mood")
+    numbers: list[Any] = [np.array(row, float)[:, None] for row in rows[:of_mood]]
+    mood: list[Any] = [np.array(row, float)[:, None] for row in zip(*rows[of_mood], strict=True)]
+    return CharacterPose(*numbers, mood=UpperFace(*mood))

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay, cKDTree
@@ -49,6 +52,55 @@ CALM_RADIUS = 0.035
 """Round the corners of the lips, where the surface folds, the shading changes less than the surface."""
 
 
+@dataclass(frozen=True)
+class Binding:
+    """How vertices of the face follow the lips and the jaw.
+
+    places     : at rest [shape=(N, 3)]; the first ones are those of the outer contour of the lips
+    columns    : which columns of the lips these first ones are [indices]
+    jaw_weight : how far they belong to the jaw [shape=(N,)]
+    bound      : which of them follow the lips [B indices];  shares : of each column of the lips [shape=(B, COLUMNS)]
+    cheeks, nose : how they move with raised cheeks and a wrinkled nose [shape=(N, 3), both]
+    """
+
+    places: Real
+    columns: Index
+    jaw_weight: Real
+    bound: Index
+    shares: Real
+    cheeks: Real
+    nose: Real
+
+    def only(self, rows: Index) -> Binding:
+        """Return the binding of some vertices alone, in ascending order, of that of all."""
+        of = np.full(len(self.places), -1)
+        of[self.bound] = np.arange(len(self.bound))
+        bound, columns = np.flatnonzero(of[rows] >= 0), rows[rows < COLUMNS]
+        places, jaw, cheeks, nose = (each[rows] for each in (self.places, self.jaw_weight, self.cheeks, self.nose))
+        return Binding(places, columns, jaw, bound, self.shares[of[rows][bound]], cheeks, nose)
+
+    def moved(self, pose: CharacterPose, contour: Real, columns: Binding) -> Real:
+        """Return the places in a pose [shape=(..., N, 3)].
+
+        contour : places of the outer contour of the lips [shape=(..., COLUMNS, 3)]; columns : its binding
+        """
+        own = contour - columns._by_jaw(pose)
+        places = self._by_jaw(pose)
+        places[..., self.bound, :] += self.shares @ own
+        spread, roundness, cheek, sneer = (
+            np.asarray(number)[..., None] for number in (pose.spread, pose.roundness, pose.mood.cheek, pose.mood.sneer)
+        )
+        raised = CHEEKS_SPREAD * spread - CHEEKS_ROUND * roundness + CHEEKS_RAISED * cheek
+        places += raised * self.cheeks + NOSE_LIFT * sneer * self.nose
+        places[..., : len(self.columns), :] = contour[..., self.columns, :]
+        return places
+
+    def _by_jaw(self, pose: CharacterPose) -> Real:
+        """Return the places with the jaw of a pose [shape=(..., N, 3)]."""
+        turned = jaw_moved(self.places, pose.jaw)
+        return np.asarray(self.places + self.jaw_weight[:, None] * (turned - self.places))
+
+
 class Skin:
     """The skin: vertices of face, lips, wall of the mouth and lids, in this order.
 
@@ -80,8 +132,9 @@ class Skin:
             "wall": len(grids[0]) - front,
             "lids": len(grids[1]) + len(grids[2]),
         }
-        self._bind(contour)
-        self._cheeks, self._nose = _cheeks(fill, len(self.face)), _nose(self.face)
+        self._contour = contour
+        self.binding = self._bound(fill)
+        self._columns = self.binding.only(np.arange(COLUMNS))
         self.rest = self.places(REST)
         meshed = normals_of(self.rest, self.triangles)
         self.normals = meshed.copy()
@@ -134,23 +187,26 @@ class Skin:
         outer = rows[1:VISIBLE_RINGS]
         normals[outer] += CORNER_SKIN_SHARE * (1 - pose.roundness) * _NEAR_CORNER * (self._before_lips - normals[outer])
 
-    def _bind(self, contour: Real) -> None:
-        """Bind every vertex of the face to two columns of the lips, and to the jaw."""
-        self._contour = contour
-        self.jaw_weight = jaw_weight(self.face)
-        away = self.face[:, None, :2] - contour[None, :, :2]
-        nearest, across = cKDTree(contour[:, :2]).query(self.face[:, :2])[0], np.linalg.norm(away, axis=2)
-        angle = np.arctan2(self.face[:, 1] - MOUTH_Y, np.abs(self.face[:, 0]))
+    def _bound(self, fill: Real) -> Binding:
+        """Return how every vertex of the face is bound to the columns of the lips, and to the jaw.
+
+        fill : the last of them, between mouth, eyes and the back of the head
+        """
+        contour, face = self._contour, self.face
+        away = face[:, None, :2] - contour[None, :, :2]
+        nearest, across = cKDTree(contour[:, :2]).query(face[:, :2])[0], np.linalg.norm(away, axis=2)
+        angle = np.arctan2(face[:, 1] - MOUTH_Y, np.abs(face[:, 0]))
         up = np.sin(angle) ** 2
         reach = np.where(angle > 0, 0.18, 0.36) * up + 0.44 * (1 - up)
-        near = np.clip(1 - nearest / reach, 0, 1) * (self.face[:, 2] > -0.65)
+        near = np.clip(1 - nearest / reach, 0, 1) * (face[:, 2] > -0.65)
         self.lip_weight = near * near * (3 - 2 * near)
-        self._bound = np.flatnonzero(self.lip_weight)
+        bound = np.flatnonzero(self.lip_weight)
         length = np.linalg.norm(np.roll(contour, -1, axis=0) - np.roll(contour, 1, axis=0), axis=1)
-        width = (0.016 + 0.55 * nearest[self._bound])[:, None]
-        shares = length * np.exp(-0.5 * ((across[self._bound] - nearest[self._bound, None]) / width) ** 2)
-        shares *= np.exp(-across[self._bound] / 0.5)
-        self._shares = shares / shares.sum(axis=1, keepdims=True) * self.lip_weight[self._bound, None]
+        width = (0.016 + 0.55 * nearest[bound])[:, None]
+        shares = length * np.exp(-0.5 * ((across[bound] - nearest[bound, None]) / width) ** 2)
+        shares *= np.exp(-across[bound] / 0.5)
+        shares = shares / shares.sum(axis=1, keepdims=True) * self.lip_weight[bound, None]
+        return Binding(face, np.arange(COLUMNS), jaw_weight(face), bound, shares, _cheeks(fill, len(face)), _nose(face))
 
     def places(self, pose: CharacterPose) -> Real:
         """Return the places of all vertices [shape=(V, 3)], the head not turned."""
@@ -159,18 +215,17 @@ class Skin:
 
     def places_without_lids(self, pose: CharacterPose) -> Real:
         """Return the first of the places of ``places``: all but the lids of the eyes, which come last."""
-        points = section_points(pose, self.base_z)
-        lips = lip_surface(points)
-        moved = lips[0] - self._contour
-        turned = jaw_moved(self.face, pose.jaw) - self.face
-        by_jaw = self.jaw_weight[:, None] * turned
-        own = moved - by_jaw[:COLUMNS]
-        face = self.face + by_jaw
-        face[self._bound] += self._shares @ own
-        face += (CHEEKS_SPREAD * pose.spread - CHEEKS_ROUND * pose.roundness) * self._cheeks
-        face += CHEEKS_RAISED * pose.mood.cheek * self._cheeks + NOSE_LIFT * pose.mood.sneer * self._nose
-        face[:COLUMNS] = lips[0]
+        lips, face = self.lips_and_face(pose, self.binding)
         return np.concatenate([face, lips[1:].reshape(-1, 3)])
+
+    def lips_and_face(self, pose: CharacterPose, binding: Binding) -> tuple[Real, Real]:
+        """Return the places of the rings of the lips [shape=(..., RINGS, COLUMNS, 3)] and of vertices of the face.
+
+        pose    : one, or several of ``pose.stacked``
+        binding : of the vertices beside the lips [shape of their places=(..., N, 3)]
+        """
+        lips = lip_surface(section_points(pose, self.base_z))
+        return lips, binding.moved(pose, lips[..., 0, :, :], self._columns)
 
 
 def _cheeks(fill: Real, count: int) -> Real:
@@ -197,14 +252,14 @@ def jaw_weight(places: Real) -> Real:
     return down * front
 
 
-def jaw_moved(places: Real, drop: float) -> Real:
-    """Return places turned with the jaw about its hinge, so that the chin drops by a length [shape=(N, 3)]."""
-    angle = drop / 0.72
-    y, z = (places - HINGE)[:, 1], (places - HINGE)[:, 2]
-    moved = places.copy()
-    moved[:, 1] = HINGE[1] + y * np.cos(angle) - z * np.sin(angle)
-    moved[:, 2] = HINGE[2] + y * np.sin(angle) + z * np.cos(angle)
-    return moved
+def jaw_moved(places: Real, drop: Any) -> Real:
+    """Return places turned with the jaw about its hinge, so that the chin drops by a length [shape=(..., N, 3)].
+
+    drop : a number, or several [shape=(T, 1)]
+    """
+    angle, (y, z) = drop / 0.72, (places - HINGE)[:, 1:].T
+    down, forward = y * np.cos(angle) - z * np.sin(angle), y * np.sin(angle) + z * np.cos(angle)
+    return np.stack([np.broadcast_to(places[:, 0], down.shape), HINGE[1] + down, HINGE[2] + forward], axis=-1)
 
 
 def _step(share: Real) -> Real:
