@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from lipmotion.articulation.contact import GAP, closed_lips, gap_in, in_pictures
 from lipmotion.articulation.expression import action_units
 from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER
 from lipmotion.articulation.phone_targets import GESTURES, OVAL, PURSED_PRESS, TIP_OUT, TIP_UP, gesture_curves
-from lipmotion.articulation.rest import against_rest, rest_frames
+from lipmotion.articulation.rest import rest_frames, size_at_rest
 from lipmotion.errors import InputError
 from lipmotion.types import Motion, Timeline, Unit
 
@@ -133,6 +133,10 @@ class SpokenMouth:
         sampled = in_pictures(rows, self.contact, self.rate_hz, time_s)
         return SpokenMouth(fps, *(np.ascontiguousarray(column) for column in sampled.T))
 
+    def within(self, frames: slice) -> SpokenMouth:
+        """Return the mouth in some frames alone."""
+        return SpokenMouth(self.rate_hz, *(curve[frames] for curve in self._curves().values()))
+
     def rows(self) -> Iterator[dict[str, float]]:
         """Yield the values of every frame by the names of the curves."""
         curves = self._curves()
@@ -143,12 +147,52 @@ class SpokenMouth:
         return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "rate_hz"}
 
 
+class MouthAtRest(NamedTuple):
+    """Sizes of a mouth in its rest pose, in eye distances; None: its motion says nothing of them.
+
+    width     : distance of the lip corners, in the unit of their motion
+    thickness : of the lips
+    chin      : height of the chin
+    """
+
+    width: float | None
+    thickness: float | None
+    chin: float | None
+
+
+def mouth_at_rest(motion: Motion, units: Timeline[Unit]) -> MouthAtRest:
+    """Return the sizes of the rest pose of a motion. Raises InputError: as ``spoken_mouth``."""
+    check_spoken(motion, motion.rate_hz)
+    rest, across, thickness = rest_frames(motion, units), _across(motion), _thickness(motion)
+    name = "width" if "width" in motion.names else "distance of the lip corners"
+    return MouthAtRest(
+        None if across is None else size_at_rest(name, across, rest),
+        None if thickness is None else size_at_rest("thickness of the lips (outer - opening)", thickness, rest),
+        float(np.median(motion["y_152"][rest].astype(np.float64))) if "y_152" in motion.names else None,
+    )
+
+
+def _across(motion: Motion) -> Curve | None:
+    """Return the distance of the lip corners, in any unit [shape=(T,)]; None: the motion does not say it."""
+    if "width" in motion.names:
+        return motion["width"].astype(np.float64)
+    if {*CORNERS} <= {*motion.names}:
+        return (motion[CORNERS[1]] - motion[CORNERS[0]]).astype(np.float64)
+    return None
+
+
+def _thickness(motion: Motion) -> Curve | None:
+    return (motion["outer"] - motion["opening"]).astype(np.float64) if "outer" in motion.names else None
+
+
 def frame_times(frames: int, rate_hz: float, fps: float) -> Curve:
     """Return the times of pictures, ``fps`` a second, of so many frames of motion, to the last one [shape=(N,)]."""
     return np.arange(int(np.floor((frames - 1) / rate_hz * fps + 1e-9)) + 1) / fps
 
 
-def spoken_mouth(motion: Motion, units: Timeline[Unit], fps: float | None = None) -> SpokenMouth:
+def spoken_mouth(
+    motion: Motion, units: Timeline[Unit], fps: float | None = None, at_rest: MouthAtRest | None = None
+) -> SpokenMouth:
     """Return the mouth of a motion and its phones in every frame.
 
     motion : needs ``opening``. ``width``, ``outer`` and the chin ``y_152`` are used where it has them, against the rest
@@ -156,12 +200,13 @@ def spoken_mouth(motion: Motion, units: Timeline[Unit], fps: float | None = None
              of rigs has, phones say of the gap only that p, b and m close the lips
     units  : phones in time; may be empty
     fps    : frames per second, to the end of the motion; None: those of the motion
+    at_rest : of the whole motion, where this is a part of it; None: this is the whole
     In every p, b and m the lips touch (``contact.closed_lips``).
     Raises InputError: no channel ``opening``, no frames, values that are not finite, fps not positive, or lips without
     width or thickness at rest.
     """
     check_spoken(motion, motion.rate_hz if fps is None else fps)
-    time_s, rest = motion.time_s, rest_frames(motion, units)
+    time_s, rest = motion.time_s, at_rest or mouth_at_rest(motion, units)
     said = gesture_curves(units, time_s, [name for name in (*GESTURES, OVAL) if name not in motion.names])
     said |= {name: np.clip(motion[name].astype(np.float64), 0, 1) for name in {*GESTURES} & {*motion.names}}
     # w has half the press of p, with protruded lips: a hole that is almost closed
@@ -277,14 +322,12 @@ def _most_beside_tucks(gap: Curve, tuck: Curve, time_s: Curve) -> Curve:
     return np.minimum(after, before)
 
 
-def _width(motion: Motion, rest: NDArray[np.bool_], said: dict[str, Curve], oval: Curve) -> Curve:
-    if "width" in motion.names:
-        change = against_rest("width", motion["width"].astype(np.float64), rest) - 1
-    elif {*CORNERS} <= {*motion.names}:
-        apart = (motion[CORNERS[1]] - motion[CORNERS[0]]).astype(np.float64)
-        change = against_rest("distance of the lip corners", apart, rest) - 1
-    else:
+def _width(motion: Motion, rest: MouthAtRest, said: dict[str, Curve], oval: Curve) -> Curve:
+    across = _across(motion)
+    if across is None or rest.width is None:
         change = -0.25 * np.clip(motion["opening"].astype(np.float64), 0, 0.4)
+    else:
+        change = across / rest.width - 1
     width = 1 + WIDTH_REACH * np.tanh(change / WIDTH_REACH)
     for name, wider in (("smile", SMILE_WIDTH), ("stretched", STRETCH_WIDTH), ("dropped", DROPPED_WIDTH)):
         width = width + wider * said[name]
@@ -294,17 +337,17 @@ def _width(motion: Motion, rest: NDArray[np.bool_], said: dict[str, Curve], oval
     return np.asarray(width + spread * (np.maximum(width, SPREAD_WIDTH) - width))
 
 
-def _fullness(motion: Motion, rest: NDArray[np.bool_]) -> Curve:
-    if "outer" not in motion.names:
+def _fullness(motion: Motion, rest: MouthAtRest) -> Curve:
+    thickness = _thickness(motion)
+    if thickness is None or rest.thickness is None:
         return 1 - 0.4 * np.clip(motion["opening"].astype(np.float64), 0, 0.4)
-    thickness = (motion["outer"] - motion["opening"]).astype(np.float64)
-    return np.clip(against_rest("thickness of the lips (outer - opening)", thickness, rest), 0.75, 1.25)
+    return np.clip(thickness / rest.thickness, 0.75, 1.25)
 
 
-def _jaw(motion: Motion, rest: NDArray[np.bool_], gap: Curve) -> Curve:
+def _jaw(motion: Motion, rest: MouthAtRest, gap: Curve) -> Curve:
     """Return how far the chin drops: as tracked (point 152, y upwards), within limits that suit the gap."""
     usual = jaw_drop(gap)
-    if "y_152" not in motion.names:
+    if rest.chin is None:
         return np.asarray(usual)
     chin = motion["y_152"].astype(np.float64)
-    return np.clip(np.median(chin[rest]) - chin, LEAST_CHIN_DROP_SHARE * usual, 1.15 * usual + 0.01)
+    return np.clip(rest.chin - chin, LEAST_CHIN_DROP_SHARE * usual, 1.15 * usual + 0.01)

@@ -1,4 +1,4 @@
-"""The rest pose of a mouth: the frames that show it, and curves against it."""
+"""The rest pose of a mouth: the frames that show it, and sizes in it."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ def rest_frames(motion: Motion, units: Timeline[Unit], opening: Array | None = N
     """
     time_s = motion.time_s
     rest = np.zeros(len(time_s), dtype=bool)
-    for span in units:
-        if is_silent(span.label.phone):
-            rest |= (span.start_s <= time_s) & (time_s < span.end_s)
+    silent_s = [(span.start_s, span.end_s) for span in units if is_silent(span.label.phone)]
+    for first, stop in np.searchsorted(time_s, np.array(silent_s).reshape(-1, 2)).tolist():
+        rest[first:stop] = True
     if opening is None:
         if "opening" not in motion.names:
             return rest if rest.any() else ~rest
@@ -37,8 +37,8 @@ def rest_frames(motion: Motion, units: Timeline[Unit], opening: Array | None = N
     return rest
 
 
-def against_rest(name: str, curve: Array, rest: NDArray[np.bool_]) -> Array:
-    """Return a curve as a multiple of its median at rest [shape=(T,)].
+def size_at_rest(name: str, curve: Array, rest: NDArray[np.bool_]) -> float:
+    """Return the median of a curve at rest.
 
     name : of the curve, for the message
     rest : of ``rest_frames``
@@ -47,4 +47,4 @@ def against_rest(name: str, curve: Array, rest: NDArray[np.bool_]) -> Array:
     value = float(np.median(curve[rest]))
     if not value > 0:
         raise InputError(f"the {name} is {value:g} at rest, required more than 0")
-    return curve / value
+    return value

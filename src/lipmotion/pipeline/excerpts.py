@@ -20,7 +20,6 @@ from lipmotion.types import (
     Motion,
     Pin,
     PriorOutput,
-    Span,
     Speech,
     Timeline,
     Unit,
@@ -52,14 +51,7 @@ class Excerpt:
 
     def within(self, units: Timeline[Unit]) -> Timeline[Unit]:
         """Return the phones in these frames, cut at the ends, with times from the first of them."""
-        first_s, last_s = self._times_s
-        return Timeline(
-            tuple(
-                Span(max(span.start_s, first_s) - first_s, min(span.end_s, last_s) - first_s, span.label)
-                for span in units
-                if span.end_s > first_s and span.start_s < last_s
-            )
-        )
+        return units.between(*self._times_s)
 
     def pinned(self, pins: Collection[Pin]) -> Constraints:
         """Return the pins in these frames, with times from the first of them."""

@@ -87,6 +87,16 @@ class Timeline(Generic[LabelT]):
     def __getitem__(self, position: int) -> Span[LabelT]:
         return self.spans[position]
 
+    def between(self, start_s: float, end_s: float) -> Timeline[LabelT]:
+        """Return what lies in a stretch, cut at its ends, with times from its start."""
+        return Timeline(
+            tuple(
+                Span(max(span.start_s, start_s) - start_s, min(span.end_s, end_s) - start_s, span.label)
+                for span in self.spans
+                if span.end_s > start_s and span.start_s < end_s
+            )
+        )
+
     def shifted(self, offset_s: float) -> Timeline[LabelT]:
         """Return the timeline with ``offset_s`` seconds added to all times."""
         return Timeline(tuple(replace(s, start_s=s.start_s + offset_s, end_s=s.end_s + offset_s) for s in self.spans))

@@ -185,7 +185,7 @@ def _opening(pose: CharacterPose) -> tuple[Real, Real]:
 
 
 def _squeeze(pose: CharacterPose) -> Any:
-    """Return how much nearer to the middle the inner edge of the lips is than the corners, 0 to 1 [shape of the gap]."""
+    """Return how much nearer the inner edge of the lips lies to the middle than the corners [shape of the gap]."""
     hole = (HOLE_WIDTH[0] + HOLE_WIDTH[1] * pose.gap) / (REST_HALF_WIDTH * pose.width)
     as_ring = np.maximum(1 - hole, 0.0) * (1 - 0.6 * pose.press) * (1 - LINE_SHARE * closed_share(pose, RING_GAP))
     return as_ring * pose.roundness + OVAL_SQUEEZE * pose.oval * (1 - pose.roundness)

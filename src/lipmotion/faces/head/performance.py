@@ -46,7 +46,7 @@ def head_poses(
     return posed(mouth, alive(np.arange(len(mouth.gap)) / fps, motion, units, staging, prosody))
 
 
-def posed(mouth: SpokenMouth, moved: Liveliness, frames: slice = slice(None)) -> list[CharacterPose]:
+def posed(mouth: SpokenMouth, moved: Liveliness) -> list[CharacterPose]:
     """Return the poses that show a mouth, and eyes, brows and head, one a frame."""
     mouth = mouth.with_corners(moved.unit(12), moved.unit(15))
     gap, change = mouth.gap, mouth.width - 1
@@ -78,11 +78,11 @@ def posed(mouth: SpokenMouth, moved: Liveliness, frames: slice = slice(None)) ->
         "shut": moved.lids,
         "brows": moved.brows,
     }
-    rows = np.stack(list(curves.values()), axis=1)[frames].tolist()
+    rows = np.stack(list(curves.values()), axis=1).tolist()
     return [
         CharacterPose(**dict(zip(curves, row, strict=True)), mood=mood, gaze=(across, up), turn=(yaw, pitch, roll))
         for row, mood, (across, up), (yaw, pitch, roll) in zip(
-            rows, moved.upper_face[frames], moved.gaze[frames].tolist(), moved.turn[frames].tolist(), strict=True
+            rows, moved.upper_face, moved.gaze.tolist(), moved.turn.tolist(), strict=True
         )
     ]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -59,8 +59,10 @@ class CharacterPose(NamedTuple):
 
 def stacked(poses: Sequence[CharacterPose]) -> CharacterPose:
     """Return poses as one whose numbers are columns [shape=(T, 1)]: for what is computed for many at once."""
-    rows = list(zip(*poses, strict=True))
-    of_mood = CharacterPose._fields.index("mood")
-    numbers: list[Any] = [np.array(row, float)[:, None] for row in rows[:of_mood]]
-    mood: list[Any] = [np.array(row, float)[:, None] for row in zip(*rows[of_mood], strict=True)]
-    return CharacterPose(*numbers, mood=UpperFace(*mood))
+    return CharacterPose._make(_columns(poses))._replace(mood=UpperFace._make(_columns([pose.mood for pose in poses])))
+
+
+def _columns(rows: Sequence[Any]) -> Iterator[Any]:
+    """Yield each member of some rows as a column [shape=(T, 1)]; a member of several numbers is left out: empty."""
+    for column in zip(*rows, strict=True):
+        yield np.array(column if isinstance(column[0], float | int) else [], float)[:, None]

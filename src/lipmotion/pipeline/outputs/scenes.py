@@ -13,7 +13,7 @@ from lipmotion.articulation.contact import in_pictures
 from lipmotion.articulation.delivery import closed_times
 from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.liveliness import CALM
-from lipmotion.articulation.mouth import frame_times, spoken_mouth
+from lipmotion.articulation.mouth import SpokenMouth, frame_times, mouth_at_rest, spoken_mouth
 from lipmotion.faces.base import Staging, alive
 from lipmotion.meshes.files.gltf_animator import write_animated_gltf
 from lipmotion.meshes.files.gltf_writer import write_gltf_scene
@@ -33,15 +33,15 @@ from lipmotion.pipeline.outputs.living_curves import living_curves
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
 from lipmotion.pipeline.outputs.prosody import recorded_prosody
 from lipmotion.storage.files import as_text
-from lipmotion.types import Channel, Generation, Motion, Prosody, StateTrace
+from lipmotion.types import Channel, Generation, Motion, Prosody, StateTrace, Timeline, Unit
 from lipmotion.types.motion import WEIGHT
 
 GLTF, USD = ".glb", ".usda"
 SCENE_SUFFIXES = (GLTF, USD)
 KEPT = (GLTF, ".vrm")
 """Suffixes of files of characters that are kept as they are, with an animation more."""
-MARGIN = 10
-"""Frames before and after those that are wanted alone, within which weights settle."""
+MARGIN, MOUTH_MARGIN = 10, 100
+"""Frames before and after those that are wanted alone, within which weights settle, and the mouth."""
 METRES = 0.09
 """The distance between the outer eye corners of the 3D head, in metres."""
 
@@ -65,7 +65,8 @@ class SceneOutput(Output):
 def delivered_scene(performance: Performance, frames: slice | None = None) -> Scene:
     """Return the scene of a face as it is delivered; held poses are those of the mouth.
 
-    frames : the only ones that it is to have, which differ by less than 0.01 from those of the whole; None: all
+    frames : of the motion, at its rate: the only ones that it is to have, which differ by less than 0.01 from those of
+             the whole; None: all
     """
     settings, delivery = performance.settings, performance.settings.delivery
     moved = with_drawn_channels(delivered(performance.generation, delivery))
@@ -133,22 +134,22 @@ def head_scene(
     from lipmotion.faces.head.shape_fit import mouth_weights
     from lipmotion.faces.head.stage import figure, mesh_of_figure
 
-    motion, hertz = generation.motion, rate_hz or generation.motion.rate_hz
-    around, kept = _around(frames)
-    mouth = spoken_mouth(motion, generation.units, hertz)
+    motion, units, hertz = generation.motion, generation.units, rate_hz or generation.motion.rate_hz
     times_s = frame_times(len(motion.values), motion.rate_hz, hertz)
-    moved = alive(times_s, motion, generation.units, staging, prosody)
-    poses = posed(mouth, moved, around)
+    around, kept = _around(frames, MARGIN)
+    mouth = spoken_mouth(motion, units, hertz) if frames is None else _mouth_in(motion, units, around)
+    moved = alive(times_s[around], motion, units, staging, prosody)
+    poses = posed(mouth, moved)
     character, mesh = (
         figure(),
         mesh_of_figure(moods=any(map(is_mood, motion.names)) or any(pose.mood != CALM for pose in poses)),
     )
     curves = mouth_weights(character, mesh, poses)
-    curves |= {name: curve[around] for name, curve in eye_and_brow_weights(moved).items()}
+    curves |= eye_and_brow_weights(moved)
     names = [name for name in mesh.shape_names if name in curves]
     table, channels = np.zeros((len(times_s), len(names))), tuple(Channel(name, WEIGHT) for name in names)
     table[around] = np.stack([curves[name] for name in names], axis=1)
-    weights = edited_weights(Motion(table, hertz, channels), generation.units, generation.curve_edits)
+    weights = edited_weights(Motion(table, hertz, channels), units, generation.curve_edits)
     weights = replace(weights, values=weights.values[around][kept])
     shapes = tuple(Blendshape(each.name, each.rows, METRES * each.displacements) for each in mesh.shapes)
     scaled = replace(mesh, vertices=METRES * mesh.vertices, shapes=shapes)
@@ -156,12 +157,20 @@ def head_scene(
     return Scene(scaled, weights, HeadTurn(METRES * PIVOT, character.turning(), turns), split=False)
 
 
-def _around(frames: slice | None) -> tuple[slice, slice]:
+def _around(frames: slice | None, margin: int) -> tuple[slice, slice]:
     """Return the frames that are computed for some, None: all; and which of them these are."""
     if frames is None:
         return slice(None), slice(None)
-    first = max(frames.start - MARGIN, 0)
-    return slice(first, frames.stop + MARGIN), slice(frames.start - first, frames.stop - first)
+    first = max(frames.start - margin, 0)
+    return slice(first, frames.stop + margin), slice(frames.start - first, frames.stop - first)
+
+
+def _mouth_in(motion: Motion, units: Timeline[Unit], frames: slice) -> SpokenMouth:
+    """Return the mouth in some frames of a motion, made of those around them."""
+    around, kept = _around(frames, MOUTH_MARGIN)
+    part, rate_hz = replace(motion, values=motion.values[around]), motion.rate_hz
+    there = units.between(around.start / rate_hz, (around.start + len(part.values)) / rate_hz)
+    return spoken_mouth(part, there, at_rest=mouth_at_rest(motion, units)).within(kept)
 
 
 def character_scene(
