@@ -39,8 +39,7 @@ def test_a_voice_is_trained_and_used_from_the_page(tmp_path: Path) -> None:
         window.run("document.getElementById('own-prior').checked = false")
         window.click("#own-voice")
         wait_until(lambda: "%" in window.text("#own-job"), LIMIT_S)
-        window.run("location.reload()")  # the work goes on, and is told
-        page.ready()
+        page.reload()  # the work goes on, and is told
         assert "Own voice" in window.text("#own")
         window.click("#own")
         wait_until(lambda: "is ready" in window.text("#own-job") or "could not" in window.text("#own-job"))
