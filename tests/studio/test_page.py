@@ -32,6 +32,16 @@ LIMIT_S = 120.0
 FRAME_S = 1 / 60
 CLOSED = "document.querySelector('dialog').close()"
 FAILED = "{ ...studio.store.line, status: 'failed', error: 'no speech' }"
+SLOW = """const { audio } = studio.player, { head } = studio.stage, frame = requestAnimationFrame, posed = head.pose.bind(head);
+window.requestAnimationFrame = (act) => setTimeout(() => frame(act), 250);
+window.ends_s = [];
+window.shown = [];
+audio.addEventListener("ended", () => window.ends_s.push(audio.currentTime), { capture: true });
+head.pose = (...given) => {
+  window.shown.push({ time_s: given[1], comparing: studio.store.comparing });
+  posed(...given);
+};"""
+"""From now on frames are slow; which ones are shown is noted, and when the sound ends."""
 READY = """const store = globalThis.studio?.store, line = store?.line;
 return Boolean(line?.status === "ready" && line.id === store.lineId && store.weights && !store.saving &&
   studio.stage.head?.character);"""
@@ -392,10 +402,14 @@ def test_the_real_video_beside_and_comparisons(opens: Opens, tmp_path: Path, fil
             window.run_until_done("setTimeout(arguments[0], 100)")
             check_screen(window, "compared", width, scheme)
         window.show_as(1440, 900, "light", mobile=False)
-        window.run("studio.store.set({ span: { start_s: 0.5, end_s: 0.8 } })")
+        window.run(SLOW)
+        window.run("studio.store.set({ span: { start_s: 0.5, end_s: 0.8 }, looping: true })")
         window.click("#compare-blind")
         assert not page.of("studio.store.sideBySide")
         wait_until(lambda: page.of("studio.store.blind.asked"), LIMIT_S)
+        assert page.of("window.ends_s") == pytest.approx([0.8, 0.8], abs=1e-3)
+        assert page.of("[...new Set(window.shown.map(({ comparing }) => comparing))].length") == 2
+        assert page.of("Math.max(...window.shown.map(({ time_s }) => time_s))") <= 0.8 + 1e-6
         wait_until(lambda: not page.of("document.getElementById('blind-better-A').disabled"), LIMIT_S)
         window.click("#blind-better-A")
         wait_until(lambda: "A was" in window.text("#blind-told"), LIMIT_S)

@@ -50,26 +50,24 @@ export class Comparison {
 
   /** Play the two, one after the other, in an order that is not told. */
   blind() {
-    const order = Math.random() < 0.5 ? [false, true] : [true, false];
-    this.store.set({ sideBySide: false, looping: false, blind: { order, place: 0, asked: false, told: "" } });
+    const order = Math.random() < 0.5 ? [false, true] : [true, false], { duration_s } = this.studio.player;
+    const span = this.store.span ?? { start_s: 0, end_s: duration_s };
+    this.store.set({ sideBySide: false, blind: { order, span, place: 0, asked: false, told: "" } });
     this.play(0, false);
   }
 
   /** Play the first or the second one, 0 or 1. */
   play(place, alone = true) {
-    const { blind, span } = this.store;
+    const { blind } = this.store;
     this.store.set({ blind: { ...blind, place, asked: alone || blind.asked }, comparing: blind.order[place] });
-    this.studio.player.seek(span?.start_s ?? 0);
+    this.studio.player.seek(blind.span.start_s);
     this.studio.player.play();
   }
 
   /** The end of the first is followed by the second; then it is asked. */
   heard() {
-    const { blind, playing, span, time_s } = this.store, { player } = this.studio;
-    if (!blind || blind.told) return;
-    if (playing && span && time_s >= span.end_s) return player.stop();
-    const ended = !playing && time_s >= (span?.end_s ?? player.duration_s) - 0.02;
-    if (!ended || blind.asked) return;
+    const { blind, playing, time_s } = this.store;
+    if (!blind || blind.told || blind.asked || playing || time_s < blind.span.end_s - 0.02) return;
     if (blind.place === 0) this.play(1, false);
     else this.store.set({ blind: { ...blind, asked: true } });
   }
