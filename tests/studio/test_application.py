@@ -379,6 +379,11 @@ def _compared(studio: OpenStudio) -> None:
     names = json.loads(edited.headers["x-lipmotion-names"])
     shown = np.frombuffer(edited.body, "<f4").reshape(-1, len(names))
     assert shown[50, names.index("opening")] == pytest.approx(0.3, abs=1e-5)
+    some = studio.ask("/api/lines/1/motion?by=other&names=opening,jump")
+    assert json.loads(some.headers["x-lipmotion-names"]) == ["opening"]
+    assert np.frombuffer(some.body, "<f4") == pytest.approx(shown[:, names.index("opening")])
+    none = studio.ask("/api/lines/1/motion?by=other&names=jump")
+    assert (none.status, none.headers["x-lipmotion-names"], none.body) == (200, "[]", b"")
     assert studio.ask("/api/lines/1/motion?by=../x").status == 422
     shown_names = ["now", "the model b"]
     for better in ("now", "the model b", "now"):

@@ -32,6 +32,11 @@ LIMIT_S = 120.0
 FRAME_S = 1 / 60
 CLOSED = "document.querySelector('dialog').close()"
 FAILED = "{ ...studio.store.line, status: 'failed', error: 'no speech' }"
+ASKED = """return performance.getEntriesByType("resource").map(({ name }) => new URL(name))
+  .filter(({ pathname }) => pathname.endsWith("/motion"))
+  .map(({ searchParams }) => ["of", "names", "by"].map((name) => searchParams.get(name)).join(" "))"""
+"""Which curves were asked for: of which kind, by which model."""
+NOT_SHOWN = "studio.store.line.channels.find(({ name }) => !studio.store.channels.includes(name)).name"
 SLOW = """const { audio } = studio.player, { head } = studio.stage, frame = requestAnimationFrame, posed = head.pose.bind(head);
 window.requestAnimationFrame = (act) => setTimeout(() => frame(act), 250);
 window.ends_s = [];
@@ -278,14 +283,11 @@ def test_the_weights_of_the_page_are_those_of_the_exported_file(page: Page) -> N
 
 
 def test_only_curves_that_are_shown_are_asked_for(page: Page) -> None:
-    asked = """return performance.getEntriesByType("resource").map(({ name }) => new URL(name))
-      .filter(({ pathname }) => pathname.endsWith("/motion"))
-      .map(({ searchParams }) => `${searchParams.get("of")} ${searchParams.get("names")}`)"""
     page.window.run("performance.clearResourceTimings()")
-    first = page.of("studio.store.line.channels.find(({ name }) => !studio.store.channels.includes(name)).name")
+    first = page.of(NOT_SHOWN)
     page.window.run("studio.showCurves([...studio.store.channels, arguments[0]])", first)
     wait_until(lambda: page.of(f"studio.store.motion.column({first!r})") == 3, LIMIT_S)
-    assert sorted(page.window.run(asked)) == [f"deviation {first}", f"motion {first}"]
+    assert sorted(page.window.run(ASKED)) == [f"deviation {first} ", f"motion {first} "]
     shown = page.of("Array.from(studio.store.motion.values).filter((_, place) => place % 4 === 3)")
     whole = page.window.run_until_done(
         """const [name, done] = arguments, { server, store } = studio;
@@ -394,6 +396,12 @@ def test_the_real_video_beside_and_comparisons(opens: Opens, tmp_path: Path, fil
         window.click("#tab-history")
         window.click("#compare-model")
         wait_until(lambda: page.of("Boolean(studio.store.other?.weights)"), LIMIT_S)
+        assert page.of("studio.store.other.motion.names") == ["opening", "width", "outer"]
+        more = page.of(NOT_SHOWN)
+        window.run("performance.clearResourceTimings(); studio.showCurves(['width', arguments[0]])", more)
+        wait_until(lambda: page.of("studio.store.other.motion.names") == ["width", more], LIMIT_S)
+        assert [asked for asked in window.run(ASKED) if asked.endswith("other")] == [f"motion {more} other"]
+        assert page.of("studio.store.other.motion.frames") == page.of("studio.store.motion.frames")
         window.click("#compare-sides")
         assert page.of("studio.stage.head.pair.length") == 2
         for width, height, scheme in SCREENS:

@@ -114,12 +114,12 @@ class LineReplies:
         if of not in NUMBERS:
             raise InputError(f"of is {of!r}, required one of: {', '.join(NUMBERS)}")
         names = text(query, "names", longest=LONGEST_NAMES).split(",") if "names" in query else None
-
         by = text(query, "by", "")
 
         def found(line: OpenLine) -> Response:
             motion = self._studio.line_as(line, by).numbers(of)
-            motion = motion if names is None else _only(motion, names)
+            if names is not None:
+                motion = _only(motion, [name for name in names if name in motion.names] if by else names)
             frames = stretch(query, motion.rate_hz, len(motion.values))
             return _numbers(replace(motion, values=motion.values[frames]), frames.start, {})
 

@@ -3,12 +3,16 @@
 import { Curves } from "../curves.js";
 import { TEXT, filled } from "../strings.js";
 
+/** What the server calls the model that the project's is compared with. */
+const OTHER = "other";
+
 export class Comparison {
   /** @param {import("../studio.js").Studio} studio */
   constructor(studio) {
     this.studio = studio;
     this.store = studio.store;
     this.store.on(["line", "face"], () => this.renew());
+    this.store.on(["channels"], () => this.fill());
     this.store.on(["playing", "time_s"], () => this.heard());
   }
 
@@ -22,15 +26,30 @@ export class Comparison {
 
   /** Compare with the motion that the other model makes of the same edits. */
   async withModel() {
-    const { store, studio: { server } } = this, { lineId, line, face, project } = store;
-    const address = `lines/${lineId}`, isMesh = project.forms.faces.find(({ name }) => name === face)?.mesh;
+    const { store, studio: { server, curves, curves: { names } } } = this, { lineId, line, face, project } = store;
+    const isMesh = project.forms.faces.find(({ name }) => name === face)?.mesh;
     try {
-      const [motion, moved] = await Promise.all([server.curves(`${address}/motion?by=other`),
-        isMesh && server.weights(`${address}/weights?by=other&face=${encodeURIComponent(face)}`)]);
+      const [motion, moved] = await Promise.all([curves.read(lineId, "motion", names, null, OTHER),
+        isMesh && server.weights(`lines/${lineId}/weights?by=${OTHER}&face=${encodeURIComponent(face)}`)]);
       if (lineId !== store.lineId || face !== store.face) return;
-      this.show({ by: "other", revision: line.revision, face, name: filled(TEXT.modelNamed, { name: project.forms.against }), motion, weights: moved ? moved.weights : null });
+      this.show({ by: OTHER, revision: line.revision, face, name: filled(TEXT.modelNamed, { name: project.forms.against }), motion, names, weights: moved ? moved.weights : null });
+      await this.fill();
     } catch (error) {
       this.studio.refuse(error);
+    }
+  }
+
+  /** Read the other model's curves that are shown by now and are not here. */
+  async fill() {
+    const { store, store: { other, lineId }, studio, studio: { curves } } = this;
+    if (!other?.by || !store.line || String(other.names) === String(curves.names)) return;
+    const { names } = curves;
+    try {
+      const motion = await curves.completed(lineId, "motion", other.motion, other.by);
+      if (other === store.other) store.set({ other: { ...other, motion, names } });
+      await this.fill();
+    } catch (error) {
+      studio.refuse(error);
     }
   }
 
