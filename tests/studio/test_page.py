@@ -6,7 +6,7 @@ import re
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +16,9 @@ import pytest
 from children import LIPMOTION, child, wait_until
 from lipmotion.export.video import write_mp4
 from lipmotion.meshes.files.gltf_weights import read_gltf_motion
-from lipmotion.pipeline.model import shipped_path
+from lipmotion.pipeline.model import load_model, save_model, shipped_path
 from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.storage.files import sha256_of
 from study.browser import CONTROL, DELETE, ENTER, ESCAPE, RIGHT, SHIFT, SPACE, TAB, UP, WINDOW_S, Browser, check_screen
 from study.firefox import BOTH, Opens
 
@@ -37,7 +38,8 @@ ASKED = """return performance.getEntriesByType("resource").map(({ name }) => new
   .map(({ searchParams }) => ["of", "names", "by"].map((name) => searchParams.get(name)).join(" "))"""
 """Which curves were asked for: of which kind, by which model."""
 NOT_SHOWN = "studio.store.line.channels.find(({ name }) => !studio.store.channels.includes(name)).name"
-SLOW = """const { audio } = studio.player, { head } = studio.stage, frame = requestAnimationFrame, posed = head.pose.bind(head);
+SLOW = """const { player: { audio }, stage: { head } } = studio;
+const frame = requestAnimationFrame, posed = head.pose.bind(head);
 window.requestAnimationFrame = (act) => setTimeout(() => frame(act), 250);
 window.ends_s = [];
 window.shown = [];
@@ -383,7 +385,10 @@ def test_the_real_video_beside_and_comparisons(opens: Opens, tmp_path: Path, fil
     sound = Path(shutil.copy(WELCOME, tmp_path))
     pictures = (np.full((64, 96, 3), 40 + number % 200, np.uint8) for number in range(100))
     write_mp4(sound.with_suffix(".mp4"), pictures, fps=25, audio=read_audio(sound))
-    options = ("--against", shipped_path(), "--face", filmed_face_file)
+    other = tmp_path / shipped_path().name  # another file, of the same name
+    model = load_model()
+    save_model(replace(model, about={**model.about, "seed": "another"}), other)
+    options = ("--against", other, "--face", filmed_face_file)
     with served(tmp_path / "project", sound, *options) as address, opens(tmp_path / "home", *WEBGL) as window:
         window.open(address)
         page = Page(window, tmp_path / "project")
@@ -422,8 +427,10 @@ def test_the_real_video_beside_and_comparisons(opens: Opens, tmp_path: Path, fil
         window.click("#blind-better-A")
         wait_until(lambda: "A was" in window.text("#blind-told"), LIMIT_S)
         (vote,) = read_votes(tmp_path / "project" / "votes.json")
-        assert vote.better == vote.shown[0]
-        assert vote.shown[0] in window.text("#blind-told").partition(", B was")[0]
+        assert vote.better == 0
+        assert {side.model for side in vote.shown} == {sha256_of(path) for path in (other, shipped_path())}
+        is_other, told = vote.shown[0].model == sha256_of(other), window.text("#blind-told")
+        assert (f"{other.stem} ({sha256_of(other)[:8]})" in told.partition(", B was")[0]) == is_other
         window.run("studio.store.set({ face: 'toy', mesh: '' })")
         wait_until(lambda: "filmed" in window.text("#stage .note"), LIMIT_S)
         check_screen(window, "filmed", 1440, "light")

@@ -21,7 +21,7 @@ export class Comparison {
     const { motion, weights, line, face } = this.store;
     if (!motion) return;
     const copy = weights && new Curves(weights.names, weights.rate_hz, weights.values.slice());
-    this.show({ by: "", face, name: line.steps.length ? filled(TEXT.afterEdit, { number: line.steps.length }) : TEXT.withoutEdits, motion, weights: copy });
+    this.show({ by: "", edits: line.edits_digest, face, name: line.steps.length ? filled(TEXT.afterEdit, { number: line.steps.length }) : TEXT.withoutEdits, motion, weights: copy });
   }
 
   /** Compare with the motion that the other model makes of the same edits. */
@@ -91,13 +91,17 @@ export class Comparison {
     else this.store.set({ blind: { ...blind, asked: true } });
   }
 
+  /** Whether the other motion may be another one: it is that of the other model, or of other edits. */
+  get differs() { return Boolean(this.store.other?.by) || this.store.other?.edits !== this.store.line?.edits_digest; }
+
   /** Keep which was better: 0, 1, or null: neither; and tell what was what. */
   async vote(place) {
-    const { blind, other, lineId } = this.store, names = blind.order.map((isOther) => (isOther ? other.name : TEXT.now));
+    const { blind, blind: { order }, other, lineId } = this.store, names = order.map((isOther) => (isOther ? other.name : TEXT.now));
+    const shown = order.map((isOther) => (isOther ? { by: other.by, edits: other.edits } : {}));
     try {
-      const { votes } = await this.studio.server.told(`lines/${lineId}/votes`, { shown: names, better: place === null ? "" : names[place] });
+      const { better, neither } = await this.studio.server.told(`lines/${lineId}/votes`, { shown, better: place });
       this.studio.player.stop();
-      const told = filled(TEXT.blindTold, { a: names[0], b: names[1], now: votes[TEXT.now] ?? 0, other: votes[other.name] ?? 0, neither: votes[""] ?? 0, name: other.name });
+      const told = filled(TEXT.blindTold, { a: names[0], b: names[1], now: better[order.indexOf(false)], other: better[order.indexOf(true)], neither, name: other.name });
       this.store.set({ blind: { ...blind, told }, comparing: false });
       this.studio.say(told);
     } catch (error) {
