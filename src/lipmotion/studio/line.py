@@ -29,6 +29,7 @@ from lipmotion.pipeline.understand.read_request import read_request
 from lipmotion.pipeline.understand.transcribe import guesses
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
 from lipmotion.studio.meshes import with_turn
+from lipmotion.studio.project import digest_of
 from lipmotion.types import Audio, Channel, Explanation, Generation, Motion, Timeline, Unit
 from lipmotion.units import Lexicon, Pronunciation, is_silent, words_in_time, words_of
 
@@ -182,6 +183,7 @@ class OpenLine:
             "phones": phone_rows(units),
             "channels": [{"name": channel.name, "unit": channel.unit} for channel in motion.channels],
             "steps": list(self.file.edits.sentences),
+            "edits_digest": digest_of(self.file.edits.sentences),
             "undo": len(self.file.edits.steps),
             "redo": len(self.file.undone),
             "warnings": list(outlook.advice) if outlook else [],

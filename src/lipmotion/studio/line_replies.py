@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import tempfile
-from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -20,10 +19,10 @@ from lipmotion.errors import InputError, shortened
 from lipmotion.pipeline.outputs.shown_faces import ShownPerson
 from lipmotion.storage.json_text import as_json
 from lipmotion.studio.access import Access
-from lipmotion.studio.asked import content_of, seconds, stretch, text, texts, whole
+from lipmotion.studio.asked import content_of, objects, seconds, stretch, text, texts, whole
 from lipmotion.studio.line import OpenLine, RevisionError, transcript_step
 from lipmotion.studio.studio import Studio
-from lipmotion.studio.votes import LONGEST_NAME, Vote
+from lipmotion.studio.votes import Vote, tally
 from lipmotion.types import Motion
 from lipmotion.web.replies import FRESH, json_bytes
 
@@ -100,12 +99,14 @@ class LineReplies:
     async def vote(self, request: Request) -> Response:
         """Which of two motions somebody found better."""
         number, content = self._number(request), await content_of(request)
-        shown = texts(content, "shown", most=2, longest=LONGEST_NAME)
-        better, edits = text(content, "better", longest=LONGEST_NAME), self._studio.summary(number).digest
-        vote = Vote(self._studio.folder.line(number).name, shown, better, edits)
+        sides = tuple(
+            self._studio.side(number, text(side, "by", ""), text(side, "edits", ""))
+            for side in objects(content, "shown")
+        )
+        better = None if content.get("better") is None else whole(content, "better", most=1)
+        vote = Vote(self._studio.folder.line(number).name, sides, better)
         found = await self._desk.beside(lambda: self._studio.folder.add_vote(vote))
-        counts = Counter(each.better for each in found if sorted(each.shown) == sorted(shown))
-        return json_bytes(as_json({"votes": counts}).encode())
+        return json_bytes(as_json(tally(found, vote)).encode())
 
     async def motion(self, request: Request) -> Response:
         """Numbers of the motion."""
@@ -114,12 +115,12 @@ class LineReplies:
         if of not in NUMBERS:
             raise InputError(f"of is {of!r}, required one of: {', '.join(NUMBERS)}")
         names = text(query, "names", longest=LONGEST_NAMES).split(",") if "names" in query else None
-
         by = text(query, "by", "")
 
         def found(line: OpenLine) -> Response:
             motion = self._studio.line_as(line, by).numbers(of)
-            motion = motion if names is None else _only(motion, names)
+            if names is not None:
+                motion = _only(motion, [name for name in names if name in motion.names] if by else names)
             frames = stretch(query, motion.rate_hz, len(motion.values))
             return _numbers(replace(motion, values=motion.values[frames]), frames.start, {})
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
+from hashlib import sha256
 from typing import Any
 
 from lipmotion.errors import InputError
@@ -155,3 +156,12 @@ def _line(row: Any) -> ProjectLine:
     numbers = {name: None if row.get(name) is None else float(row[name]) for name in ("duration_s", "doubt")}
     exports = tuple(ExportRecord(**each) for each in row.get("exports", ()))
     return ProjectLine(**{**row, **numbers, "exports": exports})
+
+
+def digest_of(sentences: Iterable[str]) -> str:
+    """Return the digest of edits, by their sentences.
+
+    >>> digest_of(["phone 2 is p"])[:8]
+    '2a0d1f5a'
+    """
+    return sha256("\n".join(sentences).encode("utf-8", "surrogatepass")).hexdigest()
