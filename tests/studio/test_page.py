@@ -19,6 +19,7 @@ from lipmotion.meshes.files.gltf_weights import read_gltf_motion
 from lipmotion.pipeline.model import load_model, save_model, shipped_path
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.files import sha256_of
+from studio.late_sound import shifted
 from study.browser import CONTROL, DELETE, ENTER, ESCAPE, RIGHT, SHIFT, SPACE, TAB, UP, WINDOW_S, Browser, check_screen
 from study.firefox import BOTH, Opens
 
@@ -49,6 +50,20 @@ head.pose = (...given) => {
   posed(...given);
 };"""
 """From now on frames are slow; which ones are shown is noted, and when the sound ends."""
+FOLLOWS = """const [off_s] = arguments, { store, stage: { recorded } } = studio, { video } = recorded;
+const here_s = store.time_s + recorded.begins_s;
+let sought_s = null;
+const set = (to_s) => { sought_s = to_s; };
+Object.defineProperty(video, "currentTime", { configurable: true, get: () => here_s + off_s, set });
+Object.assign(store, { playing: true });
+recorded.lead_s = 0;
+recorded.follow();
+const found = [video.playbackRate, sought_s === null ? null : sought_s - here_s];
+delete video.currentTime;
+Object.assign(store, { playing: false });
+recorded.follow();
+return found;"""
+"""How fast the real video plays where it is so far off the sound [s], and how far off the sound it is set."""
 READY = """const store = globalThis.studio?.store, line = store?.line;
 return Boolean(line?.status === "ready" && line.id === store.lineId && store.weights && !store.saving &&
   studio.stage.head?.character);"""
@@ -384,7 +399,8 @@ def test_the_real_video_beside_and_comparisons(opens: Opens, tmp_path: Path, fil
     (tmp_path / "home").mkdir()
     sound = Path(shutil.copy(WELCOME, tmp_path))
     pictures = (np.full((64, 96, 3), 40 + number % 200, np.uint8) for number in range(100))
-    write_mp4(sound.with_suffix(".mp4"), pictures, fps=25, audio=read_audio(sound))
+    write_mp4(tmp_path / "in step.mp4", pictures, fps=25, audio=read_audio(sound))
+    shifted(tmp_path / "in step.mp4", sound.with_suffix(".mp4"), sound_s=0.2)
     other = tmp_path / shipped_path().name  # another file, of the same name
     model = load_model()
     save_model(replace(model, about={**model.about, "seed": "another"}), other)
@@ -397,7 +413,10 @@ def test_the_real_video_beside_and_comparisons(opens: Opens, tmp_path: Path, fil
         wait_until(lambda: page.of("document.querySelector('.recorded').readyState") >= 2, LIMIT_S)
         window.run("studio.player.seek(1.23)")
         wait_until(lambda: page.of("!document.querySelector('.recorded').seeking"), LIMIT_S)
-        assert abs(page.of("document.querySelector('.recorded').currentTime") - 1.23) <= 1 / 25
+        assert abs(page.of("document.querySelector('.recorded').currentTime") - 1.43) <= 1 / 25
+        assert window.run(FOLLOWS, 0) == [1, None]
+        assert 0.5 <= window.run(FOLLOWS, 0.1)[0] < 1 < window.run(FOLLOWS, -0.1)[0] <= 1.5
+        assert window.run(FOLLOWS, -1)[1] == pytest.approx(0)
         window.click("#tab-history")
         window.click("#compare-model")
         wait_until(lambda: page.of("Boolean(studio.store.other?.weights)"), LIMIT_S)
