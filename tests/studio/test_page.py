@@ -210,6 +210,21 @@ def test_each_edit_by_pointer_and_keys(page: Page) -> None:
     assert [each for each in window.problems() if each.startswith("SEVERE") and "favicon" not in each] == []
 
 
+def test_edited_phones_are_marked_and_the_strip_of_confidence_says_what_it_shows(page: Page) -> None:
+    marked = "[...document.querySelectorAll('.phones .edited')].map((phone) => [phone.dataset.index, phone.title])"
+    assert page.of(marked) == []
+    page.choose(9)
+    page.edit(lambda: page.window.press(ENTER, *"aa", ENTER), "phone 9 is aa")
+    ((index, name),) = page.of(marked)
+    assert (index, name.endswith(", edited")) == ("8", True)
+    assert page.of("document.querySelector('.phones .edited').getAttribute('aria-label')") == name
+    page.window.press_together(CONTROL, "z")
+    wait_until(lambda: page.of(marked) == [], LIMIT_S)
+    assert page.window.text(".confidence .label") == "stronger: less sure"
+    page.window.run("document.querySelector('.confidence .label').focus()")
+    wait_until(lambda: "the stronger" in page.window.text("#message"), LIMIT_S)
+
+
 def test_sound_and_face_are_in_step(page: Page) -> None:
     wait_until(lambda: page.of("studio.weights.exact"), LIMIT_S)
     page.window.press(ESCAPE, ESCAPE)
