@@ -64,6 +64,8 @@ Object.assign(store, { playing: false });
 recorded.follow();
 return found;"""
 """How fast the real video plays where it is so far off the sound [s], and how far off the sound it is set."""
+ROWS = "new Set([...document.querySelectorAll('.over > :not([hidden])')].map((each) => each.offsetTop)).size"
+"""In how many rows the buttons over the face stand."""
 READY = """const store = globalThis.studio?.store, line = store?.line;
 return Boolean(line?.status === "ready" && line.id === store.lineId && store.weights && !store.saving &&
   studio.stage.head?.character);"""
@@ -448,6 +450,11 @@ def test_the_real_video_beside_and_comparisons(opens: Opens, tmp_path: Path, fil
             window.run("studio.showPlace('panel')")
             window.run_until_done("setTimeout(arguments[0], 100)")
             check_screen(window, "compared", width, scheme)
+            assert page.of(ROWS) == 1, width
+        icons = page.of(
+            "[...document.querySelectorAll('header path, .over path')].map((path) => path.getAttribute('d'))"
+        )
+        assert len(set(icons)) == len(icons) == 6
         window.show_as(1440, 900, "light", mobile=False)
         window.run(SLOW)
         window.run("studio.store.set({ span: { start_s: 0.5, end_s: 0.8 }, looping: true })")

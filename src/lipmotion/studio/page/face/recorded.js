@@ -18,7 +18,7 @@ export class Recorded {
     this.moved = false; // whether it was to follow since it went to a time
     this.video = made("video", { className: "recorded", muted: true, playsInline: true, preload: "auto", hidden: true, "aria-label": TEXT.recorded });
     this.video.addEventListener("error", () => { if (!this.video.hidden) studio.stage.say(TEXT.noRecorded); });
-    this.button = iconButton("person", TEXT.besideFace, () => this.toggle(), { id: "recorded", "aria-pressed": "false" });
+    this.button = iconButton("camera", TEXT.besideFace, () => this.toggle(), { id: "recorded", "aria-pressed": "false" });
     place.append(this.video);
     this.store.on(["line"], () => this.offer());
     this.store.on(["time_s", "playing", "speed"], () => this.follow());
