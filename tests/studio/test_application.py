@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import av
 import numpy as np
@@ -69,6 +70,19 @@ def test_an_edit_is_made_stored_and_taken_back(studio: OpenStudio) -> None:
     assert list(map(str, read_edits(studio.folder.edits(studio.folder.line(1))).undone)) == state["steps"]
     redone = studio.ask("/api/lines/1/redo", {"revision": undone["revision"]}).content
     assert (redone["steps"], redone["redo"]) == (["phone 3 is p"], 1)
+
+
+def test_phones_that_edits_have_touched_are_told(studio: OpenStudio) -> None:
+    def edited(state: dict[str, Any]) -> list[int]:
+        return [number for number, phone in enumerate(state["phones"], 1) if phone["edited"]]
+
+    before = studio.ready()
+    own, end_s = before["phones"][2]["label"], before["phones"][4]["end_s"]
+    assert edited(before) == []
+    assert edited(studio.edit("phone 3 is p", "pin opening 0.1 at 1.0").content) == [3]
+    assert edited(studio.edit(f"phone 5 ends {end_s - 0.01:.3f}").content) == [3, 5, 6]
+    assert edited(studio.edit(f"phone 3 is {own}").content) == [5, 6]
+    assert edited(studio.edit("split phone 1 at 0.02").content) == [1, 2, 6, 7]
 
 
 def test_while_something_is_dragged_each_edit_replaces_the_one_before(studio: OpenStudio) -> None:

@@ -19,6 +19,7 @@ from lipmotion.meshes.files.gltf_weights import read_gltf_motion
 from lipmotion.pipeline.model import load_model, save_model, shipped_path
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.files import sha256_of
+from studio.late_sound import shifted
 from study.browser import CONTROL, DELETE, ENTER, ESCAPE, RIGHT, SHIFT, SPACE, TAB, UP, WINDOW_S, Browser, check_screen
 from study.firefox import BOTH, Opens
 
@@ -49,6 +50,22 @@ head.pose = (...given) => {
   posed(...given);
 };"""
 """From now on frames are slow; which ones are shown is noted, and when the sound ends."""
+FOLLOWS = """const [off_s] = arguments, { store, stage: { recorded } } = studio, { video } = recorded;
+const here_s = store.time_s + recorded.begins_s;
+let sought_s = null;
+const set = (to_s) => { sought_s = to_s; };
+Object.defineProperty(video, "currentTime", { configurable: true, get: () => here_s + off_s, set });
+Object.assign(store, { playing: true });
+recorded.lead_s = 0;
+recorded.follow();
+const found = [video.playbackRate, sought_s === null ? null : sought_s - here_s];
+delete video.currentTime;
+Object.assign(store, { playing: false });
+recorded.follow();
+return found;"""
+"""How fast the real video plays where it is so far off the sound [s], and how far off the sound it is set."""
+ROWS = "new Set([...document.querySelectorAll('.over > :not([hidden])')].map((each) => each.offsetTop)).size"
+"""In how many rows the buttons over the face stand."""
 READY = """const store = globalThis.studio?.store, line = store?.line;
 return Boolean(line?.status === "ready" && line.id === store.lineId && store.weights && !store.saving &&
   studio.stage.head?.character);"""
@@ -193,6 +210,21 @@ def test_each_edit_by_pointer_and_keys(page: Page) -> None:
         page.wait_for_steps(count + 1)
     assert page.steps == made
     assert [each for each in window.problems() if each.startswith("SEVERE") and "favicon" not in each] == []
+
+
+def test_edited_phones_are_marked_and_the_strip_of_confidence_says_what_it_shows(page: Page) -> None:
+    marked = "[...document.querySelectorAll('.phones .edited')].map((phone) => [phone.dataset.index, phone.title])"
+    assert page.of(marked) == []
+    page.choose(9)
+    page.edit(lambda: page.window.press(ENTER, *"aa", ENTER), "phone 9 is aa")
+    ((index, name),) = page.of(marked)
+    assert (index, name.endswith(", edited")) == ("8", True)
+    assert page.of("document.querySelector('.phones .edited').getAttribute('aria-label')") == name
+    page.window.press_together(CONTROL, "z")
+    wait_until(lambda: page.of(marked) == [], LIMIT_S)
+    assert page.window.text(".confidence .label") == "stronger: less sure"
+    page.window.run("document.querySelector('.confidence .label').focus()")
+    wait_until(lambda: "the stronger" in page.window.text("#message"), LIMIT_S)
 
 
 def test_sound_and_face_are_in_step(page: Page) -> None:
@@ -384,7 +416,8 @@ def test_the_real_video_beside_and_comparisons(opens: Opens, tmp_path: Path, fil
     (tmp_path / "home").mkdir()
     sound = Path(shutil.copy(WELCOME, tmp_path))
     pictures = (np.full((64, 96, 3), 40 + number % 200, np.uint8) for number in range(100))
-    write_mp4(sound.with_suffix(".mp4"), pictures, fps=25, audio=read_audio(sound))
+    write_mp4(tmp_path / "in step.mp4", pictures, fps=25, audio=read_audio(sound))
+    shifted(tmp_path / "in step.mp4", sound.with_suffix(".mp4"), sound_s=0.2)
     other = tmp_path / shipped_path().name  # another file, of the same name
     model = load_model()
     save_model(replace(model, about={**model.about, "seed": "another"}), other)
@@ -397,7 +430,10 @@ def test_the_real_video_beside_and_comparisons(opens: Opens, tmp_path: Path, fil
         wait_until(lambda: page.of("document.querySelector('.recorded').readyState") >= 2, LIMIT_S)
         window.run("studio.player.seek(1.23)")
         wait_until(lambda: page.of("!document.querySelector('.recorded').seeking"), LIMIT_S)
-        assert abs(page.of("document.querySelector('.recorded').currentTime") - 1.23) <= 1 / 25
+        assert abs(page.of("document.querySelector('.recorded').currentTime") - 1.43) <= 1 / 25
+        assert window.run(FOLLOWS, 0) == [1, None]
+        assert 0.5 <= window.run(FOLLOWS, 0.1)[0] < 1 < window.run(FOLLOWS, -0.1)[0] <= 1.5
+        assert window.run(FOLLOWS, -1)[1] == pytest.approx(0)
         window.click("#tab-history")
         window.click("#compare-model")
         wait_until(lambda: page.of("Boolean(studio.store.other?.weights)"), LIMIT_S)
@@ -414,6 +450,11 @@ def test_the_real_video_beside_and_comparisons(opens: Opens, tmp_path: Path, fil
             window.run("studio.showPlace('panel')")
             window.run_until_done("setTimeout(arguments[0], 100)")
             check_screen(window, "compared", width, scheme)
+            assert page.of(ROWS) == 1, width
+        icons = page.of(
+            "[...document.querySelectorAll('header path, .over path')].map((path) => path.getAttribute('d'))"
+        )
+        assert len(set(icons)) == len(icons) == 6
         window.show_as(1440, 900, "light", mobile=False)
         window.run(SLOW)
         window.run("studio.store.set({ span: { start_s: 0.5, end_s: 0.8 }, looping: true })")

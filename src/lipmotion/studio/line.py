@@ -30,7 +30,7 @@ from lipmotion.pipeline.understand.transcribe import guesses
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
 from lipmotion.studio.meshes import with_turn
 from lipmotion.studio.project import digest_of
-from lipmotion.types import Audio, Channel, Explanation, Generation, Motion, Timeline, Unit
+from lipmotion.types import Audio, Channel, Explanation, Generation, Motion, Span, Timeline, Unit
 from lipmotion.units import Lexicon, Pronunciation, is_silent, words_in_time, words_of
 
 LEAST_MOVE = 5e-4
@@ -180,7 +180,7 @@ class OpenLine:
             "rate_hz": motion.rate_hz,
             "frames": len(motion.values),
             "words": word_rows(units),
-            "phones": phone_rows(units),
+            "phones": phone_rows(units, self.session.units()),
             "channels": [{"name": channel.name, "unit": channel.unit} for channel in motion.channels],
             "steps": list(self.file.edits.sentences),
             "edits_digest": digest_of(self.file.edits.sentences),
@@ -276,8 +276,12 @@ def moved_stretch(before: Motion, after: Motion) -> dict[str, float] | None:
     return {"start_s": float(moved[0] / after.rate_hz), "end_s": float(moved[-1] / after.rate_hz)}
 
 
-def phone_rows(units: Timeline[Unit]) -> list[dict[str, Any]]:
-    """Return phones in time as objects of JSON."""
+def phone_rows(units: Timeline[Unit], plain: Timeline[Unit]) -> list[dict[str, Any]]:
+    """Return phones in time as objects of JSON.
+
+    plain : the phones before all edits: what is not one of them was edited
+    """
+    before = set(map(_said, plain))
     return [
         {
             "label": span.label.phone or span.label.unit,
@@ -285,9 +289,15 @@ def phone_rows(units: Timeline[Unit]) -> list[dict[str, Any]]:
             "end_s": span.end_s,
             "word": span.label.word,
             "confidence": span.label.confidence,
+            "edited": _said(span) not in before,
         }
         for span in units
     ]
+
+
+def _said(span: Span[Unit]) -> tuple[str, float, float]:
+    """Return which phone is said, and from when to when."""
+    return span.label.phone or span.label.unit, span.start_s, span.end_s
 
 
 def word_rows(units: Timeline[Unit]) -> list[dict[str, Any]]:

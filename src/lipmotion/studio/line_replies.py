@@ -215,11 +215,11 @@ class LineReplies:
         document = self._studio.line_document(number) | {"media": self._media(number)}
         return json_bytes(as_json(document).encode())
 
-    def _media(self, number: int) -> dict[str, str]:
-        parts = {"sound": "sound.wav"}
-        if self._studio.video_of(number) is not None:
-            parts["video"] = "recorded"
-        return {name: self._access.with_key(f"/api/lines/{number}/{path}") for name, path in parts.items()}
+    def _media(self, number: int) -> dict[str, Any]:
+        video = self._studio.video_of(number)
+        parts = {"sound": "sound.wav"} | ({"video": "recorded"} if video else {})
+        addresses = {name: self._access.with_key(f"/api/lines/{number}/{path}") for name, path in parts.items()}
+        return addresses | ({"sound_begins_s": video[1]} if video else {})
 
 
 def _only(motion: Motion, names: list[str]) -> Motion:

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES
 from lipmotion.export.video import write_mp4
 from lipmotion.pipeline.outputs.drawn_video import read_sound
+from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ, read_audio
 from lipmotion.storage.media import has_video, open_media, video_streams
 from lipmotion.vision.footage import untracked_frames
 
@@ -17,6 +21,10 @@ PLAYED = {
 }
 """What browsers play as it is: the kind of a file by its suffix, and the codecs in it."""
 MP4 = "video/mp4"
+IN_STEP_S = 0.005
+"""Sound and pictures that begin further apart do not begin together."""
+LOUDNESS_HZ = 100
+"""Rate of the loudness by which two sounds are compared: encoders move samples a little, which it hardly shows."""
 
 
 def video_of(recording: Path) -> Path | None:
@@ -31,12 +39,53 @@ def video_of(recording: Path) -> Path | None:
 
 
 def played_as(path: Path) -> str | None:
-    """Return the media type of a video that browsers play as it is; None: they do not, and it is written anew."""
+    """Return the media type of a video that browsers play as it is; None: they do not, and it is written anew.
+
+    What begins later than 0 is written anew, too, so that no browser has to say what its times are.
+    """
     kind, codecs = PLAYED.get(path.suffix.lower(), ("", ()))
     if not kind:
         return None
     with open_media(path) as container:
-        return kind if video_streams(container)[0].codec_context.name.removeprefix("lib") in codecs else None
+        is_known = video_streams(container)[0].codec_context.name.removeprefix("lib") in codecs
+        return kind if is_known and (container.start_time or 0) < IN_STEP_S * 1e6 else None
+
+
+def sound_begins_s(video: Path, sound: Path) -> float:
+    """Return when in a real video the sound of its line begins, in seconds from the beginning of the video.
+
+    sound : the recording: the video itself, of which the readers have silence before a sound that begins later than
+            the pictures; or another file, which begins with the video or, as programs that extract sound leave that
+            silence out, with the sound in it: where it is more like the sound of the video
+    Raises InputError: one of both cannot be read.
+    """
+    late_s = 0.0 if sound == video else _late_s(video)
+    if late_s < IN_STEP_S:
+        return 0.0
+    own, given = map(_loudness, (video, sound))
+    return late_s if _alike(own[round(late_s * LOUDNESS_HZ) :], given) > _alike(own, given) else 0.0
+
+
+def _late_s(video: Path) -> float:
+    """Return how much later than a video its sound begins, in seconds; without sound 0."""
+    with open_media(video) as container:
+        for stream in container.streams.audio:
+            start_s = float((stream.start_time or 0) * stream.time_base)
+            return max(start_s - (container.start_time or 0) / 1e6, 0.0)
+    return 0.0
+
+
+def _loudness(path: Path) -> NDArray[np.float64]:
+    """Return the loudness of a sound, ``LOUDNESS_HZ`` values a second."""
+    samples, each = np.abs(read_audio(path, warn=False).samples), SPEECH_RATE_HZ // LOUDNESS_HZ
+    return np.sqrt(samples[: len(samples) // each * each].reshape(-1, each).mean(axis=1, dtype=float))
+
+
+def _alike(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+    """Return the correlation of two courses that begin together, over what both have."""
+    count = min(len(one), len(other))
+    one, other = one[:count] - one[:count].mean(), other[:count] - other[:count].mean()
+    return float(one @ other / max(np.sqrt((one @ one) * (other @ other)), 1e-12))
 
 
 def write_playable(video: Path, sound: Path, path: Path) -> None:

@@ -35,7 +35,7 @@ from lipmotion.studio.line import OpenLine
 from lipmotion.studio.meshes import Faces
 from lipmotion.studio.presets import PRESETS, Preset, suffixes
 from lipmotion.studio.project import EDITS_SUFFIX, MARKS, ExportRecord, Project, ProjectLine, digest_of
-from lipmotion.studio.recorded_videos import MP4, played_as, video_of, write_playable
+from lipmotion.studio.recorded_videos import MP4, played_as, sound_begins_s, video_of, write_playable
 from lipmotion.studio.trainer import VOICES, Trainer
 from lipmotion.studio.training import FACE, VOICE
 from lipmotion.studio.votes import Side
@@ -71,7 +71,7 @@ class Studio:
         self, folder: ProjectFolder, used: KnownModel | None = None, against: KnownModel | None = None
     ) -> None:
         self.folder, self.against = folder, against
-        self._videos: dict[Path, Path | None] = {}
+        self._videos: dict[Path, tuple[Path, float] | None] = {}
         self._writing_video = Lock()
         self.used = used or known_model(_model_file(folder))
         self.desk = Desk(folder, self.used.model)
@@ -295,11 +295,12 @@ class Studio:
             write_sound(path, read_sound(self.folder.sound(self.folder.line(number))))
         return path
 
-    def video_of(self, number: int) -> Path | None:
-        """Return the path of a line's real video; None: there is none."""
+    def video_of(self, number: int) -> tuple[Path, float] | None:
+        """Return the path of a line's real video, and when in it the line's sound begins [s]; None: there is none."""
         recording = self.folder.sound(self.folder.line(number))
         if recording not in self._videos:
-            self._videos[recording] = video_of(recording)
+            video = video_of(recording)
+            self._videos[recording] = (video, sound_begins_s(video, recording)) if video else None
         return self._videos[recording]
 
     def played_video(self, number: int) -> tuple[Path, str]:
@@ -307,7 +308,7 @@ class Studio:
 
         Raises HTTPException: it has none. InputError: it cannot be read.
         """
-        video = self.video_of(number)
+        video, _ = self.video_of(number) or (None, 0.0)
         if video is None or not video.is_file():
             raise HTTPException(404, "the line has no video")
         kind = played_as(video)

@@ -6,7 +6,7 @@ import { ROWS, Spectra } from "../sound/spectrum.js";
 import { cleared, colours } from "./canvas.js";
 
 const STEPS_S = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120];
-const LABEL_PX = 64, STRIP_PX = 2, SHADES = 8, TILE_PX = 256, TILES = 48;
+const LABEL_PX = 64, STRIP_PX = 2, STRIP_HEIGHT_PX = 15, SHADES = 8, TILE_PX = 256, TILES = 48;
 
 export class Ruler {
   constructor(timeline) {
@@ -128,11 +128,13 @@ export class ConfidenceStrip {
     this.timeline = timeline;
     this.selectable = true;
     this.canvas = made("canvas", { role: "img", "aria-label": TEXT.confidence });
-    this.element = made("div", { className: "track confidence" }, this.canvas);
+    const explain = () => timeline.studio.say(TEXT.confidenceOf);
+    this.element = made("div", { className: "track confidence" }, this.canvas,
+      made("button", { type: "button", className: "label", textContent: TEXT.confidenceLegend, title: TEXT.confidenceOf, onclick: explain, onfocus: explain }));
   }
 
   draw() {
-    const { timeline, timeline: { width, store: { confidence } } } = this, pen = cleared(this.canvas, width, 8), colour = colours();
+    const { timeline, timeline: { width, store: { confidence } } } = this, pen = cleared(this.canvas, width, STRIP_HEIGHT_PX), colour = colours();
     pen.fillStyle = colour.doubt;
     if (!confidence?.frames) return;
     if (this.of !== confidence) this.levels = quantiles(this.of = confidence);
@@ -143,7 +145,7 @@ export class ConfidenceStrip {
       const next = x + STRIP_PX > end ? -1 : level(x);
       if (next === shade) continue;
       pen.globalAlpha = shade / SHADES;
-      if (shade) pen.fillRect(from, 1, x - from, 6);
+      if (shade) pen.fillRect(from, 1, x - from, STRIP_HEIGHT_PX - 2);
       [from, shade] = [x, next];
     }
     pen.globalAlpha = 1;

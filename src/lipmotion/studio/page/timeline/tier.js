@@ -66,10 +66,11 @@ export class Tier {
     button.classList.toggle("narrow", wide < NARROW_PX);
     button.classList.toggle("silent", span.label === "sil" || span.label === "sp");
     button.classList.toggle("doubtful", span.confidence !== null && span.confidence < SURE);
+    button.classList.toggle("edited", Boolean(span.edited));
     button.setAttribute("aria-pressed", isSelected);
     const values = { number: n + 1, label: span.label, start: span.start_s.toFixed(3), end: span.end_s.toFixed(3) };
     const sure = span.confidence === null || span.confidence === undefined ? "" : `, ${filled(TEXT.sure, { share: Math.round(100 * span.confidence) })}`;
-    const name = filled(TEXT[`${this.kind}Label`], values) + sure;
+    const name = filled(TEXT[`${this.kind}Label`], values) + sure + (span.edited ? `, ${TEXT.edited}` : "");
     if (button.title !== name) {
       button.title = name;
       button.setAttribute("aria-label", name);

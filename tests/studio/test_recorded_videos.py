@@ -1,0 +1,47 @@
+"""Real videos beside faces: when in them the sound of a line begins, and which are played as they are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lipmotion.export.sound import write_sound
+from lipmotion.export.video import write_mp4
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.studio.recorded_videos import MP4, played_as, sound_begins_s, video_of, write_playable
+from lipmotion.testing.toy import ToySentence
+from studio.late_sound import shifted
+
+LATE_S = 0.3
+
+
+@pytest.fixture(scope="module")
+def video(toy_sentence: ToySentence, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("videos") / "line.mp4"
+    pictures = (np.full((32, 48, 3), 40 + 5 * number, np.uint8) for number in range(25))
+    write_mp4(path, pictures, fps=25, audio=toy_sentence.audio)
+    return path
+
+
+def test_sound_that_begins_with_the_video_is_in_step(video: Path, toy_speech: Path) -> None:
+    assert sound_begins_s(video, video) == sound_begins_s(video, toy_speech) == 0
+
+
+def test_a_later_sound_is_found_in_the_video(video: Path, toy_speech: Path, tmp_path: Path) -> None:
+    late = shifted(video, tmp_path / "late.mp4", sound_s=LATE_S)
+    assert sound_begins_s(late, late) == 0  # the readers have silence before it
+    assert sound_begins_s(late, toy_speech) == pytest.approx(LATE_S, abs=0.03)  # and the silence of the encoder
+    with_silence = tmp_path / "with silence.wav"
+    write_sound(with_silence, read_audio(late))
+    assert sound_begins_s(late, with_silence) == 0
+
+
+def test_what_begins_later_than_0_is_written_anew(video: Path, tmp_path: Path) -> None:
+    assert played_as(video) == MP4
+    later = shifted(video, tmp_path / "later.mp4", all_s=1.0)
+    assert video_of(later) == later
+    assert played_as(later) is None
+    write_playable(later, later, tmp_path / "playable.mp4")
+    assert played_as(tmp_path / "playable.mp4") == MP4
