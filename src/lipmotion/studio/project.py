@@ -13,6 +13,8 @@ from lipmotion.pipeline.batch.lines import BatchLine, check_names
 FORMAT, VERSION = "lipmotion.project", 1
 NO_MARK, APPROVED, REDO = MARKS = ("none", "approved", "redo")
 MOST_LINES = 100_000
+MOST_VERSIONS = 100
+"""Versions that are kept of a line."""
 EDITS_SUFFIX = "edits.json"
 """How files of edits end, after the name of the line and a dot."""
 
@@ -38,6 +40,23 @@ class ExportRecord:
 
 
 @dataclass(frozen=True)
+class KeptVersion:
+    """Edits of a line as they once were, to compare with and to go back to.
+
+    number : of the version in its line, from 1; never used again
+    steps  : its edits, as sentences
+    """
+
+    number: int
+    steps: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """What requests call it."""
+        return f"version-{self.number}"
+
+
+@dataclass(frozen=True)
 class ProjectLine:
     """A recording that is worked on.
 
@@ -50,6 +69,7 @@ class ProjectLine:
     doubt      : how unsure the motion of its speech is, 0 to 1; None: not known yet
     mark       : one of ``MARKS``
     exports    : in their order
+    versions   : that were kept, in their order
     """
 
     number: int
@@ -61,12 +81,22 @@ class ProjectLine:
     doubt: float | None = None
     mark: str = NO_MARK
     exports: tuple[ExportRecord, ...] = ()
+    versions: tuple[KeptVersion, ...] = ()
 
     def __post_init__(self) -> None:
         if self.mark not in MARKS:
             raise InputError(f"the mark is {self.mark!r}, required one of: {', '.join(MARKS)}")
         if type(self.number) is not int or self.number < 1:
             raise InputError(f"the line {self.name!r} has the number {self.number!r}, required 1 or more")
+
+    def with_version(self, steps: tuple[str, ...]) -> ProjectLine:
+        """Return the line with a version of these edits; as it is, where there is one. Raises InputError: too many."""
+        if any(version.steps == steps for version in self.versions):
+            return self
+        if len(self.versions) >= MOST_VERSIONS:
+            raise InputError(f"{len(self.versions)} versions are kept, required fewer than {MOST_VERSIONS}; remove one")
+        kept = KeptVersion(self.versions[-1].number + 1 if self.versions else 1, steps)
+        return replace(self, versions=(*self.versions, kept))
 
 
 @dataclass(frozen=True)
@@ -121,7 +151,7 @@ def _without_usual(line: ProjectLine) -> dict[str, Any]:
     usual = {each.name: each.default for each in fields(line)}
     values = {each.name: getattr(line, each.name) for each in fields(line)}
     kept = {name: value for name, value in values.items() if value != usual[name]}
-    return kept | ({"exports": [asdict(each) for each in line.exports]} if line.exports else {})
+    return kept | {name: [asdict(each) for each in kept[name]] for name in ("exports", "versions") if name in kept}
 
 
 def project_from(content: Any) -> Project:
@@ -154,4 +184,11 @@ def _line(row: Any) -> ProjectLine:
         raise ValueError(f"a text of the line {row.get('number')} is none")
     numbers = {name: None if row.get(name) is None else float(row[name]) for name in ("duration_s", "doubt")}
     exports = tuple(ExportRecord(**each) for each in row.get("exports", ()))
-    return ProjectLine(**{**row, **numbers, "exports": exports})
+    versions = tuple(KeptVersion(int(each["number"]), _sentences(each["steps"])) for each in row.get("versions", ()))
+    return ProjectLine(**{**row, **numbers, "exports": exports, "versions": versions})
+
+
+def _sentences(steps: Any) -> tuple[str, ...]:
+    if not isinstance(steps, list) or not all(isinstance(step, str) for step in steps):
+        raise ValueError("edits of a version that are no texts")
+    return tuple(steps)
