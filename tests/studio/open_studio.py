@@ -13,9 +13,11 @@ from lipmotion.pipeline.model import Model
 from lipmotion.studio.access import TOKEN_HEADER, Access
 from lipmotion.studio.application import studio_application
 from lipmotion.studio.folder import ProjectFolder, opened_folder
+from lipmotion.studio.known_model import KnownModel
 from lipmotion.studio.studio import Studio
 from study.asgi import Application, Reply, ask
 
+TOY_DIGEST = "0" * 64
 HOST, TOKEN = "127.0.0.1:8000", "a-token"
 PATIENCE_S = 120.0
 
@@ -48,6 +50,11 @@ class OpenStudio(NamedTuple):
         return self.ask("/api/lines/1/edits", {"revision": revision, "steps": list(steps), **more})
 
 
+def toy(model: Model) -> KnownModel:
+    """Return a model of the tests, which has no file, as the studio knows models."""
+    return KnownModel(model, "toy", TOY_DIGEST)
+
+
 @contextmanager
 def open_studio(speech: Path, transcript: str, model: Model, folder: Path) -> Iterator[OpenStudio]:
     """Give a studio of a recording that is copied into a folder."""
@@ -56,5 +63,5 @@ def open_studio(speech: Path, transcript: str, model: Model, folder: Path) -> It
     if not sound.exists():
         shutil.copy(speech, sound)
         sound.with_suffix(".txt").write_text(transcript, encoding="utf-8")
-    with opened_folder(sound) as opened, closing(Studio(opened, model)) as studio:
+    with opened_folder(sound) as opened, closing(Studio(opened, toy(model))) as studio:
         yield OpenStudio(opened, studio, studio_application(studio, Access(TOKEN, frozenset({HOST}))))

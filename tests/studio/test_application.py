@@ -29,9 +29,13 @@ from lipmotion.studio import line as line_module
 from lipmotion.studio.access import TOKEN_HEADER, Access
 from lipmotion.studio.application import studio_application
 from lipmotion.studio.folder import opened_folder
+from lipmotion.studio.project import project_from
 from lipmotion.studio.studio import Studio
 from lipmotion.studio.votes import read_votes
-from studio.open_studio import HOST, TOKEN, OpenStudio, open_studio
+from studio.open_studio import HOST, TOKEN, TOY_DIGEST, OpenStudio, open_studio, toy
+from study.asgi import Reply
+
+OTHER_DIGEST = "1" * 64
 
 
 @pytest.fixture(scope="module")
@@ -279,7 +283,7 @@ def test_a_project_outlives_its_model(
         asked.append(path)
         return toy_model
 
-    monkeypatch.setattr("lipmotion.studio.studio.load_model", loaded)
+    monkeypatch.setattr("lipmotion.studio.known_model.load_model", loaded)
     with opened_folder(None, tmp_path / "project") as folder:
         folder.change(lambda project: replace(project, model="../gone.lipmotion"))
         with closing(Studio(folder)):
@@ -343,7 +347,7 @@ def test_a_filmed_face_the_real_video_and_another_model(
     write_mp4(sound.with_suffix(".mp4"), pictures, fps=25, audio=read_audio(sound))
     with opened_folder(sound) as opened:
         opened.change(lambda now: replace(now, characters={"toy": str(filmed_face_file)}))
-        with closing(Studio(opened, toy_model, coupled_model)) as running:
+        with closing(Studio(opened, toy(toy_model), replace(toy(coupled_model), digest=OTHER_DIGEST))) as running:
             studio = OpenStudio(opened, running, studio_application(running, Access(TOKEN, frozenset({HOST}))))
             _compared(studio)
             assert _film(studio) == (video_frames(0.2, 0.6), "video/mp4")
@@ -379,11 +383,65 @@ def _compared(studio: OpenStudio) -> None:
     names = json.loads(edited.headers["x-lipmotion-names"])
     shown = np.frombuffer(edited.body, "<f4").reshape(-1, len(names))
     assert shown[50, names.index("opening")] == pytest.approx(0.3, abs=1e-5)
+    some = studio.ask("/api/lines/1/motion?by=other&names=opening,jump")
+    assert json.loads(some.headers["x-lipmotion-names"]) == ["opening"]
+    assert np.frombuffer(some.body, "<f4") == pytest.approx(shown[:, names.index("opening")])
+    none = studio.ask("/api/lines/1/motion?by=other&names=jump")
+    assert (none.status, none.headers["x-lipmotion-names"], none.body) == (200, "[]", b"")
     assert studio.ask("/api/lines/1/motion?by=../x").status == 422
-    shown_names = ["now", "the model b"]
-    for better in ("now", "the model b", "now"):
-        votes = studio.ask("/api/lines/1/votes", {"shown": shown_names, "better": better})
-    assert votes.content == {"votes": {"now": 2, "the model b": 1}}
-    assert [vote.better for vote in read_votes(studio.folder.path / "votes.json")] == ["now", "the model b", "now"]
-    assert studio.ask("/api/lines/1/votes", {"shown": shown_names, "better": "another"}).status == 422
-    assert studio.ask("/api/lines/1/votes", {"shown": ["now", "now"], "better": ""}).status == 422
+    _voted(studio)
+
+
+def test_versions_are_kept_shown_and_gone_back_to(studio: OpenStudio) -> None:
+    """What was there when one goes back is kept, too."""
+    assert studio.edit("pin opening 0.3 at 0.5").status == 200
+    first = studio.ready()
+    assert studio.ask("/api/lines/1/versions", {}).content["versions"] == [
+        {"name": "version-1", "number": 1, "edits": first["undo"], "digest": first["edits_digest"]}
+    ]
+    assert len(studio.ask("/api/lines/1/versions", {}).content["versions"]) == 1  # there is one of these edits
+    then = studio.ask("/api/lines/1/motion").body
+    assert studio.edit("phone 3 is p").status == 200
+    now = studio.ask("/api/lines/1/motion").body
+    assert now != then
+    assert studio.ask("/api/lines/1/motion?by=version-1").body == then
+    assert studio.ask("/api/lines/1/weights?by=version-1").body != studio.ask("/api/lines/1/weights").body
+    back = studio.ask("/api/lines/1/versions/back", {"revision": studio.ready()["revision"], "version": "version-1"})
+    assert back.content["steps"] == first["steps"]
+    assert back.content["changed"]
+    assert [each["edits"] for each in back.content["versions"]] == [first["undo"], first["undo"] + 1]
+    assert studio.ask("/api/lines/1/motion").body == then
+    assert studio.ask("/api/lines/1/motion?by=version-2").body == now
+    read = project_from(json.loads((studio.folder.path / "project.json").read_text(encoding="utf-8")))
+    assert [len(each.steps) for each in read.lines[1].versions] == [first["undo"], first["undo"] + 1]
+    assert studio.ask("/api/lines/1/versions/forget", {"version": "version-2"}).content["versions"][-1]["number"] == 1
+    for wrong in ("version-2", "other", ""):
+        assert studio.ask("/api/lines/1/versions/forget", {"version": wrong}).status == 422
+    old = {"revision": studio.ready()["revision"] - 1, "version": "version-1"}
+    assert studio.ask("/api/lines/1/versions/back", old).status == 409
+
+
+def _voted(studio: OpenStudio) -> None:
+    """Both models have the same name."""
+    assert studio.ask("/api/project").content["forms"]["against"] == f"toy ({OTHER_DIGEST[:8]})"
+
+    def vote(better: int | None, *shown: dict[str, str]) -> Reply:
+        return studio.ask("/api/lines/1/votes", {"shown": list(shown), "better": better})
+
+    (version,) = studio.ask("/api/lines/1/versions", {}).content["versions"]
+    now, other, kept = {"by": ""}, {"by": "other"}, {"by": version["name"]}
+    assert vote(0, now, kept).status == 422  # the same motion
+    assert vote(1, now, other).content == {"better": [0, 1], "neither": 0}
+    assert vote(1, other, now).content == {"better": [1, 1], "neither": 0}
+    assert studio.edit("phone 3 is p").status == 200
+    assert vote(None, now, other).content == {"better": [1, 1], "neither": 1}
+    assert vote(1, now, kept).content == {"better": [0, 1], "neither": 0}
+    votes = read_votes(studio.folder.path / "votes.json")
+    assert [each.name for each in votes[0].shown] == ["toy", "toy"]
+    assert [each.model for each in votes[1].shown] == [OTHER_DIGEST, TOY_DIGEST]
+    assert [each.edits for each in votes[3].shown] == [studio.ready()["edits_digest"], version["digest"]]
+    for wrong in ([now], [now, now], [now, {"by": "another"}], [now, {"by": "version-2"}], [now, "other"]):
+        assert studio.ask("/api/lines/1/votes", {"shown": wrong, "better": 0}).status == 422
+    for better in (2, "toy", -1):
+        assert studio.ask("/api/lines/1/votes", {"shown": [now, other], "better": better}).status == 422
+    assert len(read_votes(studio.folder.path / "votes.json")) == 4

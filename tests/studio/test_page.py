@@ -6,7 +6,7 @@ import re
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +16,9 @@ import pytest
 from children import LIPMOTION, child, wait_until
 from lipmotion.export.video import write_mp4
 from lipmotion.meshes.files.gltf_weights import read_gltf_motion
-from lipmotion.pipeline.model import shipped_path
+from lipmotion.pipeline.model import load_model, save_model, shipped_path
 from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.storage.files import sha256_of
 from study.browser import CONTROL, DELETE, ENTER, ESCAPE, RIGHT, SHIFT, SPACE, TAB, UP, WINDOW_S, Browser, check_screen
 from study.firefox import BOTH, Opens
 
@@ -32,6 +33,22 @@ LIMIT_S = 120.0
 FRAME_S = 1 / 60
 CLOSED = "document.querySelector('dialog').close()"
 FAILED = "{ ...studio.store.line, status: 'failed', error: 'no speech' }"
+ASKED = """return performance.getEntriesByType("resource").map(({ name }) => new URL(name))
+  .filter(({ pathname }) => pathname.endsWith("/motion"))
+  .map(({ searchParams }) => ["of", "names", "by"].map((name) => searchParams.get(name)).join(" "))"""
+"""Which curves were asked for: of which kind, by which model."""
+NOT_SHOWN = "studio.store.line.channels.find(({ name }) => !studio.store.channels.includes(name)).name"
+SLOW = """const { player: { audio }, stage: { head } } = studio;
+const frame = requestAnimationFrame, posed = head.pose.bind(head);
+window.requestAnimationFrame = (act) => setTimeout(() => frame(act), 250);
+window.ends_s = [];
+window.shown = [];
+audio.addEventListener("ended", () => window.ends_s.push(audio.currentTime), { capture: true });
+head.pose = (...given) => {
+  window.shown.push({ time_s: given[1], comparing: studio.store.comparing });
+  posed(...given);
+};"""
+"""From now on frames are slow; which ones are shown is noted, and when the sound ends."""
 READY = """const store = globalThis.studio?.store, line = store?.line;
 return Boolean(line?.status === "ready" && line.id === store.lineId && store.weights && !store.saving &&
   studio.stage.head?.character);"""
@@ -268,14 +285,11 @@ def test_the_weights_of_the_page_are_those_of_the_exported_file(page: Page) -> N
 
 
 def test_only_curves_that_are_shown_are_asked_for(page: Page) -> None:
-    asked = """return performance.getEntriesByType("resource").map(({ name }) => new URL(name))
-      .filter(({ pathname }) => pathname.endsWith("/motion"))
-      .map(({ searchParams }) => `${searchParams.get("of")} ${searchParams.get("names")}`)"""
     page.window.run("performance.clearResourceTimings()")
-    first = page.of("studio.store.line.channels.find(({ name }) => !studio.store.channels.includes(name)).name")
+    first = page.of(NOT_SHOWN)
     page.window.run("studio.showCurves([...studio.store.channels, arguments[0]])", first)
     wait_until(lambda: page.of(f"studio.store.motion.column({first!r})") == 3, LIMIT_S)
-    assert sorted(page.window.run(asked)) == [f"deviation {first}", f"motion {first}"]
+    assert sorted(page.window.run(ASKED)) == [f"deviation {first} ", f"motion {first} "]
     shown = page.of("Array.from(studio.store.motion.values).filter((_, place) => place % 4 === 3)")
     whole = page.window.run_until_done(
         """const [name, done] = arguments, { server, store } = studio;
@@ -371,7 +385,10 @@ def test_the_real_video_beside_and_comparisons(opens: Opens, tmp_path: Path, fil
     sound = Path(shutil.copy(WELCOME, tmp_path))
     pictures = (np.full((64, 96, 3), 40 + number % 200, np.uint8) for number in range(100))
     write_mp4(sound.with_suffix(".mp4"), pictures, fps=25, audio=read_audio(sound))
-    options = ("--against", shipped_path(), "--face", filmed_face_file)
+    other = tmp_path / shipped_path().name  # another file, of the same name
+    model = load_model()
+    save_model(replace(model, about={**model.about, "seed": "another"}), other)
+    options = ("--against", other, "--face", filmed_face_file)
     with served(tmp_path / "project", sound, *options) as address, opens(tmp_path / "home", *WEBGL) as window:
         window.open(address)
         page = Page(window, tmp_path / "project")
@@ -384,6 +401,12 @@ def test_the_real_video_beside_and_comparisons(opens: Opens, tmp_path: Path, fil
         window.click("#tab-history")
         window.click("#compare-model")
         wait_until(lambda: page.of("Boolean(studio.store.other?.weights)"), LIMIT_S)
+        assert page.of("studio.store.other.motion.names") == ["opening", "width", "outer"]
+        more = page.of(NOT_SHOWN)
+        window.run("performance.clearResourceTimings(); studio.showCurves(['width', arguments[0]])", more)
+        wait_until(lambda: page.of("studio.store.other.motion.names") == ["width", more], LIMIT_S)
+        assert [asked for asked in window.run(ASKED) if asked.endswith("other")] == [f"motion {more} other"]
+        assert page.of("studio.store.other.motion.frames") == page.of("studio.store.motion.frames")
         window.click("#compare-sides")
         assert page.of("studio.stage.head.pair.length") == 2
         for width, height, scheme in SCREENS:
@@ -392,16 +415,22 @@ def test_the_real_video_beside_and_comparisons(opens: Opens, tmp_path: Path, fil
             window.run_until_done("setTimeout(arguments[0], 100)")
             check_screen(window, "compared", width, scheme)
         window.show_as(1440, 900, "light", mobile=False)
-        window.run("studio.store.set({ span: { start_s: 0.5, end_s: 0.8 } })")
+        window.run(SLOW)
+        window.run("studio.store.set({ span: { start_s: 0.5, end_s: 0.8 }, looping: true })")
         window.click("#compare-blind")
         assert not page.of("studio.store.sideBySide")
         wait_until(lambda: page.of("studio.store.blind.asked"), LIMIT_S)
+        assert page.of("window.ends_s") == pytest.approx([0.8, 0.8], abs=1e-3)
+        assert page.of("[...new Set(window.shown.map(({ comparing }) => comparing))].length") == 2
+        assert page.of("Math.max(...window.shown.map(({ time_s }) => time_s))") <= 0.8 + 1e-6
         wait_until(lambda: not page.of("document.getElementById('blind-better-A').disabled"), LIMIT_S)
         window.click("#blind-better-A")
         wait_until(lambda: "A was" in window.text("#blind-told"), LIMIT_S)
         (vote,) = read_votes(tmp_path / "project" / "votes.json")
-        assert vote.better == vote.shown[0]
-        assert vote.shown[0] in window.text("#blind-told").partition(", B was")[0]
+        assert vote.better == 0
+        assert {side.model for side in vote.shown} == {sha256_of(path) for path in (other, shipped_path())}
+        is_other, told = vote.shown[0].model == sha256_of(other), window.text("#blind-told")
+        assert (f"{other.stem} ({sha256_of(other)[:8]})" in told.partition(", B was")[0]) == is_other
         window.run("studio.store.set({ face: 'toy', mesh: '' })")
         wait_until(lambda: "filmed" in window.text("#stage .note"), LIMIT_S)
         check_screen(window, "filmed", 1440, "light")

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.types import Motion, Timeline, Unit
-from lipmotion.units import is_silent
+from lipmotion.types import Motion, Span, Timeline, Unit
+from lipmotion.units import SILENCE, is_silent
 
 Array = NDArray[np.float64]
 LARGEST_REST = 0.06
@@ -35,6 +37,26 @@ def rest_frames(motion: Motion, units: Timeline[Unit], opening: Array | None = N
     rest = np.zeros(len(time_s), dtype=bool)
     rest[np.argsort(opening, kind="stable")[: max(1, len(time_s) // 10)]] = True
     return rest
+
+
+def beside_rest(motion: Motion, units: Timeline[Unit], frames: slice) -> tuple[Motion, Timeline[Unit], slice]:
+    """Return frames of a motion with their phones, beside silence in the rest pose of the whole, and where they are.
+
+    So the rest pose of what is returned is that of the whole: there is more of that silence than of others in it. It
+    comes before the frames; after them, where they are the first ones, which nothing then smooths.
+    """
+    values, rate_hz, rest = motion.values[frames], motion.rate_hz, rest_frames(motion, units)
+    still = np.median(motion.values[rest], axis=0)
+    count = int(np.count_nonzero(rest[frames])) + len(values) // 5 + 1
+    start_s, long_s, silent_s = (number / rate_hz for number in (frames.start, len(values), count))
+    said = units.between(start_s, start_s + long_s)
+    silence, label = np.tile(still, (count, 1)), Unit(SILENCE)
+    if frames.start == 0:
+        spans = (*said, Span(long_s, long_s + silent_s, label))
+        return replace(motion, values=np.concatenate([values, silence])), Timeline(spans), slice(0, len(values))
+    spans = (Span(0.0, silent_s, label), *said.shifted(silent_s))
+    together = np.concatenate([silence, values])
+    return replace(motion, values=together), Timeline(spans), slice(count, len(together))
 
 
 def size_at_rest(name: str, curve: Array, rest: NDArray[np.bool_]) -> float:

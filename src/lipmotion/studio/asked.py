@@ -73,3 +73,11 @@ def texts(given: Mapping[str, Any], name: str, *, most: int, longest: int = 2000
     if any(len(each) > longest for each in value):
         raise InputError(f"a text of {name} has more than {longest} characters")
     return tuple(value)
+
+
+def objects(given: Mapping[str, Any], name: str, *, most: int = 2) -> list[dict[str, Any]]:
+    """Return a list of objects of a request. Raises InputError: there is none, or it is too long."""
+    value = given.get(name)
+    if not isinstance(value, list) or len(value) > most or not all(isinstance(each, dict) for each in value):
+        raise InputError(f"{name} is {shortened(repr(value))}, required a list of at most {most} objects")
+    return value

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
+from hashlib import sha256
 from typing import Any
 
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, shortened
 from lipmotion.extensions import installed_version
 from lipmotion.pipeline.batch.lines import BatchLine, check_names
 
@@ -43,7 +44,7 @@ class ExportRecord:
 class KeptVersion:
     """Edits of a line as they once were, to compare with and to go back to.
 
-    number : of the version in its line, from 1; never used again
+    number : of the version, unique in its line, from 1
     steps  : its edits, as sentences
     """
 
@@ -54,6 +55,11 @@ class KeptVersion:
     def name(self) -> str:
         """What requests call it."""
         return f"version-{self.number}"
+
+    @property
+    def digest(self) -> str:
+        """The digest of its edits."""
+        return digest_of(self.steps)
 
 
 @dataclass(frozen=True)
@@ -97,6 +103,19 @@ class ProjectLine:
             raise InputError(f"{len(self.versions)} versions are kept, required fewer than {MOST_VERSIONS}; remove one")
         kept = KeptVersion(self.versions[-1].number + 1 if self.versions else 1, steps)
         return replace(self, versions=(*self.versions, kept))
+
+    def without_version(self, name: str) -> ProjectLine:
+        """Return the line without a version. Raises InputError: as ``version``."""
+        gone = self.version(name)
+        return replace(self, versions=tuple(version for version in self.versions if version != gone))
+
+    def version(self, name: str) -> KeptVersion:
+        """Return a version. Raises InputError: none of that name is kept."""
+        for version in self.versions:
+            if version.name == name:
+                return version
+        known = ", ".join(version.name for version in self.versions) or "nothing: none is kept"
+        raise InputError(f"no version {shortened(repr(name))} of the line, required one of: {known}")
 
 
 @dataclass(frozen=True)
@@ -192,3 +211,12 @@ def _sentences(steps: Any) -> tuple[str, ...]:
     if not isinstance(steps, list) or not all(isinstance(step, str) for step in steps):
         raise ValueError("edits of a version that are no texts")
     return tuple(steps)
+
+
+def digest_of(sentences: Iterable[str]) -> str:
+    """Return the digest of edits, by their sentences.
+
+    >>> digest_of(["phone 2 is p"])[:8]
+    '2a0d1f5a'
+    """
+    return sha256("\n".join(sentences).encode("utf-8", "surrogatepass")).hexdigest()

@@ -45,10 +45,10 @@ def serve_studio(  # noqa: PLR0913
     check_installed("the studio", "studio")
     if recordings is not None and not recordings.is_dir():
         raise InputError(f"{recordings}: no such folder; give a folder of videos of one person")
-    from lipmotion.pipeline.model import load_model
     from lipmotion.studio.access import Access
     from lipmotion.studio.application import studio_application
     from lipmotion.studio.folder import PROJECT, opened_folder
+    from lipmotion.studio.known_model import known_model
     from lipmotion.studio.studio import Studio
 
     with listening(HOST, port) as place, opened_folder(source, out) as folder:
@@ -59,7 +59,7 @@ def serve_studio(  # noqa: PLR0913
         if own or model or recordings:
             together = {**folder.project.characters, **own}
             folder.change(lambda now: replace(now, characters=together, model=chosen, recordings=spoken))
-        other = load_model(against) if against else None
+        other = known_model(against) if against else None
         token = token_urlsafe(TOKEN_BYTES)
         hosts = frozenset(f"{name}:{place.getsockname()[1]}" for name in NAMES)
         with closing(Studio(folder, against=other)) as studio:

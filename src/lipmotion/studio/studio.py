@@ -6,10 +6,9 @@ import logging
 import os
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
-from hashlib import sha256
 from pathlib import Path
 from threading import Lock
 from typing import Any
@@ -24,7 +23,6 @@ from lipmotion.faces.base import Face
 from lipmotion.pipeline.edit_files import read_edits, write_edits
 from lipmotion.pipeline.edits import FORMS, Step, Text, WordIs, WordSaid, WordsSaid, WordsSaidSo, step_of
 from lipmotion.pipeline.job import Job, Outputs
-from lipmotion.pipeline.model import Model, load_model, shipped_path
 from lipmotion.pipeline.opened_job import opened
 from lipmotion.pipeline.outputs.curve_sets import SHAPE_SETS
 from lipmotion.pipeline.outputs.drawn_video import read_sound
@@ -32,13 +30,15 @@ from lipmotion.storage.files import TEMPORARY, made_folders, read_text_file, sha
 from lipmotion.storage.json_text import from_json
 from lipmotion.studio.desk import NEW, READY, WAITING, WORKING, Desk, NotReadyError, Work
 from lipmotion.studio.folder import EXPORTS, ProjectFolder
+from lipmotion.studio.known_model import KnownModel, known_model
 from lipmotion.studio.line import OpenLine
 from lipmotion.studio.meshes import Faces
 from lipmotion.studio.presets import PRESETS, Preset, suffixes
-from lipmotion.studio.project import EDITS_SUFFIX, MARKS, ExportRecord, Project, ProjectLine
+from lipmotion.studio.project import EDITS_SUFFIX, MARKS, ExportRecord, Project, ProjectLine, digest_of
 from lipmotion.studio.recorded_videos import MP4, played_as, video_of, write_playable
 from lipmotion.studio.trainer import VOICES, Trainer
 from lipmotion.studio.training import FACE, VOICE
+from lipmotion.studio.votes import Side
 from lipmotion.types.configuration import ANY, kind_of
 from lipmotion.types.delivery import Delivery
 from lipmotion.types.moods import MANNERS, MOODS
@@ -63,24 +63,24 @@ class Studio:
     """A project that is open.
 
     folder : the project
-    model  : None: as the project says
+    used   : the model that moves its lines; None: as the project says
     against : a model with which its motion is compared; None: there is none
     """
 
-    def __init__(self, folder: ProjectFolder, model: Model | None = None, against: Model | None = None) -> None:
+    def __init__(
+        self, folder: ProjectFolder, used: KnownModel | None = None, against: KnownModel | None = None
+    ) -> None:
         self.folder, self.against = folder, against
         self._videos: dict[Path, Path | None] = {}
         self._writing_video = Lock()
-        file = _model_file(folder)
-        self.model = model or load_model(file)
-        self.desk = Desk(folder, self.model)
+        self.used = used or known_model(_model_file(folder))
+        self.desk = Desk(folder, self.used.model)
         places = {name: Path(os.path.normpath(folder.path / file)) for name, file in folder.project.characters.items()}
         self.trainer = Trainer(folder)
         self.faces = Faces(places, lambda: self.trainer.made(FACE))
         self._sounds = Path(tempfile.mkdtemp(prefix="lipmotion-studio-"))
         self._exporting: dict[str, int] | None = None
         self._summaries: dict[int, tuple[int, EditsSummary]] = {}
-        self._model_digest = sha256_of(file or shipped_path())
 
     def close(self) -> None:
         """Write what is not written, and remove what was kept for this run alone."""
@@ -119,13 +119,13 @@ class Studio:
             "lines": [self.row(line.number) for line in lines[first : first + count]],
             "forms": self.forms(),
             "version": installed_version(),
-            "model": {"name": self.model.about.get("name", ""), "engine": self.model.engine.name},
+            "model": {"name": self.used.name, "engine": self.used.model.engine.name},
         }
 
     def row(self, number: int) -> dict[str, Any]:
         """Return what the list says of a line."""
         line, summary = self.folder.line(number), self.summary(number)
-        made = (summary.digest, self._model_digest)
+        made = (summary.digest, self.used.digest)
         changed = bool(line.exports) and (line.exports[-1].steps, line.exports[-1].model) != made
         return {
             "id": number,
@@ -143,6 +143,10 @@ class Studio:
         """Return what is said of a line, ready or not."""
         line, work = self.folder.line(number), self.desk.work(number)
         known: dict[str, Any] = {"id": number, "name": line.name, "mark": line.mark, "transcript": line.transcript}
+        known["versions"] = [
+            {"name": each.name, "number": each.number, "edits": len(each.steps), "digest": each.digest}
+            for each in line.versions
+        ]
         if work is None:
             return known | {"status": self.desk.status(number), "progress": None, "error": ""}
         status = WORKING if work.status == READY and work.line is None else work.status
@@ -166,15 +170,15 @@ class Studio:
         others = [path for path in (project.given_model, project.model) if path and path not in own.values()]
         return {"": ""} | {Path(path).name: path for path in others} | own
 
-    def voice_model(self, name: str) -> tuple[str, Model, str]:
-        """Return path, model and digest of a voice. Raises InputError: none of that name. Others as ``load_model``."""
+    def voice_model(self, name: str) -> tuple[str, KnownModel]:
+        """Return path and model of a voice. Raises InputError: none of that name. Others as ``load_model``."""
         known = self.voices()
         if name not in known:
             raise InputError(f"no voice {shortened(repr(name))}; required one of: {', '.join(filter(None, known))}")
         file = Path(os.path.normpath(self.folder.path / known[name])) if known[name] else None
-        return known[name], load_model(file), sha256_of(file or shipped_path())
+        return known[name], known_model(file)
 
-    def use_voice(self, path: str, model: Model, digest: str) -> None:
+    def use_voice(self, path: str, voice: KnownModel) -> None:
         """Let another model move the lines of the project, from now on; their phones and edits stay.
 
         path : from the folder of the project; empty: the one that ships
@@ -186,8 +190,8 @@ class Studio:
             return replace(project, model=path, given_model=given)
 
         self.folder.change(with_model)
-        self.model, self._model_digest = model, digest
-        self.desk.use(model)
+        self.used = voice
+        self.desk.use(voice.model)
 
     def is_given(self, path: str) -> bool:
         """Return whether a model was given, and not trained here."""
@@ -203,7 +207,7 @@ class Studio:
                 {"name": name, "title": name, "mesh": mesh, "filmed": self.faces.is_filmed(name)}
                 for name, mesh in self.faces.names.items()
             ],
-            "against": self.against.about.get("name") or self.against.engine.name if self.against else None,
+            "against": self.against.name_beside(self.used) if self.against else None,
             "curve_sets": list(SHAPE_SETS),
             "presets": [
                 {"name": each.name, "title": each.title, "files": list(each.files)} for each in PRESETS.values()
@@ -319,18 +323,33 @@ class Studio:
                 write_playable(video, self.folder.sound(self.folder.line(number)), path)
         return path, MP4
 
-    def line_as(self, line: OpenLine, by: str, face: str = "") -> OpenLine:
-        """Return an open line as the other model moves it, or mapped onto the person of a filmed face.
+    def line_as(self, number: int, line: OpenLine, by: str, face: str = "") -> OpenLine:
+        """Return an open line as it once was, or as the other model moves it, or mapped onto another person.
 
-        by   : ``OTHER``: the model it is compared with; empty: the project's
-        face : the name of the face that is shown
-        Raises InputError: there is no other model, or it cannot make an edit.
+        by   : the name of a version that was kept; ``OTHER``: the model it is compared with; empty: the line as it is
+        face : the name of the face that is shown; a filmed one may be of another person
+        Raises InputError: there is no such version or model, or it cannot make an edit.
         """
-        if by not in ("", OTHER) or (by and self.against is None):
-            raise InputError(f"by is {shortened(repr(by))}, required nothing, or {OTHER} after studio --against FILE")
-        model = self.against if by and self.against else self.model
+        if by not in ("", OTHER):
+            return self.line_as(number, line.with_edits(self.folder.line(number).version(by).steps), "", face)
+        model = self._called(by).model
         onto = self.faces.shown(face).other_person(model, line.file.named.speaker) if face else None
-        return line if model is self.model and onto is None else line.moved_by(model, onto)
+        return line if model is self.used.model and onto is None else line.moved_by(model, onto)
+
+    def side(self, number: int, by: str) -> Side:
+        """Return what identifies a motion of a line in a comparison; ``by``: as in ``line_as``. Raises as that."""
+        if by not in ("", OTHER):
+            return Side(self.used.name, self.used.digest, self.folder.line(number).version(by).digest)
+        model = self._called(by)
+        return Side(model.name, model.digest, self.summary(number).digest)
+
+    def _called(self, by: str) -> KnownModel:
+        """Return the model that requests call so. Raises InputError: there is none."""
+        if not by:
+            return self.used
+        if self.against is None:
+            raise InputError("there is no other model; give it: lipmotion studio --against FILE")
+        return self.against
 
     def export(self, number: int, preset: Preset) -> dict[str, Any]:
         """Write files of a line, and record what was written from which edits; return their paths.
@@ -348,14 +367,14 @@ class Studio:
             write_edits(file, copy)
             request = replace(file.named, recording=self.folder.sound(line), edits=copy)
             outputs = Outputs(files, curves=preset.curves, fps=preset.fps)
-            opened(Job(request, outputs)).run(lambda: self.model)
+            opened(Job(request, outputs)).run(lambda: self.used.model)
         digests = {Path(path).relative_to(self.folder.path).as_posix(): sha256_of(Path(path)) for path in files}
         record = ExportRecord(
             preset.name,
             digests,
             copy.relative_to(self.folder.path).as_posix(),
             digest_of(file.edits.sentences),
-            self._model_digest,
+            self.used.digest,
             installed_version(),
         )
         self.folder.change_line(number, lambda now: _with_export(now, record))
@@ -375,15 +394,6 @@ class Studio:
             self._exporting = None
         self.folder.change(lambda project: replace(project, preset=preset.name or project.preset))
         return {"exported": exported, "failed": failed}
-
-
-def digest_of(sentences: Iterable[str]) -> str:
-    """Return the digest of edits, by their sentences.
-
-    >>> digest_of(["phone 2 is p"])[:8]
-    '2a0d1f5a'
-    """
-    return sha256("\n".join(sentences).encode("utf-8", "surrogatepass")).hexdigest()
 
 
 def _pronounced(step: Step, own: Mapping[str, Sequence[Pronunciation]]) -> Step:

@@ -51,8 +51,8 @@ class TrainingReplies:
     async def voice(self, request: Request) -> Response:
         """The voice that the project uses from now on."""
         name = text(await content_of(request), "voice")
-        path, model, digest = await self._desk.beside(lambda: self._studio.voice_model(name))
-        self._studio.use_voice(path, model, digest)
+        path, voice = await self._desk.beside(lambda: self._studio.voice_model(name))
+        self._studio.use_voice(path, voice)
         return await self._told()
 
     async def _told(self, status: int = 200) -> Response:

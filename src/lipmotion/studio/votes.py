@@ -2,16 +2,41 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, shortened
 from lipmotion.storage.files import read_text_file
 from lipmotion.storage.json_text import as_json, from_json
 
-LONGEST_NAME = 200
-"""Most characters of the name of a motion."""
+DIGEST = re.compile(r"[0-9a-f]{64}|")
+
+
+@dataclass(frozen=True)
+class Side:
+    """One of two motions of a line.
+
+    name  : of the model that made it; of votes from before digests were kept, what the page called it
+    model : digest of the model's file (SHA-256); empty: it was not kept
+    edits : digest of the edits it was made with; empty: it was not kept
+    Raises InputError: no name, or no digests.
+    """
+
+    name: str
+    model: str
+    edits: str
+
+    def __post_init__(self) -> None:
+        if not self.name or not DIGEST.fullmatch(self.model) or not DIGEST.fullmatch(self.edits):
+            raise InputError(f"{shortened(repr(self))}: required a name, and digests as hexadecimal figures")
+
+    @property
+    def motion(self) -> tuple[str, str]:
+        """What tells it from other motions of the line: the model, by its name where nothing else is known; edits."""
+        return self.model or self.name, self.edits
 
 
 @dataclass(frozen=True)
@@ -19,24 +44,39 @@ class Vote:
     """One answer of a blind comparison.
 
     line   : name of the line
-    shown  : names of the two motions, in the order in which they were shown
-    better : name of the one that was found better; empty: neither
-    edits  : digest of the line's edits as they were
+    shown  : the two motions, in the order in which they were shown
+    better : place of the one that was found better, 0 or 1; None: neither
     Raises InputError: these are not two, or the better one is neither.
     """
 
     line: str
-    shown: tuple[str, ...]
-    better: str = ""
-    edits: str = ""
+    shown: tuple[Side, ...]
+    better: int | None = None
 
     def __post_init__(self) -> None:
-        if len(set(self.shown)) != 2 or len(self.shown) != 2 or not all(self.shown):
-            raise InputError(f"{len(self.shown)} motions were shown, required the names of two that differ")
-        if self.better and self.better not in self.shown:
-            raise InputError(
-                f"better is {self.better!r}, required {' or '.join(self.shown)}, or nothing: no difference"
-            )
+        if len(self.shown) != 2 or self.shown[0].motion == self.shown[1].motion:
+            raise InputError("these are not two motions that differ: required two models, or other edits")
+        if self.better not in (0, 1, None):
+            raise InputError(f"better is {shortened(repr(self.better))}, required 0, 1, or null: no difference")
+
+    @property
+    def compared(self) -> tuple[tuple[str, str], ...]:
+        """What the two are, whatever the line: edits that both have are those of the line, and do not count."""
+        first, second = (side.motion for side in self.shown)
+        return ((first[0], ""), (second[0], "")) if first[1] == second[1] else (first, second)
+
+
+def tally(votes: Sequence[Vote], vote: Vote) -> dict[str, Any]:
+    """Return how often each of the two of a vote was ``better``, in its order, and ``neither``, of all votes."""
+    better, neither = [0, 0], 0
+    for each in votes:
+        if set(each.compared) != set(vote.compared):
+            continue
+        if each.better is None:
+            neither += 1
+        else:
+            better[vote.compared.index(each.compared[each.better])] += 1
+    return {"better": better, "neither": neither}
 
 
 def votes_text(votes: Sequence[Vote]) -> str:
@@ -49,8 +89,20 @@ def read_votes(path: Path) -> tuple[Vote, ...]:
     if not path.exists():
         return ()
     try:
-        rows = from_json(read_text_file(path, "votes"))
-        named = ({name: str(row[name]) for name in ("line", "better", "edits")} for row in rows)
-        return tuple(Vote(shown=tuple(map(str, row["shown"])), **texts) for row, texts in zip(rows, named, strict=True))
+        return tuple(
+            _vote(row) if "edits" not in row else _named_vote(row) for row in from_json(read_text_file(path, "votes"))
+        )
     except (ValueError, TypeError, KeyError) as error:  # InputError is a ValueError
         raise InputError(f"{path}: {error}; put it right, or take it away") from error
+
+
+def _vote(row: dict[str, Any]) -> Vote:
+    sides = tuple(Side(str(side["name"]), str(side["model"]), str(side["edits"])) for side in row["shown"])
+    return Vote(str(row["line"]), sides, row["better"])
+
+
+def _named_vote(row: dict[str, Any]) -> Vote:
+    """Return a vote from before digests were kept: of two names, with the digest of the line's edits."""
+    names = list(map(str, row["shown"]))
+    better = names.index(row["better"]) if row["better"] else None
+    return Vote(str(row["line"]), tuple(Side(name, "", str(row["edits"])) for name in names), better)

@@ -49,7 +49,7 @@ def check_curve_set(curves: str | Path) -> None:
 def curve_names(curves: str | Path | DrivenCharacter) -> tuple[str, ...]:
     """Return the names that a character or a rig has for its curves; none, for the sets of ``SHAPE_SETS``."""
     if isinstance(curves, DrivenCharacter):
-        return (*curves.mesh.shape_names, *_known_names(curves.mesh))
+        return (*curves.mesh.shape_names, *known_names(curves.mesh))
     return () if curves in SHAPE_SETS else tuple(row.control for row in read_rig_table(Path(curves)))
 
 
@@ -72,7 +72,7 @@ def curves_of(
     Raises InputError: no such set or file, the character has no blendshapes, or the motion has no channel ``opening``.
     """
     if isinstance(curves, DrivenCharacter):
-        return edited_weights(curves.weights(motion, units), units, edits, _known_names(curves.mesh))
+        return edited_weights(curves.weights(motion, units), units, edits, known_names(curves.mesh))
     check_curve_set(curves)
     if curves in SHAPE_SETS:
         return with_edited_curves(_curves_of(motion, units, str(curves), staging, prosody), units, edits)
@@ -120,7 +120,7 @@ def edited_weights(
     return with_edited_curves(weights, units, ours)
 
 
-def _known_names(mesh: Mesh) -> dict[str, str]:
+def known_names(mesh: Mesh) -> dict[str, str]:
     """Return the blendshapes of a mesh by the names of the curves that they follow, or by ARKit's."""
     return {arkit_name(shape.called) or shape.called: shape.name for shape in reversed(mesh.shapes) if shape.called}
 

@@ -14,6 +14,7 @@ from lipmotion.articulation.delivery import closed_times
 from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.liveliness import CALM
 from lipmotion.articulation.mouth import SpokenMouth, frame_times, mouth_at_rest, spoken_mouth
+from lipmotion.articulation.rest import beside_rest
 from lipmotion.faces.base import Staging, alive
 from lipmotion.meshes.files.gltf_animator import write_animated_gltf
 from lipmotion.meshes.files.gltf_writer import write_gltf_scene
@@ -26,7 +27,7 @@ from lipmotion.meshes.model.head_angles import head_quaternions
 from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.mesh import Blendshape
 from lipmotion.meshes.model.scene import HeadTurn, Scene
-from lipmotion.pipeline.outputs.curve_sets import curves_of, edited_weights
+from lipmotion.pipeline.outputs.curve_sets import edited_weights, known_names
 from lipmotion.pipeline.outputs.delivered import delivered, held_mouth, with_drawn_channels
 from lipmotion.pipeline.outputs.drawn_video import check_drawable
 from lipmotion.pipeline.outputs.living_curves import living_curves
@@ -40,7 +41,7 @@ GLTF, USD = ".glb", ".usda"
 SCENE_SUFFIXES = (GLTF, USD)
 KEPT = (GLTF, ".vrm")
 """Suffixes of files of characters that are kept as they are, with an animation more."""
-MARGIN, MOUTH_MARGIN = 10, 100
+MARGIN, MOUTH_MARGIN = 10, 50
 """Frames before and after those that are wanted alone, within which weights settle, and the mouth."""
 METRES = 0.09
 """The distance between the outer eye corners of the 3D head, in metres."""
@@ -186,22 +187,29 @@ def character_scene(
 
     rate_hz : keys a second; None: those of the motion. A closure between two keys is at the nearer one
     staging, prosody : seed, and what moves on its own
-    frames  : as of ``delivered_scene``; all are computed
+    frames  : as of ``delivered_scene``
     Raises InputError: the character has no blendshapes, or the motion has no channel ``opening``.
     """
-    motion, units = generation.motion, generation.units
-    weights = curves_of(motion, units, character, edits=generation.curve_edits)
-    living = living_curves(with_mouth(motion), units, staging, prosody)
-    mouth = spoken_mouth(with_mouth(motion), units)
+    motion, units, rate = generation.motion, generation.units, generation.motion.rate_hz
+    around, kept = _around(frames, MOUTH_MARGIN)
+    is_part = frames is not None and (around.start > 0 or around.stop < len(motion.values))
+    part, said, there = beside_rest(motion, units, around) if is_part else (motion, units, slice(None))
+    solved, mouth = character.weights(part, said), spoken_mouth(with_mouth(part), said)
+    table = np.zeros((len(motion.values), len(solved.names)))
+    table[around] = solved.values[there]
+    known = known_names(character.mesh)
+    weights = edited_weights(replace(solved, values=table), units, generation.curve_edits, known)
+    living = living_curves(with_mouth(motion), units, staging, prosody, around)
     others = {name: living[name].astype(np.float64) for name in living.names}
-    beside = character.beside(others, len(weights.values))
-    beside = {name: curve for name, curve in beside.items() if name not in weights.names}
-    beside |= character.expressions(motion, mouth)
-    table = np.concatenate([weights.values, *(curve[:, None] for curve in beside.values())], axis=1)
+    beside = {
+        name: curve for name, curve in character.beside(others, len(living.values)).items() if name not in weights.names
+    }
+    beside |= {name: curve[there] for name, curve in character.expressions(part, mouth).items()}
+    rows = np.concatenate([weights.values[around], *(curve[:, None] for curve in beside.values())], axis=1)
     channels = weights.channels + tuple(Channel(name, WEIGHT) for name in beside)
-    hertz = rate_hz or motion.rate_hz
-    rows = in_pictures(table, mouth.contact, motion.rate_hz, frame_times(len(table), motion.rate_hz, hertz))
-    return Scene(character.mesh, Motion(rows[frames or slice(None)], hertz, channels), original=character.file)
+    hertz = rate if frames is not None else rate_hz or rate
+    shown = in_pictures(rows, mouth.contact[there], rate, frame_times(len(rows), rate, hertz))
+    return Scene(character.mesh, Motion(shown[kept], hertz, channels), original=character.file)
 
 
 def check_sound_name(path: Path, sound: Path) -> None:

@@ -15,10 +15,17 @@ export class ShownCurves {
     return this.store.channels.filter((name) => known.has(name));
   }
 
-  async read(id, of, names, span) {
+  /** Read some curves of a kind; `by`: as the server calls the model that moves the line. */
+  async read(id, of, names, span, by = "") {
     if (!names.length) return new Curves([], this.store.line.rate_hz, new Float32Array());
     const stretch = span ? `&start_s=${span.start_s}&end_s=${span.end_s}` : "";
-    return this.server.curves(`lines/${id}/motion?of=${of}&names=${names.map(encodeURIComponent).join()}${stretch}`);
+    return this.server.curves(`lines/${id}/motion?of=${of}&names=${names.map(encodeURIComponent).join()}&by=${by}${stretch}`);
+  }
+
+  /** Return curves with those that are shown and not among them, and without those that are not shown. */
+  async completed(id, of, curves, by = "") {
+    const { names } = this, missing = names.filter((name) => curves.column(name) < 0);
+    return curves.and(await this.read(id, of, missing, null, by)).only(names);
   }
 
   /** Read again what has changed, of the line with a number; null: all. */
@@ -40,10 +47,9 @@ export class ShownCurves {
   async fill(id) {
     const { store, store: { motion, deviation }, names } = this;
     if (!motion || String(motion.names) === String(names)) return; // what is still to come is filled then
-    const missing = names.filter((name) => motion.column(name) < 0);
-    const [means, spreads] = await Promise.all(["motion", "deviation"].map((of) => this.read(id, of, missing, null)));
+    const [means, spreads] = await Promise.all([this.completed(id, "motion", motion), this.completed(id, "deviation", deviation)]);
     if (id !== store.lineId) return;
-    if (motion === store.motion) store.set({ motion: motion.and(means).only(names), deviation: deviation.and(spreads).only(names) });
+    if (motion === store.motion) store.set({ motion: means, deviation: spreads });
     await this.fill(id);
   }
 }

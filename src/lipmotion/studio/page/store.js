@@ -22,7 +22,8 @@ export class Store {
     this.time_s = 0;
     this.comparing = false; // whether the other version is shown
     this.sideBySide = false; // whether both are
-    /** @type {{order: boolean[], place: number, asked: boolean, told: string} | null} */ this.blind = null; // comparison: which is the other one, which plays
+    /** @type {{order: boolean[], span: {start_s: number, end_s: number}, place: number, asked: boolean, told: string} | null} */
+    this.blind = null; // comparison: which is the other one, of what stretch, which plays
     /** @type {any} */ this.progress = null; // of the open line
     /** @type {any} */ this.training = {}; // how far a voice or a face is
     this.tool = "select";

@@ -11,7 +11,7 @@ export function compareSection(studio) {
   return section(TEXT.compare, other && made("p", { className: "hint", textContent: filled(TEXT.comparedWith, { name: other.name }) }),
     row(...kept), other && row(...(blind && !blind.told ? blindButtons(studio) : [
       held(studio), textButton(TEXT.sideBySide, () => comparison.toggleSides(), { id: "compare-sides", disabled: !other.weights, "aria-pressed": String(store.sideBySide) }),
-      textButton(TEXT.blind, () => comparison.blind(), { id: "compare-blind", disabled: !other.weights }),
+      textButton(TEXT.blind, () => comparison.blind(), { id: "compare-blind", disabled: !other.weights || !comparison.differs }),
       textButton(TEXT.compareStop, () => comparison.stop(), { id: "compare-stop" })])),
     blind && made("p", { id: "blind-told", className: "hint", textContent: blind.told || filled(TEXT.blindAsk, { what: "AB"[blind.place] }) }));
 }

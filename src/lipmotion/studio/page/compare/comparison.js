@@ -3,12 +3,16 @@
 import { Curves } from "../curves.js";
 import { TEXT, filled } from "../strings.js";
 
+/** What the server calls the model that the project's is compared with. */
+const OTHER = "other";
+
 export class Comparison {
   /** @param {import("../studio.js").Studio} studio */
   constructor(studio) {
     this.studio = studio;
     this.store = studio.store;
     this.store.on(["line", "face"], () => this.renew());
+    this.store.on(["channels"], () => this.fill());
     this.store.on(["playing", "time_s"], () => this.heard());
   }
 
@@ -17,20 +21,35 @@ export class Comparison {
     const { motion, weights, line, face } = this.store;
     if (!motion) return;
     const copy = weights && new Curves(weights.names, weights.rate_hz, weights.values.slice());
-    this.show({ by: "", face, name: line.steps.length ? filled(TEXT.afterEdit, { number: line.steps.length }) : TEXT.withoutEdits, motion, weights: copy });
+    this.show({ by: "", edits: line.edits_digest, face, name: line.steps.length ? filled(TEXT.afterEdit, { number: line.steps.length }) : TEXT.withoutEdits, motion, weights: copy });
   }
 
   /** Compare with the motion that the other model makes of the same edits. */
   async withModel() {
-    const { store, studio: { server } } = this, { lineId, line, face, project } = store;
-    const address = `lines/${lineId}`, isMesh = project.forms.faces.find(({ name }) => name === face)?.mesh;
+    const { store, studio: { server, curves, curves: { names } } } = this, { lineId, line, face, project } = store;
+    const isMesh = project.forms.faces.find(({ name }) => name === face)?.mesh;
     try {
-      const [motion, moved] = await Promise.all([server.curves(`${address}/motion?by=other`),
-        isMesh && server.weights(`${address}/weights?by=other&face=${encodeURIComponent(face)}`)]);
+      const [motion, moved] = await Promise.all([curves.read(lineId, "motion", names, null, OTHER),
+        isMesh && server.weights(`lines/${lineId}/weights?by=${OTHER}&face=${encodeURIComponent(face)}`)]);
       if (lineId !== store.lineId || face !== store.face) return;
-      this.show({ by: "other", revision: line.revision, face, name: filled(TEXT.modelNamed, { name: project.forms.against }), motion, weights: moved ? moved.weights : null });
+      this.show({ by: OTHER, revision: line.revision, face, name: filled(TEXT.modelNamed, { name: project.forms.against }), motion, names, weights: moved ? moved.weights : null });
+      await this.fill();
     } catch (error) {
       this.studio.refuse(error);
+    }
+  }
+
+  /** Read the other model's curves that are shown by now and are not here. */
+  async fill() {
+    const { store, store: { other, lineId }, studio, studio: { curves } } = this;
+    if (!other?.by || !store.line || String(other.names) === String(curves.names)) return;
+    const { names } = curves;
+    try {
+      const motion = await curves.completed(lineId, "motion", other.motion, other.by);
+      if (other === store.other) store.set({ other: { ...other, motion, names } });
+      await this.fill();
+    } catch (error) {
+      studio.refuse(error);
     }
   }
 
@@ -50,37 +69,39 @@ export class Comparison {
 
   /** Play the two, one after the other, in an order that is not told. */
   blind() {
-    const order = Math.random() < 0.5 ? [false, true] : [true, false];
-    this.store.set({ sideBySide: false, looping: false, blind: { order, place: 0, asked: false, told: "" } });
+    const order = Math.random() < 0.5 ? [false, true] : [true, false], { duration_s } = this.studio.player;
+    const span = this.store.span ?? { start_s: 0, end_s: duration_s };
+    this.store.set({ sideBySide: false, blind: { order, span, place: 0, asked: false, told: "" } });
     this.play(0, false);
   }
 
   /** Play the first or the second one, 0 or 1. */
   play(place, alone = true) {
-    const { blind, span } = this.store;
+    const { blind } = this.store;
     this.store.set({ blind: { ...blind, place, asked: alone || blind.asked }, comparing: blind.order[place] });
-    this.studio.player.seek(span?.start_s ?? 0);
+    this.studio.player.seek(blind.span.start_s);
     this.studio.player.play();
   }
 
   /** The end of the first is followed by the second; then it is asked. */
   heard() {
-    const { blind, playing, span, time_s } = this.store, { player } = this.studio;
-    if (!blind || blind.told) return;
-    if (playing && span && time_s >= span.end_s) return player.stop();
-    const ended = !playing && time_s >= (span?.end_s ?? player.duration_s) - 0.02;
-    if (!ended || blind.asked) return;
+    const { blind, playing, time_s } = this.store;
+    if (!blind || blind.told || blind.asked || playing || time_s < blind.span.end_s - 0.02) return;
     if (blind.place === 0) this.play(1, false);
     else this.store.set({ blind: { ...blind, asked: true } });
   }
 
+  /** Whether the other motion may be another one: it is that of the other model, or of other edits. */
+  get differs() { return Boolean(this.store.other?.by) || this.store.other?.edits !== this.store.line?.edits_digest; }
+
   /** Keep which was better: 0, 1, or null: neither; and tell what was what. */
   async vote(place) {
-    const { blind, other, lineId } = this.store, names = blind.order.map((isOther) => (isOther ? other.name : TEXT.now));
+    const { blind, blind: { order }, other, lineId } = this.store, names = order.map((isOther) => (isOther ? other.name : TEXT.now));
+    const shown = order.map((isOther) => (isOther ? { by: other.by, edits: other.edits } : {}));
     try {
-      const { votes } = await this.studio.server.told(`lines/${lineId}/votes`, { shown: names, better: place === null ? "" : names[place] });
+      const { better, neither } = await this.studio.server.told(`lines/${lineId}/votes`, { shown, better: place });
       this.studio.player.stop();
-      const told = filled(TEXT.blindTold, { a: names[0], b: names[1], now: votes[TEXT.now] ?? 0, other: votes[other.name] ?? 0, neither: votes[""] ?? 0, name: other.name });
+      const told = filled(TEXT.blindTold, { a: names[0], b: names[1], now: better[order.indexOf(false)], other: better[order.indexOf(true)], neither, name: other.name });
       this.store.set({ blind: { ...blind, told }, comparing: false });
       this.studio.say(told);
     } catch (error) {

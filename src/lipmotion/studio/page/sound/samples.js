@@ -52,15 +52,27 @@ function narrowed({ lowest, highest }) {
 
 /** Return the samples of a WAV file of 16 bits and one channel. */
 export function samplesOf(buffer) {
+  const { start, count, rate_hz } = partsOf(buffer);
+  return new Samples(new Int16Array(buffer, start, count), rate_hz);
+}
+
+/** Return a WAV file that ends at a time, to the sample; its beginning is the same. */
+export function endingAt(buffer, end_s) {
+  const { start, count, rate_hz } = partsOf(buffer), stop = start + 2 * Math.min(Math.floor(end_s * rate_hz + 1e-6), count);
+  const cut = buffer.slice(0, stop), view = new DataView(cut);
+  view.setUint32(4, stop - 8, true);
+  view.setUint32(start - 4, stop - start, true);
+  return cut;
+}
+
+/** Where the samples of a WAV file of 16 bits and one channel start, in bytes, how many there are, and their rate. */
+function partsOf(buffer) {
   const view = new DataView(buffer);
   let rate_hz = 0;
   for (let place = 12; place + 8 <= buffer.byteLength;) {
     const name = view.getUint32(place), size = view.getUint32(place + 4, true);
     if (name === 0x666d7420) rate_hz = view.getUint32(place + 12, true); // "fmt "
-    if (name === 0x64617461) { // "data"
-      const length = Math.min(size, buffer.byteLength - place - 8) >> 1;
-      return new Samples(new Int16Array(buffer, place + 8, length), rate_hz);
-    }
+    if (name === 0x64617461) return { start: place + 8, count: Math.min(size, buffer.byteLength - place - 8) >> 1, rate_hz }; // "data"
     place += 8 + size + (size & 1);
   }
   throw new Error("no WAV file");
