@@ -30,6 +30,7 @@ from lipmotion.studio import line as line_module
 from lipmotion.studio.access import TOKEN_HEADER, Access
 from lipmotion.studio.application import studio_application
 from lipmotion.studio.folder import opened_folder
+from lipmotion.studio.project import project_from
 from lipmotion.studio.studio import Studio
 from lipmotion.studio.votes import read_votes
 from studio.open_studio import HOST, TOKEN, TOY_DIGEST, OpenStudio, open_studio, toy
@@ -405,6 +406,35 @@ def _compared(studio: OpenStudio) -> None:
     _voted(studio)
 
 
+def test_versions_are_kept_shown_and_gone_back_to(studio: OpenStudio) -> None:
+    """What was there when one goes back is kept, too."""
+    assert studio.edit("pin opening 0.3 at 0.5").status == 200
+    first = studio.ready()
+    assert studio.ask("/api/lines/1/versions", {}).content["versions"] == [
+        {"name": "version-1", "number": 1, "edits": first["undo"], "digest": first["edits_digest"]}
+    ]
+    assert len(studio.ask("/api/lines/1/versions", {}).content["versions"]) == 1  # there is one of these edits
+    then = studio.ask("/api/lines/1/motion").body
+    assert studio.edit("phone 3 is p").status == 200
+    now = studio.ask("/api/lines/1/motion").body
+    assert now != then
+    assert studio.ask("/api/lines/1/motion?by=version-1").body == then
+    assert studio.ask("/api/lines/1/weights?by=version-1").body != studio.ask("/api/lines/1/weights").body
+    back = studio.ask("/api/lines/1/versions/back", {"revision": studio.ready()["revision"], "version": "version-1"})
+    assert back.content["steps"] == first["steps"]
+    assert back.content["changed"]
+    assert [each["edits"] for each in back.content["versions"]] == [first["undo"], first["undo"] + 1]
+    assert studio.ask("/api/lines/1/motion").body == then
+    assert studio.ask("/api/lines/1/motion?by=version-2").body == now
+    read = project_from(json.loads((studio.folder.path / "project.json").read_text(encoding="utf-8")))
+    assert [len(each.steps) for each in read.lines[1].versions] == [first["undo"], first["undo"] + 1]
+    assert studio.ask("/api/lines/1/versions/forget", {"version": "version-2"}).content["versions"][-1]["number"] == 1
+    for wrong in ("version-2", "other", ""):
+        assert studio.ask("/api/lines/1/versions/forget", {"version": wrong}).status == 422
+    old = {"revision": studio.ready()["revision"] - 1, "version": "version-1"}
+    assert studio.ask("/api/lines/1/versions/back", old).status == 409
+
+
 def _voted(studio: OpenStudio) -> None:
     """Both models have the same name."""
     assert studio.ask("/api/project").content["forms"]["against"] == f"toy ({OTHER_DIGEST[:8]})"
@@ -412,7 +442,8 @@ def _voted(studio: OpenStudio) -> None:
     def vote(better: int | None, *shown: dict[str, str]) -> Reply:
         return studio.ask("/api/lines/1/votes", {"shown": list(shown), "better": better})
 
-    now, other, kept = {"by": ""}, {"by": "other"}, {"edits": studio.ready()["edits_digest"]}
+    (version,) = studio.ask("/api/lines/1/versions", {}).content["versions"]
+    now, other, kept = {"by": ""}, {"by": "other"}, {"by": version["name"]}
     assert vote(0, now, kept).status == 422  # the same motion
     assert vote(1, now, other).content == {"better": [0, 1], "neither": 0}
     assert vote(1, other, now).content == {"better": [1, 1], "neither": 0}
@@ -422,8 +453,8 @@ def _voted(studio: OpenStudio) -> None:
     votes = read_votes(studio.folder.path / "votes.json")
     assert [each.name for each in votes[0].shown] == ["toy", "toy"]
     assert [each.model for each in votes[1].shown] == [OTHER_DIGEST, TOY_DIGEST]
-    assert [each.edits for each in votes[3].shown] == [studio.ready()["edits_digest"], kept["edits"]]
-    for wrong in ([now], [now, now], [now, {"by": "another"}], [now, {"edits": "x"}], [now, "other"]):
+    assert [each.edits for each in votes[3].shown] == [studio.ready()["edits_digest"], version["digest"]]
+    for wrong in ([now], [now, now], [now, {"by": "another"}], [now, {"by": "version-2"}], [now, "other"]):
         assert studio.ask("/api/lines/1/votes", {"shown": wrong, "better": 0}).status == 422
     for better in (2, "toy", -1):
         assert studio.ask("/api/lines/1/votes", {"shown": [now, other], "better": better}).status == 422

@@ -31,6 +31,10 @@ WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"
 SCREENS = ((1440, 900, "light"), (900, 800, "dark"), (320, 640, "light"), (320, 640, "dark"))
 WEBGL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--autoplay-policy=no-user-gesture-required")
 LIMIT_S = 120.0
+GHOST_PIXELS = """(() => { const { width, height } = studio.stage.ghost;
+  const { data } = studio.stage.ghost.getContext("2d").getImageData(0, 0, width, height);
+  return data.reduce((count, value, n) => count + (n % 4 === 3 && value > 0), 0); })()"""
+"""How many pixels of the other head are drawn over the first one."""
 FRAME_S = 1 / 60
 CLOSED = "document.querySelector('dialog').close()"
 FAILED = "{ ...studio.store.line, status: 'failed', error: 'no speech' }"
@@ -316,6 +320,41 @@ def test_the_weights_of_the_page_are_those_of_the_exported_file(page: Page) -> N
         assert values[:, names.index(name)] == pytest.approx(read[name], abs=1e-5), name
 
 
+def test_versions_are_kept_compared_and_gone_back_to(page: Page) -> None:
+    window = page.window
+    page.choose(9)
+    page.edit(lambda: window.press(ENTER, *"aa", ENTER), "phone 9 is aa")
+    window.click("#tab-history")
+    window.click("#compare-keep")
+    wait_until(lambda: page.of("Boolean(studio.store.other?.weights)"), LIMIT_S)
+    kept = page.of("studio.store.other.motion.values.join()")
+    assert page.of("document.getElementById('compare-blind').disabled")  # it is what is shown
+    page.choose(12)
+    page.edit(lambda: window.press(ENTER, *"uw", ENTER), "phone 12 is uw")
+    page.reload()
+    window.click("#tab-history")
+    window.click("#version-1")
+    wait_until(lambda: page.of("Boolean(studio.store.other?.weights)"), LIMIT_S)
+    assert page.of("studio.store.other.motion.values.join()") == kept
+    assert page.of("studio.store.motion.values.join()") != kept
+    window.run("studio.player.seek(1.2)")
+    window.click("#compare-over")
+    wait_until(lambda: page.of(GHOST_PIXELS) > 1000, LIMIT_S)
+    for width, height, scheme in SCREENS:
+        window.show_as(width, height, scheme, mobile=width < 600)
+        window.run("studio.showPlace('panel')")
+        window.run_until_done("setTimeout(arguments[0], 100)")
+        check_screen(window, "versions", width, scheme)
+    window.show_as(1200, 900)
+    window.click("#version-1-back")
+    page.wait_for_steps(1)
+    assert page.steps == ["phone 9 is aa"]
+    wait_until(lambda: page.of("studio.store.line.versions.length") == 2, LIMIT_S)
+    for number in (1, 2):
+        window.click(f"#version-{number}-forget")
+        wait_until(lambda left=2 - number: page.of("studio.store.line.versions.length") == left, LIMIT_S)
+
+
 def test_only_curves_that_are_shown_are_asked_for(page: Page) -> None:
     page.window.run("performance.clearResourceTimings()")
     first = page.of(NOT_SHOWN)
@@ -459,7 +498,7 @@ def test_the_real_video_beside_and_comparisons(opens: Opens, tmp_path: Path, fil
         window.run(SLOW)
         window.run("studio.store.set({ span: { start_s: 0.5, end_s: 0.8 }, looping: true })")
         window.click("#compare-blind")
-        assert not page.of("studio.store.sideBySide")
+        assert page.of("studio.store.heads") == "one"
         wait_until(lambda: page.of("studio.store.blind.asked"), LIMIT_S)
         assert page.of("window.ends_s") == pytest.approx([0.8, 0.8], abs=1e-3)
         assert page.of("[...new Set(window.shown.map(({ comparing }) => comparing))].length") == 2

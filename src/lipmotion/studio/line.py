@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
+from copy import copy
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -16,7 +18,7 @@ from lipmotion.export.video import write_mp4
 from lipmotion.faces.base import Face
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.pipeline.edit_files import EditFile, write_edits
-from lipmotion.pipeline.edits import Step, WordIs, WordSaid, WordStep, step_of
+from lipmotion.pipeline.edits import Edits, Step, WordIs, WordSaid, WordStep, step_of
 from lipmotion.pipeline.film.filmed_video import write_film
 from lipmotion.pipeline.generate.explain import explain_session, explanation_text
 from lipmotion.pipeline.model import Model
@@ -88,6 +90,12 @@ class OpenLine:
         self._others[key].file = self.file
         return self._others[key]
 
+    def with_edits(self, sentences: Sequence[str]) -> OpenLine:
+        """Return the line with other edits; it is only read. Raises InputError: an edit is refused."""
+        other = copy(self)
+        other.file, other.settled = replace(self.file, edits=Edits().then(*sentences), undone=()), True
+        return other
+
     @property
     def generation(self) -> Generation:
         """The motion with all edits, but for its delivery."""
@@ -124,6 +132,13 @@ class OpenLine:
         self._check(revision)
         changed = self._changed(self.file.undo(instead).then(*steps) if steps else self.file.undo(instead))
         return changed | {"guessed": self._guessed(steps)}
+
+    def back_to(self, revision: int, sentences: Sequence[str]) -> dict[str, Any]:
+        """Go back to edits as they once were; return what moved. Raises as ``edited``."""
+        now = self.file.edits.sentences
+        same = next((n for n, (old, new) in enumerate(zip(now, sentences, strict=False)) if old != new), len(now))
+        same = min(same, len(sentences))
+        return self.edited(revision, tuple(sentences[same:]), len(now) - same)
 
     def _guessed(self, steps: tuple[str | Step, ...]) -> list[dict[str, Any]]:
         """Return the words of edits whose pronunciation is a guess, with it, as objects of JSON."""

@@ -99,14 +99,45 @@ class LineReplies:
     async def vote(self, request: Request) -> Response:
         """Which of two motions somebody found better."""
         number, content = self._number(request), await content_of(request)
-        sides = tuple(
-            self._studio.side(number, text(side, "by", ""), text(side, "edits", ""))
-            for side in objects(content, "shown")
-        )
+        sides = tuple(self._studio.side(number, text(side, "by", "")) for side in objects(content, "shown"))
         better = None if content.get("better") is None else whole(content, "better", most=1)
         vote = Vote(self._studio.folder.line(number).name, sides, better)
         found = await self._desk.beside(lambda: self._studio.folder.add_vote(vote))
         return json_bytes(as_json(tally(found, vote)).encode())
+
+    async def keep(self, request: Request) -> Response:
+        """The edits as they are, to be kept as a version."""
+        number = self._number(request)
+
+        def kept(line: OpenLine) -> Changed:
+            steps = line.file.edits.sentences
+            self._studio.folder.change_line(number, lambda now: now.with_version(steps))
+            return {}
+
+        return await self._state_after(number, kept)
+
+    async def forget(self, request: Request) -> Response:
+        """A version that is kept no longer."""
+        number, name = self._number(request), text(await content_of(request), "version")
+
+        def forgotten(_: OpenLine) -> Changed:
+            self._studio.folder.change_line(number, lambda now: now.without_version(name))
+            return {}
+
+        return await self._state_after(number, forgotten)
+
+    async def back(self, request: Request) -> Response:
+        """A version to go back to; the edits as they are become one, too."""
+        content, number = await content_of(request), self._number(request)
+        revision, name = whole(content, "revision"), text(content, "version")
+
+        def back(line: OpenLine) -> Changed:
+            steps, now = self._studio.folder.line(number).version(name).steps, line.file.edits.sentences
+            changed = line.back_to(revision, steps)
+            self._studio.folder.change_line(number, lambda line: line.with_version(now))
+            return changed
+
+        return await self._state_after(number, back)
 
     async def motion(self, request: Request) -> Response:
         """Numbers of the motion."""
@@ -115,24 +146,24 @@ class LineReplies:
         if of not in NUMBERS:
             raise InputError(f"of is {of!r}, required one of: {', '.join(NUMBERS)}")
         names = text(query, "names", longest=LONGEST_NAMES).split(",") if "names" in query else None
-        by = text(query, "by", "")
+        by, number = text(query, "by", ""), self._number(request)
 
         def found(line: OpenLine) -> Response:
-            motion = self._studio.line_as(line, by).numbers(of)
+            motion = self._studio.line_as(number, line, by).numbers(of)
             if names is not None:
                 motion = _only(motion, [name for name in names if name in motion.names] if by else names)
             frames = stretch(query, motion.rate_hz, len(motion.values))
             return _numbers(replace(motion, values=motion.values[frames]), frames.start, {})
 
-        return await self._desk.at(self._number(request), found)
+        return await self._desk.at(number, found)
 
     async def weights(self, request: Request) -> Response:
         """The weights of a face's morph targets."""
         query = request.query_params
-        name, by = text(query, "face", "head"), text(query, "by", "")
+        name, by, number = text(query, "face", "head"), text(query, "by", ""), self._number(request)
 
         def found(given: OpenLine) -> Response:
-            line = self._studio.line_as(given, by)
+            line = self._studio.line_as(number, given, by)
             delivered = line.numbers("delivered")
             frames = stretch(query, delivered.rate_hz, len(delivered.values))
             is_part = frames.stop - frames.start < len(delivered.values)
@@ -140,28 +171,28 @@ class LineReplies:
             mesh = self._studio.faces.mesh_name(name, delivered)
             return _numbers(motion, frames.start, {"x-lipmotion-mesh": quote(mesh)})
 
-        return await self._desk.at(self._number(request), found)
+        return await self._desk.at(number, found)
 
     async def picture(self, request: Request) -> Response:
         """A picture of a drawn face."""
         query = request.query_params
         time_s, shown = seconds(query, "time"), self._studio.drawn(text(query, "face", "woman"))
-        by = text(query, "by", "")
+        by, number = text(query, "by", ""), self._number(request)
 
         def found(line: OpenLine) -> bytes:
-            return as_png(self._studio.line_as(line, by).picture(time_s, shown))
+            return as_png(self._studio.line_as(number, line, by).picture(time_s, shown))
 
-        return Response(await self._desk.at(self._number(request), found), media_type="image/png", headers=FRESH)
+        return Response(await self._desk.at(number, found), media_type="image/png", headers=FRESH)
 
     async def video(self, request: Request) -> Response:
         """A video of a stretch."""
         content = await content_of(request)
         start_s, end_s = seconds(content, "start_s"), seconds(content, "end_s")
-        name, by = text(content, "face", "woman"), text(content, "by", "")
+        name, by, number = text(content, "face", "woman"), text(content, "by", ""), self._number(request)
 
         def found(given: OpenLine) -> bytes:
             shown = self._studio.faces.shown(name)
-            line = self._studio.line_as(given, by, name)
+            line = self._studio.line_as(number, given, by, name)
             with tempfile.TemporaryDirectory(prefix="lipmotion-studio-") as folder:
                 path = Path(folder) / "stretch.mp4"
                 if isinstance(shown, ShownPerson):
@@ -170,7 +201,7 @@ class LineReplies:
                     line.write_video(path, start_s, end_s, self._studio.drawn(name))
                 return path.read_bytes()
 
-        return Response(await self._desk.at(self._number(request), found), media_type="video/mp4", headers=FRESH)
+        return Response(await self._desk.at(number, found), media_type="video/mp4", headers=FRESH)
 
     async def why(self, request: Request) -> Response:
         """What determined a frame."""

@@ -7,13 +7,15 @@ from dataclasses import asdict, dataclass, field, fields, replace
 from hashlib import sha256
 from typing import Any
 
-from lipmotion.errors import InputError
+from lipmotion.errors import InputError, shortened
 from lipmotion.extensions import installed_version
 from lipmotion.pipeline.batch.lines import BatchLine, check_names
 
 FORMAT, VERSION = "lipmotion.project", 1
 NO_MARK, APPROVED, REDO = MARKS = ("none", "approved", "redo")
 MOST_LINES = 100_000
+MOST_VERSIONS = 100
+"""Versions that are kept of a line."""
 EDITS_SUFFIX = "edits.json"
 """How files of edits end, after the name of the line and a dot."""
 
@@ -39,6 +41,28 @@ class ExportRecord:
 
 
 @dataclass(frozen=True)
+class KeptVersion:
+    """Edits of a line as they once were, to compare with and to go back to.
+
+    number : of the version, unique in its line, from 1
+    steps  : its edits, as sentences
+    """
+
+    number: int
+    steps: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """What requests call it."""
+        return f"version-{self.number}"
+
+    @property
+    def digest(self) -> str:
+        """The digest of its edits."""
+        return digest_of(self.steps)
+
+
+@dataclass(frozen=True)
 class ProjectLine:
     """A recording that is worked on.
 
@@ -51,6 +75,7 @@ class ProjectLine:
     doubt      : how unsure the motion of its speech is, 0 to 1; None: not known yet
     mark       : one of ``MARKS``
     exports    : in their order
+    versions   : that were kept, in their order
     """
 
     number: int
@@ -62,12 +87,35 @@ class ProjectLine:
     doubt: float | None = None
     mark: str = NO_MARK
     exports: tuple[ExportRecord, ...] = ()
+    versions: tuple[KeptVersion, ...] = ()
 
     def __post_init__(self) -> None:
         if self.mark not in MARKS:
             raise InputError(f"the mark is {self.mark!r}, required one of: {', '.join(MARKS)}")
         if type(self.number) is not int or self.number < 1:
             raise InputError(f"the line {self.name!r} has the number {self.number!r}, required 1 or more")
+
+    def with_version(self, steps: tuple[str, ...]) -> ProjectLine:
+        """Return the line with a version of these edits; as it is, where there is one. Raises InputError: too many."""
+        if any(version.steps == steps for version in self.versions):
+            return self
+        if len(self.versions) >= MOST_VERSIONS:
+            raise InputError(f"{len(self.versions)} versions are kept, required fewer than {MOST_VERSIONS}; remove one")
+        kept = KeptVersion(self.versions[-1].number + 1 if self.versions else 1, steps)
+        return replace(self, versions=(*self.versions, kept))
+
+    def without_version(self, name: str) -> ProjectLine:
+        """Return the line without a version. Raises InputError: as ``version``."""
+        gone = self.version(name)
+        return replace(self, versions=tuple(version for version in self.versions if version != gone))
+
+    def version(self, name: str) -> KeptVersion:
+        """Return a version. Raises InputError: none of that name is kept."""
+        for version in self.versions:
+            if version.name == name:
+                return version
+        known = ", ".join(version.name for version in self.versions) or "nothing: none is kept"
+        raise InputError(f"no version {shortened(repr(name))} of the line, required one of: {known}")
 
 
 @dataclass(frozen=True)
@@ -122,7 +170,7 @@ def _without_usual(line: ProjectLine) -> dict[str, Any]:
     usual = {each.name: each.default for each in fields(line)}
     values = {each.name: getattr(line, each.name) for each in fields(line)}
     kept = {name: value for name, value in values.items() if value != usual[name]}
-    return kept | ({"exports": [asdict(each) for each in line.exports]} if line.exports else {})
+    return kept | {name: [asdict(each) for each in kept[name]] for name in ("exports", "versions") if name in kept}
 
 
 def project_from(content: Any) -> Project:
@@ -155,7 +203,14 @@ def _line(row: Any) -> ProjectLine:
         raise ValueError(f"a text of the line {row.get('number')} is none")
     numbers = {name: None if row.get(name) is None else float(row[name]) for name in ("duration_s", "doubt")}
     exports = tuple(ExportRecord(**each) for each in row.get("exports", ()))
-    return ProjectLine(**{**row, **numbers, "exports": exports})
+    versions = tuple(KeptVersion(int(each["number"]), _sentences(each["steps"])) for each in row.get("versions", ()))
+    return ProjectLine(**{**row, **numbers, "exports": exports, "versions": versions})
+
+
+def _sentences(steps: Any) -> tuple[str, ...]:
+    if not isinstance(steps, list) or not all(isinstance(step, str) for step in steps):
+        raise ValueError("edits of a version that are no texts")
+    return tuple(steps)
 
 
 def digest_of(sentences: Iterable[str]) -> str:

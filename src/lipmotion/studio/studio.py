@@ -143,6 +143,10 @@ class Studio:
         """Return what is said of a line, ready or not."""
         line, work = self.folder.line(number), self.desk.work(number)
         known: dict[str, Any] = {"id": number, "name": line.name, "mark": line.mark, "transcript": line.transcript}
+        known["versions"] = [
+            {"name": each.name, "number": each.number, "edits": len(each.steps), "digest": each.digest}
+            for each in line.versions
+        ]
         if work is None:
             return known | {"status": self.desk.status(number), "progress": None, "error": ""}
         status = WORKING if work.status == READY and work.line is None else work.status
@@ -320,33 +324,32 @@ class Studio:
                 write_playable(video, self.folder.sound(self.folder.line(number)), path)
         return path, MP4
 
-    def line_as(self, line: OpenLine, by: str, face: str = "") -> OpenLine:
-        """Return an open line as the other model moves it, or mapped onto the person of a filmed face.
+    def line_as(self, number: int, line: OpenLine, by: str, face: str = "") -> OpenLine:
+        """Return an open line as it once was, or as the other model moves it, or mapped onto another person.
 
-        by   : ``OTHER``: the model it is compared with; empty: the project's
-        face : the name of the face that is shown
-        Raises InputError: there is no other model, or it cannot make an edit.
+        by   : the name of a version that was kept; ``OTHER``: the model it is compared with; empty: the line as it is
+        face : the name of the face that is shown; a filmed one may be of another person
+        Raises InputError: there is no such version or model, or it cannot make an edit.
         """
+        if by not in ("", OTHER):
+            return self.line_as(number, line.with_edits(self.folder.line(number).version(by).steps), "", face)
         model = self._called(by).model
         onto = self.faces.shown(face).other_person(model, line.file.named.speaker) if face else None
         return line if model is self.used.model and onto is None else line.moved_by(model, onto)
 
-    def side(self, number: int, by: str, edits: str) -> Side:
-        """Return what identifies a motion of a line in a comparison.
-
-        by    : as in ``line_as``
-        edits : digest of the edits of a version that was kept; empty: those that the line has
-        Raises InputError: there is no other model, or no such digest.
-        """
+    def side(self, number: int, by: str) -> Side:
+        """Return what identifies a motion of a line in a comparison; ``by``: as in ``line_as``. Raises as that."""
+        if by not in ("", OTHER):
+            return Side(self.used.name, self.used.digest, self.folder.line(number).version(by).digest)
         model = self._called(by)
-        return Side(model.name, model.digest, edits or self.summary(number).digest)
+        return Side(model.name, model.digest, self.summary(number).digest)
 
     def _called(self, by: str) -> KnownModel:
         """Return the model that requests call so. Raises InputError: there is none."""
         if not by:
             return self.used
-        if by != OTHER or self.against is None:
-            raise InputError(f"by is {shortened(repr(by))}, required nothing, or {OTHER} after studio --against FILE")
+        if self.against is None:
+            raise InputError("there is no other model; give it: lipmotion studio --against FILE")
         return self.against
 
     def export(self, number: int, preset: Preset) -> dict[str, Any]:

@@ -21,7 +21,7 @@ export class Store {
     /** @type {{start_s: number, end_s: number} | null} */ this.span = null;
     this.time_s = 0;
     this.comparing = false; // whether the other version is shown
-    this.sideBySide = false; // whether both are
+    /** @type {"one" | "sides" | "over"} */ this.heads = "one"; // whether both are shown, and how
     /** @type {{order: boolean[], span: {start_s: number, end_s: number}, place: number, asked: boolean, told: string} | null} */
     this.blind = null; // comparison: which is the other one, of what stretch, which plays
     /** @type {any} */ this.progress = null; // of the open line

@@ -162,7 +162,7 @@ export class Studio {
     if (id === this.store.lineId && !again) return;
     this.player.stop();
     this.weights.forget();
-    this.store.set({ lineId: id, line: null, sound: null, motion: null, deviation: null, confidence: null, weights: null, other: null, comparing: false, sideBySide: false, blind: null, doubts: [], selected: null, span: null, time_s: 0, progress: null });
+    this.store.set({ lineId: id, line: null, sound: null, motion: null, deviation: null, confidence: null, weights: null, other: null, comparing: false, heads: "one", blind: null, doubts: [], selected: null, span: null, time_s: 0, progress: null });
     try {
       const line = { ...NOTHING, ...(await this.server.read(`lines/${id}`)) };
       if (id !== this.store.lineId) return;
@@ -220,6 +220,9 @@ export class Studio {
   undo() { return this.stepped("undo", TEXT.undone, TEXT.nothingToUndo); }
 
   redo() { return this.stepped("redo", TEXT.redone, TEXT.nothingToRedo); }
+
+  /** Go back to a version that was kept; the edits as they are are kept, too. */
+  backTo({ name, number }) { return this.request("versions/back", { version: name }, filled(TEXT.wentBack, { number })); }
 
   stepped(kind, done, nothing) {
     const { line, saving } = this.store;

@@ -1,19 +1,28 @@
 // The part of the panel that compares: with what, how, and a blind comparison.
 
-import { made, textButton } from "../dom.js";
+import { iconButton, made, textButton } from "../dom.js";
 import { row, section } from "../panel/panel.js";
 import { TEXT, filled } from "../strings.js";
+import { OTHER } from "./comparison.js";
 
 export function compareSection(studio) {
-  const { store, comparison } = studio, { other, project, blind } = store, against = project?.forms.against;
+  const { store, comparison } = studio, { other, project, blind, line } = store, against = project?.forms.against;
   const kept = [textButton(TEXT.compareKeep, () => comparison.keep(), { id: "compare-keep" }),
-    against && textButton(filled(TEXT.compareModel, { name: against }), () => comparison.withModel(), { id: "compare-model" })].filter(Boolean);
-  return section(TEXT.compare, other && made("p", { className: "hint", textContent: filled(TEXT.comparedWith, { name: other.name }) }),
+    against && textButton(filled(TEXT.compareModel, { name: against }), () => comparison.with(OTHER), { id: "compare-model" })].filter(Boolean);
+  return section(TEXT.compare, line.versions.length ? made("ul", { className: "list versions" }, ...line.versions.map((version) => versionRow(studio, version))) : null, other && made("p", { className: "hint", textContent: filled(TEXT.comparedWith, { name: other.name }) }),
     row(...kept), other && row(...(blind && !blind.told ? blindButtons(studio) : [
-      held(studio), textButton(TEXT.sideBySide, () => comparison.toggleSides(), { id: "compare-sides", disabled: !other.weights, "aria-pressed": String(store.sideBySide) }),
+      held(studio), ...Object.entries(TEXT.heads).map(([heads, name]) => textButton(name, () => comparison.toggle(heads), { id: `compare-${heads}`, disabled: !other.weights, "aria-pressed": String(store.heads === heads) })),
       textButton(TEXT.blind, () => comparison.blind(), { id: "compare-blind", disabled: !other.weights || !comparison.differs }),
       textButton(TEXT.compareStop, () => comparison.stop(), { id: "compare-stop" })])),
     blind && made("p", { id: "blind-told", className: "hint", textContent: blind.told || filled(TEXT.blindAsk, { what: "AB"[blind.place] }) }));
+}
+
+function versionRow(studio, version) {
+  const { comparison, store: { other, blind } } = studio, name = filled(TEXT.versionNamed, version), during = { disabled: Boolean(blind && !blind.told) };
+  return made("li", {}, row(
+    textButton(name, () => comparison.with(version.name), { id: version.name, "aria-pressed": String(other?.by === version.name), ...during }),
+    textButton(TEXT.versionBack, () => studio.backTo(version), { id: `${version.name}-back`, title: TEXT.versionBackHint, ...during }),
+    iconButton("remove", filled(TEXT.versionForget, { name }), () => comparison.forget(version.name), { id: `${version.name}-forget`, ...during })));
 }
 
 function held({ store }) {

@@ -1,10 +1,9 @@
 // The other motion: a version that was kept, or that of the other model; and blind comparisons with it.
 
-import { Curves } from "../curves.js";
 import { TEXT, filled } from "../strings.js";
 
 /** What the server calls the model that the project's is compared with. */
-const OTHER = "other";
+export const OTHER = "other";
 
 export class Comparison {
   /** @param {import("../studio.js").Studio} studio */
@@ -16,33 +15,57 @@ export class Comparison {
     this.store.on(["playing", "time_s"], () => this.heard());
   }
 
-  /** Keep the motion as it is now, to compare with later. */
-  keep() {
-    const { motion, weights, line, face } = this.store;
-    if (!motion) return;
-    const copy = weights && new Curves(weights.names, weights.rate_hz, weights.values.slice());
-    this.show({ by: "", edits: line.edits_digest, face, name: line.steps.length ? filled(TEXT.afterEdit, { number: line.steps.length }) : TEXT.withoutEdits, motion, weights: copy });
+  /** Keep the edits as they are, and compare with them from now on. */
+  async keep() {
+    const line = await this.told("versions", {});
+    const version = line?.versions.find(({ digest }) => digest === line.edits_digest);
+    if (version) await this.with(version.name);
   }
 
-  /** Compare with the motion that the other model makes of the same edits. */
-  async withModel() {
-    const { store, studio: { server, curves, curves: { names } } } = this, { lineId, line, face, project } = store;
-    const isMesh = project.forms.faces.find(({ name }) => name === face)?.mesh;
+  /** Keep a version no longer. */
+  async forget(name) {
+    if (this.store.other?.by === name) this.stop();
+    await this.told("versions/forget", { version: name });
+  }
+
+  async told(path, content) {
+    const { store, studio: { server } } = this, { lineId } = store;
     try {
-      const [motion, moved] = await Promise.all([curves.read(lineId, "motion", names, null, OTHER),
-        isMesh && server.weights(`lines/${lineId}/weights?by=${OTHER}&face=${encodeURIComponent(face)}`)]);
+      const line = await server.told(`lines/${lineId}/${path}`, content);
+      if (lineId !== store.lineId) return null;
+      store.set({ line });
+      return line;
+    } catch (error) {
+      this.studio.refuse(error);
+      return null;
+    }
+  }
+
+  /** What a motion is called, by what the server calls it. */
+  name(by) {
+    const { line, project } = this.store, version = line.versions.find(({ name }) => name === by);
+    return version ? filled(TEXT.versionNamed, version) : filled(TEXT.modelNamed, { name: project.forms.against });
+  }
+
+  /** Compare with a version, or with the motion that the other model makes of the same edits. */
+  async with(by) {
+    const { store, studio: { server, curves, curves: { names } } } = this, { lineId, line: { revision }, face } = store;
+    const isMesh = store.project.forms.faces.find(({ name }) => name === face)?.mesh;
+    try {
+      const [motion, moved] = await Promise.all([curves.read(lineId, "motion", names, null, by),
+        isMesh && server.weights(`lines/${lineId}/weights?by=${by}&face=${encodeURIComponent(face)}`)]);
       if (lineId !== store.lineId || face !== store.face) return;
-      this.show({ by: OTHER, revision: line.revision, face, name: filled(TEXT.modelNamed, { name: project.forms.against }), motion, names, weights: moved ? moved.weights : null });
+      this.show({ by, revision, face, name: this.name(by), motion, names, weights: moved ? moved.weights : null });
       await this.fill();
     } catch (error) {
       this.studio.refuse(error);
     }
   }
 
-  /** Read the other model's curves that are shown by now and are not here. */
+  /** Read the other motion's curves that are shown by now and are not here. */
   async fill() {
     const { store, store: { other, lineId }, studio, studio: { curves } } = this;
-    if (!other?.by || !store.line || String(other.names) === String(curves.names)) return;
+    if (!other || !store.line || String(other.names) === String(curves.names)) return;
     const { names } = curves;
     try {
       const motion = await curves.completed(lineId, "motion", other.motion, other.by);
@@ -53,25 +76,25 @@ export class Comparison {
     }
   }
 
-  show(other) { this.store.set({ other, comparing: false, ...(other.by === this.store.other?.by && this.store.blind === null ? {} : { blind: null, sideBySide: false }) }); }
+  show(other) { this.store.set({ other, comparing: false, ...(other.by === this.store.other?.by && this.store.blind === null ? {} : { blind: null, heads: "one" }) }); }
 
-  stop() { this.store.set({ other: null, comparing: false, sideBySide: false, blind: null }); }
+  stop() { this.store.set({ other: null, comparing: false, heads: "one", blind: null }); }
 
-  /** After an edit the other model moves the mouth by it, too; the weights of a version are of the face it was kept with. */
+  /** After an edit the other model moves the mouth by it, too; weights are of the face that is shown. */
   renew() {
     const { other, line, face } = this.store;
-    if (!other || line?.status !== "ready" || (line.revision === other.revision && face === other.face)) return;
-    if (other.by) this.withModel();
-    else if (face !== other.face) this.show({ ...other, face, weights: null });
+    if (!other || line?.status !== "ready") return;
+    if (face !== other.face || (other.by === OTHER && line.revision !== other.revision)) this.with(other.by);
   }
 
-  toggleSides() { this.store.set({ sideBySide: !this.store.sideBySide, comparing: false }); }
+  /** Show both heads in a way, or, if they are, one. */
+  toggle(heads) { this.store.set({ heads: this.store.heads === heads ? "one" : heads, comparing: false }); }
 
   /** Play the two, one after the other, in an order that is not told. */
   blind() {
     const order = Math.random() < 0.5 ? [false, true] : [true, false], { duration_s } = this.studio.player;
     const span = this.store.span ?? { start_s: 0, end_s: duration_s };
-    this.store.set({ sideBySide: false, blind: { order, span, place: 0, asked: false, told: "" } });
+    this.store.set({ heads: "one", blind: { order, span, place: 0, asked: false, told: "" } });
     this.play(0, false);
   }
 
@@ -92,12 +115,15 @@ export class Comparison {
   }
 
   /** Whether the other motion may be another one: it is that of the other model, or of other edits. */
-  get differs() { return Boolean(this.store.other?.by) || this.store.other?.edits !== this.store.line?.edits_digest; }
+  get differs() {
+    const { other, line } = this.store;
+    return other?.by === OTHER || line?.versions.find(({ name }) => name === other?.by)?.digest !== line?.edits_digest;
+  }
 
   /** Keep which was better: 0, 1, or null: neither; and tell what was what. */
   async vote(place) {
     const { blind, blind: { order }, other, lineId } = this.store, names = order.map((isOther) => (isOther ? other.name : TEXT.now));
-    const shown = order.map((isOther) => (isOther ? { by: other.by, edits: other.edits } : {}));
+    const shown = order.map((isOther) => ({ by: isOther ? other.by : "" }));
     try {
       const { better, neither } = await this.studio.server.told(`lines/${lineId}/votes`, { shown, better: place });
       this.studio.player.stop();

@@ -13,9 +13,14 @@ const VIEWS = {
 };
 
 export class Head {
-  /** @param {HTMLCanvasElement} canvas  Throws where there is no WebGL. */
-  constructor(canvas) {
+  /**
+   * @param {HTMLCanvasElement} canvas
+   * @param {HTMLCanvasElement} ghost  lies over it, for the other of two heads
+   * Throws where there is no WebGL.
+   */
+  constructor(canvas, ghost) {
     this.canvas = canvas;
+    this.ghost = ghost;
     this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
     this.scene = new Scene();
     this.camera = new PerspectiveCamera(FIELD_DEG, 1, 0.01, 100);
@@ -53,10 +58,13 @@ export class Head {
    * Show weights at a time.
    * @param {import("../curves.js").Curves | null} weights
    * @param {import("../curves.js").Curves | null} other  is shown beside them, at the right
+   * @param {boolean} over  is shown as a ghost over them instead
    */
-  pose(weights, time_s, other = null) {
+  pose(weights, time_s, other = null, over = false) {
     this.shown_s = time_s;
-    this.pair = other && [weights, other];
+    this.pair = other && !over ? [weights, other] : null;
+    this.ghostly = other && over ? [other, weights] : null;
+    this.ghost.hidden = !this.ghostly;
     if (!this.character) return;
     this.move(weights, time_s);
     this.draw();
@@ -144,11 +152,25 @@ export class Head {
     camera.position.set(middle.x + Math.sin(this.turn) * near, middle.y + Math.sin(this.tilt) * away, middle.z + Math.cos(this.turn) * near);
     camera.lookAt(middle);
     renderer.setScissorTest(Boolean(this.pair));
+    if (this.ghostly) return this.drawGhost();
     (this.pair ?? [null]).forEach((weights, n) => {
       if (weights) this.move(weights, this.shown_s);
       renderer.setViewport(n * part, 0, part, height);
       renderer.setScissor(n * part, 0, part, height);
       renderer.render(this.scene, camera);
     });
+  }
+
+  /** Draw the other head on the ghost's canvas, which lies over this one, and then this one. */
+  drawGhost() {
+    const { canvas, ghost, renderer } = this, [other, weights] = this.ghostly;
+    renderer.setViewport(0, 0, canvas.clientWidth, canvas.clientHeight);
+    this.move(other, this.shown_s);
+    renderer.render(this.scene, this.camera);
+    ghost.width = canvas.width; // this clears it, too
+    ghost.height = canvas.height;
+    ghost.getContext("2d").drawImage(canvas, 0, 0);
+    this.move(weights, this.shown_s);
+    renderer.render(this.scene, this.camera);
   }
 }

@@ -19,6 +19,7 @@ export class Stage {
     this.asked = false; // a picture is on its way
     this.wanted = false; // and another one is wanted
     this.solid = made("canvas", { className: "head", tabIndex: 0, role: "img", "aria-label": TEXT.faceLabel });
+    this.ghost = made("canvas", { className: "ghost", hidden: true, "aria-hidden": "true" });
     this.drawn = made("canvas", { className: "drawn", width: 640, height: 640, hidden: true, role: "img", "aria-label": TEXT.faceLabel });
     this.film = made("video", { controls: true, loop: true, hidden: true });
     this.note = made("p", { className: "note", hidden: true });
@@ -27,7 +28,7 @@ export class Stage {
     this.faces = made("div", { className: "faces" });
     this.filmButton = iconButton("film", TEXT.film, () => this.toggleFilm());
     this.recorded = new Recorded(place, studio);
-    place.append(this.solid, this.drawn, this.film, this.note, made("div", { className: "over" }, this.views, this.faces, this.recorded.button, this.filmButton));
+    place.append(this.solid, this.ghost, this.drawn, this.film, this.note, made("div", { className: "over" }, this.views, this.faces, this.recorded.button, this.filmButton));
     onDrag(this.solid, {
       start: (event) => { this.from = [event.clientX, event.clientY]; },
       move: (event) => {
@@ -49,7 +50,7 @@ export class Stage {
     this.store.on(["project", "face"], () => this.offer());
     this.store.on(["face", "lineId"], () => this.leaveFilm());
     this.store.on(["face", "project", "mesh"], () => this.change());
-    this.store.on(["weights", "time_s", "line", "other", "comparing", "sideBySide"], () => this.show());
+    this.store.on(["weights", "time_s", "line", "other", "comparing", "heads"], () => this.show());
   }
 
   get form() { return this.store.project?.forms.faces.find(({ name }) => name === this.store.face); }
@@ -66,7 +67,7 @@ export class Stage {
     if (!this.store.project) return;
     if (this.isSolid && this.head === null) {
       try {
-        this.head = new Head(this.solid);
+        this.head = new Head(this.solid, this.ghost);
       } catch {
         this.isWebgl = false;
         this.say(TEXT.noWebgl);
@@ -103,10 +104,10 @@ export class Stage {
   }
 
   show() {
-    const { weights, other, comparing, sideBySide, time_s, line } = this.store;
+    const { weights, other, comparing, heads, time_s, line } = this.store;
     if (this.isSolid && this.head) {
       if (weights && !this.studio.weights.known(time_s)) return; // the pose before stays until it is known
-      this.head.pose(comparing && other?.weights ? other.weights : weights, time_s, sideBySide ? other?.weights : null);
+      this.head.pose(comparing && other?.weights ? other.weights : weights, time_s, heads === "one" ? null : other?.weights, heads === "over");
       this.studio.measured();
     } else if (line && !this.drawn.hidden) this.picture();
   }

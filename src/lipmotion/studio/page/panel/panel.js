@@ -10,7 +10,7 @@ import { historyTab } from "./history_tab.js";
 /** Each tab, and what it is made anew for: a panel that is made anew under the pointer loses a click. */
 const TABS = {
   edit: { shown: editTab, follows: ["line", "selected", "span"] }, delivery: { shown: deliveryTab, follows: ["line"] },
-  why: { shown: whyTab, follows: ["line", "doubts"] }, history: { shown: historyTab, follows: ["line", "other", "blind", "sideBySide", "project"] },
+  why: { shown: whyTab, follows: ["line", "doubts"] }, history: { shown: historyTab, follows: ["line", "other", "blind", "heads", "project"] },
 };
 
 export class Panel {
