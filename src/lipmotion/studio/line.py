@@ -303,7 +303,7 @@ def phone_rows(units: Timeline[Unit], plain: Timeline[Unit]) -> list[dict[str, A
             "start_s": span.start_s,
             "end_s": span.end_s,
             "word": span.label.word,
-            "confidence": span.label.confidence,
+            "confidence": span.label.confidence or None,  # 0: of a recogniser that does not tell
             "edited": _said(span) not in before,
         }
         for span in units

@@ -54,9 +54,9 @@ def test_a_clip_has_the_curves_of_the_motion(tmp_path: Path) -> None:
 def test_unityparser_reads_the_same_clip(tmp_path: Path) -> None:
     unityparser = pytest.importorskip("unityparser")
     talking = generation("jawOpen", "Mund auf", "aa", stepped=("aa",))
-    write_motion(tmp_path / "a.anim", talking, source={}, model={})
+    write_motion(tmp_path / "a.anim", talking, source={"path": "lines/Anna 1.wav"}, model={})
     clip = unityparser.UnityDocument.load_yaml(str(tmp_path / "a.anim")).entry
-    assert (clip.anchor, clip.m_Name, clip.m_AnimationClipSettings["m_StopTime"]) == ("7400000", "speech", "1.000000")
+    assert (clip.anchor, clip.m_Name, clip.m_AnimationClipSettings["m_StopTime"]) == ("7400000", "Anna 1", "1.000000")
     assert clip.m_FloatCurves == clip.m_EditorCurves
     names = [curve["attribute"] for curve in clip.m_FloatCurves]
     assert names == ["blendShape.jawOpen", "blendShape.Mund auf", "blendShape.aa"]

@@ -42,15 +42,15 @@ def check(motion: Motion) -> None:
         raise ExportError("the motion has no blendshapes, or no two frames; write .json or .csv")
 
 
-def write(path: Path, generation: Generation, _source: Mapping[str, str], _model: Mapping[str, str]) -> None:
-    """Write one clip, ``speech``, with a curve for each weight of the motion."""
-    motion = generation.motion
+def write(path: Path, generation: Generation, source: Mapping[str, str], _model: Mapping[str, str]) -> None:
+    """Write one clip, named as the recording, with a curve for each weight of the motion."""
+    motion, name = generation.motion, Path(source.get("path", "")).stem or "speech"
     end_s = float(motion.time_s[-1])
     curves = [line for name in _weights(motion) for line in _curve(generation, name)]
     lines = [
         *("%YAML 1.1", "%TAG !u! tag:unity3d.com,2011:", "--- !u!74 &7400000", "AnimationClip:"),
         *("  m_ObjectHideFlags: 0", "  m_CorrespondingSourceObject: {fileID: 0}", "  m_PrefabInstance: {fileID: 0}"),
-        *("  m_PrefabAsset: {fileID: 0}", "  m_Name: speech", "  serializedVersion: 6", "  m_Legacy: 0"),
+        *("  m_PrefabAsset: {fileID: 0}", f"  m_Name: {_quoted(name)}", "  serializedVersion: 6", "  m_Legacy: 0"),
         *("  m_Compressed: 0", "  m_UseHighQualityCurve: 1", *(f"  {name}: []" for name in _EMPTY)),
         *(
             "  m_FloatCurves:",
@@ -71,6 +71,11 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
         *("  m_HasMotionFloatCurves: 0", "  m_Events: []"),
     ]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+
+
+def _quoted(name: str) -> str:
+    """Return a name as YAML has it: in quotes, where it needs some."""
+    return name if _PLAIN.fullmatch(name) else json.dumps(name, ensure_ascii=False)
 
 
 def _weights(motion: Motion) -> list[str]:
@@ -97,7 +102,7 @@ def _curve(generation: Generation, name: str) -> Iterator[str]:
         )
     yield from ("      m_PreInfinity: 2", "      m_PostInfinity: 2", "      m_RotationOrder: 4")
     attribute = f"blendShape.{name}"
-    yield f"    attribute: {attribute if _PLAIN.fullmatch(attribute) else json.dumps(attribute, ensure_ascii=False)}"
+    yield f"    attribute: {_quoted(attribute)}"
     yield from ("    path: ", f"    classID: {RENDERER}", "    script: {fileID: 0}")
 
 

@@ -84,9 +84,12 @@ export class SpectrumTrack {
     const { height, timeline, timeline: { width, px_s, left_px, store: { sound } } } = this;
     const pen = cleared(this.canvas, width, height);
     if (!sound) return;
-    if (this.of !== sound) this.spectra = new Spectra(this.of = sound);
-    if (this.key !== `${px_s} ${sound.duration_s}`) {
-      this.key = `${px_s} ${sound.duration_s}`;
+    if (this.of !== sound) {
+      this.spectra = new Spectra(this.of = sound);
+      this.tiles.clear();
+    }
+    if (this.px_s !== px_s) {
+      this.px_s = px_s;
       this.tiles.clear();
     }
     const last = Math.floor(Math.min(left_px + width, timeline.duration_s * px_s) / TILE_PX);
