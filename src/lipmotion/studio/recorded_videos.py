@@ -85,7 +85,7 @@ def _alike(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
     """Return the correlation of two courses that begin together, over what both have."""
     count = min(len(one), len(other))
     one, other = one[:count] - one[:count].mean(), other[:count] - other[:count].mean()
-    return float(one @ other / max(np.sqrt((one @ one) * (other @ other)), 1e-12))
+    return float(one @ other) / max(float(np.sqrt((one @ one) * (other @ other))), 1e-12)
 
 
 def write_playable(video: Path, sound: Path, path: Path) -> None:

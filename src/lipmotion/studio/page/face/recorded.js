@@ -4,7 +4,7 @@ import { iconButton, made } from "../dom.js";
 import { TEXT } from "../strings.js";
 
 /** Further off than the second it is set to the time of the sound; further than the first it goes faster or slower. */
-const NEAR_S = 0.01, FAR_S = 0.25, HASTE = 2, MOST_HASTE = 0.5, MOST_LEAD_S = 1;
+const NEAR_S = 0.01, FAR_S = 0.25, HASTE = 5, MOST_HASTE = 0.5, MOST_LEAD_S = 1;
 
 export class Recorded {
   /**
