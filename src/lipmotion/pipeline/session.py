@@ -114,8 +114,10 @@ KNOWN_CURVES = (*WEIGHTS, *(row[1] for row in PARAMETERS))
 LIP_POINT = re.compile(r"[xyz]_\d+")
 LATE_S = 0.1
 """Seconds by which times of edits may lie after the end; editing programs round times."""
-KEPT = 4
-"""Results that each stage keeps: the last ones that were asked for."""
+KEPT, LEAST_KEPT = 4, 2
+"""Results that each stage keeps: the last ones that were asked for; motion of many frames less often."""
+KEPT_FRAMES = 60_000
+"""Frames of motion that a stage keeps together, as long as these are more than ``LEAST_KEPT`` results."""
 ALIGNED = 1000
 """Words of edits whose phones are kept."""
 LOCKED = 1000
@@ -143,10 +145,15 @@ class _Kept(Generic[KeptT]):
         """Return the result for a key, made if it is not kept."""
         if key not in self._results:
             self._results[key] = make()
-            while len(self._results) > self._most:
+            while len(self._results) > self._most or self._is_heavy():
                 self._results.popitem(last=False)
         self._results.move_to_end(key)
         return self._results[key]
+
+    def _is_heavy(self) -> bool:
+        """Return whether the results hold too much motion together."""
+        frames = sum(len(found.motion.values) for found in self._results.values() if isinstance(found, Generation))
+        return frames > KEPT_FRAMES and len(self._results) > LEAST_KEPT
 
 
 class Session:

@@ -223,7 +223,9 @@ def test_many_locks_take_the_motion_once_each(session: Session, monkeypatch: pyt
     made: list[int] = []
     generation_of = session_module.generation_of
     monkeypatch.setattr(session_module, "generation_of", lambda *given: made.append(1) or generation_of(*given))
-    steps = [each for n in range(12) for each in (f"pin opening 0.1 at {n / 10}", f"lock from {n / 10} to {n / 10 + 0.02}")]
+    steps = [
+        each for n in range(12) for each in (f"pin opening 0.1 at {n / 10}", f"lock from {n / 10} to {n / 10 + 0.02}")
+    ]
     session.generated(edited(*steps))
     assert 12 <= len(made) <= 14  # of every pin once
     session.generated(edited(*steps, "gain 1.5 from 1.5 to 1.6"))
