@@ -13,7 +13,7 @@ from threading import Event, Thread
 from typing import Any, NamedTuple
 
 from children import LIMIT_S, LIPMOTION, Child, child
-from lipmotion.pipeline.edits import step_of
+from lipmotion.pipeline.edits import Step, step_of
 from lipmotion.studio.access import TOKEN_HEADER
 from study.served import NO_REPLY
 
@@ -190,7 +190,8 @@ def undone_edits(
     They are taken back, and made again, some at a time: 1 to ``MOST_AT_ONCE``.
     Raises AssertionError: what the server then gives and exports is not to the byte what it was.
     """
-    chance, found = Random(seed), {"edits": 0, "refused": 0, "kinds": set()}
+    chance, edits, refused = Random(seed), 0, 0
+    kinds: set[type[Step]] = set()
 
     def stepped(server: Served, state: dict[str, Any], what: str, **more: Any) -> dict[str, Any] | None:
         status, reply = server.ask(f"/api/lines/1/{what}", {"revision": state["revision"], **more})
@@ -200,12 +201,14 @@ def undone_edits(
     with served(project, errors, model, limit_s) as server:
         state = server.ready()
         first = _bytes_of(server)
-        while found["edits"] < count:
+        while edits < count:
             step = random_edit(chance, state)
             after = stepped(server, state, "edits", steps=[step])
-            found["edits" if after else "refused"] += 1
-            found["kinds"] |= {type(step_of(step))} if after else set()
-            state = after or state
+            if after is None:
+                refused += 1
+            else:
+                edits, state = edits + 1, after
+                kinds.add(type(step_of(step)))
         last = _bytes_of(server)
         server.kill()
     with served(project, errors, model, limit_s) as server:
@@ -218,7 +221,7 @@ def undone_edits(
             now = _bytes_of(server)
             assert [name for name in wanted if now[name] != wanted[name]] == []
     assert first["motion?of=delivered"] != last["motion?of=delivered"]
-    return found | {"kinds": len(found["kinds"]), "compared": sorted(first)}
+    return {"edits": edits, "refused": refused, "kinds": len(kinds), "compared": sorted(first)}
 
 
 def _bytes_of(server: Served) -> dict[str, bytes]:

@@ -144,7 +144,7 @@ class Stretch(NamedTuple):
 
     frames: slice
     share: Curve
-    values: Curve
+    values: NDArray[np.floating[Any]]
     variance: NDArray[np.floating[Any]]
 
 

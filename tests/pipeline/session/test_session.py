@@ -232,6 +232,18 @@ def test_many_locks_take_the_motion_once_each(session: Session, monkeypatch: pyt
     assert len(made) <= 15
 
 
+def test_of_long_motion_less_is_kept(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[int] = []
+    generation_of = session_module.generation_of
+    monkeypatch.setattr(session_module, "generation_of", lambda *given: made.append(1) or generation_of(*given))
+    monkeypatch.setattr(session_module, "KEPT_FRAMES", len(session.generated().motion.values))
+    found = [session.generated(edited(f"pin opening 0.1 at 0.{n}")) for n in (3, 5, 7)]
+    assert session.generated(edited("pin opening 0.1 at 0.5")) is found[1]
+    assert len(made) == 4
+    again = session.generated(edited("pin opening 0.1 at 0.3"))
+    assert (len(made), np.array_equal(again.motion.values, found[0].motion.values)) == (5, True)
+
+
 def test_edits_of_another_recording_are_refused(session: Session, toy_model: Model, request_: SpeechRequest) -> None:
     file = EditFile(edited("phone 3 is p"), units=session.units())
     half = Audio(request_.recording.samples[:16_000], 16_000)  # type: ignore[union-attr]
