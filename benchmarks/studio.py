@@ -48,10 +48,12 @@ from lipmotion.studio.line import OpenLine  # noqa: E402
 from lipmotion.studio.understanding import open_line, understand_line  # noqa: E402
 from lipmotion.types import Audio, Timeline  # noqa: E402
 from studio.attack import attacked  # noqa: E402
-from studio.served import lost_edits, random_edit, served  # noqa: E402
+from studio.served import lost_edits, random_edit, served, undone_edits  # noqa: E402
 
 RECOGNISED_S = 100.0
 """In longer recordings phones are repeated, not recognised."""
+UNDO_LIMIT_S = 7200.0
+"""How long a server may be asked for edits, until it is ended."""
 EDITS, FEW_EDITS = 40, 10
 """Edits of which the time is taken, after some that load what they need; of longer recordings fewer."""
 
@@ -242,7 +244,7 @@ def edit_for_ever(line: OpenLine, chance: Random, writing: int) -> NoReturn:
                 tell(tried=[])
                 line.undone(line.revision, len(steps))
             else:
-                step = random_edit(chance, line.state()["phones"])
+                step = random_edit(chance, line.state())
                 tell(tried=[*steps, str(step_of(step))])
                 line.edited(line.revision, (step,))
             tell(done=list(line.file.edits.sentences))
@@ -260,26 +262,11 @@ def hostile(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
 
 
 def undo(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
-    """Make random edits, then take all back; after a restart, too. Raises AssertionError: not the first bytes."""
-    count, line, chance, refused = options.count or 1000, opened(sound), Random(9), 0  # noqa: S311
-    first = line.numbers("delivered").values.tobytes()
-    started_s = time.process_time()
-    while line.revision < count:
-        try:
-            line.edited(line.revision, (random_edit(chance, line.state()["phones"]),))
-        except ValueError:
-            refused += 1
-    edits_s = time.process_time() - started_s
-    last = line.numbers("delivered").values.tobytes()
-    started_s = time.process_time()
-    again = OpenLine(read_edits(line.path), line.path, line.recording, line.model, line.audio)
-    opened_s = time.process_time() - started_s
-    assert again.numbers("delivered").values.tobytes() == last
-    while again.state()["undo"]:
-        again.undone(again.revision, 1)
-    assert again.numbers("delivered").values.tobytes() == first
-    times_s = {"edits_s": round(edits_s, 1), "opened_again_s": round(opened_s, 1)}
-    return {"edits": count, "refused": refused, "undone": "the first bytes", **times_s}
+    """Make random edits over HTTP, take all back after a restart, and make all again: the bytes are the same."""
+    started_s, errors = time.monotonic(), sound.with_name("errors.txt")
+    found = undone_edits(sound, None, errors, options.count or 1000, options.seed, UNDO_LIMIT_S)
+    tracebacks = errors.read_text(encoding="utf-8").count("Traceback")
+    return found | {"tracebacks": tracebacks, "minutes": round((time.monotonic() - started_s) / 60, 1)}
 
 
 WHAT = {"times": times, "browser": in_browsers, "kills": kills, "forks": forks, "hostile": hostile, "undo": undo}

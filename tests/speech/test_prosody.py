@@ -21,3 +21,10 @@ def test_silence_is_quiet_and_without_pitch():
     voice = prosody_of(Audio(np.zeros(16_000, np.float32), 16_000))
     assert voice.level_db.max() < -80
     assert not np.isfinite(voice.log_f0).any()
+
+
+def test_a_level_is_the_mean_power_of_10_ms_before_and_after() -> None:
+    samples = np.random.default_rng(4).normal(0, 0.1, 1_650).astype(np.float32)
+    levels = prosody_of(Audio(samples, 16_000)).level_db
+    around = [samples[max(160 * n - 160, 0) : 160 * n + 160].astype(float) for n in range(11)]
+    assert levels == pytest.approx([10 * np.log10(np.mean(part**2) + 1e-9) for part in around])

@@ -5,19 +5,25 @@ from __future__ import annotations
 import http.client
 import json
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from random import Random
 from threading import Event, Thread
 from typing import Any, NamedTuple
 
-from children import LIPMOTION, Child, child
+from children import LIMIT_S, LIPMOTION, Child, child
+from lipmotion.pipeline.edits import Step, step_of
 from lipmotion.studio.access import TOKEN_HEADER
 from study.served import NO_REPLY
 
 PATIENCE_S = 120.0
 PHONES = "p b m f aa iy uw ow s t".split()
+GIVEN = ("motion", "motion?of=delivered", "motion?of=deviation", "motion?of=confidence", "weights?face=head")
+EXPORTED = (".json", ".csv", ".livelink.csv", ".glb", ".TextGrid", ".cues.json")
+"""What a line gives, and is exported as, where its bytes are compared."""
+MOST_AT_ONCE = 20
+WORDS = ("bob", "we may", "so", "put a map")
 
 
 class Served(NamedTuple):
@@ -57,35 +63,53 @@ class Served(NamedTuple):
 
 
 @contextmanager
-def served(source: Path, errors: Path, model: Path | None = None) -> Iterator[Served]:
+def served(source: Path, errors: Path, model: Path | None = None, limit_s: float = LIMIT_S) -> Iterator[Served]:
     """Give a studio of a recording or a project; all that it prints on standard error is added to a file."""
     command = [*LIPMOTION, "studio", source, "--no-browser", *(["--model", model] if model else [])]
-    with errors.open("a", encoding="utf-8") as file, child(command, stderr=file) as process:
+    with errors.open("a", encoding="utf-8") as file, child(command, stderr=file, limit_s=limit_s) as process:
         line = process.stdout.readline() if process.stdout else ""
         port, token = line.split("http://127.0.0.1:")[1].split()[0].split("/#")
         yield Served(process, int(port), token)
 
 
-def random_edit(chance: Random, phones: Sequence[dict[str, Any]]) -> str:
-    """Return an edit that a page could make of a line with these phones; it may be refused."""
-    number = chance.randrange(1, len(phones) - 1)
-    phone, last_s = phones[number], phones[-1]["end_s"]
-    time_s = round(chance.uniform(0, last_s - 0.3), 2)
-    return chance.choice(
-        [
-            f"phone {number + 1} is {chance.choice(PHONES)}",
-            f"phone {number + 1} ends {phone['end_s'] + chance.uniform(-0.03, 0.03):.3f}",
-            f"split phone {number + 1} at {(phone['start_s'] + phone['end_s']) / 2:.3f}",
-            f"remove phone {number + 1}",
-            f"pin opening {chance.uniform(0, 0.3):.3f} at {time_s}",
-            f"pin jawOpen {chance.uniform(0, 1):.3f} at {time_s}",
-            f"gain {chance.uniform(0.5, 1.5):.2f} from {time_s} to {time_s + 0.2:.2f}",
-            f"draw opening 0.05 0.2 0.1 from {time_s} to {time_s + 0.1:.2f}",
-            f"hold from {time_s} to {time_s + 0.05:.2f}",
-            f"mood {chance.choice(('happy', 'sad:0.5', 'neutral'))} at {time_s}",
-            f"set intensity {chance.uniform(0.8, 1.3):.2f}",
-        ]
-    )
+def random_edit(chance: Random, state: dict[str, Any]) -> str:
+    """Return an edit of any kind that a page could make of a line in this state; it may be refused."""
+    return chance.choice(edits_of_all_kinds(chance, state))
+
+
+def edits_of_all_kinds(chance: Random, state: dict[str, Any]) -> list[str]:
+    """Return an edit of each kind (``lipmotion.pipeline.edits.STEPS``)."""
+    phones = state["phones"]
+    number, word = chance.randrange(1, len(phones) - 1), chance.randrange(max(len(state["words"]), 1)) + 1
+    phone, said = phones[number], chance.choice(PHONES)
+    start_s = round(chance.uniform(0, phones[-1]["end_s"] - 0.5), 2)
+    part = f"from {start_s} to {start_s + chance.uniform(0.05, 0.3):.2f}"
+    words = f"say {chance.choice(WORDS)} from {start_s} to {start_s + 0.4:.2f}"
+    locked = [step for step in state["steps"] if step.startswith("lock ")] or [f"lock {part}"]
+    return [
+        f"word {word} is {chance.choice(WORDS).split()[0]}",
+        f"word {word} is bob said b {chance.choice(('aa', 'ow'))} b",
+        words,
+        f"{words} with bob b {chance.choice(('aa', 'ow'))} b",
+        f"phone {number + 1} is {said}",
+        f"phone {number + 1} begins {phone['start_s'] + chance.uniform(-0.03, 0.03):.3f}",
+        f"phone {number + 1} ends {phone['end_s'] + chance.uniform(-0.03, 0.03):.3f}",
+        f"split phone {number + 1} at {(phone['start_s'] + phone['end_s']) / 2:.3f}",
+        f"remove phone {number + 1}",
+        f"insert {said} {part}",
+        f"pin {chance.choice(('opening', 'width'))} {chance.uniform(0, 0.3):.3f} at {start_s}",
+        f"pin jawOpen {chance.uniform(0, 1):.3f} at {start_s}",
+        f"gain {chance.uniform(0.5, 1.5):.2f} {part}",
+        f"gain mouthPucker {chance.uniform(0.5, 1.5):.2f} {part}",
+        f"draw {chance.choice(('opening', 'jawOpen'))} 0.05 0.2 0.1 {part}",
+        f"hold {part}",
+        f"lock {part}",
+        f"un{chance.choice(locked)}",
+        f"mood {chance.choice(('happy', 'sad:0.5', 'neutral'))} at {start_s}",
+        f"set intensity {chance.uniform(0.8, 1.3):.2f}",
+        f"set anticipation_ms {chance.randrange(0, 60)}",
+        f"set min_hold_ms {chance.choice((0, 0, 60))}",
+    ]
 
 
 class Editor:
@@ -104,7 +128,7 @@ class Editor:
             self.sent = state["steps"][:-1]
             status, reply = server.ask("/api/lines/1/undo", {"revision": state["revision"]})
         else:
-            step = random_edit(self._chance, state["phones"])
+            step = random_edit(self._chance, state)
             self.sent = [*state["steps"], step]
             status, reply = server.ask("/api/lines/1/edits", {"revision": state["revision"], "steps": [step]})
         if status == 200:
@@ -156,3 +180,56 @@ def _killed_at(server: Served, ends_s: float) -> Event:
 
     Thread(target=kill, daemon=True).start()
     return killed
+
+
+def undone_edits(
+    project: Path, model: Path | None, errors: Path, count: int, seed: int = 9, limit_s: float = LIMIT_S
+) -> dict[str, Any]:
+    """Make random edits through a server, end it, take all back through another one, and make all again.
+
+    They are taken back, and made again, some at a time: 1 to ``MOST_AT_ONCE``.
+    Raises AssertionError: what the server then gives and exports is not to the byte what it was.
+    """
+    chance, edits, refused = Random(seed), 0, 0
+    kinds: set[type[Step]] = set()
+
+    def stepped(server: Served, state: dict[str, Any], what: str, **more: Any) -> dict[str, Any] | None:
+        status, reply = server.ask(f"/api/lines/1/{what}", {"revision": state["revision"], **more})
+        assert status in (200, 422), (status, reply)
+        return dict(reply) if status == 200 else None
+
+    with served(project, errors, model, limit_s) as server:
+        state = server.ready()
+        first = _bytes_of(server)
+        while edits < count:
+            step = random_edit(chance, state)
+            after = stepped(server, state, "edits", steps=[step])
+            if after is None:
+                refused += 1
+            else:
+                edits, state = edits + 1, after
+                kinds.add(type(step_of(step)))
+        last = _bytes_of(server)
+        server.kill()
+    with served(project, errors, model, limit_s) as server:
+        for what, left, wanted in (("undo", "redo", first), ("redo", "undo", last)):
+            state = server.ready()
+            while state[what]:
+                some = chance.randint(1, min(MOST_AT_ONCE, state[what]))
+                state = stepped(server, state, what, count=some) or {}
+            assert (state[what], state[left]) == (0, count)
+            now = _bytes_of(server)
+            assert [name for name in wanted if now[name] != wanted[name]] == []
+    assert first["motion?of=delivered"] != last["motion?of=delivered"]
+    return {"edits": edits, "refused": refused, "kinds": len(kinds), "compared": sorted(first)}
+
+
+def _bytes_of(server: Served) -> dict[str, bytes]:
+    """Return what a server gives of its line, and the files that it exports, by name; and the file of its edits."""
+    found = {part: server.ask(f"/api/lines/1/{part}")[1] for part in GIVEN}
+    status, reply = server.ask("/api/lines/1/export", {"files": EXPORTED})
+    assert status == 200, reply
+    folder = Path(server.ask("/api/project")[1]["folder"])
+    for name in (*reply["exported"][0]["files"], reply["exported"][0]["edits"]):
+        found[name] = (folder / name).read_bytes()
+    return found

@@ -1,4 +1,4 @@
-"""``lipmotion studio`` as a process: kills in the middle of edits, hostile requests; and hundreds of edits undone."""
+"""``lipmotion studio`` as a process: kills while it is edited, hostile requests, edits undone to the first bytes."""
 
 from __future__ import annotations
 
@@ -9,17 +9,12 @@ from random import Random
 import pytest
 
 from children import LIPMOTION, environment, run_child
-from lipmotion.pipeline.edit_files import begun, read_edits
-from lipmotion.pipeline.job import Request
-from lipmotion.pipeline.model import Model
-from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.pipeline.edits import STEPS, step_of
 
 pytest.importorskip("uvicorn", reason="the extra 'studio' is not installed")
 
-from lipmotion.studio.line import OpenLine
 from studio.attack import attacked
-from studio.served import lost_edits, random_edit, served
+from studio.served import edits_of_all_kinds, lost_edits, served, undone_edits
 
 
 @pytest.fixture
@@ -51,24 +46,17 @@ def test_hostile_requests_get_no_file_and_leave_no_traceback(line: Path, toy_mod
 
 
 @pytest.mark.long
-def test_hundreds_of_edits_undone_give_the_first_motion(line: Path, toy_model: Model, tmp_path: Path) -> None:
-    path, audio = tmp_path / "line.edits.json", analysed(read_audio(line))
-    opened = OpenLine(begun(Request(line)), path, line, toy_model, audio)
-    first, chance, refused = opened.numbers("delivered").values.tobytes(), Random(9), 0
-    while opened.revision < 150:
-        try:
-            opened.edited(opened.revision, (random_edit(chance, opened.state()["phones"]),))
-        except ValueError:
-            refused += 1
-    last, steps = opened.numbers("delivered").values.tobytes(), opened.state()["steps"]
-    assert refused < 150
-    again = OpenLine(read_edits(path), path, line, toy_model, audio)  # as after a restart
-    assert (again.numbers("delivered").values.tobytes() == last, again.state()["steps"]) == (True, steps)
-    while again.state()["undo"]:
-        again.undone(again.revision, min(7, again.state()["undo"]))
-    assert again.numbers("delivered").values.tobytes() == first
-    again.redone(again.revision, len(steps))
-    assert again.numbers("delivered").values.tobytes() == last
+def test_edits_taken_back_over_http_give_the_first_bytes(line: Path, toy_model_file: Path, tmp_path: Path) -> None:
+    errors = tmp_path / "errors.txt"
+    found = undone_edits(line, toy_model_file, errors, 40)
+    assert (found["edits"], found["kinds"] > 8) == (40, True)
+    assert "Traceback" not in errors.read_text(encoding="utf-8")
+
+
+def test_random_edits_are_of_all_kinds() -> None:
+    phones = [{"start_s": n / 5, "end_s": (n + 1) / 5} for n in range(9)]
+    state = {"phones": phones, "words": [{}], "steps": ["lock from 0.2 to 0.4"]}
+    assert {type(step_of(edit)) for edit in edits_of_all_kinds(Random(1), state)} == {*STEPS}
 
 
 @pytest.mark.long

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,7 +121,7 @@ def with_gain(generation: Generation, gain: Gain) -> Generation:
     motion = generation.motion
     weight = span_weight(motion.time_s, gain.start_s, gain.end_s, GAIN_EDGE_S)
     larger = intensified(generation, gain.factor)
-    return _blended(generation, larger, weight)
+    return _blended(generation, _stretch(larger, weight))
 
 
 def with_held(generation: Generation, hold: Hold) -> Generation:
@@ -129,27 +130,49 @@ def with_held(generation: Generation, hold: Hold) -> Generation:
     frame = min(round(hold.start_s * motion.rate_hz), len(motion.values) - 1)
     still = replace(motion, values=np.broadcast_to(motion.values[frame], motion.values.shape))
     weight = span_weight(motion.time_s, hold.start_s, hold.end_s, LOCK_EDGE_S)
-    return _blended(generation, replace(generation, motion=still), weight)
+    return _blended(generation, _stretch(replace(generation, motion=still), weight))
 
 
-def with_locked(generation: Generation, locked: Generation, start_s: float, end_s: float) -> Generation:
-    """Return a generation that is another one from ``start_s`` to ``end_s``, and goes over to it beside this span.
+class Stretch(NamedTuple):
+    """Motion of N frames that takes the place of other motion.
+
+    frames   : which these are, at 100 Hz
+    share    : how far it takes its place, 0 to 1 [shape=(N, 1)]
+    values   : of all P channels [shape=(N, P)]
+    variance : [shape=(N, P)]
+    """
+
+    frames: slice
+    share: Curve
+    values: NDArray[np.floating[Any]]
+    variance: NDArray[np.floating[Any]]
+
+
+def locked_stretch(generation: Generation, start_s: float, end_s: float) -> Stretch:
+    """Return what ``with_locked`` keeps of motion from ``start_s`` to ``end_s``, and beside this span."""
+    return _stretch(generation, span_weight(generation.motion.time_s, start_s, end_s, LOCK_EDGE_S))
+
+
+def with_locked(generation: Generation, locked: Stretch) -> Generation:
+    """Return a generation that is another one in a locked span, and goes over to it beside the span.
 
     locked : of the same recording, with the same channels
     """
-    return _blended(generation, locked, span_weight(generation.motion.time_s, start_s, end_s, LOCK_EDGE_S))
+    return _blended(generation, locked)
 
 
-def _blended(first: Generation, second: Generation, weight: Curve) -> Generation:
-    """Return the first generation where the weight is 0, the second one where it is 1 [shape=(T,)]; also variances."""
-    values = first.motion.values.astype(np.float64)
-    inside = np.nonzero(weight)[0]
-    share = weight[inside, None]
-    values[inside] += share * (second.motion.values[inside] - values[inside])
-    whole = weight == 1
-    values[whole] = second.motion.values[whole]
-    variance = np.array(first.variance)
-    variance[inside] += share * (second.variance[inside] - variance[inside])
+def _stretch(generation: Generation, weight: Curve) -> Stretch:
+    """Return the motion where a weight [shape=(T,)] is not 0, which is in one span."""
+    inside = np.flatnonzero(weight)
+    frames = slice(inside[0], inside[-1] + 1) if len(inside) else slice(0)
+    return Stretch(frames, weight[frames, None], generation.motion.values[frames], generation.variance_of(frames))
+
+
+def _blended(first: Generation, other: Stretch) -> Generation:
+    """Return a generation that goes over to other motion where its share is more than 0; also variances."""
+    values, variance = first.motion.values.astype(np.float64), np.array(first.variance)
+    for ours, theirs in ((values[other.frames], other.values), (variance[other.frames], other.variance)):
+        ours[:] = np.where(other.share == 1, theirs, ours + other.share * (theirs - ours))
     return replace(first, motion=replace(first.motion, values=values), spread=variance)
 
 

@@ -20,7 +20,9 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from lipmotion.articulation.curve_edits import (
+    Stretch,
     check_drawn,
+    locked_stretch,
     pinned_frame,
     with_edited_curves,
     with_gain,
@@ -112,10 +114,14 @@ KNOWN_CURVES = (*WEIGHTS, *(row[1] for row in PARAMETERS))
 LIP_POINT = re.compile(r"[xyz]_\d+")
 LATE_S = 0.1
 """Seconds by which times of edits may lie after the end; editing programs round times."""
-KEPT = 4
-"""Results that each stage keeps: the last ones that were asked for."""
+KEPT, LEAST_KEPT = 4, 2
+"""Results that each stage keeps: the last ones that were asked for; motion of many frames less often."""
+KEPT_FRAMES = 60_000
+"""Frames of motion that a stage keeps together, as long as these are more than ``LEAST_KEPT`` results."""
 ALIGNED = 1000
 """Words of edits whose phones are kept."""
+LOCKED = 1000
+"""Locked stretches that are kept: each is asked for again after every edit, and needs those before it."""
 INTERACTIVE = 3
 """A session that generates motion for the third time will do so often: kernels are loaded that pay then."""
 NO_EDITS = Edits()
@@ -139,10 +145,15 @@ class _Kept(Generic[KeptT]):
         """Return the result for a key, made if it is not kept."""
         if key not in self._results:
             self._results[key] = make()
-            while len(self._results) > self._most:
+            while len(self._results) > self._most or self._is_heavy():
                 self._results.popitem(last=False)
         self._results.move_to_end(key)
         return self._results[key]
+
+    def _is_heavy(self) -> bool:
+        """Return whether the results hold too much motion together."""
+        frames = sum(len(found.motion.values) for found in self._results.values() if isinstance(found, Generation))
+        return frames > KEPT_FRAMES and len(self._results) > LEAST_KEPT
 
 
 class Session:
@@ -190,6 +201,7 @@ class Session:
         self._aligned: _Kept[list[Span[Unit]]] = _Kept(ALIGNED)
         self._moved: _Kept[Generation] = _Kept()
         self._generated: _Kept[Generation] = _Kept()
+        self._locks: _Kept[Stretch] = _Kept(LOCKED)
         self._delivered: _Kept[Generation] = _Kept()
         self._faces: _Kept[DrawsSingly] = _Kept()
         self._drawn: _Kept[DrawnMotion[Any]] = _Kept()
@@ -377,8 +389,18 @@ class Session:
             for later in steps[place + 1 :]:
                 if isinstance(later, CurveStep) and lock.holds(later.edit):
                     raise InputError(f"{str(later)!r} lies in what is locked ({str(lock)!r}); take the lock out first")
-            generation = with_locked(generation, self._after(steps[:place]), lock.start_s, lock.end_s)
+            generation = with_locked(generation, self._locked(steps[:place], lock, generation.motion.names))
         return generation
+
+    def _locked(self, before: tuple[Step, ...], lock: LockStep, names: tuple[str, ...]) -> Stretch:
+        """Return what a lock keeps: the motion after the edits before it, with the channels of these names."""
+
+        def stretch() -> Stretch:
+            generation = self._after(before)
+            motion = with_gestures(generation.motion, generation.units, names)
+            return locked_stretch(with_motion(generation, motion), lock.start_s, lock.end_s)
+
+        return self._locks.once((before, lock, names, self._sketching), stretch)
 
     def _after(self, steps: tuple[Step, ...]) -> Generation:
         return self._generated.once((steps, self._sketching), lambda: self._with_locks(steps))

@@ -212,6 +212,38 @@ def test_a_locked_span_stays_as_it_was(session: Session) -> None:
     assert freed.motion["opening"][70] == pytest.approx(0.2)
 
 
+def test_a_locked_span_keeps_channels_that_are_added_later(session: Session) -> None:
+    spoken = session.generated(edited("pin tongue 0.5 at 1.5"))
+    locked = session.generated(edited("lock from 0.6 to 1.0", "pin tongue 0.5 at 1.5"))
+    assert np.allclose(locked.motion["tongue"], spoken.motion["tongue"])
+    assert locked.motion["tongue"][150] == pytest.approx(0.5)
+
+
+def test_many_locks_take_the_motion_once_each(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[int] = []
+    generation_of = session_module.generation_of
+    monkeypatch.setattr(session_module, "generation_of", lambda *given: made.append(1) or generation_of(*given))
+    steps = [
+        each for n in range(12) for each in (f"pin opening 0.1 at {n / 10}", f"lock from {n / 10} to {n / 10 + 0.02}")
+    ]
+    session.generated(edited(*steps))
+    assert 12 <= len(made) <= 14  # of every pin once
+    session.generated(edited(*steps, "gain 1.5 from 1.5 to 1.6"))
+    assert len(made) <= 15
+
+
+def test_of_long_motion_less_is_kept(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[int] = []
+    generation_of = session_module.generation_of
+    monkeypatch.setattr(session_module, "generation_of", lambda *given: made.append(1) or generation_of(*given))
+    monkeypatch.setattr(session_module, "KEPT_FRAMES", len(session.generated().motion.values))
+    found = [session.generated(edited(f"pin opening 0.1 at 0.{n}")) for n in (3, 5, 7)]
+    assert session.generated(edited("pin opening 0.1 at 0.5")) is found[1]
+    assert len(made) == 4
+    again = session.generated(edited("pin opening 0.1 at 0.3"))
+    assert (len(made), np.array_equal(again.motion.values, found[0].motion.values)) == (5, True)
+
+
 def test_edits_of_another_recording_are_refused(session: Session, toy_model: Model, request_: SpeechRequest) -> None:
     file = EditFile(edited("phone 3 is p"), units=session.units())
     half = Audio(request_.recording.samples[:16_000], 16_000)  # type: ignore[union-attr]

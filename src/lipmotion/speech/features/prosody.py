@@ -15,10 +15,12 @@ FLOOR = 1e-9
 
 def prosody_of(audio: Audio) -> Prosody:
     """Return loudness and pitch of a sound at 16 kHz. Raises InputError: as ``speech.features.mfcc`` says."""
-    checked = checked_samples(audio)
-    samples, frames = checked.astype(np.float64), frame_count(checked)
-    power = np.concatenate([[0.0], np.cumsum(samples * samples)])
+    samples = checked_samples(audio)
+    frames = frame_count(samples)
+    hops = samples[: (frames - 1) * HOP].reshape(-1, HOP)
+    rest = samples[hops.size :].astype(np.float64)
+    energy = np.append(np.einsum("ij,ij->i", hops, hops, dtype=np.float64), rest @ rest)  # from frame to frame
     centre = np.arange(frames) * HOP
-    first, last = np.clip(centre - HOP, 0, len(samples)), np.clip(centre + HOP, 0, len(samples))
-    mean = (power[last] - power[first]) / np.maximum(last - first, 1)
+    length = np.minimum(centre + HOP, len(samples)) - np.maximum(centre - HOP, 0)
+    mean = (energy + np.concatenate([[0.0], energy[:-1]])) / np.maximum(length, 1)
     return Prosody(10 * np.log10(mean + FLOOR), log_f0(Audio(audio.samples, SPEECH_RATE_HZ)))

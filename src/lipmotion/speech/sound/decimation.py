@@ -12,6 +12,8 @@ Samples = NDArray[np.float32]
 
 REACH = 10
 """The filter reaches this many samples of the lower rate to either side."""
+BLOCK = 1 << 18
+"""Samples of the lower rate that are computed at a time: memory stays bounded for any length."""
 BETA = 5.0
 """Shape of the filter's Kaiser window."""
 
@@ -31,11 +33,14 @@ def decimated(samples: Samples, factor: int) -> Samples:
     at = np.arange(-half, half + 1)
     taps = np.sinc(at / factor) * np.kaiser(2 * half + 1, BETA)
     taps = (taps / taps.sum()).astype(np.float32)
-    length = -(-len(samples) // factor)
-    padded = np.zeros((length + 2 * REACH + 1) * factor, np.float32)
-    padded[half : half + len(samples)] = samples
-    phases = padded.reshape(-1, factor)  # sample n · factor + p of the sound is [REACH + n, p]
-    result = np.zeros(length, np.float32)
-    for phase in range(factor):
-        result += np.convolve(phases[:, phase], taps[phase::factor][::-1], "valid")[:length]
+    result = np.zeros(-(-len(samples) // factor), np.float32)
+    for start in range(0, len(result), BLOCK):
+        part = result[start : start + BLOCK]
+        first = (start - REACH) * factor  # the sample that padded[0] is
+        padded = np.zeros((len(part) + 2 * REACH + 1) * factor, np.float32)
+        inside = samples[max(first, 0) : first + len(padded)]
+        padded[max(-first, 0) :][: len(inside)] = inside
+        phases = padded.reshape(-1, factor)  # sample n · factor + p of the sound is [n - first / factor, p]
+        for phase in range(factor):
+            part += np.convolve(phases[:, phase], taps[phase::factor][::-1], "valid")[: len(part)]
     return result
