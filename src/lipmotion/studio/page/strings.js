@@ -123,7 +123,7 @@ export const TEXT = {
   noHistory: "No edits yet.",
   compare: "Compare",
   now: "the line as it is now",
-  versionNamed: "version {number}, {edits} edits",
+  versionNamed: "version {number} (edits: {edits})",
   versionBack: "Go back to it",
   versionBackHint: "The edits as they are now are kept as a version, too.",
   versionForget: "Forget {name}",
