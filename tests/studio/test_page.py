@@ -350,9 +350,8 @@ def test_versions_are_kept_compared_and_gone_back_to(page: Page) -> None:
     page.wait_for_steps(1)
     assert page.steps == ["phone 9 is aa"]
     wait_until(lambda: page.of("studio.store.line.versions.length") == 2, LIMIT_S)
-    for number in (1, 2):
-        window.click(f"#version-{number}-forget")
-        wait_until(lambda left=2 - number: page.of("studio.store.line.versions.length") == left, LIMIT_S)
+    window.click("#version-2-forget")
+    wait_until(lambda: page.of("studio.store.line.versions.length") == 1, LIMIT_S)
 
 
 def test_only_curves_that_are_shown_are_asked_for(page: Page) -> None:
