@@ -17,7 +17,7 @@ from lipmotion.pipeline.edits import Step, step_of
 from lipmotion.studio.access import TOKEN_HEADER
 from study.served import NO_REPLY
 
-PATIENCE_S = 120.0
+PATIENCE_S = 600.0
 PHONES = "p b m f aa iy uw ow s t".split()
 GIVEN = ("motion", "motion?of=delivered", "motion?of=deviation", "motion?of=confidence", "weights?face=head")
 EXPORTED = (".json", ".csv", ".livelink.csv", ".glb", ".TextGrid", ".cues.json")
