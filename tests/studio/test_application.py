@@ -18,7 +18,7 @@ from lipmotion.export.video import write_mp4
 from lipmotion.meshes.files.gltf_weights import read_gltf_motion
 from lipmotion.pipeline.edit_files import read_edits
 from lipmotion.pipeline.edits import FORMS
-from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.model import Model, save_model
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence
 from lipmotion.units import Lexicon
@@ -29,6 +29,7 @@ from lipmotion.studio import line as line_module
 from lipmotion.studio.access import TOKEN_HEADER, Access
 from lipmotion.studio.application import studio_application
 from lipmotion.studio.folder import opened_folder
+from lipmotion.studio.known_model import known_model
 from lipmotion.studio.project import project_from
 from lipmotion.studio.studio import Studio
 from lipmotion.studio.votes import read_votes
@@ -272,6 +273,11 @@ def test_what_is_dropped_is_read_by_the_same_readers(studio: OpenStudio) -> None
     assert studio.ask(f"/api/lines/{reply.content['id']}/doubts").status == 422
     assert studio.ask(f"/api/lines/{reply.content['id']}/remove", {}).status == 200
     assert studio.ask("/api/project").content["count"] == 1
+
+
+def test_a_model_is_called_as_its_file(toy_model: Model, tmp_path: Path) -> None:
+    save_model(replace(toy_model, about={**toy_model.about, "name": "trajectory"}), tmp_path / "Sam.lipmotion")
+    assert known_model(tmp_path / "Sam.lipmotion").name == "Sam"
 
 
 def test_a_project_outlives_its_model(
