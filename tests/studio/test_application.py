@@ -357,6 +357,7 @@ def test_a_filmed_face_the_real_video_and_another_model(
             studio = OpenStudio(opened, running, studio_application(running, Access(TOKEN, frozenset({HOST}))))
             _compared(studio)
             assert _film(studio) == (video_frames(0.2, 0.6), "video/mp4")
+            _exported(studio)
             address = studio.ready()["media"]["video"]
             part = studio.ask(address, range="bytes=4-7", **{TOKEN_HEADER: ""})
             assert (part.status, part.body, part.headers["content-type"]) == (206, b"ftyp", "video/mp4")
@@ -378,6 +379,19 @@ def _film(studio: OpenStudio) -> tuple[int, str]:
     with av.open(io.BytesIO(reply.body)) as film:
         assert len(film.streams.audio) == 1
         return sum(1 for _ in film.decode(video=0)), reply.headers["content-type"]
+
+
+def _exported(studio: OpenStudio) -> None:
+    """The video of a preset is that of the face, with its mark; other files do not depend on it."""
+    for wanted in ({"preset": "video", "face": "toy"}, {"files": [".csv"]}):
+        assert studio.ask("/api/lines/1/export", wanted).content["failed"] == []
+    with av.open(str(studio.folder.path / "exports" / "line.mp4")) as film:
+        assert film.metadata["comment"].startswith("synthetic:")
+    table = (studio.folder.path / "exports" / "line.csv").read_bytes()
+    assert studio.ask("/api/lines/1/export", {"files": [".csv"], "face": "toy"}).content["failed"] == []
+    assert (studio.folder.path / "exports" / "line.csv").read_bytes() == table
+    (failed,) = studio.ask("/api/lines/1/export", {"preset": "video", "face": "../x"}).content["failed"]
+    assert "no face" in failed["error"]
 
 
 def _compared(studio: OpenStudio) -> None:
