@@ -7,7 +7,7 @@ import os
 import shutil
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from multiprocessing.connection import Connection
@@ -36,6 +36,8 @@ MOST_TOLD = 200
 """Warnings, and recordings that are not used, of which the page is told."""
 MOST_LISTED = 500
 """Videos of a project that the page lists."""
+MOST_UNFINISHED = 0.99
+"""The share of the work that is told, at most, until it is done."""
 
 
 @dataclass(frozen=True)
@@ -65,16 +67,19 @@ class Trainer:
 
     The last one is told until there is another: what was asked for, and how it went. It is kept in the folder of the
     project, so that one that a killed studio was making is told as interrupted, and can be made again.
+
+    clock : returns seconds, and only grows
     """
 
-    def __init__(self, folder: ProjectFolder) -> None:
-        self._folder, self._lock = folder, threading.RLock()
+    def __init__(self, folder: ProjectFolder, clock: Callable[[], float] = time.monotonic) -> None:
+        self._folder, self._lock, self._clock = folder, threading.RLock(), clock
         self._file = folder.path / TRAINING / STATE
         self._wanted, self._told = self._read()
         self._process: BaseProcess | None = None
         self._thread: threading.Thread | None = None
         self._begun_s = 0.0
         self._first_share: float | None = None
+        self._ends_s: float | None = None
 
     @property
     def is_working(self) -> bool:
@@ -155,7 +160,7 @@ class Trainer:
             except ExportError:
                 self._wanted, self._told = before
                 raise
-            self._begun_s, self._first_share = time.monotonic(), None
+            self._begun_s, self._first_share, self._ends_s = self._clock(), None, None
             self._process, pipe = begun_apart(carry_out, order)
             self._thread = threading.Thread(
                 target=self._follow, args=(self._process, pipe), name="training", daemon=True
@@ -214,9 +219,7 @@ class Trainer:
     def _take(self, told: Mapping[str, Any]) -> None:
         with self._lock:
             if "stage" in told:
-                if self._first_share is None:
-                    self._first_share = told["share"]
-                self._told |= {"stage": told["stage"], "share": max(told["share"], self._told["share"])}
+                self._go_on(told["stage"], min(told["share"], MOST_UNFINISHED))
             elif "report" in told:
                 self._told |= {"state": DONE, "share": 1.0, "report": {**told["report"], "file": self._made_file()}}
             elif "error" in told and self.is_working:
@@ -231,12 +234,18 @@ class Trainer:
     def _made_file(self) -> str:
         return self._wanted.file if self._wanted else ""
 
-    def _left_s(self) -> float | None:
-        """Return how many seconds are left, if it goes on as until now; None: not known yet."""
-        done = self._told["share"] - (self._first_share or 0.0)
-        if done <= 0:
-            return None
-        return round((time.monotonic() - self._begun_s) * (1 - self._told["share"]) / done)
+    def _go_on(self, stage: str, share: float) -> None:
+        """Tell how far it is; where it has gone on, estimate anew when it will be done, if it goes on as until now."""
+        now_s = self._clock()
+        if self._first_share is None:
+            self._first_share = share
+        elif share > max(self._told["share"], self._first_share):
+            self._ends_s = now_s + (now_s - self._begun_s) * (1 - share) / (share - self._first_share)
+        self._told |= {"stage": stage, "share": max(share, self._told["share"])}
+
+    def _left_s(self) -> int | None:
+        """Return how many seconds are left, by the last estimate; 0: it takes longer than that; None: not known yet."""
+        return None if self._ends_s is None else max(round(self._ends_s - self._clock()), 0)
 
     def _write(self) -> None:
         self._file.parent.mkdir(exist_ok=True)

@@ -7,7 +7,7 @@ import { OWN, filled } from "./strings.js";
 const FOLDER = "folder", LINES = "lines", MINUTE_S = 60;
 const percent = (share) => `${Math.round(100 * share)} %`;
 const figure = (value) => (value === null || value === undefined ? "–" : value.toFixed(2));
-const left = (left_s) => (left_s === null ? "" : left_s < MINUTE_S ? filled(OWN.leftSeconds, { count: Math.max(left_s, 1) })
+const left = (left_s) => (left_s === null ? "" : left_s === 0 ? OWN.leftLonger : left_s < MINUTE_S ? filled(OWN.leftSeconds, { count: left_s })
   : filled(OWN.leftMinutes, { count: Math.round(left_s / MINUTE_S) }));
 const paragraph = (textContent, more = {}) => made("p", { textContent, ...more });
 

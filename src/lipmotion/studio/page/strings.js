@@ -179,6 +179,7 @@ export const OWN = {
     stopped: "{what} “{name}” was stopped", interrupted: "{what} “{name}” was interrupted: the studio ended meanwhile",
   },
   progress: "How far it is",
+  leftLonger: "a little longer",
   leftSeconds: "about {count} s left",
   leftMinutes: "about {count} min left",
   stop: "Stop",
