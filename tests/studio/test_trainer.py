@@ -56,7 +56,7 @@ def test_a_voice_is_trained_measured_used_and_taken_back(studio: OpenStudio) -> 
     studio.edit("phone 3 is p")
     studio.ask("/api/lines/1/export", {"files": [".csv"]})
     before = studio.ask("/api/lines/1/motion").body
-    begun = studio.ask("/api/training", {"kind": "voice", "name": "../Me", "options": OPTIONS})
+    begun = studio.ask("/api/training", {"kind": "voice", "name": "Me", "options": OPTIONS})
     assert (begun.status, begun.content["job"]["state"], begun.content["job"]["name"]) == (201, "working", "Me")
     refused = studio.ask("/api/training", {"kind": "face", "name": "me"})
     assert (refused.status, "wait for it" in refused.content["error"]) == (422, True)
@@ -131,6 +131,10 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"kind": "voice", "name": "a", "options": {"path": "/etc"}}, "no option 'path'"),
     ({"kind": "voice", "name": "a", "options": []}, "options"),
     ({"kind": "voice", "name": "a" * 300}, "at most 200"),
+    ({"kind": "voice", "name": " .. "}, "give it a name"),
+    ({"kind": "face"}, "give it a name"),
+    ({"kind": "voice", "name": "../Me"}, "slash"),
+    ({"kind": "voice", "name": "a\\b"}, "slash"),
 ]
 
 

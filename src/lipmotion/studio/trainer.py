@@ -112,13 +112,17 @@ class Trainer:
 
         name  : of its file, which is made one that is free
         lines : numbers of lines that are videos; none: the project's folder of recordings
-        Raises InputError: something is being made, no such kind, no videos of these numbers, or no folder.
+        Raises InputError: something is being made, no such kind, no name, no videos of these numbers, or no folder.
         ExportError: the folder of the project cannot be written.
         """
         if kind not in KINDS:
             raise InputError(f"no kind {shortened(repr(kind))}; required {' or '.join(KINDS)}")
         folder, suffix = PLACES[kind]
-        plain, number = plain_name(name, kind), 1
+        plain, number = plain_name(name, ""), 1
+        if "/" in name or "\\" in name:
+            raise InputError(f"the name {shortened(repr(name))} has a slash; give it a name without one, as Anna")
+        if not plain:
+            raise InputError(f"the {kind} has no name; give it a name, as that of the person")
         while (self._folder.path / folder / f"{_numbered(plain, number)}{suffix}").exists():
             number += 1
         self._begin(Wanted(kind, _numbered(plain, number), tuple(lines), options.as_mapping()))
