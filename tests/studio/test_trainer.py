@@ -187,7 +187,7 @@ def test_some_recordings_are_kept_back(toy_corpus: Corpus) -> None:
     assert divided_names(toy_corpus, without_list[:9], held_out=True) == (without_list[:9], [])
 
 
-def test_the_time_left_counts_down_until_it_is_done(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_time_left_counts_down_and_reports_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder, now_s, (pipe, tells) = ProjectFolder(tmp_path), [0.0], Pipe(duplex=False)
     folder.change(lambda project: replace(project, recordings="."))
     process = SimpleNamespace(join=lambda: None, kill=tells.close)
@@ -211,8 +211,21 @@ def test_the_time_left_counts_down_until_it_is_done(tmp_path: Path, monkeypatch:
     assert told(150.0) == ("working", 0.2, 0)
     assert told(160.0, stage="measuring", share=1.0) == ("working", 0.99, 2)
     assert told(170.0) == ("working", 0.99, 0)
-    assert told(171.0, report={}) == ("done", 1.0, None)
+    assert told(171.0, report={"minutes": 3.5}) == ("done", 1.0, None)
     tells.close()
+    wait_until(lambda: trainer._thread is None)
+    assert trainer.earlier() == []
+    pipe, tells = Pipe(duplex=False)
+    trainer.begin("face", "me", [], VoiceOptions())
+    for opened in (trainer, Trainer(folder)):  # as it is, and as where the studio is opened again
+        (voice,) = opened.earlier()
+        assert (voice["kind"], voice["file"], voice["report"]["minutes"]) == ("voice", "voices/me.lipmotion", 3.5)
+    tells.close()
+    wait_until(lambda: trainer._thread is None)
+    assert [(job["state"], job["kind"]) for job in (trainer.document() or {}, *trainer.earlier())] == [
+        ("failed", "face"),
+        ("done", "voice"),
+    ]
 
 
 def test_a_state_that_cannot_be_understood_is_none(tmp_path: Path) -> None:

@@ -62,11 +62,20 @@ class Wanted:
         return f"{folder}/{self.name}{suffix}"
 
 
+@dataclass(frozen=True)
+class Job:
+    """What was asked for, and how it went."""
+
+    wanted: Wanted
+    told: dict[str, Any]
+
+
 class Trainer:
     """Makes voices and faces of a project, one at a time; may be used by several threads.
 
-    The last one is told until there is another: what was asked for, and how it went. It is kept in the folder of the
-    project, so that one that a killed studio was making is told as interrupted, and can be made again.
+    The last one is told until there is another: what was asked for, and how it went; and besides, the last voice and
+    the last face that were made. All is kept in the folder of the project, so that one that a killed studio was making
+    is told as interrupted, and can be made again.
 
     clock : returns seconds, and only grows
     """
@@ -74,7 +83,10 @@ class Trainer:
     def __init__(self, folder: ProjectFolder, clock: Callable[[], float] = time.monotonic) -> None:
         self._folder, self._lock, self._clock = folder, threading.RLock(), clock
         self._file = folder.path / TRAINING / STATE
-        self._wanted, self._told = self._read()
+        self._wanted: Wanted | None = None
+        self._told: dict[str, Any] = {}
+        self._made: dict[str, Job] = {}
+        self._read()
         self._process: BaseProcess | None = None
         self._thread: threading.Thread | None = None
         self._begun_s = 0.0
@@ -95,6 +107,12 @@ class Trainer:
         """Return how it goes on or ended: ``state``, ``stage``, ``share``, ``left_s`` and what was told."""
         with self._lock:
             return dict(self._told) | ({"left_s": self._left_s()} if self.is_working else {})
+
+    def earlier(self) -> list[dict[str, Any]]:
+        """Return the last voice and the last face that were made, as ``document``, where that is another one."""
+        with self._lock:
+            last = self._wanted if self._told.get("state") == DONE else None
+            return [{**_wanted_document(job.wanted), **job.told} for job in self._made.values() if job.wanted != last]
 
     def videos(self) -> list[ProjectLine]:
         """Return the lines of the project that are videos."""
@@ -226,6 +244,8 @@ class Trainer:
                 self._go_on(told["stage"], min(told["share"], MOST_UNFINISHED))
             elif "report" in told:
                 self._told |= {"state": DONE, "share": 1.0, "report": {**told["report"], "file": self._made_file()}}
+                if self._wanted:
+                    self._made[self._wanted.kind] = Job(self._wanted, self._told)
             elif "error" in told and self.is_working:
                 self._told |= {"state": FAILED, "error": told["error"]}
             elif "warning" in told:
@@ -254,25 +274,33 @@ class Trainer:
     def _write(self) -> None:
         self._file.parent.mkdir(exist_ok=True)
         wanted = {} if self._wanted is None else asdict(self._wanted)
-        document = {"format": FORMAT, "version": VERSION, "wanted": wanted, "told": self._told}
+        made = [asdict(job) for job in self._made.values()]
+        document = {"format": FORMAT, "version": VERSION, "wanted": wanted, "told": self._told, "made": made}
         with whole_file(self._file) as temporary:
             temporary.write_text(as_json(document, indent=1, ensure_ascii=False), encoding="utf-8")
 
-    def _read(self) -> tuple[Wanted | None, dict[str, Any]]:
-        """Return what was made last; nothing, where the file says nothing that can be understood."""
+    def _read(self) -> None:
+        """Read what was made last; nothing, where the file says nothing that can be understood."""
         try:
             found = from_json(read_text_file(self._file, "training"))
             if found["format"] != FORMAT or found["version"] != VERSION:
-                return None, {}
-            given, told = found["wanted"], found["told"]
-            wanted = Wanted(given["kind"], plain_name(given["name"]), tuple(map(int, given["lines"])), given["options"])
-            VoiceOptions.stored(wanted.options)
-            if wanted.kind not in KINDS or told["state"] not in (WORKING, DONE, FAILED, STOPPED, INTERRUPTED):
-                return None, {}
-            state = INTERRUPTED if told["state"] == WORKING else told["state"]
-            return wanted, {**_nothing_told(), **told, "state": state}
+                return
+            last, made = _job(found), [_job(each) for each in found.get("made", ())]
         except (InputError, KeyError, TypeError, ValueError, AttributeError):
-            return None, {}
+            return
+        self._wanted, self._told = last.wanted, last.told
+        self._made = {job.wanted.kind: job for job in (*made, last) if job.told["state"] == DONE}
+
+
+def _job(found: Mapping[str, Any]) -> Job:
+    """Return what a file says of something that was made. Raises InputError and others: it cannot be understood."""
+    given, told = found["wanted"], found["told"]
+    wanted = Wanted(given["kind"], plain_name(given["name"]), tuple(map(int, given["lines"])), given["options"])
+    VoiceOptions.stored(wanted.options)
+    if wanted.kind not in KINDS or told["state"] not in (WORKING, DONE, FAILED, STOPPED, INTERRUPTED):
+        raise ValueError("of another kind, or in another state")
+    state = INTERRUPTED if told["state"] == WORKING else told["state"]
+    return Job(wanted, {**_nothing_told(), **told, "state": state})
 
 
 def _numbered(name: str, number: int) -> str:
