@@ -28,7 +28,7 @@ pytest.importorskip("starlette", reason="the extra 'studio' is not installed")
 from lipmotion.studio import line as line_module
 from lipmotion.studio.access import TOKEN_HEADER, Access
 from lipmotion.studio.application import studio_application
-from lipmotion.studio.folder import opened_folder
+from lipmotion.studio.folder import ProjectFolder, opened_folder
 from lipmotion.studio.known_model import known_model
 from lipmotion.studio.project import project_from
 from lipmotion.studio.studio import Studio
@@ -295,6 +295,18 @@ def test_a_project_outlives_its_model(
         with closing(Studio(folder)):
             assert asked == [None]
     assert "the model of the project is not there" in caplog.text
+
+
+def test_what_the_list_says_of_a_line_outlives_a_kill(
+    tmp_path: Path, toy_speech: Path, toy_sentence: ToySentence, toy_model: Model
+) -> None:
+    for _ in range(2):
+        with open_studio(toy_speech, " ".join(toy_sentence.words), toy_model, tmp_path) as studio:
+            duration_s = studio.ready()["duration_s"]
+            (stored,) = ProjectFolder(studio.folder.path).project.lines.values()  # as where it is killed now
+            assert stored.duration_s == pytest.approx(duration_s)
+            assert stored.doubt is not None
+            studio.folder.change_line(1, lambda line: replace(line, duration_s=None, doubt=None))
 
 
 @pytest.mark.long
