@@ -139,7 +139,7 @@ export const TEXT = {
   besideFace: "The real video beside the face",
   recorded: "The real video of the line",
   noRecorded: "The video of the line cannot be played.",
-  filmed: "This is a filmed face: it is made as a video. Select a stretch, and press the button for its video.",
+  filmOld: "This video is of another stretch, or from before the last edit. The button makes it anew.",
   compareShow: "Hold to see it",
   compareStop: "Stop",
   saved: "All saved",
