@@ -97,7 +97,6 @@ export const TEXT = {
   mood: "Mood",
   moodAt: "Mood from the playhead on",
   strength: "Strength",
-  set: "Set",
   transcript: "Words of the line",
   align: "Align anew",
   aligned: "The words are aligned anew.",
@@ -172,7 +171,7 @@ export const OWN = {
   open: "Own voice …",
   openWorking: "Own voice: {share}",
   title: "Your own voice and face",
-  about: "A minute or more of video of one person who talks, seen from the front, becomes a voice: how this person's mouth moves. Or a face: what it looks like. Whose they are must have agreed.",
+  about: "A minute or more of video of one person who talks, seen from the front, becomes a voice: how this person's mouth moves. Or a face: what it looks like. They must have agreed.",
   kinds: { voice: "The voice", face: "The face" },
   states: {
     working: "{what} “{name}” is being made", done: "{what} “{name}” is ready", failed: "{what} “{name}” could not be made",
@@ -215,7 +214,7 @@ export const OWN = {
   usedTitle: "In use",
   voice: "Voice of this project",
   shipped: "the one that ships",
-  usedHint: "Another voice moves the mouths of all lines otherwise; words, phones and edits stay. Choose the one before, and all is as it was.",
+  usedHint: "Another voice moves the mouths of all lines differently; words, phones and edits stay. Choose the one before, and all is as it was.",
   faces: "Faces of this project: {files}",
 };
 
