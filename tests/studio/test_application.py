@@ -192,7 +192,9 @@ def test_why_and_doubts(studio: OpenStudio) -> None:
 def test_a_line_is_marked_exported_and_then_changed(studio: OpenStudio) -> None:
     assert studio.ask("/api/lines/1/mark", {"mark": "approved"}).content["mark"] == "approved"
     assert studio.ask("/api/lines/1/mark", {"mark": "perhaps"}).status == 422
+    assert studio.studio.row(1)["marked"] == studio.studio.row(1)["edits_digest"]
     studio.edit("phone 3 is p")
+    assert studio.studio.row(1)["marked"] != studio.studio.row(1)["edits_digest"] == studio.ready()["edits_digest"]
     done = studio.ask("/api/export", {"files": [".csv"], "only": "approved"}).content
     assert (done["exported"][0]["files"], done["failed"]) == (["exports/line.csv"], [])
     record = studio.folder.line(1).exports[-1]

@@ -84,7 +84,9 @@ def test_what_cannot_be_written_is_not_kept(lines: Path, monkeypatch: pytest.Mon
 
 
 def test_a_project_is_what_its_document_says() -> None:
-    project = Project({1: ProjectLine(1, "a", "a.wav", "0", "hello", 1.5, 0.25, "redo", (RECORD,))}, preset="arkit")
+    project = Project(
+        {1: ProjectLine(1, "a", "a.wav", "0", "hello", 1.5, 0.25, "redo", "4", (RECORD,))}, preset="arkit"
+    )
     assert project_from(json.loads(json.dumps(project_document(project)))) == replace(project, next_number=2)
 
 

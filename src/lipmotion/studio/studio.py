@@ -132,6 +132,8 @@ class Studio:
             "name": line.name,
             "status": self.desk.status(number),
             "mark": line.mark,
+            "marked": line.marked,
+            "edits_digest": summary.digest,
             "doubt": line.doubt,
             "duration_s": line.duration_s,
             "edits": summary.count,
@@ -277,8 +279,9 @@ class Studio:
         self.desk.opened(number)
 
     def mark(self, number: int, mark: str) -> None:
-        """Mark a line. Raises InputError: no such mark."""
-        self.folder.change_line(number, lambda line: replace(line, mark=mark))
+        """Mark a line as its edits are now. Raises InputError: no such mark."""
+        marked = self.summary(number).digest
+        self.folder.change_line(number, lambda line: replace(line, mark=mark, marked=marked))
 
     def remove(self, number: int) -> None:
         """Take a line out of the project; its files stay where they are."""

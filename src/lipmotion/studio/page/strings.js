@@ -19,6 +19,7 @@ export const TEXT = {
   counted: "{shown} of {count} lines, {approved} approved",
   states: { new: "new", waiting: "waiting", working: "working", ready: "ready", failed: "failed" },
   marks: { none: "no mark", approved: "approved", redo: "to redo" },
+  editedSince: { approved: "edited after it was approved", exported: "edited after its export" },
   approve: "Approve",
   redoLine: "Redo",
   hideLines: "Show or hide the lines",

@@ -295,7 +295,7 @@ export class Studio {
     const { selected, lines, span, line: before } = this.store, list = selected && line[`${selected.kind}s`];
     const was = selected && before?.[`${selected.kind}s`]?.[selected.index], is = list?.[selected.index];
     const follows = was && is && span && span.start_s === was.start_s && span.end_s === was.end_s;
-    const listed = lines.map((each) => (each.id === line.id ? { ...each, edits: line.steps.length, exported: each.exported === "yes" ? "changed" : each.exported } : each));
+    const listed = lines.map((each) => (each.id === line.id ? { ...each, edits: line.steps.length, edits_digest: line.edits_digest, exported: each.exported === "yes" ? "changed" : each.exported } : each));
     this.settleSoon(line);
     this.store.set({ line, lines: listed, ...(list && !is ? { selected: null } : {}),
       ...(follows ? { span: { start_s: is.start_s, end_s: is.end_s } } : {}) });
