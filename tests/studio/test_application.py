@@ -19,7 +19,7 @@ from lipmotion.export.video import write_mp4
 from lipmotion.meshes.files.gltf_weights import read_gltf_motion
 from lipmotion.pipeline.edit_files import read_edits
 from lipmotion.pipeline.edits import FORMS
-from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.model import Model, save_model
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence
 from lipmotion.units import Lexicon
@@ -29,7 +29,8 @@ pytest.importorskip("starlette", reason="the extra 'studio' is not installed")
 from lipmotion.studio import line as line_module
 from lipmotion.studio.access import TOKEN_HEADER, Access
 from lipmotion.studio.application import studio_application
-from lipmotion.studio.folder import opened_folder
+from lipmotion.studio.folder import ProjectFolder, opened_folder
+from lipmotion.studio.known_model import known_model
 from lipmotion.studio.project import project_from
 from lipmotion.studio.studio import Studio
 from lipmotion.studio.votes import read_votes
@@ -205,7 +206,9 @@ def test_why_and_doubts(studio: OpenStudio) -> None:
 def test_a_line_is_marked_exported_and_then_changed(studio: OpenStudio) -> None:
     assert studio.ask("/api/lines/1/mark", {"mark": "approved"}).content["mark"] == "approved"
     assert studio.ask("/api/lines/1/mark", {"mark": "perhaps"}).status == 422
+    assert studio.studio.row(1)["marked"] == studio.studio.row(1)["edits_digest"]
     studio.edit("phone 3 is p")
+    assert studio.studio.row(1)["marked"] != studio.studio.row(1)["edits_digest"] == studio.ready()["edits_digest"]
     done = studio.ask("/api/export", {"files": [".csv"], "only": "approved"}).content
     assert (done["exported"][0]["files"], done["failed"]) == (["exports/line.csv"], [])
     record = studio.folder.line(1).exports[-1]
@@ -288,6 +291,11 @@ def test_what_is_dropped_is_read_by_the_same_readers(studio: OpenStudio) -> None
     assert studio.ask("/api/project").content["count"] == 1
 
 
+def test_a_model_is_called_as_its_file(toy_model: Model, tmp_path: Path) -> None:
+    save_model(replace(toy_model, about={**toy_model.about, "name": "trajectory"}), tmp_path / "Sam.lipmotion")
+    assert known_model(tmp_path / "Sam.lipmotion").name == "Sam"
+
+
 def test_a_project_outlives_its_model(
     tmp_path: Path, toy_model: Model, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -303,6 +311,18 @@ def test_a_project_outlives_its_model(
         with closing(Studio(folder)):
             assert asked == [None]
     assert "the model of the project is not there" in caplog.text
+
+
+def test_what_the_list_says_of_a_line_outlives_a_kill(
+    tmp_path: Path, toy_speech: Path, toy_sentence: ToySentence, toy_model: Model
+) -> None:
+    for _ in range(2):
+        with open_studio(toy_speech, " ".join(toy_sentence.words), toy_model, tmp_path) as studio:
+            duration_s = studio.ready()["duration_s"]
+            (stored,) = ProjectFolder(studio.folder.path).project.lines.values()  # as where it is killed now
+            assert stored.duration_s == pytest.approx(duration_s)
+            assert stored.doubt is not None
+            studio.folder.change_line(1, lambda line: replace(line, duration_s=None, doubt=None))
 
 
 @pytest.mark.long
@@ -365,6 +385,7 @@ def test_a_filmed_face_the_real_video_and_another_model(
             studio = OpenStudio(opened, running, studio_application(running, Access(TOKEN, frozenset({HOST}))))
             _compared(studio)
             assert _film(studio) == (video_frames(0.2, 0.6), "video/mp4")
+            _exported(studio)
             address = studio.ready()["media"]["video"]
             part = studio.ask(address, range="bytes=4-7", **{TOKEN_HEADER: ""})
             assert (part.status, part.body, part.headers["content-type"]) == (206, b"ftyp", "video/mp4")
@@ -386,6 +407,19 @@ def _film(studio: OpenStudio) -> tuple[int, str]:
     with av.open(io.BytesIO(reply.body)) as film:
         assert len(film.streams.audio) == 1
         return sum(1 for _ in film.decode(video=0)), reply.headers["content-type"]
+
+
+def _exported(studio: OpenStudio) -> None:
+    """The video of a preset is that of the face, with its mark; other files do not depend on it."""
+    for wanted in ({"preset": "video", "face": "toy"}, {"files": [".csv"]}):
+        assert studio.ask("/api/lines/1/export", wanted).content["failed"] == []
+    with av.open(str(studio.folder.path / "exports" / "line.mp4")) as film:
+        assert film.metadata["comment"].startswith("synthetic:")
+    table = (studio.folder.path / "exports" / "line.csv").read_bytes()
+    assert studio.ask("/api/lines/1/export", {"files": [".csv"], "face": "toy"}).content["failed"] == []
+    assert (studio.folder.path / "exports" / "line.csv").read_bytes() == table
+    (failed,) = studio.ask("/api/lines/1/export", {"preset": "video", "face": "../x"}).content["failed"]
+    assert "no face" in failed["error"]
 
 
 def _compared(studio: OpenStudio) -> None:

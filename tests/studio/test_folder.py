@@ -62,6 +62,13 @@ def test_the_folder_of_a_project(tmp_path: Path, lines: Path) -> None:
         folder_for(tmp_path / "nothing")
 
 
+def test_a_project_that_is_not_there_is_an_empty_one(tmp_path: Path) -> None:
+    for _ in range(2):
+        with opened_folder(tmp_path / "hero.studio") as folder:
+            assert (folder.path, folder.project) == (tmp_path / "hero.studio", Project())
+    assert (tmp_path / "hero.studio" / PROJECT).is_file()
+
+
 def test_what_cannot_be_written_is_not_kept(lines: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with opened_folder(lines) as folder:
         before = folder.project
@@ -77,7 +84,9 @@ def test_what_cannot_be_written_is_not_kept(lines: Path, monkeypatch: pytest.Mon
 
 
 def test_a_project_is_what_its_document_says() -> None:
-    project = Project({1: ProjectLine(1, "a", "a.wav", "0", "hello", 1.5, 0.25, "redo", (RECORD,))}, preset="arkit")
+    project = Project(
+        {1: ProjectLine(1, "a", "a.wav", "0", "hello", 1.5, 0.25, "redo", "4", (RECORD,))}, preset="arkit"
+    )
     assert project_from(json.loads(json.dumps(project_document(project)))) == replace(project, next_number=2)
 
 

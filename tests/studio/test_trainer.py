@@ -6,7 +6,9 @@ import os
 import signal
 from collections.abc import Iterator
 from dataclasses import replace
+from multiprocessing import Pipe
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -18,6 +20,7 @@ from lipmotion.testing.toy import ToySentence
 
 pytest.importorskip("starlette", reason="the extra 'studio' is not installed")
 
+from lipmotion.studio.folder import ProjectFolder
 from lipmotion.studio.trainer import TRAINING, Trainer
 from lipmotion.studio.training import TrainingOrder, VoiceOptions, carry_out, divided_names
 from studio.open_studio import OpenStudio, open_studio
@@ -53,7 +56,7 @@ def test_a_voice_is_trained_measured_used_and_taken_back(studio: OpenStudio) -> 
     studio.edit("phone 3 is p")
     studio.ask("/api/lines/1/export", {"files": [".csv"]})
     before = studio.ask("/api/lines/1/motion").body
-    begun = studio.ask("/api/training", {"kind": "voice", "name": "../Me", "options": OPTIONS})
+    begun = studio.ask("/api/training", {"kind": "voice", "name": "Me", "options": OPTIONS})
     assert (begun.status, begun.content["job"]["state"], begun.content["job"]["name"]) == (201, "working", "Me")
     refused = studio.ask("/api/training", {"kind": "face", "name": "me"})
     assert (refused.status, "wait for it" in refused.content["error"]) == (422, True)
@@ -128,6 +131,10 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"kind": "voice", "name": "a", "options": {"path": "/etc"}}, "no option 'path'"),
     ({"kind": "voice", "name": "a", "options": []}, "options"),
     ({"kind": "voice", "name": "a" * 300}, "at most 200"),
+    ({"kind": "voice", "name": " .. "}, "give it a name"),
+    ({"kind": "face"}, "give it a name"),
+    ({"kind": "voice", "name": "../Me"}, "slash"),
+    ({"kind": "voice", "name": "a\\b"}, "slash"),
 ]
 
 
@@ -180,9 +187,48 @@ def test_some_recordings_are_kept_back(toy_corpus: Corpus) -> None:
     assert divided_names(toy_corpus, without_list[:9], held_out=True) == (without_list[:9], [])
 
 
-def test_a_state_that_cannot_be_understood_is_none(tmp_path: Path) -> None:
-    from lipmotion.studio.folder import ProjectFolder
+def test_the_time_left_counts_down_and_reports_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder, now_s, (pipe, tells) = ProjectFolder(tmp_path), [0.0], Pipe(duplex=False)
+    folder.change(lambda project: replace(project, recordings="."))
+    process = SimpleNamespace(join=lambda: None, kill=tells.close)
+    monkeypatch.setattr("lipmotion.studio.trainer.begun_apart", lambda *_: (process, pipe))
+    trainer = Trainer(folder, lambda: now_s[0])
+    trainer.begin("voice", "me", [], VoiceOptions())
 
+    def told(at_s: float, **more: Any) -> tuple[Any, ...]:
+        """Return what is told at a time, once something was reported."""
+        now_s[0] = at_s
+        if more:
+            before = trainer.short_document()
+            tells.send(more)
+            wait_until(lambda: trainer.short_document() != before)
+        document = trainer.short_document()
+        return document["state"], document["share"], document.get("left_s")
+
+    assert told(0.0, stage="tracking", share=0.0) == ("working", 0.0, None)
+    assert told(20.0, stage="tracking", share=0.2) == ("working", 0.2, 80)
+    assert told(50.0) == ("working", 0.2, 50)
+    assert told(150.0) == ("working", 0.2, 0)
+    assert told(160.0, stage="measuring", share=1.0) == ("working", 0.99, 2)
+    assert told(170.0) == ("working", 0.99, 0)
+    assert told(171.0, report={"minutes": 3.5}) == ("done", 1.0, None)
+    tells.close()
+    wait_until(lambda: trainer._thread is None)
+    assert trainer.earlier() == []
+    pipe, tells = Pipe(duplex=False)
+    trainer.begin("face", "me", [], VoiceOptions())
+    for opened in (trainer, Trainer(folder)):  # as it is, and as where the studio is opened again
+        (voice,) = opened.earlier()
+        assert (voice["kind"], voice["file"], voice["report"]["minutes"]) == ("voice", "voices/me.lipmotion", 3.5)
+    tells.close()
+    wait_until(lambda: trainer._thread is None)
+    assert [(job["state"], job["kind"]) for job in (trainer.document() or {}, *trainer.earlier())] == [
+        ("failed", "face"),
+        ("done", "voice"),
+    ]
+
+
+def test_a_state_that_cannot_be_understood_is_none(tmp_path: Path) -> None:
     folder = ProjectFolder(tmp_path)
     (tmp_path / TRAINING).mkdir()
     for text in ("", "[]", "{}", '{"format": "lipmotion.training", "version": 1, "wanted": {"kind": "x"}}'):

@@ -31,6 +31,8 @@ ResultT = TypeVar("ResultT")
 NEW, WAITING, WORKING, READY, FAILED = STATUSES = ("new", "waiting", "working", "ready", "failed")
 MOST_OPEN, MOST_OPEN_S = 12, 3600.0
 """Lines that stay open, and the seconds of sound in them together: what was used last is closed last."""
+SAVED_EACH = 50
+"""Lines after which the project is written while lines are understood; and after the last one."""
 RECENT_S = 60.0
 """How long a line that is done, or failed, is told among those at work."""
 
@@ -227,7 +229,10 @@ class Desk:
             if self.folder.edits(line).exists():
                 return None
             work.turn(WORKING)
-            return understand_line(self.folder, line, self.model, work.report)
+            audio = understand_line(self.folder, line, self.model, work.report)
+            if len(self._waiting) % SAVED_EACH == 0:
+                self.folder.save()
+            return audio
 
     def _run(self, work: Work, do: Callable[[], object]) -> None:
         """Do something for a line, and keep how it ended; nothing is raised."""

@@ -190,10 +190,13 @@ def _read(file: Path) -> Project:
 def folder_for(source: Path | None, out: Path | None = None) -> Path:
     """Return the folder of the project of a recording, of a folder or a list of recordings, or of the project itself.
 
+    A path that ends as projects do, and is not there, is that of an empty project.
     Raises InputError: there is no such file or folder.
     """
     if source is None:
         return out or UNTITLED
+    if _is_new(source):
+        return source
     if not source.exists():
         raise InputError(f"{source}: no such file or folder; give a recording, a folder of them, or a project")
     if _is_project(source):
@@ -206,6 +209,10 @@ def _is_project(source: Path) -> bool:
     return source.name == PROJECT or (source / PROJECT).exists()
 
 
+def _is_new(source: Path) -> bool:
+    return source.suffix == SUFFIX and not source.exists()
+
+
 @contextmanager
 def opened_folder(source: Path | None, out: Path | None = None) -> Iterator[ProjectFolder]:
     """Open the project of ``folder_for``, created if needed, with the recordings of the source as its lines.
@@ -213,10 +220,11 @@ def opened_folder(source: Path | None, out: Path | None = None) -> Iterator[Proj
     Raises ExportError: another process works on it, or it cannot be written.  Raises InputError: it cannot be read.
     """
     path = folder_for(source, out)
+    recordings = None if source is None or _is_project(source) or _is_new(source) else source
     with locked(path):
         folder = ProjectFolder(path)
-        if source is not None and not _is_project(source):
-            folder.add(source)
+        if recordings is not None:
+            folder.add(recordings)
         elif not (path / PROJECT).exists():
             folder.save()
         yield folder

@@ -16,7 +16,7 @@ SHORT_DIGEST = 8
 class KnownModel:
     """A model, and what tells it from others.
 
-    name   : as it calls itself, or that of its file
+    name   : of its file, without suffix: what its owner calls it
     digest : of its file (SHA-256)
     """
 
@@ -32,4 +32,4 @@ class KnownModel:
 def known_model(file: Path | None) -> KnownModel:
     """Return the model of a file; None: the one that ships. Raises as ``load_model``."""
     model, path = load_model(file), file or shipped_path()
-    return KnownModel(model, str(model.about.get("name") or path.stem), sha256_of(path))
+    return KnownModel(model, path.stem, sha256_of(path))

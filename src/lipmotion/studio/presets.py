@@ -44,7 +44,7 @@ PRESETS = {
         Preset("rhubarb", "Rhubarb: mouth shapes", (".cues.json", ".cues.tsv")),
         Preset("spine", "Spine", (".cues.spine.json",)),
         Preset("live2d", "Live2D", (".motion3.json",)),
-        Preset("video", "A video of the drawn face", (".mp4",)),
+        Preset("video", "A video of the face", (".mp4",)),
         Preset("labels", "Praat, ELAN, subtitles", (".TextGrid", ".vtt")),
     )
 }

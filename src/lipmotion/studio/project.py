@@ -74,6 +74,7 @@ class ProjectLine:
     duration_s : of the sound; None: not known yet
     doubt      : how unsure the motion of its speech is, 0 to 1; None: not known yet
     mark       : one of ``MARKS``
+    marked     : digest of the edits when it was marked; empty: not known
     exports    : in their order
     versions   : that were kept, in their order
     """
@@ -86,6 +87,7 @@ class ProjectLine:
     duration_s: float | None = None
     doubt: float | None = None
     mark: str = NO_MARK
+    marked: str = ""
     exports: tuple[ExportRecord, ...] = ()
     versions: tuple[KeptVersion, ...] = ()
 
@@ -198,7 +200,7 @@ def project_from(content: Any) -> Project:
 
 
 def _line(row: Any) -> ProjectLine:
-    texts = {name: row[name] for name in ("name", "sound", "sha256", "transcript", "mark") if name in row}
+    texts = {name: row[name] for name in ("name", "sound", "sha256", "transcript", "mark", "marked") if name in row}
     if not all(isinstance(text, str) for text in texts.values()):
         raise ValueError(f"a text of the line {row.get('number')} is none")
     numbers = {name: None if row.get(name) is None else float(row[name]) for name in ("duration_s", "doubt")}

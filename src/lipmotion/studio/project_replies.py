@@ -90,8 +90,8 @@ class ProjectReplies:
 
     async def _exported(self, content: dict[str, object], numbers: list[int]) -> Response:
         files = texts(content, "files", most=20, longest=40) if "files" in content else ()
-        preset = preset_of(text(content, "preset", ""), files)
-        found = await self._desk.beside(lambda: self._studio.export_several(numbers, preset))
+        preset, face = preset_of(text(content, "preset", ""), files), text(content, "face", "")
+        found = await self._desk.beside(lambda: self._studio.export_several(numbers, preset, face))
         return JSONResponse(found, headers=FRESH)
 
     async def mesh(self, request: Request) -> Response:

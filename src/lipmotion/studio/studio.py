@@ -25,7 +25,7 @@ from lipmotion.pipeline.edits import FORMS, Step, Text, WordIs, WordSaid, WordsS
 from lipmotion.pipeline.job import Job, Outputs
 from lipmotion.pipeline.opened_job import opened
 from lipmotion.pipeline.outputs.curve_sets import SHAPE_SETS
-from lipmotion.pipeline.outputs.drawn_video import read_sound
+from lipmotion.pipeline.outputs.drawn_video import VideoOutput, read_sound
 from lipmotion.storage.files import TEMPORARY, made_folders, read_text_file, sha256_of
 from lipmotion.storage.json_text import from_json
 from lipmotion.studio.desk import NEW, READY, WAITING, WORKING, Desk, NotReadyError, Work
@@ -132,6 +132,8 @@ class Studio:
             "name": line.name,
             "status": self.desk.status(number),
             "mark": line.mark,
+            "marked": line.marked,
+            "edits_digest": summary.digest,
             "doubt": line.doubt,
             "duration_s": line.duration_s,
             "edits": summary.count,
@@ -277,8 +279,9 @@ class Studio:
         self.desk.opened(number)
 
     def mark(self, number: int, mark: str) -> None:
-        """Mark a line. Raises InputError: no such mark."""
-        self.folder.change_line(number, lambda line: replace(line, mark=mark))
+        """Mark a line as its edits are now. Raises InputError: no such mark."""
+        marked = self.summary(number).digest
+        self.folder.change_line(number, lambda line: replace(line, mark=mark, marked=marked))
 
     def remove(self, number: int) -> None:
         """Take a line out of the project; its files stay where they are."""
@@ -352,10 +355,12 @@ class Studio:
             raise InputError("there is no other model; give it: lipmotion studio --against FILE")
         return self.against
 
-    def export(self, number: int, preset: Preset) -> dict[str, Any]:
+    def export(self, number: int, preset: Preset, face: str = "") -> dict[str, Any]:
         """Write files of a line, and record what was written from which edits; return their paths.
 
-        Raises InputError: it is not understood yet. ExportError: a file cannot be written. Others as ``Job.run``.
+        face : the name of that which videos show; empty: the usual one
+        Raises InputError: it is not understood yet, or there is no such face. ExportError: a file cannot be written.
+        Others as ``Job.run``.
         """
         line = self.folder.line(number)
         if self.desk.status(number) in (NEW, WAITING, WORKING) and not self.folder.edits(line).exists():
@@ -368,7 +373,10 @@ class Studio:
             write_edits(file, copy)
             request = replace(file.named, recording=self.folder.sound(line), edits=copy)
             outputs = Outputs(files, curves=preset.curves, fps=preset.fps)
-            opened(Job(request, outputs)).run(lambda: self.used.model)
+            job = opened(Job(request, outputs))
+            if face and any(isinstance(output, VideoOutput) for output in job.checked(request.recording)):
+                job = replace(job, face=self.faces.shown(face))
+            job.run(lambda: self.used.model)
         digests = {Path(path).relative_to(self.folder.path).as_posix(): sha256_of(Path(path)) for path in files}
         record = ExportRecord(
             preset.name,
@@ -381,14 +389,14 @@ class Studio:
         self.folder.change_line(number, lambda now: _with_export(now, record))
         return {"id": number, "files": list(digests), "edits": record.edits}
 
-    def export_several(self, numbers: Sequence[int], preset: Preset) -> dict[str, Any]:
+    def export_several(self, numbers: Sequence[int], preset: Preset, face: str = "") -> dict[str, Any]:
         """Write files of several lines, as ``export``; what fails is told, and the others are written."""
         exported, failed = [], []
         try:
             for done, number in enumerate(numbers):
                 self._exporting = {"done": done, "count": len(numbers)}
                 try:
-                    exported.append(self.export(number, preset))
+                    exported.append(self.export(number, preset, face))
                 except LipMotionError as error:
                     failed.append({"id": number, "error": str(error)})
         finally:

@@ -7,7 +7,7 @@ import os
 import shutil
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from multiprocessing.connection import Connection
@@ -36,6 +36,8 @@ MOST_TOLD = 200
 """Warnings, and recordings that are not used, of which the page is told."""
 MOST_LISTED = 500
 """Videos of a project that the page lists."""
+MOST_UNFINISHED = 0.99
+"""The share of the work that is told, at most, until it is done."""
 
 
 @dataclass(frozen=True)
@@ -60,21 +62,36 @@ class Wanted:
         return f"{folder}/{self.name}{suffix}"
 
 
+@dataclass(frozen=True)
+class Job:
+    """What was asked for, and how it went."""
+
+    wanted: Wanted
+    told: dict[str, Any]
+
+
 class Trainer:
     """Makes voices and faces of a project, one at a time; may be used by several threads.
 
-    The last one is told until there is another: what was asked for, and how it went. It is kept in the folder of the
-    project, so that one that a killed studio was making is told as interrupted, and can be made again.
+    The last one is told until there is another: what was asked for, and how it went; and besides, the last voice and
+    the last face that were made. All is kept in the folder of the project, so that one that a killed studio was making
+    is told as interrupted, and can be made again.
+
+    clock : returns seconds, and only grows
     """
 
-    def __init__(self, folder: ProjectFolder) -> None:
-        self._folder, self._lock = folder, threading.RLock()
+    def __init__(self, folder: ProjectFolder, clock: Callable[[], float] = time.monotonic) -> None:
+        self._folder, self._lock, self._clock = folder, threading.RLock(), clock
         self._file = folder.path / TRAINING / STATE
-        self._wanted, self._told = self._read()
+        self._wanted: Wanted | None = None
+        self._told: dict[str, Any] = {}
+        self._made: dict[str, Job] = {}
+        self._read()
         self._process: BaseProcess | None = None
         self._thread: threading.Thread | None = None
         self._begun_s = 0.0
         self._first_share: float | None = None
+        self._ends_s: float | None = None
 
     @property
     def is_working(self) -> bool:
@@ -90,6 +107,12 @@ class Trainer:
         """Return how it goes on or ended: ``state``, ``stage``, ``share``, ``left_s`` and what was told."""
         with self._lock:
             return dict(self._told) | ({"left_s": self._left_s()} if self.is_working else {})
+
+    def earlier(self) -> list[dict[str, Any]]:
+        """Return the last voice and the last face that were made, as ``document``, where that is another one."""
+        with self._lock:
+            last = self._wanted if self._told.get("state") == DONE else None
+            return [{**_wanted_document(job.wanted), **job.told} for job in self._made.values() if job.wanted != last]
 
     def videos(self) -> list[ProjectLine]:
         """Return the lines of the project that are videos."""
@@ -107,13 +130,17 @@ class Trainer:
 
         name  : of its file, which is made one that is free
         lines : numbers of lines that are videos; none: the project's folder of recordings
-        Raises InputError: something is being made, no such kind, no videos of these numbers, or no folder.
+        Raises InputError: something is being made, no such kind, no name, no videos of these numbers, or no folder.
         ExportError: the folder of the project cannot be written.
         """
         if kind not in KINDS:
             raise InputError(f"no kind {shortened(repr(kind))}; required {' or '.join(KINDS)}")
         folder, suffix = PLACES[kind]
-        plain, number = plain_name(name, kind), 1
+        plain, number = plain_name(name, ""), 1
+        if "/" in name or "\\" in name:
+            raise InputError(f"the name {shortened(repr(name))} has a slash; give it a name without one, as Anna")
+        if not plain:
+            raise InputError(f"the {kind} has no name; give it a name, as that of the person")
         while (self._folder.path / folder / f"{_numbered(plain, number)}{suffix}").exists():
             number += 1
         self._begin(Wanted(kind, _numbered(plain, number), tuple(lines), options.as_mapping()))
@@ -155,7 +182,7 @@ class Trainer:
             except ExportError:
                 self._wanted, self._told = before
                 raise
-            self._begun_s, self._first_share = time.monotonic(), None
+            self._begun_s, self._first_share, self._ends_s = self._clock(), None, None
             self._process, pipe = begun_apart(carry_out, order)
             self._thread = threading.Thread(
                 target=self._follow, args=(self._process, pipe), name="training", daemon=True
@@ -214,11 +241,11 @@ class Trainer:
     def _take(self, told: Mapping[str, Any]) -> None:
         with self._lock:
             if "stage" in told:
-                if self._first_share is None:
-                    self._first_share = told["share"]
-                self._told |= {"stage": told["stage"], "share": max(told["share"], self._told["share"])}
+                self._go_on(told["stage"], min(told["share"], MOST_UNFINISHED))
             elif "report" in told:
                 self._told |= {"state": DONE, "share": 1.0, "report": {**told["report"], "file": self._made_file()}}
+                if self._wanted:
+                    self._made[self._wanted.kind] = Job(self._wanted, self._told)
             elif "error" in told and self.is_working:
                 self._told |= {"state": FAILED, "error": told["error"]}
             elif "warning" in told:
@@ -231,35 +258,49 @@ class Trainer:
     def _made_file(self) -> str:
         return self._wanted.file if self._wanted else ""
 
-    def _left_s(self) -> float | None:
-        """Return how many seconds are left, if it goes on as until now; None: not known yet."""
-        done = self._told["share"] - (self._first_share or 0.0)
-        if done <= 0:
-            return None
-        return round((time.monotonic() - self._begun_s) * (1 - self._told["share"]) / done)
+    def _go_on(self, stage: str, share: float) -> None:
+        """Tell how far it is; where it has gone on, estimate anew when it will be done, if it goes on as until now."""
+        now_s = self._clock()
+        if self._first_share is None:
+            self._first_share = share
+        elif share > max(self._told["share"], self._first_share):
+            self._ends_s = now_s + (now_s - self._begun_s) * (1 - share) / (share - self._first_share)
+        self._told |= {"stage": stage, "share": max(share, self._told["share"])}
+
+    def _left_s(self) -> int | None:
+        """Return how many seconds are left, by the last estimate; 0: it takes longer than that; None: not known yet."""
+        return None if self._ends_s is None else max(round(self._ends_s - self._clock()), 0)
 
     def _write(self) -> None:
         self._file.parent.mkdir(exist_ok=True)
         wanted = {} if self._wanted is None else asdict(self._wanted)
-        document = {"format": FORMAT, "version": VERSION, "wanted": wanted, "told": self._told}
+        made = [asdict(job) for job in self._made.values()]
+        document = {"format": FORMAT, "version": VERSION, "wanted": wanted, "told": self._told, "made": made}
         with whole_file(self._file) as temporary:
             temporary.write_text(as_json(document, indent=1, ensure_ascii=False), encoding="utf-8")
 
-    def _read(self) -> tuple[Wanted | None, dict[str, Any]]:
-        """Return what was made last; nothing, where the file says nothing that can be understood."""
+    def _read(self) -> None:
+        """Read what was made last; nothing, where the file says nothing that can be understood."""
         try:
             found = from_json(read_text_file(self._file, "training"))
             if found["format"] != FORMAT or found["version"] != VERSION:
-                return None, {}
-            given, told = found["wanted"], found["told"]
-            wanted = Wanted(given["kind"], plain_name(given["name"]), tuple(map(int, given["lines"])), given["options"])
-            VoiceOptions.stored(wanted.options)
-            if wanted.kind not in KINDS or told["state"] not in (WORKING, DONE, FAILED, STOPPED, INTERRUPTED):
-                return None, {}
-            state = INTERRUPTED if told["state"] == WORKING else told["state"]
-            return wanted, {**_nothing_told(), **told, "state": state}
+                return
+            last, made = _job(found), [_job(each) for each in found.get("made", ())]
         except (InputError, KeyError, TypeError, ValueError, AttributeError):
-            return None, {}
+            return
+        self._wanted, self._told = last.wanted, last.told
+        self._made = {job.wanted.kind: job for job in (*made, last) if job.told["state"] == DONE}
+
+
+def _job(found: Mapping[str, Any]) -> Job:
+    """Return what a file says of something that was made. Raises InputError and others: it cannot be understood."""
+    given, told = found["wanted"], found["told"]
+    wanted = Wanted(given["kind"], plain_name(given["name"]), tuple(map(int, given["lines"])), given["options"])
+    VoiceOptions.stored(wanted.options)
+    if wanted.kind not in KINDS or told["state"] not in (WORKING, DONE, FAILED, STOPPED, INTERRUPTED):
+        raise ValueError("of another kind, or in another state")
+    state = INTERRUPTED if told["state"] == WORKING else told["state"]
+    return Job(wanted, {**_nothing_told(), **told, "state": state})
 
 
 def _numbered(name: str, number: int) -> str:

@@ -67,6 +67,7 @@ class TrainingReplies:
         voices = [{"name": name, "used": path == used} for name, path in self._studio.voices().items()]
         return {
             "job": trainer.document(),
+            "earlier": trainer.earlier(),
             "voices": voices,
             "faces": [path.relative_to(project.path).as_posix() for path in trainer.made(FACE).values()],
             "videos": listed,

@@ -61,14 +61,19 @@ def understand_line(
 
 
 def open_line(folder: ProjectFolder, line: ProjectLine, model: Model, audio: AnalysedAudio | None = None) -> OpenLine:
-    """Return a line that has been understood, open.
+    """Return a line that has been understood, open; the project is told its length and doubt, where it has neither.
 
     audio : its sound, where it has been read
-    Raises InputError: its sound or its file of edits cannot be read, or belongs to another recording.
+    Raises InputError: its sound or its file of edits cannot be read, or belongs to another recording. ExportError: the
+    project cannot be written.
     """
     file = read_edits(folder.edits(line))
     recording = folder.sound(line)
     named = replace(file.named, recording=recording, model=folder.model_file)
-    return OpenLine(
+    opened = OpenLine(
         replace(file, named=named), folder.edits(line), recording, model, audio or read_sound_of(folder, line)
     )
+    if line.duration_s is None:  # it was understood by a studio that was killed before the project was written
+        duration_s, doubt = opened.audio.duration_s, doubt_of(opened.generation)
+        folder.change_line(line.number, lambda now: replace(now, duration_s=duration_s, doubt=doubt))
+    return opened

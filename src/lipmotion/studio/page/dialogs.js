@@ -25,7 +25,7 @@ export function showKeys() {
 
 /** @param {import("./studio.js").Studio} studio */
 export function showExport(studio) {
-  const { project, lines, line } = studio.store, presets = project.forms.presets;
+  const { project, lines, line, face } = studio.store, presets = project.forms.presets;
   let chosen = project.forms.preset || presets[0].name;
   const was = lines.find(({ id }) => id === line?.id)?.exported;
   const told = made("p", { role: "status", className: "hint", textContent: was ? TEXT.wasExported[was] : "" }), approved = lines.filter(({ mark }) => mark === "approved").length;
@@ -49,7 +49,7 @@ export function showExport(studio) {
       describe();
     }, { id: "preset" })), about,
     made("div", { className: "row" },
-      textButton(TEXT.exportThis, run((preset) => studio.server.told(`lines/${line.id}/export`, { preset })), { id: "export-this", disabled: !line?.phones.length, className: "main" }),
-      textButton(filled(TEXT.exportApproved, { count: approved }), run((preset) => studio.server.told("export", { preset, only: "approved" })), { id: "export-approved", disabled: !approved })),
+      textButton(TEXT.exportThis, run((preset) => studio.server.told(`lines/${line.id}/export`, { preset, face })), { id: "export-this", disabled: !line?.phones.length, className: "main" }),
+      textButton(filled(TEXT.exportApproved, { count: approved }), run((preset) => studio.server.told("export", { preset, face, only: "approved" })), { id: "export-approved", disabled: !approved })),
     told);
 }

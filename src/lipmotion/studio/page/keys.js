@@ -54,15 +54,21 @@ export const KEYS = [
 
 const TYPED = "input:not([type=range]):not([type=checkbox]), textarea, select";
 
+const PRESSED = "button, a, summary, [type=checkbox], [role=tab]";
+
 /** Listen to keys, wherever the focus is but in fields that are typed into. */
 export function listen(studio) {
+  addEventListener("click", (event) => { // by a pointer, and not by a key: the keys are then those of the page again
+    const pressed = /** @type {HTMLElement} */ (event.target).closest?.("button, summary");
+    if (event.detail && pressed instanceof HTMLElement && !pressed.closest(".timeline, dialog")) pressed.blur();
+  });
   addEventListener("keydown", (event) => {
     const target = /** @type {HTMLElement} */ (event.target);
     if (document.querySelector("dialog[open]") || event.altKey || event.isComposing) return;
     const ctrl = event.ctrlKey || event.metaKey, name = event.key.length === 1 ? event.key.toLowerCase() : event.key;
     if (target.matches?.(TYPED) && event.key !== "Escape") return;
-    if (target.matches?.("button, a, [type=range], [type=checkbox], [role=tab]") && !target.closest(".timeline") && [" ", "Enter", "Tab"].includes(event.key)) return;
-    if (target.matches?.("[type=range]") && event.key.startsWith("Arrow")) return;
+    if (target.matches?.(PRESSED) && !target.closest(".timeline") && [" ", "Enter", "Tab"].includes(event.key)) return;
+    if (target.matches?.("[type=range]") && (event.key.startsWith("Arrow") || ["Enter", "Tab"].includes(event.key))) return;
     if (name === "y" && ctrl && !event.shiftKey) return run(event, () => studio.redo());
     if (name === "e" && event.shiftKey && !ctrl) return run(event, () => studio.jump(-1));
     const symbol = event.key.length === 1 && !/[a-z ]/i.test(event.key);

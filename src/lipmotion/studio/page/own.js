@@ -7,7 +7,7 @@ import { OWN, filled } from "./strings.js";
 const FOLDER = "folder", LINES = "lines", MINUTE_S = 60;
 const percent = (share) => `${Math.round(100 * share)} %`;
 const figure = (value) => (value === null || value === undefined ? "–" : value.toFixed(2));
-const left = (left_s) => (left_s === null ? "" : left_s < MINUTE_S ? filled(OWN.leftSeconds, { count: Math.max(left_s, 1) })
+const left = (left_s) => (left_s === null ? "" : left_s === 0 ? OWN.leftLonger : left_s < MINUTE_S ? filled(OWN.leftSeconds, { count: left_s })
   : filled(OWN.leftMinutes, { count: Math.round(left_s / MINUTE_S) }));
 const paragraph = (textContent, more = {}) => made("p", { textContent, ...more });
 
@@ -88,13 +88,19 @@ class Own {
       this.bar = made("progress", { max: 1, "aria-label": OWN.progress });
       this.stage = made("p", { className: "hint" });
       replaced(this.job, title, this.bar, this.stage,
-        made("div", { className: "row" }, textButton(OWN.stop, () => this.send("training/stop"), { id: "own-stop" })), this.noted = made("div"));
+        made("div", { className: "row" }, textButton(OWN.stop, () => this.send("training/stop"), { id: "own-stop" })), this.noted = made("div"), ...this.earlier());
       this.notedCount = 0;
       return this.showProgress();
     }
     const again = textButton(OWN.again, () => this.send("training/again"), { id: "own-again", className: "main" });
     return replaced(this.job, title, job.error ? paragraph(job.error, { className: "warning" }) : null,
-      ...(job.report ? this.report(job) : [made("div", { className: "row" }, again)]), ...this.notes(job));
+      ...(job.report ? this.report(job) : [made("div", { className: "row" }, again)]), ...this.notes(job), ...this.earlier());
+  }
+
+  /** What was made before, and its report. */
+  earlier() {
+    return this.told.earlier.map((job) => made("details", {}, made("summary", { textContent: filled(OWN.states.done, { what: OWN.kinds[job.kind], name: job.name }) }),
+      ...this.report(job).filter(Boolean), ...this.notes(job)));
   }
 
   showProgress() {

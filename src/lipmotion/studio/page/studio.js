@@ -94,6 +94,9 @@ export class Studio {
   /** Say something in the status line. */
   say(text, kind = "") { this.store.set({ message: { text, kind } }); }
 
+  /** What was refused is told until something succeeds. */
+  succeed() { if (this.store.message.kind) this.say(""); }
+
   refuse(error) {
     if (error.name === "AbortError") return;
     this.say(error.status === 401 ? TEXT.noToken : error.message, "bad");
@@ -131,6 +134,7 @@ export class Studio {
     let pause_ms = CALM_MS;
     try {
       const { lines, revision, training } = await this.server.read("progress");
+      if (this.store.message.text === TEXT.noReply) this.succeed();
       this.store.set({ training });
       const before = this.store.lines.map(({ id, status }) => `${id} ${status}`).join();
       if (lines.length || revision !== this.store.project?.revision) {
@@ -160,6 +164,7 @@ export class Studio {
   /** Show another line. */
   async open(id, again = false) {
     if (id === this.store.lineId && !again) return;
+    if (!again) this.say("");
     this.player.stop();
     this.weights.forget();
     this.store.set({ lineId: id, line: null, sound: null, motion: null, deviation: null, confidence: null, weights: null, other: null, comparing: false, heads: "one", blind: null, doubts: [], selected: null, span: null, time_s: 0, progress: null });
@@ -266,6 +271,7 @@ export class Studio {
       if (state.status && state.status !== "ready") return this.open(id, true);
       this.take(state);
       const guessed = (state.guessed ?? []).map(({ word, phones }) => `${word} (${phones.join(" ")})`).join(", ");
+      this.succeed();
       if (guessed || done) this.say(guessed ? filled(TEXT.guessed, { words: guessed }) : done);
       this.store.set({ unsaved: false });
       this.askedAt = asked_ms;
@@ -289,7 +295,7 @@ export class Studio {
     const { selected, lines, span, line: before } = this.store, list = selected && line[`${selected.kind}s`];
     const was = selected && before?.[`${selected.kind}s`]?.[selected.index], is = list?.[selected.index];
     const follows = was && is && span && span.start_s === was.start_s && span.end_s === was.end_s;
-    const listed = lines.map((each) => (each.id === line.id ? { ...each, edits: line.steps.length, exported: each.exported === "yes" ? "changed" : each.exported } : each));
+    const listed = lines.map((each) => (each.id === line.id ? { ...each, edits: line.steps.length, edits_digest: line.edits_digest, exported: each.exported === "yes" ? "changed" : each.exported } : each));
     this.settleSoon(line);
     this.store.set({ line, lines: listed, ...(list && !is ? { selected: null } : {}),
       ...(follows ? { span: { start_s: is.start_s, end_s: is.end_s } } : {}) });
@@ -444,6 +450,7 @@ export class Studio {
   async understand(lines) {
     try {
       await this.server.told("understand", { lines });
+      this.succeed();
       await this.listed();
       this.wake();
     } catch (error) {
@@ -457,6 +464,7 @@ export class Studio {
     try {
       const changed = await this.server.told(`lines/${lineId}/mark`, { mark: line.mark === mark ? "none" : mark });
       this.store.set({ lines: this.store.lines.map((each) => (each.id === lineId ? changed : each)) });
+      this.succeed();
     } catch (error) {
       this.refuse(error);
     }
@@ -473,9 +481,11 @@ export class Studio {
 
   async add(dropped) {
     try {
-      const first = await added(dropped, this);
+      const first = await added(dropped, this), { message } = this.store;
       await this.listed();
-      if (first) await this.open(first.id);
+      const opened = first && this.open(first.id);
+      this.store.set({ message }); // what was not added is told with the new line, too
+      await opened;
     } catch (error) {
       this.refuse(error);
     }

@@ -1,7 +1,8 @@
 // The place of the face: a character in WebGL, or pictures of a drawn face, or a video of a span.
 
-import { choice, made, onDrag, textButton, iconButton } from "../dom.js";
+import { choice, made, onDrag, textButton } from "../dom.js";
 import { TEXT, filled } from "../strings.js";
+import { Film } from "./film.js";
 import { Head } from "./head.js";
 import { Recorded } from "./recorded.js";
 
@@ -21,14 +22,14 @@ export class Stage {
     this.solid = made("canvas", { className: "head", tabIndex: 0, role: "img", "aria-label": TEXT.faceLabel });
     this.ghost = made("canvas", { className: "ghost", hidden: true, "aria-hidden": "true" });
     this.drawn = made("canvas", { className: "drawn", width: 640, height: 640, hidden: true, role: "img", "aria-label": TEXT.faceLabel });
-    this.film = made("video", { controls: true, loop: true, hidden: true });
     this.note = made("p", { className: "note", hidden: true });
     this.views = made("div", { className: "views", role: "group", "aria-label": TEXT.show },
       ...Object.entries(TEXT.views).map(([name, text]) => textButton(text, () => this.head?.look(name))));
     this.faces = made("div", { className: "faces" });
-    this.filmButton = iconButton("film", TEXT.film, () => this.toggleFilm());
     this.recorded = new Recorded(place, studio);
-    place.append(this.solid, this.ghost, this.drawn, this.film, this.note, made("div", { className: "over" }, this.views, this.faces, this.recorded.button, this.filmButton));
+    place.append(this.solid, this.ghost, this.drawn);
+    this.film = new Film(place, this);
+    place.append(this.note, made("div", { className: "over" }, this.views, this.faces, this.recorded.button, this.film.button));
     onDrag(this.solid, {
       start: (event) => { this.from = [event.clientX, event.clientY]; },
       move: (event) => {
@@ -48,7 +49,6 @@ export class Stage {
     });
     new ResizeObserver(() => this.head?.draw()).observe(this.solid);
     this.store.on(["project", "face"], () => this.offer());
-    this.store.on(["face", "lineId"], () => this.leaveFilm());
     this.store.on(["face", "project", "mesh"], () => this.change());
     this.store.on(["weights", "time_s", "line", "other", "comparing", "heads"], () => this.show());
   }
@@ -77,8 +77,6 @@ export class Stage {
     }
     this.solid.hidden = this.views.hidden = !this.isSolid;
     this.drawn.hidden = this.isSolid || Boolean(this.form?.filmed);
-    if (this.form?.filmed) this.say(TEXT.filmed);
-    else if (this.note.textContent === TEXT.filmed) this.say("");
     const mesh = this.store.mesh || this.store.face;
     if (this.isSolid && this.loaded !== mesh) {
       this.loaded = mesh;
@@ -132,30 +130,5 @@ export class Stage {
       this.wanted = false;
       this.picture();
     }
-  }
-
-  async toggleFilm() {
-    if (!this.film.hidden) return this.leaveFilm();
-    const { span, lineId, face } = this.store;
-    const { start_s, end_s } = span ?? { start_s: 0, end_s: this.studio.player.duration_s };
-    this.say(TEXT.filmMaking);
-    try {
-      const reply = await this.studio.server.send(`lines/${lineId}/video`, { start_s, end_s, face });
-      this.film.src = URL.createObjectURL(await reply.blob());
-      this.film.hidden = false;
-      this.filmButton.title = TEXT.backToFace;
-      this.say("");
-      await this.film.play().catch(() => {});
-    } catch (error) {
-      this.say(error.message);
-    }
-  }
-
-  leaveFilm() {
-    if (this.film.hidden) return;
-    this.film.pause();
-    this.film.hidden = true;
-    this.filmButton.title = TEXT.film;
-    URL.revokeObjectURL(this.film.src);
   }
 }

@@ -132,7 +132,7 @@ function moodPart(studio) {
   const known = ["neutral", ...project.forms.moods, "plain", ...project.forms.manners].map((each) => [each, each]);
   const moods = choice(known, "happy", () => {}, { id: "mood", "aria-label": TEXT.mood });
   const set = () => studio.edit([say.mood(PLAIN.includes(moods.value) ? moods.value : `${moods.value}:${strength.value}`, studio.store.time_s)]);
-  return section(TEXT.moodAt, row(moods, strength, textButton(TEXT.set, set, { id: "mood-set" })));
+  return section(TEXT.moodAt, row(moods, strength, textButton(TEXT.apply, set, { id: "mood-set" })));
 }
 
 function transcriptPart(studio) {

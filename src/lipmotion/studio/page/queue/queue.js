@@ -15,6 +15,10 @@ const ORDERS = {
 /** Return a name without its ending. */
 const shortName = (name) => name.replace(/\.[a-z0-9]{2,4}$/i, "");
 
+/** Return what a line was edited after: that it was approved, or exported; empty: it was not. */
+const editedSince = ({ mark, marked, edits_digest, exported }) => [mark === "approved" && marked && marked !== edits_digest && TEXT.editedSince.approved,
+  exported === "changed" && TEXT.editedSince.exported].filter(Boolean).join(", ");
+
 export class Queue {
   /**
    * @param {HTMLElement} place
@@ -58,7 +62,7 @@ export class Queue {
 
   sort() {
     const words = this.filter.value.toLowerCase().split(/\s+/).filter(Boolean);
-    const texts = (line) => `${line.name} ${TEXT.states[line.status]} ${TEXT.marks[line.mark]} ${line.error ?? ""}`.toLowerCase();
+    const texts = (line) => `${line.name} ${TEXT.states[line.status]} ${TEXT.marks[line.mark]} ${editedSince(line)} ${line.error ?? ""}`.toLowerCase();
     this.lines = this.store.lines.filter((line) => words.every((word) => texts(line).includes(word)));
     if (ORDERS[this.order]) this.lines.sort(ORDERS[this.order]);
     const approved = this.store.lines.filter(({ mark }) => mark === "approved").length;
@@ -101,9 +105,10 @@ export class Queue {
     doubt.style.setProperty("--share", String(Math.min((line.doubt ?? 0) / DOUBT_FULL, 1)));
     const mark = made("span", { className: `mark ${line.mark}`, title: TEXT.marks[line.mark] });
     if (line.mark !== "none") mark.append(icon(line.mark === "approved" ? "check" : "again"));
-    const edits = made("span", { className: line.edits ? "edits" : "", textContent: line.edits || "", title: line.edits ? `${line.edits} edits` : "" });
+    const since = editedSince(line), shown = since ? `${line.edits} *` : line.edits || "";
+    const edits = made("span", { className: shown ? "edits" : "", textContent: shown, title: [shown && `${line.edits} edits`, since].filter(Boolean).join(", ") });
     const length = line.duration_s ? clock(line.duration_s, 0) : "";
-    const row = made("div", { className: `line ${line.status}`, id: `line-${line.id}`, role: "option", title: line.error || line.name,
+    const row = made("div", { className: `line ${line.status}`, id: `line-${line.id}`, role: "option", title: line.error || [line.name, since].filter(Boolean).join(", "),
       "aria-selected": line.id === this.store.lineId, "aria-posinset": place + 1, "aria-setsize": this.lines.length },
     made("span", { className: "state", title: TEXT.states[line.status] }), made("span", { className: "name", textContent: shortName(line.name) }),
     edits, doubt, made("span", { className: "length", textContent: length }), mark);

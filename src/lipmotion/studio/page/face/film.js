@@ -1,0 +1,104 @@
+// A video of a stretch of the line in the place of the face; a filmed face is shown as such a video alone.
+
+import { iconButton, made } from "../dom.js";
+import { TEXT } from "../strings.js";
+import { Following } from "./following.js";
+
+/** The longest video that the server makes. */
+const MOST_S = 60;
+
+export class Film extends Following {
+  /**
+   * @param {HTMLElement} place
+   * @param {import("./stage.js").Stage} stage
+   */
+  constructor(place, stage) {
+    super(made("video", { className: "film", muted: true, playsInline: true, preload: "auto", hidden: true, "aria-label": TEXT.film }), stage.store);
+    this.stage = stage;
+    this.number = 0; // of the video that was asked for last: others that come are dropped
+    /** @type {{lineId: string, face: string, digest: string, start_s: number, end_s: number} | null} */ this.shown = null; // what it is a video of
+    this.tried = ""; // line and filmed face of which one was made by itself
+    this.told = false; // whether the note is of this
+    this.button = iconButton("film", TEXT.film, () => this.toggle(), { id: "film", "aria-pressed": "false" });
+    this.video.addEventListener("loadedmetadata", () => this.follow());
+    place.append(this.video);
+    this.store.on(["project", "face", "lineId", "line", "span"], () => this.check());
+  }
+
+  get begins_s() { return -(this.shown?.start_s ?? 0); }
+
+  get isFilmed() { return Boolean(this.stage.form?.filmed); }
+
+  /** What a video is made of now: the selection, or the line, as far as videos go. */
+  get wanted() {
+    const { lineId, face, line, span } = this.store, { start_s, end_s } = span ?? { start_s: 0, end_s: this.stage.studio.player.duration_s };
+    return { lineId, face, digest: line?.edits_digest ?? "", start_s, end_s: Math.min(end_s, start_s + MOST_S) };
+  }
+
+  /** Whether the video shows the stretch as it is now, and perhaps more. */
+  get isNew() {
+    const { shown, wanted } = this;
+    return shown.digest === wanted.digest && shown.start_s <= wanted.start_s && shown.end_s >= wanted.end_s;
+  }
+
+  say(text) {
+    if (text || this.told) this.stage.say(text);
+    this.told = Boolean(text);
+  }
+
+  /** Leave a video that shows something else by now; of a filmed face, make one where there is none, and tell of an old one. */
+  check() {
+    const { lineId, face, line } = this.store, { shown, isFilmed } = this;
+    if (shown && (shown.lineId !== lineId || shown.face !== face || !line)) this.leave();
+    else if (shown && !isFilmed && !this.isNew) this.leave();
+    else if (shown) this.say(this.isNew ? "" : TEXT.filmOld);
+    if (!isFilmed) {
+      if (this.tried) this.leave();
+    } else if (line?.status === "ready" && !this.shown && this.tried !== `${lineId} ${face}`) {
+      this.tried = `${lineId} ${face}`;
+      this.make();
+    }
+  }
+
+  toggle() { return this.shown && !this.isFilmed ? this.leave() : this.make(); }
+
+  async make() {
+    const { wanted, stage: { studio } } = this, { lineId, start_s, end_s, face } = wanted, number = this.number += 1;
+    this.say(TEXT.filmMaking);
+    try {
+      const film = await (await studio.server.send(`lines/${lineId}/video`, { start_s, end_s, face })).blob();
+      if (number === this.number) this.show(wanted, film);
+    } catch (error) {
+      if (number === this.number) this.say(error.message);
+    }
+  }
+
+  show(shown, film) {
+    URL.revokeObjectURL(this.video.src);
+    this.video.src = URL.createObjectURL(film);
+    this.shown = shown;
+    this.turn();
+    this.say("");
+    this.check();
+  }
+
+  leave() {
+    this.number += 1;
+    this.shown = null;
+    this.tried = "";
+    this.video.pause();
+    URL.revokeObjectURL(this.video.src);
+    this.video.removeAttribute("src");
+    this.turn();
+    this.say("");
+  }
+
+  /** The button says what it does: a filmed face has no other face to go back to. */
+  turn() {
+    const back = Boolean(this.shown) && !this.isFilmed;
+    this.video.hidden = !this.shown;
+    this.button.title = back ? TEXT.backToFace : TEXT.film;
+    this.button.setAttribute("aria-label", this.button.title);
+    this.button.setAttribute("aria-pressed", String(back));
+  }
+}
