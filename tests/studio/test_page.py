@@ -211,12 +211,30 @@ def test_sound_and_face_are_in_step(page: Page) -> None:
         };"""
     )
     page.window.run("studio.store.set({ looping: true, span: { start_s: 0.2, end_s: 2 } })")  # it never ends by itself
+    for speed in (0.5, 1):  # after a click the keys are those of the page
+        page.window.click("#half")
+        assert page.of("studio.store.speed") == speed
     page.window.press(SPACE)
     wait_until(lambda: page.of("window.offsets.length") > 5, LIMIT_S)
     page.window.press(SPACE)
     assert page.of("studio.player.audio.paused")
     page.window.run("studio.store.set({ looping: false, span: null })")
     assert max(map(abs, page.of("window.offsets"))) <= FRAME_S
+    page.window.run("document.getElementById('half').focus()")
+    for speed in (0.5, 1):  # as one comes there by Tab: it is pressed
+        page.window.press(SPACE)
+        assert page.of("[studio.store.speed, studio.store.playing]") == [speed, False]
+
+
+def test_what_was_refused_is_told_until_something_succeeds(page: Page) -> None:
+    page.window.run("studio.store.set({ selected: null })")
+    page.window.press("s")
+    wait_until(lambda: "phone first" in page.window.text("#message"), LIMIT_S)
+    page.window.press("a")
+    wait_until(lambda: page.of("studio.store.lines[0].mark") == "approved", LIMIT_S)
+    assert page.window.text("#message") == ""
+    page.window.press("a")
+    wait_until(lambda: page.of("studio.store.lines[0].mark") == "none", LIMIT_S)
 
 
 def test_an_edit_waits_for_a_border_that_is_on_its_way(page: Page) -> None:
