@@ -488,11 +488,13 @@ def test_the_real_video_beside_and_comparisons(opens: Opens, tmp_path: Path, fil
         assert {side.model for side in vote.shown} == {sha256_of(path) for path in (other, shipped_path())}
         is_other, told = vote.shown[0].model == sha256_of(other), window.text("#blind-told")
         assert (f"{other.stem} ({sha256_of(other)[:8]})" in told.partition(", B was")[0]) == is_other
-        window.run("studio.store.set({ face: 'toy', mesh: '' })")
+        window.click("#film")
         wait_until(lambda: page.of("document.querySelector('#stage .film').readyState") >= 2, LIMIT_S)
         window.run("studio.player.seek(0.7)")  # the video is that of the selection, from 0.5 s on
         wait_until(lambda: abs(page.of("document.querySelector('#stage .film').currentTime") - 0.2) < 1 / 25, LIMIT_S)
         window.run("studio.store.set({ span: { start_s: 1, end_s: 1.2 } })")
-        wait_until(lambda: "anew" in window.text("#stage .note"), LIMIT_S)
+        wait_until(lambda: page.of("document.querySelector('#stage .film').hidden"), LIMIT_S)
+        window.run("studio.store.set({ face: 'toy', mesh: '' })")  # its video is asked for, of another model's channels
+        wait_until(lambda: "the face: its motion" in window.text("#stage .note"), LIMIT_S)
         check_screen(window, "filmed", 1440, "light")
         assert [each for each in window.problems() if each.startswith("SEVERE") and "favicon" not in each] == []
