@@ -243,12 +243,30 @@ def test_sound_and_face_are_in_step(page: Page) -> None:
         };"""
     )
     page.window.run("studio.store.set({ looping: true, span: { start_s: 0.2, end_s: 2 } })")  # it never ends by itself
+    for speed in (0.5, 1):  # after a click the keys are those of the page
+        page.window.click("#half")
+        assert page.of("studio.store.speed") == speed
     page.window.press(SPACE)
     wait_until(lambda: page.of("window.offsets.length") > 5, LIMIT_S)
     page.window.press(SPACE)
     assert page.of("studio.player.audio.paused")
     page.window.run("studio.store.set({ looping: false, span: null })")
     assert max(map(abs, page.of("window.offsets"))) <= FRAME_S
+    page.window.run("document.getElementById('half').focus()")
+    for speed in (0.5, 1):  # as one comes there by Tab: it is pressed
+        page.window.press(SPACE)
+        assert page.of("[studio.store.speed, studio.store.playing]") == [speed, False]
+
+
+def test_what_was_refused_is_told_until_something_succeeds(page: Page) -> None:
+    page.window.run("studio.store.set({ selected: null })")
+    page.window.press("s")
+    wait_until(lambda: "phone first" in page.window.text("#message"), LIMIT_S)
+    page.window.press("a")
+    wait_until(lambda: page.of("studio.store.lines[0].mark") == "approved", LIMIT_S)
+    assert page.window.text("#message") == ""
+    page.window.press("a")
+    wait_until(lambda: page.of("studio.store.lines[0].mark") == "none", LIMIT_S)
 
 
 def test_an_edit_waits_for_a_border_that_is_on_its_way(page: Page) -> None:
@@ -510,11 +528,13 @@ def test_the_real_video_beside_and_comparisons(opens: Opens, tmp_path: Path, fil
         assert {side.model for side in vote.shown} == {sha256_of(path) for path in (other, shipped_path())}
         is_other, told = vote.shown[0].model == sha256_of(other), window.text("#blind-told")
         assert (f"{other.stem} ({sha256_of(other)[:8]})" in told.partition(", B was")[0]) == is_other
-        window.run("studio.store.set({ face: 'toy', mesh: '' })")
+        window.click("#film")
         wait_until(lambda: page.of("document.querySelector('#stage .film').readyState") >= 2, LIMIT_S)
         window.run("studio.player.seek(0.7)")  # the video is that of the selection, from 0.5 s on
         wait_until(lambda: abs(page.of("document.querySelector('#stage .film').currentTime") - 0.2) < 1 / 25, LIMIT_S)
         window.run("studio.store.set({ span: { start_s: 1, end_s: 1.2 } })")
-        wait_until(lambda: "anew" in window.text("#stage .note"), LIMIT_S)
+        wait_until(lambda: page.of("document.querySelector('#stage .film').hidden"), LIMIT_S)
+        window.run("studio.store.set({ face: 'toy', mesh: '' })")  # its video is asked for, of another model's channels
+        wait_until(lambda: "the face: its motion" in window.text("#stage .note"), LIMIT_S)
         check_screen(window, "filmed", 1440, "light")
         assert [each for each in window.problems() if each.startswith("SEVERE") and "favicon" not in each] == []

@@ -6,6 +6,8 @@ import { Following } from "./following.js";
 
 /** The longest video that the server makes. */
 const MOST_S = 60;
+/** How long a video that is made by itself waits for what else is asked of the line. */
+const SOON_MS = 500;
 
 export class Film extends Following {
   /**
@@ -22,7 +24,7 @@ export class Film extends Following {
     this.button = iconButton("film", TEXT.film, () => this.toggle(), { id: "film", "aria-pressed": "false" });
     this.video.addEventListener("loadedmetadata", () => this.follow());
     place.append(this.video);
-    this.store.on(["project", "face", "lineId", "line", "span"], () => this.check());
+    this.store.on(["project", "face", "lineId", "line", "motion", "span"], () => this.check());
   }
 
   get begins_s() { return -(this.shown?.start_s ?? 0); }
@@ -48,26 +50,33 @@ export class Film extends Following {
 
   /** Leave a video that shows something else by now; of a filmed face, make one where there is none, and tell of an old one. */
   check() {
-    const { lineId, face, line } = this.store, { shown, isFilmed } = this;
+    const { lineId, face, line, motion } = this.store, { shown, isFilmed } = this;
     if (shown && (shown.lineId !== lineId || shown.face !== face || !line)) this.leave();
     else if (shown && !isFilmed && !this.isNew) this.leave();
     else if (shown) this.say(this.isNew ? "" : TEXT.filmOld);
     if (!isFilmed) {
       if (this.tried) this.leave();
-    } else if (line?.status === "ready" && !this.shown && this.tried !== `${lineId} ${face}`) {
+    } else if (line?.status === "ready" && motion && !this.shown && this.tried !== `${lineId} ${face}`) {
       this.tried = `${lineId} ${face}`;
-      this.make();
+      this.say(TEXT.filmMaking);
+      clearTimeout(this.soon);
+      this.soon = setTimeout(() => this.make(), SOON_MS);
     }
   }
 
   toggle() { return this.shown && !this.isFilmed ? this.leave() : this.make(); }
 
   async make() {
+    clearTimeout(this.soon);
+    if (this.store.line?.status !== "ready") return;
     const { wanted, stage: { studio } } = this, { lineId, start_s, end_s, face } = wanted, number = this.number += 1;
     this.say(TEXT.filmMaking);
     try {
       const film = await (await studio.server.send(`lines/${lineId}/video`, { start_s, end_s, face })).blob();
-      if (number === this.number) this.show(wanted, film);
+      const { lineId: lineNow, face: faceNow } = this.store;
+      if (number !== this.number) return;
+      if (lineNow === lineId && faceNow === face) this.show(wanted, film);
+      else this.say("");
     } catch (error) {
       if (number === this.number) this.say(error.message);
     }
@@ -83,6 +92,7 @@ export class Film extends Following {
   }
 
   leave() {
+    clearTimeout(this.soon);
     this.number += 1;
     this.shown = null;
     this.tried = "";
