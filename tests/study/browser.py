@@ -72,9 +72,19 @@ class Browser:
         self.command("POST", "/actions", {"actions": [{"type": "pointer", "id": "mouse", "actions": acts}]})
 
     def click(self, selector: str) -> None:
-        """Click an element, as a person does: it must be seen."""
-        found = self.command("POST", "/element", {"using": "css selector", "value": selector})
-        self.command("POST", f"/element/{found[ELEMENT]}/click", {})
+        """Click an element, as a person does: it must be seen. One that is drawn anew just then is looked for again."""
+
+        def clicked() -> bool:
+            found = self.command("POST", "/element", {"using": "css selector", "value": selector})
+            try:
+                self.command("POST", f"/element/{found[ELEMENT]}/click", {})
+            except AssertionError as error:
+                if "stale element" not in str(error):
+                    raise
+                return False
+            return True
+
+        wait_until(clicked, 60)
 
     def text(self, selector: str) -> str:
         """Return the text of an element, as it is seen; empty: it is hidden or not there."""
