@@ -101,7 +101,7 @@ class Page:
     def reload(self) -> None:
         """Load the page anew, and wait until its line is shown."""
         self.window.run("document.documentElement.dataset.old = 'yes'; location.reload()")
-        wait_until(lambda: not self.of("document.documentElement.dataset.old"), LIMIT_S)
+        wait_until(lambda: self.of("document.documentElement?.dataset.old === undefined"), LIMIT_S)
         self.ready()
 
     def wait_for_steps(self, count: int) -> None:

@@ -133,7 +133,7 @@ def with_held(generation: Generation, hold: Hold) -> Generation:
     return _blended(generation, _stretch(replace(generation, motion=still), weight))
 
 
-class Stretch(NamedTuple):
+class LockedStretch(NamedTuple):
     """Motion of N frames that takes the place of other motion.
 
     frames   : which these are, at 100 Hz
@@ -148,12 +148,12 @@ class Stretch(NamedTuple):
     variance: NDArray[np.floating[Any]]
 
 
-def locked_stretch(generation: Generation, start_s: float, end_s: float) -> Stretch:
+def locked_stretch(generation: Generation, start_s: float, end_s: float) -> LockedStretch:
     """Return what ``with_locked`` keeps of motion from ``start_s`` to ``end_s``, and beside this span."""
     return _stretch(generation, span_weight(generation.motion.time_s, start_s, end_s, LOCK_EDGE_S))
 
 
-def with_locked(generation: Generation, locked: Stretch) -> Generation:
+def with_locked(generation: Generation, locked: LockedStretch) -> Generation:
     """Return a generation that is another one in a locked span, and goes over to it beside the span.
 
     locked : of the same recording, with the same channels
@@ -161,14 +161,14 @@ def with_locked(generation: Generation, locked: Stretch) -> Generation:
     return _blended(generation, locked)
 
 
-def _stretch(generation: Generation, weight: Curve) -> Stretch:
+def _stretch(generation: Generation, weight: Curve) -> LockedStretch:
     """Return the motion where a weight [shape=(T,)] is not 0, which is in one span."""
     inside = np.flatnonzero(weight)
     frames = slice(inside[0], inside[-1] + 1) if len(inside) else slice(0)
-    return Stretch(frames, weight[frames, None], generation.motion.values[frames], generation.variance_of(frames))
+    return LockedStretch(frames, weight[frames, None], generation.motion.values[frames], generation.variance_of(frames))
 
 
-def _blended(first: Generation, other: Stretch) -> Generation:
+def _blended(first: Generation, other: LockedStretch) -> Generation:
     """Return a generation that goes over to other motion where its share is more than 0; also variances."""
     values, variance = first.motion.values.astype(np.float64), np.array(first.variance)
     for ours, theirs in ((values[other.frames], other.values), (variance[other.frames], other.variance)):

@@ -20,7 +20,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from lipmotion.articulation.curve_edits import (
-    Stretch,
+    LockedStretch,
     check_drawn,
     locked_stretch,
     pinned_frame,
@@ -201,7 +201,7 @@ class Session:
         self._aligned: _Kept[list[Span[Unit]]] = _Kept(ALIGNED)
         self._moved: _Kept[Generation] = _Kept()
         self._generated: _Kept[Generation] = _Kept()
-        self._locks: _Kept[Stretch] = _Kept(LOCKED)
+        self._locks: _Kept[LockedStretch] = _Kept(LOCKED)
         self._delivered: _Kept[Generation] = _Kept()
         self._faces: _Kept[DrawsSingly] = _Kept()
         self._drawn: _Kept[DrawnMotion[Any]] = _Kept()
@@ -392,10 +392,10 @@ class Session:
             generation = with_locked(generation, self._locked(steps[:place], lock, generation.motion.names))
         return generation
 
-    def _locked(self, before: tuple[Step, ...], lock: LockStep, names: tuple[str, ...]) -> Stretch:
+    def _locked(self, before: tuple[Step, ...], lock: LockStep, names: tuple[str, ...]) -> LockedStretch:
         """Return what a lock keeps: the motion after the edits before it, with the channels of these names."""
 
-        def stretch() -> Stretch:
+        def stretch() -> LockedStretch:
             generation = self._after(before)
             motion = with_gestures(generation.motion, generation.units, names)
             return locked_stretch(with_motion(generation, motion), lock.start_s, lock.end_s)

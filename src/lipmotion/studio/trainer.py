@@ -63,7 +63,7 @@ class Wanted:
 
 
 @dataclass(frozen=True)
-class Job:
+class TrainingJob:
     """What was asked for, and how it went."""
 
     wanted: Wanted
@@ -85,7 +85,7 @@ class Trainer:
         self._file = folder.path / TRAINING / STATE
         self._wanted: Wanted | None = None
         self._told: dict[str, Any] = {}
-        self._made: dict[str, Job] = {}
+        self._made: dict[str, TrainingJob] = {}
         self._read()
         self._process: BaseProcess | None = None
         self._thread: threading.Thread | None = None
@@ -245,7 +245,7 @@ class Trainer:
             elif "report" in told:
                 self._told |= {"state": DONE, "share": 1.0, "report": {**told["report"], "file": self._made_file()}}
                 if self._wanted:
-                    self._made[self._wanted.kind] = Job(self._wanted, self._told)
+                    self._made[self._wanted.kind] = TrainingJob(self._wanted, self._told)
             elif "error" in told and self.is_working:
                 self._told |= {"state": FAILED, "error": told["error"]}
             elif "warning" in told:
@@ -292,7 +292,7 @@ class Trainer:
         self._made = {job.wanted.kind: job for job in (*made, last) if job.told["state"] == DONE}
 
 
-def _job(found: Mapping[str, Any]) -> Job:
+def _job(found: Mapping[str, Any]) -> TrainingJob:
     """Return what a file says of something that was made. Raises InputError and others: it cannot be understood."""
     given, told = found["wanted"], found["told"]
     wanted = Wanted(given["kind"], plain_name(given["name"]), tuple(map(int, given["lines"])), given["options"])
@@ -300,7 +300,7 @@ def _job(found: Mapping[str, Any]) -> Job:
     if wanted.kind not in KINDS or told["state"] not in (WORKING, DONE, FAILED, STOPPED, INTERRUPTED):
         raise ValueError("of another kind, or in another state")
     state = INTERRUPTED if told["state"] == WORKING else told["state"]
-    return Job(wanted, {**_nothing_told(), **told, "state": state})
+    return TrainingJob(wanted, {**_nothing_told(), **told, "state": state})
 
 
 def _numbered(name: str, number: int) -> str:
