@@ -129,7 +129,7 @@ class Editor:
             status, reply = server.ask("/api/lines/1/undo", {"revision": state["revision"]})
         else:
             step = random_edit(self._chance, state)
-            self.sent = [*state["steps"], step]
+            self.sent = [*state["steps"], str(step_of(step))]  # as it is written
             status, reply = server.ask("/api/lines/1/edits", {"revision": state["revision"], "steps": [step]})
         if status == 200:
             self.steps = reply["steps"]
