@@ -37,7 +37,7 @@ def test_hostile_requests_get_no_file_and_leave_no_traceback(line: Path, toy_mod
     errors = tmp_path / "errors.txt"
     with served(line, errors, toy_model_file) as server:
         server.ready()
-        statuses = attacked(server, line.parent, 300)
+        statuses = attacked(server, line.parent, 500)
         assert server.ready()["steps"] == [] or server.ready()["undo"] > 0
         server.process.terminate()
         assert server.process.wait(60) == 143
