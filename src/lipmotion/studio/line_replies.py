@@ -132,8 +132,9 @@ class LineReplies:
         revision, name = whole(content, "revision"), text(content, "version")
 
         def back(line: OpenLine) -> Changed:
-            steps, now = self._studio.folder.line(number).version(name).steps, line.file.edits.sentences
-            changed = line.back_to(revision, steps)
+            known, now = self._studio.folder.line(number), line.file.edits.sentences
+            known.with_version(now)  # refuses one too many before anything has changed
+            changed = line.back_to(revision, known.version(name).steps)
             self._studio.folder.change_line(number, lambda line: line.with_version(now))
             return changed
 
