@@ -121,7 +121,7 @@ def with_gain(generation: Generation, gain: Gain) -> Generation:
     motion = generation.motion
     weight = span_weight(motion.time_s, gain.start_s, gain.end_s, GAIN_EDGE_S)
     larger = intensified(generation, gain.factor)
-    return _blended(generation, _stretch(larger, weight))
+    return with_stretch(generation, _stretch(larger, weight))
 
 
 def with_held(generation: Generation, hold: Hold) -> Generation:
@@ -130,10 +130,10 @@ def with_held(generation: Generation, hold: Hold) -> Generation:
     frame = min(round(hold.start_s * motion.rate_hz), len(motion.values) - 1)
     still = replace(motion, values=np.broadcast_to(motion.values[frame], motion.values.shape))
     weight = span_weight(motion.time_s, hold.start_s, hold.end_s, LOCK_EDGE_S)
-    return _blended(generation, _stretch(replace(generation, motion=still), weight))
+    return with_stretch(generation, _stretch(replace(generation, motion=still), weight))
 
 
-class LockedStretch(NamedTuple):
+class MotionStretch(NamedTuple):
     """Motion of N frames that takes the place of other motion.
 
     frames   : which these are, at 100 Hz
@@ -148,28 +148,23 @@ class LockedStretch(NamedTuple):
     variance: NDArray[np.floating[Any]]
 
 
-def locked_stretch(generation: Generation, start_s: float, end_s: float) -> LockedStretch:
-    """Return what ``with_locked`` keeps of motion from ``start_s`` to ``end_s``, and beside this span."""
+def locked_stretch(generation: Generation, start_s: float, end_s: float) -> MotionStretch:
+    """Return what a lock keeps of motion from ``start_s`` to ``end_s``, and beside this span."""
     return _stretch(generation, span_weight(generation.motion.time_s, start_s, end_s, LOCK_EDGE_S))
 
 
-def with_locked(generation: Generation, locked: LockedStretch) -> Generation:
-    """Return a generation that is another one in a locked span, and goes over to it beside the span.
-
-    locked : of the same recording, with the same channels
-    """
-    return _blended(generation, locked)
-
-
-def _stretch(generation: Generation, weight: Curve) -> LockedStretch:
+def _stretch(generation: Generation, weight: Curve) -> MotionStretch:
     """Return the motion where a weight [shape=(T,)] is not 0, which is in one span."""
     inside = np.flatnonzero(weight)
     frames = slice(inside[0], inside[-1] + 1) if len(inside) else slice(0)
-    return LockedStretch(frames, weight[frames, None], generation.motion.values[frames], generation.variance_of(frames))
+    return MotionStretch(frames, weight[frames, None], generation.motion.values[frames], generation.variance_of(frames))
 
 
-def _blended(first: Generation, other: LockedStretch) -> Generation:
-    """Return a generation that goes over to other motion where its share is more than 0; also variances."""
+def with_stretch(first: Generation, other: MotionStretch) -> Generation:
+    """Return a generation that goes over to other motion where its share is more than 0; also variances.
+
+    other : of the same recording, with the same channels
+    """
     values, variance = first.motion.values.astype(np.float64), np.array(first.variance)
     for ours, theirs in ((values[other.frames], other.values), (variance[other.frames], other.variance)):
         ours[:] = np.where(other.share == 1, theirs, ours + other.share * (theirs - ours))

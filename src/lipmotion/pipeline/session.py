@@ -20,14 +20,14 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from lipmotion.articulation.curve_edits import (
-    LockedStretch,
+    MotionStretch,
     check_drawn,
     locked_stretch,
     pinned_frame,
     with_edited_curves,
     with_gain,
     with_held,
-    with_locked,
+    with_stretch,
 )
 from lipmotion.articulation.pauses import with_pauses
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
@@ -201,7 +201,7 @@ class Session:
         self._aligned: _Kept[list[Span[Unit]]] = _Kept(ALIGNED)
         self._moved: _Kept[Generation] = _Kept()
         self._generated: _Kept[Generation] = _Kept()
-        self._locks: _Kept[LockedStretch] = _Kept(LOCKED)
+        self._locks: _Kept[MotionStretch] = _Kept(LOCKED)
         self._delivered: _Kept[Generation] = _Kept()
         self._faces: _Kept[DrawsSingly] = _Kept()
         self._drawn: _Kept[DrawnMotion[Any]] = _Kept()
@@ -389,13 +389,13 @@ class Session:
             for later in steps[place + 1 :]:
                 if isinstance(later, CurveStep) and lock.holds(later.edit):
                     raise InputError(f"{str(later)!r} lies in what is locked ({str(lock)!r}); take the lock out first")
-            generation = with_locked(generation, self._locked(steps[:place], lock, generation.motion.names))
+            generation = with_stretch(generation, self._locked(steps[:place], lock, generation.motion.names))
         return generation
 
-    def _locked(self, before: tuple[Step, ...], lock: LockStep, names: tuple[str, ...]) -> LockedStretch:
+    def _locked(self, before: tuple[Step, ...], lock: LockStep, names: tuple[str, ...]) -> MotionStretch:
         """Return what a lock keeps: the motion after the edits before it, with the channels of these names."""
 
-        def stretch() -> LockedStretch:
+        def stretch() -> MotionStretch:
             generation = self._after(before)
             motion = with_gestures(generation.motion, generation.units, names)
             return locked_stretch(with_motion(generation, motion), lock.start_s, lock.end_s)
