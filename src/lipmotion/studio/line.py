@@ -205,12 +205,12 @@ class OpenLine:
         }
 
     def numbers(self, of: str) -> Motion:
-        """Return the numbers of a kind: ``motion``, ``delivered``, ``deviation`` or ``confidence``."""
+        """Return the numbers of a kind: ``motion``, ``delivered``, ``variance`` or ``confidence``."""
         generation = self.generation
         if of == "delivered":
             return self._delivered
-        if of == "deviation":
-            return replace(generation.motion, values=np.sqrt(np.maximum(generation.variance, 0)))
+        if of == "variance":
+            return replace(generation.motion, values=generation.variance)
         if of == "confidence":
             return Motion(confidence_of(generation)[:, None], generation.motion.rate_hz, CONFIDENCE)
         return generation.motion

@@ -150,11 +150,14 @@ class LineReplies:
         by, number = text(query, "by", ""), self._number(request)
 
         def found(line: OpenLine) -> Response:
-            motion = self._studio.line_as(number, line, by).numbers(of)
+            motion = self._studio.line_as(number, line, by).numbers("variance" if of == "deviation" else of)
             if names is not None:
                 motion = _only(motion, [name for name in names if name in motion.names] if by else names)
             frames = stretch(query, motion.rate_hz, len(motion.values))
-            return _numbers(replace(motion, values=motion.values[frames]), frames.start, {})
+            values = motion.values[frames]
+            if of == "deviation":
+                values = np.sqrt(np.maximum(values, 0))
+            return _numbers(replace(motion, values=values), frames.start, {})
 
         return await self._desk.at(number, found)
 

@@ -108,7 +108,8 @@ def minnis2000(
     models : folder of the model ``selection.lipmotion`` (``models.engine_models``), so that a second run does not train
              again; None: it is trained and not kept
     quick  : train for few epochs; the model is not kept
-    work   : a folder for finished rows, from which the same call goes on after a stop; None: none
+    work   : a folder for finished rows, and for the model if ``models`` is None, from which the same call goes on
+             after a stop; None: none
     All rows use one model, with the default's inventory, guide and phone recogniser, of which each takes what it needs:
     the row as printed is what ``train --preset minnis2000`` makes (tests/experiments/minnis_breen2000).
     Raises CorpusError: no utterances to train on or of ``test``, or motion without an opening.
@@ -120,7 +121,8 @@ def minnis2000(
         check_training_names(corpus, corpus.required("train"), held_out)
     monitor = settings.monitor
     training = replace(settings, monitor=sub_monitor(monitor, 0, 0.6))
-    trained = _quick_model(corpus, training) if quick else engine_models(corpus, models, training, [ENGINE])[ENGINE]
+    kept_in = models or (work and work / "model")
+    trained = _quick_model(corpus, training) if quick else engine_models(corpus, kept_in, training, [ENGINE])[ENGINE]
     found = {}
     for number, (split, names) in enumerate(lists.items()):
         start, stop = (0.6 + 0.4 * (number + step) / len(lists) for step in (0, 1))

@@ -1,6 +1,7 @@
 // The studio: one page over the lines of a project. What it shows comes from the server; what it changes are sentences.
 
 import { showExport, showKeys } from "./dialogs.js";
+import { WhenCalm } from "./calm.js";
 import { bothButton, icon, iconButton, made, textButton } from "./dom.js";
 import { Comparison } from "./compare/comparison.js";
 import { Stage } from "./face/stage.js";
@@ -20,7 +21,7 @@ import { OWN, TEXT, filled } from "./strings.js";
 import { Timeline } from "./timeline/timeline.js";
 import { Transport } from "./transport.js";
 
-const PAGE_OF_LINES = 1000, POLL_MS = 300, DOUBTFUL = 0.7, MOST_DOUBTS = 12, CALM_MS = 5000, OWN_MS = 1000, NUDGE_MS = 250, SETTLE_MS = 1500;
+const PAGE_OF_LINES = 1000, POLL_MS = 300, DOUBTFUL = 0.7, MOST_DOUBTS = 12, CALM_MS = 5000, OWN_MS = 1000, NUDGE_MS = 250;
 /** Of a line that is not ready. */
 const NOTHING = { words: [], phones: [], channels: [], steps: [], undo: 0, redo: 0 };
 
@@ -29,6 +30,7 @@ export class Studio {
     this.server = new Server(location.hash.slice(1));
     this.store = new Store();
     this.player = new Player(this.store);
+    this.settling = new WhenCalm(this.store, () => this.settle());
     /** @type {Promise<any>} */ this.edits = Promise.resolve();
     this.left = false; // whether tabulators go on past the timeline
     this.askedAt = this.editedAt = 0; // when the edit was asked for whose motion is on its way, or is shown next
@@ -172,7 +174,7 @@ export class Studio {
       const line = { ...NOTHING, ...(await this.server.read(`lines/${id}`)) };
       if (id !== this.store.lineId) return;
       if (line.status !== "ready") this.wake();
-      this.settleSoon(line);
+      this.settleLater(line);
       this.store.set({ line });
       const sound = this.server.bytes(`lines/${id}/sound.wav`).then((buffer) => {
         if (id !== this.store.lineId) return;
@@ -241,14 +243,18 @@ export class Studio {
   }
 
   /** After edits of a long line, which moved the mouth around them alone, let the whole motion be made. */
-  settleSoon({ id, settled }) {
-    clearTimeout(this.settling);
-    if (settled !== false) return;
-    this.settling = setTimeout(() => { this.edits = this.edits.then(() => this.requested(id, "settle", {}, "")).catch(() => {}); }, SETTLE_MS);
+  settleLater({ settled }) {
+    if (settled === false) this.settling.want();
+    else this.settling.drop();
+  }
+
+  settle() {
+    const id = this.store.lineId;
+    this.edits = this.edits.then(() => this.requested(id, "settle", {}, "")).catch(() => {});
   }
 
   request(kind, content, done) {
-    clearTimeout(this.settling);
+    this.settling.drop();
     const id = this.store.lineId, { phones } = this.timeline;
     phones.drop();
     const reply = this.sending(Promise.all([phones.settled, this.edits]).then(() => this.requested(id, kind, content, done)));
@@ -296,7 +302,7 @@ export class Studio {
     const was = selected && before?.[`${selected.kind}s`]?.[selected.index], is = list?.[selected.index];
     const follows = was && is && span && span.start_s === was.start_s && span.end_s === was.end_s;
     const listed = lines.map((each) => (each.id === line.id ? { ...each, edits: line.steps.length, edits_digest: line.edits_digest, exported: each.exported === "yes" ? "changed" : each.exported } : each));
-    this.settleSoon(line);
+    this.settleLater(line);
     this.store.set({ line, lines: listed, ...(list && !is ? { selected: null } : {}),
       ...(follows ? { span: { start_s: is.start_s, end_s: is.end_s } } : {}) });
   }

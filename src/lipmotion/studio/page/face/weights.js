@@ -1,8 +1,10 @@
 // The weights of the face, portion by portion: first where the playhead is, so that the face follows an edit at once.
 
+import { WhenCalm } from "../calm.js";
 import { Curves } from "../curves.js";
 
-const PORTION_S = 0.5, AT_ONCE = 8, AHEAD = 20, SHORT_S = 20, IDLE_MS = 1500;
+/** Few portions at once: an edit waits until the server has made them. */
+const PORTION_S = 0.5, AT_ONCE = 2, PLAYED_AHEAD = 20, AHEAD = 2, SHORT_S = 20;
 
 export class Weights {
   /** @param {import("../studio.js").Studio} studio */
@@ -13,6 +15,7 @@ export class Weights {
     this.held = null; // which portions are known
     this.running = false;
     this.exact = false; // whether all are those of the exported file
+    this.settling = new WhenCalm(this.store, () => this.settle());
     this.store.on(["time_s"], () => this.look());
   }
 
@@ -21,13 +24,14 @@ export class Weights {
     this.number += 1;
     this.held = null;
     this.exact = false;
+    this.settling.drop();
   }
 
   /** Read again what has changed; null: all. */
   change(span) {
     this.number += 1;
     this.exact = false;
-    clearTimeout(this.idle);
+    this.settling.drop();
     if (!this.held || !span) this.held = null;
     else this.held.fill(0, this.portion(span.start_s), this.portion(span.end_s) + 1);
     return this.look();
@@ -42,9 +46,9 @@ export class Weights {
 
   /** The next portions to ask for: the one at the playhead alone, then what follows; of a short line all. */
   next() {
-    const { line, time_s } = this.store, count = Math.max(Math.ceil(line.duration_s / PORTION_S), 1);
+    const { line, time_s, playing } = this.store, ahead = playing ? PLAYED_AHEAD : AHEAD, count = Math.max(Math.ceil(line.duration_s / PORTION_S), 1);
     this.held ??= new Uint8Array(count);
-    const here = Math.min(this.portion(time_s), count - 1), last = line.duration_s <= SHORT_S ? count : Math.min(here + AHEAD, count);
+    const here = Math.min(this.portion(time_s), count - 1), last = line.duration_s <= SHORT_S ? count : Math.min(here + ahead, count);
     if (!this.held[here]) return [here, here + 1];
     let first = this.held.indexOf(0, here);
     if (first < 0 || first >= last) first = line.duration_s <= SHORT_S ? this.held.indexOf(0) : -1;
@@ -63,7 +67,7 @@ export class Weights {
       this.studio.refuse(error);
     }
     this.running = false;
-    if (this.store.line?.status === "ready" && !this.exact && this.store.line.duration_s <= SHORT_S) this.idle = setTimeout(() => this.settle(), IDLE_MS);
+    if (this.store.line?.status === "ready" && !this.exact && this.store.line.duration_s <= SHORT_S) this.settling.want();
   }
 
   address() { return `lines/${this.store.lineId}/weights?face=${encodeURIComponent(this.store.face)}`; }

@@ -15,8 +15,10 @@ export function cleared(canvas, width, height) {
   return pen;
 }
 
-/** Return the colours of the style sheet that is in force. */
-export function colours() {
-  const style = getComputedStyle(document.documentElement);
-  return new Proxy({}, { get: (_, name) => style.getPropertyValue(`--${String(name)}`).trim() });
-}
+let known = {};
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { known = {}; });
+
+/** The colours of the style sheet that is in force, each read once: to read one computes the styles of the page. */
+export const colour = new Proxy({}, {
+  get: (_, name) => (known[name] ||= getComputedStyle(document.documentElement).getPropertyValue(`--${String(name)}`).trim()),
+});

@@ -2,7 +2,7 @@
 
 import { made } from "../dom.js";
 import { placed, say } from "../sentences.js";
-import { cleared, colours } from "./canvas.js";
+import { cleared, colour } from "./canvas.js";
 
 const PAD_PX = 6, STROKE_STEP_S = 0.02, ROOM = 0.2, OF_WEIGHTS = [-0.06, 1.06];
 
@@ -59,7 +59,7 @@ export class CurveTracks {
   }
 
   drawRow(name, row, pins, locks) {
-    const { timeline, store, store: { deviation, selected, other, blind } } = this, hidden = blind && !blind.told, comparing = store.comparing && !hidden, motion = store.curvesOf(name), its = other && !hidden && store.curvesOf(name, other), { height } = row, colour = colours();
+    const { timeline, store, store: { deviation, selected, other, blind } } = this, hidden = blind && !blind.told, comparing = store.comparing && !hidden, motion = store.curvesOf(name), its = other && !hidden && store.curvesOf(name, other), { height } = row;
     const pen = cleared(row.canvas, timeline.width, height), isSelected = selected?.kind === "curve" && selected.channel === name;
     row.element.classList.toggle("selected", isSelected);
     row.label.setAttribute("aria-pressed", isSelected);

@@ -3,7 +3,7 @@
 import { made, onDrag } from "../dom.js";
 import { TEXT } from "../strings.js";
 import { ROWS, Spectra } from "../sound/spectrum.js";
-import { cleared, colours } from "./canvas.js";
+import { cleared, colour } from "./canvas.js";
 
 const STEPS_S = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120];
 const LABEL_PX = 64, STRIP_PX = 2, STRIP_HEIGHT_PX = 15, SHADES = 8, TILE_PX = 256, TILES = 48;
@@ -18,7 +18,7 @@ export class Ruler {
   }
 
   draw() {
-    const { timeline } = this, { width, px_s, start_s, end_s } = timeline, colour = colours();
+    const { timeline } = this, { width, px_s, start_s, end_s } = timeline;
     const pen = cleared(this.canvas, width, 20);
     const step = STEPS_S.find((each) => each * px_s >= LABEL_PX) ?? 300, digits = step < 0.1 ? 2 : step < 1 ? 1 : 0;
     pen.font = "11px system-ui, sans-serif";
@@ -51,7 +51,7 @@ export class WaveTrack {
 
   draw() {
     const { height, timeline, timeline: { width, store: { sound } } } = this;
-    const pen = cleared(this.canvas, width, height), middle = height / 2, colour = colours();
+    const pen = cleared(this.canvas, width, height), middle = height / 2;
     pen.fillStyle = colour.faint;
     pen.fillRect(0, middle, width, 1);
     if (!sound) return;
@@ -105,7 +105,7 @@ export class SpectrumTrack {
     tile.width = TILE_PX;
     tile.height = ROWS;
     const pen = tile.getContext("2d"), image = pen.createImageData(TILE_PX, ROWS);
-    pen.fillStyle = colours().ink;
+    pen.fillStyle = colour.ink;
     pen.fillRect(0, 0, 1, 1);
     const [red, green, blue] = pen.getImageData(0, 0, 1, 1).data;
     for (let x = 0; x < TILE_PX; x++) {
@@ -137,7 +137,7 @@ export class ConfidenceStrip {
   }
 
   draw() {
-    const { timeline, timeline: { width, store: { confidence } } } = this, pen = cleared(this.canvas, width, STRIP_HEIGHT_PX), colour = colours();
+    const { timeline, timeline: { width, store: { confidence } } } = this, pen = cleared(this.canvas, width, STRIP_HEIGHT_PX);
     pen.fillStyle = colour.doubt;
     if (!confidence?.frames) return;
     if (this.of !== confidence) this.levels = quantiles(this.of = confidence);

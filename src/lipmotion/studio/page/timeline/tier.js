@@ -20,7 +20,8 @@ export class Tier {
     this.borders = new Map();
     this.settled = Promise.resolve(); // when what was dragged before is on the server
     this.dragged = null; // a border on its way: the phone before it, its time, and the time that the server has
-    this.element = made("div", { className: `track tier ${name}`, role: "group", "aria-label": TEXT[name] });
+    this.whole = made("div", { className: "whole" }); // from the beginning of the line: scrolling moves this alone
+    this.element = made("div", { className: `track tier ${name}`, role: "group", "aria-label": TEXT[name] }, this.whole);
   }
 
   /** Spans as they are shown: with the border that is dragged. */
@@ -33,19 +34,23 @@ export class Tier {
 
   draw() {
     const { timeline, store: { selected } } = this, spans = this.spans(), seen = new Set(), seenBorders = new Set();
-    const first = firstAfter(spans, timeline.start_s), { end_s, px_s } = timeline;
+    const first = firstAfter(spans, timeline.start_s), { end_s, px_s, left_px } = timeline;
+    const scrolled = this.of?.spans === spans && this.of.px_s === px_s && this.of.selected === selected;
+    this.of = { spans, px_s, selected };
+    this.whole.style.transform = `translateX(${-left_px}px)`;
     for (let n = first; n < spans.length && spans[n].start_s < end_s; n++) {
       const span = spans[n], wide = (span.end_s - span.start_s) * px_s;
       if (wide < LEAST_PX && this.dragged?.before !== n) continue;
       seen.add(n);
-      this.drawSpan(n, span, wide, selected);
+      if (!scrolled || !this.shown.has(n)) this.drawSpan(n, span, wide, selected);
       if (this.name !== "phones" || n + 1 >= spans.length) continue;
       const across = Math.min(BORDER_PX, wide / 2, ((spans[n + 1].end_s - spans[n + 1].start_s) * px_s) / 2);
       if (across < LEAST_BORDER_PX && this.dragged?.before !== n) continue;
       seenBorders.add(n);
+      if (scrolled && this.borders.has(n)) continue;
       const border = this.border(n);
       border.style.width = `${across}px`;
-      border.style.transform = `translateX(${timeline.x(span.end_s) - across / 2}px)`;
+      border.style.transform = `translateX(${span.end_s * px_s - across / 2}px)`;
     }
     for (const [kept, known] of [[seen, this.shown], [seenBorders, this.borders]]) {
       for (const [n, element] of known) {
@@ -60,7 +65,7 @@ export class Tier {
     const button = this.button(n), isSelected = selected?.kind === this.kind && selected.index === n;
     const label = wide >= LABEL_PX ? span.label : "";
     if (button.textContent !== label) button.textContent = label;
-    button.style.transform = `translateX(${this.timeline.x(span.start_s)}px)`;
+    button.style.transform = `translateX(${span.start_s * this.timeline.px_s}px)`;
     button.style.width = `${wide}px`;
     button.classList.toggle("selected", isSelected);
     button.classList.toggle("narrow", wide < NARROW_PX);
@@ -87,7 +92,7 @@ export class Tier {
       });
       button.addEventListener("dblclick", () => this.type(n));
       this.shown.set(n, button);
-      this.element.append(button);
+      this.whole.append(button);
     }
     return this.shown.get(n);
   }
@@ -97,7 +102,7 @@ export class Tier {
       const border = made("div", { className: "border" });
       border.dataset.before = n;
       this.borders.set(n, border);
-      this.element.append(border);
+      this.whole.append(border);
       onDrag(border, {
         start: (event) => { this.offset = event.clientX - this.timeline.x(this.store.line.phones[n].end_s); },
         move: (event) => this.drag(n, (event.clientX - this.offset + this.timeline.left_px) / this.timeline.px_s),
