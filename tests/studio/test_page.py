@@ -393,6 +393,17 @@ def test_only_curves_that_are_shown_are_asked_for(page: Page) -> None:
     wait_until(lambda: page.of("studio.store.motion.names.length") == 3, LIMIT_S)
 
 
+def test_a_line_that_is_opened_while_the_timeline_is_hidden_is_shown_later(page: Page) -> None:
+    page.window.run("document.getElementById('timeline').style.display = 'none'")
+    wait_until(lambda: page.of("studio.timeline.width") == 0, LIMIT_S)
+    page.window.run("const id = studio.store.lineId; studio.store.set({ lineId: '' }); studio.open(id)")
+    page.ready()
+    page.window.run("studio.timeline.zoom(2); document.getElementById('timeline').style.display = ''")
+    wait_until(lambda: page.of("studio.timeline.width") > 0, LIMIT_S)
+    wait_until(lambda: page.of("document.querySelectorAll('.phones .phone').length") > 10, LIMIT_S)
+    assert page.of("studio.timeline.least_px_s <= studio.timeline.px_s && studio.timeline.px_s < 1000")
+
+
 def test_what_another_window_did_is_shown(page: Page) -> None:
     before = page.steps
     page.window.run_until_done(

@@ -18,7 +18,7 @@ export class Timeline {
     this.studio = studio;
     this.store = studio.store;
     this.px_s = 100;
-    this.width = 100;
+    this.width = 0; // until it is laid out
     this.left_px = 0;
     this.window = made("div", { className: "window" });
     this.extent = made("div", { className: "extent" }, this.window);
@@ -48,10 +48,7 @@ export class Timeline {
     });
     this.store.on(["lineId"], () => { this.fitted = false; });
     this.store.on(["sound", "line"], () => {
-      if (!this.fitted && this.duration_s) {
-        this.fit();
-        if (this.px_s < READABLE_PX_S) this.zoom(READABLE_PX_S / this.px_s, 0);
-      }
+      this.fitFirst();
       this.sized();
     });
     const { store } = this;
@@ -79,7 +76,9 @@ export class Timeline {
     const whole = this.px_s <= this.least_px_s * 1.001;
     this.width = this.scroller.clientWidth;
     this.window.style.width = `${this.width}px`;
-    if (whole || this.px_s < this.least_px_s) this.fit();
+    if (!this.width) return; // it is hidden
+    if (!this.fitted) this.fitFirst();
+    else if (whole || this.px_s < this.least_px_s) this.fit();
     else this.draw();
   }
 
@@ -96,8 +95,15 @@ export class Timeline {
     this.scrollTo(held * this.px_s - x);
   }
 
+  /** Show a line that has just been opened: all of it, or as much as can be read. */
+  fitFirst() {
+    if (this.fitted || !this.duration_s || !this.width) return;
+    this.fitted = true;
+    this.fit();
+    if (this.px_s < READABLE_PX_S) this.zoom(READABLE_PX_S / this.px_s, 0);
+  }
+
   fit() {
-    this.fitted = this.duration_s > 0;
     this.px_s = this.least_px_s;
     this.sized();
     this.scrollTo(0);
