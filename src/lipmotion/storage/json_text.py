@@ -65,8 +65,8 @@ def as_json_rows(content: Mapping[str, Any], *, ensure_ascii: bool = True) -> st
 
 def _rows(rows: Sequence[Any], *, ensure_ascii: bool) -> str:
     """Return the members of a list, a line each; of long lists of lists or of objects at once, which is faster."""
-    for kind, between in ((list, "], ["), (dict, "}, {")):
-        if all(type(row) is kind for row in rows):
+    for kinds, between in (((list, tuple), "], ["), (dict, "}, {")):
+        if all(isinstance(row, kinds) for row in rows):
             text = as_json(rows, ensure_ascii=ensure_ascii)[1:-1]
             if text.count(between) == len(rows) - 1:  # it stands nowhere within a row
                 return text.replace(between, between.replace(" ", "\n  "))
