@@ -31,7 +31,7 @@ from lipmotion.storage.json_text import from_json
 from lipmotion.studio.desk import NEW, READY, WAITING, WORKING, Desk, NotReadyError, Work
 from lipmotion.studio.folder import EXPORTS, ProjectFolder
 from lipmotion.studio.known_model import KnownModel, known_model
-from lipmotion.studio.line import OpenLine
+from lipmotion.studio.line import LONGEST_VIDEO_S, OpenLine
 from lipmotion.studio.meshes import Faces
 from lipmotion.studio.presets import PRESETS, Preset, suffixes
 from lipmotion.studio.project import EDITS_SUFFIX, MARKS, ExportRecord, Project, ProjectLine, digest_of
@@ -219,6 +219,7 @@ class Studio:
             "edit_forms": list(FORMS),
             "controls": list(_controls()),
             "marks": list(MARKS),
+            "longest_video_s": LONGEST_VIDEO_S,
         }
 
     def summary(self, number: int) -> EditsSummary:

@@ -4,8 +4,6 @@ import { iconButton, made } from "../dom.js";
 import { TEXT } from "../strings.js";
 import { Following } from "./following.js";
 
-/** The longest video that the server makes. */
-const MOST_S = 60;
 /** How long a video that is made by itself waits for what else is asked of the line. */
 const SOON_MS = 500;
 
@@ -33,8 +31,8 @@ export class Film extends Following {
 
   /** What a video is made of now: the selection, or the line, as far as videos go. */
   get wanted() {
-    const { lineId, face, line, span } = this.store, { start_s, end_s } = span ?? { start_s: 0, end_s: this.stage.studio.player.duration_s };
-    return { lineId, face, digest: line?.edits_digest ?? "", start_s, end_s: Math.min(end_s, start_s + MOST_S) };
+    const { lineId, face, line, span, project } = this.store, longest_s = project?.forms.longest_video_s ?? Infinity, { start_s, end_s } = span ?? { start_s: 0, end_s: this.stage.studio.player.duration_s };
+    return { lineId, face, digest: line?.edits_digest ?? "", start_s, end_s: Math.min(end_s, start_s + longest_s) };
   }
 
   /** Whether the video shows the stretch as it is now, and perhaps more. */
