@@ -320,11 +320,11 @@ def test_a_dropped_line_is_read_corrected_and_exported(opens: Opens, tmp_path: P
 
 
 def test_the_weights_of_the_page_are_those_of_the_exported_file(page: Page) -> None:
+    page.window.run("window.touching = setInterval(() => dispatchEvent(new PointerEvent('pointermove')), 100)")
     page.choose(9)
     page.edit(lambda: page.window.press(ENTER, *"aa", ENTER), "phone 9 is aa")
     page.edit(lambda: page.window.press("f"), r"hold from \S+ to \S+")
     wait_until(lambda: page.of("studio.weights.settling.wanted"), LIMIT_S)
-    page.window.run("window.touching = setInterval(() => dispatchEvent(new PointerEvent('pointermove')), 100)")
     page.window.run_until_done("setTimeout(arguments[0], 4000)")
     assert not page.of("studio.weights.exact")  # what takes long waits while somebody works
     page.window.run("clearInterval(window.touching)")

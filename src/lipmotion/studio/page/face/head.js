@@ -67,11 +67,12 @@ export class Head {
     this.ghostly = other && over ? [other, weights] : null;
     this.ghost.hidden = !this.ghostly;
     if (!this.character) return;
-    const moved = this.move(weights, time_s);
-    if (moved || before || this.pair || this.ghostly) this.draw();
+    const stood = String(this.numbers());
+    this.move(weights, time_s);
+    if (before || this.pair || this.ghostly || stood !== String(this.numbers())) this.draw();
   }
 
-  /** Move the character; return whether it has moved. */
+  /** Move the character. */
   move(weights, time_s) {
     if (weights?.names !== this.named) {
       this.named = weights?.names;
@@ -80,17 +81,15 @@ export class Head {
     this.turned ??= this.turnedNodes(weights);
     this.columns ??= this.meshes.map((mesh) => Object.entries(mesh.morphTargetDictionary)
       .map(([name, place]) => [place, weights ? weights.column(name) : -1]).filter(([, column]) => column >= 0));
-    const before = this.numbers();
     this.meshes.forEach((mesh, n) => {
       if (!weights) mesh.morphTargetInfluences.fill(0);
       for (const [place, column] of this.columns[n]) mesh.morphTargetInfluences[place] = weights.at(time_s, column);
     });
     for (const [node, columns] of this.turned) node.quaternion.set(...columns.map((column) => weights.at(time_s, column))).normalize();
-    return String(before) !== String(this.numbers());
   }
 
   /** All that moves, as numbers. */
-  numbers() { return [...this.meshes.flatMap((mesh) => mesh.morphTargetInfluences), ...this.turned.flatMap(([node]) => node.quaternion.toArray())]; }
+  numbers() { return [...this.meshes.flatMap((mesh) => mesh.morphTargetInfluences), ...(this.turned ?? []).flatMap(([node]) => node.quaternion.toArray())]; }
 
   /** Nodes that turn, with the columns of their quaternions: `head.rotation.x` to `.w`. */
   turnedNodes(weights) {
