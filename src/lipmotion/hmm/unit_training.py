@@ -21,7 +21,7 @@ from lipmotion.hmm.baum_welch import (
     utterance_statistics,
 )
 from lipmotion.hmm.log_likelihoods import log_likelihoods_of
-from lipmotion.hmm.loudness import loud_frames
+from lipmotion.hmm.loudness import smooth_level
 from lipmotion.hmm.model import HmmConfig, UnitHmm, hmm_arrays, hmm_from_arrays
 from lipmotion.hmm.states import plain_states
 from lipmotion.stats.bigram import estimate_bigram
@@ -354,7 +354,7 @@ def _initial_path(energy: NDArray[np.float32], chain: StateSequence, units: int)
     chain  : the states of the utterance, of so many units
     Silence lasts up to the first loud frame, and from the last one; the other states divide the rest evenly.
     """
-    above = np.nonzero(loud_frames(energy, ONSET_FRAMES))[0]
+    above = np.nonzero(smooth_level(energy, ONSET_FRAMES) > 0)[0]
     onset, offset = (int(above[0]), int(above[-1]) + 1) if len(above) else (0, len(energy))
     silence = int((chain.positions == 0).sum())
     speech = int(((chain.positions > 0) & (chain.positions < units - 1)).sum())

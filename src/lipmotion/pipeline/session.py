@@ -530,11 +530,15 @@ def generation_of(
     person : of ``person_of``
     Raises InputError: a constraint is not usable.
     """
-    generation = generate_for(person, model.engine, model.learned, understood.speech, constraints)
-    pinned_s = [pin.time_s for pin in constraints.pins] if constraints else []
-    if request.onto is None:
-        generation = replace(generation, motion=symmetrical(generation.motion, request.asymmetry))
-    paused = with_pauses(generation, request.pauses, pinned_s, understood.events)
+
+    def finish(generation: Generation, start_s: float) -> Generation:
+        pinned_s = [pin.time_s - start_s for pin in constraints.pins] if constraints else []
+        if request.onto is None:
+            generation = replace(generation, motion=symmetrical(generation.motion, request.asymmetry))
+        events = [event.shifted(-start_s) for event in understood.events]
+        return with_pauses(generation, request.pauses, pinned_s, events)
+
+    paused = generate_for(person, model.engine, model.learned, understood.speech, constraints, finish)
     speech, fit = understood.speech, understood.fit
     knowledge = SpeechKnowledge(speech.voice, float(np.mean(speech.confidence)), fit.share if fit else 1.0)
     moods = moods_in_time(understood.tags, speech.units)

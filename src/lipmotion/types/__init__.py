@@ -43,6 +43,7 @@ if TYPE_CHECKING:
         PriorOutput,
         ReducedVariance,
         Speech,
+        SpeechPart,
         SpokenText,
         StateTrace,
     )
@@ -97,6 +98,7 @@ __all__ = [
     "Span",
     "Speech",
     "SpeechKnowledge",
+    "SpeechPart",
     "SpokenText",
     "Staging",
     "StateTrace",

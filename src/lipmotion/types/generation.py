@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError, shortened
 from lipmotion.types.audio import Audio
 from lipmotion.types.confidence import SpeechKnowledge
-from lipmotion.types.features import Features, TokenPosteriors
+from lipmotion.types.features import FRAME_RATE_HZ, Features, TokenPosteriors
 from lipmotion.types.moods import MoodKey
 from lipmotion.types.motion import Motion, between_frames
 from lipmotion.types.timeline import Timeline, Unit
@@ -54,6 +54,8 @@ class Speech:
     voice       : 0 to 1, how well the model's training knows the voice
     posteriors  : of a phone recogniser (None: the engine does not use them, or none is installed)
     kept        : what was computed of the sound alone (``once``); speech with other units shares it
+    parts       : the speech of each passage of the recording, which is animated by itself (None: all is one passage);
+                  empty: nothing is said
     """
 
     features: Features
@@ -67,6 +69,7 @@ class Speech:
     posteriors: TokenPosteriors | None = None
     times_given: bool = False
     kept: dict[Any, Any] = field(default_factory=dict, repr=False)
+    parts: tuple[SpeechPart, ...] | None = None
 
     def once(self, of: Any, make: Callable[[], KeptT]) -> KeptT:
         """Return what a function makes of the sound; speech of the same sound with other units shares it.
@@ -84,6 +87,30 @@ class Speech:
     def units_decide(self) -> bool:
         """Whether engines that recognise units themselves must take these: all, or some of them, are known."""
         return self.units_known or isinstance(self.confidence, np.ndarray)
+
+
+class SpeechPart(NamedTuple):
+    """The speech of one passage of a recording.
+
+    first  : the frame of the recording in which it begins, with the silence before it; it may be negative
+    own    : frames of the recording that are nearer to it than to other passages
+    speech : of its sound, with silence before and after it
+    """
+
+    first: int
+    own: slice
+    speech: Speech
+
+    @property
+    def frames(self) -> int:
+        """The number of its frames."""
+        return len(self.speech.features.values)
+
+    def between(self, units: Timeline[Unit]) -> Timeline[Unit]:
+        """Return the recording's phones in time in its own frames, with times from its first frame."""
+        start, stop = max(self.own.start, self.first), min(self.own.stop, self.first + self.frames)
+        within = units.between(start / FRAME_RATE_HZ, stop / FRAME_RATE_HZ)
+        return within.shifted((start - self.first) / FRAME_RATE_HZ)
 
 
 @dataclass(frozen=True, eq=False)

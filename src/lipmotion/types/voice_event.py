@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 LAUGHTER, BREATH, WHISPER, SHOUT = "laughter", "breath", "whisper", "shout"
 
@@ -24,3 +24,8 @@ class VoiceEvent:
     kind: str
     strength: float
     calls: tuple[tuple[float, float], ...] = ()
+
+    def shifted(self, offset_s: float) -> VoiceEvent:
+        """Return the event with ``offset_s`` seconds added to all times."""
+        calls = tuple((time_s + offset_s, loudness) for time_s, loudness in self.calls)
+        return replace(self, start_s=self.start_s + offset_s, end_s=self.end_s + offset_s, calls=calls)

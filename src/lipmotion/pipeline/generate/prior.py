@@ -22,6 +22,9 @@ def with_prior(prior: Model | None, speech: Speech) -> Speech:
     """
     if prior is None:
         return speech
+    if speech.parts is not None:
+        parts = tuple(part._replace(speech=with_prior(prior, part.speech)) for part in speech.parts)
+        speech = replace(speech, parts=parts)
     motion = prior.engine.without_closures().generate(prior.learned, speech).motion
     measured = measured_articulators(motion.values, motion.names)
     chosen = [measured[name][::STEP] for name in ARTICULATORS if name in measured]

@@ -9,13 +9,12 @@ from typing import NamedTuple
 
 from lipmotion.corpora.labels import check_plain_text, read_transcript
 from lipmotion.errors import shortened
-from lipmotion.hmm.loudness import loud_frames
+from lipmotion.hmm.loudness import frames_above
 from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.features.mfcc import LOG_ENERGY
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit, transcript_fit
 from lipmotion.speech.recognition.anchors import anchors_of, fitted
 from lipmotion.speech.recognition.network.posteriors import POSTERIOR_STEP, recording_posteriors
-from lipmotion.speech.recognition.recogniser import ENERGY_SMOOTHING_FRAMES, Recogniser, network_of
+from lipmotion.speech.recognition.recogniser import Recogniser, network_of
 from lipmotion.speech.recognition.transcript_evidence import DOUBTFUL_LOSS, transcript_evidence
 from lipmotion.speech.voices.pronunciations import LanguageLexicon
 from lipmotion.storage.files import read_text_file
@@ -68,8 +67,7 @@ def transcribe(
     Raises AlignmentError: the words cannot be aligned with the recording.
     """
     if isinstance(words, TimedTranscript):
-        loud = loud_frames(features.values[:, LOG_ENERGY], ENERGY_SMOOTHING_FRAMES)
-        words = fitted(words, loud, audio.duration_s)
+        words = fitted(words, frames_above(analysed(audio, features).log_energy), audio.duration_s)
     spoken = words.words if isinstance(words, TimedTranscript) else words or ()
     if is_other_language(spoken, lexicon):
         LOG.warning(

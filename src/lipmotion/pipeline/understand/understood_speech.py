@@ -29,7 +29,7 @@ from lipmotion.speech.recognition.agreement import TranscriptFit
 from lipmotion.speech.recognition.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
 from lipmotion.speech.recognition.network.posteriors import token_posteriors
 from lipmotion.speech.recognition.network.word_tree import english_words
-from lipmotion.speech.recognition.recognised_speech import Recognition, level_range_db
+from lipmotion.speech.recognition.recognised_speech import Recognition, level_range_db, placed_units, relied_on
 from lipmotion.speech.recognition.recogniser import (
     RECOGNISER_KINDS,
     Recogniser,
@@ -48,6 +48,7 @@ from lipmotion.types import (
     Progress,
     Span,
     Speech,
+    SpeechPart,
     TimedTranscript,
     TimedWord,
     Timeline,
@@ -59,12 +60,14 @@ from lipmotion.types import (
 )
 from lipmotion.types.languages import ENGLISH
 from lipmotion.types.moods import MoodTag
-from lipmotion.units import Lexicon, check_phones, check_text, is_silent, without_gaps, words_of
+from lipmotion.units import SILENCE, Lexicon, check_phones, check_text, is_silent, without_gaps, words_of
 from lipmotion.units.mood_tags import tagged_text
 
 ItemT = TypeVar("ItemT")
 ResultT = TypeVar("ResultT")
 
+UNHEARD_S = 0.05
+"""Phones may last so long outside of all passages, and half of their time: alignment is no surer."""
 LATE_S = 0.1
 """Seconds by which given units may end after the sound; editing programs round times."""
 LATEST_S = 1e15
@@ -132,8 +135,26 @@ def understood_speech(
         LOG.warning("no speech found in the recording: the mouth rests; give a recording in which something is said")
     speech, found = understood.speech, understood.recognition
     voice = known_voice(model.phones, audio, speech, found, given=request.units is not None)
-    speech = replace(with_prior(model.prior, speech), voice=voice)
-    return replace(understood, speech=speech)
+    speech = replace(_with_voices(model.phones, audio, speech, voice), voice=voice)
+    return replace(understood, speech=replace(with_prior(model.prior, speech), voice=voice))
+
+
+def _with_voices(phones: UnitHmm, audio: AnalysedAudio, speech: Speech, voice: float) -> Speech:
+    """Return speech in whose passages it is known how well the model knows each voice.
+
+    voice : 0 to 1, that of the recording; 1: the engine recognised the speaker
+    """
+    parts = [
+        part._replace(speech=replace(part.speech, voice=1.0 if voice == 1 else _voice_of(phones, passage.audio)))
+        for part in speech.parts or ()
+        for passage in audio.passages
+        if passage.first == part.first
+    ]
+    return replace(speech, parts=None if speech.parts is None else tuple(parts))
+
+
+def _voice_of(phones: UnitHmm, audio: AnalysedAudio) -> float:
+    return voice_knowledge(speaker_similarity(phones, audio).score)
 
 
 def _detected(understood: UnderstoodSpeech, audio: AnalysedAudio) -> UnderstoodSpeech:
@@ -168,7 +189,7 @@ def known_voice(
         return 1.0
     if found is not None and found.similarity is not None:
         return voice_knowledge(found.similarity)
-    return voice_knowledge(speaker_similarity(phones, analysed(audio)).score)
+    return _voice_of(phones, analysed(audio))
 
 
 def aligned_within(
@@ -286,19 +307,28 @@ def speech_of(
     kind : of the recognition; of all but ``auto``, a phone recogniser has no part in it
     each : applies a function to many items, perhaps in several processes
     """
-    inputs = engine.inputs()
-    f0 = log_f0(audio) if inputs.f0 else None
-    spectrum = analysed(audio).spectrum if inputs.conditions else None
+    inputs, audio = engine.inputs(), analysed(audio, features)
+    f0 = audio.joined(log_f0, np.nan) if inputs.f0 else None
+    spectrum = audio.spectrum if inputs.conditions else None
     network = network_of(kind) if inputs.posteriors else None
     posteriors = token_posteriors(network, audio, each) if network is not None else None
-    return with_units(Speech(features, Timeline(()), f0, spectrum=spectrum, posteriors=posteriors), units)
+    parts = None
+    if not audio.is_passage:
+        parts = tuple(
+            SpeechPart(first, own, speech_of(engine, sound, sound.mfcc(), Timeline(()), kind, each))
+            for first, own, sound in audio.passages
+        )
+    speech = Speech(features, Timeline(()), f0, spectrum=spectrum, posteriors=posteriors, parts=parts)
+    return with_units(speech, units) if len(units) else speech
 
 
 def with_units(speech: Speech, units: Timeline[Unit]) -> Speech:
     """Return speech with other phones in time, which are known or recognised as their labels say.
 
     Where only some of them are known, those of a user who corrected the others, ``confidence`` is one of each frame.
+    Every passage has those in its time; where phones are said outside of all, the recording is one passage.
     """
+    speech = replace(speech, parts=None if speech.parts is None else _parts_with(speech.parts, units))
     found = [span.label.confidence for span in units]
     first = found[0] if found else None
     if found.count(first) == len(found):
@@ -309,9 +339,30 @@ def with_units(speech: Speech, units: Timeline[Unit]) -> Speech:
     return replace(speech, units=units, units_known=False, confidence=confidence)
 
 
-def recognised_with(units: Timeline[Unit], confidence: float) -> Timeline[Unit]:
-    """Return phones in time as recognised ones of a confidence."""
-    return Timeline(tuple(replace(span, label=replace(span.label, confidence=confidence)) for span in units))
+def _parts_with(parts: tuple[SpeechPart, ...], units: Timeline[Unit]) -> tuple[SpeechPart, ...] | None:
+    """Return the passages with the phones in their time; None where phones are said outside of them."""
+    covered = np.zeros(max((part.first + part.frames for part in parts), default=0), bool)
+    for part in parts:
+        covered[max(part.first, 0) : part.first + part.frames] = True
+    for span in units:
+        first, end = (min(round(time_s * FRAME_RATE_HZ), len(covered)) for time_s in (span.start_s, span.end_s))
+        unheard_s = span.duration_s - int(covered[first:end].sum()) / FRAME_RATE_HZ
+        if not is_silent(span.label.phone) and unheard_s > max(UNHEARD_S, span.duration_s / 2):
+            return None
+    spoken = []
+    for part in parts:
+        within = without_gaps(part.between(units), part.speech.features.duration_s)
+        sure = next((span.label.confidence for span in within if span.label.confidence is not None), None)
+        silent = Unit(SILENCE, confidence=sure)  # as sure as the phones beside it
+        spans: list[Span[Unit]] = []
+        for span in within:
+            label = silent if is_silent(span.label.phone) and not span.label.unit else span.label
+            if spans and label == silent == spans[-1].label:
+                spans[-1] = replace(spans[-1], end_s=span.end_s)
+            else:
+                spans.append(replace(span, label=label))
+        spoken.append(part._replace(speech=with_units(part.speech, Timeline(tuple(spans)))))
+    return tuple(spoken)
 
 
 def recognised_speech(
@@ -332,18 +383,30 @@ def recognised_speech(
     If the engine's own model recognises phones of this speaker, these are aligned by ``phones``, as the phones of the
     training were; else the result of ``recognise`` is used.
     """
+    audio = analysed(audio, features)
     speech = speech_of(engine, audio, features, Timeline(()), phones.kind, each)
-    recognised = None
-    if phones.kind not in ("general", "words"):
-        recognised = engine.recognise(learned, speech)
-    if recognised is not None:
-        try:
-            units = phones.align_phones(audio, features, recognised)
-            return with_units(speech, recognised_with(units, 0.0))
-        except AlignmentError:
-            pass
-    found = recognise()
-    return with_units(speech, recognised_with(found.units, found.reliability))
+    passages = (SpeechPart(0, slice(0, len(features.values)), speech),) if speech.parts is None else speech.parts
+    units, spoken, found = list[Span[Unit]](), list[SpeechPart](), None
+    for part, (_, _, sound) in zip(passages, audio.passages, strict=True):
+        within = None
+        if phones.kind not in ("general", "words"):
+            within = engine.recognise(learned, part.speech)
+        if within is not None:
+            try:
+                within = relied_on(phones.align_phones(sound, sound.mfcc(), within), 0.0)
+            except AlignmentError:
+                within = None
+        if within is None:
+            found = found or recognise()
+            within = part.between(relied_on(found.units, found.reliability))
+        if sum(span.duration_s for span in within if not is_silent(span.label.phone)) < LEAST_SPEECH_S:
+            continue  # a click, a knock
+        spoken.append(part)
+        units += placed_units(within, part.first, part.own)
+    if speech.parts is not None:
+        speech = replace(speech, parts=tuple(spoken))
+    confidence = found.reliability if found is not None else 0.0
+    return with_units(speech, relied_on(without_gaps(Timeline(tuple(units)), features.duration_s), confidence))
 
 
 def _words(

@@ -5,17 +5,24 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, TypeVar
+from itertools import pairwise
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.speech.features.mfcc import HOP, LOG_ENERGY, checked_samples, log_energy, mfcc_of_warps
+from lipmotion.hmm.loudness import QUIETEST, silence_weights, smooth_level, spoken_frames
+from lipmotion.speech.features.mfcc import HOP, checked_samples, frame_count, log_energy, mfcc_of_warps
 from lipmotion.speech.features.spectrum import spectrum
 from lipmotion.speech.recognition.general.front_end import general_features
+from lipmotion.speech.sound.voice_activity import find_passages, level_passage
 from lipmotion.types import Audio, Features
 
 MadeT = TypeVar("MadeT")
+SILENT_FRAMES = 50
+"""Frames of silence before and after the sound of each passage, recorded or not: the mouth opens before the sound."""
+SILENT_ENERGY = -17.0
+"""The log energy between passages: 80 dB beneath their loudest moments."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,12 +31,12 @@ class AnalysedAudio(Audio):
 
     Each kind of features is computed when it is first asked for, and kept as long as this object. The samples must not
     change. Make one for each recording (``analysed``), hand it down to everything that works on this recording, and
-    drop it then: an hour takes 56 MB a kind.
+    drop it then: an hour takes 56 MB a kind. Every passage is analysed by itself, at a level that is the same for all
+    (``speech.sound.voice_activity``); between passages, features are those of the silence beside them.
     All methods raise InputError as ``mfcc`` says.
     """
 
     _mfcc: dict[float, Features] = field(default_factory=dict, repr=False)
-    _stretches: dict[int, AnalysedAudio] = field(default_factory=dict, repr=False)
     _made: dict[str, Any] = field(default_factory=dict, repr=False)
 
     def once(self, name: str, make: Callable[[], MadeT]) -> MadeT:
@@ -38,6 +45,47 @@ class AnalysedAudio(Audio):
             self._made[name] = make()
         made: MadeT = self._made[name]
         return made
+
+    @cached_property
+    def passages(self) -> tuple[Passage, ...]:
+        """The passages of the recording, in order; none where nothing can be said in it."""
+        energy = log_energy(checked_samples(self))
+        found = find_passages(energy)
+        bounds = [0, *((before.end + after.first) // 2 for before, after in pairwise(found)), self.frames]
+        passages = []
+        for number, (first, end) in enumerate(found):
+            samples = level_passage(self.samples[first * HOP : end * HOP], energy[first:end])
+            sound = spoken_frames(energy[first:end])
+            lead, tail = (max(SILENT_FRAMES - int(side.argmax()), 0) // 4 * 4 for side in (sound, sound[::-1]))
+            padded = _PassageAudio(np.pad(samples, (lead * HOP, tail * HOP)), self.rate_hz, lead=lead, tail=tail)
+            passages.append(Passage(first - lead, slice(bounds[number], bounds[number + 1]), padded))
+        return tuple(passages)
+
+    @property
+    def is_passage(self) -> bool:
+        """Whether it is a passage itself, and not divided any further."""
+        return any(passage.audio is self for passage in self.passages)
+
+    @cached_property
+    def frames(self) -> int:
+        """T, the number of frames at 100 Hz."""
+        return frame_count(self.samples)
+
+    def joined(self, of_passage: Callable[[AnalysedAudio], NDArray[Any]], silence: float | None = None) -> NDArray[Any]:
+        """Return features of the whole recording, joined from those of its passages [shape=(T, ...)].
+
+        of_passage : returns the features of one
+        silence    : the value between passages; None: as in the last frame of silence beside them
+        """
+        parts = [of_passage(passage.audio) for passage in self.passages]
+        if not parts:
+            return np.zeros_like(of_passage(_PassageAudio(self.samples, self.rate_hz)))
+        whole = np.empty((self.frames, *parts[0].shape[1:]), parts[0].dtype)
+        for (first, own, _), part in zip(self.passages, parts, strict=True):
+            whole[own] = part[-1] if silence is None else silence
+            start, stop = max(first, own.start), min(first + len(part), own.stop)
+            whole[start:stop] = part[start - first : stop - first]
+        return whole
 
     def mfcc(self, warp: float = 1.0) -> Features:
         """Return the features of ``speech.features.mfcc.mfcc`` at one warp of the frequencies."""
@@ -48,39 +96,101 @@ class AnalysedAudio(Audio):
         """Return the features of ``features.mfcc.mfcc`` at several warps; the missing ones are computed together."""
         missing = [warp for warp in warps if warp not in self._mfcc]
         if missing:
-            self._mfcc.update(zip(missing, mfcc_of_warps(self, missing, self.log_energy), strict=True))
+            self._mfcc.update(zip(missing, self._new_mfcc(missing), strict=True))
         return [self._mfcc[warp] for warp in warps]
+
+    def _new_mfcc(self, warps: Sequence[float]) -> list[Features]:
+        for passage in self.passages:
+            passage.audio.mfcc_of_warps(warps)  # the spectra are computed once for all
+        return [Features(self.joined(lambda audio, w=warp: audio.mfcc(w).values), self.duration_s) for warp in warps]
 
     @cached_property
     def log_energy(self) -> NDArray[np.float32]:
-        """The natural logarithm of the energy of every frame [shape=(T,)], as of ``features.mfcc.log_energy``."""
-        return log_energy(checked_samples(self))
+        """The natural logarithm of the energy of every frame [shape=(T,)], each passage at the same level."""
+        return self.joined(lambda audio: audio.log_energy, SILENT_ENERGY)
+
+    @cached_property
+    def weights(self) -> NDArray[np.float64]:
+        """How much each frame counts in means over the recording [shape=(T,)] (``hmm.loudness.silence_weights``)."""
+        return silence_weights(self.log_energy)
 
     @cached_property
     def general_features(self) -> NDArray[np.float32]:
         """The features of the general models [shape=(T, 39)], as of ``speech.recognition.general.front_end``."""
-        return general_features(self)
+        return self.joined(lambda audio: audio.general_features)
 
     @cached_property
     def spectrum(self) -> NDArray[np.float32]:
         """The normalised log mel spectrum [shape=(T, 40)], as of ``speech.features.spectrum``."""
-        return spectrum(self)
-
-    def loudest_stretch(self, frames: int) -> AnalysedAudio:
-        """Return the stretch of so many frames with the most energy; the recording itself if it is no longer."""
-        energy = self.mfcc().values[:, LOG_ENERGY].astype(float)
-        if len(energy) <= frames:
-            return self
-        if frames not in self._stretches:
-            total: NDArray[np.float64] = np.concatenate([[0.0], np.cumsum(energy)])
-            start = int((total[frames:] - total[:-frames]).argmax())
-            samples = self.samples[start * HOP : (start + frames) * HOP]
-            self._stretches[frames] = AnalysedAudio(samples, self.rate_hz)
-        return self._stretches[frames]
+        return self.joined(lambda audio: audio.spectrum)
 
     def stretch(self, first: int, stop: int) -> AnalysedAudio:
         """Return some frames of the recording, with the features that they have in the whole."""
         return _Stretch(self.samples[first * HOP : stop * HOP], self.rate_hz, whole=self, first=first)
+
+
+class Passage(NamedTuple):
+    """A passage of a recording.
+
+    first : the frame of the recording in which its sound begins, with the silence before it; it may be negative
+    own   : frames of the recording that are nearer to it than to other passages
+    audio : its sound, at the level of all passages, with silence before and after it
+    """
+
+    first: int
+    own: slice
+    audio: AnalysedAudio
+
+
+@dataclass(frozen=True, eq=False)
+class _PassageAudio(AnalysedAudio):
+    """The sound of one passage, of which features are computed.
+
+    lead, tail : frames of silence before and after what is recorded, with the features of the quietest moment
+    """
+
+    lead: int = 0
+    tail: int = 0
+
+    @cached_property
+    def passages(self) -> tuple[Passage, ...]:
+        return (Passage(0, slice(0, self.frames), self),)
+
+    @cached_property
+    def _sound(self) -> Audio:
+        return Audio(self.samples[self.lead * HOP : len(self.samples) - self.tail * HOP], self.rate_hz)
+
+    @cached_property
+    def _silence(self) -> NDArray[np.float64]:
+        """The weights of the frames that are the most silent [shape=(T,)]."""
+        level = smooth_level(log_energy(checked_samples(self._sound)))
+        quietest = level <= np.quantile(level, QUIETEST)
+        return quietest / quietest.sum()
+
+    def _with_silence(self, rows: NDArray[Any]) -> NDArray[Any]:
+        """Return the rows of the sound, and before and after them their mean where it is the most silent."""
+        silence = (self._silence @ rows).astype(rows.dtype)[None]
+        return np.concatenate([np.repeat(silence, self.lead, axis=0), rows, np.repeat(silence, self.tail, axis=0)])
+
+    @cached_property
+    def weights(self) -> NDArray[np.float64]:
+        return np.pad(silence_weights(log_energy(checked_samples(self._sound))), (self.lead, self.tail))
+
+    def _new_mfcc(self, warps: Sequence[float]) -> list[Features]:
+        found = mfcc_of_warps(self._sound, warps, log_energy(checked_samples(self._sound)))
+        return [Features(self._with_silence(each.values), self.duration_s) for each in found]
+
+    @cached_property
+    def log_energy(self) -> NDArray[np.float32]:
+        return self._with_silence(log_energy(checked_samples(self._sound)))
+
+    @cached_property
+    def general_features(self) -> NDArray[np.float32]:
+        return self._with_silence(general_features(self._sound))
+
+    @cached_property
+    def spectrum(self) -> NDArray[np.float32]:
+        return self._with_silence(spectrum(self._sound))
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +199,10 @@ class _Stretch(AnalysedAudio):
 
     whole: AnalysedAudio = field(default=None, repr=False, kw_only=True)  # type: ignore[assignment]
     first: int = field(default=0, kw_only=True)
+
+    @property
+    def passages(self) -> tuple[Passage, ...]:  # type: ignore[override]
+        return (Passage(0, slice(0, self.frames), self),)
 
     def mfcc_of_warps(self, warps: Sequence[float]) -> list[Features]:
         return [Features(self._rows(each.values), self.duration_s) for each in self.whole.mfcc_of_warps(warps)]
@@ -105,8 +219,10 @@ class _Stretch(AnalysedAudio):
     def spectrum(self) -> NDArray[np.float32]:
         return self._rows(self.whole.spectrum)
 
-    def loudest_stretch(self, frames: int) -> AnalysedAudio:
-        return self.whole.loudest_stretch(frames)
+    @cached_property
+    def weights(self) -> NDArray[np.float64]:
+        rows = self._rows(self.whole.weights)
+        return rows / max(rows.sum(), 1e-9)
 
     def _rows(self, rows: NDArray[np.float32]) -> NDArray[np.float32]:
         return rows[self.first : self.first + len(self.samples) // HOP + 1]

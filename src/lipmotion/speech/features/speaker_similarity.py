@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lipmotion.hmm.loudness import spoken_frames
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
 from lipmotion.stats.mixture import QuadraticForm
@@ -14,15 +15,15 @@ from lipmotion.stats.mixture import QuadraticForm
 WARPS = (0.88, 0.94, 1.0, 1.06, 1.12)
 """The lengths of adults' vocal tracts differ by about so much."""
 JUDGED_FRAMES = 2000
-"""The 20 seconds with the most energy are enough to judge a speaker by."""
+"""20 seconds are enough to judge a speaker by."""
 
 
 class SpeakerSimilarity(NamedTuple):
     """The similarity of a recording to the training data of some models.
 
     warp  : factor by which the frequencies of the recording are stretched to make it most similar
-    score : mean log density per frame of the recording, so warped, less that of the training data. It depends on the
-            speaker in speech, on the room and the microphone in silence
+    score : mean log density per frame of the recording, so warped, less that of the training data. Silence counts half
+            (``hmm.loudness.silence_weights``), and not at all where it is more silent than that of the training data
     """
 
     warp: float
@@ -32,15 +33,24 @@ class SpeakerSimilarity(NamedTuple):
 def speaker_similarity(hmm: UnitHmm, audio: AnalysedAudio) -> SpeakerSimilarity:
     """Return the speaker similarity of a recording to the training data of some models, at the best of ``WARPS``.
 
-    A recording longer than ``JUDGED_FRAMES`` is judged by its loudest stretch of this length.
+    A recording is judged by its longest passage, of which ``JUDGED_FRAMES`` are enough.
     Source: Lee & Rose 1996 (vocal tract length normalisation); the best density of each frame stands for the
     state path, so that the warp is chosen before anything is recognised.
     """
-    stretch = audio.loudest_stretch(JUDGED_FRAMES)
-    form, warped = _densities(hmm), zip(WARPS, stretch.mfcc_of_warps(WARPS), strict=True)
-    fits = {warp: float(form.log_likelihood(features.values).max(axis=1).mean()) for warp, features in warped}
-    warp = best_warp(fits)
-    return SpeakerSimilarity(warp, fits[warp] - hmm.typical_fit)
+    stretch = max((passage.audio for passage in audio.passages), key=lambda part: part.frames, default=audio)
+
+    def judge() -> SpeakerSimilarity:
+        part = stretch if stretch.frames <= JUDGED_FRAMES else stretch.stretch(0, JUDGED_FRAMES)
+        form, sound = _densities(hmm), spoken_frames(part.log_energy)
+        spoken, silent = part.weights * sound, part.weights * ~sound
+        fits = {}
+        for warp, features in zip(WARPS, part.mfcc_of_warps(WARPS), strict=True):
+            beyond = form.log_likelihood(features.values).max(axis=1) - hmm.typical_fit
+            fits[warp] = float(spoken @ beyond + min(silent @ beyond, 0.0))
+        warp = best_warp(fits)
+        return SpeakerSimilarity(warp, fits[warp])
+
+    return stretch.once(f"similarity to {id(hmm)}", judge)
 
 
 @lru_cache(maxsize=2)

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
+from lipmotion.speech.features.analysed_audio import SILENT_ENERGY, AnalysedAudio, analysed
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.laughter import laughter
 from lipmotion.speech.features.mfcc import HOP
@@ -115,6 +115,12 @@ def smoothed_level_db(audio: Audio) -> Curve:
     return _smoothed(analysed(audio).log_energy.astype(np.float64) * DB)
 
 
+def _heard(level_db: Curve) -> Curve:
+    """Return the levels within passages, over which levels are compared; all, where there is none."""
+    heard = level_db[level_db > (SILENT_ENERGY + 1) * DB]
+    return heard if len(heard) else level_db
+
+
 def _voice(audio: AnalysedAudio) -> tuple[Voiced, Curve]:
     """Return whether each frame is voiced, and its pitch in semitones, NaN where it is not [each shape=(T,)]."""
     pitch = log_f0(audio).astype(np.float64) * 12 / np.log(2)
@@ -154,7 +160,7 @@ def _phrases(units: Timeline[Unit]) -> list[tuple[float, float]]:
 
 def _whispers(level_db: Curve, voiced: Voiced, phrases: Sequence[tuple[float, float]]) -> Iterator[VoiceEvent]:
     """Yield the phrases without a voice."""
-    quiet_db, most_db = np.percentile(level_db, (10, 99))
+    quiet_db, most_db = np.percentile(_heard(level_db), (10, 99))
     for start_s, end_s in phrases:
         frames = _frames(start_s, end_s)
         middle_db, loudest_db = np.percentile(level_db[frames], (50, 95)) if len(level_db[frames]) else (quiet_db,) * 2
@@ -196,7 +202,7 @@ def _shouts(
 
 def _breaths(audio: AnalysedAudio, level_db: Curve, voiced: Voiced, units: Timeline[Unit]) -> Iterator[VoiceEvent]:
     """Yield the breaths that are detected in pauses."""
-    loud_db, spoken = float(np.percentile(level_db, 95)), np.flatnonzero(voiced)
+    loud_db, spoken = float(np.percentile(_heard(level_db), 95)), np.flatnonzero(voiced)
     for start_s, end_s in _silences(units):
         pause, reach = _frames(start_s, end_s), round(QUIET_REACH_S * FRAME_RATE_HZ)
         around = slice(max(pause.start - reach, 0), min(pause.stop + reach, len(level_db)))

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.hmm.loudness import loud_frames
+from lipmotion.hmm.loudness import frames_above
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.recognition.general.acoustic import STATES, density_column, general_model
 from lipmotion.speech.recognition.transcript_evidence import TranscriptEvidence, WordLoss
@@ -31,8 +31,6 @@ LEAST_FITTING_SHARE = 0.9
 """A transcript that fits less of the speech is worth a remark."""
 JOINED_S = 0.5
 """Places nearer than this are one stretch."""
-SMOOTHING_FRAMES = 11
-"""The energy is averaged over so many frames before loud frames are told from quiet ones."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +86,7 @@ def transcript_fit(audio: Audio, units: Timeline[Unit]) -> TranscriptFit:
     """
     analysis = analysed(audio)
     scored = _scored_frames(analysis, units)
-    loud = loud_frames(analysis.log_energy, SMOOTHING_FRAMES)
+    loud = frames_above(analysis.log_energy)
     missing, speech_s = [], 0.0
     for span in units:
         loud_s = (_first_frame(span.start_s) + np.flatnonzero(loud[_frames_of(span)])) / FRAME_RATE_HZ

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.speech.features.analysed_audio import SILENT_ENERGY, Passage
 from lipmotion.speech.recognition.word_fit import AlignedWords
 from lipmotion.speech.sound.voice_activity import Stretch
 from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit
-from lipmotion.units import is_silent
+from lipmotion.units import is_silent, without_gaps
+
+LabelT = TypeVar("LabelT")
 
 CONFIDENCES = (0.25, 0.4)
 """Words confirm nothing at the first confidence, all at the second one. Five-second pieces of a fluent stranger had
@@ -92,11 +95,14 @@ class Recognition:
 
 
 def level_range_db(log_energy: NDArray[np.floating[Any]]) -> float:
-    """Return the decibels between the loud and the quiet moments of a recording (``RANGE_PERCENTILES``).
+    """Return the decibels between loud and quiet moments of what is heard in a recording (``RANGE_PERCENTILES``).
 
     log_energy : natural logarithm of the energy of every frame [shape=(T,)]
     """
-    return float(np.ptp(np.percentile(log_energy, RANGE_PERCENTILES)) * 10 / np.log(10))
+    heard = log_energy[log_energy > SILENT_ENERGY + 1]
+    if not len(heard):
+        return 0.0
+    return float(np.ptp(np.percentile(heard, RANGE_PERCENTILES)) * 10 / np.log(10))
 
 
 def recognition_of(
@@ -122,6 +128,51 @@ def recognition_of(
     word_s = sum(span.duration_s for span in spoken if span.label.word)
     phone_s = sum(span.duration_s for span in spoken) - word_s
     return Recognition(units, Timeline(tuple(words)), word_s, phone_s, similarity)
+
+
+def placed_units(units: Timeline[LabelT], first: int, own: slice) -> Timeline[LabelT]:
+    """Return labels in time of a passage that lie in its own frames, with times of the recording.
+
+    first, own : as of ``Passage``
+    """
+    start, stop = max(own.start, first), own.stop
+    within = units.between((start - first) / FRAME_RATE_HZ, (stop - first) / FRAME_RATE_HZ)
+    return within.shifted(start / FRAME_RATE_HZ)
+
+
+def joined_recognition(parts: Sequence[tuple[Passage, Recognition]], duration_s: float) -> Recognition:
+    """Return the recognition of a recording from those of its passages.
+
+    The phones of each passage are as reliable as they are there; the similarity is that of the longest passage.
+    """
+    units, words = list[Span[Unit]](), list[Span[RecognisedWord]]()
+    for (first, own, _), part in parts:
+        units += placed_units(relied_on(part.units, part.reliability), first, own)
+        words += placed_units(part.words, first, own)
+    speech_s = np.array([part.word_s + part.phone_s for _, part in parts])
+    posteriors = np.array([np.nan if part.posterior is None else part.posterior for _, part in parts])
+    decided = ~np.isnan(posteriors)
+    posterior = float(np.average(posteriors[decided], weights=speech_s[decided] + 1e-9)) if decided.any() else None
+    return Recognition(
+        without_gaps(Timeline(tuple(units)), duration_s),
+        Timeline(tuple(words)),
+        sum(part.word_s for _, part in parts),
+        sum(part.phone_s for _, part in parts),
+        parts[int(np.argmax(speech_s))][1].similarity,
+        posterior,
+    )
+
+
+def relied_on(units: Timeline[Unit], confidence: float) -> Timeline[Unit]:
+    """Return phones in time as recognised ones, with a confidence where they have none yet."""
+    return Timeline(
+        tuple(
+            span
+            if span.label.confidence is not None
+            else replace(span, label=replace(span.label, confidence=confidence))
+            for span in units
+        )
+    )
 
 
 def labels_of_words(

@@ -19,11 +19,10 @@ from lipmotion.hmm.log_likelihoods import (
     penalise_silence,
     penalise_speech,
 )
-from lipmotion.hmm.loudness import loud_frames, quiet_frames
+from lipmotion.hmm.loudness import frames_above, quiet_frames
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.kernels.sequences.windowed_viterbi import Windows
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
-from lipmotion.speech.features.mfcc import LOG_ENERGY
 from lipmotion.speech.features.speaker_similarity import SpeakerSimilarity, speaker_similarity
 from lipmotion.speech.recognition.adaptation import Adaptation
 from lipmotion.speech.recognition.anchors import Anchors, align_within, least_frames
@@ -40,6 +39,7 @@ from lipmotion.speech.recognition.recognised_speech import (
     LabelledFrames,
     RecognisedWord,
     Recognition,
+    joined_recognition,
     recognition_of,
     spliced,
 )
@@ -54,11 +54,11 @@ RECOGNISER_KINDS = ("auto", "words", "fast", "own", "general")
 words are recognised by pocketsphinx and aligned. ``auto``: by a phone recogniser, where one is installed and sure; else
 as ``fast``, and words where they fit."""
 USING_WORDS, WEIGHTED = ("auto", "words"), ("auto", "words", "fast")
-OWN_VOICE_SCORE, SMALL_PERPLEXITY = -3.0, 9.0
+OWN_VOICE_SCORE, SMALL_PERPLEXITY = -5.2, 9.0
 """A voice with the first speaker similarity score or more is that of the own models; if the perplexity of their bigram
 is less than the second one, their corpus has few words, which no language model of English expects. Then the phones
 alone decide. The perplexity is 5.3 for GRID's 51 words, 18.6 for English."""
-NO_WEIGHT_SCORE, FULL_WEIGHT_SCORE = -9.0, -5.0
+NO_WEIGHT_SCORE, FULL_WEIGHT_SCORE = -9.6, -7.5
 """Own models have no weight for recordings with the first speaker similarity score or less, and the weight of the
 general models from the second one on. The score of another speaker in the same studio is -4 to -6 for GRID's models, of
 other voices in other rooms -7 to -15."""
@@ -66,8 +66,6 @@ FEW_GAUSSIANS = 2
 """Own models of so few Gaussians a state were trained on less than two minutes: forced alignment uses the general ones
 alone then. With 20 clips of GRID that raises ACC of opening on the validation list from 0.767 to 0.786 (audio only),
 from 0.806 to 0.841 (transcripts)."""
-ENERGY_SMOOTHING_FRAMES = 11
-"""The energy is averaged over so many frames before it rules silence out."""
 
 
 class Recogniser:
@@ -112,10 +110,18 @@ class Recogniser:
         become more probable (``speech.recognition.word_search``).
         Raises MissingDependencyError: as ``recognise``.
         """
-        if not features.values.any():
+        audio = analysed(audio, features)
+        if not features.values.any() or not audio.passages:
             silence = _timeline([(SILENCE, "")], np.array([0, len(features.values)]), features.duration_s)
             return recognition_of(silence, [LabelledFrames(0, SILENCE)], (), None)
-        audio = analysed(audio, features)
+        if not audio.is_passage:
+            if (network := network_of(self.kind)) is not None:
+                posterior_stretches(network, audio, each)  # of all passages at once: several processes work on them
+            parts = [
+                (passage, self.recognition(passage.audio, passage.audio.mfcc(), each, english=english))
+                for passage in audio.passages
+            ]
+            return joined_recognition(parts, features.duration_s)
         similarity = self._similarity(audio)
         known = self._knows_voice_and_words(similarity)
         network = None if known else network_of(self.kind)
@@ -143,7 +149,7 @@ class Recogniser:
     ) -> Recognition:
         """Return what a phone recogniser finds in a recording: words, or phones that our models find as well."""
         features = audio.mfcc()
-        loud = loud_frames(features.values[:, LOG_ENERGY], ENERGY_SMOOTHING_FRAMES)
+        loud = frames_above(audio.log_energy)
         hmm, log_likelihoods = self._log_likelihoods(audio, similarity, aligning=english)
         if english:
             parts, recognised = NetworkSearch(hmm, log_likelihoods, loud).labels(found)
@@ -171,7 +177,7 @@ class Recogniser:
     ) -> WordSearch:
         """Return the search for words in a recording whose phones without words have a path through ``_loop``."""
         aligning = self._log_likelihoods(audio, aligning=True)[1] if self._has_few_gaussians else log_likelihoods
-        loud = loud_frames(audio.mfcc().values[:, LOG_ENERGY], ENERGY_SMOOTHING_FRAMES)
+        loud = frames_above(audio.log_energy)
         free = self._loop.network.emission[path]
         return WordSearch(hmm, self._loop, log_likelihoods, aligning, free, loud, believing=self.kind == "words")
 
@@ -202,9 +208,9 @@ class Recogniser:
         Raises AlignmentError: the transcript does not fit into the recording.
         Raises MissingDependencyError: as ``recognise``.
         """
-        hmm, log_likelihoods = self._log_likelihoods(analysed(audio, features), aligning=True)
-        loud = loud_frames(features.values[:, LOG_ENERGY], ENERGY_SMOOTHING_FRAMES)
-        log_likelihoods = penalise_silence(hmm, log_likelihoods, loud)
+        audio = analysed(audio, features)
+        hmm, log_likelihoods = self._log_likelihoods(audio, aligning=True)
+        log_likelihoods = penalise_silence(hmm, log_likelihoods, frames_above(audio.log_energy))
         variants_of = {word: lexicon.pronunciations(word) for word in set(words)}
         modelled = [unit for unit in hmm.table.units if not is_silent(unit)]
         units_of = {

@@ -8,13 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.hmm.loudness import loud_frames
+from lipmotion.hmm.loudness import frames_above
 from lipmotion.speech.features.mfcc import HOP, checked_samples, log_energy
 from lipmotion.types import Audio
 
 NOISE_KINDS = ("white", "babble")
-SMOOTHING = 11
-"""The log energy is averaged over so many frames before it separates speech from pauses."""
 FEWEST_TALKERS = 2
 """One other talker is an interruption, not a babble."""
 SILENT_RMS = 1e-6
@@ -99,7 +97,7 @@ def spoken_samples(audio: Audio) -> NDArray[np.bool_]:
     Raises InputError: not one channel of finite samples at 16 kHz, shorter than 25 ms, or silent.
     """
     samples = checked_samples(audio)
-    loud = loud_frames(log_energy(samples), SMOOTHING)
+    loud = frames_above(log_energy(samples))
     if not loud.any():  # a steady tone has no quiet frames
         loud = np.ones_like(loud)
     nearest = np.minimum((np.arange(len(samples)) + HOP // 2) // HOP, len(loud) - 1)

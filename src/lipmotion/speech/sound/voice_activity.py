@@ -1,29 +1,47 @@
-"""Stretches of a recording with sound in them, not too long to be recognised in one piece."""
+"""Where a recording may hold speech: passages that are animated by themselves, and stretches that recognisers take.
+
+A passage is what somebody might have kept in a file of its own: a line between silences, or one that is much louder or
+softer than the one before. Its features are normalised, and its speaker judged, by itself.
+"""
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.hmm.loudness import loud_frames
-from lipmotion.speech.features.mfcc import HOP
+from lipmotion.hmm.loudness import DECIBEL, LEAST_RANGE, frames_above, power_level, smooth_level, sound_runs
+from lipmotion.speech.features.mfcc import DYNAMIC_RANGE, HOP, WINDOW
 from lipmotion.types import Audio
 from lipmotion.types.audio import sixteen_bits
 
-LOUD_SHARE = 0.3
-"""Sound is louder than this share of the way from the recording's quiet frames to its loud ones."""
-SMOOTHING_FRAMES = 11
-"""The energy is averaged over so many frames first."""
-LEAST_FRAMES, PAUSE_FRAMES = 6, 40
-"""Sound with shorter pauses is one stretch; shorter stretches are clicks."""
+PAUSE_FRAMES = 40
+"""Sound with shorter pauses is one stretch."""
 MARGIN_FRAMES = 30
 """Frames before and after the sound that belong to its stretch: recognisers expect a little silence."""
 JOINED_FRAMES = 60
 """Stretches nearer than this, with their margins, are joined: words say more of one another than of nothing."""
 LONGEST_FRAMES = 1000
 """Longer stretches are cut where they are quietest: the time of phone networks grows faster than the length."""
+
+SEPARATE_FRAMES = 50
+"""A longer pause separates passages."""
+SHORT_FRAMES, NEAR_FRAMES = 150, 150
+"""A passage shorter than the first belongs to a neighbour nearer than the second: one word says little of a voice."""
+LEVEL_STEP = 15 * DECIBEL
+"""Voices with a dip between them are passages of their own where their levels differ by more."""
+PASSAGE_MARGIN = 50
+"""Frames before and after the sound of a passage that belong to it, where they are not digital silence."""
+CUT_FROM, CUT_FRAMES, CUT_STEP = 10, 6, 3 * DECIBEL
+"""So many frames beside sound and more, a steady level that changes at once by the last of these is another sound's."""
+LOCAL_FRAMES, LOCAL_DROP, SOFTEST_DROP = 301, 30 * DECIBEL, 42 * DECIBEL
+"""Sound lies less than the second below the loudest within the first, and less than the third below all of it."""
+STEADY, STEADY_FRAMES = 10 * DECIBEL, 201
+"""The level of a voice falls by more than the first from the loudest of so many frames around."""
+SAME_LEVEL = 0.1
+"""Root mean square of the loudest quarter of a second of a passage, once its level is that of all others."""
 
 
 class Stretch(NamedTuple):
@@ -39,15 +57,8 @@ def stretches_of_sound(log_energy: NDArray[np.float32]) -> list[Stretch]:
     log_energy : of every frame, natural logarithm [shape=(T,)]
     None is longer than ``LONGEST_FRAMES``. A recording of constant energy has none.
     """
-    loud = np.flatnonzero(loud_frames(log_energy, SMOOTHING_FRAMES, LOUD_SHARE))
-    if not len(loud):
-        return []
-    runs = np.split(loud, np.flatnonzero(np.diff(loud) > PAUSE_FRAMES) + 1)
     stretches: list[Stretch] = []
-    for run in runs:
-        first, end = int(run[0]), int(run[-1]) + 1
-        if end - first < LEAST_FRAMES:
-            continue
+    for first, end in sound_runs(frames_above(log_energy), PAUSE_FRAMES):
         earliest = stretches[-1].end if stretches else 0
         stretch = Stretch(max(earliest, first - MARGIN_FRAMES), min(len(log_energy), end + MARGIN_FRAMES))
         if (
@@ -67,17 +78,110 @@ def _cut(stretch: Stretch, log_energy: NDArray[np.float32]) -> list[Stretch]:
     pieces = []
     while end - first > LONGEST_FRAMES:
         half = first + LONGEST_FRAMES // 2
-        cut = half + int(np.argmin(_smooth(log_energy[half : first + LONGEST_FRAMES])))
+        cut = half + int(np.argmin(smooth_level(log_energy[half : first + LONGEST_FRAMES])))
         pieces.append(Stretch(first, cut))
         first = cut
     return [*pieces, Stretch(first, end)]
 
 
-def _smooth(log_energy: NDArray[np.float32]) -> NDArray[np.float32]:
-    padded = np.pad(log_energy, SMOOTHING_FRAMES // 2, "edge")
-    return np.convolve(padded, np.full(SMOOTHING_FRAMES, 1 / SMOOTHING_FRAMES), "valid").astype(np.float32)
-
-
 def stretch_samples(audio: Audio, stretch: Stretch) -> bytes:
     """Return the samples of a stretch of a recording at 16 kHz, as 16-bit integers."""
     return sixteen_bits(audio.samples[stretch.first * HOP : stretch.end * HOP]).astype("<i2").tobytes()
+
+
+def find_passages(log_energy: NDArray[np.float32]) -> list[Stretch]:
+    """Return the passages of a recording, in order, without overlap; none where there is no sound but steady noise.
+
+    log_energy : of every frame, natural logarithm [shape=(T,)]
+    Each is found by its own level, so that it is the same wherever it stands, and whatever silence is around it.
+    """
+    passages: list[Stretch] = []
+    floor = float(log_energy.max() + np.log(DYNAMIC_RANGE)) + 1e-3
+    for region in _regions(log_energy):
+        found = sound_runs(frames_above(log_energy[region.first : region.end]), SEPARATE_FRAMES)
+        runs = _joined([Stretch(region.first + first, region.first + end) for first, end in found])
+        for number, run in enumerate(runs):
+            before = (runs[number - 1].end + run.first + 1) // 2 if number else region.first
+            after = (run.end + runs[number + 1].first + 1) // 2 if number + 1 < len(runs) else region.end
+            first, end = max(before, run.first - PASSAGE_MARGIN), min(after, run.end + PASSAGE_MARGIN)
+            before, after = log_energy[first : run.first][::-1], log_energy[run.end : end]
+            passages.append(Stretch(run.first - _margin(before, floor, 1), run.end + _margin(after, floor, 2)))
+    return passages
+
+
+def _margin(log_energy: NDArray[np.float32], floor: float, reaching: int) -> int:
+    """Return how many of the frames beside a sound are of the same recording: up to where it was cut, or mixed.
+
+    log_energy : of the frames beside the sound, the nearest first [shape=(M,)]
+    floor      : that of digital silence
+    reaching   : so many frames beside it have windows that reach into it
+    """
+    zeros = np.flatnonzero(log_energy <= floor)
+    count = max(int(zeros[0]) - reaching, 0) if len(zeros) else len(log_energy)
+    for cut in range(CUT_FROM, count - CUT_FRAMES):
+        room, other = log_energy[cut - CUT_FRAMES : cut - 1], log_energy[cut + 1 : count]
+        steady = np.ptp(room) < LEAST_RANGE
+        if steady and (other.max() < room.min() - CUT_STEP or other.min() > room.max() + CUT_STEP):
+            return cut - 1
+    return count
+
+
+def _regions(log_energy: NDArray[np.float32]) -> list[Stretch]:
+    """Return the recording cut in the quietest frames between voices of other levels, and in long silence."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+    level = power_level(log_energy)
+    local = maximum_filter1d(level, LOCAL_FRAMES, mode="nearest")
+    smooth = smooth_level(log_energy)
+    falls = maximum_filter1d(local - minimum_filter1d(smooth, STEADY_FRAMES, mode="nearest"), STEADY_FRAMES) > STEADY
+    sound = (smooth > local - LOCAL_DROP) & (level > level.max() - SOFTEST_DROP) & falls
+    if not sound.any():
+        return []
+    cuts = {0, len(level)}
+    for pause in (SEPARATE_FRAMES, SHORT_FRAMES // 10):  # whole lines first, then voices that follow at once
+        before: tuple[float, int, int] | None = None
+        for first, end in sound_runs(sound, pause):
+            loud, length = float(level[first:end].max()), end - first
+            if before is not None:
+                step = abs(loud - before[0]) > LEVEL_STEP and min(length, before[2]) > SHORT_FRAMES // 2
+                divided = any(before[1] < cut <= first for cut in cuts)
+                apart = NEAR_FRAMES if min(length, before[2]) < SHORT_FRAMES else SEPARATE_FRAMES
+                if step or divided or first - before[1] > apart:
+                    if not divided:
+                        cuts.add(before[1] + int(np.argmin(smooth[before[1] : first + 1])))
+                else:
+                    loud, length = max(loud, before[0]), length + before[2]
+            before = loud, end, length
+    return [Stretch(first, end) for first, end in pairwise(sorted(cuts))]
+
+
+def _joined(runs: list[Stretch]) -> list[Stretch]:
+    """Return runs of sound of which none is short, where a neighbour is near."""
+    joined: list[Stretch] = []
+    for run in runs:
+        short = joined and min(run.end - run.first, joined[-1].end - joined[-1].first) < SHORT_FRAMES
+        if short and run.first - joined[-1].end < NEAR_FRAMES:
+            joined[-1] = Stretch(joined[-1].first, run.end)
+        else:
+            joined.append(run)
+    return joined
+
+
+def level_passage(samples: NDArray[np.float32], log_energy: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the samples of a passage at the level of all passages; where its voice becomes softer, it is raised.
+
+    samples    : [shape=(N,)], full scale 1
+    log_energy : of its frames, natural logarithm [shape=(T,)]
+    """
+    from scipy.ndimage import maximum_filter1d
+
+    level = power_level(log_energy)
+    loud = float(level.max())
+    gain = np.full(len(level), SAME_LEVEL / np.exp((loud - np.log(WINDOW)) / 2))
+    lower = loud - maximum_filter1d(level, 2 * STEADY_FRAMES // 2 + 1, mode="nearest") - STEADY
+    sound = np.flatnonzero(frames_above(log_energy, LOCAL_DROP + STEADY))
+    if len(sound) and lower[sound].max() > 0:
+        raised = np.clip(lower[sound], 0, LOCAL_DROP) / 2
+        gain *= np.exp(np.interp(np.arange(len(level)), sound, raised))
+    times = np.arange(len(samples)) / HOP
+    return (samples * np.interp(times, np.arange(len(gain)), gain)).astype(np.float32)

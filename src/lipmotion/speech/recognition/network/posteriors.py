@@ -7,7 +7,7 @@ which its phone is said, ``BLANK`` in all others.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property, partial
 from itertools import groupby
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.extensions import Registry
-from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
+from lipmotion.speech.features.analysed_audio import AnalysedAudio, Passage, analysed
 from lipmotion.speech.sound.voice_activity import Stretch, stretch_samples, stretches_of_sound
 from lipmotion.types import Audio, ParallelMap, TokenPosteriors
 from lipmotion.types.audio import from_sixteen_bits
@@ -168,17 +168,35 @@ def posterior_stretches(name: str, audio: AnalysedAudio, each: ParallelMap = map
     Raises InputError, MissingDependencyError: as ``phone_recogniser``.
     """
 
+    key = f"posteriors of {name}"
+
     def found() -> list[PosteriorStretch]:
         tokens = phone_recogniser(name).tokens
-        stretches = stretches_of_sound(audio.log_energy)
-        chosen = each if sum(stretch.end - stretch.first for stretch in stretches) > SHORT_FRAMES else map
-        rows = chosen(partial(stretch_posteriors, name), (stretch_samples(audio, stretch) for stretch in stretches))
-        return [
-            PosteriorStretch(stretch, PhonePosteriors(values.astype(np.float32), tokens))
-            for stretch, values in zip(stretches, rows, strict=True)
-        ]
+        places = [(part, each_of) for part in audio.passages for each_of in stretches_of_sound(part.audio.log_energy)]
+        chosen = each if sum(stretch.end - stretch.first for _, stretch in places) > SHORT_FRAMES else map
+        sounds = (stretch_samples(part.audio, stretch) for part, stretch in places)
+        rows = chosen(partial(stretch_posteriors, name), sounds)
+        by_passage: dict[int, list[PosteriorStretch]] = {part.first: [] for part in audio.passages}
+        for (part, stretch), values in zip(places, rows, strict=True):
+            found_here = PhonePosteriors(values.astype(np.float32), tokens)
+            by_passage[part.first].append(PosteriorStretch(stretch, found_here))
+        if audio.is_passage:
+            return by_passage[0]
+        for part in audio.passages:
+            part.audio.once(key, lambda part=part: by_passage[part.first])
+        return [each_of for part in audio.passages for each_of in _placed(by_passage[part.first], part)]
 
-    return audio.once(f"posteriors of {name}", found)
+    return audio.once(key, found)
+
+
+def _placed(found: Sequence[PosteriorStretch], passage: Passage) -> Iterator[PosteriorStretch]:
+    """Yield what is found in a passage, in its own frames of the recording."""
+    for (first, end), posteriors in found:
+        start, stop = max(passage.first + first, passage.own.start), min(passage.first + end, passage.own.stop)
+        skipped = -(-(start - passage.first - first) // POSTERIOR_STEP)
+        values = posteriors.values[skipped : skipped + -(-(stop - start) // POSTERIOR_STEP)]
+        if len(values):
+            yield PosteriorStretch(Stretch(start, stop), PhonePosteriors(values, posteriors.tokens))
 
 
 def mean_posterior(found: Sequence[PosteriorStretch]) -> float:
