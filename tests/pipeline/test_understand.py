@@ -18,7 +18,7 @@ from lipmotion.pipeline.understand import understood_speech as pipeline_understa
 from lipmotion.pipeline.understand.request import SpeechRequest, request_of
 from lipmotion.pipeline.understand.understood_speech import (
     recognised_speech,
-    recognised_with,
+    relied_on,
     speech_of,
     understand,
     understood_speech,
@@ -71,7 +71,7 @@ def test_phones_that_the_engine_recognises_are_aligned_as_in_training(
     assert [s.label.phone for s in speech.units] == [s.label.phone for s in toy_sentence.units]
     assert {s.label.word for s in speech.units} == {""}
     aligned = Recogniser(toy_model.phones, "own").align_phones(toy_sentence.audio, mfcc(toy_sentence.audio), late)
-    assert speech.units == recognised_with(aligned, 0.0)
+    assert speech.units == relied_on(aligned, 0.0)
     errors = [abs(a.start_s - b.start_s) for a, b in zip(speech.units, toy_sentence.units, strict=True)]
     assert np.median(errors) < 0.03
 

@@ -25,6 +25,7 @@ from lipmotion.types import (
     Explanation,
     NamedProbability,
     RegressedMean,
+    SpeechPart,
     frame_of,
 )
 
@@ -68,14 +69,29 @@ def explain_session(session: Session, edits: Edits, times: Sequence[float]) -> t
     speech, person = session.understood(edits).speech, session.speaker
     frames = [_frame(time_s, len(speech.features.values)) for time_s in times]
     generation = session.generated(edits)
-    by_engine = session.model.engine.explain(session.model.learned, speech, frames)
-    if by_engine is None:
-        found = [explain_by_trace(generation, frame) for frame in frames]
-    else:
-        found = [explanation_for(person, explanation, speech) for explanation in by_engine]
+    found = []
+    for frame in frames:
+        whole = [] if speech.parts is not None else [SpeechPart(0, slice(0, len(speech.features.values)), speech)]
+        within = [each for each in speech.parts or whole if each.own.start <= frame < each.own.stop]
+        first, _, part = within[0] if within else (frame + 1, None, speech)
+        by_engine = None
+        if 0 <= frame - first < len(part.features.values):  # not in the silence between passages
+            by_engine = session.model.engine.explain(session.model.learned, part, [frame - first])
+        if by_engine is None:
+            found.append(explain_by_trace(generation, frame))
+        else:
+            found.append(_placed(explanation_for(person, by_engine[0], part), first))
     if generation.confidence is None:
         return tuple(found)
     return tuple(replace(each, confidence=float(generation.confidence[each.frame])) for each in found)
+
+
+def _placed(explanation: Explanation, first: int) -> Explanation:
+    """Return an explanation of a passage that begins in a frame, with times of the recording."""
+    offset_s, span = first / FRAME_RATE_HZ, explanation.span
+    if span is not None:
+        span = replace(span, start_s=max(span.start_s + offset_s, 0.0), end_s=span.end_s + offset_s)
+    return replace(explanation, time_s=explanation.time_s + offset_s, frame=explanation.frame + first, span=span)
 
 
 def _frame(time_s: float, frames: int) -> int:

@@ -16,6 +16,7 @@ from lipmotion.errors import InputError
 from lipmotion.motion.closure import OPENING
 from lipmotion.motion.generation import BLOCK_FRAMES, DOUBLE_FRAMES
 from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps, restfulness, viseme_weights
+from lipmotion.speech.recognition.recognised_speech import joined_units, placed_units
 from lipmotion.types import (
     FRAME_RATE_HZ,
     WEIGHT,
@@ -136,18 +137,19 @@ def _of_parts(
     generations = []
     for part in parts:
         start_s = part.first / FRAME_RATE_HZ
-        inside = [pin for pin in pins if 0 <= round((pin.time_s - start_s) * FRAME_RATE_HZ) < part.frames]
-        pins = tuple(pin for pin in pins if pin not in inside)
+        inside = [pin for pin in pins if part.own.start <= round(pin.time_s * FRAME_RATE_HZ) < part.own.stop]
+        inside = [pin for pin in inside if 0 <= round((pin.time_s - start_s) * FRAME_RATE_HZ) < part.frames]
         shifted = Constraints(tuple(replace(pin, time_s=pin.time_s - start_s) for pin in inside))
         try:
             generation = generate(part.speech, shifted)
         except InputError as error:
             raise InputError(f"{error} (in the passage that begins at {start_s:.2f} s)") from error
         first, *others = generation.units
+        units = generation.units
         apart = Timeline((replace(first, start_s=-LONG_SILENCE_S), *others))
         last = apart[-1]
         apart = Timeline((*apart.spans[:-1], replace(last, end_s=last.end_s + LONG_SILENCE_S)))
-        generations.append(finish(replace(generation, units=apart), start_s))
+        generations.append(replace(finish(replace(generation, units=apart), start_s), units=units))
     dtype = np.float32 if frames > DOUBLE_FRAMES else rest.motion.values.dtype
     values = _joined(parts, [each.motion.values for each in generations], rest.motion.values, frames, dtype)
     if isinstance(rest.spread, ReducedVariance):
@@ -163,11 +165,15 @@ def _of_parts(
         first, end = max(part.first, 0), min(part.first + part.frames, frames)
         trace[first:end] = named[first - part.first : end - part.first]
     motion = replace(rest.motion, values=values)
-    bend_through_pins(
-        values, [(pinned_frame(pin, motion, is_weight=False), motion.column(pin.channel), pin.value) for pin in pins],
-        REACH_FRAMES,
-    )  # fmt: skip
-    return replace(rest, motion=motion, spread=spread, units=speech.units, trace=StateTrace(states, trace))
+    held = [(pinned_frame(pin, motion, is_weight=False), motion.column(pin.channel), pin.value) for pin in pins]
+    bend_through_pins(values, held, REACH_FRAMES)  # those in silence; the others hold but for the way to rest
+    if not isinstance(spread, ReducedVariance):
+        for frame, column, _ in held:
+            spread[frame, column] = 0
+    end_s = speech.units[-1].end_s if len(speech.units) else speech.features.duration_s
+    placed = (placed_units(each.units, part.first, part.own) for part, each in zip(parts, generations, strict=True))
+    units = joined_units(placed, rest.units[0].label, end_s)
+    return replace(rest, motion=motion, spread=spread, units=units, trace=StateTrace(states, trace))
 
 
 def _joined(

@@ -29,7 +29,13 @@ from lipmotion.speech.recognition.agreement import TranscriptFit
 from lipmotion.speech.recognition.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
 from lipmotion.speech.recognition.network.posteriors import token_posteriors
 from lipmotion.speech.recognition.network.word_tree import english_words
-from lipmotion.speech.recognition.recognised_speech import Recognition, level_range_db, placed_units, relied_on
+from lipmotion.speech.recognition.recognised_speech import (
+    Recognition,
+    joined_units,
+    level_range_db,
+    placed_units,
+    relied_on,
+)
 from lipmotion.speech.recognition.recogniser import (
     RECOGNISER_KINDS,
     Recogniser,
@@ -351,17 +357,11 @@ def _parts_with(parts: tuple[SpeechPart, ...], units: Timeline[Unit]) -> tuple[S
             return None
     spoken = []
     for part in parts:
-        within = without_gaps(part.between(units), part.speech.features.duration_s)
+        within = part.between(units)
         sure = next((span.label.confidence for span in within if span.label.confidence is not None), None)
         silent = Unit(SILENCE, confidence=sure)  # as sure as the phones beside it
-        spans: list[Span[Unit]] = []
-        for span in within:
-            label = silent if is_silent(span.label.phone) and not span.label.unit else span.label
-            if spans and label == silent == spans[-1].label:
-                spans[-1] = replace(spans[-1], end_s=span.end_s)
-            else:
-                spans.append(replace(span, label=label))
-        spoken.append(part._replace(speech=with_units(part.speech, Timeline(tuple(spans)))))
+        within = joined_units([within], silent, part.speech.features.duration_s)
+        spoken.append(part._replace(speech=with_units(part.speech, within)))
     return tuple(spoken)
 
 
@@ -386,7 +386,7 @@ def recognised_speech(
     audio = analysed(audio, features)
     speech = speech_of(engine, audio, features, Timeline(()), phones.kind, each)
     passages = (SpeechPart(0, slice(0, len(features.values)), speech),) if speech.parts is None else speech.parts
-    units, spoken, found = list[Span[Unit]](), list[SpeechPart](), None
+    units, spoken, found = list[Timeline[Unit]](), list[SpeechPart](), None
     for part, (_, _, sound) in zip(passages, audio.passages, strict=True):
         within = None
         if phones.kind not in ("general", "words"):
@@ -402,11 +402,11 @@ def recognised_speech(
         if sum(span.duration_s for span in within if not is_silent(span.label.phone)) < LEAST_SPEECH_S:
             continue  # a click, a knock
         spoken.append(part)
-        units += placed_units(within, part.first, part.own)
+        units.append(placed_units(within, part.first, part.own))
     if speech.parts is not None:
         speech = replace(speech, parts=tuple(spoken))
     confidence = found.reliability if found is not None else 0.0
-    return with_units(speech, relied_on(without_gaps(Timeline(tuple(units)), features.duration_s), confidence))
+    return with_units(speech, joined_units(units, Unit(SILENCE, confidence=confidence), features.duration_s))
 
 
 def _words(

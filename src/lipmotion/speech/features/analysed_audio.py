@@ -161,36 +161,40 @@ class _PassageAudio(AnalysedAudio):
         return Audio(self.samples[self.lead * HOP : len(self.samples) - self.tail * HOP], self.rate_hz)
 
     @cached_property
-    def _silence(self) -> NDArray[np.float64]:
-        """The weights of the frames that are the most silent [shape=(T,)]."""
-        level = smooth_level(log_energy(checked_samples(self._sound)))
-        quietest = level <= np.quantile(level, QUIETEST)
-        return quietest / quietest.sum()
+    def _energy(self) -> NDArray[np.float32]:
+        return log_energy(checked_samples(self._sound))
+
+    @cached_property
+    def _weights(self) -> NDArray[np.float64]:
+        return silence_weights(self._energy)
 
     def _with_silence(self, rows: NDArray[Any]) -> NDArray[Any]:
         """Return the rows of the sound, and before and after them their mean where it is the most silent."""
-        silence = (self._silence @ rows).astype(rows.dtype)[None]
+        if not self.lead and not self.tail:
+            return rows
+        level = smooth_level(self._energy)
+        silence = rows[level <= np.quantile(level, QUIETEST)].mean(axis=0)[None].astype(rows.dtype)
         return np.concatenate([np.repeat(silence, self.lead, axis=0), rows, np.repeat(silence, self.tail, axis=0)])
 
     @cached_property
     def weights(self) -> NDArray[np.float64]:
-        return np.pad(silence_weights(log_energy(checked_samples(self._sound))), (self.lead, self.tail))
+        return np.pad(self._weights, (self.lead, self.tail))
 
     def _new_mfcc(self, warps: Sequence[float]) -> list[Features]:
-        found = mfcc_of_warps(self._sound, warps, log_energy(checked_samples(self._sound)))
+        found = mfcc_of_warps(self._sound, warps, self._energy)
         return [Features(self._with_silence(each.values), self.duration_s) for each in found]
 
     @cached_property
     def log_energy(self) -> NDArray[np.float32]:
-        return self._with_silence(log_energy(checked_samples(self._sound)))
+        return self._with_silence(self._energy)
 
     @cached_property
     def general_features(self) -> NDArray[np.float32]:
-        return self._with_silence(general_features(self._sound))
+        return self._with_silence(general_features(self._sound, self._weights))
 
     @cached_property
     def spectrum(self) -> NDArray[np.float32]:
-        return self._with_silence(spectrum(self._sound))
+        return self._with_silence(spectrum(self._sound, weights=self._weights))
 
 
 @dataclass(frozen=True, eq=False)

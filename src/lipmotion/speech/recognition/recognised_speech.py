@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import Any, NamedTuple, TypeVar
@@ -14,7 +14,7 @@ from lipmotion.speech.features.analysed_audio import SILENT_ENERGY, Passage
 from lipmotion.speech.recognition.word_fit import AlignedWords
 from lipmotion.speech.sound.voice_activity import Stretch
 from lipmotion.types import FRAME_RATE_HZ, Span, Timeline, Unit
-from lipmotion.units import is_silent, without_gaps
+from lipmotion.units import SILENCE, is_silent
 
 LabelT = TypeVar("LabelT")
 
@@ -28,6 +28,8 @@ noise of 20 dB 0.70 to 0.95, other languages 0.58 to 0.64."""
 RANGE_PERCENTILES = (5, 95)
 NOISY_DB = 20.0
 """A recording with a smaller range of levels is noisy: 25 to 34 dB in these pieces, 16 to 19 dB in babble of 10 dB."""
+GAP_S = 1e-6
+"""Shorter gaps between phones are of rounding."""
 SLIVER_FRAMES = 3
 """Phones without words of which fewer frames are left beside a word are not made: no phone model is shorter."""
 
@@ -140,21 +142,41 @@ def placed_units(units: Timeline[LabelT], first: int, own: slice) -> Timeline[La
     return within.shifted(start / FRAME_RATE_HZ)
 
 
+def joined_units(parts: Iterable[Timeline[Unit]], silence: Unit, end_s: float) -> Timeline[Unit]:
+    """Return the phones in time of a recording from those of its passages, with silence before, between and after them.
+
+    parts : of each passage, with times of the recording (``placed_units``)
+    end_s : of the recording
+    """
+    joined: list[Span[Unit]] = []
+    for span in [*(span for part in parts for span in part), Span(end_s, end_s, silence)]:
+        before_s = joined[-1].end_s if joined else 0.0
+        gap = [Span(before_s, span.start_s, silence)] if span.start_s - before_s > GAP_S else []
+        for each in [*gap, replace(span, end_s=min(span.end_s, end_s))]:
+            if joined and is_silent(each.label.phone) and is_silent(joined[-1].label.phone):
+                joined[-1] = replace(joined[-1], end_s=max(each.end_s, joined[-1].end_s))
+            elif each.end_s > each.start_s:
+                joined.append(each)
+    if joined:
+        joined[-1] = replace(joined[-1], end_s=end_s)
+    return Timeline(tuple(joined) or (Span(0.0, end_s, silence),))
+
+
 def joined_recognition(parts: Sequence[tuple[Passage, Recognition]], duration_s: float) -> Recognition:
     """Return the recognition of a recording from those of its passages.
 
     The phones of each passage are as reliable as they are there; the similarity is that of the longest passage.
     """
-    units, words = list[Span[Unit]](), list[Span[RecognisedWord]]()
+    units, words = list[Timeline[Unit]](), list[Span[RecognisedWord]]()
     for (first, own, _), part in parts:
-        units += placed_units(relied_on(part.units, part.reliability), first, own)
+        units.append(placed_units(relied_on(part.units, part.reliability), first, own))
         words += placed_units(part.words, first, own)
     speech_s = np.array([part.word_s + part.phone_s for _, part in parts])
     posteriors = np.array([np.nan if part.posterior is None else part.posterior for _, part in parts])
     decided = ~np.isnan(posteriors)
     posterior = float(np.average(posteriors[decided], weights=speech_s[decided] + 1e-9)) if decided.any() else None
     return Recognition(
-        without_gaps(Timeline(tuple(units)), duration_s),
+        joined_units(units, Unit(SILENCE), duration_s),
         Timeline(tuple(words)),
         sum(part.word_s for _, part in parts),
         sum(part.phone_s for _, part in parts),
