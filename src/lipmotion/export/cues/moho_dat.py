@@ -15,7 +15,7 @@ def text(sheet: CueSheet, _sound_file: str) -> str:
     frames = {1 + int(sheet.fps * cue.start_s): cue.label for cue in reversed(sheet.cues.spans)}
     end = max(1 + int(sheet.fps * sheet.duration_s), max(frames) + 1)
     rows = [*sorted(frames.items()), (end, sheet.rest)]
-    return f"{MARK}\n" + "".join(f"{frame} {SHAPES[shape].blair}\n" for frame, shape in rows)
+    return f"{MARK}\n" + "".join(f"{frame} {SHAPES[shape].blair if sheet.blair else shape}\n" for frame, shape in rows)
 
 
 def parse(text: str) -> CueSheet:

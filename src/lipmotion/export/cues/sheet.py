@@ -22,6 +22,7 @@ class CueSheet:
     fps   : the frame rate that they were chosen for; ``int(fps * start_s)`` is a cue's first frame, the first is 0
     drawn : the shapes that the character has
     words : the words in time, where they are known
+    blair : whether shapes have Preston Blair's names where a format has no letters of its own, ``.dat``
 
     >>> sheet = CueSheet(Timeline((Span(0.0, 0.5, "X"), Span(0.5, 0.62, "A"))), fps=24.0, drawn="ABCDEFX")
     >>> sheet.duration_s, sheet.rest
@@ -32,6 +33,7 @@ class CueSheet:
     fps: float
     drawn: str
     words: Timeline[str] = field(default_factory=lambda: Timeline(()))
+    blair: bool = True
 
     @property
     def rest(self) -> str:
