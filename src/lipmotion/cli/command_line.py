@@ -182,7 +182,7 @@ def _is_option(word: str) -> bool:
 
 
 def _option_of(parser: argparse.ArgumentParser, word: str) -> argparse.Action | None:
-    """Return what an option means; None: the word is none. Raises WrongCommandLineError: the parser has no such option."""
+    """Return what an option means; None: the word is none. Raises WrongCommandLineError: the parser has none so."""
     if not _is_option(word):
         return None
     name, known = word.partition("=")[0], parser._option_string_actions

@@ -11,6 +11,7 @@ import numpy as np
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import Registry
 from lipmotion.storage.files import check_regular, whole_file
+from lipmotion.storage.sources import check_kind
 from lipmotion.types import Generation, Motion, Timeline, Unit
 
 About = Mapping[str, str]
@@ -168,6 +169,7 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
     (100.0, 'sil')
     """
     path = Path(path)
+    check_kind(path, "motion file")
     read = _reader_of(path)
     if read is None:
         raise InputError(

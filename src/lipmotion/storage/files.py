@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import IO
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.storage.sources import Source, check_apart, is_same
+from lipmotion.storage.sources import Source, check_apart, check_kind, is_same
 
 if sys.platform == "win32":
     import msvcrt
@@ -44,6 +44,7 @@ def check_source(path: Path, kind: str) -> None:
         raise InputError(f"{path}: no such file")
     if path.stat().st_size == 0:
         raise InputError(f"{path}: the file is empty; give a {kind}")
+    check_kind(path, kind)
 
 
 def sha256_of(path: Path) -> str:
@@ -83,6 +84,7 @@ def read_text_file(path: Path, kind: str, largest: int = LARGEST_TEXT_BYTES) -> 
         size = path.stat().st_size
         if size > largest:
             raise InputError(f"{path}: {size} bytes, required at most {largest}: is it a {kind}?")
+        check_kind(path, "text", kind)
         return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError as error:
         raise InputError(f"{path}: no such {kind} file") from error

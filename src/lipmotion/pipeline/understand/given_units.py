@@ -8,6 +8,7 @@ from lipmotion.corpora.labels import holds_timings, read_phones
 from lipmotion.errors import InputError
 from lipmotion.export.base import motion_suffix
 from lipmotion.export.base import read_units as read_units_of_motion
+from lipmotion.storage.sources import check_kind
 from lipmotion.types import Timeline, Unit
 
 LABEL_SUFFIXES = (".textgrid", ".lab", ".txt", ".json", ".jsonl", ".marks", ".csv")
@@ -24,6 +25,7 @@ def read_units(path: str | Path) -> Timeline[Unit]:
     Raises InputError: no such file, not one of these, or without phones.
     """
     path = Path(path)
+    check_kind(path, "motion file", "units file")
     is_label = path.suffix.lower() in LABEL_SUFFIXES
     if motion_suffix(path) and not (is_label and holds_timings(path)):
         return read_units_of_motion(path)

@@ -11,6 +11,7 @@ from lipmotion.pipeline.job import Request
 from lipmotion.pipeline.understand.given_units import read_units
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.transcribe import read_transcript
+from lipmotion.storage.sources import check_kind
 from lipmotion.types import TimedTranscript
 from lipmotion.units import Lexicon
 
@@ -60,7 +61,10 @@ def text_or_file_content(argument: str) -> str | TimedTranscript:
     """
     path = Path(argument)
     looks_like_path = _may_be_name(argument) and (_SUFFIX.fullmatch(path.suffix) or _is_in_a_folder(argument))
-    return read_transcript(path) if looks_like_path or _file_exists(path) else argument
+    if not looks_like_path and not _file_exists(path):
+        return argument
+    check_kind(path, "text", "transcript")
+    return read_transcript(path)
 
 
 def _may_be_name(argument: str) -> bool:

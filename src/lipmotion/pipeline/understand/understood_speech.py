@@ -19,6 +19,7 @@ from lipmotion.pipeline.generate.prior import with_prior
 from lipmotion.pipeline.job import DETECTED
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.understand.spoken_language import warn_of_another_language
 from lipmotion.pipeline.understand.transcribe import read_transcript, transcribe, warn_of_guesses
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.f0 import log_f0
@@ -131,6 +132,8 @@ def understood_speech(
     if understood.is_without_speech and not understood.events:
         LOG.warning("no speech found in the recording: the mouth rests; give a recording in which something is said")
     speech, found = understood.speech, understood.recognition
+    if found is not None and request.language == ENGLISH:
+        warn_of_another_language(found)
     voice = known_voice(model.phones, audio, speech, found, given=request.units is not None)
     speech = replace(with_prior(model.prior, speech), voice=voice)
     return replace(understood, speech=speech)

@@ -15,6 +15,7 @@ from lipmotion.errors import InputError
 from lipmotion.speech.sound.audio_decoding import DecodedAudio, check_sound_format, decode_audio
 from lipmotion.storage.files import check_source
 from lipmotion.storage.media import open_media, stated_duration_s
+from lipmotion.storage.sources import is_text
 from lipmotion.types import Audio
 
 LOG = logging.getLogger("lipmotion")
@@ -85,6 +86,9 @@ def _decoded(path: Path, rate_hz: int, channel: int | None) -> DecodedAudio:
     except (av.FFmpegError, ValueError) as error:
         if isinstance(error, InputError):
             raise
+        if is_text(path):
+            told = f"is text, required a recording; give the recording first, its words with --transcript {path}"
+            raise InputError(f"{path}: {told}") from error
         raise InputError(f"{path}: not a readable recording ({_reason(error)}); give an audio or video file") from error
 
 
