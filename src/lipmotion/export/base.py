@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,15 +11,23 @@ import numpy as np
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import Registry
+from lipmotion.meshes.model.shape_names import is_known
 from lipmotion.storage.files import check_regular, whole_file
-from lipmotion.types import Generation, Motion, Timeline, Unit
+from lipmotion.types import EYE_DISTANCE, WEIGHT, Generation, Motion, Timeline, Unit
 
+LOG = logging.getLogger("lipmotion")
 About = Mapping[str, str]
 LARGEST_MOTION_BYTES = 1 << 31
 """Most bytes of a motion file: four hours of a hundred channels."""
 
 LARGEST_UNITS_BYTES = 1 << 28
 """Most bytes of a file of units alone: phones of a day."""
+
+
+LARGEST_WEIGHT = 4.0
+"""Largest weight of a blendshape that is read; captures and sculpted faces go a little over 1."""
+TOLERATED_WEIGHT = 0.1
+"""By how much weights may go beyond 0 to 1 without a warning."""
 
 
 @dataclass(frozen=True)
@@ -181,12 +190,28 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
         motion, units = read(path)
         if not np.isfinite(motion.values).all():
             raise InputError("there are values that are not finite; interpolate them first")
+        _check_weights(path, motion)
         return motion, units
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
     except InputError as error:
         text = str(error)
         raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from error
+
+
+def _check_weights(path: Path, motion: Motion) -> None:
+    """Raise InputError if blendshapes count from 0 to 100; warn where they go beyond 0 to 1."""
+    beyond = []
+    for channel, curve in zip(motion.channels, motion.values.T, strict=True):
+        if channel.unit in {WEIGHT, EYE_DISTANCE} and is_known(channel.name):
+            low, high = float(curve.min(initial=0.0)), float(curve.max(initial=0.0))
+            if high > LARGEST_WEIGHT:
+                raise InputError(f"the weight {channel.name} goes up to {high:g}, required 0 to 1; divide percent by 100")
+            if not -TOLERATED_WEIGHT <= low <= high <= 1 + TOLERATED_WEIGHT:
+                beyond.append(f"{channel.name} from {low:.2f} to {high:.2f}")
+    if beyond:
+        what = f"{len(beyond)} weights go beyond 0 to 1, where faces are drawn as at 0 or 1"
+        LOG.warning("%s: %s: %s", path, what, ", ".join(beyond[:8]))
 
 
 def read_units(path: Path) -> Timeline[Unit]:

@@ -13,7 +13,7 @@ from lipmotion.corpora.facegood import read_bare_motion
 from lipmotion.corpora.source_recordings import MotionFile, SourceRecording
 from lipmotion.errors import InputError
 from lipmotion.export.base import read_motion
-from lipmotion.meshes.files.live_link_table import is_live_link_file, speech_curves
+from lipmotion.meshes.files.curve_table import is_live_link_file, speech_curves
 from lipmotion.pipeline.corpus.mesh_motion import SUFFIX, mesh_files, read_mesh_motion
 from lipmotion.storage.files import sha256_of
 from lipmotion.types import Span, Timeline, Track, Unit
