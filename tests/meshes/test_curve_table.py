@@ -73,20 +73,20 @@ def test_uneven_times_and_lost_frames_are_evened_out(tmp_path, curves):
 def test_drop_frame_timecode_is_real_time(tmp_path):
     """At 29.97 frames a second, 00:00:59;29 is followed by 00:01:00;02."""
     codes = [f"00:00:59;{n:02d}" for n in range(30)] + [f"00:01:00;{n:02d}" for n in range(2, 30)]
-    motion = read(tmp_path, "\n".join([HEAD, *(row(code, n) for n, code in enumerate(codes))]))
+    motion = read(tmp_path, "\n".join([HEAD, *(row(code, n / 100) for n, code in enumerate(codes))]))
     assert motion.rate_hz == pytest.approx(30 / 1.001, abs=1e-3)
-    assert motion["eyeBlinkLeft"].tolist() == list(range(58))
+    assert motion["eyeBlinkLeft"] == pytest.approx(np.arange(58) / 100)
     codes = [f"00:09:59;{n:02d}" for n in range(30)] + [f"00:10:00;{n:02d}" for n in range(30)]  # none is left out
-    motion = read(tmp_path, "\n".join([HEAD, *(row(code, n) for n, code in enumerate(codes))]))
+    motion = read(tmp_path, "\n".join([HEAD, *(row(code, n / 100) for n, code in enumerate(codes))]))
     assert motion.rate_hz == pytest.approx(30 / 1.001, abs=1e-3)
-    assert motion["eyeBlinkLeft"].tolist() == list(range(60))
+    assert motion["eyeBlinkLeft"] == pytest.approx(np.arange(60) / 100)
 
 
 def test_rows_without_a_face_are_bridged(tmp_path):
-    lines = [row(f"10:00:0{n // 60}:{n % 60:02d}.000", 0.1 * n) for n in range(90)]
+    lines = [row(f"10:00:0{n // 60}:{n % 60:02d}.000", 0.01 * n) for n in range(90)]
     lines[10:13] = [lines[10].split(",")[0] + ",0", lines[11].split(",")[0] + ",0,,,", lines[12].split(",")[0] + ",0"]
     motion = read(tmp_path, "\n".join([HEAD + ",", *lines]) + "\n")
-    np.testing.assert_allclose(motion["eyeBlinkLeft"], 0.1 * np.arange(90), atol=1e-9)
+    np.testing.assert_allclose(motion["eyeBlinkLeft"], 0.01 * np.arange(90), atol=1e-9)
 
 
 def test_a_short_take_has_the_rate_of_the_app(tmp_path):

@@ -43,7 +43,6 @@ class MotionFormat:
     rate_hz : frames per second where the user asks for none; None: those of the motion
     mouth   : whether the file shows how the mouth itself moves: the pipeline keeps the channel ``opening`` for it,
               whatever channels or curves the user asks for
-    most_frames : number of frames that such a file can hold; None: any number
     fixed_rate : whether a file can have no other rate than ``rate_hz``
     other_curves : whether weights and controls that the user asks for take the place of ``curves``
     keyed   : whether the file holds keys of weights with straight lines between, and needs none where a line goes on
@@ -65,7 +64,6 @@ class MotionFormat:
     names_sound: bool = False
     mouth: bool = False
     keyed: bool = False
-    most_frames: int | None = None
 
 
 MOTION_FORMATS: Registry[MotionFormat] = Registry(
@@ -206,7 +204,9 @@ def _check_weights(path: Path, motion: Motion) -> None:
         if channel.unit in {WEIGHT, EYE_DISTANCE} and is_known(channel.name):
             low, high = float(curve.min(initial=0.0)), float(curve.max(initial=0.0))
             if high > LARGEST_WEIGHT:
-                raise InputError(f"the weight {channel.name} goes up to {high:g}, required 0 to 1; divide percent by 100")
+                raise InputError(
+                    f"the weight {channel.name} goes up to {high:g}, required 0 to 1; divide percent by 100"
+                )
             if not -TOLERATED_WEIGHT <= low <= high <= 1 + TOLERATED_WEIGHT:
                 beyond.append(f"{channel.name} from {low:.2f} to {high:.2f}")
     if beyond:

@@ -65,7 +65,7 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
 
 
 def _read(table: TextTable) -> Motion:
-    """Return the motion of a table that ``write`` wrote. Raises ValueError: a field is no number, or rows are uneven."""
+    """Return the motion of a table as of ``write``. Raises ValueError: a field is no number, or rows are uneven."""
     columns, numbers = len(table.names), array("d")
     for line, fields in table.rows:
         if len(fields) != columns:

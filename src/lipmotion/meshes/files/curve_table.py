@@ -120,8 +120,8 @@ def _read(table: TextTable) -> tuple[Motion, NDArray[np.bool_]]:
     used = [n for n, key in enumerate(keys) if n != timed and not NO_CURVES.fullmatch(key)]
     if timed is None or not 0 < len(used) <= MOST_CURVES:
         raise ValueError(
-            f"the first line is {shortened(','.join(table.names))!r}, required 'time_s,opening,...', or curves beside a "
-            "column of times: Timecode,BlendshapeCount,JawOpen,... or timestamp_ms,jawOpen,..."
+            f"the first line is {shortened(','.join(table.names))!r}, required 'time_s,opening,...', or curves beside "
+            "a column of times: Timecode,BlendshapeCount,JawOpen,... or timestamp_ms,jawOpen,..."
         )
     times, names, values = _rows(table, timed, used, keys.index(COUNT) if COUNT in keys else None)
     coded = bool(re.search("[:;]", times[0][1]))
