@@ -89,14 +89,24 @@ MOTION_FORMATS: Registry[MotionFormat] = Registry(
 """Motion formats by suffix, without the first dot; a suffix may have several parts, as ``livelink.csv``."""
 _GLTF = "lipmotion.meshes.files.gltf_weights:read_gltf_motion"
 _CUES = "lipmotion.export.cues.cue_motion:read_cue_motion"
+_FRAMES = "lipmotion.export.motion.json_frames:read"
 MOTION_READERS: Registry[Callable[[Path], tuple[Motion, Timeline[Unit]]]] = Registry(
     "motion reader",
     "lipmotion.motion_readers",
-    {"glb": _GLTF, "gltf": _GLTF, "tsv": _CUES, "xml": _CUES, "dat": _CUES, "pgo": _CUES},
+    {"glb": _GLTF, "gltf": _GLTF, **dict.fromkeys(("tsv", "xml", "dat", "pgo"), _CUES), "jsonl": _FRAMES},
 )
 """Readers of files that hold motion, but are not written as motion formats, by suffix as ``MOTION_FORMATS``."""
-OTHER_JSON = {b'"mouthCues"': ".tsv", b'"facsNames"': ".a2f.json"}
-"""Members at the beginning of ``.json`` files of other programs, and the suffix of files that are read alike."""
+OTHER_JSON = {
+    b'"lipmotion.motion"': ".json",
+    b'"mouthCues"': ".tsv",
+    b'"facsNames"': ".a2f.json",
+    b'"weightMat"': ".a2f.json",
+    b"lendShapes": ".jsonl",
+    b"lendshape": ".jsonl",
+    b"ategory": ".jsonl",
+    b'awOpen"': ".jsonl",
+}
+"""What the beginnings of ``.json`` files hold, and the suffix of files that are read alike; the first counts."""
 JSON_HEAD = 1 << 16
 """How many bytes of a ``.json`` are searched for them."""
 

@@ -39,7 +39,9 @@ SPEECH_CURVES = frozenset(
 )
 """The curves that speech moves: those of mouth, jaw, tongue, cheeks and nose."""
 PER_SECOND = {"ms": 1e3, "msec": 1e3, "milliseconds": 1e3, "us": 1e6, "microseconds": 1e6, "ns": 1e9}
-_TIME = re.compile(rf"(?:(?:time(?:stamp|code)?|t)(?:s|secs?|seconds?|{'|'.join(PER_SECOND)})?|seconds?|milliseconds)")
+TIME_COLUMN = re.compile(
+    rf"(?:(?:time(?:stamp|code)?|t)(?:s|secs?|seconds?|{'|'.join(PER_SECOND)})?|seconds?|milliseconds)"
+)
 """Names of columns of times, without blanks, brackets and underscores."""
 NO_CURVES = re.compile(r"(?:|unnamed:?0|(?:frame|face)?(?:index|idx|id|number|no|num)?s?|blendshapecount|neutral)")
 """The same of columns that are no curves: numbers of frames and faces, and what MediaPipe calls neutral."""
@@ -114,9 +116,14 @@ def read_curve_table(path: Path) -> tuple[Motion, NDArray[np.bool_]]:
         raise InputError(f"not a table of numbers under a header ({error}); export it again") from error
 
 
+def column_key(name: str) -> str:
+    """Return the name of a column as it is compared: ``Time (ms)`` is ``timems``."""
+    return re.sub(r"[\s_()\[\].-]+", "", name).lower()
+
+
 def _read(table: TextTable) -> tuple[Motion, NDArray[np.bool_]]:
-    keys = [re.sub(r"[\s_()\[\].-]+", "", name).lower() for name in table.names]
-    timed = next((column for column, key in enumerate(keys) if _TIME.fullmatch(key)), None)
+    keys = list(map(column_key, table.names))
+    timed = next((column for column, key in enumerate(keys) if TIME_COLUMN.fullmatch(key)), None)
     used = [n for n, key in enumerate(keys) if n != timed and not NO_CURVES.fullmatch(key)]
     if timed is None or not 0 < len(used) <= MOST_CURVES:
         raise ValueError(
@@ -125,7 +132,10 @@ def _read(table: TextTable) -> tuple[Motion, NDArray[np.bool_]]:
         )
     times, names, values = _rows(table, timed, used, keys.index(COUNT) if COUNT in keys else None)
     coded = bool(re.search("[:;]", times[0][1]))
-    time_s = _seconds([_timecode(text, line) for line, text in times]) if coded else _numeric_s(times, keys[timed])
+    if coded:
+        time_s = _seconds([_timecode(text, line) for line, text in times])
+    else:
+        time_s = in_seconds(np.array([numbers_in([text], line)[0] for line, text in times]), keys[timed])
     return motion_at_times(names, time_s, values, WEIGHT if coded else EYE_DISTANCE)
 
 
@@ -200,18 +210,19 @@ def tabulated(frames: Sequence[Mapping[str, float]]) -> tuple[list[str], Array]:
     return names, np.array([[frame.get(name, np.nan) for name in names] for frame in frames], float)
 
 
-def _numeric_s(times: list[tuple[int, str]], key: str) -> Array:
-    """Return numbers of a column of times in seconds; their size shows the unit where the name does not."""
-    time_s = np.array([numbers_in([text], line)[0] for line, text in times])
-    if not np.isfinite(time_s).all():
-        line, text = times[int(np.argmin(np.isfinite(time_s)))]
-        raise ValueError(f"line {line} begins with {shortened(text)!r}, required a time")
+def in_seconds(times: Array, key: str) -> Array:
+    """Return times in seconds; their size shows the unit where the name of their column (``column_key``) does not.
+
+    Raises InputError: one is no number.
+    """
+    if not np.isfinite(times).all():
+        raise InputError(f"the time of row {int(np.argmin(np.isfinite(times))) + 1} is no number, required one in each")
     per_second = next((scale for unit, scale in PER_SECOND.items() if key.endswith(unit)), 1.0)
-    step = float(np.median(np.diff(time_s))) / per_second if len(time_s) > 1 else 0.0
+    step = float(np.median(np.diff(times))) / per_second if len(times) > 1 else 0.0
     if per_second == 1 and step > LONGEST_STEP_S:
         per_second = next(scale for scale in (1e3, 1e6, 1e9) if step / scale <= LONGEST_STEP_S or scale == 1e9)
         LOG.warning("the times rise by %g a row: read as parts of a second, %g of them", step, per_second)
-    return time_s / per_second
+    return np.asarray(times / per_second)
 
 
 def motion_at_times(
