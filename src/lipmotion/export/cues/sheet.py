@@ -55,10 +55,11 @@ def start_s(frame: int, fps: float) -> float:
     """Return the first hundredth of a second in which a frame is shown.
 
     Rounded up, so that ``int(fps * start)``, which readers of Rhubarb's and Moho's files compute, is the frame again.
-    Frame 1 at 24 fps, 0.0417 s, becomes 0.05 s; rounded to 0.04 s it would be in frame 0.
+    Frame 1 at 24 fps, 0.0417 s, becomes 0.05 s; rounded to 0.04 s it would be in frame 0. At 100 fps a frame is a
+    hundredth, and none is left to round to.
     """
     hundredths = int(np.ceil(frame / fps * 100 - 1e-6))
-    return (hundredths + (int(fps * (hundredths / 100)) < frame)) / 100
+    return (hundredths + (fps < 100 and int(fps * (hundredths / 100)) < frame)) / 100
 
 
 def cue_frame_count(duration_s: float, fps: float) -> int:

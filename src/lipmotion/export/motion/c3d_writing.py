@@ -7,12 +7,16 @@ from pathlib import Path
 
 import numpy as np
 
-from lipmotion.export.motion.c3d_file import BLOCK, INTEL_PROCESSOR, MARK, C3dFile, Values
+from lipmotion.export.motion.c3d_file import BLOCK, INTEL_PROCESSOR, MARK, MOST_FRAMES, OVERFLOW, C3dFile, Values
 
 
 def write_c3d(path: Path, content: C3dFile) -> None:
-    """Write a file of at most ``MOST_FRAMES`` frames; texts are ASCII, numbers have single precision."""
+    """Write a file; texts are ASCII, numbers have single precision.
+
+    More frames than the header can number stand in ``TRIAL`` as two whole numbers each, and in ``POINT:LONG_FRAMES``.
+    """
     frames, points = content.points.shape[:2]
+    numbered = min(frames, MOST_FRAMES)
     curves = len(content.analog_labels)
     groups: dict[str, dict[str, int | float | Values]] = {
         "POINT": {
@@ -20,7 +24,7 @@ def write_c3d(path: Path, content: C3dFile) -> None:
             "SCALE": -1.0,
             "RATE": content.rate_hz,
             "DATA_START": 0,
-            "FRAMES": frames,
+            "FRAMES": numbered,
             "LABELS": list(content.labels),
             "DESCRIPTIONS": ["" for _ in content.labels],
             "UNITS": [content.unit],
@@ -37,10 +41,14 @@ def write_c3d(path: Path, content: C3dFile) -> None:
         },
         "MANUFACTURER": {"SOFTWARE": [content.software]},
     }
+    if frames > numbered:
+        groups["POINT"]["LONG_FRAMES"] = float(frames)
+        start, end = (np.array([number % OVERFLOW, number // OVERFLOW]) for number in (1, frames))
+        groups["TRIAL"] = {"ACTUAL_START_FIELD": start, "ACTUAL_END_FIELD": end}
     blocks = -(-(4 + len(_section(groups))) // BLOCK)
     groups["POINT"]["DATA_START"] = 2 + blocks
     section = bytes([1, MARK, blocks, INTEL_PROCESSOR]) + _section(groups)
-    header = struct.pack("<BB5HfHHf", 2, MARK, points, curves, 1, frames, 10, -1.0, 2 + blocks, 1, content.rate_hz)
+    header = struct.pack("<BB5HfHHf", 2, MARK, points, curves, 1, numbered, 10, -1.0, 2 + blocks, 1, content.rate_hz)
     seen = np.isfinite(content.points).all(axis=2)
     data = np.zeros((frames, points * 4 + curves), "<f4")
     placed = np.concatenate([content.points, np.where(seen, 0.0, -1.0)[..., None]], axis=2)

@@ -14,6 +14,7 @@ from lipmotion.export.motion.vmd_file import RATE_HZ, Turns, VmdFile, read_vmd, 
 from lipmotion.meshes.fitting.eyes_and_brows import MOVED_BY, gaze_weights, given_gaze
 from lipmotion.meshes.model.head_angles import ANGLES, head_angles, head_quaternions
 from lipmotion.meshes.model.other_shapes import CLOSED
+from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VRM_VOWELS, arkit_name, vowel_name
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Timeline, Unit
 from lipmotion.types.motion import RADIAN
 
@@ -79,17 +80,21 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
     Weights are linear between keys, and constant before the first and after the last one. Raises InputError: no motion
     of MikuMikuDance, or none of its morphs is one of the mouth.
     """
-    file = read_vmd(path)
-    if not any(morph in file.morphs for morph in list(MORPHS)[:5]):
-        found = ", ".join([*file.morphs][:8]) or "none"
-        raise InputError(f"the motion has none of the morphs あ い う え お; its morphs are: {found}")
+    file = read_vmd(path, lambda name: bool(_channels(name)) or name in {HEAD, EYES})
+    moved = {name for morph in file.morphs for name in _channels(morph)}
+    if not moved & {*VRM_VOWELS, *ARKIT_MOUTH}:
+        morphs = ", ".join([*file.morphs][:8]) or "none"
+        raise InputError(
+            f"the motion has none of the morphs あ い う え お; its morphs are: {morphs}; "
+            f"it moves {len(file.bones)} bones and has {file.camera} keys of a camera; save the motion of the face"
+        )
     last = max(keys[-1][0] for keys in (*file.morphs.values(), *file.bones.values()))
     frames = np.arange(last + 1)
     curves: dict[str, tuple[np.ndarray, str]] = {}
-    for morph, sources in MORPHS.items():
-        if morph in file.morphs:
-            at, values = zip(*file.morphs[morph], strict=True)
-            curves |= dict.fromkeys(sources, (np.interp(frames, at, values), WEIGHT))
+    for morph, keys in sorted(file.morphs.items(), key=lambda each: each[0] not in MORPHS):
+        at, values = zip(*keys, strict=True)
+        for name in _channels(morph):
+            curves.setdefault(name, (np.interp(frames, at, values), WEIGHT))
     if HEAD in file.bones:
         curves |= {name: (curve, RADIAN) for name, curve in zip(ANGLES, _turned(file, HEAD, frames).T, strict=True)}
     if EYES in file.bones:
@@ -97,6 +102,12 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
         curves |= {name: (curve, WEIGHT) for name, curve in looks.items()}
     table = np.stack([curve for curve, _ in curves.values()], axis=1)
     return Motion(table, RATE_HZ, tuple(Channel(name, unit) for name, (_, unit) in curves.items())), Timeline(())
+
+
+def _channels(morph: str) -> tuple[str, ...]:
+    """Return the channels that a morph moves: a standard one, or a vowel or blendshape by its name; none of others."""
+    known = vowel_name(morph) or arkit_name(morph)
+    return MORPHS.get(morph, (known,) if known else ())
 
 
 def _turned(file: VmdFile, bone: str, frames: np.ndarray) -> np.ndarray:

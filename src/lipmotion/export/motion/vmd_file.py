@@ -2,13 +2,14 @@
 
 Source: the layout as MikuMikuDance 9 writes it: a header, then counted lists of keys of bones (name, frame, place,
 rotation, 64 bytes of interpolation), of morphs (name, frame, weight), of the camera, of lights and of shadows. Names
-are in Shift JIS. Camera, lights and shadows are passed over, and between keys of bones everything is linear.
+are in Shift JIS, or as other countries' programs write them. Camera, lights and shadows are passed over, and between
+keys of bones everything is linear.
 """
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,6 +28,8 @@ RATE_HZ = 30.0
 MARK, OLD_MARK = b"Vocaloid Motion Data 0002", b"Vocaloid Motion Data file"
 MARK_BYTES, MODEL_BYTES, OLD_MODEL_BYTES = 30, 20, 10
 ENCODING = "cp932"
+ENCODINGS = (ENCODING, "gb18030", "euc_jp", "utf-8", "big5", "euc_kr")
+"""Encodings of names, the usual one first: programs in other countries write their own."""
 BONE_KEY, MORPH_KEY, COUNT = struct.Struct("<15sI3f4f64s"), struct.Struct("<15sIf"), struct.Struct("<I")
 _SLOW, _FAST = bytes([20]), bytes([107])
 LINEAR = (
@@ -43,10 +46,14 @@ LAST_FRAME = 86_400 * 30
 
 @dataclass(frozen=True)
 class VmdFile:
-    """What a VMD file holds of a face: keys of morphs, and rotations of bones, by their names, in order of time."""
+    """What a VMD file holds of a face: keys of morphs, and rotations of bones, by their names, in order of time.
+
+    camera : number of keys of the camera
+    """
 
     morphs: Mapping[str, Keys]
     bones: Mapping[str, Turns]
+    camera: int = 0
 
 
 def write_vmd(path: Path, file: VmdFile, model: str) -> None:
@@ -72,9 +79,10 @@ def _named(name: str, size: int) -> bytes:
     return kept.ljust(size, b"\0")
 
 
-def read_vmd(path: Path) -> VmdFile:
+def read_vmd(path: Path, is_known: Callable[[str], bool]) -> VmdFile:
     """Return the keys of a file. Of several keys of one frame, the last counts.
 
+    is_known : whether a name means something: that shows the encoding of all names
     Raises InputError: not a VMD file, too large, cut short, or a value that is not finite.
     """
     size = path.stat().st_size
@@ -85,23 +93,35 @@ def read_vmd(path: Path) -> VmdFile:
     if not content.startswith((MARK, OLD_MARK)):
         raise InputError("not a motion of MikuMikuDance: its first bytes are not those of the format; save it again")
     at = MARK_BYTES + model_bytes
-    bones: dict[str, dict[int, tuple[float, float, float, float]]] = {}
-    morphs: dict[str, dict[int, float]] = {}
+    bones: dict[bytes, dict[int, tuple[float, float, float, float]]] = {}
+    morphs: dict[bytes, dict[int, float]] = {}
+    camera = 0
     try:
         for name, frame, (_, _, _, x, y, z, w) in _keys(content, at, BONE_KEY):
             bones.setdefault(name, {})[frame] = (x, y, z, w)
         at += COUNT.size + COUNT.unpack_from(content, at)[0] * BONE_KEY.size
         for name, frame, (value,) in _keys(content, at, MORPH_KEY) if at < len(content) else ():
             morphs.setdefault(name, {})[frame] = value
+        if at < len(content):
+            at += COUNT.size + COUNT.unpack_from(content, at)[0] * MORPH_KEY.size
+            camera = COUNT.unpack_from(content, at)[0] if at + COUNT.size <= len(content) else 0
     except struct.error as error:
         raise InputError("the motion of MikuMikuDance is cut short; save it again") from error
+    encoding = max(ENCODINGS, key=lambda each: _understood((*morphs, *bones), each, is_known))
     return VmdFile(
-        {name: sorted(keys.items()) for name, keys in morphs.items()},
-        {name: sorted(keys.items()) for name, keys in bones.items()},
+        {name.decode(encoding, "replace"): sorted(keys.items()) for name, keys in morphs.items()},
+        {name.decode(encoding, "replace"): sorted(keys.items()) for name, keys in bones.items()},
+        camera,
     )
 
 
-def _keys(content: bytes, at: int, form: struct.Struct) -> Iterator[tuple[str, int, list[float]]]:
+def _understood(names: Iterable[bytes], encoding: str, is_known: Callable[[str], bool]) -> tuple[int, int]:
+    """Return how many names an encoding makes known ones, and minus how many letters it cannot read."""
+    texts = [name.decode(encoding, "replace") for name in names]
+    return sum(map(is_known, texts)), -sum(text.count("\ufffd") for text in texts)
+
+
+def _keys(content: bytes, at: int, form: struct.Struct) -> Iterator[tuple[bytes, int, list[float]]]:
     """Yield the name of each key of a counted list, its frame and its numbers.
 
     Raises struct.error: it is cut short. Raises InputError: a frame of another day, or a value that is not finite.
@@ -110,8 +130,9 @@ def _keys(content: bytes, at: int, form: struct.Struct) -> Iterator[tuple[str, i
     if count * form.size > len(content) - at - COUNT.size:
         raise struct.error
     for raw, frame, *values in form.iter_unpack(content[at + COUNT.size : at + COUNT.size + count * form.size]):
-        name = raw.partition(b"\0")[0].decode(ENCODING, "replace")
+        name = raw.partition(b"\0")[0]
         numbers = [value for value in values if isinstance(value, float)]
         if frame > LAST_FRAME or not np.isfinite(numbers).all():
-            raise InputError(f"a key of {name!r} at frame {frame} is none; save the motion again in MikuMikuDance")
+            text = name.decode(ENCODING, "replace")
+            raise InputError(f"a key of {text!r} at frame {frame} is none; save the motion again in MikuMikuDance")
         yield name, frame, numbers

@@ -7,7 +7,7 @@ from lipmotion.pipeline.understand.spoken_language import confidence_of
 from lipmotion.pipeline.understand.transcribe import is_other_language
 from lipmotion.pipeline.understand.understood_speech import UnderstoodSpeech
 from lipmotion.speech.recognition.agreement import LEAST_FITTING_SHARE
-from lipmotion.speech.recognition.recognised_speech import NOISY_DB, Recognition
+from lipmotion.speech.recognition.recognised_speech import NOISY_DB
 from lipmotion.speech.recognition.recogniser import FULL_WEIGHT_SCORE, own_model_weight
 from lipmotion.speech.voices.pronunciations import MAPPED_CONFIDENCE
 from lipmotion.types import Outlook

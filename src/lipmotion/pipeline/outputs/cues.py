@@ -20,7 +20,7 @@ from lipmotion.types import Generation
 
 SHEET = ".cues."
 """What the name of a cue sheet among other outputs has before its format."""
-FASTEST_FPS = 60.0
+FASTEST_FPS = 100.0
 """Largest frame rate: times in cue files are in hundredths of a second, and two frames must not share one."""
 
 

@@ -55,7 +55,7 @@ def warn_of_another_language(found: Recognition) -> None:
     confidence = confidence_of(found)
     if found.word_s >= LEAST_TOLD_S and confidence < UNDERSTOOD:
         LOG.warning(
-            "the words are hardly understood (confidence %.2f, required %.1f): the speech may not be English, then give "
-            "its language (--language es, fr, de, ...); or it is noisy, then give its words (--transcript)",
+            "the words are hardly understood (confidence %.2f, required %.1f): the speech may not be English, then "
+            "give its language (--language es, fr, de, ...); or it is noisy, then give its words (--transcript)",
             *(confidence, UNDERSTOOD),
         )
