@@ -151,21 +151,21 @@ def _in_order(parser: argparse.ArgumentParser, words: Sequence[str]) -> list[str
     verb, verbs = next((at for at, word in enumerate(words) if not word.startswith("-")), len(words)), _verbs(parser)
     if verb < len(words) and words[verb] in verbs:
         return [*words[: verb + 1], *_in_order(verbs[words[verb]], words[verb + 1 :])]
-    words, free, taken, at = list(words), 0, list[int](), 0
+    known, free, taken, at = parser._option_string_actions, 0, list[int](), 0
+    words = [  # "-o OUT" may be one word, as for Rhubarb
+        part for word in words for part in (word.split(maxsplit=1) if word.partition(" ")[0] in known else (word,))
+    ]
     while at < len(words) and words[at] != "--":
-        first, _, rest = words[at].partition(" ")
-        if rest and first in parser._option_string_actions:  # "-o OUT" as one word, which Rhubarb takes
-            words[at : at + 1] = [first, rest.strip()]
         option, at = _option_of(parser, words[at]), at + 1
-        behind = next((end for end in range(at, len(words)) if _is_option(words[end])), len(words))
         if option is None:
             free += 1
         elif option.nargs == "+" and "=" not in words[at - 1]:
+            behind = next((end for end in range(at, len(words)) if _is_option(words[end])), len(words))
             taken, at = list(range(at + 1, behind)), behind
         elif option.nargs is None and words[at - 1] in option.option_strings:
             at += 1
     wanted = next((action for action in parser._actions if not action.option_strings), None)
-    if free or wanted is None or not taken or at < len(words):
+    if free or wanted is None or not taken or at < len(words) or "--job" in words:
         return words
     last = words[taken[-1]]
     if wanted.nargs == "?" and Path(last).suffix and " " not in last:

@@ -114,7 +114,7 @@ _KINDS: dict[str, tuple[str, dict[str, tuple[tuple[int, bytes], ...]]]] = {
             "a PowerPoint file": ((-1, b"ppt/presentation.xml"),),
             "an OpenDocument file": ((30, b"mimetypeapplication/vnd.oasis"),),
             "a Word document or another of an old Office": ((0, b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"),),
-            "formatted text (RTF)": ((0, b"{\\rtf"),),
+            "a rich-text file (RTF)": ((0, b"{\\rtf"),),
         },
     ),
     "project": (
@@ -129,7 +129,7 @@ _KINDS: dict[str, tuple[str, dict[str, tuple[tuple[int, bytes], ...]]]] = {
             "a session of Audition": ((-2, b"<sesx"),),
             "a project of Premiere": ((-2, b"<PremiereData"),),
             "a project of After Effects": ((8, b"Egg!"),),
-            "notes (MIDI)": ((0, b"MThd"),),
+            "a MIDI file of notes": ((0, b"MThd"),),
             "a sound bank of a game": ((0, b"BKHD"), (0, b"FSB5")),
         },
     ),

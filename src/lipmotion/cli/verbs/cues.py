@@ -51,6 +51,8 @@ def run(options: argparse.Namespace) -> None:
     piped = is_pipe(options.speech)
     placed = placed_outputs(options.speech, options.output, options.format or "tsv")
     with status_lines(options) as set_progress, placed as options.output, read_pipe(options.speech) as speech:
+        if [path.suffix.lower() in {"", ".txt"} for path in options.output] == [True]:
+            options.format = options.format or "tsv"  # as Rhubarb writes whatever the name is
         check_paths(options)  # in a folder it may be a file that is read
         delivery, asked = part_of(options, Delivery()), part_of(options, Request(), recording=speech)
         check_cue_options(options.fps, options.hold, options.shapes)

@@ -35,7 +35,7 @@ def cues(
     """Return the mouth shapes of generated motion for 2D animation, each held for a least number of frames.
 
     generation  : from ``animate``; without a channel ``opening``, shapes are chosen from the phones alone
-    fps         : frames per second of the animation, 1 to 60
+    fps         : frames per second of the animation, 1 to 100
     hold_frames : smallest number of frames of a shape; None: as many as last two frames at 24 frames per second
     shapes      : the optional shapes among ``G``, ``H`` and ``X`` that the character has, besides A to F, in any case
     delivery    : intensity, anticipation and offset of the shapes, and the least time of each (docs/controls.md); of
