@@ -17,7 +17,7 @@ from lipmotion.units.ipa_phones import token_phones
 from lipmotion.units.languages_told import is_english
 
 LOG = logging.getLogger("lipmotion")
-UNDERSTOOD = 0.4
+LEAST_CONFIDENCE = 0.4
 """English words are recognised with at least this confidence in clear English (0.8 to 0.9 there), and with less in
 other languages and in English played backwards (0.18 to 0.25), and in noise."""
 LEAST_TOLD_S = 1.0
@@ -53,9 +53,9 @@ def confidence_of(found: Recognition) -> float:
 def warn_of_another_language(found: Recognition) -> None:
     """Log a warning where English words were recognised in what is hardly English."""
     confidence = confidence_of(found)
-    if found.word_s >= LEAST_TOLD_S and confidence < UNDERSTOOD:
+    if found.word_s >= LEAST_TOLD_S and confidence < LEAST_CONFIDENCE:
         LOG.warning(
             "the words are hardly understood (confidence %.2f, required %.1f): the speech may not be English, then "
             "give its language (--language es, fr, de, ...); or it is noisy, then give its words (--transcript)",
-            *(confidence, UNDERSTOOD),
+            *(confidence, LEAST_CONFIDENCE),
         )
