@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
 from lipmotion.units import words_of
-from lipmotion.units.text_normalisation import MOST_MARKS, ONES, SCALES, TENS, normalised_text, number_words
+from lipmotion.units.spelling import MOST_MARKS, normalised_text
+from lipmotion.units.written_forms import ONES, SCALES, TENS, number_words
 
 
 def test_texts() -> None:

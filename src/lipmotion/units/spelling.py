@@ -1,4 +1,4 @@
-"""Letter-to-sound rules for words that are in no dictionary."""
+"""The letters of words: in one form of writing, and read by rules where a word is in no dictionary."""
 
 from __future__ import annotations
 
@@ -95,8 +95,41 @@ _LONG_VOWEL = re.compile(r"[aeiou][bcdfgklmnpstvz]e('?s)?$")
 """A long vowel: vowel, consonant, final e."""
 
 
+MOST_MARKS = 30
+"""Most accents on one letter; no language has so many."""
+APOSTROPHES = re.compile("[’‘ʼʻ′´`‛ʹ＇]")
+UNSPOKEN = re.compile("\u00ad\\s*\n\\s*|[™®©]")
+"""A soft hyphen at the end of a line, and signs that Unicode's NFKC makes letters of."""
+DASHES = str.maketrans({"‐": "-", "‒": "-", "²": " squared", "³": " cubed", "″": '"'})
 PLAIN = str.maketrans({"ß": "ss", "æ": "ae", "œ": "oe", "ø": "o", "đ": "d", "ð": "th", "þ": "th", "ł": "l", "ı": "i"})
 """Letters of Latin alphabets that Unicode does not divide into a letter and an accent."""
+
+
+def plain_text(text: str) -> str:
+    """Return a text in Unicode's NFKC form, with straight apostrophes, without characters that nobody sees.
+
+    ``2½`` becomes ``2 1⁄2``.
+    """
+    if not text.isascii():
+        text = re.sub(r"(?<=\d)(?=[¼-¾⅐-⅞])", " ", UNSPOKEN.sub("", APOSTROPHES.sub("'", _few_marks(text))))
+        text = unicodedata.normalize("NFKC", text.translate(DASHES)).translate(DASHES)
+        text = "".join(letter for letter in text if unicodedata.category(letter) != "Cf")
+        text = re.sub(r"\d", lambda digit: str(int(digit[0])), text)
+    return text.replace("`", "'")
+
+
+def normalised_text(text: str) -> str:
+    """Return a text as ``plain_text`` does, in lower case."""
+    return plain_text(text).lower()
+
+
+def _few_marks(text: str) -> str:
+    """Return a text with at most ``MOST_MARKS`` marks on a letter: Unicode sorts them in quadratic time.
+
+    Source: Unicode Standard Annex 15, Stream-Safe Text Format.
+    """
+    marks = re.escape("".join(c for c in set(text) if unicodedata.combining(unicodedata.normalize("NFKD", c)[0])))
+    return re.sub(f"([{marks}]{{{MOST_MARKS}}})[{marks}]+", r"\1", text) if marks else text
 
 
 def without_accents(word: str) -> str:
