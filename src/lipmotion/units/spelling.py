@@ -7,84 +7,20 @@ import unicodedata
 
 from lipmotion.errors import InputError, shortened
 
-SPELLINGS: dict[str, str] = {
-    # The longest match from the left wins. ARPAbet, lower case; an empty value is a silent letter.
-    "tion": "sh ah n",
-    "sion": "zh ah n",
-    "ture": "ch er",
-    "ough": "ao",
-    "augh": "ao",
-    "eigh": "ey",
-    "igh": "ay",
-    "tch": "ch",
-    "dge": "jh",
-    "sch": "sh",
-    "ee": "iy",
-    "ea": "iy",
-    "ie": "iy",
-    "ei": "ey",
-    "ai": "ey",
-    "ay": "ey",
-    "ey": "iy",
-    "oa": "ow",
-    "oo": "uw",
-    "ou": "aw",
-    "ow": "ow",
-    "oi": "oy",
-    "oy": "oy",
-    "au": "ao",
-    "aw": "ao",
-    "ew": "uw",
-    "ue": "uw",
-    "ar": "aa r",
-    "er": "er",
-    "ir": "er",
-    "or": "ao r",
-    "ur": "er",
-    "ch": "ch",
-    "ck": "k",
-    "gh": "g",
-    "kn": "n",
-    "ng": "ng",
-    "ph": "f",
-    "qu": "k w",
-    "rh": "r",
-    "sh": "sh",
-    "th": "th",
-    "wh": "w",
-    "wr": "r",
-    "ce": "s eh",
-    "ci": "s ih",
-    "cy": "s iy",
-    "ge": "jh eh",
-    "a": "ae",
-    "b": "b",
-    "c": "k",
-    "d": "d",
-    "e": "eh",
-    "f": "f",
-    "g": "g",
-    "h": "hh",
-    "i": "ih",
-    "j": "jh",
-    "k": "k",
-    "l": "l",
-    "m": "m",
-    "n": "n",
-    "o": "aa",
-    "p": "p",
-    "q": "k",
-    "r": "r",
-    "s": "s",
-    "t": "t",
-    "u": "ah",
-    "v": "v",
-    "w": "w",
-    "x": "k s",
-    "y": "iy",
-    "z": "z",
-    "'": "",
-}
+
+def table(rows: str) -> dict[str, str]:
+    """Return a table of ``key=value`` between blanks; an underscore in a value is a blank."""
+    return {key: value.replace("_", " ") for key, _, value in (row.partition("=") for row in rows.split())}
+
+
+SPELLINGS = table(
+    "tion=sh_ah_n sion=zh_ah_n ture=ch_er ough=ao augh=ao eigh=ey igh=ay tch=ch dge=jh sch=sh ee=iy ea=iy ie=iy "
+    "ei=ey ai=ey ay=ey ey=iy oa=ow oo=uw ou=aw ow=ow oi=oy oy=oy au=ao aw=ao ew=uw ue=uw ar=aa_r er=er ir=er "
+    "or=ao_r ur=er ch=ch ck=k gh=g kn=n ng=ng ph=f qu=k_w rh=r sh=sh th=th wh=w wr=r ce=s_eh ci=s_ih cy=s_iy "
+    "ge=jh_eh a=ae b=b c=k d=d e=eh f=f g=g h=hh i=ih j=jh k=k l=l m=m n=n o=aa p=p q=k r=r s=s t=t u=ah v=v w=w "
+    "x=k_s y=iy z=z '="
+)
+"""The longest match from the left wins. ARPAbet, lower case; an empty value is a silent letter."""
 LONG_VOWELS = {"a": "ey", "e": "iy", "i": "ay", "o": "ow", "u": "uw"}
 ACCENTS = re.compile("[\u0300-\u036f]")
 """The accents of Latin letters; the marks of other scripts are sounds."""

@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from lipmotion.errors import InputError
 from lipmotion.types import TimedWord, TranscriptLine
 from lipmotion.units.text_normalisation import tokens_in
+from lipmotion.units.written_forms import readings
 
 TAG = re.compile(r"</?[a-zA-Z!][^<>]{0,200}>|<[\d:.]{1,20}>|\{[^{}]{0,200}\}")
 """Tags of SubRip and WebVTT (``<i>``, ``<v Anna>``, ``<00:01.500>``), of SubStation (``{\\an8}``), and ``<unk>``."""
@@ -92,10 +93,11 @@ def timed_words(
     words = line_words(text, where)
     if len(words) < 2 or start_s is None or end_s is None:
         return [TimedWord(word, start_s, end_s) for word in words]
-    letters, done = sum(map(len, words)), 0
+    said = ["".join(readings(word)[0]) for word in words]
+    letters, done = sum(map(len, said)), 0
     timed = []
-    for word in words:
-        first, done = done, done + len(word)
+    for word, usual in zip(words, said, strict=True):
+        first, done = done, done + len(usual)
         timed.append(TimedWord(word, *(start_s + (end_s - start_s) * share / letters for share in (first, done))))
     return timed
 
