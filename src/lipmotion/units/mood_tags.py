@@ -83,6 +83,8 @@ MoodTag(share=0.4, mood='happy', strength=0.6), MoodTag(share=0.6, mood='neutral
         else:
             found.append((len(words(spoken)), *meaning))
     spoken += text[last:]
+    if not found and not unknown:
+        return TaggedText(text, ())
     if unknown:
         named = ", ".join(map(shortened, dict.fromkeys(unknown)))
         LOG.warning(

@@ -10,7 +10,7 @@ from functools import cache
 from lipmotion.errors import InputError
 from lipmotion.units.lexicon import in_dictionary, lengthened
 from lipmotion.units.spelling import normalised_text, plain_text
-from lipmotion.units.written_forms import FORMS, WORD, readings
+from lipmotion.units.written_forms import FORMS, NUMERIC, WORD, readings
 
 CHINESE = "[\u3400-\u4dbf\u4e00-\u9fff]"
 """A Chinese character."""
@@ -51,7 +51,7 @@ def tokens_in(text: str) -> tuple[str, ...]:
     ('Dr.', 'brown', 'met', 'Henry VIII', 'at', '5:00', 'in', 'may', '1995')
     """
     text = SMILEY.sub(" ", REFERENCE.sub(lambda found: html.unescape(found[0]), text))
-    plain = RANGE.sub("–", plain_text(text))
+    plain = re.sub(r"\bUS(?=\$)", "", RANGE.sub("–", plain_text(text)))
     shouted = not any(letter.islower() for letter in plain)
     tokens = []
     for token in (found[0] for found in _scanner().finditer(plain)):
@@ -65,10 +65,13 @@ def tokens_in(text: str) -> tuple[str, ...]:
 @cache
 def _scanner() -> re.Pattern[str]:
     """Return what finds written forms, signs, words, and numbers beside letters."""
-    forms = [f"(?<![^\\W_])(?:{form})(?![^\\W_])" for form, _ in FORMS[:-1]]  # initials are words
+    word = rf"{WORD}(?=[,;!?]|\s+(?-i:[a-z])|\s*\Z)"  # most are words and no more; the rest takes a tenfold time
+    forms = [rf"(?:{form})(?![^\W_])" for form, _ in FORMS[:-1]]  # initials are words
+    numeric, worded = ("|".join(part) for part in (forms[: len(NUMERIC)], forms[len(NUMERIC) :]))
     signs = r"(?<!\w)w/o?(?=\s)|[&@×÷]|[+=](?![+=])(?<![+=]{2})|#(?=\w)|~(?=\d)"
     dashes = r"(?<![^\s(])-(?=[.$£€]?\d)|−(?=\d)|(?<=[m\d])–(?=\d)"
-    grouped = "|".join([*forms, signs, dashes, WORD, r"\d+(?:\.\d+)*"])
+    begun = rf"(?<![^\W_])(?:{word}|(?=[^\W\d_])(?:{worded})|(?![\s,;!?])(?:{numeric}))"
+    grouped = "|".join([begun, signs, dashes, WORD, r"\d+(?:\.\d+)*"])
     return re.compile(re.sub(r"(?<!\\)\((?!\?)", "(?:", grouped), re.IGNORECASE)
 
 

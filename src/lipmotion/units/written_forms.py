@@ -12,6 +12,7 @@ from functools import cache
 from lipmotion.units.spelling import table
 
 Reading = tuple[str, ...]
+Forms = tuple[tuple[str, str | Callable[[str], Iterator[str]]], ...]
 
 MOST_READINGS = 8
 """Most readings of a form: alignment tries each."""
@@ -92,6 +93,9 @@ def readings(token: str) -> tuple[Reading, ...]:
 
 
 def _readings(token: str) -> Iterator[str]:
+    if token.isalpha() and token.islower():
+        yield token
+        return
     if token in SIGNS:
         yield from SIGNS[token].split("|")
         return
@@ -292,10 +296,8 @@ PARTED = "([3-9]|12|16|20|32|64)"
 NUMERAL = "(X{0,3}(?:IX|IV|V?I{0,3}))"
 TITLE = "|".join(name for name in ABBREVIATIONS if name[0].isupper())
 _NAMES = {each.split()[0] for each in UNITS.values()} | set(" ".join(CURRENCIES.values()).split())
-_COUNTED = re.compile(rf"((?:^|\band )one )({'|'.join(sorted(_NAMES))})\b")
-FORMS: tuple[tuple[str, str | Callable[[str], Iterator[str]]], ...] = (
-    (r"[\w.+-]{1,64}@[\w-]{1,63}(?:\.[\w-]{1,63}){1,4}|(?:https?://|www\.)[^\s<>()]{0,200}[\w/]", _address),
-    (rf"[a-z][\w-]{{0,63}}(?:\.[\w-]{{1,63}}){{0,4}}\.{DOMAIN}\b(?:/[\w/.-]{{0,200}}\w)?", _address),
+_COUNTED: re.Pattern[str] = re.compile(rf"((?:^|\band )one )({'|'.join(sorted(_NAMES))})\b")
+NUMERIC: Forms = (
     (r"(?:\+\d{1,3}[ .-]?|1[-.])?(?:\(\d{3}\)[ -]?|\d{3}[-.])?\d{3}-\d{4}|\d{3}\.\d{3}\.\d{4}|\+\d{7,14}", _telephone),
     (rf"(\d{{4}})-{MM}-{DD}", "{2:m} {3:o} {1}|the {3:o} of {2:m} {1}|{2:m} {3:c} {1}|{2:m} {3:o} {1:*}"),
     (r"\+\d{1,3}(?:[ .-]\(?\d{1,4}\)?){2,5}|\d+(?:-\d+){2,5}", _telephone),
@@ -305,7 +307,6 @@ FORMS: tuple[tuple[str, str | Callable[[str], Iterator[str]]], ...] = (
     ),
     (rf"{MM}[/.]{DD}[/.](\d{{4}}|\d\d)", "{1:m} {2:o} {3:y}|the {2:o} of {1:m} {3:y}|{1:c} {2:c} {3:y}"),
     (rf"{DD}[/.]{MM}[/.](\d{{4}}|\d\d)", "the {1:o} of {2:m} {3:y}|{2:m} {1:o} {3:y}|{1:c} {2:c} {3:y}"),
-    (rf"{MONTH}\s{DD}(?:st|nd|rd|th)?(?!\s?[-–:.]?\d)", "{1:m} {2:o}|{1:m} {2:c}|{1:m} the {2:o}|the {2:o} of {1:m}"),
     (rf"{DD}(?:st|nd|rd|th)?\s{MONTH}", "the {1:o} of {2:m}|{1:o} of {2:m}|{2:m} {1:o}|{1:c} {2:m}|the {1:o} {2:m}"),
     (rf"(\d\d?):00{PM}", "{1:c} {2:w} m|{1:c} o'clock {2:w} m|{1:c} o'clock|{1:c}"),
     (rf"(\d\d?:\d\d){PM}", "{1:*} {2:w} m|{1}"),
@@ -320,18 +321,18 @@ FORMS: tuple[tuple[str, str | Callable[[str], Iterator[str]]], ...] = (
     ),
     (r"([01]?\d|2[0-4]):([345]\d)", "{1:c} {2:p}|{2:l} to {1:f}|{2:L} to {1:f}|{1:t} {2:p}"),
     (r"(\d+):(\d+)", "{1} to {2}|{1} {2}"),
-    (rf"(?:us)?{S}\s?({A})\s?(?:k|thousand)", "{2} thousand {1:s}|{2} k|{2:k} {1:s}|{2:e} {1:s}|{2:*} thousand {1:s}"),
+    (rf"{S}\s?({A})\s?(?:k|thousand)", "{2} thousand {1:s}|{2} k|{2:k} {1:s}|{2:e} {1:s}|{2:*} thousand {1:s}"),
     (
-        rf"(?:us)?{S}\s?{R}(\s?(?:hundred|million|billion|trillion)\b|mm?|mn|mil|bn?|tn?)",
+        rf"{S}\s?{R}(\s?(?:hundred|million|billion|trillion)\b|mm?|mn|mil|bn?|tn?)",
         "{2:*} {3:x} {1:s}|{2} {3:x}|{2} {3:x} {1:b}",
     ),
-    (rf"(?:us)?{S}\s?0?\.(?!00)(\d\d)", "{2:c} {1:S}"),
-    (rf"(?:us)?{S}\s?({NUMBER})\.00", "{2} {1:s}|{2} {1:s} even"),
+    (rf"{S}\s?0?\.(?!00)(\d\d)", "{2:c} {1:S}"),
+    (rf"{S}\s?({NUMBER})\.00", "{2} {1:s}|{2} {1:s} even"),
     (
-        rf"(?:us)?{S}\s?({NUMBER})\.(\d\d)",
+        rf"{S}\s?({NUMBER})\.(\d\d)",
         "{2:i} {1:s} and {3:c} {1:S}|{2:i} {1:s} {3:c} {1:S}|{2:i} {3:p}|{2:i} {1:s} {3:p}",
     ),
-    (rf"(?:us)?{S}\s?{R}(?:\s?[-–]\s?{S})?", "{2:i} {1:s}|{2:i} {1:b}|{2:*} {1:s}"),
+    (rf"{S}\s?{R}(?:\s?[-–]\s?{S})?", "{2:i} {1:s}|{2:i} {1:b}|{2:*} {1:s}"),
     (rf"{R}\s?([$£€¥₹₩¢])", "{1:i} {2:s}|{1:i} {2:b}|{1:*} {2:s}"),
     (r"'?(\d0)'?s", "{1:d}|{1} seconds"),
     (r"'?(\d\d\d0)'?s", "{1:d}"),
@@ -365,10 +366,16 @@ FORMS: tuple[tuple[str, str | Callable[[str], Iterator[str]]], ...] = (
     (rf"({A})(b|bn)", "{1} billion|{1} b"),
     (rf"({A})\s?[x×]\s?({A})", "{1} by {2}|{1} times {2}|{1} x {2}"),
     (rf"({A})x", "{1} times|{1} x"),
-    (r"no\.\s?(\d+)", "number {1}|no {1}"),
     (r"#(\d+)", "number {1}|hashtag {1}"),
     (rf"{NUMBER}?\.\d+", _decimal),
     (NUMBER, _number),
+)
+FORMS: Forms = (
+    *NUMERIC,
+    (r"[\w.+-]{1,64}@[\w-]{1,63}(?:\.[\w-]{1,63}){1,4}|(?:https?://|www\.)[^\s<>()]{0,200}[\w/]", _address),
+    (rf"[a-z][\w-]{{0,63}}(?:\.[\w-]{{1,63}}){{0,4}}\.{DOMAIN}\b(?:/[\w/.-]{{0,200}}\w)?", _address),
+    (rf"{MONTH}\s{DD}(?:st|nd|rd|th)?(?!\s?[-–:.]?\d)", "{1:m} {2:o}|{1:m} {2:c}|{1:m} the {2:o}|the {2:o} of {1:m}"),
+    (r"no\.\s?(\d+)", "number {1}|no {1}"),
     (r"(?-i:St\. ([A-Z][a-z]+))", "saint {1:w}|street {1:w}"),
     (rf"(?-i:(?:{TITLE})\.)(?=\s+(?-i:[A-Z])|\Z)", lambda text: iter(ABBREVIATIONS[text[:-1]].split("|"))),
     (
@@ -384,6 +391,7 @@ FORMS: tuple[tuple[str, str | Callable[[str], Iterator[str]]], ...] = (
     (r"(?-i:[A-Z]{2,5}s?)", _initials),
 )  # fmt: skip
 """Patterns of forms, without regard of case, and how they are read: the first that matches counts.
+Those that begin with a letter come last.
 
 Readings are divided by ``|``; ``{1}`` is the usual reading of the first group, ``{1:*}`` each of its readings, and what
 else may stand there is in ``SAID``.
