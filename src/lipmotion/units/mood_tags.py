@@ -24,7 +24,7 @@ TAG = re.compile(
 LINK = re.compile(
     r"\[\[(?!(?:slnc|rate|volm|pbas|emph|inpt|rset)\b)(?:[^\[\]\n]*<-)?([^\[\]|\n]*?)(?:(?:\||->)[^\[\]\n]*)?\]\]"
 )
-"""Of a link (``[[Go north|North]]``) what is shown is spoken."""
+"""A link (``[[Go north|North]]``), of which what is shown is spoken."""
 INSIDE_WORDS = frozenset("a b i u s em strong mark sub sup font span color colour size wave shake".split())
 """Tags of style, which may stand inside a word."""
 _NAME = re.compile(r"([a-z][a-z '-]*?)\s*(?::\s*(\d*\.?\d+))?")

@@ -104,14 +104,14 @@ def _readings(token: str) -> Iterator[str]:
     if match is None or callable(said):
         yield from said(token) if callable(said) else [token.lower()]
         return
-    parts = ["", *map(_Part, match.groups(""))]
+    parts = ["", *map(_FormPart, match.groups(""))]
     for template in said.split("|"):
         each = re.search(r"{(\d):\*}", template)
         for reading in map(" ".join, readings(parts[int(each[1])])) if each else ("",):
             yield (template.replace(each[0], reading) if each else template).format(*parts)
 
 
-class _Part(str):
+class _FormPart(str):
     """A part of a written form, which the templates of ``FORMS`` say in several ways: ``{1:o}`` as an ordinal."""
 
     def __format__(self, way: str) -> str:
