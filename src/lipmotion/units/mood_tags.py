@@ -87,9 +87,7 @@ MoodTag(share=0.4, mood='happy', strength=0.6), MoodTag(share=0.6, mood='neutral
         return TaggedText(text, ())
     if unknown:
         named = ", ".join(map(shortened, dict.fromkeys(unknown)))
-        LOG.warning(
-            "not known, and not spoken: %s; known tags are [happy], [sad:0.5], ... (docs/expression.md)", named
-        )
+        LOG.warning("not known, and not spoken: %s; known tags are [happy], [sad:0.5], ... (docs/expression.md)", named)
     count = max(len(words(spoken)), 1)
     return TaggedText(spoken, tuple(MoodTag(before / count, mood, strength) for before, mood, strength in found))
 
