@@ -56,7 +56,7 @@ WORDS = {
     "Polly": (POLLY, [("mama", 0.06, 0.4), ("bites", 0.7, 1.1)]),
     "Azure's boundaries": (AZURE_WORDS, [("hello", 0.05, 0.3875), ("you", 0.45, 0.75)]),
     "Azure's batch": ([{"Text": "the", "AudioOffset": 38, "Duration": 153}], [("the", 0.038, 0.191)]),
-    "ElevenLabs": (ELEVENLABS, [("hi", 0.5, 0.7), ("two", 0.8, 1.2)]),
+    "ElevenLabs": (ELEVENLABS, [("hi", 0.5, 0.7), ("2", 0.8, 1.2)]),
     "ElevenLabs' pieces": (
         lines(
             {"alignment": {"characters": ["h"], "character_start_times_seconds": [0.5],

@@ -195,14 +195,14 @@ def test_words_in_time(read: Read, kind: str) -> None:
 def test_some_words_have_no_time(read: Read) -> None:
     items = [{"word": "In", "start": 0.5, "end": 0.6}, {"word": "1999"}, {"word": "we", "start": 2.0, "end": None}]
     found = words(read(json.dumps({"segments": [{"start": 0.5, "end": 2.5, "text": "", "words": items}]})))
-    assert [word for word, *_ in found] == ["in", "one", "thousand", "nine", "hundred", "ninety", "nine", "we"]
-    assert [time is None for _, time, _ in found] == [False] + [True] * 6 + [False]
+    assert [word for word, *_ in found] == ["in", "1999", "we"]
+    assert [time is None for _, time, _ in found] == [False, True, False]
     assert found[-1] == ("we", 2.0, None)
 
 
 def test_several_words_share_the_time_of_one(read: Read) -> None:
     found = words(read('{"words": [{"word": "20-foot", "start": 1.0, "end": 2.0}]}'))
-    assert [word for word, *_ in found] == ["twenty", "foot"]
+    assert [word for word, *_ in found] == ["20", "foot"]
     assert [time for row in found for time in row[1:]] == pytest.approx([1.0, 1.6, 1.6, 2.0])
 
 
@@ -246,11 +246,11 @@ def test_what_is_spoken(read: Read) -> None:
     for text, said in (
         ("ANNA: hi\nBOB #2: you", "hi you"),
         ("Speaker 1: hi\n[SPEAKER_02]: you", "hi you"),
-        ("It is AT 10:30 now", "it is at ten thirty now"),
-        ("Tom &amp; Jerry&#39;s", "tom and jerry's"),
+        ("It is AT 10:30 now", "it is at 10:30 now"),
+        ("Tom &amp; Jerry&#39;s", "tom & jerry's"),
         ("♪ la la ♪", "la la"),
         ("(all) hi [laughs\nloudly] you", "hi you"),
-        ("5 < 6 and 7 > 3", "five six and seven three"),
+        ("5 < 6 and 7 > 3", "5 6 and 7 3"),
         ("Note: hi", "note hi"),
     ):
         assert " ".join(read(f"00:01,000 --> 00:02,000\n{text}\n").words) == said
@@ -258,7 +258,7 @@ def test_what_is_spoken(read: Read) -> None:
 
 def test_names_that_come_again_and_again_are_not_said(read: Read) -> None:
     cues = [f"00:0{i}.000 --> 00:0{i}.900\nAnna Smith: hello {i}\n" for i in range(1, 4)]
-    assert read("WEBVTT\n\n" + "\n".join(cues)).words == ("hello", "one", "hello", "two", "hello", "three")
+    assert read("WEBVTT\n\n" + "\n".join(cues)).words == ("hello", "1", "hello", "2", "hello", "3")
 
 
 DAMAGED = {

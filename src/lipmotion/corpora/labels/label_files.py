@@ -32,9 +32,11 @@ from lipmotion.corpora.labels.word_lists import is_ctm, is_lrs, parse_ctm, parse
 from lipmotion.errors import InputError
 from lipmotion.storage.files import check_regular
 from lipmotion.types import TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
-from lipmotion.units import phone_named, words_of
+from lipmotion.units import phone_named
 from lipmotion.units.length_limits import LARGEST_TRANSCRIPT_BYTES
 from lipmotion.units.mood_tags import tagged_text, without_known_tags
+from lipmotion.units.text_normalisation import checked_tokens
+from lipmotion.units.written_forms import readings
 
 LOG = logging.getLogger("lipmotion")
 RECOGNISED = (".srt", ".vtt", ".ass", ".ssa", ".json", ".ctm", ".tsv")
@@ -65,8 +67,9 @@ class RecordingLabels:
 
     @property
     def words(self) -> tuple[str, ...] | None:
-        """The words of the transcript, lower case, or None."""
-        return self.transcript.words if self.transcript else None
+        """The words of the transcript, lower case, as they are usually read, or None."""
+        said = self.transcript.words if self.transcript else ()
+        return tuple(word for token in said for word in readings(token)[0]) or None
 
 
 def labels_beside(recording: Path, *, ignored: frozenset[Path] = frozenset()) -> RecordingLabels:
@@ -219,7 +222,7 @@ def _read(path: Path, *, unknown_json: bool) -> RecordingLabels | None:
     if not tokens:
         LOG.warning("%s: is empty: it counts as no transcript; write the words that are said, or remove it", path)
         return RecordingLabels()
-    return RecordingLabels(TimedTranscript((TranscriptLine(tuple(map(TimedWord, words_of(text)))),), tags))
+    return RecordingLabels(TimedTranscript((TranscriptLine(tuple(map(TimedWord, checked_tokens(text)))),), tags))
 
 
 def _timed(text: str, path: Path) -> RecordingLabels | None:

@@ -60,8 +60,9 @@ from lipmotion.types import (
 )
 from lipmotion.types.languages import ENGLISH
 from lipmotion.types.moods import MoodTag
-from lipmotion.units import Lexicon, check_phones, check_text, is_silent, without_gaps, words_of
+from lipmotion.units import Lexicon, check_phones, check_text, is_silent, without_gaps
 from lipmotion.units.mood_tags import tagged_text
+from lipmotion.units.text_normalisation import checked_tokens
 
 ItemT = TypeVar("ItemT")
 ResultT = TypeVar("ResultT")
@@ -196,7 +197,7 @@ def aligned_within(
         (round(time_s * FRAME_RATE_HZ) for time_s in (start_s, end_s)),
         request.lexicon or Lexicon(),
     )
-    words = words_of(word)
+    words = checked_tokens(word)
     warn_of_guesses(words, lexicon)
     piece = audio.stretch(first, stop)
     if stop > len(audio.samples) // HOP:
@@ -360,7 +361,7 @@ def _words(
         raise InputError(f"the transcript {text!r} is the name of a file; give Path({text!r}), or the words themselves")
     check_text(text, duration_s)
     plain, tags = tagged_text(text)
-    words = words_of(plain)
+    words = checked_tokens(plain)
     return TimedTranscript((TranscriptLine(tuple(map(TimedWord, words))),), tags) if tags else words
 
 
