@@ -35,7 +35,7 @@ demo: $(VENV)/core
 	$(BIN)/lipmotion animate examples/welcome.flac --transcript examples/welcome.txt --face head -o $(BUILD)/welcome.mp4 $(BUILD)/welcome.json
 
 test: $(VENV)/dev
-	$(TIMED) --limit 500 $(PYTEST) -m "not long"
+	$(TIMED) --limit 600 $(PYTEST) -m "not long"
 
 test-all: BROWSERS := --both-browsers
 test-all: test-long test-portable test-explore

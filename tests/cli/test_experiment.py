@@ -21,13 +21,12 @@ from lipmotion.experiments.xie_liu2007 import text as xieliu2007_text
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.bootstrap import bootstrap_interval
 from lipmotion.pipeline.evaluation import figures as evaluation_figures
-from lipmotion.pipeline.training import train as train_module
 
 
 @pytest.fixture(autouse=True)
 def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
     """Few draws of the bootstrap intervals, small phone models, and only two of the paper's unit sets."""
-    for module in (runner, table1, six_systems, train_module):
+    for module in (runner, table1, six_systems):
         monkeypatch.setattr(module, "HmmConfig", partial(HmmConfig, mixtures=1, iterations=1))
     for module in (comparison, evaluation_figures, disagreement):
         monkeypatch.setattr(module, "bootstrap_interval", partial(bootstrap_interval, draws=20))
