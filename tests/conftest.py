@@ -48,7 +48,7 @@ settings.register_profile(EXPLORE, ANYWHERE, derandomize=False, max_examples=100
 settings.load_profile(FIXED)
 
 
-HASTY = {"cli", "experiments", "training"}
+HASTY = {"cli", "experiments"}
 """Folders of tests whose networks are trained for a few steps."""
 MEASURED_S = pytest.StashKey[float]()
 """Processor time of these tests, and of all processes that they waited for, when it was last looked at."""
