@@ -15,6 +15,9 @@ SHORT_PAUSE_S = 0.2
 """Silence shorter than this is a pause between words."""
 
 PHONES: tuple[str, ...] = tuple(sorted(VISEME_OF))
+UNKNOWN_PHONES = "spn"
+"""The unit, without a phone, of a span in which somebody speaks and nobody says what: as aligners label a word that is
+in no dictionary. Its word, where it is given, is that of the whole span."""
 
 REDUCED_VOWELS = {"ah": "ax", "er": "axr", "ih": "ix"}
 """Vowels to their unstressed forms."""
