@@ -99,8 +99,7 @@ class Request(Configuration):
     speaker: str = option(
         "",
         metavar="NAME",
-        help="whose motion, of the people that the model was trained on (default: the mean person; see lipmotion info); "
-        "of labels with several speakers, whose words",
+        help="whose motion, of the people that the model was trained on (default: the mean person; see lipmotion info)",
     )
     pauses: Pauses = option(
         "rest",

@@ -40,7 +40,7 @@ class SpokenAs(Enum):
     UNKNOWN = "unknown"
 
 
-SILENCES = frozenset(["", *"sil sp pau ssil nsn h# #h # ## _ - silence = <p> <s> </s> ".split()])
+SILENCES = frozenset(["", *"sil sp pau ssil nsn h# #h # ## _ - silence = vocnoise iver".split()])
 """Labels of silence, pauses and noise that is not speech; so is anything in brackets that is not of speech."""
 UNKNOWN_WORDS = frozenset("spn unk oov xxx yyy usb".split())
 """Labels of speech of which nobody knows the words, also in brackets: of aligners, of CHAT, of WebMAUS (``<usb>``)."""

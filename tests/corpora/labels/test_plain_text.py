@@ -12,7 +12,7 @@ OTHER = {
     "RTF": ("{\\rtf1\\ansi hello}", "begins with '{"),
     "HTML": ("\n<html><body>hello</body></html>", "begins with '<html>"),
     "ESPS with a header": ("signal b\nnfields 1\n#\n 0.0500 26 sil\n 0.1 26 p\n 0.2 26 aa\n", "its lines hold times"),
-    "NUL": ("h\0e\0l\0l\0o\0", "holds NUL characters: is it UTF-16 without its mark"),
+    "NUL": ("hello you\0 there", "holds NUL characters"),
     "ESPS": ("signal a\nnfields 1\n#\n 0.0500 26 sil\n 0.1 26 p\n 0.2 26 aa\n", "its lines hold times"),
     "mixed seconds": ("0 0.5 p\n0.5 1 aa\n", "its lines hold times"),
     "a start of NaN": ("nan 1000000 sil\n1000000 2000000 p\n2000000 3500000 aa\n", "its lines hold times"),

@@ -114,7 +114,7 @@ def test_what_cannot_be_used_is_named(tmp_path, old, new, words):
 
 def test_two_tiers_of_phones_are_refused(tmp_path):
     (tmp_path / "a.TextGrid").write_text(short_form({"one": PHONES, "two": PHONES}))
-    with pytest.raises(InputError, match="tier 'one' and tier 'two' both hold phones; .*--tier"):
+    with pytest.raises(InputError, match=r"tier 'one' and tier 'two' both hold phones; .*--tier"):
         read_labels(tmp_path / "a.TextGrid")
 
 

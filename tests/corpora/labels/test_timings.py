@@ -49,7 +49,8 @@ def words(path: Path) -> list[tuple[str, float | None, float | None]]:
 
 
 def phones(path: Path) -> list[tuple[float, float, str, str]]:
-    return [(round(s.start_s, 6), round(s.end_s, 6), s.label.phone or s.label.unit, s.label.word) for s in read_units(path)]
+    units = read_units(path)
+    return [(round(s.start_s, 6), round(s.end_s, 6), s.label.phone or s.label.unit, s.label.word) for s in units]
 
 
 WORDS = {

@@ -23,7 +23,7 @@ from lipmotion.corpora.labels.tier import (
     TimedLabel,
     holds_phones,
     in_seconds,
-    merged_labels,
+    merged_timelines,
     phone_timeline,
     tier_transcript,
     tiers_of_speakers,
@@ -166,7 +166,6 @@ def read_phones(path: Path, tier: str = "", speaker: str = "") -> Timeline[Unit]
     text, where = _text(path), str(path)
     tiers = _chosen(_timed_tiers(text, where) or [], where, tier, speaker)
     phones = _tiers_of_phones(tiers, where)
-    words = [each for each in tiers if each.role == WORDS]
     if not phones and any(each.role in (WORDS, LINES) for each in tiers):
         raise InputError(f"{where}: holds words in time, but no phones; give it as a transcript (--transcript)")
     if not phones:
@@ -176,8 +175,9 @@ def read_phones(path: Path, tier: str = "", speaker: str = "") -> Timeline[Unit]
             "phones, or labels with times, one phone a line"
         )
     _name_speakers(phones, where)
-    merged = phones[0] if len(phones) == 1 else replace(phones[0], labels=merged_labels(phones))
-    units = with_words(phone_timeline(merged, (), where, with_gaps=True), _labels_of(words))
+    units = merged_timelines(
+        [with_words(phone_timeline(each, (), where, with_gaps=True), _words_of(each, tiers)) for each in phones]
+    )
     recognised = next((each for each in tiers if each.role == RECOGNISED_PHONES), None)
     return units if recognised is None else with_recognised(units, recognised)
 
@@ -238,10 +238,10 @@ def _labels(tiers: list[LabelTier], where: str) -> RecordingLabels:
         if transcript is None and any(tier.role != LINES and tier.labels for tier in chosen):
             raise InputError(f"{where}: {chosen[0].name} holds no word; remove the file if the words are not known")
         return RecordingLabels(transcript)
-    words = _labels_of([tier for tier in chosen if tier.role == WORDS or not (tier.role or holds_phones(tier))])
-    words = words if all(len(label.text.split()) < 2 for label in words) else ()
-    merged = phones[0] if len(phones) == 1 else replace(phones[0], labels=merged_labels(phones))
-    timeline = phone_timeline(merged, words, where, with_gaps=len(phones) > 1)
+    several = len(phones) > 1
+    timeline = merged_timelines(
+        [phone_timeline(tier, _words_of(tier, chosen), where, with_gaps=several) for tier in phones]
+    )
     unknown = [span for span in timeline if span.label.unit == UNKNOWN_PHONES]
     if unknown:
         LOG.warning(
@@ -339,9 +339,11 @@ def _name_speakers(tiers: list[LabelTier], where: str) -> None:
         LOG.warning("%s: %d people speak: %s; all are read; --tier NAME chooses one", where, len(speakers), names)
 
 
-def _labels_of(tiers: list[LabelTier]) -> tuple[TimedLabel, ...]:
-    """Return the labels of tiers in order of time."""
-    return tuple(sorted((label for tier in tiers for label in tier.labels), key=lambda label: label.start_s))
+def _words_of(phones: LabelTier, tiers: list[LabelTier]) -> tuple[TimedLabel, ...]:
+    """Return the words in time of the speaker of some phones; none where labels hold several."""
+    said = [tier for tier in tiers if tier.speaker == phones.speaker and not holds_phones(tier)]
+    words = next((tier.labels for role in (WORDS, "") for tier in said if tier.role == role), ())
+    return words if all(len(label.text.split()) < 2 for label in words) else ()
 
 
 def _check_plain(text: str, path: Path) -> None:

@@ -84,7 +84,7 @@ TIMES = (
     Times("", "resultendoffset", per_s=1),
 )
 TEXTS = (
-    "punctuatedword word text content value transcript sentence display lexical markname token lines displaytext "
+    "punctuatedword word text content value transcript sentence display lexical markname token lines displaytext segs "
     "alternatives nbest"
 ).split()
 """The names of what is said, in order; of alternatives it is the first one."""
@@ -92,7 +92,7 @@ ALTERNATIVES = ("alternatives", "nbest")
 WORD_LISTS = ("words", "items", "elements", "tokens", "timestamps", "timepoints")
 """Members that hold words in time, within a line or alone."""
 LINE_LISTS = (
-    "segments transcription utterances monologues chunks fragments channels recognizedphrases sentences phrases "
+    "segments transcription utterances monologues events chunks fragments channels recognizedphrases sentences phrases "
     "paragraphs result results transcript alternatives nbest data response output prediction predictions documents"
 ).split()
 """Members in which lines or further lists are searched, in this order."""
@@ -334,7 +334,7 @@ def _rows_of_object(item: dict[str, Any], place: str, where: str, name: str, dep
     if words and not any(line.parts for line in lines):
         lines = [replace(own, parts=tuple(words))] if own is not None and timed else words
     elif not lines and not timed:  # under a name that is not known
-        lines = first_of(each for each in item if each not in (*WORD_LISTS, *LINE_LISTS, *TEXTS))
+        lines = first_of(each for each in item if each not in (*WORD_LISTS, *LINE_LISTS))
         lines = [line for line in lines if line.parts or not math.isnan(line.start)]
     if not lines:
         return [own] if own is not None else []

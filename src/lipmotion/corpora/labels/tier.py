@@ -40,7 +40,7 @@ WORDS, LINES, PHONE_LABELS, RECOGNISED_PHONES, OTHER = "words", "lines", "phones
 """What a tier holds. ``OTHER`` is neither said nor seen: pronunciations, syllables, translations, notes."""
 ROLES = (
     (OTHER, r"^(kan|kas|mas|pho)\b|canonical|syll|tones?\b|tobi|gloss|transl|comment|notes?\b|pos\b|lemma|gesture"),
-    (PHONE_LABELS, r"phon(e|$|s\b)|fonem|fones?\b|segment|(?<!-)\bmau\b|^laute?\b|ipa\b|x?-?sampa|音素|фонем"),
+    (PHONE_LABELS, r"phon([eéè]|$|s\b)|fonem|fones?\b|segment|(?<!-)\bmau\b|^laute?\b|ipa\b|x?-?sampa|音素|фонем"),
     (WORDS, r"\b_?words?\b|\bort\b|orthogr|\bmots?\b|\bw(ö|oe)rter\b|\bwort\b|palabras?|parole\b|tokens?\b|単語|слов"),
     (LINES, r"\btrn\b|transcri|utteranc|sentence|phrase|\btext\b|äußerung|énoncé|enunciado"),
 )  # fmt: skip
@@ -58,6 +58,8 @@ WHOLE_WORD_S = 0.03
 """A span of unknown phones whose ends are so near to those of a word is all of it."""
 IN_CONTEXT = re.compile(r"[^-+]*-([^-+]+)\+.*")
 """Triphones and full-context labels of HTK and HTS: ``t-iy+n``, ``x^sil-hh+iy=t@...``."""
+GLOTTAL_STOP = "q"
+"""TIMIT's: a sound of the throat, with any lips."""
 STATE_NUMBER = re.compile(r"\[(\d{1,9})\]$")
 RECOGNISED_LABEL = re.compile(r"(\S+) (0|1|1\.0|0\.\d+|\d(?:\.\d+)?e-\d+)")
 """A phone or unit, and its confidence from 0 to 1."""
@@ -309,15 +311,17 @@ def _check_order(labels: Sequence[TimedLabel], where: str, *, with_gaps: bool) -
         end_s = label.end_s
 
 
-def merged_labels(tiers: Sequence[LabelTier]) -> tuple[TimedLabel, ...]:
-    """Return the spoken labels of several speakers in order; where two speak at once, who began goes on."""
-    labels = (label for tier in tiers for label in tier.labels if spoken_as(label.text) is not SpokenAs.SILENCE)
-    merged: list[TimedLabel] = []
-    for label in sorted(labels, key=lambda label: label.start_s):
+def merged_timelines(timelines: Sequence[Timeline[Unit]]) -> Timeline[Unit]:
+    """Return what several speakers say in order, without silence; where two speak at once, who began goes on."""
+    if len(timelines) == 1:
+        return timelines[0]
+    merged: list[Span[Unit]] = []
+    spoken = (span for units in timelines for span in units if not is_silent(span.label.phone))
+    for span in sorted(spoken, key=lambda span: span.start_s):
         end_s = merged[-1].end_s if merged else -math.inf
-        if label.end_s > end_s:
-            merged.append(replace(label, start_s=max(label.start_s, end_s)))
-    return tuple(merged)
+        if span.end_s > end_s:
+            merged.append(replace(span, start_s=max(span.start_s, end_s)))
+    return Timeline(tuple(merged))
 
 
 def _inner(text: str) -> str | None:
@@ -330,14 +334,14 @@ def phone_of(text: str) -> str | None:
     """Return the phone that a label stands for, ``UNKNOWN_PHONES`` for speech of unknown ones, or None."""
     text = STATE_NUMBER.sub("", text)
     name = phone_named(text) or phone_named(_inner(text) or "")
-    if name is not None:
-        return name
+    if name is not None or text == GLOTTAL_STOP:
+        return name or "hh"
     kind = spoken_as(_inner(text) or text)
     return {SpokenAs.SILENCE: SILENCE, SpokenAs.UNKNOWN: UNKNOWN_PHONES}.get(kind)
 
 
 def _required_phone(label: TimedLabel, where: str) -> str:
-    phone = phone_of(label.text)
+    phone = phone_of(label.text) or phone_of(label.text.lower().removesuffix("n"))  # nasal vowels of Buckeye
     if phone is None:
         raise InputError(
             f"{where}: {label.position} is {label.text[:40]!r}, which is no phone; the phones are: {' '.join(PHONES)}"

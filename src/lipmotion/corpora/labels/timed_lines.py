@@ -8,7 +8,7 @@ import re
 from collections import defaultdict
 from collections.abc import Iterator
 from io import StringIO
-from itertools import islice, pairwise
+from itertools import islice
 from pathlib import Path
 from statistics import median
 
@@ -54,8 +54,8 @@ COLUMNS = {
 }
 """Names of columns of tables: of the Montreal Forced Aligner, of Praat, of people."""
 TIMIT_HZ, TIMIT_SUFFIXES, TIMIT_SILENCE = 16_000, (".phn", ".wrd"), "h#"
-SAMPLES, LONGEST_SAMPLES = 400, 150_000
-"""A label in samples lasts so many of them."""
+LONGEST_SAMPLES, LAST_SAMPLE = 50_000, 1e7
+"""Most samples that the middle label, and those that a whole file, lasts: more are ticks."""
 
 
 def line_tiers(text: str, where: str) -> list[LabelTier] | None:
@@ -67,29 +67,24 @@ def line_tiers(text: str, where: str) -> list[LabelTier] | None:
     Raises InputError: a later line is of another form, or has a time that is none, with its number.
     """
     first = next((line for _, line in _lines(text)), "")
-    if LRS_TEXT.match(text):
-        return [_lrs(text, where)]
     if RTTM.match(first):
         raise InputError(f"{where}: is RTTM, which says who speaks and no words; give a transcript or labels")
     columns = _header(first)
-    if columns:
-        return _table(text, columns, where)
+    if columns or LRS_TEXT.match(text):
+        return _table(text, columns, where) if columns else [_lrs(text, where)]
+    whole, starts = WHOLE.fullmatch(first), STARTS.fullmatch(first)
     if SECONDS.fullmatch(first):
         return [_spans(text, SECONDS, where)]
-    whole, starts = WHOLE.fullmatch(first), STARTS.fullmatch(first)
     if whole and (float(whole[2]) >= SHORTEST_TICKS or _are_spans(text)):
         return [_spans(text, WHOLE, where)]
-    last = STARTS.fullmatch(list(islice(_lines(text), MOST_LABELS + 1))[-1][1]) if starts else None
-    if last and "\n" in text.strip() and float(last[1]) >= SHORTEST_TICKS:
+    lines = [line for _, line in islice(_lines(text), MOST_LABELS + 1)] if starts else []
+    last = STARTS.fullmatch(lines[-1]) if len(lines) > 1 else None
+    if last and float(last[1]) >= SHORTEST_TICKS:
         return [_from_starts(text, where)]
-    first = next((line for _, line in _lines(text) if not line.startswith(COMMENT)), "")
-    for form, place in ((STM, 3), (CTM, 3)):
-        found = form.fullmatch(first) if len(first) < 1000 else None
-        if (
-            found is not None
-            and "." in found[place] + found[place + 1]
-            and not re.match(rf"(?:{NUMBER})(?:\s|$)", found[5])
-        ):
+    first = next((line for _, line in _lines(text) if not line.startswith(COMMENT)), "")[:1000]
+    for form in (STM, CTM):
+        found = form.fullmatch(first)
+        if found is not None and "." in found[3] + found[4] and not re.match(rf"(?:{NUMBER})(?:\s|$)", found[5]):
             return _nist(text, form, where)
     return None
 
@@ -114,12 +109,10 @@ def _fitted(text: str, form: re.Pattern[str], wanted: str, where: str) -> Iterat
 
 
 def _are_spans(text: str) -> bool:
-    """Return whether whole numbers before every label are times: each starts where or after the one before ends, and
-    they last too long for seconds.
-    """
+    """Return whether whole numbers before every label are times: they are in order, and last too long for seconds."""
     found = [WHOLE.fullmatch(line) for _, line in islice(_lines(text), 1000)]
     spans = [(int(match[1]), int(match[2])) for match in found if match and len(match[2]) < 15]
-    in_order = all(a <= b for a, b in spans) and all(before[1] <= after[0] for before, after in pairwise(spans))
+    in_order = all(a <= b for a, b in spans) and spans == sorted(spans)
     return len(found) == len(spans) > 2 and in_order and median(end - start for start, end in spans) > 45
 
 
@@ -134,7 +127,7 @@ def _spans(text: str, form: re.Pattern[str], where: str) -> LabelTier:
         return LabelTier("labels", tuple(labels))
     lengths = [label.end_s - label.start_s for label in labels if label.end_s > label.start_s]
     is_timit = Path(where).suffix.lower() in TIMIT_SUFFIXES or any(label.text == TIMIT_SILENCE for label in labels)
-    short = bool(lengths) and median(lengths) < LONGEST_SAMPLES / 3 and labels[-1].end_s < 1e7
+    short = bool(lengths) and median(lengths) < LONGEST_SAMPLES and labels[-1].end_s < LAST_SAMPLE
     per_s = TIMIT_HZ if is_timit and short else 1 if short else TICKS_PER_S
     scaled = (TimedLabel(label.start_s / per_s, label.end_s / per_s, label.text, label.position) for label in labels)
     tier = LabelTier("labels", tuple(scaled))
