@@ -255,14 +255,16 @@ def _labels(tiers: list[LabelTier], where: str) -> RecordingLabels:
 
 
 def _timed_tiers(text: str, where: str) -> list[LabelTier] | None:
-    """Return the tiers of a text whose form has times; None of any other text."""
+    """Return the tiers of a text whose form has times, in the phones of the inventory; None of any other text."""
     if is_textgrid(text):
-        return in_seconds(parse_interval_tiers(text, where), where)
-    if is_timed_xml(text):
-        return xml_tiers(text, where)
-    if is_subtitles(text):
-        return [subtitle_tier(text, where)]
-    return service_tiers(text, where) if is_json(text) else line_tiers(text, where)
+        tiers: list[LabelTier] | None = in_seconds(parse_interval_tiers(text, where), where)
+    elif is_timed_xml(text):
+        tiers = xml_tiers(text, where)
+    elif is_subtitles(text):
+        tiers = [subtitle_tier(text, where)]
+    else:
+        tiers = service_tiers(text, where) if is_json(text) else line_tiers(text, where)
+    return None if tiers is None else [in_inventory(tier, where) for tier in tiers]
 
 
 def _chosen(tiers: list[LabelTier], where: str, tier: str = "", speaker: str = "") -> list[LabelTier]:

@@ -13,12 +13,13 @@ import logging
 import math
 import re
 from bisect import bisect_right
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate, zip_longest
 from typing import Any, NamedTuple
 
-from lipmotion.corpora.labels.phone_symbols import in_inventory, inventory_labels, ipa_labels, with_pauses
+from lipmotion.corpora.labels.phone_symbols import ipa_labels, with_pauses
 from lipmotion.corpora.labels.tier import (
     LINES,
     PHONE_LABELS,
@@ -131,6 +132,19 @@ COLUMNS = (
 COLUMN_OWNERS = ("normalizedalignment", "alignment", "wordtimestamps", "phonemetimestamps")
 SPOKEN_WORD = re.compile(r"\[[^\[\]]*\]|[^\s\[]+")
 """A word of characters, or a direction in brackets (``[whispers]``), which is not said."""
+TEXT_ALONE = {
+    "text",
+    "partial",
+    "result",
+    "language",
+    "duration",
+    "task",
+    "usage",
+    "logprobs",
+    "alternatives",
+    "confidence",
+}
+"""Members of what a recogniser says without times."""
 KNOWN_SHAPES = "segments, words, results, utterances, monologues, alignment, tiers, fragments, ..."
 BLANK = re.compile(r"\s*")
 DIGITS = re.compile(r"(?:PT)?([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d{1,3})?)\s*(s|ms)?", re.IGNORECASE)
@@ -185,7 +199,8 @@ def service_tiers(text: str, where: str) -> list[LabelTier] | None:
     if len(objects) < len(numbered):
         return None
     rows = [row for place, item in objects for row in _rows(item, place if len(objects) > 1 else "", where)]
-    if not rows:
+    timed = any(row.parts or not math.isnan(row.start) or row.times.end for row in rows)
+    if not rows or not (timed or all(item.keys() <= TEXT_ALONE for _, item in objects)):
         return [] if all(_heard_nothing(item) for _, item in objects) else None
     return _tiers(rows, where)
 
@@ -256,7 +271,7 @@ def _number(value: Any, where: str, per_s: int = 0) -> tuple[float, int]:
     if value is None:
         return math.nan, per_s
     try:
-        time = float([] if isinstance(value, bool) else value)
+        time = float(str(value) if isinstance(value, bool) else value)
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{where}: a time is {shortened(repr(value)[:200])}, required a number of seconds") from error
     return (time if math.isfinite(time) else math.nan), per_s
@@ -350,6 +365,9 @@ def _speaker(item: dict[str, Any]) -> str:
 
 def _tiers(rows: list[Row], where: str) -> list[LabelTier]:
     """Return rows as tiers, one for each speaker, with times in seconds."""
+    half = len(rows) // 2
+    if half and [(row.text, row.start) for row in rows[:half]] == [(row.text, row.start) for row in rows[half:]]:
+        rows = rows[half:]  # Google's last result has the words of all again, with their speakers
     if any(len({part.speaker for part in row.parts}) > 1 for row in rows):
         rows = [part for row in rows for part in row.parts or (row,)]
     counts = [len(words_in(spoken_text(row.text[:LONGEST_JUDGED]))) for row in rows]
@@ -358,8 +376,7 @@ def _tiers(rows: list[Row], where: str) -> list[LabelTier]:
     check_word_count(sum(counts) + sum(len(row.parts) for row in rows), where)
     leaves = [part for row in rows for part in row.parts or (row,)]
     per_s = _per_s(leaves, role, where)
-    speakers = list(dict.fromkeys(row.speaker or (row.parts[0].speaker if row.parts else "") for row in rows))
-    by_speaker: dict[str, list[TimedLabel]] = {speaker: [] for speaker in speakers}
+    by_speaker: dict[str, list[TimedLabel]] = defaultdict(list)
     for row in rows:
         parts = tuple(_label(part, per_s, where) for part in row.parts)
         label = replace(_label(row, per_s, where), parts=parts)
@@ -595,7 +612,7 @@ def _aligned_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
             start_s = until_s
     if missed:
         LOG.warning("%s: %d of %d words were not found in the sound and are left out", where, missed, len(items))
-    return _word_and_phone_tiers(words, inventory_labels(phones, where), where)
+    return _word_and_phone_tiers(words, phones, where)
 
 
 def _named_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
@@ -618,5 +635,5 @@ def _named_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
             *times_s, text = (*(_seconds(time, f"{where}: {place}") for time in entry[:-1]), entry[-1])
             labels.append(TimedLabel(times_s[0], times_s[-1], _required_text(text, f"{where}: {place}"), place))
         if len(tier["entries"][0] if tier["entries"] else ()) == 3:
-            tiers.append(in_inventory(named_tier(name, sorted(labels, key=lambda label: label.start_s)), where))
+            tiers.append(named_tier(name, sorted(labels, key=lambda label: label.start_s)))
     return tiers

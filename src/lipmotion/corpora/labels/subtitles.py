@@ -6,12 +6,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from io import StringIO
 
 from lipmotion.corpora.labels.tier import LINES, LabelTier, TimedLabel, check_count
 from lipmotion.errors import InputError, shortened
-from lipmotion.units.spoken_text import line_words, spoken_text
+from lipmotion.units.spoken_text import spoken_text
 
 CLOCK = r"(?:(\d{1,4}):)?(\d{1,2}):(\d{1,2})(?:[.,](\d{1,6}))?"
 """A time as subtitles write it: hours (which may be missing), minutes, seconds, and their fraction."""
@@ -52,19 +52,6 @@ BREAK = re.compile(r"\\[Nnh]")
 """Line breaks and hard blanks within the text."""
 
 
-@dataclass(frozen=True)
-class SubtitleCue:
-    """Some lines of text that are shown together.
-
-    number : of the line of the file that holds its times
-    """
-
-    number: int
-    start_s: float
-    end_s: float
-    lines: tuple[str, ...]
-
-
 def clock_seconds(match: re.Match[str], group: int) -> float:
     """Return the time in seconds of the four groups of ``CLOCK`` in a match; ``group``: the first of them."""
     hours, minutes, seconds, fraction = match.group(group, group + 1, group + 2, group + 3)
@@ -97,15 +84,11 @@ def subtitle_tier(text: str, where: str) -> LabelTier:
         cues = _rows(text, where)
     else:
         cues = _substation_cues(text, where) if _is_substation(text) else _cues(text, where)
-    labels = []
-    for cue in _without_repetitions(list(cues)):
-        place, shown = f"line {cue.number}", "\n".join(cue.lines)
-        line_words(shown, f"{where}: {place}")
-        labels.append(TimedLabel(cue.start_s, cue.end_s, shown, place, _words(cue, shown)))
+    labels = (replace(cue, parts=_words(cue)) for cue in _without_repetitions(list(cues)))
     return LabelTier("subtitles", tuple(labels), LINES)
 
 
-def _cues(text: str, where: str) -> Iterator[SubtitleCue]:
+def _cues(text: str, where: str) -> Iterator[TimedLabel]:
     cue, lines, count = None, list[str](), 0
     for number, row in enumerate(StringIO(text), 1):
         line = row.rstrip("\r\n")
@@ -117,15 +100,15 @@ def _cues(text: str, where: str) -> Iterator[SubtitleCue]:
             lines.append(line)
             continue
         if cue is not None:
-            yield replace(cue, lines=_shown(lines))
+            yield replace(cue, text=_shown(lines))
         count += 1
         check_count(count, where)
-        cue, lines = SubtitleCue(number, clock_seconds(times, 1), clock_seconds(times, 5), ()), []
+        cue, lines = TimedLabel(clock_seconds(times, 1), clock_seconds(times, 5), "", f"line {number}"), []
     if cue is not None:
-        yield replace(cue, lines=_shown([*lines, "", ""]))
+        yield replace(cue, text=_shown([*lines, "", ""]))
 
 
-def _shown(lines: list[str]) -> tuple[str, ...]:
+def _shown(lines: list[str]) -> str:
     """Return the lines that a cue shows, of all up to the times of the next one: without that one's name, and notes."""
     blank = [number for number, line in enumerate(lines) if not line]
     if lines and (lines[-1].strip().isdecimal() or (blank and blank[-1] == len(lines) - 2)):
@@ -136,10 +119,10 @@ def _shown(lines: list[str]) -> tuple[str, ...]:
         hidden = (hidden and bool(line)) or (not before and NO_CUE.match(line) is not None)
         if line.strip() and not hidden:
             shown.append(line)
-    return tuple(shown)
+    return "\n".join(shown)
 
 
-def _rows(text: str, where: str) -> Iterator[SubtitleCue]:
+def _rows(text: str, where: str) -> Iterator[TimedLabel]:
     """Yield the rows of Whisper's table as cues."""
     for number, row in enumerate(StringIO(text), 1):
         line = row.rstrip("\r\n")
@@ -149,12 +132,12 @@ def _rows(text: str, where: str) -> Iterator[SubtitleCue]:
         found = ROW.fullmatch(line)
         if found is None:
             raise InputError(f"{where}: line {number} is {shortened(line)!r}; required: start, end and text, with tabs")
-        yield SubtitleCue(number, int(found[1]) / 1000, int(found[2]) / 1000, (found[3],))
+        yield TimedLabel(int(found[1]) / 1000, int(found[2]) / 1000, found[3], f"line {number}")
 
 
-def _without_repetitions(cues: list[SubtitleCue]) -> list[SubtitleCue]:
+def _without_repetitions(cues: list[TimedLabel]) -> list[TimedLabel]:
     """Return cues without the lines that captions that scroll repeat."""
-    plain = [tuple(" ".join(WORD_TIME.sub("", line).split()) for line in cue.lines) for cue in cues]
+    plain = [tuple(" ".join(WORD_TIME.sub("", line).split()) for line in cue.text.split("\n")) for cue in cues]
     plain = [tuple(spoken_text(line).strip() for line in lines) for lines in plain]
     bridges = sum(
         cue.end_s - cue.start_s < BRIDGE_S and shown[-len(lines) :] == lines
@@ -165,7 +148,7 @@ def _without_repetitions(cues: list[SubtitleCue]) -> list[SubtitleCue]:
     kept = cues[:1]
     for before, cue, shown, lines in zip(cues, cues[1:], plain, plain[1:], strict=False):
         near = cue.start_s <= before.end_s + NEAR_S
-        kept.append(replace(cue, lines=cue.lines[_repeated(shown, lines) if near else 0 :]))
+        kept.append(replace(cue, text="\n".join(cue.text.split("\n")[_repeated(shown, lines) if near else 0 :])))
     return kept
 
 
@@ -174,8 +157,9 @@ def _repeated(shown: tuple[str, ...], lines: tuple[str, ...]) -> int:
     return next((n for n in range(min(len(lines), len(shown)), 0, -1) if shown[-n:] == lines[:n]), 0)
 
 
-def _words(cue: SubtitleCue, text: str) -> tuple[TimedLabel, ...]:
+def _words(cue: TimedLabel) -> tuple[TimedLabel, ...]:
     """Return the words of a cue with times, where these stand between them."""
+    text = cue.text
     marks = list(WORD_TIME.finditer(text))
     if not marks:
         return ()
@@ -183,12 +167,12 @@ def _words(cue: SubtitleCue, text: str) -> tuple[TimedLabel, ...]:
     ends = [*(mark.start() for mark in marks), len(text)]
     times_s = [cue.start_s, *(min(max(clock_seconds(mark, 1), cue.start_s), cue.end_s) for mark in marks), cue.end_s]
     return tuple(
-        TimedLabel(start_s, max(start_s, end_s), text[first:end], f"line {cue.number}")
+        TimedLabel(start_s, max(start_s, end_s), text[first:end], cue.position)
         for first, end, start_s, end_s in zip(edges, ends, times_s, times_s[1:], strict=False)
     )
 
 
-def _substation_cues(text: str, where: str) -> Iterator[SubtitleCue]:
+def _substation_cues(text: str, where: str) -> Iterator[TimedLabel]:
     """Yield the dialogue of a file, without drawings; comments, styles and what else it holds are left out.
 
     The tags of styles (``{\\an8}``, ``{\\i1}``) stay in the text: ``spoken_text`` takes them out, as of all subtitles.
@@ -208,7 +192,7 @@ def _substation_cues(text: str, where: str) -> Iterator[SubtitleCue]:
             yield _dialogue(line, number, fields, where)
 
 
-def _dialogue(line: str, number: int, fields: list[str], where: str) -> SubtitleCue:
+def _dialogue(line: str, number: int, fields: list[str], where: str) -> TimedLabel:
     """Return one line of dialogue; the text is the last field, and may hold commas."""
     values = line[len(DIALOGUE_LINE) :].split(",", maxsplit=len(fields) - 1)
     by_name = dict(zip(fields, values, strict=False))
@@ -217,7 +201,7 @@ def _dialogue(line: str, number: int, fields: list[str], where: str) -> Subtitle
         wanted = "Dialogue: 0,0:00:01.00,0:00:02.50,Default,,0,0,0,,Words"
         raise InputError(f"{where}: line {number} is {shortened(line)!r}; required a line as {wanted}")
     shown = BREAK.sub("\n", _without_drawings(by_name.get("text", values[-1])))
-    return SubtitleCue(number, clock_seconds(start, 1), clock_seconds(end, 1), tuple(shown.split("\n")))
+    return TimedLabel(clock_seconds(start, 1), clock_seconds(end, 1), shown, f"line {number}")
 
 
 def _without_drawings(text: str) -> str:

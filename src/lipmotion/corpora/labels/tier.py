@@ -256,7 +256,8 @@ def _times(label: TimedLabel, where: str) -> tuple[float | None, float | None]:
     """Return the times of a label, None where they are not known. Raises InputError: it ends before it starts."""
     if label.end_s < label.start_s:
         raise _reversed(label, where)
-    return tuple(time_s if math.isfinite(time_s) else None for time_s in (label.start_s, label.end_s))
+    start_s, end_s = (time_s if math.isfinite(time_s) else None for time_s in (label.start_s, label.end_s))
+    return start_s, end_s
 
 
 def _reversed(label: TimedLabel, where: str) -> InputError:

@@ -12,7 +12,6 @@ from itertools import islice
 from pathlib import Path
 from statistics import median
 
-from lipmotion.corpora.labels.phone_symbols import in_inventory
 from lipmotion.corpora.labels.tier import (
     LINES,
     MOST_LABELS,
@@ -141,7 +140,8 @@ def _from_starts(text: str, where: str) -> LabelTier:
     rows = list(_fitted(text, STARTS, "start label", where))
     starts_s = [required_time(row[0], f"line {number}", where) / TICKS_PER_S for number, row in rows]
     spans = zip(rows, starts_s, [*starts_s[1:], math.inf], strict=True)
-    return LabelTier("labels", tuple(TimedLabel(*span_s, row[1], f"line {number}") for (number, row), *span_s in spans))
+    labels = (TimedLabel(start_s, end_s, row[1], f"line {number}") for (number, row), start_s, end_s in spans)
+    return LabelTier("labels", tuple(labels))
 
 
 def _nist(text: str, form: re.Pattern[str], where: str) -> list[LabelTier]:
@@ -188,8 +188,8 @@ def _lrs(text: str, where: str) -> LabelTier:
         found = LRS_WORD.fullmatch(row.strip())
         if found is None:
             raise InputError(f"{where}: line {number} is {shortened(row.strip())!r}; required: word start end")
-        times_s = (required_time(time, f"line {number}", where) for time in found.group(2, 3))
-        labels.append(TimedLabel(*times_s, found[1], f"line {number}"))
+        start_s, end_s = (required_time(time, f"line {number}", where) for time in found.group(2, 3))
+        labels.append(TimedLabel(start_s, end_s, found[1], f"line {number}"))
     return LabelTier("WORD", tuple(labels), WORDS)
 
 
@@ -232,4 +232,4 @@ def _table(text: str, columns: dict[str, int], where: str) -> list[LabelTier]:
         named_tier(kind, sorted(labels, key=lambda label: label.start_s), speaker)
         for (kind, speaker), labels in kinds.items()
     ]
-    return [in_inventory(tier, where) for tier in in_seconds(tiers, where)]
+    return in_seconds(tiers, where)

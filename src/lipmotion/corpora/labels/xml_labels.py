@@ -8,7 +8,6 @@ from collections import defaultdict
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from lipmotion.corpora.labels.phone_symbols import in_inventory
 from lipmotion.corpora.labels.tier import LINES, OTHER, LabelTier, TimedLabel, check_count, named_tier
 from lipmotion.errors import InputError, shortened
 
@@ -51,8 +50,8 @@ def _elan_tiers(root: Element, where: str) -> list[LabelTier]:
     spans_s: dict[str | None, tuple[float, float]] = {}
     owners: dict[str | None, str | None] = {}
     for each in root.iter("ALIGNABLE_ANNOTATION"):
-        edges = (times_s.get(each.get(f"TIME_SLOT_REF{edge}"), math.nan) for edge in (1, 2))
-        spans_s[each.get("ANNOTATION_ID")] = tuple(edges)
+        start_s, end_s = (times_s.get(each.get(f"TIME_SLOT_REF{edge}"), math.nan) for edge in (1, 2))
+        spans_s[each.get("ANNOTATION_ID")] = start_s, end_s
     for each in root.iter("REF_ANNOTATION"):
         owners[each.get("ANNOTATION_ID")] = each.get("ANNOTATION_REF")
     tiers = []
@@ -69,7 +68,7 @@ def _elan_tiers(root: Element, where: str) -> list[LabelTier]:
         labels = [TimedLabel(*span_s, text, f"tier {name!r}, annotation {number}") for number, (span_s, text) in rows]
         found = named_tier(name, labels, tier.get("PARTICIPANT") or "")
         role = found.role or (OTHER if tier.get("PARENT_REF") else LINES if found.speaker else "")
-        tiers.append(in_inventory(LabelTier(name, found.labels, role, found.speaker), where))
+        tiers.append(LabelTier(name, found.labels, role, found.speaker))
     return tiers
 
 
