@@ -16,7 +16,7 @@ from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import accumulate, zip_longest
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 from lipmotion.corpora.labels.phone_symbols import ipa_labels, with_pauses
@@ -80,13 +80,12 @@ TIMES = (
     Times("timestart", "timeend"),
     Times("from", "to"),
     Times("timeseconds", per_s=1),  # Google, text to speech
-    Times("time", "", "duration", usual=1000),  # Amazon Polly
     Times("", "resultendtime", per_s=1),  # Google, a result without words
     Times("", "resultendoffset", per_s=1),
 )
 TEXTS = (
-    "punctuatedword word text content value transcript sentence display lexical markname token lines displaytext segs "
-    "alternatives nbest"
+    "punctuatedword word alignedword text content value transcript sentence display lexical markname token lines displaytext "
+    "segs alternatives nbest"
 ).split()
 """The names of what is said, in order; of alternatives it is the first one."""
 ALTERNATIVES = ("alternatives", "nbest")
@@ -97,6 +96,8 @@ LINE_LISTS = (
     "paragraphs result results transcript alternatives nbest data response output prediction predictions documents"
 ).split()
 """Members in which lines or further lists are searched, in this order."""
+MISSED = "not-found-in-audio"
+"""Gentle's case of a word that is not said."""
 KINDS = ("type", "boundarytype", "kind", "category")
 NOT_SAID = re.compile(r"punct|spac|audio.?event|sentence|ssml|pause|silence|non.?speech|blank|laugh|noise|session")
 """Kinds of items that are no words."""
@@ -112,15 +113,11 @@ AZURE_VISEMES = "sil ah aa ao eh er ih uw ow aw oy ay hh r l s sh th f t k p".sp
 KOKORO_LETTERS = {"A": "eɪ", "I": "aɪ", "W": "aʊ", "Y": "ɔɪ", "O": "oʊ", "Q": "əʊ", "ᵊ": "ə", "T": "ɾ"}
 KOKORO_FRAMES_PER_S = 40
 """Durations are in frames of 600 samples at 24 kHz."""
-EVENTS = (
-    ("audiooffset", TICKS_PER_S, "visemeid", "text"),  # Azure, speech synthesis: boundaries and visemes
-    ("time", 1000, "value", "value"),  # Amazon Polly, speech marks
-    ("timeseconds", 1, "", "markname"),  # Google, marks of SSML that are named as the word after them
-)
-"""Events: names of their start, the usual unit, and the names of a viseme and of a word."""
+EVENTS = ("audiooffset", "time", "timeseconds")
+"""Starts of events, which last to the next one: of Azure, of Amazon Polly, of Google's marks."""
 POLLY_KINDS = ("sentence", "word", "viseme", "ssml")
 MARK = re.compile(r"[^\W\d_]+(?:['’-][^\W\d_]+)*[.,;:!?]?")
-"""A name of a mark that is a word."""
+"""A name of one of Google's marks that is the word after it."""
 COLUMNS = (
     ("characters", ("characters", "characterstarttimesseconds", "characterendtimesseconds"), 1),  # ElevenLabs
     ("characters", ("chars", "charstarttimesms", "chardurationsms"), 1000),  # ElevenLabs' web socket
@@ -160,7 +157,7 @@ UNTIMED = Times("")
 
 @dataclass(frozen=True)
 class Row:
-    """An item of a list: its times as they stand, NaN where they are missing, and what their unit is."""
+    """An item of a list: its times as they stand, NaN where they are missing, their names, and what it is."""
 
     start: float
     end: float
@@ -168,7 +165,7 @@ class Row:
     place: str
     times: Times = UNTIMED
     speaker: str = ""
-    is_word: bool = False
+    role: str = ""
     parts: tuple[Row, ...] = ()
 
 
@@ -190,19 +187,20 @@ def service_tiers(text: str, where: str) -> list[LabelTier] | None:
     objects = [(place, item) for place, item in numbered if isinstance(item, dict)]
     if not objects or any("mouthcues" in item or {"format", "channels"} <= item.keys() for _, item in objects):
         return None
-    readers = (_event_tiers, _column_tiers, _duration_tiers, _aligned_tiers, _named_tiers)
-    for tiers in (reader(objects, where) for reader in readers):
-        if tiers is not None and not any(tier.labels for tier in tiers):
-            raise InputError(f"{where}: holds no word and no phone in time; ask the service for them")
-        if tiers is not None:
-            return [replace(t, labels=with_pauses(t.labels)) if t.role == PHONE_LABELS else t for t in tiers]
-    if len(objects) < len(numbered):
-        return None
-    rows = [row for place, item in objects for row in _rows(item, place if len(objects) > 1 else "", where)]
-    timed = any(row.parts or not math.isnan(row.start) or row.times.end for row in rows)
-    if not rows or not (timed or all(item.keys() <= TEXT_ALONE for _, item in objects)):
-        return [] if all(_heard_nothing(item) for _, item in objects) else None
-    return _tiers(rows, where)
+    readers = (_column_tiers, _duration_tiers, _named_tiers)
+    tiers = next((tiers for reader in readers if (tiers := reader(objects, where)) is not None), None)
+    if tiers is None and len(objects) == len(numbered):
+        rows = [row for place, item in objects for row in _rows(item, place if len(objects) > 1 else "", where)]
+        timed = any(row.parts or not math.isnan(row.start) or row.times.end for row in rows)
+        missed = [word for _, item in objects for word in item.get("words") or () if word.get("case") == MISSED]
+        if missed:
+            LOG.warning("%s: %d words were not found in the sound and are left out", where, len(missed))
+        heard_nothing = not rows and all(_heard_nothing(item) for _, item in objects)
+        is_text = bool(rows) and all(item.keys() <= TEXT_ALONE for _, item in objects)
+        tiers = _tiers(rows, where) if timed or is_text else [] if heard_nothing else None
+    elif tiers is not None and not any(tier.labels for tier in tiers):
+        raise InputError(f"{where}: holds no word and no phone in time; ask the service for them")
+    return tiers and [replace(t, labels=with_pauses(t.labels)) if t.role == PHONE_LABELS else t for t in tiers]
 
 
 def described(text: str, where: str) -> str:
@@ -277,24 +275,34 @@ def _number(value: Any, where: str, per_s: int = 0) -> tuple[float, int]:
     return (time if math.isfinite(time) else math.nan), per_s
 
 
-def _row(item: dict[str, Any], place: str, where: str) -> Row | None:
+def _row(item: dict[str, Any], place: str, where: str, name: str) -> Row | None:
     """Return an item with its text and the times that it has; None: it has no text."""
     text = next((text for name in TEXTS if name in item and (text := _text(item[name])) is not None), None)
     if text is None and any(item.get(name) for name in ("text", "word")):
         found = shortened(repr(item.get("text") or item.get("word"))[:200])
         raise InputError(f"{where}: {place}: its text is {found}, required a text")
     speaker, stamp, offsets = _speaker(item), item.get("timestamp"), item.get("offsets")
+    role = WORDS if "word" in item or name in WORD_LISTS else ""
+    if "visemeid" in item or item.get("type") == "viseme":
+        text, role = _viseme(item.get("visemeid", item.get("value")), f"{where}: {place}"), PHONE_LABELS
+    if text is not None and "markname" in item and not MARK.fullmatch(text):
+        raise InputError(
+            f"{where}: {place} is the mark {shortened(text)!r}, which is no word; name every mark as the word that "
+            'follows it, <mark name="hello"/>hello, or give the words as a transcript'
+        )
     if isinstance(offsets, dict) and "from" in offsets:  # whisper.cpp
         item, times = offsets, Times("from", "to", per_s=1000)
     elif isinstance(stamp, list) and len(stamp) == 2:  # transformers
         item, times = dict(zip(("start", "end"), stamp, strict=True)), Times("start", "end", per_s=1)
     else:
         times = next((row for row in TIMES if (row.start or row.end) in item), UNTIMED)
+        if "time" in item and item.get("type") in POLLY_KINDS:  # its start and end are places in the text
+            times = Times("time", usual=1000)
     start, per_s = _number(item.get(times.start), f"{where}: {place}", times.per_s)
     end, per_s = _number(item.get(times.end), f"{where}: {place}", per_s)
     if math.isnan(end) and times.duration in item:
         end = start + _number(item[times.duration], f"{where}: {place}")[0]
-    return None if text is None else Row(start, end, text, place, times._replace(per_s=per_s), speaker)
+    return None if text is None else Row(start, end, text, place, times._replace(per_s=per_s), speaker, role)
 
 
 def _text(value: Any) -> str | None:
@@ -338,9 +346,7 @@ def _rows_of_object(item: dict[str, Any], place: str, where: str, name: str, dep
         members = (each for each in names if isinstance(item.get(each), dict | list))
         return next((rows for each in members if (rows := _rows(item[each], place, where, each, depth + 1))), [])
 
-    own = _row(item, place, where)
-    if own is not None and (name in WORD_LISTS or "word" in item):
-        own = replace(own, is_word=True)
+    own = _row(item, place, where, name)
     timed = own is not None and not math.isnan(own.start)
     if name == "words" and own is None:
         raise InputError(f"{where}: {place}: no text; required a member 'word'")
@@ -352,11 +358,24 @@ def _rows_of_object(item: dict[str, Any], place: str, where: str, name: str, dep
         lines = first_of(each for each in item if each not in (*WORD_LISTS, *LINE_LISTS))
         lines = [line for line in lines if line.parts or not math.isnan(line.start)]
     if not lines:
-        return [own] if own is not None else []
+        return [] if own is None or item.get("case") == MISSED else [own, *_phones_in(item, own, where)]
     if len(lines) == 1 and math.isnan(lines[0].start) and own is not None:  # one alternative, whose owner has the time
         lines = [replace(lines[0], start=own.start, end=own.end, times=own.times)]
     speaker = own.speaker if own is not None else _speaker(item)
     return [line if line.speaker else replace(line, speaker=speaker) for line in lines]
+
+
+def _phones_in(item: dict[str, Any], word: Row, where: str) -> list[Row]:
+    """Return the phones of a word of Gentle, of which the durations are given."""
+    phones: list[Row] = []
+    start = word.start
+    for number, each in enumerate(item["phones"] if isinstance(item.get("phones"), list) else [], 1):
+        place, fields = f"{word.place}, phone {number}", each if isinstance(each, dict) else {}
+        end = start + _seconds(fields.get("duration"), f"{where}: {place}")
+        name = _required_text(fields.get("phone"), f"{where}: {place}").partition("_")[0]
+        phones.append(replace(word, start=start, end=end, text=name, place=place, role=PHONE_LABELS))
+        start = end
+    return phones
 
 
 def _speaker(item: dict[str, Any]) -> str:
@@ -364,31 +383,49 @@ def _speaker(item: dict[str, Any]) -> str:
 
 
 def _tiers(rows: list[Row], where: str) -> list[LabelTier]:
-    """Return rows as tiers, one for each speaker, with times in seconds."""
+    """Return rows as tiers with times in seconds: of phones, and of the words of each speaker."""
+    phones = [row for row in rows if row.role == PHONE_LABELS]
+    rows = [row for row in rows if row.role != PHONE_LABELS]
     half = len(rows) // 2
     if half and [(row.text, row.start) for row in rows[:half]] == [(row.text, row.start) for row in rows[half:]]:
         rows = rows[half:]  # Google's last result has the words of all again, with their speakers
     if any(len({part.speaker for part in row.parts}) > 1 for row in rows):
         rows = [part for row in rows for part in row.parts or (row,)]
     counts = [len(words_in(spoken_text(row.text[:LONGEST_JUDGED]))) for row in rows]
-    single = sum(row.is_word or count < 2 for row, count in zip(rows, counts, strict=True)) >= SINGLE_SHARE * len(rows)
-    role = WORDS if single and not any(row.parts for row in rows) else LINES
     check_word_count(sum(counts) + sum(len(row.parts) for row in rows), where)
-    leaves = [part for row in rows for part in row.parts or (row,)]
-    per_s = _per_s(leaves, role, where)
+    single = sum(row.role == WORDS or count < 2 for row, count in zip(rows, counts, strict=True))
+    role = WORDS if single >= SINGLE_SHARE * len(rows) and not any(row.parts for row in rows) else LINES
     by_speaker: dict[str, list[TimedLabel]] = defaultdict(list)
-    for row in rows:
-        parts = tuple(_label(part, per_s, where) for part in row.parts)
-        label = replace(_label(row, per_s, where), parts=parts)
+    labels = _labels(rows, role, where, [row.start for row in phones if row.text == SILENCE])
+    for row, label in zip(rows, labels, strict=True):
         by_speaker[row.speaker or (row.parts[0].speaker if row.parts else "")].append(label)
-    return [LabelTier(speaker or role, tuple(labels), role, speaker) for speaker, labels in by_speaker.items()]
+    tiers = [LabelTier(PHONE_LABELS, tuple(_labels(phones, PHONE_LABELS, where, [])), PHONE_LABELS)] if phones else []
+    return tiers + [LabelTier(who or role, tuple(said), role, who) for who, said in by_speaker.items()]
+
+
+def _labels(rows: list[Row], role: str, where: str, silences: list[float]) -> list[TimedLabel]:
+    """Return rows in seconds; an event lasts to the next one or to a silence, the last one is open."""
+    events = [row.start for row in rows if row.times.start in EVENTS]
+    edges = sorted([*events, *silences]) if events else []
+    ended = [
+        replace(row, end=next(iter(edges[bisect_right(edges, row.start) :]), math.inf))
+        if math.isnan(row.end) and edges
+        else row
+        for row in (sorted(rows, key=lambda row: row.start) if edges else rows)
+    ]
+    rows[:] = ended
+    per_s = _per_s([part for row in rows for part in row.parts or (row,)], role, where)
+    return [
+        replace(_label(row, per_s, where), parts=tuple(_label(part, per_s, where) for part in row.parts))
+        for row in rows
+    ]
 
 
 def _label(row: Row, per_s: int, where: str) -> TimedLabel:
     """Return a row in seconds. Raises InputError: it ends long before it starts, or its time is none."""
     start_s, end_s = (time / (row.times.per_s or per_s) for time in (row.start, row.end))
     for time, time_s in ((row.start, start_s), (row.end, end_s)):
-        if abs(time_s) > LATEST_S:
+        if LATEST_S < abs(time_s) < math.inf:
             raise InputError(f"{where}: {row.place}: a time is {time:g}, required seconds, up to {LATEST_S:g}")
     start_s = math.nan if start_s < EARLIEST_S else start_s
     if end_s < start_s - ROUNDING_S:
@@ -397,15 +434,10 @@ def _label(row: Row, per_s: int, where: str) -> TimedLabel:
 
 
 def _per_s(rows: Sequence[Row], role: str, where: str) -> int:
-    """Return how many units are a second in rows whose names do not say it; one without an end lasts to the next."""
+    """Return how many units are a second in rows whose names do not say it."""
     judged = [row for row in rows if not row.times.per_s and not math.isnan(row.start)]
-    if not judged:
-        return 1
-    spans = [
-        (row.start, following.start if following is not None and math.isnan(row.end) else row.end, row.text)
-        for row, following in zip_longest(judged, judged[1:])
-    ]
-    return unit_of_times(spans, role, where, judged[0].times.usual)
+    spans = [(row.start, row.end, row.text) for row in judged]
+    return unit_of_times(spans, role, where, judged[0].times.usual) if judged else 1
 
 
 def _heard_nothing(item: dict[str, Any]) -> bool:
@@ -436,43 +468,6 @@ def _word_and_phone_tiers(words: Sequence[TimedLabel], phones: Sequence[TimedLab
     return [tier for tier in tiers if tier.labels]
 
 
-def _event_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
-    """Return words and visemes of events with a start alone, which last to the next: of Azure, Polly and Google."""
-    if len(objects) == 1 and isinstance(objects[0][1].get("timepoints"), list):
-        points = enumerate(objects[0][1]["timepoints"], 1)
-        objects = [(f"time point {number}", point) for number, point in points if isinstance(point, dict)]
-        objects = [(place, {"timeseconds": 0, **point}) for place, point in objects]
-    for start, usual, viseme, text in EVENTS:  # noqa: B007 (the one that fits is used)
-        named = all(start in item and {viseme, text, "type"} & item.keys() for _, item in objects)
-        if objects and named and (start != "time" or all(item.get("type") in POLLY_KINDS for _, item in objects)):
-            break
-    else:
-        return [] if not objects else None
-    words: list[Row] = []
-    visemes: list[Row] = []
-    for place, item in objects:
-        kind = str(item.get("type", item.get("boundarytype", ""))).rpartition(".")[2].lower()
-        time = _number(item[start], f"{where}: {place}")[0]
-        if math.isnan(time):
-            raise InputError(f"{where}: {place} has no time")
-        duration = _number(item.get("duration"), f"{where}: {place}")[0]
-        row = Row(time, time + duration, "", place, Times(start, usual=usual))
-        if viseme in item and kind in ("", "viseme"):
-            visemes.append(replace(row, text=_viseme(item[viseme], f"{where}: {place}")))
-        elif kind in ("", "word", "wordboundary"):
-            words.append(replace(row, text=_required_text(item.get(text), f"{where}: {place}")))
-            if text == "markname" and not MARK.fullmatch(item[text]):
-                raise InputError(
-                    f"{where}: {place} is the mark {shortened(item[text])!r}, which is no word; name every mark as the "
-                    'word that follows it, <mark name="hello"/>hello, or give the words as a transcript'
-                )
-    silences = [row for row in visemes if row.text == SILENCE]
-    timed = [_until_next(rows, edges, role, where) for rows, edges, role in (
-        (words, silences, WORDS), (visemes, (), PHONE_LABELS)
-    )]  # fmt: skip
-    return _word_and_phone_tiers(timed[0], timed[1], where)
-
-
 def _viseme(value: Any, where: str) -> str:
     """Return the phone with the mouth of a viseme of Azure (a number) or of Polly (a name)."""
     if isinstance(value, str):
@@ -484,23 +479,6 @@ def _viseme(value: Any, where: str) -> str:
         found = shortened(repr(value)[:200])
         raise InputError(f"{where}: the viseme is {found}, required 0 to {len(AZURE_VISEMES) - 1}")
     return AZURE_VISEMES[value]
-
-
-def _until_next(rows: list[Row], silences: Sequence[Row], role: str, where: str) -> list[TimedLabel]:
-    """Return rows in order of time, s; one without an end lasts to the next, or to a silence; the last is open."""
-    ordered = sorted(rows, key=lambda row: row.start)
-    per_s = _per_s(ordered, role, where)
-    edges = sorted([row.start for row in (*rows, *silences)])
-    return [
-        TimedLabel(
-            row.start / per_s,
-            (row.end if not math.isnan(row.end) else next(iter(edges[bisect_right(edges, row.start) :]), math.inf))
-            / per_s,
-            row.text,
-            row.place,
-        )
-        for row in ordered
-    ]
 
 
 def _column_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
@@ -583,36 +561,6 @@ def _duration_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
     words = [row for item in kokoro for row in _rows({"tokens": item.get("tokens")}, "", where)]
     timed = [_label(row, 1, where) for row in words if not math.isnan(row.start)]
     return _word_and_phone_tiers(timed, ipa_labels(phones, where), where)
-
-
-def _aligned_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
-    """Return the words and phones of Gentle; a word without phones that are known is speech of unknown ones.
-
-    Words that are not in the transcript are said; those that are not in the sound are left out, with a warning.
-    """
-    items = objects[0][1].get("words") if len(objects) == 1 else None
-    if not isinstance(items, list) or not items or not all(isinstance(word, dict) and "case" in word for word in items):
-        return None
-    words: list[TimedLabel] = []
-    phones: list[TimedLabel] = []
-    missed = 0
-    for number, word in enumerate(items, 1):
-        place = f"word {number}"
-        if word["case"] == "not-found-in-audio" or "start" not in word:
-            missed += 1
-            continue
-        start_s, end_s = (_seconds(word.get(name), f"{where}: {place}") for name in ("start", "end"))
-        text = _required_text(word.get("word", word.get("alignedword")), f"{where}: {place}")
-        words.append(TimedLabel(start_s, end_s, text, place))
-        for count, item in enumerate(word["phones"] if isinstance(word.get("phones"), list) else [], 1):
-            at, fields = f"{place}, phone {count}", item if isinstance(item, dict) else {}
-            until_s = start_s + _seconds(fields.get("duration"), f"{where}: {at}")
-            name = _required_text(fields.get("phone"), f"{where}: {at}").partition("_")[0]
-            phones.append(TimedLabel(start_s, until_s, name, at))
-            start_s = until_s
-    if missed:
-        LOG.warning("%s: %d of %d words were not found in the sound and are left out", where, missed, len(items))
-    return _word_and_phone_tiers(words, phones, where)
 
 
 def _named_tiers(objects: Objects, where: str) -> list[LabelTier] | None:

@@ -178,7 +178,7 @@ def _lrs(text: str, where: str) -> LabelTier:
     heading, said = LRS_WORDS.search(text), LRS_TEXT.match(text)
     if heading is None:
         return LabelTier("Text", (TimedLabel(math.nan, math.nan, said[1] if said else "", "line 1"),), LINES)
-    labels = []
+    labels: list[TimedLabel] = []
     for number, row in enumerate(
         StringIO(text[heading.end() :].lstrip("\r\n")), text.count("\n", 0, heading.end()) + 2
     ):
