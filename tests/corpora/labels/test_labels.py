@@ -164,7 +164,7 @@ def test_a_file_that_cannot_be_read(tmp_path, monkeypatch):
 
     (tmp_path / "a.lab").touch()
     monkeypatch.setattr(Path, "read_bytes", refused)
-    with pytest.raises(InputError, match=r"a\.lab: cannot be read: Permission denied"):
+    with pytest.raises(InputError, match=r"a\.lab: not a readable label \(Permission denied"):
         labels_beside(tmp_path / "a.mp4")
 
 

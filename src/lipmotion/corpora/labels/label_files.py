@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,7 +11,7 @@ from lipmotion.corpora.labels.phone_symbols import in_inventory
 from lipmotion.corpora.labels.plain_text import check_no_labels
 from lipmotion.corpora.labels.services import DamagedJsonError, described, is_json, service_tiers
 from lipmotion.corpora.labels.subtitles import is_subtitles, subtitle_tier
-from lipmotion.corpora.labels.textgrid import MARK, is_textgrid, parse_interval_tiers
+from lipmotion.corpora.labels.textgrid import is_textgrid, parse_interval_tiers
 from lipmotion.corpora.labels.tier import (
     LINES,
     OTHER,
@@ -33,7 +32,7 @@ from lipmotion.corpora.labels.tier import (
 from lipmotion.corpora.labels.timed_lines import line_tiers
 from lipmotion.corpora.labels.xml_labels import is_timed_xml, xml_tiers
 from lipmotion.errors import InputError, shortened
-from lipmotion.storage.files import check_regular, decoded_text
+from lipmotion.storage.files import read_text_file
 from lipmotion.types import TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
 from lipmotion.units import UNKNOWN_PHONES, phone_named, words_of
 from lipmotion.units.length_limits import LARGEST_TRANSCRIPT_BYTES
@@ -80,41 +79,25 @@ def labels_beside(recording: Path, *, ignored: frozenset[Path] = frozenset()) ->
     ignored : files that are no labels (the lists of the splits)
     Raises InputError: one of them cannot be read.
     """
-    found = list(each_labels_beside(recording, ignored=ignored))
-    transcripts = [labels.transcript for _, labels in found if labels.transcript]
-    in_order = sorted(found, key=lambda item: FOR_PHONES.index(item[0]) if item[0] in FOR_PHONES else len(FOR_PHONES))
-    phones = [labels.phones for _, labels in in_order if labels.phones]
-    return RecordingLabels(next(iter(transcripts), None), next(iter(phones), None))
-
-
-def each_labels_beside(
-    recording: Path, *, ignored: frozenset[Path] = frozenset()
-) -> Iterator[tuple[str, RecordingLabels]]:
-    """Yield the suffix and the labels of each file that ``labels_beside`` reads, in the order of ``FOR_WORDS``.
-
-    Raises InputError: one of them cannot be read.
-    """
     seen: list[Path] = []
-    for suffix in dict.fromkeys((*FOR_WORDS, *FOR_PHONES)):
-        for path in _named(recording, suffix):
-            if path in ignored or any(path.samefile(other) for other in seen):
-                continue
+    found: list[tuple[Path, RecordingLabels]] = []
+    for path in label_files_beside(recording):
+        if path not in ignored and not any(path.samefile(other) for other in seen):
+            labels = _read(path, unknown_json=path.suffix == ".json")
+            found += [(path, labels)] if labels is not None else []
             seen.append(path)
-            labels = _read(path, unknown_json=suffix == ".json")
-            if labels is not None:
-                yield suffix, labels
+    in_order = sorted(found, key=lambda item: (*FOR_PHONES, item[0].suffix).index(item[0].suffix))
+    transcripts = (labels.transcript for _, labels in found if labels.transcript)
+    return RecordingLabels(next(transcripts, None), next((each.phones for _, each in in_order if each.phones), None))
 
 
 def label_files_beside(recording: Path) -> list[Path]:
     """Return the files beside a recording that ``labels_beside`` reads, in the order of ``FOR_WORDS``."""
-    return [path for suffix in dict.fromkeys((*FOR_WORDS, *FOR_PHONES)) for path in _named(recording, suffix)]
-
-
-def _named(recording: Path, suffix: str) -> list[Path]:
-    """Return the files that have a recording's name and a suffix."""
-    names = [recording.with_suffix(suffix)]
-    if suffix in RECOGNISED:
-        names += [recording.with_suffix(f".en{suffix}"), recording.with_name(recording.name + suffix)]
+    names: list[Path] = []
+    for suffix in dict.fromkeys((*FOR_WORDS, *FOR_PHONES)):
+        names.append(recording.with_suffix(suffix))
+        if suffix in RECOGNISED:
+            names += [recording.with_suffix(f".en{suffix}"), recording.with_name(recording.name + suffix)]
     return [path for path in names if path.is_file()]
 
 
@@ -135,10 +118,7 @@ def read_transcript(path: Path, tier: str = "", speaker: str = "") -> str | Time
     tier, speaker : which tier and whose words; empty: all that hold words are read, and a warning names the speakers
     Raises InputError: as ``read_labels``, no such file, phones without words, or no such tier or speaker.
     """
-    check_regular(path, "transcript file")
-    if not path.exists():
-        raise InputError(f"{path}: no such transcript file")
-    text = _text(path)
+    text = _text(path, "transcript")
     tiers = _timed_tiers(text, str(path))
     if tiers is None:
         _check_plain(text, path)
@@ -160,10 +140,7 @@ def read_phones(path: Path, tier: str = "", speaker: str = "") -> Timeline[Unit]
     tier, speaker : which tier and whose phones; empty: those of all speakers, whom a warning names
     Raises InputError: no such file or tier or speaker, as ``read_labels``, or no phones in time.
     """
-    check_regular(path, "units file")
-    if not path.exists():
-        raise InputError(f"{path}: no such units file")
-    text, where = _text(path), str(path)
+    text, where = _text(path, "units"), str(path)
     tiers = _chosen(_timed_tiers(text, where) or [], where, tier, speaker)
     phones = _tiers_of_phones(tiers, where)
     if not phones and any(each.role in (WORDS, LINES) for each in tiers):
@@ -359,22 +336,5 @@ def _check_plain(text: str, path: Path) -> None:
     check_no_labels(without_known_tags(text), str(path))
 
 
-def _text(path: Path) -> str:
-    """Return the text of a label file, in UTF-8, UTF-16 or, with a warning, Windows-1252.
-
-    Raises InputError: it is not such a text, or too large.
-    """
-    try:
-        size = path.stat().st_size
-        if size > LARGEST_LABELS:
-            raise InputError(f"{path}: {size} bytes, required at most {LARGEST_LABELS}: is it a transcript or labels?")
-        content = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
-    found = MARK.match(content[:40].decode("latin-1"))
-    if found and found[1] == "Binary":
-        raise InputError(f"{path}: is a binary TextGrid; save it as a text file")
-    text, is_sure = decoded_text(content, str(path), "label file")
-    if not is_sure:
-        LOG.warning("%s: not UTF-8; read as Windows-1252 (western Europe); save it as UTF-8 if letters are wrong", path)
-    return text
+def _text(path: Path, kind: str = "label") -> str:
+    return read_text_file(path, kind, LARGEST_LABELS, western=True)

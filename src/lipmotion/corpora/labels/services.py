@@ -84,8 +84,8 @@ TIMES = (
     Times("", "resultendoffset", per_s=1),
 )
 TEXTS = (
-    "punctuatedword word alignedword text content value transcript sentence display lexical markname token lines displaytext "
-    "segs alternatives nbest"
+    "punctuatedword word alignedword text content value transcript sentence display lexical markname token lines "
+    "displaytext segs alternatives nbest"
 ).split()
 """The names of what is said, in order; of alternatives it is the first one."""
 ALTERNATIVES = ("alternatives", "nbest")
