@@ -2,6 +2,7 @@
 
 from lipmotion.corpora.labels.label_files import (
     RecordingLabels,
+    check_plain_text,
     holds_timings,
     label_files_beside,
     labels_beside,
@@ -10,7 +11,6 @@ from lipmotion.corpora.labels.label_files import (
     read_transcript,
     speakers_in,
 )
-from lipmotion.corpora.labels.plain_text import check_plain_text
 
 __all__ = [
     "RecordingLabels",

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import logging
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from io import StringIO
+from itertools import islice
 from pathlib import Path
 
 from lipmotion.corpora.labels.phone_symbols import in_inventory
-from lipmotion.corpora.labels.plain_text import check_no_labels
 from lipmotion.corpora.labels.services import DamagedJsonError, described, is_json, service_tiers
-from lipmotion.corpora.labels.subtitles import is_subtitles, subtitle_tier
+from lipmotion.corpora.labels.subtitles import NO_ARROW, is_subtitles, subtitle_tier
 from lipmotion.corpora.labels.textgrid import is_textgrid, parse_interval_tiers
 from lipmotion.corpora.labels.tier import (
     LINES,
@@ -50,6 +52,15 @@ LARGEST_LABELS = 1 << 24
 """Most bytes of a label file: labels of a day."""
 MOTION, MOTION_HEAD = re.compile(rb'"lipmotion\.motion"|time_s,'), 64
 """How our own motion files begin, and in how many bytes: a quick answer for large ones."""
+MASTER = "#!MLF!#"
+"""The start of HTK's master label files, which hold the labels of many recordings."""
+MARKUP = re.compile(r'\{\\rtf|<[!?a-zA-Z]|\{\s*"|\[\s*[\[{]')
+"""The start of RTF, HTML, XML and JSON."""
+JUDGED_LINES = 1000
+"""Lines of a text that are judged for whether they hold times."""
+NUMBERED = re.compile(r"[-+.]?\d|nan\b|[-+]?inf\b")
+TIME = re.compile(r"(?<![\w.])(?:\d*\.\d+|\d{5,})(?![\w.])")
+"""Seconds with decimals, or a number that counts parts of a second."""
 NAMED_TIERS = 12
 """Most names in a message."""
 
@@ -325,6 +336,60 @@ def _words_of(phones: LabelTier, tiers: list[LabelTier]) -> tuple[TimedLabel, ..
     return words if all(len(label.text.split()) < 2 for label in words) else ()
 
 
+def check_plain_text(text: str, where: str) -> None:
+    """Raise InputError unless a text is words alone: times and marks of labels and subtitles would be read as words.
+
+    where : the file's name, for messages
+    """
+    if is_textgrid(text) or line_tiers(text, where) is not None:
+        raise InputError(f"{where}: holds labels in time, required the words alone; write them into a text file")
+    _check_no_labels(text, where)
+
+
+def _check_no_labels(text: str, where: str) -> None:
+    """Raise InputError for labels, subtitles and documents in forms that are not read."""
+    start = text[:200].lstrip()
+    if "\0" in text:
+        raise InputError(f"{where}: holds NUL characters: is it UTF-16 without its mark? save it as UTF-8 text")
+    if start.startswith(MASTER):
+        raise InputError(f"{where}: is a master label file of many recordings; write a .lab beside each")
+    if MARKUP.match(start):
+        raise InputError(f"{where}: begins with {shortened(start[:20])!r}, required the words alone; save it as text")
+    if is_subtitles(text):
+        raise InputError(f"{where}: is a file of subtitles, required the words alone; write them into a text file")
+    found = NO_ARROW.search(text)
+    if found:
+        raise InputError(
+            f"{where}: has the line {shortened(found[0].strip())!r}, two times as in subtitles; required: times as in "
+            "00:00:01,000 --> 00:00:02,500, or the words alone"
+        )
+    if _seems_timed(text):
+        raise InputError(
+            f"{where}: its lines hold times, but not as in a TextGrid, HTK's or Audacity's labels; save it in one of "
+            "these forms, or give the words alone"
+        )
+
+
+def _seems_timed(text: str) -> bool:
+    """Return whether most of the first lines begin with a number and some with a time, or half hold two times."""
+    lines = numbered = timed = with_two = 0
+    for line in islice(_body(text), JUDGED_LINES):
+        lines += 1
+        numbered += NUMBERED.match(line) is not None
+        times = sum(1 for _, _ in zip(TIME.finditer(line), "12", strict=False))
+        timed += TIME.match(line) is not None
+        with_two += times > 1
+    return lines > 1 and ((2 * numbered > lines and timed > 0) or 2 * with_two >= lines)
+
+
+def _body(text: str) -> Iterator[str]:
+    """Yield the lines that are not blank; of a file with a header, as of ESPS, those after the header."""
+    header = re.search(r"^#$", text[:2000], re.MULTILINE)
+    for line in StringIO(text[header.end() if header else 0 :]):
+        if line.strip():
+            yield line.strip()
+
+
 def _check_plain(text: str, path: Path) -> None:
     """Raise InputError for a text that is no plain text, or more than a transcript has."""
     if len(text) > LARGEST_TRANSCRIPT_BYTES:
@@ -333,7 +398,7 @@ def _check_plain(text: str, path: Path) -> None:
         )
     if is_json(text):
         raise InputError(f"{path}: {described(text, str(path))}")
-    check_no_labels(without_known_tags(text), str(path))
+    _check_no_labels(without_known_tags(text), str(path))
 
 
 def _text(path: Path, kind: str = "label") -> str:

@@ -195,7 +195,8 @@ def service_tiers(text: str, where: str) -> list[LabelTier] | None:
         missed = [word for _, item in objects for word in item.get("words") or () if word.get("case") == MISSED]
         if missed:
             LOG.warning("%s: %d words were not found in the sound and are left out", where, len(missed))
-        heard_nothing = not rows and all(_heard_nothing(item) for _, item in objects)
+        lists = [item[name] for _, item in objects for name in (*LINE_LISTS, *WORD_LISTS) if name in item]
+        heard_nothing = bool(lists) and not any(lists)
         is_text = bool(rows) and all(item.keys() <= TEXT_ALONE for _, item in objects)
         tiers = _tiers(rows, where) if timed or is_text else [] if heard_nothing else None
     elif tiers is not None and not any(tier.labels for tier in tiers):
@@ -440,12 +441,6 @@ def _per_s(rows: Sequence[Row], role: str, where: str) -> int:
     return unit_of_times(spans, role, where, judged[0].times.usual) if judged else 1
 
 
-def _heard_nothing(item: dict[str, Any]) -> bool:
-    """Return whether an object is of a recogniser that heard nothing: its lists are empty."""
-    members = [item[name] for name in (*LINE_LISTS, *WORD_LISTS) if isinstance(item.get(name), list)]
-    return bool(members) and not any(members)
-
-
 def _seconds(value: Any, where: str, per_s: float = 1) -> float:
     """Return a time in seconds. Raises InputError: it is missing, or no number."""
     time, own = _number(value, where)
@@ -483,22 +478,20 @@ def _viseme(value: Any, where: str) -> str:
 
 def _column_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
     """Return words and phones of parallel lists: of ElevenLabs' characters, of Cartesia's messages."""
-    found: list[tuple[str, str, list[TimedLabel]]] = []
+    found: dict[str, list[TimedLabel]] = defaultdict(list)
+    pieces = 0
     for place, item in objects:
-        owners = [(name, item[name]) for name in COLUMN_OWNERS if isinstance(item.get(name), dict)]
-        for name, owner in [*owners, ("", item)] if not owners or owners[0][0].endswith("s") else owners[:1]:
+        owners = {name: item[name] for name in COLUMN_OWNERS if isinstance(item.get(name), dict)}
+        owners.pop("alignment" if "normalizedalignment" in owners else "", None)
+        for name, owner in (owners or {"lists": item}).items():
             for role, names, per_s in COLUMNS:
-                if isinstance(owner.get(names[0]), list) and names[1] in owner and names[2] in owner:
-                    labels = _columns(owner, names, per_s, f"{where}: {place}{f', {name}' if name else ''}")
-                    found.append((role, names[1], labels))
-    if not found:
-        return None
-    pieces = sum(start == "charstarttimesms" for _, start, _ in found)
+                if isinstance(owner.get(names[0]), list) and owner.keys() >= {*names}:
+                    found[role] += _columns(owner, names, per_s, f"{where}: {place}, {name}")
+                    pieces += per_s != 1
     if pieces > 1:
         raise InputError(f"{where}: holds {pieces} pieces whose times each begin at 0; save the sound of each apart")
-    by_role = {role: [label for kind, _, labels in found if kind == role for label in labels] for role, *_ in COLUMNS}
-    words = [*by_role[WORDS], *_words_of_characters(by_role["characters"])]
-    return _word_and_phone_tiers(words, ipa_labels(by_role[PHONE_LABELS], where), where)
+    words = found[WORDS] + _words_of_characters(found["characters"])
+    return _word_and_phone_tiers(words, ipa_labels(found[PHONE_LABELS], where), where) if any(found.values()) else None
 
 
 def _columns(owner: dict[str, Any], names: tuple[str, ...], per_s: int, where: str) -> list[TimedLabel]:

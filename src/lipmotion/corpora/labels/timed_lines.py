@@ -42,7 +42,6 @@ COMMENT = (";;", "#")
 LRS_TEXT = re.compile(r"\s*Text:[ \t]+(\S.*)")
 """The first line of a text of LRS: what is said."""
 LRS_WORDS = re.compile(r"^WORD[ \t]+START[ \t]+END\b.*$", re.MULTILINE)
-LRS_WORD = re.compile(rf"(\S+)\s+({NUMBER})\s+({NUMBER})(?:\s.*)?")
 COLUMNS = {
     "start": {"begin", "start", "starttime", "starts", "tmin", "onset"},
     "end": {"end", "endtime", "ends", "stop", "tmax", "offset"},
@@ -70,7 +69,7 @@ def line_tiers(text: str, where: str) -> list[LabelTier] | None:
         raise InputError(f"{where}: is RTTM, which says who speaks and no words; give a transcript or labels")
     columns = _header(first)
     if columns or LRS_TEXT.match(text):
-        return _table(text, columns, where) if columns else [_lrs(text, where)]
+        return _table(text, columns, where) if columns else _lrs(text, where)
     whole, starts = WHOLE.fullmatch(first), STARTS.fullmatch(first)
     if SECONDS.fullmatch(first):
         return [_spans(text, SECONDS, where)]
@@ -170,27 +169,14 @@ def _nist(text: str, form: re.Pattern[str], where: str) -> list[LabelTier]:
     ]
 
 
-def _lrs(text: str, where: str) -> LabelTier:
-    """Return the words of a text of LRS: with times where it has a table ``WORD START END`` of seconds.
-
-    Raises InputError: a line of the table of another form, or with a time that is none (with its number).
-    """
+def _lrs(text: str, where: str) -> list[LabelTier]:
+    """Return the words of a text of LRS: with times where it has a table ``WORD START END`` of seconds."""
     heading, said = LRS_WORDS.search(text), LRS_TEXT.match(text)
     if heading is None:
-        return LabelTier("Text", (TimedLabel(math.nan, math.nan, said[1] if said else "", "line 1"),), LINES)
-    labels: list[TimedLabel] = []
-    for number, row in enumerate(
-        StringIO(text[heading.end() :].lstrip("\r\n")), text.count("\n", 0, heading.end()) + 2
-    ):
-        if not row.strip():
-            break
-        check_count(len(labels), where)
-        found = LRS_WORD.fullmatch(row.strip())
-        if found is None:
-            raise InputError(f"{where}: line {number} is {shortened(row.strip())!r}; required: word start end")
-        start_s, end_s = (required_time(time, f"line {number}", where) for time in found.group(2, 3))
-        labels.append(TimedLabel(start_s, end_s, found[1], f"line {number}"))
-    return LabelTier("WORD", tuple(labels), WORDS)
+        return [LabelTier("Text", (TimedLabel(math.nan, math.nan, said[1] if said else "", "line 1"),), LINES)]
+    rows = re.split(r"\n\s*\n", text[heading.start() :], maxsplit=1)[0]
+    padded = "\n" * text.count("\n", 0, heading.start()) + re.sub(r"[ \t]+", "\t", rows)
+    return _table(padded, _header("WORD\tSTART\tEND"), where)
 
 
 def _header(line: str) -> dict[str, int]:

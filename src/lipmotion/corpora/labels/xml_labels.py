@@ -15,7 +15,6 @@ ROOT = re.compile(r"\s*(?:<\?xml[^>]{0,200}\?>\s*)?(?:<!--.{0,2000}?-->\s*)*<(?:
 READ_ROOTS = ("ANNOTATION_DOCUMENT", "tt", "transcript", "timedtext")
 CLOCK_TIME = re.compile(r"(\d+):(\d{2}):(\d{2}(?:\.\d+)?)(?::(\d+(?:\.\d+)?))?")
 OFFSET_TIME = re.compile(r"(\d+(?:\.\d+)?)(h|ms|m|s|f|t)?")
-MS_PER_S = 1000
 NEAR_S = 0.01
 
 
@@ -46,7 +45,7 @@ def xml_tiers(text: str, where: str) -> list[LabelTier]:
 def _elan_tiers(root: Element, where: str) -> list[LabelTier]:
     """Return the tiers of ELAN; annotations that divide another without times are one label with its time."""
     slots_s = {each.get("TIME_SLOT_ID"): each.get("TIME_VALUE") for each in root.iter("TIME_SLOT")}
-    times_s = {name: _number(value, where) / MS_PER_S if value else math.nan for name, value in slots_s.items()}
+    times_s = {name: _seconds(f"{value}ms", {}, where) if value else math.nan for name, value in slots_s.items()}
     spans_s: dict[str | None, tuple[float, float]] = {}
     owners: dict[str | None, str | None] = {}
     for each in root.iter("ALIGNABLE_ANNOTATION"):
@@ -138,12 +137,4 @@ def _seconds(value: str, per_s: dict[str, float], where: str) -> float:
         return seconds + float(clock[4] or 0) / per_s["f"]
     if offset is None:
         raise InputError(f"{where}: a time is {shortened(value)!r}, required as in 00:00:01.500, 1.5s or 36f")
-    factors = {"h": 3600, "m": 60, "ms": 1 / MS_PER_S, "f": 1 / per_s["f"], "t": 1 / per_s["t"]}
-    return float(offset[1]) * factors.get(offset[2] or "s", 1)
-
-
-def _number(value: str, where: str) -> float:
-    try:
-        return float(value)
-    except ValueError as error:
-        raise InputError(f"{where}: a time is {shortened(value)!r}, required milliseconds") from error
+    return float(offset[1]) / {"h": 1 / 3600, "m": 1 / 60, "ms": 1000, **per_s}.get(offset[2] or "s", 1)
