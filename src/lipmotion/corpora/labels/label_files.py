@@ -244,14 +244,17 @@ def _labels(tiers: list[LabelTier], where: str) -> RecordingLabels:
 
 def _timed_tiers(text: str, where: str) -> list[LabelTier] | None:
     """Return the tiers of a text whose form has times, in the phones of the inventory; None of any other text."""
-    if is_textgrid(text):
-        tiers: list[LabelTier] | None = in_seconds(parse_interval_tiers(text, where), where)
-    elif is_timed_xml(text):
-        tiers = xml_tiers(text, where)
-    elif is_subtitles(text):
-        tiers = [subtitle_tier(text, where)]
-    else:
-        tiers = service_tiers(text, where) if is_json(text) else line_tiers(text, where)
+    try:
+        if is_textgrid(text):
+            tiers: list[LabelTier] | None = in_seconds(parse_interval_tiers(text, where), where)
+        elif is_timed_xml(text):
+            tiers = xml_tiers(text, where)
+        elif is_subtitles(text):
+            tiers = [subtitle_tier(text, where)]
+        else:
+            tiers = service_tiers(text, where) if is_json(text) else line_tiers(text, where)
+    except RecursionError as error:
+        raise InputError(f"{where}: is nested too deeply; give the words in time alone") from error
     return None if tiers is None else [in_inventory(tier, where) for tier in tiers]
 
 

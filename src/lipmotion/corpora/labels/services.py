@@ -192,13 +192,14 @@ def service_tiers(text: str, where: str) -> list[LabelTier] | None:
     if tiers is None and len(objects) == len(numbered):
         rows = [row for place, item in objects for row in _rows(item, place if len(objects) > 1 else "", where)]
         timed = any(row.parts or not math.isnan(row.start) or row.times.end for row in rows)
-        missed = [word for _, item in objects for word in item.get("words") or () if word.get("case") == MISSED]
+        lists_of_words = [item["words"] for _, item in objects if isinstance(item.get("words"), list)]
+        missed = sum(isinstance(word, dict) and word.get("case") == MISSED for each in lists_of_words for word in each)
         if missed:
-            LOG.warning("%s: %d words were not found in the sound and are left out", where, len(missed))
+            LOG.warning("%s: %d words were not found in the sound and are left out", where, missed)
         lists = [item[name] for _, item in objects for name in (*LINE_LISTS, *WORD_LISTS) if name in item]
-        heard_nothing = bool(lists) and not any(lists)
+        is_empty = bool(lists) and not any(lists)
         is_text = bool(rows) and all(item.keys() <= TEXT_ALONE for _, item in objects)
-        tiers = _tiers(rows, where) if timed or is_text else [] if heard_nothing else None
+        tiers = _tiers(rows, where) if timed or is_text else [] if is_empty else None
     elif tiers is not None and not any(tier.labels for tier in tiers):
         raise InputError(f"{where}: holds no word and no phone in time; ask the service for them")
     return tiers and [replace(t, labels=with_pauses(t.labels)) if t.role == PHONE_LABELS else t for t in tiers]

@@ -109,7 +109,7 @@ def _fitted(text: str, form: re.Pattern[str], wanted: str, where: str) -> Iterat
 def _are_spans(text: str) -> bool:
     """Return whether whole numbers before every label are times: they are in order, and last too long for seconds."""
     found = [WHOLE.fullmatch(line) for _, line in islice(_lines(text), 1000)]
-    spans = [(int(match[1]), int(match[2])) for match in found if match and len(match[2]) < 15]
+    spans = [(int(match[1]), int(match[2])) for match in found if match and len(match[1]) < 15 > len(match[2])]
     in_order = all(a <= b for a, b in spans) and spans == sorted(spans)
     return len(found) == len(spans) > 2 and in_order and median(end - start for start, end in spans) > 45
 

@@ -13,9 +13,9 @@ from lipmotion.errors import InputError, shortened
 
 ROOT = re.compile(r"\s*(?:<\?xml[^>]{0,200}\?>\s*)?(?:<!--.{0,2000}?-->\s*)*<(?:\w+:)?(\w+)", re.DOTALL)
 READ_ROOTS = ("ANNOTATION_DOCUMENT", "tt", "transcript", "timedtext")
-CLOCK_TIME = re.compile(r"(\d+):(\d{2}):(\d{2}(?:\.\d+)?)(?::(\d+(?:\.\d+)?))?")
+CLOCK_TIME = re.compile(r"(\d{1,6}):(\d{2}):(\d{2}(?:\.\d+)?)(?::(\d+(?:\.\d+)?))?")
 OFFSET_TIME = re.compile(r"(\d+(?:\.\d+)?)(h|ms|m|s|f|t)?")
-NEAR_S = 0.01
+NEAR_S, DEEPEST = 0.01, 20
 
 
 def is_timed_xml(text: str) -> bool:
@@ -59,7 +59,7 @@ def _elan_tiers(root: Element, where: str) -> list[LabelTier]:
         texts: dict[str | None, list[str]] = defaultdict(list)
         for each in (*tier.iter("ALIGNABLE_ANNOTATION"), *tier.iter("REF_ANNOTATION")):
             aligned = each.get("ANNOTATION_ID")
-            for _ in range(len(owners)):
+            for _ in range(DEEPEST):
                 aligned = owners.get(aligned, aligned) if aligned not in spans_s else aligned
             texts[aligned].append((each.findtext("ANNOTATION_VALUE") or "").strip())
         timed = [(spans_s.get(aligned, (math.nan, math.nan)), " ".join(parts)) for aligned, parts in texts.items()]
