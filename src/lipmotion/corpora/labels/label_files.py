@@ -271,12 +271,9 @@ def _chosen(tiers: list[LabelTier], where: str, tier: str = "", speaker: str = "
         )
     if tier:
         named = next((each for each in tiers if each.name.lower() == tier.lower()), None)
-        if named is None:
-            return (
-                _chosen(tiers, where, speaker=tier)
-                if any(each.speaker.lower() == tier.lower() for each in tiers)
-                else _refuse("tier", tier, [each.name for each in tiers], where)
-            )
+        if named is None and any(each.speaker.lower() == tier.lower() for each in tiers):
+            return _chosen(tiers, where, speaker=tier)
+        named = named or _refuse("tier", tier, [each.name for each in tiers], where)[0]
         if not named.role or named.role == OTHER:
             named = replace(named, role=PHONE_LABELS if holds_phones(replace(named, role="")) else LINES)
         same = (WORDS, LINES, "", OTHER) if named.role in (WORDS, LINES) else (PHONE_LABELS,)
@@ -313,12 +310,10 @@ def _transcript(tiers: list[LabelTier], where: str, tier: str = "", speaker: str
     if any(best):
         best.pop("", None)
     first = best.get("")
-    passed_over = [each.name for each in chosen if first and not first.role and each is not first and each.labels]
-    if passed_over:
-        names = ", ".join(map(repr, passed_over[:NAMED_TIERS]))
-        LOG.warning(
-            "%s: the words of tier %r are read; others are %s; --tier chooses", where, first and first.name, names
-        )
+    others = [each.name for each in chosen if first and not first.role and each is not first and each.labels]
+    if first and others:
+        names = ", ".join(map(repr, others[:NAMED_TIERS]))
+        LOG.warning("%s: the words of tier %r are read; others are %s; --tier chooses", where, first.name, names)
     _name_speakers(list(best.values()), where)
     transcript = tier_transcript(list(best.values()), where)
     return transcript if transcript.lines else None

@@ -158,19 +158,13 @@ def in_seconds(tiers: list[LabelTier], where: str) -> list[LabelTier]:
     spans = [(label.start_s, label.end_s, label.text) for label in judged.labels] if judged else []
     role = PHONE_LABELS if judged and holds_phones(judged) else WORDS
     per_s = unit_of_times(spans, role, where)
-    return (
-        [
-            replace(
-                tier,
-                labels=tuple(
-                    replace(label, start_s=label.start_s / per_s, end_s=label.end_s / per_s) for label in tier.labels
-                ),
-            )
-            for tier in tiers
-        ]
-        if per_s != 1
-        else tiers
-    )
+    return [scaled_tier(tier, per_s) for tier in tiers]
+
+
+def scaled_tier(tier: LabelTier, per_s: float) -> LabelTier:
+    """Return a tier in seconds, of whose units of time so many are a second."""
+    labels = (replace(label, start_s=label.start_s / per_s, end_s=label.end_s / per_s) for label in tier.labels)
+    return replace(tier, labels=tuple(labels))
 
 
 def holds_phones(tier: LabelTier) -> bool:

@@ -7,6 +7,7 @@ import math
 import re
 from collections import defaultdict
 from collections.abc import Iterator
+from dataclasses import replace
 from io import StringIO
 from itertools import islice
 from pathlib import Path
@@ -15,6 +16,7 @@ from statistics import median
 from lipmotion.corpora.labels.tier import (
     LINES,
     MOST_LABELS,
+    PHONE_LABELS,
     TICKS_PER_S,
     WORDS,
     LabelTier,
@@ -24,6 +26,7 @@ from lipmotion.corpora.labels.tier import (
     named_tier,
     phone_of,
     required_time,
+    scaled_tier,
 )
 from lipmotion.errors import InputError, shortened
 
@@ -121,18 +124,16 @@ def _spans(text: str, form: re.Pattern[str], where: str) -> LabelTier:
         place = f"line {number}"
         start_s, end_s = (required_time(time, place, where) for time in (start, end))
         labels.append(TimedLabel(start_s, end_s, words[0].strip() if words else "", place))
+    tier = LabelTier("labels", tuple(labels))
     if form is SECONDS:
-        return LabelTier("labels", tuple(labels))
+        return tier
     lengths = [label.end_s - label.start_s for label in labels if label.end_s > label.start_s]
     is_timit = Path(where).suffix.lower() in TIMIT_SUFFIXES or any(label.text == TIMIT_SILENCE for label in labels)
     short = bool(lengths) and median(lengths) < LONGEST_SAMPLES and labels[-1].end_s < LAST_SAMPLE
-    per_s = TIMIT_HZ if is_timit and short else 1 if short else TICKS_PER_S
-    scaled = (TimedLabel(label.start_s / per_s, label.end_s / per_s, label.text, label.position) for label in labels)
-    tier = LabelTier("labels", tuple(scaled))
-    if per_s != 1:
-        return tier
-    role = "phones" if all(phone_of(label.text) for label in labels) else WORDS
-    return in_seconds([LabelTier("labels", tier.labels, role)], where)[0]
+    if is_timit or not short:
+        return scaled_tier(tier, TIMIT_HZ if short else TICKS_PER_S)
+    role = PHONE_LABELS if all(phone_of(label.text) for label in labels) else WORDS
+    return in_seconds([replace(tier, role=role)], where)[0]
 
 
 def _from_starts(text: str, where: str) -> LabelTier:
