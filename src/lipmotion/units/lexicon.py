@@ -12,7 +12,7 @@ from pathlib import Path
 
 from lipmotion.errors import InputError, MissingDependencyError, shortened
 from lipmotion.storage.files import read_text_file
-from lipmotion.units.phones import PAUSE, PHONES, REDUCED_VOWELS, is_silent
+from lipmotion.units.phones import OTHER_NAMES, PAUSE, PHONES, REDUCED_VOWELS, is_silent
 from lipmotion.units.spelling import guess_pronunciation, normalised_text, without_accents
 from lipmotion.units.spelling_network import network_pronunciation
 from lipmotion.units.written_forms import readings
@@ -42,9 +42,13 @@ six."""
 
 @lru_cache(maxsize=4096)
 def phone_named(label: str) -> str | None:
-    """Return the phone that a label names, or None: ARPAbet in either case, stressed or not, or our own name."""
-    name = re.sub(r"\d$", "", label.lower())
-    name = REDUCED_VOWELS.get(name, name) if label.endswith("0") else name
+    """Return the phone that a label names, or None.
+
+    A label is ARPAbet in either case, stressed or not, TIMIT's, with its place in the word as in Kaldi (``hh_B``), or
+    our own name.
+    """
+    name = re.sub(r"\d?(_[bies])?$", "", label.lower())
+    name = REDUCED_VOWELS.get(name, name) if label[len(name) :].startswith("0") else OTHER_NAMES.get(name, name)
     return name if name in PHONES else None
 
 
