@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.storage.files import read_text_file, whole_file
+from lipmotion.storage.text_table import read_table
 from lipmotion.types import Channel, Motion
 
 COLUMNS = ("control", "source", "gain", "offset", "low", "high")
@@ -47,19 +48,20 @@ def read_rig_table(path: Path) -> tuple[RigRow, ...]:
 
     Raises InputError: no such file, other columns, no rows, or a row that is damaged.
     """
-    reader = csv.DictReader(io.StringIO(read_text_file(path, "rig table", LARGEST_TABLE_BYTES)))
     try:
-        found = [name.strip() for name in reader.fieldnames or ()]
-        reader.fieldnames = found
-        table = [(reader.line_num, fields) for fields in reader]
-    except csv.Error as error:
+        table = read_table(io.StringIO(read_text_file(path, "rig table", LARGEST_TABLE_BYTES), newline=""))
+        lines = list(table.rows)
+    except ValueError as error:
+        if isinstance(error, InputError):
+            raise
         raise InputError(f"{path}: no table ({shortened(str(error))}); required {','.join(COLUMNS)}") from error
+    found = table.names
     if found[:2] != list(COLUMNS[:2]) or not set(found) <= set(COLUMNS):
         raise InputError(f"{path}: the columns are {shortened(','.join(found))!r}, required {','.join(COLUMNS)}")
     rows = []
-    for line, fields in table:
-        texts = {name: (fields.get(name) or "").strip() for name in COLUMNS}
-        if texts["control"].startswith("#") or not any(texts.values()):
+    for line, fields in lines:
+        texts = dict.fromkeys(COLUMNS, "") | dict(zip(found, map(str.strip, fields), strict=False))
+        if texts["control"].startswith("#"):
             continue
         try:
             rows.append(_row(texts))
@@ -124,7 +126,7 @@ def _row(texts: Mapping[str, str]) -> RigRow:
 def _number(text: str, default: float) -> float:
     if not text:
         return default
-    value = float(text)
+    value = float(text.replace(",", "."))
     if not abs(value) <= LARGEST_NUMBER:
         raise ValueError(f"the number {text}, required at most {LARGEST_NUMBER:g}")
     return value
