@@ -13,8 +13,7 @@ import pytest
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export import read_motion, write_motion
-from lipmotion.export.motion.c3d_file import BLOCK, C3dFile, read_c3d
-from lipmotion.export.motion.c3d_writing import write_c3d
+from lipmotion.export.motion.c3d_file import BLOCK, C3dFile, read_c3d, write_c3d
 from lipmotion.export.motion.marker_frame import MILLIMETRES, in_head_frame
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
 

@@ -20,8 +20,7 @@ from lipmotion.export.base import write_motion
 from lipmotion.export.cues.base import CUE_FORMATS
 from lipmotion.export.cues.cue_motion import PARSERS
 from lipmotion.export.cues.sheet import CueSheet
-from lipmotion.export.motion.c3d_file import C3dFile
-from lipmotion.export.motion.c3d_writing import write_c3d
+from lipmotion.export.motion.c3d_file import C3dFile, write_c3d
 from lipmotion.pipeline.corpus.supplied_motion import supplied_track
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline
 from lipmotion.units.mouth_chart import SHAPES
