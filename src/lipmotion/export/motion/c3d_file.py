@@ -100,8 +100,8 @@ def _parsed(content: bytes) -> C3dFile:
         raise InputError(f"its processor type is {processor}, required 84 (Intel), 85 or 86; export the capture so")
     numbers = _Numbers(processor)
     found = _parameters(content, start + 4, numbers)
-    words = numbers.read(content, "u2", 11).astype(int).tolist()
-    points, analog, first, last, block, samples = *words[1:5], *words[8:10]
+    words: list[int] = numbers.read(content, "u2", 10).astype(int).tolist()
+    _, points, analog, first, last, _, _, _, block, samples = words
     rate_hz = _number(found, "POINT.RATE", numbers.read(content, "f4", 1, 20)[0])
     scale = _number(found, "POINT.SCALE", numbers.read(content, "f4", 1, 12)[0])
     if not (0 <= points <= MOST_POINTS and 0 <= analog <= MOST_ANALOG_CHANNELS and points + analog > 0):

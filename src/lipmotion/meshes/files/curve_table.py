@@ -239,7 +239,7 @@ def motion_at_times(
     """
     ordered = _in_order(time_s)
     time_s, values = time_s[ordered], values[ordered]
-    measured = np.isfinite(values).any(axis=0)
+    measured: NDArray[np.bool_] = np.asarray(np.isfinite(values).any(axis=0))
     if not measured.any():
         raise InputError("0 rows with values, required two or more")
     if not measured.all():
@@ -250,7 +250,7 @@ def motion_at_times(
     channels = [_channel(name, unit) for name in names]
     kept = strongest_columns([channel.name for channel in channels], values)
     values, channels = values[:, kept], [channels[column] for column in kept]
-    seen = np.isfinite(values).all(axis=1)
+    seen: NDArray[np.bool_] = np.asarray(np.isfinite(values).all(axis=1))
     if not seen.all():
         if not seen.any():
             raise InputError("0 rows with values of all curves, required two or more")
