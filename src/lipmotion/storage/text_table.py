@@ -48,7 +48,7 @@ def read_table(lines: Iterable[str]) -> TextTable:
     lines = iter(lines)
     above, head, separator = 0, "", ""
     for head in lines:
-        stated = re.match(r'"?sep=(.)', head)
+        stated = re.match(r'"?sep=([,;\t|])', head)
         separator = stated[1] if stated else separator
         if not (stated or head.startswith("#") or not head.strip(SEPARATORS + '" \r\n')):
             break

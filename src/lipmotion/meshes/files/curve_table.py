@@ -110,7 +110,7 @@ def read_curve_table(path: Path) -> tuple[Motion, NDArray[np.bool_]]:
     try:
         with open_table(path) as table:
             return _read(table)
-    except ValueError as error:
+    except (ValueError, OverflowError) as error:
         if isinstance(error, InputError):
             raise
         raise InputError(f"not a table of numbers under a header ({error}); export it again") from error
@@ -152,7 +152,7 @@ def _rows(
             fields.pop()
         times.append((line, fields[timed].strip() if timed < len(fields) else ""))
         found = [fields[column] for column in used if column < len(fields)]
-        if not any(map(str.strip, found)) or (counted is not None and fields[counted].strip() == "0"):
+        if not any(map(str.strip, found)) or (counted is not None and fields[counted : counted + 1] in (["0"], [" 0"])):
             continue
         if len(fields) != columns:
             curves = len(fields) - columns + len(used)
