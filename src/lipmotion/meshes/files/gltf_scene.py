@@ -231,4 +231,5 @@ def target_names(document: GltfDocument, mesh: Mapping[str, Any], primitive: Map
 def mesh_target_names(document: GltfDocument, mesh: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the names of the morph targets of a mesh; some of its primitives may have none."""
     named = [target_names(document, mesh, primitive) for primitive in mesh.get("primitives", [])]
-    return tuple(max(named, key=len)) if named else ()
+    longest = max(named, key=len, default=[])
+    return tuple(longest)
