@@ -17,7 +17,7 @@ from pathlib import Path
 
 LONGEST_LINE = 1 << 20
 """Most characters of a line."""
-SEPARATORS = ",;\t|"
+SEPARATORS = ",;\t"
 MISSING = frozenset(("", "nan", "na", "n/a", "none", "null", "-", "-nan", "nan(ind)", "-nan(ind)"))
 """Fields that hold no number, in lower case."""
 
@@ -28,6 +28,14 @@ class TextTable:
 
     names: list[str]
     rows: Iterator[tuple[int, list[str]]]
+
+    @property
+    def plain_names(self) -> list[str]:
+        """The names without blanks around them, and without empty ones at the end."""
+        names = [name.strip() for name in self.names]
+        while len(names) > 1 and not names[-1]:
+            names.pop()
+        return names
 
 
 @contextmanager
@@ -48,18 +56,14 @@ def read_table(lines: Iterable[str]) -> TextTable:
     lines = iter(lines)
     above, head, separator = 0, "", ""
     for head in lines:
-        stated = re.match(r'"?sep=([,;\t|])', head)
+        stated = re.match(r'"?sep=([,;\t])', head)
         separator = stated[1] if stated else separator
         if not (stated or head.startswith("#") or not head.strip(SEPARATORS + '" \r\n')):
             break
         above += 1
     bare = re.sub(r'"[^"]*"', "", head)
     rows = _rows(csv.reader(chain([head], lines), delimiter=separator or max(SEPARATORS, key=bare.count)), above)
-    _, names = next(rows, (0, [""]))
-    names = [name.strip() for name in names]
-    while len(names) > 1 and not names[-1]:
-        names.pop()
-    return TextTable(names, rows)
+    return TextTable(next(rows, (0, [""]))[1], rows)
 
 
 def _rows(reader: Iterator[list[str]], above: int) -> Iterator[tuple[int, list[str]]]:

@@ -160,8 +160,8 @@ def _rows(path: Path, columns: tuple[str, ...], kind: str) -> Iterator[tuple[int
         if isinstance(error, InputError):
             raise
         raise InputError(f"{path}: no table ({shortened(str(error))}); required {','.join(columns)}") from error
-    if table.names != list(columns):
-        found = shortened(",".join(table.names))
+    if table.plain_names != list(columns):
+        found = shortened(",".join(table.plain_names))
         raise InputError(f"{path}: the columns are {found!r}, required {','.join(columns)}")
     for line, row in rows:
         if not row[0].startswith("#"):

@@ -66,7 +66,7 @@ def read_rig_table(path: Path) -> tuple[RigRow, ...]:
         if isinstance(error, InputError):
             raise
         raise InputError(f"{path}: no table ({shortened(str(error))}); required {','.join(COLUMNS)}") from error
-    found = table.names
+    found = table.plain_names
     if found[:2] != list(COLUMNS[:2]) or not set(found) <= set(COLUMNS):
         raise InputError(f"{path}: the columns are {shortened(','.join(found))!r}, required {','.join(COLUMNS)}")
     rows = []
