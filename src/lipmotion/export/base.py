@@ -198,8 +198,10 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
         if size > LARGEST_MOTION_BYTES:
             raise InputError(f"{size} bytes, required at most {LARGEST_MOTION_BYTES}: is it a motion file?")
         motion, units = read(path)
-        if not np.isfinite(motion.values).all():
-            raise InputError("there are values that are not finite; interpolate them first")
+        if not (finite := np.isfinite(motion.values)).all():
+            frame, column = np.argwhere(~finite)[0].tolist()
+            first = f"the first is {motion.names[column]!r} in frame {frame}"
+            raise InputError(f"{(~finite).sum()} values that are not finite, {first}; interpolate them first")
         _check_weights(path, motion)
         return motion, units
     except OSError as error:

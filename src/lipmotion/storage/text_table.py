@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -17,7 +17,7 @@ from pathlib import Path
 
 LONGEST_LINE = 1 << 20
 """Most characters of a line."""
-SEPARATORS = ",;\t|"
+SEPARATORS = ",;\t"
 MISSING = frozenset(("", "nan", "na", "n/a", "none", "null", "-", "-nan", "nan(ind)", "-nan(ind)"))
 """Fields that hold no number, in lower case."""
 
@@ -28,6 +28,14 @@ class TextTable:
 
     names: list[str]
     rows: Iterator[tuple[int, list[str]]]
+
+    @property
+    def plain_names(self) -> list[str]:
+        """The names without blanks around them, and without empty ones at the end."""
+        names = [name.strip() for name in self.names]
+        while len(names) > 1 and not names[-1]:
+            names.pop()
+        return names
 
 
 @contextmanager
@@ -40,22 +48,22 @@ def open_table(path: Path) -> Iterator[TextTable]:
         start = file.read(2)
     encoding = "utf-16" if start in {b"\xff\xfe", b"\xfe\xff"} else "utf-16-le" if start[1:] == b"\0" else "utf-8-sig"
     with path.open(encoding=encoding, newline="") as text:
-        lines = iter(partial(text.readline, LONGEST_LINE), "")
-        above, head, separator = 0, "", ""
-        for head in lines:
-            stated = re.match(r'"?sep=(.)', head)
-            separator = stated[1] if stated else separator
-            if not (stated or head.startswith("#") or not head.strip(SEPARATORS + '" \r\n')):
-                break
-            above += 1
-        bare = re.sub(r'"[^"]*"', "", head)
-        reader = csv.reader(chain([head], lines), delimiter=separator or max(SEPARATORS, key=bare.count))
-        rows = _rows(reader, above)
-        _, names = next(rows, (0, [""]))
-        names = [name.strip() for name in names]
-        while len(names) > 1 and not names[-1]:
-            names.pop()
-        yield TextTable(names, rows)
+        yield read_table(iter(partial(text.readline, LONGEST_LINE), ""))
+
+
+def read_table(lines: Iterable[str]) -> TextTable:
+    """Return the table in some lines, with their ends. Raises ValueError, also from the rows: it is none."""
+    lines = iter(lines)
+    above, head, separator = 0, "", ""
+    for head in lines:
+        stated = re.match(r'"?sep=([,;\t])', head)
+        separator = stated[1] if stated else separator
+        if not (stated or head.startswith("#") or not head.strip(SEPARATORS + '" \r\n')):
+            break
+        above += 1
+    bare = re.sub(r'"[^"]*"', "", head)
+    rows = _rows(csv.reader(chain([head], lines), delimiter=separator or max(SEPARATORS, key=bare.count)), above)
+    return TextTable(next(rows, (0, [""]))[1], rows)
 
 
 def _rows(reader: Iterator[list[str]], above: int) -> Iterator[tuple[int, list[str]]]:

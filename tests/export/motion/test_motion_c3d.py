@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 import tempfile
 import warnings
@@ -13,8 +14,7 @@ import pytest
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export import read_motion, write_motion
-from lipmotion.export.motion.c3d_file import BLOCK, C3dFile, read_c3d
-from lipmotion.export.motion.c3d_writing import write_c3d
+from lipmotion.export.motion.c3d_file import BLOCK, C3dFile, read_c3d, write_c3d
 from lipmotion.export.motion.marker_frame import MILLIMETRES, in_head_frame
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
 
@@ -302,7 +302,7 @@ def test_files_of_other_processors(tmp_path, processor):
         (step,) = struct.unpack_from("<h", content, body)
         kind, sizes = struct.unpack_from("bB", content, body + 2)
         if content[at + 1] < 128 and kind in {2, 4}:
-            count = int(np.prod(content[body + 4 : body + 4 + sizes])) if sizes else 1
+            count = math.prod(content[body + 4 : body + 4 + sizes])
             for number in range(count):
                 turned_number(body + 4 + sizes + number * kind, "h" if kind == 2 else "f")
         turned_number(body, "h")

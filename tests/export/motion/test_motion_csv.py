@@ -40,7 +40,7 @@ WRONG = [
     ("time_s,opening\n0,1\n0.1,1\n0.3,1\n", "even steps"),
     ("time_s,opening\n0,1\n0,1\n", "even steps"),
     ("time_s,opening\n0,1\ninf,1\n", "values that are no times, required seconds up to"),
-    ("time_s,opening\n0,1\n1,nan\n", "not finite; interpolate them first"),
+    ("time_s,opening\n0,1\n1,nan\n", "1 values that are not finite, the first is 'opening' in frame 1"),
     ("time_s,opening,opening\n0,1,1\n0.1,1,1\n", "names repeat"),
     ("time_s,jawOpen\n0,0\n0.1,55\n", "jawOpen goes up to 55, required 0 to 1; divide percent by 100"),
     *(

@@ -1,7 +1,7 @@
 """The binary format C3D of motion capture: labelled points, and curves beside them as analog channels.
 
 Source: The C3D File Format, A Technical User Guide (Motion Lab Systems); c3d.org, "The C3D frame count". Files of
-Intel's, DEC's and MIPS' processors are read, points as fractions or as scaled whole numbers; ``c3d_writing`` writes
+Intel's, DEC's and MIPS' processors are read, points as fractions or as scaled whole numbers; written are
 Intel's.
 """
 
@@ -100,8 +100,8 @@ def _parsed(content: bytes) -> C3dFile:
         raise InputError(f"its processor type is {processor}, required 84 (Intel), 85 or 86; export the capture so")
     numbers = _Numbers(processor)
     found = _parameters(content, start + 4, numbers)
-    words = numbers.read(content, "u2", 11).astype(int).tolist()
-    points, analog, first, last, block, samples = *words[1:5], *words[8:10]
+    words: list[int] = numbers.read(content, "u2", 10).astype(int).tolist()
+    _, points, analog, first, last, _, _, _, block, samples = words
     rate_hz = _number(found, "POINT.RATE", numbers.read(content, "f4", 1, 20)[0])
     scale = _number(found, "POINT.SCALE", numbers.read(content, "f4", 1, 12)[0])
     if not (0 <= points <= MOST_POINTS and 0 <= analog <= MOST_ANALOG_CHANNELS and points + analog > 0):
@@ -212,3 +212,77 @@ def _values(content: bytes, at: int, numbers: _Numbers) -> Values:
     if kind not in {1, 2, 4} or len(data) < count * kind:
         raise InputError(f"a parameter of type {kind} and sizes {sizes} does not fit; export the capture again")
     return numbers.read(data, {1: "u1", 2: "u2", 4: "f4"}[kind], count)
+
+
+def write_c3d(path: Path, content: C3dFile) -> None:
+    """Write a file; texts are ASCII, numbers have single precision.
+
+    More frames than the header can number stand in ``TRIAL`` as two whole numbers each, and in ``POINT:LONG_FRAMES``.
+    """
+    frames, points = content.points.shape[:2]
+    numbered = min(frames, MOST_FRAMES)
+    curves = len(content.analog_labels)
+    groups: dict[str, dict[str, int | float | Values]] = {
+        "POINT": {
+            "USED": points,
+            "SCALE": -1.0,
+            "RATE": content.rate_hz,
+            "DATA_START": 0,
+            "FRAMES": numbered,
+            "LABELS": list(content.labels),
+            "DESCRIPTIONS": ["" for _ in content.labels],
+            "UNITS": [content.unit],
+        },
+        "ANALOG": {
+            "USED": curves,
+            "LABELS": list(content.analog_labels),
+            "DESCRIPTIONS": ["" for _ in content.analog_labels],
+            "GEN_SCALE": 1.0,
+            "OFFSET": np.zeros(curves, np.int16),
+            "SCALE": np.ones(curves, np.float32),
+            "UNITS": list(content.analog_units),
+            "RATE": content.rate_hz,
+        },
+        "MANUFACTURER": {"SOFTWARE": [content.software]},
+    }
+    if frames > numbered:
+        groups["POINT"]["LONG_FRAMES"] = float(frames)
+        start, end = (np.array([number % OVERFLOW, number // OVERFLOW]) for number in (1, frames))
+        groups["TRIAL"] = {"ACTUAL_START_FIELD": start, "ACTUAL_END_FIELD": end}
+    blocks = -(-(4 + len(_section(groups))) // BLOCK)
+    groups["POINT"]["DATA_START"] = 2 + blocks
+    section = bytes([1, MARK, blocks, INTEL_PROCESSOR]) + _section(groups)
+    header = struct.pack("<BB5HfHHf", 2, MARK, points, curves, 1, numbered, 10, -1.0, 2 + blocks, 1, content.rate_hz)
+    seen = np.isfinite(content.points).all(axis=2)
+    data = np.zeros((frames, points * 4 + curves), "<f4")
+    placed = np.concatenate([content.points, np.where(seen, 0.0, -1.0)[..., None]], axis=2)
+    data[:, : points * 4] = np.nan_to_num(placed).reshape(frames, -1)
+    if curves:
+        data[:, points * 4 :] = content.analog
+    with path.open("wb") as file:
+        file.write(header.ljust(BLOCK, b"\0") + section.ljust(blocks * BLOCK, b"\0") + data.tobytes())
+        file.write(b"\0" * (-data.nbytes % BLOCK))
+
+
+def _section(groups: dict[str, dict[str, int | float | Values]]) -> bytes:
+    """Return groups and parameters as bytes."""
+    parts = []
+    for number, (group, parameters) in enumerate(groups.items(), 1):
+        parts.append(struct.pack("<bb", len(group), -number) + group.encode() + struct.pack("<hB", 3, 0))
+        for name, value in parameters.items():
+            body = _stored_parameter(value) + b"\0"
+            head = struct.pack("<bb", len(name), number) + name.encode()
+            parts.append(head + struct.pack("<h", 2 + len(body)) + body)
+    return b"".join(parts) + b"\0\0"
+
+
+def _stored_parameter(value: int | float | Values) -> bytes:
+    """Return type, sizes and values of a parameter as bytes."""
+    if isinstance(value, list):
+        width = max((len(text.encode("ascii", "replace")) for text in value), default=0)
+        texts = b"".join(text.encode("ascii", "replace").ljust(width) for text in value)
+        return struct.pack("<bBBB", -1, 2, width, len(value)) + texts
+    numbers = np.asarray(value)
+    kind = "<u2" if numbers.dtype.kind == "i" else "<f4"
+    sizes = bytes([numbers.ndim, *numbers.shape])
+    return struct.pack("<b", 2 if kind == "<u2" else 4) + sizes + numbers.astype(kind).tobytes()

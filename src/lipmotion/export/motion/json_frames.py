@@ -39,7 +39,7 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
     try:
         documents = list(_documents(path.read_text(encoding="utf-8-sig")))
         objects = [_keyed(each) for each in _objects(documents, DEEPEST)]
-        pieces = [each for each in objects if isinstance(each.get("blendshapes"), list) and "frameindex" in each]
+        pieces = [each for each in objects if "frameindex" in each and each.get("blendshapes")]
         return (_of_azure(pieces) if pieces else _of_frames(objects)), Timeline(())
     except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise InputError(f"not JSON ({error}); export it again") from error
@@ -87,8 +87,8 @@ def _of_azure(pieces: list[dict[str, Any]]) -> Motion:
             number = each["frameindex"]
             raise InputError(f"frame {number} has {table.shape[1]} weights, required {len(AZURE_NAMES)} as Azure's")
     starts = [int(each["frameindex"]) for each in pieces]
-    offsets = [each.get("audiooffset") for each in pieces]
-    if len(set(starts)) < len(starts) and None not in offsets:  # every event counts from 0: its place is its time
+    offsets = [each["audiooffset"] for each in pieces if each.get("audiooffset") is not None]
+    if len(set(starts)) < len(starts) == len(offsets):  # every event counts from 0: its place is its time
         starts = [round(offset / TICKS_PER_S * AZURE_HZ) for offset in offsets]
     count = max(start + len(table) for start, table in zip(starts, rows, strict=True))
     if min(starts) < 0 or count > MOST_FRAMES:

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from lipmotion.articulation.lip_points import CHIN, mouth_template
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import MotionFormat
-from lipmotion.export.motion.c3d_file import LONGEST_LABEL_CHARACTERS, C3dFile, read_c3d
-from lipmotion.export.motion.c3d_writing import write_c3d
+from lipmotion.export.motion.c3d_file import LONGEST_LABEL_CHARACTERS, C3dFile, read_c3d, write_c3d
 from lipmotion.export.motion.marker_frame import MARKER, MILLIMETRES, in_head_frame, motion_of_markers
 from lipmotion.types import EYE_DISTANCE, Channel, Generation, Motion, Timeline, Unit
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import logging
 import re
 from array import array
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
@@ -81,7 +81,7 @@ def is_live_link_file(path: Path) -> bool:
     """Return whether a file is such a table; a file that cannot be read is none."""
     try:
         with open_table(path) as table:
-            return is_live_link(table.names)
+            return is_live_link(table.plain_names)
     except (OSError, ValueError):
         return False
 
@@ -110,7 +110,7 @@ def read_curve_table(path: Path) -> tuple[Motion, NDArray[np.bool_]]:
     try:
         with open_table(path) as table:
             return _read(table)
-    except ValueError as error:
+    except (ValueError, OverflowError) as error:
         if isinstance(error, InputError):
             raise
         raise InputError(f"not a table of numbers under a header ({error}); export it again") from error
@@ -122,15 +122,16 @@ def column_key(name: str) -> str:
 
 
 def _read(table: TextTable) -> tuple[Motion, NDArray[np.bool_]]:
-    keys = list(map(column_key, table.names))
+    names = table.plain_names
+    keys = list(map(column_key, names))
     timed = next((column for column, key in enumerate(keys) if TIME_COLUMN.fullmatch(key)), None)
     used = [n for n, key in enumerate(keys) if n != timed and not NO_CURVES.fullmatch(key)]
     if timed is None or not 0 < len(used) <= MOST_CURVES:
         raise ValueError(
-            f"the first line is {shortened(','.join(table.names))!r}, required 'time_s,opening,...', or curves beside "
+            f"the first line is {shortened(','.join(names))!r}, required 'time_s,opening,...', or curves beside "
             "a column of times: Timecode,BlendshapeCount,JawOpen,... or timestamp_ms,jawOpen,..."
         )
-    times, names, values = _rows(table, timed, used, keys.index(COUNT) if COUNT in keys else None)
+    times, names, values = _rows(table.rows, names, timed, used, keys.index(COUNT) if COUNT in keys else None)
     coded = bool(re.search("[:;]", times[0][1]))
     if coded:
         time_s = _seconds([_timecode(text, line) for line, text in times])
@@ -140,33 +141,33 @@ def _read(table: TextTable) -> tuple[Motion, NDArray[np.bool_]]:
 
 
 def _rows(
-    table: TextTable, timed: int, used: list[int], counted: int | None
+    rows: Iterator[tuple[int, list[str]]], names: list[str], timed: int, used: list[int], counted: int | None
 ) -> tuple[list[tuple[int, str]], list[str], Array]:
     """Return the lines and times of the rows, and names and values of curves [shape=(N, P)]: NaN without a face."""
     times: list[tuple[int, str]] = []
     faces: list[int] = []
     numbers = array("d")
-    columns = len(table.names)
-    for line, fields in table.rows:
+    columns = len(names)
+    for line, fields in rows:
         while len(fields) > columns and not fields[-1].strip():
             fields.pop()
         times.append((line, fields[timed].strip() if timed < len(fields) else ""))
         found = [fields[column] for column in used if column < len(fields)]
-        if not any(map(str.strip, found)) or (counted is not None and fields[counted].strip() == "0"):
+        if not any(map(str.strip, found)) or (counted is not None and fields[counted : counted + 1] in (["0"], [" 0"])):
             continue
         if len(fields) != columns:
             curves = len(fields) - columns + len(used)
             raise ValueError(f"line {line} has {curves} curves, required {len(used)}; delete it if it is the last")
         if not faces:
-            texts = [column for column in used if _is_text(fields[column], table.names[column])]
+            texts = [column for column in used if _is_text(fields[column], names[column])]
             used = [column for column in used if column not in texts]
             if not used:
                 raise ValueError(f"line {line} has no numbers beside the time")
             of_names = [c for c in texts if is_known(fields[c].strip()) or fields[c].strip() == "_neutral"]
             if of_names:
-                return _of_single_scores(chain([(line, fields)], table.rows), table.names, timed, of_names[0], used)
+                return _of_single_scores(chain([(line, fields)], rows), names, timed, of_names[0], used)
             if texts:
-                named = ", ".join(shortened(table.names[column]) for column in texts)
+                named = ", ".join(shortened(names[column]) for column in texts)
                 LOG.warning("%d columns hold text, not numbers, and are left out: %s", len(texts), named)
                 found = [fields[column] for column in used]
         faces.append(len(times) - 1)
@@ -175,7 +176,7 @@ def _rows(
         raise ValueError("there are no rows")
     values = np.full((len(times), len(used)), np.nan)
     values[faces] = np.frombuffer(numbers, np.float64).reshape(len(faces), len(used)) if numbers else np.nan
-    return times, [table.names[column] for column in used], values
+    return times, [names[column] for column in used], values
 
 
 def _is_text(field: str, name: str) -> bool:
@@ -239,7 +240,7 @@ def motion_at_times(
     """
     ordered = _in_order(time_s)
     time_s, values = time_s[ordered], values[ordered]
-    measured = np.isfinite(values).any(axis=0)
+    measured: NDArray[np.bool_] = np.asarray(np.isfinite(values).any(axis=0))
     if not measured.any():
         raise InputError("0 rows with values, required two or more")
     if not measured.all():
@@ -250,7 +251,7 @@ def motion_at_times(
     channels = [_channel(name, unit) for name in names]
     kept = strongest_columns([channel.name for channel in channels], values)
     values, channels = values[:, kept], [channels[column] for column in kept]
-    seen = np.isfinite(values).all(axis=1)
+    seen: NDArray[np.bool_] = np.asarray(np.isfinite(values).all(axis=1))
     if not seen.all():
         if not seen.any():
             raise InputError("0 rows with values of all curves, required two or more")

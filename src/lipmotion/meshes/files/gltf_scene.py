@@ -220,7 +220,7 @@ def target_names(document: GltfDocument, mesh: Mapping[str, Any], primitive: Map
     accessors = document.items("accessors")
     arrays = [accessors[target["POSITION"]].get("name", "") if "POSITION" in target else "" for target in targets]
     holders = [holder.get("extras", {}).get("targetNames", []) for holder in (mesh, primitive)]
-    given = next((names for names in (*holders, arrays) if any(names)), [])
+    given: list[str] = next((names for names in (*holders, arrays) if any(names)), [])
     names: list[str] = []
     for number in range(len(targets)):
         name = plain_name(given[number]) if number < len(given) else ""
@@ -230,5 +230,6 @@ def target_names(document: GltfDocument, mesh: Mapping[str, Any], primitive: Map
 
 def mesh_target_names(document: GltfDocument, mesh: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the names of the morph targets of a mesh; some of its primitives may have none."""
-    named = (target_names(document, mesh, primitive) for primitive in mesh.get("primitives", []))
-    return tuple(max(named, key=len, default=[]))
+    named = [target_names(document, mesh, primitive) for primitive in mesh.get("primitives", [])]
+    longest = max(named, key=len, default=[])
+    return tuple(longest)

@@ -97,6 +97,7 @@ def _animation(node: Schema, accessor: Schema) -> dict[str, Schema]:
     target = members({"node": node, "path": _WORD, "extensions": if_fits(pointer)})
     channel = members({"sampler": _SIZE, "target": target}, ["sampler", "target"])
     return {
+        "name": _NAME,
         "channels": items(if_fits(channel)),
         "samplers": items(members({"input": accessor, "output": accessor, "interpolation": _WORD})),
     }

@@ -21,7 +21,7 @@ ROUNDING_SHARE = 0.002
 """Rounding of times, as a share of a step: rows that are about as even at a usual rate have that rate."""
 TELEVISION_RATIO, RATIO_OFF = 1.001, 0.0002
 """By how much sound is longer than motion whose timecode counts 30 where 29.97 frames pass, and how exactly so."""
-SHORTEST_RATIO_S = 60.0
+SHORTEST_RATIO_S = 100.0
 """In less sound, 0.001 of it is no more than a frame or two."""
 LONGEST_GAP = 3
 """Most frames of the steady rate for each row: a table whose time is mostly gaps is refused."""
@@ -46,7 +46,8 @@ def rate_in_step(rate_hz: float, frames: int, duration_s: float) -> float:
     """
     near = any(abs(rate_hz / each - 1) < 1.5 * (TELEVISION_RATIO - 1) for each in (24, 30, 48, 60, 120))
     for ratio in (TELEVISION_RATIO, 1 / TELEVISION_RATIO):
-        if near and duration_s >= SHORTEST_RATIO_S and abs(duration_s * rate_hz / frames - ratio) <= RATIO_OFF:
+        off = abs(duration_s * rate_hz / ratio - frames)
+        if near and duration_s >= SHORTEST_RATIO_S and off <= max(1.0, RATIO_OFF * frames):
             return exact_rate(round(rate_hz / ratio, 6), 1e-3)
     return rate_hz
 
