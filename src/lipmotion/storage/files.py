@@ -77,11 +77,6 @@ def check_listable(folder: Path) -> None:
 
 
 LOG = logging.getLogger("lipmotion")
-PACKED = {
-    b"\x1f\x8b": "packed with gzip",
-    b"PK\x03\x04": "a ZIP archive (as Word's files are)",
-    b"ooBinaryFile": "a binary TextGrid",
-}
 MARKS_OF_TEXT = {
     codecs.BOM_UTF8: "utf-8-sig",
     codecs.BOM_UTF32_LE: "utf-32",
@@ -111,9 +106,6 @@ def read_text_file(path: Path, kind: str, largest: int = LARGEST_TEXT_BYTES, *, 
         raise InputError(f"{path}: no such {kind} file") from error
     except OSError as error:
         raise InputError(f"{path}: not a readable {kind} ({error.strerror or error})") from error
-    packed = next((name for start, name in PACKED.items() if content.startswith(start)), None)
-    if packed:
-        raise InputError(f"{path}: is {packed}, required a {kind} as text; save it as a text file")
     encoding = next((name for mark, name in MARKS_OF_TEXT.items() if content.startswith(mark)), "utf-8")
     odd, even = content[1::2].count(0), content[::2].count(0)
     if encoding == "utf-8" and max(odd, even) > len(content) // 4 > 4 * min(odd, even):

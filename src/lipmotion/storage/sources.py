@@ -123,6 +123,7 @@ _KINDS: tuple[tuple[str, str, tuple[tuple[int, bytes], ...]], ...] = (
     ("document", "an OpenDocument file", ((30, b"mimetypeapplication/vnd.oasis"),)),
     ("document", "a Word document or another of an old Office", ((0, b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"),)),
     ("document", "a rich-text file (RTF)", ((0, b"{\\rtf"),)),
+    ("document", "a binary TextGrid", ((0, b"ooBinaryFile"),)),
     ("project", "a project of Ableton Live", ((-2, b"<Ableton"),)),
     ("project", "a project of Audacity", ((68, b"AUDY"), (-2, b"audacityproject"))),
     ("project", "a project of Reaper", ((0, b"<REAPER_PROJECT"),)),

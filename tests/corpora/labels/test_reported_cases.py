@@ -402,7 +402,7 @@ def test_every_form_may_be_wide_text(write: Any, encoding: str) -> None:
         ({"metadata": {}, "mouthCues": [{"start": 0, "end": 1, "value": "X"}]}, "mouth cues"),
         ({"foo": [{"bar": 1}]}, "it has foo; known are segments"),
         ("SPEAKER take 1 0.30 0.40 <NA> <NA> ann <NA> <NA>\n", "RTTM"),
-        (b"\x1f\x8b\x08\x00", "gzip"),
+        (b"\x1f\x8b\x08\x00", "archive|gzip"),
         ("<tt><body><p begin='soon'>a</p></body></tt>", "a time is 'soon'"),
         ("<tt><body>", "damaged XML"),
         ('<!DOCTYPE a [<!ENTITY b "c">]><tt>&b;</tt>', "entities|begins with"),
