@@ -1,7 +1,7 @@
 # make demo   installs, then turns a spoken sentence into an animated face with the model in the package
 # make test   installs everything, then runs the quick tests (under three minutes)
-# make test-all   the three that follow
-# make test-long      tests that take seconds: mutations, kills, real recordings, copies of the repository
+# make test-all   the three that follow, and pages in both browsers
+# make test-long      tests that take seconds: mutations, kills, real recordings, copies of the repository, pages
 # make test-portable  the numeric tests as other processors would run them
 # make test-explore   the property tests with other random cases at every run
 # make check  lint, types, import contracts
@@ -24,9 +24,11 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 SOURCES := $(shell find src -type f -not -name '*.pyc') pyproject.toml README.md
 TIMED := $(BIN)/python scripts/processor_time.py
-PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
+PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal --slowest 20
 .PHONY: demo test test-all test-long test-portable test-explore check coverage fuzz bench model site requirements clean
 .DELETE_ON_ERROR:
+# each run of pytest would read and rewrite all tests again
+unexport PYTHONDONTWRITEBYTECODE
 
 demo: $(VENV)/core
 	mkdir -p $(BUILD)
@@ -35,10 +37,11 @@ demo: $(VENV)/core
 test: $(VENV)/dev
 	$(TIMED) --limit 600 $(PYTEST) -m "not long"
 
+test-all: BROWSERS := --both-browsers
 test-all: test-long test-portable test-explore
 
 test-long: $(VENV)/dev
-	$(TIMED) --limit 1500 $(PYTEST) -m long
+	$(TIMED) --limit 1500 $(PYTEST) -m long $(BROWSERS)
 
 test-portable: $(VENV)/dev
 	PYTHONPATH=tests $(TIMED) --limit 400 $(BIN)/python -m portable.run

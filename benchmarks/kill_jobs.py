@@ -36,21 +36,22 @@ class Job:
         return " ".join(["lipmotion", *(Path(word).name if "/" in word else word for word in self.arguments)])
 
 
-def make_inputs(folder: Path, command: Sequence[str]) -> Path:
-    """Write recordings, sounds with motion, corpora and a model; return the folder."""
+def make_inputs(folder: Path, command: Sequence[str], names: Sequence[str]) -> Path:
+    """Write what jobs of these names use: recordings, sounds with motion, corpora and a model; return the folder."""
     from lipmotion.corpora.store import Corpus
     from lipmotion.testing.toy import toy_utterances, write_toy_recordings
 
     write_toy_recordings(folder / "recordings", sentences=CLIPS)
-    utterances = toy_utterances(BATCH_LINES)
-    for name, count in (("corpus", TRAINING_CLIPS), ("large", BATCH_LINES)):
+    counts = {"corpus": TRAINING_CLIPS} | ({"large": BATCH_LINES} if "train-share" in names else {})
+    utterances = toy_utterances(max(counts.values()))
+    for name, count in counts.items():
         corpus = Corpus.create(folder / name)
         for utterance in utterances[:count]:
             corpus.add(utterance)
     (folder / "sounds").mkdir()
     for utterance in utterances[:TRAINING_CLIPS]:
         _write_sound(folder / "sounds" / f"{utterance.name}.wav", utterance)
-    train = ["train", folder / "corpus", "-o", folder / "model.lipmotion", "--workers", "1"]
+    train = ["train", folder / "corpus", "-o", folder / "model.lipmotion", "--workers", "1", "--engine", "joint"]
     subprocess.run([*command, *map(str, train)], check=True, capture_output=True)
     shutil.rmtree(folder / "model.lipmotion.unfinished", ignore_errors=True)
     return folder

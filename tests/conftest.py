@@ -10,12 +10,15 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import signal
 import wave
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Generator, Iterator
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
+from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
@@ -24,6 +27,7 @@ from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion import posterior_network
 from lipmotion.pipeline.model import Model, save_model
 from lipmotion.pipeline.training.train import train
+from lipmotion.speech.recognition.network.hama import Hama
 from lipmotion.testing.toy import ToySentence, toy_sentences, toy_utterances
 from testing.toy_face import toy_face
 
@@ -44,8 +48,24 @@ settings.register_profile(EXPLORE, ANYWHERE, derandomize=False, max_examples=100
 settings.load_profile(FIXED)
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+HASTY = {"cli", "experiments"}
+"""Folders of tests whose networks are trained for a few steps."""
+MEASURED_S = pytest.StashKey[float]()
+"""Processor time of these tests, and of all processes that they waited for, when it was last looked at."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--slowest", type=int, default=0, help="print so many tests that took most processor time")
+    parser.addoption("--both-browsers", action="store_true", help="show pages in Firefox, too, beside Chromium")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Whatever needs real recordings, or trains on them, takes long; exploring tries more than a test asks for."""
+    if not config.getoption("--both-browsers"):
+        second = [item for item in items if item.get_closest_marker("second_browser")]
+        config.hook.pytest_deselected(items=second)
+        items[:] = [item for item in items if item not in second]
+    config.stash[MEASURED_S] = sum(os.times()[:4])
     for item in items:
         if item.get_closest_marker("recordings") or item.get_closest_marker("slow"):
             item.add_marker(pytest.mark.long)
@@ -54,6 +74,28 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             own = getattr(test, "_hypothesis_internal_use_settings", None)
             if own is not None and own.max_examples < settings().max_examples:
                 test._hypothesis_internal_use_settings = settings(own, max_examples=MORE_SENTENCES * own.max_examples)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """A fixture counts for the first test that asks for it. What runs at the same time makes no test look slower."""
+    report = yield
+    before_s, item.config.stash[MEASURED_S] = item.config.stash[MEASURED_S], sum(os.times()[:4])
+    report.processor_s = item.config.stash[MEASURED_S] - before_s
+    return report
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    slowest = terminalreporter.config.getoption("--slowest")
+    if slowest:
+        used_s = Counter[str]()
+        for reports in terminalreporter.stats.values():
+            for report in reports:
+                if isinstance(report, pytest.TestReport):
+                    used_s[report.nodeid] += report.processor_s
+        terminalreporter.section(f"processor seconds: {used_s.total():,.0f}, the {slowest} slowest of {len(used_s):,}")
+        for name, used in used_s.most_common(slowest):
+            terminalreporter.line(f"{used:6.1f}  {name}")
 
 
 @pytest.fixture
@@ -71,6 +113,32 @@ def short_training() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(posterior_network, "STEPS", posterior_network.STEPS / 3)
         patched.setattr(posterior_network, "_trained_recurrent", lambda *_: None)
+        yield
+
+
+@pytest.fixture(scope="module", autouse=True)
+def hasty_training(request: pytest.FixtureRequest) -> Iterator[None]:
+    """In some folders it counts what is trained and what is told of it, not how well it moves."""
+    with pytest.MonkeyPatch.context() as patched:
+        if HASTY & set(request.path.parts):
+            patched.setattr(posterior_network, "STEPS", 4.0)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def heard_once() -> Iterator[None]:
+    """The phone network hears the same toy sentences in a hundred trainings: what it said is known by the sound."""
+    said: dict[bytes, NDArray[np.float32]] = {}
+    hear = Hama.log_posteriors
+
+    def log_posteriors(self: Hama, samples: NDArray[np.float32]) -> NDArray[np.float32]:
+        sound = sha256(samples.tobytes()).digest()
+        if sound not in said:
+            said[sound] = hear(self, samples)
+        return said[sound].copy()
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(Hama, "log_posteriors", log_posteriors)
         yield
 
 

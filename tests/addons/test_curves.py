@@ -38,8 +38,8 @@ def test_a_take_at_30_frames_keeps_its_time(tmp_path: Path) -> None:
     rows = "".join(f"{code},61,0.5\n" for code in codes) + "02:00:00:02.500,0\n"
     (tmp_path / "take.csv").write_text("Timecode,BlendShapeCount,JawOpen\n" + rows)
     curves, times = read_motion(str(tmp_path / "take.csv"))
-    assert times == pytest.approx([number / 30 for number in range(6)])
-    assert len(curves["JawOpen"]) == 6
+    assert times == pytest.approx([number / 30 for number in range(7)])
+    assert curves["JawOpen"] == [0.5] * 6 + [0.0]
 
 
 def _drop_frame(number: int) -> str:

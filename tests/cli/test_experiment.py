@@ -18,13 +18,16 @@ from lipmotion.experiments.minnis_breen2000 import text as minnis_text
 from lipmotion.experiments.report.parts import PARTS
 from lipmotion.experiments.xie_liu2007 import six_systems
 from lipmotion.experiments.xie_liu2007 import text as xieliu2007_text
+from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.bootstrap import bootstrap_interval
 from lipmotion.pipeline.evaluation import figures as evaluation_figures
 
 
 @pytest.fixture(autouse=True)
 def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Few draws of the bootstrap intervals, and only two of the paper's unit sets."""
+    """Few draws of the bootstrap intervals, small phone models, and only two of the paper's unit sets."""
+    for module in (runner, table1, six_systems):
+        monkeypatch.setattr(module, "HmmConfig", partial(HmmConfig, mixtures=1, iterations=1))
     for module in (comparison, evaluation_figures, disagreement):
         monkeypatch.setattr(module, "bootstrap_interval", partial(bootstrap_interval, draws=20))
     monkeypatch.setattr(table1, "PAPER_SCORES", {name: table1.PAPER_SCORES[name] for name in ("2vis", "phone")})

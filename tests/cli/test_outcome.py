@@ -2,9 +2,7 @@ from __future__ import annotations
 
 import os
 
-import pytest
-
-from lipmotion.cli.command_line import parser
+from cli.conftest import RunCommand, is_one_error
 from lipmotion.cli.terminal.outcome import outcome
 from lipmotion.errors import InputError
 
@@ -39,7 +37,7 @@ def test_a_message_of_usual_length_is_whole() -> None:
     assert " ... " not in told[1]
 
 
-def test_a_wrong_command_line_is_one_line_of_limited_length(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit):
-        parser().error(f"unrecognized arguments: {'a.wav ' * 10_000}; see --help")
-    assert len(capsys.readouterr().err.splitlines()[-1]) < 1100
+def test_a_wrong_command_line_is_one_line_of_limited_length(run: RunCommand) -> None:
+    done = run("cues", *["a.wav"] * 10_000)
+    assert is_one_error(done, 2)
+    assert len(done.err[0]) < 1100

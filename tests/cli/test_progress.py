@@ -129,8 +129,10 @@ def test_why_it_failed(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.M
 def test_an_error_on_the_command_line_is_a_failure_too(run: RunCommand) -> None:
     done = run("evaluate", "--machine-readable")
     assert done.code == 2
-    assert objects(done) == [{"type": "failure", "reason": "wrong command line", "exit_code": 2}]
-    assert done.err[-1].startswith("lipmotion evaluate: error: the following arguments are required")
+    (failure,) = objects(done)
+    assert (failure["type"], failure["exit_code"]) == ("failure", 2)
+    assert "required: model, corpus; see: lipmotion evaluate --help" in str(failure["reason"])
+    assert done.err == [f"lipmotion: error: {failure['reason']}"]
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no /dev/full here")  # noqa: PTH110

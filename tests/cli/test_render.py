@@ -125,3 +125,11 @@ def test_a_single_pose_is_written(run: RunCommand, here: Path) -> None:
     (here / "pose.csv").write_text("time_s,opening\n0,0.1\n0.01,0.1\n")
     assert run("render", "pose.csv", "-o", "a.livelink.csv", "a.mp4", "a%05d.png", "--size", "64").code == 0
     assert {path.name for path in here.glob("a*")} == {"a.livelink.csv", "a.mp4", "a00000.png"}
+
+
+def test_the_rate_of_motion_can_be_given(run: RunCommand, here: Path) -> None:
+    rows = "\n".join(f"{n / 30:.5f},{n / 100:.2f}" for n in range(60))
+    (here / "a.csv").write_text(f"time,jawOpen\n{rows}\n")
+    assert run("render", "a.csv", "--motion-rate", "15", "-o", "b.json", "--curves", "arkit").code == 0
+    assert read_motion(here / "b.json")[0].rate_hz == pytest.approx(15)
+    assert is_one_error(run("render", "a.csv", "--motion-rate", "0", "-o", "b.json"), 3)

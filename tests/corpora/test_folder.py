@@ -38,7 +38,7 @@ def test_a_transcript_in_another_encoding_is_reported(tmp_path):
     (tmp_path / "b.txt").write_bytes("naïve".encode("cp1252"))
     found = discover(tmp_path)
     assert [item.words for item in found.recordings] == [("naïve",)]
-    assert "is not UTF-8 text" in found.problems["a"]
+    assert "not a readable UTF-8" in found.problems["a"]
 
 
 def test_subtitles_and_recognised_words_are_transcripts(tmp_path):

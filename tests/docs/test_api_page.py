@@ -14,6 +14,7 @@ from lipmotion.corpora.store import Corpus
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+FEW_STEPS = "from lipmotion.motion import posterior_network as n; n.STEPS = n.RECURRENT_STEPS = 4.0"
 BLOCKS = re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
 
 
@@ -22,7 +23,7 @@ def test_every_block_of_the_page_runs(toy_corpus: Corpus, tmp_path: Path) -> Non
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
     shutil.copytree(toy_corpus.path, tmp_path / "my-corpus")
     done = run_child(
-        [sys.executable, "-W", "error", "-c", "\n".join(BLOCKS)],
+        [sys.executable, "-W", "error", "-c", "\n".join([FEW_STEPS, *BLOCKS])],
         folder=tmp_path,
         variables=environment(NUMBA_DISABLE_PERFORMANCE_WARNINGS="1"),
         check=True,

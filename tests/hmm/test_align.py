@@ -79,6 +79,16 @@ def test_the_pronunciation_and_the_pauses_that_were_said_are_chosen():
         )
 
 
+def test_a_pause_inside_of_a_pronunciation_may_be_left_out():
+    who = speaker()
+    hmm, words = known_hmm(who), [[("a", PAUSE, "b"), ("c", PAUSE, "d")]]
+    for said in (("a", "b"), ("a", PAUSE, "b"), ("c", PAUSE, "d"), ("c", "d")):
+        features, _ = who.say(np.random.default_rng(3), (SILENCE, *said, SILENCE))
+        found = choose_pronunciations(hmm, log_likelihoods_of(hmm, features), words, PAUSE)
+        assert [item.units for item in found] == [(SILENCE,), said, (SILENCE,)]
+        assert found[1][:2] == (0, int(said[0] == "c"))
+
+
 def test_pronunciations_without_number_are_refused_before_a_network_is_built():
     hmm = random_hmm(2)
     features = np.zeros((60, 2), np.float32)

@@ -123,3 +123,50 @@ def test_turns_of_neck_and_head_are_against_their_rest(tmp_path: Path) -> None:
     motion, _ = read_motion(tmp_path / "a.vrma")
     assert motion["headYaw"] == pytest.approx([0, 0.3, 0.6], abs=1e-5)
     assert motion.values[:, -2:] == pytest.approx(np.zeros((3, 2)), abs=1e-5)
+
+
+def _pointed(pointer: str) -> dict[str, Any]:
+    return {"path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": pointer}}}
+
+
+@pytest.mark.parametrize("pointer", ["/nodes/0/weights", "/meshes/0/weights", "/nodes/0/weights/0"])
+def test_pointers_name_weights(tmp_path: Path, pointer: str) -> None:
+    rows = np.random.default_rng(4).random((25, 1 if pointer.endswith("0") else 2))
+    content, binary = gltf.animated_document([n / 30 for n in range(25)], rows)
+    content["animations"][1]["channels"][0]["target"] = _pointed(pointer)
+    (tmp_path / "a.glb").write_bytes(gltf.glb(content, binary))
+    motion, _ = read_motion(tmp_path / "a.glb")
+    assert motion.names == tuple(NAMES[: rows.shape[1]])
+    assert motion.values == pytest.approx(rows, abs=1e-6)
+
+
+def test_names_of_targets(tmp_path: Path) -> None:
+    """Of the mesh, of a primitive after one without targets, of the arrays; what has none is numbered."""
+    content, binary = gltf.animated_document([n / 30 for n in range(5)], [[0, 1]] * 5)
+    mesh = content["meshes"][0]
+    bare = {"attributes": {"POSITION": 0}, "indices": 3}
+    content["accessors"][1]["name"], content["accessors"][2]["name"] = "jawOpen", "mouthPucker"
+    for extras, own, expected in (
+        ({"targetNames": ["a.001", "b"]}, {}, ("a.001", "b")),
+        ({"targetNames": ["a"]}, {}, ("a", "target 1")),
+        ({"targetNames": ["a", "a"]}, {}, ("a", "target 1")),
+        ({}, {"extras": {"targetNames": ["c", "d"]}}, ("c", "d")),
+        ({}, {}, ("jawOpen", "mouthPucker")),
+    ):
+        content["meshes"][0] = {"primitives": [bare, mesh["primitives"][0] | own], "extras": extras}
+        (tmp_path / "a.glb").write_bytes(gltf.glb(content, binary))
+        assert read_motion(tmp_path / "a.glb")[0].names == expected
+
+
+def test_the_animation_that_moves_the_mouth_is_read(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    rows = np.random.default_rng(5).random((5, 2))
+    content, binary = gltf.animated_document([n / 30 for n in range(5)], rows)
+    talk = content["animations"][1]
+    still = len(content["accessors"])
+    content["bufferViews"].append({"buffer": 0, "byteOffset": len(binary), "byteLength": 40})
+    content["accessors"].append({"bufferView": 6, "componentType": 5126, "count": 10, "type": "SCALAR"})
+    idle = {"name": "idle", "channels": talk["channels"], "samplers": [{"input": 4, "output": still}]}
+    content["animations"] = [idle, talk]
+    (tmp_path / "a.glb").write_bytes(gltf.glb(content, binary + bytes(40)))
+    assert read_motion(tmp_path / "a.glb")[0].values == pytest.approx(rows, abs=1e-6)
+    assert "2 animations move the face: idle, talk; read: talk" in caplog.text

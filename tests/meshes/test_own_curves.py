@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.meshes.files.character_tables import table_path
-from lipmotion.meshes.files.rig_tables import write_rig_table
+from lipmotion.meshes.files.rig_tables import table_path, write_rig_table
 from lipmotion.meshes.fitting.driven import driven_character
 from lipmotion.meshes.model.face_shapes import life_scale
 from meshes.heads import head, write_glb

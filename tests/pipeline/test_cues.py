@@ -32,7 +32,7 @@ def test_several_files_at_once(generation: Generation, tmp_path: Path) -> None:
 
 def test_options_out_of_range(generation: Generation) -> None:
     for options, words in (
-        ({"fps": 0}, "frame rate is 0, required 1 to 60 a second"),
+        ({"fps": 0}, "frame rate is 0, required 1 to 100 a second"),
         ({"fps": float("nan")}, "frame rate is nan"),
         ({"hold_frames": 0}, "hold is 0 frames, required 1 or more"),
         ({"shapes": "GZ"}, "optional shapes are 'GZ', required letters out of 'GHX', or none"),

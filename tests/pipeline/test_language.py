@@ -17,7 +17,7 @@ from lipmotion.pipeline.understand.read_request import read_request
 from lipmotion.pipeline.understand.request import SpeechRequest, request_of
 from lipmotion.speech.voices.pronunciations import MAPPED_CONFIDENCE, LanguageLexicon
 from lipmotion.testing.toy import ToySentence
-from lipmotion.types import Audio, TimedTranscript
+from lipmotion.types import Audio, TimedTranscript, TimedWord, TranscriptLine
 from lipmotion.units import Lexicon
 
 SILENCE = Audio(np.zeros(1600, np.float32), 16_000)
@@ -37,6 +37,18 @@ def test_another_language_has_its_own_words_and_lexicon(tmp_path: Path) -> None:
         assert request.transcript.words == ("papa", "2")
         assert isinstance(request.lexicon, LanguageLexicon)
         assert request.lexicon.pronunciations("2") == (("m", "aa"),)
+
+
+def test_written_forms_in_subtitles_are_not_read_as_english() -> None:
+    written = tuple(map(TimedWord, ("perro", "$20M", "&", "St.", "21")))
+    user = Lexicon(dict.fromkeys(("perro", "20m", "st", "21"), (("m", "aa"),)))
+    request = in_language(
+        SpeechRequest(SILENCE, TimedTranscript((TranscriptLine(written),)), lexicon=user, language="es")
+    )
+    assert isinstance(request.transcript, TimedTranscript)
+    assert request.transcript.words == ("perro", "20m", "st", "21")
+    assert request.lexicon is not None
+    assert request.lexicon.spoken_forms("21") == ((("m", "21"), ("aa", "21")),)
 
 
 def test_unknown_languages_are_refused() -> None:

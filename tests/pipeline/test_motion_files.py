@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import wave
-from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +13,6 @@ from lipmotion.articulation.delivery import Delivery, closed_times
 from lipmotion.articulation.expression import with_moods
 from lipmotion.articulation.liveliness import Liveliness
 from lipmotion.articulation.mouth import spoken_mouth
-from lipmotion.errors import ExportError
 from lipmotion.faces import Staging
 from lipmotion.meshes.fitting.eyes_and_brows import FULL_LOOK_RAD, eye_and_brow_weights
 from lipmotion.meshes.model.head_angles import ANGLES as HEAD
@@ -25,8 +22,6 @@ from lipmotion.pipeline.outputs.curve_sets import curves_of
 from lipmotion.pipeline.outputs.living_curves import living_curves
 from lipmotion.pipeline.outputs.motion_files import in_format, thinned
 from lipmotion.pipeline.outputs.motion_input import read_generation
-from lipmotion.pipeline.outputs.output import OutputSettings, checked_outputs
-from lipmotion.pipeline.outputs.shown_faces import shown_face
 from lipmotion.pipeline.outputs.write import write
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
 from lipmotion.types.moods import moods_of
@@ -145,25 +140,6 @@ def test_formats_of_the_mouth_do_not_depend_on_curves(
 ) -> None:
     plain = written(tmp_path, generation, name, rate_hz=rate_hz)
     assert written(tmp_path, generation, name, rate_hz=rate_hz, curves="visemes") == plain
-
-
-@pytest.mark.parametrize(
-    ("name", "rate_hz", "fits"), [("a.c3d", None, False), ("a.c3d", 50.0, True), ("a.csv", None, True)]
-)
-def test_a_recording_that_is_too_long_is_refused_before_the_work(
-    tmp_path: Path, name: str, rate_hz: float | None, fits: bool
-) -> None:
-    with wave.open(str(tmp_path / "a.wav"), "wb") as file:
-        file.setnchannels(1)
-        file.setsampwidth(1)
-        file.setframerate(8000)
-        file.writeframes(bytes(8000 * 700))
-    face = shown_face("portrait")
-    message = r"about 70000 frames, required at most 65535 in \.c3d; give a lower --rate"
-    with nullcontext() if fits else pytest.raises(ExportError, match=message):
-        checked_outputs([tmp_path / name], OutputSettings(face, tmp_path / "a.wav", rate_hz=rate_hz))
-    earlier = Delivery(offset_ms=-60_000)
-    checked_outputs([tmp_path / name], OutputSettings(face, tmp_path / "a.wav", rate_hz=rate_hz, delivery=earlier))
 
 
 def test_controls_of_a_rig_follow_brows_in_every_mood(generation: Generation, tmp_path: Path) -> None:

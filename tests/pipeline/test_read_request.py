@@ -54,5 +54,5 @@ def test_a_name_in_a_folder_that_exists_is_no_text(here: Path) -> None:
 
 def test_a_file_that_is_not_text(here: Path) -> None:
     (here / "words.txt").write_bytes(b"\x81\xfe")
-    with pytest.raises(InputError, match=r"words.txt: is not UTF-8 text; save it as UTF-8"):
+    with pytest.raises(InputError, match=r"words.txt: not a readable UTF-8 transcript"):
         text_or_file_content("words.txt")

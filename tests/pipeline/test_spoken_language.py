@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from lipmotion.pipeline.understand import spoken_language
-from lipmotion.pipeline.understand.spoken_language import english_spoken
+from lipmotion.pipeline.understand.spoken_language import english_spoken, warn_of_another_language
+from lipmotion.speech.recognition.recognised_speech import RecognisedWord, Recognition
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.types import Audio
+from lipmotion.types import Audio, Span, Timeline
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -28,3 +29,13 @@ def test_the_words_of_english_are_known() -> None:
     welcome = read_audio(EXAMPLES / "welcome.flac").samples
     assert english_spoken(Audio(np.tile(welcome, 4), 16_000)) is True
     assert english_spoken(Audio(np.tile(welcome[::-1], 4), 16_000)) is not True
+
+
+@pytest.mark.parametrize(("confidence", "lasts_s", "warns"), [(0.2, 2.0, True), (0.85, 2.0, False), (0.2, 0.5, False)])
+def test_words_that_are_hardly_understood_are_told(
+    confidence: float, lasts_s: float, warns: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    words = Timeline((Span(0.0, lasts_s, RecognisedWord("hola", confidence)),))
+    warn_of_another_language(Recognition(Timeline(()), words, lasts_s, 0.0, None))
+    assert ("--language" in caplog.text) == warns
+    assert (f"confidence {confidence:.2f}" in caplog.text) == warns

@@ -58,13 +58,17 @@ class Outcome(NamedTuple):
 
 
 def settings() -> dict[str, dict[str, str]]:
-    """Return the variables of every setting by its name: each kind of kernels, in turn with one thread and with two."""
+    """Return the variables of every setting by its name: each kind of kernels, in turn with one thread and with two.
+
+    No processor has the oldest kernels beside AVX in NumPy: they are run without it.
+    """
     found = {
         f"{core}, {threads} thread{'s' * (threads > 1)}": {
             "OPENBLAS_CORETYPE": core,
             "OPENBLAS_NUM_THREADS": str(threads),
         }
         for core, threads in zip(different_cores(), itertools.cycle((1, 2)))
+        if core != BEFORE_AVX["OPENBLAS_CORETYPE"]
     }
     return found | {"no AVX, in NumPy neither": BEFORE_AVX}
 

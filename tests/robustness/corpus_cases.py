@@ -188,7 +188,9 @@ def _label_file(name: str, suffix: str, content: bytes | str, *messages: str) ->
         bench.file(f"a{suffix}", content)
 
 
-_label_file("binary", ".TextGrid", b"ooBinaryFile\x08TextGrid\x00\xff", "binary TextGrid; save it as a text file")
+_label_file(
+    "binary", ".TextGrid", b"ooBinaryFile\x08TextGrid\x00\xff", "is a binary TextGrid", "save it as a text file"
+)
 _label_file("a billion tiers", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 1 <exists> 1000000000\n', "tier 1 is damaged")
 _label_file("phones that overlap", ".lab", "0 2000000 p\n1000000 3000000 aa\n", "before the one ahead of it ends")
 _label_file("an unknown phone", ".lab", "0 1000000 p\n1000000 2000000 aa\n2000000 3000000 b\n3000000 4000000 qq\n",

@@ -34,7 +34,7 @@ def _file(name: str, content: bytes, code: int, *messages: str) -> None:
         return ["speak", "--text", bench.file("text.txt", content), "--model", bench.model, "-o", "a.json"]
 
 
-_file("a text file in UTF-16", "papa".encode("utf-16"), 3, "not a readable UTF-8 text", "save it as UTF-8 text")
+_file("a text file in Latin-1", "pâpa".encode("latin-1"), 3, "not a readable UTF-8 text", "save it as UTF-8 text")
 _file("a text file of a million bytes", b"papa " * 200_000, 3, "1000000 bytes, required at most 200000: is it a text?")
 
 

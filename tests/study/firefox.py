@@ -153,8 +153,10 @@ def firefox(folder: Path, *switches: str) -> Iterator[Browser]:
 
 
 Opens = Callable[..., AbstractContextManager[Browser]]
+HAS_CHROMIUM, HAS_FIREFOX = bool(BROWSER and DRIVER), bool(PROGRAM and SCREEN)
+SECOND = (pytest.mark.second_browser,) if HAS_CHROMIUM else ()
 BOTH = (
-    pytest.param(browser, id="chromium", marks=pytest.mark.skipif(not (BROWSER and DRIVER), reason=MISSING)),
-    pytest.param(firefox, id="firefox", marks=pytest.mark.skipif(not (PROGRAM and SCREEN), reason=NO_FIREFOX)),
+    pytest.param(browser, id="chromium", marks=pytest.mark.skipif(not HAS_CHROMIUM, reason=MISSING)),
+    pytest.param(firefox, id="firefox", marks=(*SECOND, pytest.mark.skipif(not HAS_FIREFOX, reason=NO_FIREFOX))),
 )
-"""For tests that run in both browsers: what opens each."""
+"""For tests of pages: what opens each browser. Where there is Chromium, Firefox waits for ``--both-browsers``."""

@@ -54,6 +54,40 @@ def test_the_whole_dictionary_maps_into_the_inventory() -> None:
         assert all(set(variant) <= set(PHONES) for variant in Lexicon().pronunciations(word))
 
 
+def test_a_lengthened_word_is_the_word_that_is_meant() -> None:
+    for word, meant in (
+        ("boooooom", "boom"),
+        ("noooo", "no"),
+        ("sooo", "so"),
+        ("mmmm", "mm"),
+        ("loooong", "long"),
+        ("yesss", "yes"),
+        ("pleeease", "please"),
+        ("goood", "good"),
+        ("whaaaat", "what"),
+        ("heyyyy", "hey"),
+        ("hellooo", "hello"),
+        ("shhhh", "shh"),
+        ("wellll", "well"),
+        ("nóóó", "no"),
+    ):
+        assert Lexicon().known(word)
+        assert said(word)[0] == said(meant)[0]
+        assert Lexicon().spoken_forms(word)[0][0][1] == meant
+    assert said("hahaha") == said("hahahah") == ["hh aa hh aa hh aa"]
+    for word in ("aaaaaaargle", "xyyyz", "booker", "bananana"):
+        assert not lexicon.lengthened(word)
+    assert not Lexicon().known("x" * 5000 + "yyy")
+
+
+def test_a_form_is_said_in_the_words_of_its_readings() -> None:
+    forms = Lexicon().spoken_forms("21")
+    words = [list(dict.fromkeys(word for _, word in form if word)) for form in forms]
+    assert words == [["twenty", "one"]] * 2 + [["two", "one"]] * (len(words) - 2)
+    assert forms[0][6] == ("sp", "")
+    assert all("sp" not in phones for phones in Lexicon().pronunciations("21"))
+
+
 def test_a_users_file(lexicon_file: Path) -> None:
     lexicon_file.write_text(
         "# my words\n\n"

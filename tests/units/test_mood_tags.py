@@ -29,6 +29,48 @@ def test_unknown_tags_are_named_and_not_spoken(caplog):
     assert "[plays the harp], <b>, </b>" in caplog.text
 
 
+@pytest.mark.parametrize(
+    ("text", "words", "named"),
+    [
+        (
+            "“What the {i}heck{/i} is this?{w=0.5} My {b}boat{/b} is gone.”",
+            "what the heck is this my boat is gone",
+            "{w=0.5}",
+        ),
+        ("<color=#f00>re</color>d un<b>believ</b>able <sprite index=1>", "red unbelievable", "<sprite index=1>"),
+        ("[wave]hey[/wave] you #line:0e12a", "hey you", "#line:0e12a"),
+        ("See [[Go north|North]] <<set $y to 2>> (set: $x to 1)", "see go north", "<<set $y to 2>>"),
+        ('<speak>hi<break time="1s"/>you</speak>', "hi you", '<break time="1s"/>'),
+        ("*really* so", "really so", ""),
+        ("ANNA: Please speak.\nBEN: I will.", "please speak i will", "ANNA:, BEN:"),
+        ("ZOË: Hi", "hi", "ZOË:"),
+        ("Anna (V.O.): Hi", "hi", "Anna (V.O.):"),
+        ("[Anna]: Hi\n[ANNA] you", "hi you", "[Anna]:, [ANNA]"),
+        ("**ANNA:** Hi", "hi", "ANNA"),
+        ("Anna: Hi\nBen: Hello", "hi hello", "Anna:, Ben:"),
+        ("SPEAKER 1: a\nspeaker 2: b", "a b", "speaker 2:"),
+        ("- Hello.\n- Hi.", "hello hi", ""),
+        ("INT. HUT - DAY\n\nANNA\n(low)\nSpeak.\n\nBEN (O.S.)\nI do.", "speak i do", "INT. HUT - DAY, (low)"),
+        ("Note: this is said.", "note this is said", ""),
+        ("He said: go\nAt 5:30: run", "he said go at five thirty run", ""),
+        ("HELP\nme now", "help me now", ""),
+    ],
+)
+def test_markup_and_names_of_speakers_are_named_and_not_spoken(caplog, text, words, named):
+    assert " ".join(words_of(tagged_text(text).text)) == words
+    assert named in caplog.text
+    assert bool(caplog.records) == bool(named)
+
+
+def test_what_somebody_does_is_a_tag_between_asterisks():
+    assert [tag.mood for tag in tagged_text("*laughs* {angry}no{/angry} *gasps*").tags] == [
+        "happy",
+        "angry",
+        NEUTRAL,
+        "surprised",
+    ]
+
+
 def test_known_tags_alone_can_be_taken_out():
     assert without_known_tags("<html> [happy] hello").split() == ["<html>", "hello"]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import io
 import logging
+import re
 import sys
 import warnings
 from collections.abc import Sequence
@@ -12,10 +13,10 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, NoReturn
 
+from lipmotion.cli.arguments.options import Version
 from lipmotion.cli.arguments.paths import check_paths
 from lipmotion.cli.terminal.events import Events
-from lipmotion.cli.terminal.outcome import one_line
-from lipmotion.cli.terminal.printing import flush_output, print_line, print_usage, with_program_name
+from lipmotion.cli.terminal.printing import flush_output, print_usage, with_program_name
 from lipmotion.cli.terminal.stop import Stopper
 from lipmotion.cli.verbs import (
     adapt,
@@ -42,7 +43,7 @@ from lipmotion.cli.verbs import (
     train,
     words,
 )
-from lipmotion.errors import ExportError
+from lipmotion.errors import ExportError, LipMotionError
 
 VERBS = (
     *(animate, batch, speak, render, edit, studio, explain, cues, words, corpus, train, adapt, face),
@@ -62,15 +63,30 @@ OF_OTHER_TOOLS = {
     **{name: f"--{name}" for name in ("version", "help")},
 }
 """Words that do in other programs what verbs do here."""
+MEANT = {
+    **dict.fromkeys(("voice", "actor", "person"), ("voice", "speaker")),
+    **dict.fromkeys(("text", "dialog", "dialogue", "script", "lyrics"), ("transcript", "text")),
+    **dict.fromkeys(("threads", "jobs", "processes"), ("workers",)),
+    **dict.fromkeys(("audio", "wav"), ("sound",)),
+    **dict.fromkeys(("rate", "framerate", "frame-rate"), ("fps",)),
+    **dict.fromkeys(("avatar", "character", "portrait"), ("face",)),
+    **dict.fromkeys(("overwrite", "yes"), ("force",)),
+    **dict.fromkeys(("emotion", "expression"), ("mood",)),
+}
+"""Options of other programs, and what may be meant here: the first that the verb has."""
+LEAST_LIKENESS = 0.7
+"""So alike must an option be to one that does not exist to be suggested: ``--force`` is not meant by ``--voice``."""
+NUMBER = re.compile(r"-\d+|-\d*\.\d+")
+"""A negative number, which is no option."""
 EXIT_CODES = """exit codes: 0 done, 1 a bug (doctor: a broken part), 2 wrong command line, 3 unusable input, 4 corpus,
 5 alignment, 6 model file, 7 output, 8 missing package, 130 interrupted, 143 terminated"""
 
 
-def run(arguments: Sequence[str] | None, stopper: Stopper, events: Events) -> None:
-    """Parse and run one command.
+def run(words: Sequence[str], stopper: Stopper, events: Events) -> None:
+    """Parse and run one command; without a word, print the help.
 
-    arguments : words of the command line without the program's name; None: those of the process
-    Raises whatever the command raises; SystemExit: help was asked for, or the command line is wrong.
+    words : of the command line, without the program's name
+    Raises whatever the command raises; WrongCommandLineError: it cannot be parsed; SystemExit: help was asked for.
     """
     if sys.stdout is None:
         raise ExportError("standard output is closed; open it, or send it to a file or to /dev/null")
@@ -79,8 +95,9 @@ def run(arguments: Sequence[str] | None, stopper: Stopper, events: Events) -> No
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # a terminal may not know every letter of a file's name
     try:
-        words = list(sys.argv[1:] if arguments is None else arguments)
-        options = _parsed(parser(), words, argparse.Namespace(stopper=stopper, events=events, words=words))
+        options = _parsed(
+            parser(), words or ["--help"], argparse.Namespace(stopper=stopper, events=events, words=words)
+        )
         events.start(options)
         check_paths(options)
         options.run(options)
@@ -97,34 +114,93 @@ def parser() -> argparse.ArgumentParser:
         description="Speech in, lip motion out, with models trained from your own recordings.",
         epilog=EXIT_CODES,
     )
-    whole.add_argument("--version", action=_Version, nargs=0, help="print the version")
+    whole.add_argument("--version", action=Version, nargs=0, help="print the version")
     verbs = whole.add_subparsers(title="verbs", dest="verb", required=True, metavar="VERB")
     for verb in VERBS:
         verb.add(verbs)
     return whole
 
 
-def _parsed(
-    whole: argparse.ArgumentParser, arguments: Sequence[str] | None, options: argparse.Namespace
-) -> argparse.Namespace:
-    """Return the options, over those of a job file and a level; of a misspelt one the error names the nearest."""
-    _check_verb(whole, sys.argv[1:] if arguments is None else arguments)
+def _parsed(whole: argparse.ArgumentParser, words: Sequence[str], options: argparse.Namespace) -> argparse.Namespace:
+    """Return the options, over those of a job file and a level."""
+    _check_verb(whole, words)
+    words = _in_order(whole, words)
     empty = argparse.Namespace(**vars(options))
-    options, unknown = whole.parse_known_args(arguments, options)
+    options, unknown = whole.parse_known_args(words, options)
     if getattr(options, "job", None) or getattr(options, "detail", None):  # what they say are the defaults by now
-        options, unknown = whole.parse_known_args(arguments, empty)
+        options, unknown = whole.parse_known_args(words, empty)
     if unknown:
-        option = next((word for word in unknown if word.startswith("-")), unknown[0]).split("=")[0]
-        near = get_close_matches(option, _option_strings(whole, options.verb), n=1)
-        hint = f"did you mean {near[0]}?" if near else f"see: {whole.prog} {options.verb} --help"
-        whole.error(f"unrecognized arguments: {' '.join(unknown)}; {hint}")
+        _verbs(whole)[options.verb].error(f"unrecognized arguments: {' '.join(unknown)}")
     return options
+
+
+def _verbs(whole: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+    """Return the parsers of the verbs of a parser, by name; none where it has none."""
+    actions = (action for action in whole._actions if isinstance(action, argparse._SubParsersAction))
+    return dict(next((action.choices for action in actions), {}))
+
+
+def _in_order(parser: argparse.ArgumentParser, words: Sequence[str]) -> list[str]:
+    """Return the words of a command with its recording ahead of the outputs.
+
+    An option that takes several words, as ``-o``, takes those that argparse finds behind it: of ``-o OUT RECORDING``
+    also the recording, if it stands nowhere else. Then the last word is the recording, and so are those before it that
+    exist and end alike, where a verb takes several.
+    Raises WrongCommandLineError: an option that the verb has not.
+    """
+    verb, verbs = next((at for at, word in enumerate(words) if not word.startswith("-")), len(words)), _verbs(parser)
+    if verb < len(words) and words[verb] in verbs:
+        return [*words[: verb + 1], *_in_order(verbs[words[verb]], words[verb + 1 :])]
+    known, free, taken, at = parser._option_string_actions, 0, list[int](), 0
+    words = [  # "-o OUT" may be one word, as for Rhubarb
+        part for word in words for part in (word.split(maxsplit=1) if word.partition(" ")[0] in known else (word,))
+    ]
+    while at < len(words) and words[at] != "--":
+        option, at = _option_of(parser, words[at]), at + 1
+        if option is None:
+            free += 1
+        elif option.nargs == "+" and "=" not in words[at - 1]:
+            behind = next((end for end in range(at, len(words)) if _is_option(words[end])), len(words))
+            taken, at = list(range(at + 1, behind)), behind
+        elif option.nargs is None and words[at - 1] in option.option_strings:
+            at += 1
+    wanted = next((action for action in parser._actions if not action.option_strings), None)
+    if free or wanted is None or not taken or at < len(words) or "--job" in words:
+        return words
+    last = words[taken[-1]]
+    if wanted.nargs == "?" and Path(last).suffix and " " not in last:
+        return words
+    end = Path(last).suffix
+    alike = [each for each in taken if Path(words[each]).suffix == end and Path(words[each]).exists()]
+    moved = sorted({taken[-1], *(alike if wanted.nargs == "+" else ())})
+    return [*(words[each] for each in moved), *(word for each, word in enumerate(words) if each not in moved)]
+
+
+def _is_option(word: str) -> bool:
+    """Return whether argparse takes a word for an option: not a pipe, a negative number, or words with a space."""
+    return word.startswith("-") and word != "-" and " " not in word and not NUMBER.fullmatch(word)
+
+
+def _option_of(parser: argparse.ArgumentParser, word: str) -> argparse.Action | None:
+    """Return what an option means; None: the word is none. Raises WrongCommandLineError: the parser has none so."""
+    if not _is_option(word):
+        return None
+    name, known = word.partition("=")[0], parser._option_string_actions
+    if name in known or (not word.startswith("--") and word[:2] in known):
+        return known.get(name) or known[word[:2]]
+    longer = [option for option in known if word.startswith("--") and option.startswith(name)]
+    if longer:
+        return known[longer[0]]
+    stems = {option.lstrip("-"): option for option in known if option.startswith("--")}
+    meant = next((each for each in MEANT.get(name.lstrip("-"), ()) if each in stems), None)
+    near = [meant] if meant else get_close_matches(name.lstrip("-"), stems, n=1, cutoff=LEAST_LIKENESS)
+    return parser.error(f"unrecognized arguments: {word}" + (f"; did you mean {stems[near[0]]}?" if near else ""))
 
 
 def _check_verb(whole: argparse.ArgumentParser, words: Sequence[str]) -> None:
     """End with an error if the first word is no verb; it names the verb that is meant, by other tools' words, too."""
     word = next((word for word in words if not word.startswith("-")), None)
-    (verbs,) = (action.choices for action in whole._actions if isinstance(action, argparse._SubParsersAction))
+    verbs = _verbs(whole)
     if word is None or word in verbs:
         return
     near = get_close_matches(word, verbs, n=1)
@@ -134,36 +210,21 @@ def _check_verb(whole: argparse.ArgumentParser, words: Sequence[str]) -> None:
     whole.error(f"no verb {word!r}; {hint}")
 
 
-def _option_strings(parser: argparse.ArgumentParser, verb: str = "") -> list[str]:
-    """Return the long options of a parser and of its verbs; of one verb, if it is named."""
-    found: list[str] = []
-    for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            for name, part in action.choices.items():
-                found += _option_strings(part) if verb in {"", name} else []
-        else:
-            found += [option for option in action.option_strings if option.startswith("--")]
-    return found
+class WrongCommandLineError(LipMotionError):
+    """The command line cannot be parsed."""
+
+    exit_code = 2
 
 
 class _Parser(argparse.ArgumentParser):
-    """Reports a wrong command line as one printable line, and help that cannot be printed."""
+    """Raises an error for a wrong command line, as one line that says where help is; reports help that cannot be
+    printed."""
 
     def error(self, message: str) -> NoReturn:
-        super().error(one_line(message))
+        raise WrongCommandLineError(f"{message}{'' if message.endswith('?') else ';'} see: {self.prog} --help")
 
     def _print_message(self, message: str, file: Any = None) -> None:
         print_usage(message, is_wanted=file is sys.stdout)
-
-
-class _Version(argparse.Action):
-    """Prints the version, which is looked up only when the option is given."""
-
-    def __call__(self, *_: object) -> None:
-        from lipmotion.extensions import installed_version
-
-        print_line(f"lipmotion {installed_version()}")
-        sys.exit(0)
 
 
 class _WarningFormatter(logging.Formatter):

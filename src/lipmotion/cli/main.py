@@ -24,11 +24,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments is None:
         _occupy_closed_streams()
         gc.set_threshold(NEW_OBJECTS)
-    stopper, events = Stopper(), events_of(sys.argv[1:] if arguments is None else arguments)
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if arguments is None and sys.argv[0].replace("\\", "/").rpartition("/")[2].lower() in {"rhubarb", "rhubarb.exe"}:
+        words = ["cues", "--datFrameRate", "24", *words]  # under this name programs that start Rhubarb find it
+    stopper, events = Stopper(), events_of(words)
     try:
         try:
             stopper.listen()
-            return _run(arguments, stopper, events)
+            return _run(words, stopper, events)
         except KeyboardInterrupt:
             return _report_failure(events, stopper.code or 130, MESSAGE)
     finally:
@@ -44,11 +47,11 @@ def _occupy_closed_streams() -> None:
             os.open(os.devnull, os.O_RDWR)
 
 
-def _run(arguments: Sequence[str] | None, stopper: Stopper, events: Events) -> int:
+def _run(words: Sequence[str], stopper: Stopper, events: Events) -> int:
     try:
         from lipmotion.cli import command_line
 
-        command_line.run(arguments, stopper, events)
+        command_line.run(words, stopper, events)
     except BrokenPipeError:  # the reader of standard output has gone
         from lipmotion.cli.terminal.printing import discard_pending_output
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,15 +11,24 @@ import numpy as np
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import Registry
+from lipmotion.meshes.model.shape_names import is_known
 from lipmotion.storage.files import check_regular, whole_file
-from lipmotion.types import Generation, Motion, Timeline, Unit
+from lipmotion.storage.sources import check_kind
+from lipmotion.types import EYE_DISTANCE, WEIGHT, Generation, Motion, Timeline, Unit
 
+LOG = logging.getLogger("lipmotion")
 About = Mapping[str, str]
 LARGEST_MOTION_BYTES = 1 << 31
 """Most bytes of a motion file: four hours of a hundred channels."""
 
 LARGEST_UNITS_BYTES = 1 << 28
 """Most bytes of a file of units alone: phones of a day."""
+
+
+LARGEST_WEIGHT = 4.0
+"""Largest weight of a blendshape that is read; captures and sculpted faces go a little over 1."""
+TOLERATED_WEIGHT = 0.1
+"""By how much weights may go beyond 0 to 1 without a warning."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +44,6 @@ class MotionFormat:
     rate_hz : frames per second where the user asks for none; None: those of the motion
     mouth   : whether the file shows how the mouth itself moves: the pipeline keeps the channel ``opening`` for it,
               whatever channels or curves the user asks for
-    most_frames : number of frames that such a file can hold; None: any number
     fixed_rate : whether a file can have no other rate than ``rate_hz``
     other_curves : whether weights and controls that the user asks for take the place of ``curves``
     keyed   : whether the file holds keys of weights with straight lines between, and needs none where a line goes on
@@ -56,7 +65,6 @@ class MotionFormat:
     names_sound: bool = False
     mouth: bool = False
     keyed: bool = False
-    most_frames: int | None = None
 
 
 MOTION_FORMATS: Registry[MotionFormat] = Registry(
@@ -82,14 +90,24 @@ MOTION_FORMATS: Registry[MotionFormat] = Registry(
 """Motion formats by suffix, without the first dot; a suffix may have several parts, as ``livelink.csv``."""
 _GLTF = "lipmotion.meshes.files.gltf_weights:read_gltf_motion"
 _CUES = "lipmotion.export.cues.cue_motion:read_cue_motion"
+_FRAMES = "lipmotion.export.motion.json_frames:read"
 MOTION_READERS: Registry[Callable[[Path], tuple[Motion, Timeline[Unit]]]] = Registry(
     "motion reader",
     "lipmotion.motion_readers",
-    {"glb": _GLTF, "gltf": _GLTF, "tsv": _CUES, "xml": _CUES, "dat": _CUES, "pgo": _CUES},
+    {"glb": _GLTF, "gltf": _GLTF, **dict.fromkeys(("tsv", "xml", "dat", "pgo"), _CUES), "jsonl": _FRAMES},
 )
 """Readers of files that hold motion, but are not written as motion formats, by suffix as ``MOTION_FORMATS``."""
-OTHER_JSON = {b'"mouthCues"': ".tsv", b'"facsNames"': ".a2f.json"}
-"""Members at the beginning of ``.json`` files of other programs, and the suffix of files that are read alike."""
+OTHER_JSON = {
+    b'"lipmotion.motion"': ".json",
+    b'"mouthCues"': ".tsv",
+    b'"facsNames"': ".a2f.json",
+    b'"weightMat"': ".a2f.json",
+    b"lendShapes": ".jsonl",
+    b"lendshape": ".jsonl",
+    b"ategory": ".jsonl",
+    b'awOpen"': ".jsonl",
+}
+"""What the beginnings of ``.json`` files hold, and the suffix of files that are read alike; the first counts."""
 JSON_HEAD = 1 << 16
 """How many bytes of a ``.json`` are searched for them."""
 
@@ -168,6 +186,7 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
     (100.0, 'sil')
     """
     path = Path(path)
+    check_kind(path, "motion file")
     read = _reader_of(path)
     if read is None:
         raise InputError(
@@ -179,14 +198,34 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
         if size > LARGEST_MOTION_BYTES:
             raise InputError(f"{size} bytes, required at most {LARGEST_MOTION_BYTES}: is it a motion file?")
         motion, units = read(path)
-        if not np.isfinite(motion.values).all():
-            raise InputError("there are values that are not finite; interpolate them first")
+        if not (finite := np.isfinite(motion.values)).all():
+            frame, column = np.argwhere(~finite)[0].tolist()
+            first = f"the first is {motion.names[column]!r} in frame {frame}"
+            raise InputError(f"{(~finite).sum()} values that are not finite, {first}; interpolate them first")
+        _check_weights(path, motion)
         return motion, units
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
     except InputError as error:
         text = str(error)
         raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from error
+
+
+def _check_weights(path: Path, motion: Motion) -> None:
+    """Raise InputError if blendshapes count from 0 to 100; warn where they go beyond 0 to 1."""
+    beyond = []
+    for channel, curve in zip(motion.channels, motion.values.T, strict=True):
+        if channel.unit in {WEIGHT, EYE_DISTANCE} and is_known(channel.name):
+            low, high = float(curve.min(initial=0.0)), float(curve.max(initial=0.0))
+            if high > LARGEST_WEIGHT:
+                raise InputError(
+                    f"the weight {channel.name} goes up to {high:g}, required 0 to 1; divide percent by 100"
+                )
+            if not -TOLERATED_WEIGHT <= low <= high <= 1 + TOLERATED_WEIGHT:
+                beyond.append(f"{channel.name} from {low:.2f} to {high:.2f}")
+    if beyond:
+        what = f"{len(beyond)} weights go beyond 0 to 1, where faces are drawn as at 0 or 1"
+        LOG.warning("%s: %s: %s", path, what, ", ".join(beyond[:8]))
 
 
 def read_units(path: Path) -> Timeline[Unit]:

@@ -99,7 +99,8 @@ class SpokenWord(NamedTuple):
 
     word    : its position in the transcript; -1 for silence and pauses
     variant : the number of the pronunciation
-    units   : those of the pronunciation; none where a possible pause was not made
+    units   : those of the pronunciation, without the possible pauses in it that were not made; none where a possible
+              pause between words was not made
     """
 
     word: int
@@ -126,7 +127,7 @@ def choose_pronunciations(
 ) -> list[SpokenWord]:
     """Return the most probable pronunciation of each word, with silence and the pauses between words, in order.
 
-    words : for each word, its possible pronunciations
+    words : for each word, its possible pronunciations; a pause inside of one may be left out
     pause : the unit that may stand between words; silence (the first free unit) surrounds them all
     Only states without context are used: then the states of a pronunciation do not depend on the words beside it.
     Raises AlignmentError: the words do not fit into the frames.
@@ -158,15 +159,17 @@ def place_words(
     builder = NetworkBuilder()
     owners: list[SpokenWord] = []
     slot_of: list[int] = []
+    place_of: list[int] = []
     open_ends: list[tuple[int, float]] = []
     for slot, choices in enumerate(slots):
         ends: list[tuple[int, float]] = []
         for choice in choices:
             begin = len(owners)
-            ends += _append(builder, hmm, choice.units, open_ends)
-            count = sum(hmm.table.count(unit) for unit in choice.units)
-            owners += [choice] * count
-            slot_of += [slot] * count
+            ends += _append(builder, hmm, choice.units, open_ends, pause if choice.word >= 0 else "")
+            places = [place for place, unit in enumerate(choice.units) for _ in range(hmm.table.count(unit))]
+            owners += [choice] * len(places)
+            slot_of += [slot] * len(places)
+            place_of += places
             if slot == 0:
                 builder.initial(begin)
         open_ends = ends
@@ -183,8 +186,14 @@ def place_words(
     fits = np.full(len(starts), np.nan)
     if windows is not None:
         fits = _fits(log_likelihoods, plain, network.emission[path], starts)
-    placed = zip(path[starts].tolist(), starts.tolist(), fits.tolist(), strict=True)
-    return [PlacedWord(owners[state], start, fit) for state, start, fit in placed]
+    placed = zip(np.split(path, starts[1:]), starts.tolist(), fits.tolist(), strict=True)
+    return [PlacedWord(_made(owners[states[0]], states, place_of), start, fit) for states, start, fit in placed]
+
+
+def _made(word: SpokenWord, states: NDArray[np.intp], place_of: Sequence[int]) -> SpokenWord:
+    """Return a word with the units that its states are of, given the place of each state's unit in it."""
+    places = dict.fromkeys(place_of[state] for state in states.tolist())
+    return word._replace(units=tuple(word.units[place] for place in places))
 
 
 def _fits(
@@ -250,17 +259,19 @@ def _state_counts(hmm: UnitHmm, words: Sequence[Sequence[Sequence[str]]]) -> dic
 
 
 def _append(
-    builder: NetworkBuilder, hmm: UnitHmm, units: Sequence[str], open_ends: list[tuple[int, float]]
+    builder: NetworkBuilder, hmm: UnitHmm, units: Sequence[str], open_ends: list[tuple[int, float]], pause: str
 ) -> list[tuple[int, float]]:
     """Add the states of some units, joined to all open ends; return the new open ends: states and log P(leave).
 
-    Without units the open ends stay as they are.
+    Without units the open ends stay as they are; ``pause`` among them may be left out.
     """
     ends = open_ends
     for unit in units:
+        before = ends if unit == pause else []
         for state in range(hmm.table.count(unit)):
             number = builder.state(hmm.table.density(unit, state), hmm.stay(unit, state))
             for source, move in ends:
                 builder.arc(source, number, move)
             ends = [(number, hmm.move(unit, state))]
+        ends = [*before, *ends]
     return ends

@@ -5,10 +5,13 @@ Everything is written under a temporary name beside its target, and renamed at t
 
 from __future__ import annotations
 
+import codecs
 import errno
 import hashlib
+import logging
 import os
 import platform
+import re
 import shutil
 import sys
 import uuid
@@ -18,7 +21,7 @@ from pathlib import Path
 from typing import IO
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.storage.sources import Source, check_apart, is_same
+from lipmotion.storage.sources import Source, check_apart, check_kind, is_same
 
 if sys.platform == "win32":
     import msvcrt
@@ -44,6 +47,7 @@ def check_source(path: Path, kind: str) -> None:
         raise InputError(f"{path}: no such file")
     if path.stat().st_size == 0:
         raise InputError(f"{path}: the file is empty; give a {kind}")
+    check_kind(path, kind)
 
 
 def sha256_of(path: Path) -> str:
@@ -72,22 +76,50 @@ def check_listable(folder: Path) -> None:
         raise InputError(f"{folder}: cannot be read: {error.strerror or error}; ask its owner, or copy it") from error
 
 
-def read_text_file(path: Path, kind: str, largest: int = LARGEST_TEXT_BYTES) -> str:
-    """Return the text of a UTF-8 file, without a byte order mark.
+LOG = logging.getLogger("lipmotion")
+MARKS_OF_TEXT = {
+    codecs.BOM_UTF8: "utf-8-sig",
+    codecs.BOM_UTF32_LE: "utf-32",
+    codecs.BOM_UTF16_LE: "utf-16",
+    codecs.BOM_UTF16_BE: "utf-16",
+}
+CONTROL = re.compile(r"[\x00-\x08\x0e-\x1a\x1c-\x1f\ufffd]")
+"""Characters that no text has."""
 
-    kind : what it should be, for messages
-    Raises InputError: no such file, not a file, larger than ``largest`` bytes, or not UTF-8.
+
+def read_text_file(path: Path, kind: str, largest: int = LARGEST_TEXT_BYTES, *, western: bool = False) -> str:
+    """Return the text of a file in UTF-8, UTF-16 or UTF-32, without a byte order mark.
+
+    UTF-16 may be without its mark, where every other byte of most letters is 0.
+    kind    : what it should be, for messages
+    western : what is none of these is in the code page of Windows in western Europe and America; a warning says so
+    Raises InputError: no such file, not a file, larger than ``largest`` bytes, or no such text.
     """
     check_regular(path, f"{kind} file")
     try:
         size = path.stat().st_size
         if size > largest:
             raise InputError(f"{path}: {size} bytes, required at most {largest}: is it a {kind}?")
-        return path.read_text(encoding="utf-8-sig")
+        check_kind(path, "text", kind)
+        content = path.read_bytes()
     except FileNotFoundError as error:
         raise InputError(f"{path}: no such {kind} file") from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: not a readable UTF-8 {kind} ({error}); save it as UTF-8 text") from error
+    except OSError as error:
+        raise InputError(f"{path}: not a readable {kind} ({error.strerror or error})") from error
+    encoding = next((name for mark, name in MARKS_OF_TEXT.items() if content.startswith(mark)), "utf-8")
+    odd, even = content[1::2].count(0), content[::2].count(0)
+    if encoding == "utf-8" and max(odd, even) > len(content) // 4 > 4 * min(odd, even):
+        encoding = "utf-16-le" if odd > even else "utf-16-be"
+    try:
+        return content.decode(encoding)
+    except UnicodeDecodeError as error:
+        text = content.decode("cp1252", "replace") if western and encoding == "utf-8" else "\0"
+        if CONTROL.search(text):
+            raise InputError(
+                f"{path}: not a readable {encoding.upper()} {kind} ({error}); save it as UTF-8 text"
+            ) from error
+    LOG.warning("%s: not UTF-8; read as Windows-1252 (western Europe); save it as UTF-8 if letters are wrong", path)
+    return text
 
 
 def check_target(target: Path, source: str | Path | None = None) -> None:

@@ -40,9 +40,10 @@ def x264_instructions() -> str:
     return ":asm=avx2" if any(name.startswith(("AVX512", "X86_V4")) for name in features) else ""
 
 
-def open_media(path: Path) -> Any:
+def open_media(path: Path, *, content: Any = None) -> Any:
     """Return an open PyAV container, which the caller closes.
 
+    content : an open file to read in its place, with its ``name``
     The name is always that of a file (in ``12:30.wav`` there is no protocol), and no other file is opened, whatever the
     content: FFmpeg itself refuses all other protocols, and all formats but ``MEDIA_FORMATS``.
     Raises ValueError: another format, or damaged. Raises the errors of PyAV.
@@ -57,7 +58,7 @@ def open_media(path: Path) -> Any:
         "max_pixels": str(MOST_PIXELS),
     }
     try:
-        return av.open(f"file:{path}", options=options)
+        return av.open(f"file:{path}" if content is None else content, options=options)
     except av.ArgumentError as error:
         raise ValueError(
             "damaged, or of a format that is not read; playlists and indexes of other files are not followed"

@@ -1,14 +1,16 @@
-"""The inputs of a call, and checks that its outputs do not overwrite them."""
+"""The inputs of a call: what a file is by its content, and that no output overwrites one."""
 
 from __future__ import annotations
 
 import os
 import stat
+import zlib
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from lipmotion.errors import ExportError
+from lipmotion.errors import ExportError, InputError
 
 
 @dataclass(frozen=True)
@@ -98,3 +100,113 @@ def _status(path: str | Path) -> os.stat_result | None:
         return Path(path).stat()
     except (OSError, ValueError):
         return None
+
+
+HEAD, TAIL = 4096, 1 << 16
+"""Bytes of the beginning and of the end of a file, that say what it is; a .zip has its names at the end."""
+_NEXT = {
+    "document": "save it as plain text (.txt); a recording is given first, its words with --transcript",
+    "project": "it holds no sound: export the track as .wav or .flac",
+    "scene": "export a character as .glb with its blendshapes, motion as .csv, speech as .wav",
+    "drawing": "export its layers as .png, a drawing for each mouth shape, into a folder for --face",
+    "picture": "give a recording, and the picture as a face: --face",
+    "archive": "unpack it, and give the file that is in it",
+    "stand-in": "it stands for the file: fetch the file itself",
+    "sound": "motion is made of it by: lipmotion animate FILE -o OUT; its words by: lipmotion words FILE",
+}
+"""What to do with a file that is given in the place of another, by group."""
+_KINDS: tuple[tuple[str, str, tuple[tuple[int, bytes], ...]], ...] = (
+    ("document", "a PDF", ((0, b"%PDF"),)),
+    ("document", "a Word document", ((-1, b"word/document.xml"),)),
+    ("document", "an Excel table", ((-1, b"xl/workbook.xml"),)),
+    ("document", "a PowerPoint file", ((-1, b"ppt/presentation.xml"),)),
+    ("document", "an OpenDocument file", ((30, b"mimetypeapplication/vnd.oasis"),)),
+    ("document", "a Word document or another of an old Office", ((0, b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"),)),
+    ("document", "a rich-text file (RTF)", ((0, b"{\\rtf"),)),
+    ("document", "a binary TextGrid", ((0, b"ooBinaryFile"),)),
+    ("project", "a project of Ableton Live", ((-2, b"<Ableton"),)),
+    ("project", "a project of Audacity", ((68, b"AUDY"), (-2, b"audacityproject"))),
+    ("project", "a project of Reaper", ((0, b"<REAPER_PROJECT"),)),
+    ("project", "a project of FL Studio", ((0, b"FLhd"),)),
+    ("project", "a project of Cubase", ((8, b"NUND"),)),
+    ("project", "a project of Pro Tools", ((0, b"\x030010111100101011"),)),
+    ("project", "a session of Audition", ((-2, b"<sesx"),)),
+    ("project", "a project of Premiere", ((-2, b"<PremiereData"),)),
+    ("project", "a project of After Effects", ((8, b"Egg!"),)),
+    ("project", "a MIDI file of notes", ((0, b"MThd"),)),
+    ("project", "a sound bank of a game", ((0, b"BKHD"), (0, b"FSB5"))),
+    ("scene", "a Blender file", ((0, b"BLENDER-"), (0, b"BLENDER_"), (0, b"BLENDER1"))),
+    ("scene", "a Blender file, or another that is compressed (Zstandard)", ((0, b"\x28\xb5\x2f\xfd"),)),
+    ("scene", "an FBX file", ((0, b"Kaydara FBX"), (0, b"; FBX"))),
+    ("scene", "a Maya file", ((0, b"//Maya"), (0, b"FOR4"), (0, b"FOR8"))),
+    ("scene", "a Cinema 4D file", ((0, b"QC4DC4D6"),)),
+    ("scene", "a USD scene", ((0, b"PXR-USDC"), (0, b"#usda"))),
+    ("scene", "an asset of Unreal", ((0, b"\xc1\x83\x2a\x9e"),)),
+    ("scene", "a bundle of Unity", ((0, b"UnityFS"),)),
+    ("drawing", "a Photoshop file", ((0, b"8BPS"),)),
+    ("drawing", "a Krita file", ((30, b"mimetypeapplication/x-krita"),)),
+    ("picture", "a picture", ((0, b"\x89PNG\r\n"), (0, b"\xff\xd8\xff"), (0, b"GIF8"), (8, b"WEBP"), (-2, b"<svg"))),
+    ("picture", "a picture", ((0, b"II*\0"), (0, b"MM\0*"), (0, b"gimp xcf"), (4, b"ftypheic"), (4, b"ftypavif"))),
+    (
+        "archive",
+        "an archive",
+        ((0, b"PK\3\4"), (0, b"7z\xbc\xaf"), (0, b"Rar!\x1a"), (0, b"\x1f\x8b\x08"), (0, b"BZh")),
+    ),
+    ("archive", "an archive", ((0, b"\xfd7zXZ"), (257, b"ustar"))),
+    ("stand-in", "a web page", ((0, b"<!DOCTYPE html"), (0, b"<!doctype html"), (0, b"<html"), (0, b"<HTML"))),
+    ("stand-in", "a pointer of Git LFS", ((0, b"version https://git-lfs"),)),
+    ("stand-in", "a note of macOS beside a file", ((0, b"\0\x05\x16\x07"),)),
+    ("sound", "a recording", ((8, b"WAVE"), (8, b"AIFF"), (8, b"AIFC"), (8, b"AVI "), (4, b"ftyp"), (0, b"fLaC"))),
+    ("sound", "a recording", ((0, b"OggS"), (0, b"ID3"), (0, b"\xff\xfb"), (0, b"\x1a\x45\xdf\xa3"))),
+)
+"""Group and name of files, and what is in them at a byte; -1: anywhere at the end, -2: anywhere at the beginning. What
+is packed with gzip is unpacked."""
+_NO_MISTAKE = {
+    "recording": {"sound"},
+    "video": {"sound", "picture"},
+    "text": set[str](),
+    "motion file": {"archive", "picture"},
+}
+"""Groups that may be what is wanted; of anything else: archives, pictures and sound."""
+
+
+def check_kind(path: Path, wanted: str, kind: str = "") -> None:
+    """Raise InputError for a file that is known to be something else, whatever its suffix, with the next step.
+
+    wanted : ``recording``, ``video``, ``text``, ``motion file``, or another noun;  kind : noun for the message
+    """
+    if not is_file(path):
+        return
+    with suppress(OSError), path.open("rb") as file:
+        head = file.read(HEAD)
+        file.seek(max(path.stat().st_size - TAIL, 0))
+        tail = file.read(TAIL) if head.startswith(b"PK") else b""
+        unpacked = _unpacked(head)
+        fine = _NO_MISTAKE.get(wanted, {"archive", "picture", "sound"})
+        for group, name, marks in _KINDS:
+            for at, mark in marks if group not in fine else ():
+                beginnings = (head[at : at + len(mark)], unpacked[at : at + len(mark)])
+                if mark in (tail if at == -1 else unpacked) if at < 0 else mark in beginnings:
+                    raise InputError(f"{path}: is {name}, required a {kind or wanted}; {_NEXT[group]}")
+
+
+def _unpacked(head: bytes) -> bytes:
+    """Return the beginning of a file without the packing of gzip."""
+    with suppress(zlib.error):
+        return zlib.decompressobj(31).decompress(head, HEAD) if head.startswith(b"\x1f\x8b") else head
+    return b""
+
+
+def is_text(path: Path) -> bool:
+    """Return whether a file begins as text does."""
+    with path.open("rb") as file:
+        head = file.read(HEAD)
+    with suppress(UnicodeDecodeError):
+        text = head.decode(
+            "utf-16" if head[:2] in {b"\xff\xfe", b"\xfe\xff"} else "utf-8", "strict" if len(head) < HEAD else "ignore"
+        )
+        return (
+            all(letter.isprintable() or letter in "\t\n\r\f\ufeff" for letter in text)
+            and 2 * len(text) > len(head) // 2
+        )
+    return False

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 
 from lipmotion.types.moods import MoodTag
 
@@ -60,6 +61,16 @@ class TimedTranscript:
                 for line in self.lines
             ),
             self.tags,
+        )
+
+    def with_words(self, words: Callable[[str], Iterable[str]]) -> TimedTranscript:
+        """Return the transcript with other words in place of each one; they have its times."""
+        return replace(
+            self,
+            lines=tuple(
+                replace(line, words=tuple(replace(word, word=each) for word in line.words for each in words(word.word)))
+                for line in self.lines
+            ),
         )
 
     @property

@@ -21,7 +21,7 @@ class Track:
              points (``x_17``, ``y_17``, ``z_17``: face-mesh point 17) without head motion, in eye distances; supplied
              curves may have any channels
     seen   : bool array [shape=(T,)], False in frames where the face was not measured and the motion is interpolated;
-             True everywhere for supplied curves
+             True everywhere for supplied curves, but without a face in a take of Live Link Face
     crops  : uint8 array [shape=(T, 56, 72, 3)], RGB pictures of the mouth, or None
     notes  : remarks on the video for the user, in words (cuts, damage, a covered mouth)
     """

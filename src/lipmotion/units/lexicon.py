@@ -7,16 +7,19 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from importlib.util import find_spec
+from itertools import product
 from pathlib import Path
 
 from lipmotion.errors import InputError, MissingDependencyError, shortened
 from lipmotion.storage.files import read_text_file
-from lipmotion.units.phones import PHONES, REDUCED_VOWELS, is_silent
-from lipmotion.units.spelling import guess_pronunciation, without_accents
+from lipmotion.units.phones import OTHER_NAMES, PAUSE, PHONES, REDUCED_VOWELS, is_silent
+from lipmotion.units.spelling import guess_pronunciation, normalised_text, without_accents
 from lipmotion.units.spelling_network import network_pronunciation
-from lipmotion.units.text_normalisation import normalised_text
+from lipmotion.units.written_forms import readings
 
 Pronunciation = tuple[str, ...]
+SpokenForm = tuple[tuple[str, str], ...]
+"""Phones, each with the word that it is of; between words a pause that may be made, without a word."""
 
 FULL_VOWELS = frozenset("aa ae ao aw ay eh ey iy ow oy uh uw".split())
 WEAK_WORDS = frozenset("a an the of and from was but than that's her were your for if in is it its".split())
@@ -25,6 +28,11 @@ LARGEST_LEXICON_BYTES, MOST_LINES = 1 << 25, 1 << 20
 """Most bytes and lines of a user's file; the dictionary of 134,000 words has 3.3 million bytes."""
 LONGEST_LINE = 2000
 """Most characters of a line: a word, its phones and a comment."""
+OFTEN_LENGTHENED = frozenset("no so go do to who hello yo bro ho he me we she be the long stop".split())
+"""Words that are meant rather than those with their vowel twice (``noo``, ``loong``, ``stoop``)."""
+LENGTHENED, REPEATED = re.compile(r"(.)\1\1|^(..+?)\2"), re.compile(r"([a-z]{2,4}?)\1+h?")
+LONGEST_LENGTHENED, MOST_LENGTHENED = 100, 5
+"""A word of more letters, or with more that are doubled, is none of these."""
 VARIANT_NUMBER = re.compile(r"\(\d+\)$")
 """The number by which the dictionary marks a further pronunciation."""
 MOST_VARIANTS = 32
@@ -34,9 +42,13 @@ six."""
 
 @lru_cache(maxsize=4096)
 def phone_named(label: str) -> str | None:
-    """Return the phone that a label names, or None: ARPAbet in either case, stressed or not, or our own name."""
-    name = re.sub(r"\d$", "", label.lower())
-    name = REDUCED_VOWELS.get(name, name) if label.endswith("0") else name
+    """Return the phone that a label names, or None.
+
+    A label is ARPAbet in either case, stressed or not, TIMIT's, with its place in the word as in Kaldi (``hh_B``), or
+    our own name.
+    """
+    name = re.sub(r"\d?(_[bies])?$", "", label.lower())
+    name = REDUCED_VOWELS.get(name, name) if label[len(name) :].startswith("0") else OTHER_NAMES.get(name, name)
     return name if name in PHONES else None
 
 
@@ -71,16 +83,41 @@ class Lexicon:
         return cls({word: tuple(variants) for word, variants in user.items()})
 
     def known(self, word: str) -> bool:
-        """Return whether the word is in the user's file or in the dictionary."""
-        return word in self.user or bool(_dictionary_entries(word))
+        """Return whether a word, or the usual reading of a written form, is in the user's file or the dictionary."""
+        said = (each in self.user or in_dictionary(each) for each in readings(word)[0])
+        return word in self.user or all(said) or bool(lengthened(word))
 
     def pronunciations(self, word: str) -> tuple[Pronunciation, ...]:
-        """Return every pronunciation of a lower-case word.
+        """Return every pronunciation of a lower-case word, or of a written form (``1995``) in all its readings.
 
-        Of an unknown one: those of the same word without accents, if the dictionary has it (``cafe`` for ``café``),
-        else that of ``hama``'s network, where it is installed, else that of the letter-to-sound rules.
+        Of an unknown one: those of the same word without accents or lengthened letters, if the dictionary has it
+        (``cafe`` for ``café``, ``boom`` for ``boooom``), else that of ``hama``'s network, where it is installed, else
+        that of the letter-to-sound rules.
         Raises InputError: as ``guess_pronunciation``.
         """
+        forms = (tuple(phone for phone, _ in form if phone != PAUSE) for form in self.spoken_forms(word))
+        return tuple(dict.fromkeys(forms))
+
+    def spoken_forms(self, word: str) -> tuple[SpokenForm, ...]:
+        """Return every way to say a word or a written form, the usual one first. Raises as ``pronunciations``."""
+        said = readings(word)
+        if said == ((word,),) and word not in self.user:
+            said = lengthened(word) or said
+        own = tuple(reading for reading in said if len(reading) == 1 and reading[0] in self.user)
+        forms: list[SpokenForm] = []
+        for reading in ((word,),) if word in self.user else own or said:
+            choices = [self._of_word(each) for each in reading]
+            several = len(said) > 1 and len(reading) > 1  # then not in all their pronunciations
+            for number in range(min(max(map(len, choices)), 2 if several else MOST_VARIANTS)):
+                form: list[tuple[str, str]] = []
+                for each, variants in zip(reading, choices, strict=True):
+                    form += [(PAUSE, "")] if form else []
+                    form += [(phone, each) for phone in variants[min(number, len(variants) - 1)]]
+                forms.append(tuple(form))
+        return tuple(dict.fromkeys(forms))
+
+    def _of_word(self, word: str) -> tuple[Pronunciation, ...]:
+        """Return the pronunciations of one word."""
         if word in self.user:
             return self.user[word]
         entries = _dictionary_entries(word) or _dictionary_entries(without_accents(word))
@@ -89,6 +126,33 @@ class Lexicon:
             return tuple(dict.fromkeys(variants))
         by_rules = guess_pronunciation(word)
         return (with_reduced_vowels(word, network_pronunciation(without_accents(word)) or by_rules),)
+
+
+def in_dictionary(word: str) -> bool:
+    """Return whether the dictionary has a word, perhaps without accents."""
+    return bool(_dictionary_entries(word) or _dictionary_entries(without_accents(word)))
+
+
+@cache
+def lengthened(word: str) -> tuple[tuple[str, ...], ...]:
+    """Return the words of the dictionary that a lengthened word stands for, the likeliest first; none of any other.
+
+    Letters that stand there three times and more are meant once or twice: ``nooo``, ``boooom``. Else the word may be a
+    part that is repeated: ``hahaha``.
+    """
+    plain = without_accents(word)
+    if not LENGTHENED.search(plain) or len(plain) > LONGEST_LENGTHENED or in_dictionary(word):
+        return ()
+    runs = [found[0] for found in re.finditer(r"(.)\1*", plain)]
+    choices = [
+        (run[0],) if len(run) == 1 else (run[0], 2 * run[0]) if run[0] in "aiuy" else (2 * run[0], run[0])
+        for run in runs
+    ]
+    if max(map(len, runs)) > 2 and sum(len(each) > 1 for each in choices) <= MOST_LENGTHENED:
+        known = [each for each in map("".join, product(*choices)) if in_dictionary(each)]
+        return tuple((each,) for each in sorted(known, key=lambda each: each not in OFTEN_LENGTHENED))
+    found = REPEATED.fullmatch(plain)
+    return ((found[1],) * found[0].count(found[1]),) if found and in_dictionary(found[1]) else ()
 
 
 def _add_line(user: dict[str, list[Pronunciation]], line: str) -> None:

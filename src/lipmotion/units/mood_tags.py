@@ -10,11 +10,23 @@ from typing import NamedTuple
 from lipmotion.errors import shortened
 from lipmotion.types import Timeline, Unit
 from lipmotion.types.moods import MANNERS, MOODS, NEUTRAL, PLAIN, MoodKey, MoodTag, in_time
+from lipmotion.units.spoken_text import speaker_names, without_speakers
 from lipmotion.units.text_normalisation import words_in
 from lipmotion.units.word_spans import words_in_time
 
 LOG = logging.getLogger("lipmotion")
-TAG = re.compile(r"\[(/?)([^\W\d_][^\[\]<>\n]{0,80})\]|<(/?)([^\W\d_][^\[\]<>\n]{0,80})>")
+TAG = re.compile(
+    r"[\[<{](/?)([^\W\d_][^\[\]<>{}\n]{0,80})[\]>}]|\*(?P<did>[a-z]+s)\*"
+    r"|<<[^<>\n]{1,200}>>|<[/!#?][^<>\n]{0,80}>|\{[^{}\n]{0,200}\}|\[/?\]|\[\d{1,3}\]"
+    r"|\([a-z-]{2,20}: ?[$\"'][^()\n]{0,200}\)|#line:\w+|\[\[(?:slnc|rate|volm|pbas|emph|inpt|rset)\b[^\[\]\n]{0,80}]]"
+)
+"""Tags of moods, and markup of games and voices (Ren'Py, Unity, Yarn, Twine, SSML): ``{w=0.5}``, ``<color=red>``."""
+LINK = re.compile(
+    r"\[\[(?!(?:slnc|rate|volm|pbas|emph|inpt|rset)\b)(?:[^\[\]\n]*<-)?([^\[\]|\n]*?)(?:(?:\||->)[^\[\]\n]*)?\]\]"
+)
+"""A link (``[[Go north|North]]``), of which what is shown is spoken."""
+INSIDE_WORDS = frozenset("a b i u s em strong mark sub sup font span color colour size wave shake".split())
+"""Tags of style, which may stand inside a word."""
 _NAME = re.compile(r"([a-z][a-z '-]*?)\s*(?::\s*(\d*\.?\d+))?")
 SYNONYMS: dict[str, tuple[str, float]] = {
     **dict.fromkeys(
@@ -50,28 +62,32 @@ def tagged_text(text: str, words: Callable[[str], Sequence[str]] = words_in) -> 
     """Return what is spoken of a text, and its tags; a text without tags is returned as it is.
 
     words : returns the words of a text
-    A tag holds until the next one of its kind, mood or manner; ``</smile>`` ends in a neutral face. A tag that is not
-    known is not spoken, and named in a warning.
+    A tag holds until the next one of its kind, mood or manner; ``</smile>`` ends in a neutral face. What else is not
+    spoken, other tags and the names of speakers before what they say, is named in a warning.
 
     >>> tagged_text("[sad:0.5] I know. <smile>But</smile> so what")
     TaggedText(text='  I know.  But  so what', tags=(MoodTag(share=0.0, mood='sad', strength=0.5), \
 MoodTag(share=0.4, mood='happy', strength=0.6), MoodTag(share=0.6, mood='neutral', strength=1.0)))
     """
-    parts, found, unknown, last = [], [], [], 0
+    text, unknown = without_speakers(LINK.sub(r"\1", text), speaker_names([text]))
+    spoken, found, last = "", [], 0
     for tag in TAG.finditer(text):
-        parts.append(text[last : tag.start()])
-        last = tag.end()
         meaning = _meaning(tag)
+        if tag["did"] and meaning is None:
+            continue
+        name = re.split(r"[\W_]", tag[2] or "", maxsplit=1)[0]
+        spoken += text[last : tag.start()] + " " * (meaning is not None or name.lower() not in INSIDE_WORDS)
+        last = tag.end()
         if meaning is None:
             unknown.append(tag[0])
         else:
-            found.append((len(words(" ".join(parts))), *meaning))
-    if not last:
+            found.append((len(words(spoken)), *meaning))
+    spoken += text[last:]
+    if not found and not unknown:
         return TaggedText(text, ())
     if unknown:
         named = ", ".join(map(shortened, dict.fromkeys(unknown)))
         LOG.warning("not known, and not spoken: %s; known tags are [happy], [sad:0.5], ... (docs/expression.md)", named)
-    spoken = " ".join((*parts, text[last:]))
     count = max(len(words(spoken)), 1)
     return TaggedText(spoken, tuple(MoodTag(before / count, mood, strength) for before, mood, strength in found))
 
@@ -100,10 +116,10 @@ def moods_in_time(tags: Sequence[MoodTag], units: Timeline[Unit]) -> tuple[MoodK
 
 def _meaning(tag: re.Match[str]) -> tuple[str, float] | None:
     """Return the mood and the strength that a tag asks for; None: it is not known."""
-    name = _NAME.fullmatch((tag[2] or tag[4]).strip().lower())
+    name = _NAME.fullmatch((tag[2] or tag["did"] or "").strip().lower())
     known = SYNONYMS.get(name[1]) if name else None
     if name is None or known is None:
         return None
-    if tag[1] or tag[3]:
+    if tag[1]:
         return PLAIN if known[0] in MANNERS else NEUTRAL, 1.0
     return known[0], min(float(name[2]), 1.0) if name[2] else known[1]

@@ -1,4 +1,4 @@
-"""Letter-to-sound rules for words that are in no dictionary."""
+"""The letters of words: in one form of writing, and read by rules where a word is in no dictionary."""
 
 from __future__ import annotations
 
@@ -7,84 +7,20 @@ import unicodedata
 
 from lipmotion.errors import InputError, shortened
 
-SPELLINGS: dict[str, str] = {
-    # The longest match from the left wins. ARPAbet, lower case; an empty value is a silent letter.
-    "tion": "sh ah n",
-    "sion": "zh ah n",
-    "ture": "ch er",
-    "ough": "ao",
-    "augh": "ao",
-    "eigh": "ey",
-    "igh": "ay",
-    "tch": "ch",
-    "dge": "jh",
-    "sch": "sh",
-    "ee": "iy",
-    "ea": "iy",
-    "ie": "iy",
-    "ei": "ey",
-    "ai": "ey",
-    "ay": "ey",
-    "ey": "iy",
-    "oa": "ow",
-    "oo": "uw",
-    "ou": "aw",
-    "ow": "ow",
-    "oi": "oy",
-    "oy": "oy",
-    "au": "ao",
-    "aw": "ao",
-    "ew": "uw",
-    "ue": "uw",
-    "ar": "aa r",
-    "er": "er",
-    "ir": "er",
-    "or": "ao r",
-    "ur": "er",
-    "ch": "ch",
-    "ck": "k",
-    "gh": "g",
-    "kn": "n",
-    "ng": "ng",
-    "ph": "f",
-    "qu": "k w",
-    "rh": "r",
-    "sh": "sh",
-    "th": "th",
-    "wh": "w",
-    "wr": "r",
-    "ce": "s eh",
-    "ci": "s ih",
-    "cy": "s iy",
-    "ge": "jh eh",
-    "a": "ae",
-    "b": "b",
-    "c": "k",
-    "d": "d",
-    "e": "eh",
-    "f": "f",
-    "g": "g",
-    "h": "hh",
-    "i": "ih",
-    "j": "jh",
-    "k": "k",
-    "l": "l",
-    "m": "m",
-    "n": "n",
-    "o": "aa",
-    "p": "p",
-    "q": "k",
-    "r": "r",
-    "s": "s",
-    "t": "t",
-    "u": "ah",
-    "v": "v",
-    "w": "w",
-    "x": "k s",
-    "y": "iy",
-    "z": "z",
-    "'": "",
-}
+
+def table(rows: str) -> dict[str, str]:
+    """Return a table of ``key=value`` between blanks; an underscore in a value is a blank."""
+    return {key: value.replace("_", " ") for key, _, value in (row.partition("=") for row in rows.split())}
+
+
+SPELLINGS = table(
+    "tion=sh_ah_n sion=zh_ah_n ture=ch_er ough=ao augh=ao eigh=ey igh=ay tch=ch dge=jh sch=sh ee=iy ea=iy ie=iy "
+    "ei=ey ai=ey ay=ey ey=iy oa=ow oo=uw ou=aw ow=ow oi=oy oy=oy au=ao aw=ao ew=uw ue=uw ar=aa_r er=er ir=er "
+    "or=ao_r ur=er ch=ch ck=k gh=g kn=n ng=ng ph=f qu=k_w rh=r sh=sh th=th wh=w wr=r ce=s_eh ci=s_ih cy=s_iy "
+    "ge=jh_eh a=ae b=b c=k d=d e=eh f=f g=g h=hh i=ih j=jh k=k l=l m=m n=n o=aa p=p q=k r=r s=s t=t u=ah v=v w=w "
+    "x=k_s y=iy z=z '="
+)
+"""The longest match from the left wins. ARPAbet, lower case; an empty value is a silent letter."""
 LONG_VOWELS = {"a": "ey", "e": "iy", "i": "ay", "o": "ow", "u": "uw"}
 ACCENTS = re.compile("[\u0300-\u036f]")
 """The accents of Latin letters; the marks of other scripts are sounds."""
@@ -95,8 +31,41 @@ _LONG_VOWEL = re.compile(r"[aeiou][bcdfgklmnpstvz]e('?s)?$")
 """A long vowel: vowel, consonant, final e."""
 
 
+MOST_MARKS = 30
+"""Most accents on one letter; no language has so many."""
+APOSTROPHES = re.compile("[’‘ʼʻ′´`‛ʹ＇]")
+UNSPOKEN = re.compile("\u00ad\\s*\n\\s*|[™®©]")
+"""A soft hyphen at the end of a line, and signs that Unicode's NFKC makes letters of."""
+DASHES = str.maketrans({"‐": "-", "‒": "-", "²": " squared", "³": " cubed", "″": '"'})
 PLAIN = str.maketrans({"ß": "ss", "æ": "ae", "œ": "oe", "ø": "o", "đ": "d", "ð": "th", "þ": "th", "ł": "l", "ı": "i"})
 """Letters of Latin alphabets that Unicode does not divide into a letter and an accent."""
+
+
+def plain_text(text: str) -> str:
+    """Return a text in Unicode's NFKC form, with straight apostrophes, without characters that nobody sees.
+
+    ``2½`` becomes ``2 1⁄2``.
+    """
+    if not text.isascii():
+        text = re.sub(r"(?<=\d)(?=[¼-¾⅐-⅞])", " ", UNSPOKEN.sub("", APOSTROPHES.sub("'", _few_marks(text))))
+        text = unicodedata.normalize("NFKC", text.translate(DASHES)).translate(DASHES)
+        text = "".join(letter for letter in text if unicodedata.category(letter) != "Cf")
+        text = re.sub(r"\d", lambda digit: str(int(digit[0])), text)
+    return text.replace("`", "'")
+
+
+def normalised_text(text: str) -> str:
+    """Return a text as ``plain_text`` does, in lower case."""
+    return plain_text(text).lower()
+
+
+def _few_marks(text: str) -> str:
+    """Return a text with at most ``MOST_MARKS`` marks on a letter: Unicode sorts them in quadratic time.
+
+    Source: Unicode Standard Annex 15, Stream-Safe Text Format.
+    """
+    marks = re.escape("".join(c for c in set(text) if unicodedata.combining(unicodedata.normalize("NFKD", c)[0])))
+    return re.sub(f"([{marks}]{{{MOST_MARKS}}})[{marks}]+", r"\1", text) if marks else text
 
 
 def without_accents(word: str) -> str:

@@ -1,4 +1,4 @@
-"""What is spoken of a subtitle or of recognised text: without tags, descriptions of sounds, and names of speakers."""
+"""What is a word, a sound or markup in labels, subtitles and recognised text: the one place that decides."""
 
 from __future__ import annotations
 
@@ -6,49 +6,113 @@ import html
 import re
 from collections import Counter
 from collections.abc import Iterable
+from enum import Enum
 
 from lipmotion.errors import InputError
-from lipmotion.types import TimedWord, TranscriptLine
-from lipmotion.units.text_normalisation import words_in
+from lipmotion.types import TimedWord
+from lipmotion.units.text_normalisation import tokens_in
+from lipmotion.units.written_forms import readings
 
 TAG = re.compile(r"</?[a-zA-Z!][^<>]{0,200}>|<[\d:.]{1,20}>|\{[^{}]{0,200}\}")
 """Tags of SubRip and WebVTT (``<i>``, ``<v Anna>``, ``<00:01.500>``), of SubStation (``{\\an8}``), and ``<unk>``."""
-SOUND = re.compile(r"\[[^\[\]]{0,200}\]|\([^()]{0,200}\)|（[^（）]{0,200}）")
+SOUND = re.compile(r"\[[^\[\]]{0,200}\]|\((?!\d{3}\))[^()]{0,200}\)|（[^（）]{0,200}）")
 """Descriptions of sounds, as subtitles for the deaf and recognisers write them: ``[music]``, ``(laughs)``."""
 SPEAKER = re.compile(
-    r"^[ \t>\-–—]{0,8}(?:[A-Z][A-Z0-9.'_#& -]{0,30}|[Ss]peaker[ _]?\w{1,3})[ \t]*:(?=\s|$)", re.MULTILINE
+    r"^[ \t>\-–—*_]{0,8}(?:\[([^\[\]\n:]{1,31})\]|([^\W\d_][\w.'’&# -]{0,30}?))"
+    r"[ \t]*(\([^()\n]{1,30}\))?[ \t*_]*:[*_]*(?=\s|$)",
+    re.MULTILINE,
 )
-"""A name in capitals, or ``Speaker 1``, before a colon at the start of a line."""
-NAME = re.compile(r"^[ \t>\-–—]{0,8}([A-Z][\w.'-]{0,30}(?: [A-Z][\w.'-]{0,30}){0,3})[ \t]*:(?=\s)", re.MULTILINE)
-"""What may be the name of a speaker, as programs for meetings write it."""
+"""What may be the name of a speaker: before a colon at the start of a line, perhaps with ``(V.O.)``."""
+CUE = re.compile(r"(?:\A|(?<=\n\n))[ \t]*([A-Z][A-Z0-9.'’ -]{1,30}(?:\([^()\n]{1,20}\))?)[ \t]*\n(?=[^\n]*[a-z])")
+"""A name in capitals above what is said, as in screenplays."""
+DIRECTION = re.compile(r"^[ \t]*(?:\([^()\n]{1,80}\)|(?:INT|EXT)\b[./][^\n]*)[ \t]*$", re.MULTILINE)
+"""A line of a screenplay that is not said."""
+NO_NAMES = frozenset("note notes warning question answer step tip remember ps p.s example".split())
+SYMBOLS = re.compile(r"&=\S+|%hesitation\b|\b(?:xxx|yyy)\b|&[-+~](?=\w)|(?<!\w)%(?=[^\W\d])", re.IGNORECASE)
+"""CHAT's sounds (``&=laughs``) and words that nobody understood; of hesitations (``%uh``) the mark alone."""
 SPEAKER_NAME_LINES = 3
 """A name that begins so many lines is that of a speaker."""
-LONGEST_PAUSE_S = 0.5
-"""Words in time that are further apart are not of one line."""
 LONGEST_LINE = 1 << 18
 """Most characters of a line: a label may hold four hours of speech."""
 MOST_WORDS = 500_000
 """Most words of a transcript: twelve hours of the fastest speech on record."""
 
 
+class SpokenAs(Enum):
+    """What a label stands for."""
+
+    SPEECH = "speech"
+    SILENCE = "silence"
+    UNKNOWN = "unknown"
+
+
+SILENCES = frozenset(["", *"sil sp pau ssil nsn h# #h # ## _ - silence = vocnoise iver".split()])
+"""Labels of silence, pauses and noise that is not speech; so is anything in brackets that is not of speech."""
+UNKNOWN_WORDS = frozenset("spn unk oov xxx yyy usb".split())
+"""Labels of speech of which nobody knows the words, also in brackets: of aligners, of CHAT, of WebMAUS (``<usb>``)."""
+IN_BRACKETS = re.compile(r"<[^<>]*>|\[[^\[\]]*\]|\([^()]*\)|\{[^{}]*\}|\+\+?\w+\+\+?|&=\S+|♪+|\*+")
+UNKNOWN_SPEECH = re.compile(r"unknown|unintelligible|inaudible|indistinct|garbage|spoken.?noise", re.IGNORECASE)
+
+
+def spoken_as(label: str) -> SpokenAs:
+    """Return whether a whole label stands for silence or a sound, speech of unknown words, or speech.
+
+    >>> spoken_as("[laughs]"), spoken_as("<unk>"), spoken_as("hello")
+    (<SpokenAs.SILENCE: 'silence'>, <SpokenAs.UNKNOWN: 'unknown'>, <SpokenAs.SPEECH: 'speech'>)
+    """
+    name = label.strip().lower()
+    bracketed = IN_BRACKETS.fullmatch(name) is not None
+    inner = name.strip("<>[](){}+&=* ") if bracketed else name
+    if inner in UNKNOWN_WORDS or (bracketed and UNKNOWN_SPEECH.search(inner)):
+        return SpokenAs.UNKNOWN
+    return SpokenAs.SILENCE if bracketed or name in SILENCES else SpokenAs.SPEECH
+
+
 def spoken_text(text: str, names: frozenset[str] = frozenset()) -> str:
     """Return what is spoken of a text; ``names``: of speakers, as ``speaker_names`` returns them."""
     text = SOUND.sub(" ", TAG.sub("", html.unescape(TAG.sub("", text))))
-    text = SPEAKER.sub("", text)
-    return NAME.sub(lambda found: "" if found[1] in names else found[0], text) if names else text
+    return without_speakers(SYMBOLS.sub(" ", text), names)[0]
+
+
+def without_speakers(text: str, names: frozenset[str] = frozenset()) -> tuple[str, list[str]]:
+    """Return a text without the names of speakers, and what was left out.
+
+    Names are those in capitals and with a remark (``ANNA:``, ``Anna (V.O.):``, ``[Anna]:``), ``Speaker 1:``, those in
+    ``names``, and two lines or more in capitals above what is said, as in screenplays.
+    """
+    left_out: list[str] = []
+
+    def without(found: re.Match[str]) -> str:
+        left_out.append(found[0].strip())
+        return ""
+
+    def said(found: re.Match[str]) -> str:
+        name = found[1] or found[2]
+        in_capitals = name == name.upper() != name.lower()
+        has_remark = found[1] or (found[3] and name[0].isupper())
+        numbered = re.fullmatch(r"[Ss]peaker[ _]?\w{1,3}", name)
+        return without(found) if in_capitals or has_remark or numbered or name in names else found[0]
+
+    cues = list(CUE.finditer(text))
+    if len(cues) > 1 or any("(" in cue[1] for cue in cues):
+        text = DIRECTION.sub(without, CUE.sub(without, text))
+    return SPEAKER.sub(said, text), left_out
 
 
 def speaker_names(texts: Iterable[str]) -> frozenset[str]:
-    """Return the names that stand before a colon at the start of several lines."""
-    counts = Counter(found[1] for text in texts for found in NAME.finditer(text))
-    return frozenset(name for name, count in counts.items() if count >= SPEAKER_NAME_LINES)
+    """Return the names before a colon at the start of several lines, or of every one of two lines and more."""
+    lines = [line for text in texts for line in text.splitlines() if line.strip()]
+    found = [match[2] for match in map(SPEAKER.match, lines) if match and match[2] and match[2].istitle()]
+    names = {name: count for name, count in Counter(found).items() if name.lower() not in NO_NAMES}
+    in_all = len(found) == len(lines) > 1
+    return frozenset(name for name, count in names.items() if in_all or count >= SPEAKER_NAME_LINES)
 
 
 def line_words(text: str, where: str) -> tuple[str, ...]:
     """Return the words of one line; ``where``: its place, for messages. Raises InputError: it is too long."""
     if len(text) > LONGEST_LINE:
         raise InputError(f"{where}: a line of {len(text)} characters, required at most {LONGEST_LINE}")
-    return words_in(text)
+    return tokens_in(text)
 
 
 def timed_words(
@@ -61,25 +125,13 @@ def timed_words(
     words = line_words(text, where)
     if len(words) < 2 or start_s is None or end_s is None:
         return [TimedWord(word, start_s, end_s) for word in words]
-    letters, done = sum(map(len, words)), 0
+    said = ["".join(readings(word)[0]) for word in words]
+    letters, done = sum(map(len, said)), 0
     timed = []
-    for word in words:
-        first, done = done, done + len(word)
+    for word, usual in zip(words, said, strict=True):
+        first, done = done, done + len(usual)
         timed.append(TimedWord(word, *(start_s + (end_s - start_s) * share / letters for share in (first, done))))
     return timed
-
-
-def lines_by_pauses(words: list[TimedWord]) -> list[TranscriptLine]:
-    """Return words in time as lines, each up to a pause."""
-    lines: list[list[TimedWord]] = []
-    for word in words:
-        last_s = lines[-1][-1].end_s if lines else None
-        joined = last_s is not None and word.start_s is not None and word.start_s - last_s <= LONGEST_PAUSE_S
-        if joined:
-            lines[-1].append(word)
-        else:
-            lines.append([word])
-    return [TranscriptLine(tuple(line), line[0].start_s, line[-1].end_s) for line in lines]
 
 
 def check_word_count(count: int, where: str) -> None:

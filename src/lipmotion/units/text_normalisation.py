@@ -2,50 +2,77 @@
 
 from __future__ import annotations
 
+import html
 import re
 import unicodedata
+from functools import cache
 
 from lipmotion.errors import InputError
-from lipmotion.units.written_forms import ORDINAL, as_spoken, ordinal_word
+from lipmotion.units.lexicon import in_dictionary, lengthened
+from lipmotion.units.spelling import normalised_text, plain_text
+from lipmotion.units.written_forms import FORMS, NUMERIC, WORD, readings
 
-ONES = (
-    "zero one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen "
-    "seventeen eighteen nineteen"
-).split()
-TENS = "_ _ twenty thirty forty fifty sixty seventy eighty ninety".split()
-TOKEN = re.compile(rf"{ORDINAL}|[^\W\d_]+(?:'[^\W\d_]+)*|\d+")
-"""An ordinal in digits, a word, or a whole number."""
 CHINESE = "[\u3400-\u4dbf\u4e00-\u9fff]"
 """A Chinese character."""
-MOST_MARKS = 30
-"""Most accents on one letter; no language has so many."""
-SCALES = ((10**9, "billion"), (10**6, "million"), (1000, "thousand"), (100, "hundred"))
+INITIALS = re.compile("[A-Z]{2,5}s?")
+"""What may be letters that are said one by one."""
+RANGE = re.compile(
+    r"(?:(?<=\d[ap]m)|(?<=\d [ap]m)|(?<=:\d\d))\s?[-–]\s?(?=\d)|(?<=\d)-(?=\d{1,2}\s?[ap]m\b)", re.IGNORECASE
+)
+"""The dash of ``9am-5pm`` and ``5:00-6:30``."""
+SMILEY = re.compile(r"(?<!\w)(?:[:;=8][-o']?[)(\]DPpO3|/\\]+|<3+|[xX]D+|\^_+\^|[tT]_[tT])(?!\w)")
+REFERENCE = re.compile(r"&(?:[a-zA-Z]{2,8}|#\d{1,6}|#x[\da-fA-F]{1,5});")
 
 
 def words_of(text: str) -> tuple[str, ...]:
-    """Return the lower-case words of a text: punctuation dropped, hyphens split, numbers and money spelled out.
+    """Return the lower-case words of a text: punctuation dropped, hyphens split, numbers and money as they are said.
 
-    Raises InputError: there is no word in it.
+    Of what may be said in several ways, the usual one. Raises InputError: there is no word in it.
     """
-    words = words_in(text)
-    if not words:
-        raise InputError(f"the transcript {text[:40]!r} holds no word; give the words that are spoken")
-    return words
+    return tuple(word for token in checked_tokens(text) for word in readings(token)[0])
 
 
 def words_in(text: str) -> tuple[str, ...]:
     """Return the words of a text as ``words_of`` does; none where there is none."""
-    words: list[str] = []
-    text = as_spoken(re.sub(r"(?<=\d),(?=\d{3})", "", normalised_text(text)))
-    for token in TOKEN.findall(text):
-        if token.isdecimal():
-            words += number_words(token)
-        elif token[0].isdecimal():
-            *before, last = number_words(token[:-2])
-            words += [*before, ordinal_word(last)]
-        else:
-            words.append(token)
-    return tuple(words)
+    return tuple(word for token in tokens_in(text) for word in readings(token)[0])
+
+
+def checked_tokens(text: str) -> tuple[str, ...]:
+    """Return the words of a text as ``tokens_in`` does. Raises InputError: there is no word in it."""
+    return _some(tokens_in(text), text)
+
+
+def tokens_in(text: str) -> tuple[str, ...]:
+    """Return the words of a text in lower case, and what is said as other words as it is written.
+
+    A lexicon pronounces these in all their readings (``units.written_forms``).
+
+    >>> tokens_in("Dr. Brown met Henry VIII at 5:00, in May 1995!")
+    ('Dr.', 'brown', 'met', 'Henry VIII', 'at', '5:00', 'in', 'may', '1995')
+    """
+    text = SMILEY.sub(" ", REFERENCE.sub(lambda found: html.unescape(found[0]), text))
+    plain = re.sub(r"\bUS(?=\$)", "", RANGE.sub("–", plain_text(text)))
+    shouted = not any(letter.islower() for letter in plain)
+    tokens = []
+    for token in (found[0] for found in _scanner().finditer(plain)):
+        is_word = token.isalpha() or ("'" in token and token.replace("'", "").isalpha())
+        is_short = not shouted and INITIALS.fullmatch(token) and not in_dictionary(token.lower())
+        is_short = is_short and not lengthened(token.lower())
+        tokens.append(token.lower() if is_word and not is_short else token)
+    return tuple(tokens)
+
+
+@cache
+def _scanner() -> re.Pattern[str]:
+    """Return what finds written forms, signs, words, and numbers beside letters."""
+    word = rf"{WORD}(?=[,;!?]|\s+(?-i:[a-z])|\s*\Z)"  # most are words and no more; the rest takes a tenfold time
+    forms = [rf"(?:{form})(?![^\W_])" for form, _ in FORMS[:-1]]  # initials are words
+    numeric, worded = ("|".join(part) for part in (forms[: len(NUMERIC)], forms[len(NUMERIC) :]))
+    signs = r"(?<!\w)w/o?(?=\s)|[&@×÷]|[+=](?![+=])(?<![+=]{2})|#(?=\w)|~(?=\d)"
+    dashes = r"(?<![^\s(])-(?=[.$£€]?\d)|−(?=\d)|(?<=[m\d])–(?=\d)"
+    begun = rf"(?<![^\W_])(?:{word}|(?=[^\W\d_])(?:{worded})|(?![\s,;!?])(?:{numeric}))"
+    grouped = "|".join([begun, signs, dashes, WORD, r"\d+(?:\.\d+)*"])
+    return re.compile(re.sub(r"(?<!\\)\((?!\?)", "(?:", grouped), re.IGNORECASE)
 
 
 def written_words(text: str) -> tuple[str, ...]:
@@ -56,37 +83,11 @@ def written_words(text: str) -> tuple[str, ...]:
     """
     spaced = re.sub(CHINESE, r" \g<0> ", normalised_text(text))
     kept = "".join(letter if letter == "'" or unicodedata.category(letter)[0] in "LMN" else " " for letter in spaced)
-    words = tuple(word.strip("'") for word in kept.split() if word.strip("'"))
+    return _some(tuple(word.strip("'") for word in kept.split() if word.strip("'")), text)
+
+
+def _some(words: tuple[str, ...], text: str) -> tuple[str, ...]:
+    """Return words. Raises InputError: there is none."""
     if not words:
         raise InputError(f"the transcript {text[:40]!r} holds no word; give the words that are spoken")
     return words
-
-
-def normalised_text(text: str) -> str:
-    """Return a text in lower case, in Unicode's NFKC form, with straight apostrophes."""
-    return unicodedata.normalize("NFKC", _few_marks(text)).lower().replace("’", "'")
-
-
-def _few_marks(text: str) -> str:
-    """Return a text with at most ``MOST_MARKS`` marks on a letter: Unicode sorts them in quadratic time.
-
-    Source: Unicode Standard Annex 15, Stream-Safe Text Format.
-    """
-    if text.isascii():
-        return text
-    marks = re.escape("".join(c for c in set(text) if unicodedata.combining(unicodedata.normalize("NFKD", c)[0])))
-    return re.sub(f"([{marks}]{{{MOST_MARKS}}})[{marks}]+", r"\1", text) if marks else text
-
-
-def number_words(digits: str) -> list[str]:
-    """Return the words of a whole number; from a trillion on, or with leading zeros, digit by digit."""
-    if len(digits) > 12 or (len(digits) > 1 and digits[0] == "0"):
-        return [ONES[int(digit)] for digit in digits]
-    number = int(digits)
-    if number < 20:
-        return [ONES[number]]
-    if number < 100:
-        return [TENS[number // 10], *([ONES[number % 10]] if number % 10 else [])]
-    scale, name = next((scale, name) for scale, name in SCALES if number >= scale)
-    rest = number_words(str(number % scale)) if number % scale else []
-    return [*number_words(str(number // scale)), name, *rest]

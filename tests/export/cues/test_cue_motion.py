@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from lipmotion.export.base import read_motion
 from lipmotion.export.cues.base import CUE_FORMATS, write_cue_file
 from lipmotion.export.cues.cue_motion import PARSERS, cue_motion, read_cues
 from lipmotion.export.cues.sheet import CueSheet
+from lipmotion.pipeline.outputs.motion_input import read_generation
 from lipmotion.types import Span, Timeline
 from lipmotion.units.mouth_chart import SHAPES
 
@@ -91,3 +93,37 @@ def test_damaged_files_are_refused(name: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=re.escape(message)):
         read_motion(tmp_path / name)
     assert Path(name).suffix in PARSERS
+
+
+@pytest.mark.parametrize("fps", [12.0, 25.0, 29.97, 60.0])
+def test_switch_data_at_any_rate(fps: float, sheet: CueSheet, tmp_path: Path) -> None:
+    path = tmp_path / "a.dat"
+    write_cue_file(path, replace(sheet, fps=fps), "a.wav", "dat")
+    again = read_generation(path, rate_hz=fps)
+    assert again.motion.time_s[-1] == pytest.approx(2.5, abs=1 / fps + 0.011)
+    (closed,) = [span for span in again.units if span.label.phone == "p"]
+    assert (closed.start_s, closed.end_s) == pytest.approx((0.5, 0.625), abs=1 / fps)
+
+
+def test_cues_with_times_need_no_rate(sheet: CueSheet, tmp_path: Path) -> None:
+    write_cue_file(tmp_path / "a.tsv", sheet, "a.wav", "tsv")
+    with pytest.raises(InputError, match="need no rate"):
+        read_generation(tmp_path / "a.tsv", rate_hz=25.0)
+    write_cue_file(tmp_path / "a.dat", sheet, "a.wav", "dat")
+    with pytest.raises(InputError, match="required 1 to"):
+        read_generation(tmp_path / "a.dat", rate_hz=0.0)
+
+
+@pytest.mark.parametrize(
+    ("names", "shapes"),
+    [
+        ("rest M AA1 F UW2 rest", "XADGFX"),  # the phones of CMU's dictionary, as Papagayo's set of that name
+        ("rest MBP AA FV O rest", "XADGEX"),  # Fleming and Dobbs'
+        ("rest MBP AI FV WQ rest", "XADGFX"),
+        ("x a d g f x", "XADGFX"),
+    ],
+)
+def test_switch_data_with_names_of_other_sets(names: str, shapes: str, tmp_path: Path) -> None:
+    rows = "".join(f"{1 + 12 * place} {name}\n" for place, name in enumerate(names.split()))
+    (tmp_path / "a.dat").write_text(f"MohoSwitch1\n{rows}")
+    assert "".join(cue.label for cue in read_cues(tmp_path / "a.dat").cues) == shapes[:-1]

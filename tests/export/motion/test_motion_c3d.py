@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import struct
+import tempfile
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -12,8 +14,7 @@ import pytest
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export import read_motion, write_motion
-from lipmotion.export.motion.c3d_file import BLOCK, C3dFile, read_c3d
-from lipmotion.export.motion.c3d_writing import write_c3d
+from lipmotion.export.motion.c3d_file import BLOCK, C3dFile, read_c3d, write_c3d
 from lipmotion.export.motion.marker_frame import MILLIMETRES, in_head_frame
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
 
@@ -183,9 +184,8 @@ def test_points_as_whole_numbers_are_read(tmp_path):
 DAMAGES = [
     (lambda _: b"x" * 2000, "not a C3D file"),
     (lambda content: content[:1600], "cut short|not a C3D file"),
-    (lambda content: content[:-2000], "cut short: .* bytes of data, required"),
-    (lambda content: content[:515] + b"\x55" + content[516:], "its processor type is 85, required 84"),
-    (lambda content: content[:8] + b"\xf0\xff" + content[10:], "cut short"),
+    (lambda content: content[:-2000], "cut short: .* frames of data, required"),
+    (lambda content: content[:515] + b"\x57" + content[516:], "its processor type is 87, required 84"),
     (lambda content: content[:2] + b"\xff\xff" + content[4:], "65535 points and"),
     (lambda content: content[:16] + b"\0\0" + content[18:], "cut short"),
     (lambda content: content.replace(b"mm", b"ly").replace(b"lipmotion", b"otherprog"), "its unit of length is 'ly'"),
@@ -216,8 +216,101 @@ def test_markers_of_the_mouth_are_required(tmp_path):
 
 
 def test_what_does_not_fit_is_refused(tmp_path, pointed):
-    long = Motion(np.zeros((65_536, 1)), 100.0, (Channel("opening"),))
     odd = Motion(np.zeros((2, 1)), 100.0, (Channel("öffnen"),))
-    for motion, message in ((long, "at most 65535 in .c3d"), (odd, "does not fit into .c3d")):
-        with pytest.raises(ExportError, match=message):
-            write_motion(tmp_path / "a.c3d", replace(pointed, motion=motion), source={}, model={})
+    with pytest.raises(ExportError, match="does not fit into"):
+        write_motion(tmp_path / "a.c3d", replace(pointed, motion=odd), source={}, model={})
+
+
+LONG = 70_000
+
+
+@pytest.fixture(scope="module")
+def long_capture() -> bytes:
+    """One marker that moves along in 70,000 frames."""
+    content = C3dFile(("LIP_13",), np.arange(1.0, LONG + 1)[:, None, None] * [1, 0, 0], 100.0)
+    with tempfile.TemporaryDirectory() as folder:
+        write_c3d(Path(folder) / "a.c3d", content)
+        return (Path(folder) / "a.c3d").read_bytes()
+
+
+TWO = b"\x02\x01\x02"
+"""What stands before a parameter of two whole numbers."""
+
+
+def two_words(number: int) -> bytes:
+    return struct.pack("<2H", number % 65_536, number // 65_536)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {},
+        {b"LONG_FRAMES": b"XXXX_FRAMES"},  # the header stops at 65,535: TRIAL counts on
+        {b"ACTUAL_END_FIELD": b"XXXXXX_END_FIELD"},  # POINT:LONG_FRAMES alone
+        {b"LONG_FRAMES": b"XXXX_FRAMES", b"ACTUAL_END_FIELD": b"XXXXXX_END_FIELD"},  # nothing but the data
+        {two_words(LONG): two_words(LONG + 9), TWO + two_words(1): TWO + two_words(10), b"LONG_FRAMES": b"XXXX_FRAMES"},
+    ],
+)
+def test_more_frames_than_the_header_counts(tmp_path, long_capture, change, caplog):
+    head, data = long_capture[: 3 * BLOCK], long_capture[3 * BLOCK :]
+    for old, new in change.items():
+        assert old in head
+        head = head.replace(old, new)
+    (tmp_path / "a.c3d").write_bytes(head + data)
+    places = read_c3d(tmp_path / "a.c3d").points[:, 0, 0]
+    assert np.isfinite(places).sum() == LONG
+    assert places[LONG - 1] == pytest.approx(LONG)
+    assert ("65535" in caplog.text) == (len(change) == 2)
+
+
+def test_a_number_that_began_again_is_seen(tmp_path, long_capture):
+    wrapped = LONG - 65_536
+    head = long_capture[: 3 * BLOCK].replace(b"LONG_FRAMES", b"XXXX_FRAMES").replace(b"ACTUAL_END", b"XXXXXX_END")
+    head = head.replace(struct.pack("<H", 65_535), struct.pack("<H", wrapped))
+    (tmp_path / "a.c3d").write_bytes(head + long_capture[3 * BLOCK :])
+    assert len(read_c3d(tmp_path / "a.c3d").points) == LONG
+
+
+def test_a_header_that_says_another_number_is_named(tmp_path, written, caplog):
+    content = written.read_bytes()
+    (tmp_path / "b.c3d").write_bytes(content[:8] + b"\xf0\xff" + content[10:])
+    assert len(read_motion(tmp_path / "b.c3d")[0].values) == FRAMES
+    assert "80 or 65520" in caplog.text
+
+
+@pytest.mark.parametrize("processor", [85, 86])
+def test_files_of_other_processors(tmp_path, processor):
+    """DEC's fractions have their words the other way round and four times the value; MIPS turns all numbers."""
+    places = np.round(RNG.normal(0, 50, (6, 2, 3)), 3)
+    write_c3d(tmp_path / "a.c3d", C3dFile(("one", "two"), places, 120.0))
+    content = bytearray((tmp_path / "a.c3d").read_bytes())
+    start = (struct.unpack_from("<H", content, 16)[0] - 1) * BLOCK
+
+    def turned_number(at: int, kind: str) -> None:
+        (number,) = struct.unpack_from("<" + kind, content, at)
+        if processor == 86:
+            struct.pack_into(">" + kind, content, at, number)
+        elif kind == "f":
+            word = struct.pack("<f", number * 4)
+            content[at : at + 4] = word[2:] + word[:2]
+
+    for at, kind in [*((n, "h") for n in (2, 4, 6, 8, 10, 16, 18)), (12, "f"), (20, "f")]:
+        turned_number(at, kind)
+    at = BLOCK + 4
+    while content[at]:
+        body = at + 2 + content[at]
+        (step,) = struct.unpack_from("<h", content, body)
+        kind, sizes = struct.unpack_from("bB", content, body + 2)
+        if content[at + 1] < 128 and kind in {2, 4}:
+            count = math.prod(content[body + 4 : body + 4 + sizes])
+            for number in range(count):
+                turned_number(body + 4 + sizes + number * kind, "h" if kind == 2 else "f")
+        turned_number(body, "h")
+        at = body + step
+    for at in range(start, start + places.size // 3 * 16, 4):
+        turned_number(at, "f")
+    content[BLOCK + 3] = processor
+    (tmp_path / "b.c3d").write_bytes(content)
+    read = read_c3d(tmp_path / "b.c3d")
+    np.testing.assert_allclose(read.points, places, rtol=1e-6)
+    assert (read.labels, read.rate_hz) == (("one", "two"), 120.0)

@@ -40,7 +40,7 @@ WRONG = [
     ("time_s,opening\n0,1\n0.1,1\n0.3,1\n", "even steps"),
     ("time_s,opening\n0,1\n0,1\n", "even steps"),
     ("time_s,opening\n0,1\ninf,1\n", "values that are no times, required seconds up to"),
-    ("time_s,opening\n0,1\n1,nan\n", "not finite; interpolate them first"),
+    ("time_s,opening\n0,1\n1,nan\n", "1 values that are not finite, the first is 'opening' in frame 1"),
     ("time_s,opening,opening\n0,1,1\n0.1,1,1\n", "names repeat"),
     ("time_s,jawOpen\n0,0\n0.1,55\n", "jawOpen goes up to 55, required 0 to 1; divide percent by 100"),
     *(
@@ -48,8 +48,11 @@ WRONG = [
         for field in ("=1", "@A", "-1", "+x", "\t=1")
     ),
     ("time,jaw\n0,1\n", "1 rows with values, required two or more"),
-    ("time,jaw\n0,1\n0,2\n", "the time of row 2 is not after that of the row before"),
-    ("time,jaw\n0,1\n1,nan\n", "values that are not finite"),
+    ("time,jaw\n0,1\n0,2\n", "1 rows with values, required two or more"),
+    ("time,jaw\n" + "0,1\n" * 5 + "1,1\n", "4 of 6 rows are not later than those before, as row 2"),
+    ("time,jaw\n0,inf\n1,nan\n", "0 rows with values"),
+    ("frame,jaw\n0,1\n1,1\n", "first line is 'frame,jaw', required .* a column of times"),
+    ("time,jaw\nsoon,1\n1,1\n", "line 2: could not convert"),
     ("time,jaw\n0,1\n0.01,1\n0.02,1\n0.03,1\n99,1\n", "most of the time there are none; cut the take"),
 ]
 

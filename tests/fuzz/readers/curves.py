@@ -20,8 +20,7 @@ from lipmotion.export.base import write_motion
 from lipmotion.export.cues.base import CUE_FORMATS
 from lipmotion.export.cues.cue_motion import PARSERS
 from lipmotion.export.cues.sheet import CueSheet
-from lipmotion.export.motion.c3d_file import C3dFile
-from lipmotion.export.motion.c3d_writing import write_c3d
+from lipmotion.export.motion.c3d_file import C3dFile, write_c3d
 from lipmotion.pipeline.corpus.supplied_motion import supplied_track
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline
 from lipmotion.units.mouth_chart import SHAPES
@@ -49,9 +48,17 @@ def seeds(_: Good) -> list[Files]:
         {"a.csv": "\n".join(["time_s,opening,width", *rows]).encode()},
         {"a.json": json.dumps(document).encode()},
         {"a.npz": archive.getvalue()},
+        {"a.jsonl": _azure(values)},
+        {"d.csv": "\n".join(["frame;timestamp_ms;jawOpen", *(f"{n};{33 * n};0,1" for n in range(FRAMES))]).encode()},
         {"a.000001.ply": head(5, "<")},
         {VALUES: npy(values), NAMES: npy(np.array(["opening", "width"]))},
     ]
+
+
+def _azure(values: NDArray[np.float64]) -> bytes:
+    """Return frames of 55 weights as events of Azure's voices, one a line."""
+    halves = [{"FrameIndex": n, "BlendShapes": np.tile(values[n : n + 12, :1], 55).tolist()} for n in (0, 12)]
+    return "\n".join(json.dumps({"AudioOffset": 0, "Animation": json.dumps(half)}) for half in halves).encode()
 
 
 def _captures() -> list[Files]:

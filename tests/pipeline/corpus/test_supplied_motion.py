@@ -14,9 +14,8 @@ from lipmotion.corpora.source_recordings import MotionFile, SourceRecording
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.export.base import write_motion
-from lipmotion.export.motion.c3d_file import C3dFile
-from lipmotion.export.motion.c3d_writing import write_c3d
-from lipmotion.meshes.files.live_link_table import SPEECH_CURVES
+from lipmotion.export.motion.c3d_file import C3dFile, write_c3d
+from lipmotion.meshes.files.curve_table import SPEECH_CURVES
 from lipmotion.motion import acoustic_network, posterior_network
 from lipmotion.pipeline.corpus import prepare as module
 from lipmotion.pipeline.corpus.prepare import prepare
@@ -225,3 +224,11 @@ def test_a_take_of_the_app_and_markers_become_a_corpus(tmp_path):
     assert marked.rate_hz == 120.0
     expected = np.linalg.norm(places[:, 2] - places[:, 3], axis=1) / 88
     np.testing.assert_allclose(marked["opening"], expected, atol=1e-6)
+
+
+def test_frames_without_a_face_are_not_seen(tmp_path):
+    rows = [f"10:00:{n // 60:02d}:{n % 60:02d}.000,{'1,0.5' if 30 <= n < 90 else 0}" for n in range(120)]
+    (tmp_path / "a.csv").write_text("\n".join(["Timecode,BlendshapeCount,JawOpen", *rows]))
+    track = supplied_track(MotionFile(tmp_path / "a.csv"), 2.0)
+    assert np.flatnonzero(track.seen).tolist() == list(range(30, 90))
+    assert track.motion["jawOpen"] == pytest.approx(np.where(track.seen, 0.5, 0.0))

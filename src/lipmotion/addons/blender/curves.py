@@ -49,7 +49,8 @@ def read_motion(path: str) -> tuple[Curves, list[float]]:
 
 
 def spelling(name: str) -> str:
-    """Return a name as it is compared: ``head.mouthSmile_L`` and ``MouthSmileLeft`` are ``mouthsmileleft``."""
+    """Return a name as it is compared: ``head.mouthSmile_L.001`` and ``MouthSmileLeft`` are ``mouthsmileleft``."""
+    name = re.sub(r"[._ ]\d{1,4}$", "", name)
     words = [word for word in re.split(r"[\s_\-]+", re.split(r"[.:|]", name)[-1]) if word]
     if not words:
         return ""

@@ -20,7 +20,8 @@ def read_take(rows: list[list[str]]) -> tuple[list[str], list[float], list[list[
     """Return the names of the curves of a take, the times of its rows from the first one in seconds, and their values.
 
     rows : the fields of its lines, the first of them the names
-    Rows without a face (a count of 0, or empty fields) are left out: what is between others is a straight line.
+    Rows without a face (a count of 0, or empty fields) are left out: what is between others is a straight line; before
+    the first face and after the last one all is at rest.
     Raises ValueError: a row with too few curves, no timecode, timecodes that go back, or no values.
     """
     counted = len(rows[0]) > 1 and rows[0][1].strip().lower() == "blendshapecount"
@@ -42,6 +43,11 @@ def read_take(rows: list[list[str]]) -> tuple[list[str], list[float], list[list[
             kept.append(values)
     if not kept:
         raise ValueError("the take has no rows with values")
+    rest = [0.0] * len(names)
+    before = [time_s for time_s in times if time_s < kept_s[0]]
+    after = [time_s for time_s in times if time_s > kept_s[-1]]
+    kept_s = [*before[:1], *before[1:][-1:], *kept_s, *after[:1], *after[1:][-1:]]
+    kept = [*[rest] * len(before[:2]), *kept, *[rest] * len(after[:2])]
     return names, [time_s - kept_s[0] for time_s in kept_s], kept
 
 

@@ -4,6 +4,18 @@ from __future__ import annotations
 
 import argparse
 import os
+import sys
+
+
+class Version(argparse.Action):
+    """Prints the version, and a text behind it; it is looked up only when the option is given."""
+
+    def __call__(self, *_: object) -> None:  # noqa: D102
+        from lipmotion.cli.terminal.printing import print_line
+        from lipmotion.extensions import installed_version
+
+        print_line(f"lipmotion {installed_version()}{self.const or ''}")
+        sys.exit(0)
 
 
 def add_machine_readable(parser: argparse.ArgumentParser) -> None:

@@ -82,7 +82,10 @@ class JsonLines(Events):
 
 
 class RhubarbStatus(Events):
-    """One JSON object per line on standard error, and nothing else there: as Rhubarb's ``--machineReadable``."""
+    """One JSON object per line on standard error, and nothing else there: as Rhubarb's ``--machineReadable``.
+
+    Also its spaces: OpenToonz cuts two characters off both ends of a line, and divides the rest at commas.
+    """
 
     replaces_errors = True
 
@@ -93,14 +96,14 @@ class RhubarbStatus(Events):
         from lipmotion.storage.files import as_text
 
         name = as_text(options.speech)
-        self.emit("start", "Info", f'Application startup. Input file: "{name}".', file=name)
+        self.emit("start", "Info", f"Application startup. Input file: {name}.", file=name)
 
     def emit(self, kind: str, level: str, message: str, **data: Any) -> None:
         """Write one event; nothing after the last one."""
         if not self._ended:
             from lipmotion.cli.terminal.printing import print_error_json
 
-            print_error_json({"type": kind, **data, "log": {"level": level, "message": message}})
+            print_error_json({"type": kind, **data, "log": {"level": level, "message": message}}, spaced=True)
 
     def succeed(self) -> None:
         """Report success."""

@@ -79,15 +79,25 @@ def print_json(document: Any) -> None:
         print(as_json(nan_as_null(document)), flush=True)
 
 
-def print_error_json(document: Any) -> None:
-    """Print a JSON document as one line of ASCII on standard error. Raises ExportError: it cannot be written."""
+def print_error_json(document: Any, *, spaced: bool = False) -> None:
+    """Print a JSON document as one line of ASCII on standard error; ``spaced``: with a space within all braces.
+
+    Raises ExportError: it cannot be written.
+    """
     if sys.stderr is None:
         raise ExportError("standard error is closed; open it, or leave out what asks for messages there")
     try:
-        print(as_json(nan_as_null(document)), file=sys.stderr, flush=True)
+        print(_spaced(document) if spaced else as_json(nan_as_null(document)), file=sys.stderr, flush=True)
     except OSError as error:
         _discard_pending(sys.stderr)
         raise ExportError(f"standard error cannot be written: {error.strerror or error}") from error
+
+
+def _spaced(document: Any) -> str:
+    """Return a JSON document with a space within all braces."""
+    if not isinstance(document, dict):
+        return as_json(document)
+    return f"{{ {', '.join(f'{as_json(name)}: {_spaced(value)}' for name, value in document.items())} }}"
 
 
 def flush_output() -> None:

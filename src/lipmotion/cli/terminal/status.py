@@ -1,4 +1,4 @@
-"""Progress and warnings of ``cues`` as JSON events, in the format of Rhubarb's ``--machineReadable``."""
+"""Progress and warnings of ``cues``: JSON events in the form of Rhubarb's ``--machineReadable``, and its log file."""
 
 from __future__ import annotations
 
@@ -6,22 +6,74 @@ import argparse
 import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
-from lipmotion.cli.terminal.events import RhubarbStatus
+from lipmotion.cli.terminal.events import Events, RhubarbStatus
+from lipmotion.cli.terminal.outcome import outcome
+from lipmotion.errors import ExportError
+from lipmotion.storage.files import as_text
+
+LEVELS = {"trace": 5, "debug": 10, "info": 20, "warning": 30, "error": 40, "fatal": 50}
+"""Rhubarb's levels of messages, as numbers of ``logging``."""
+_NAMES = {number: name.capitalize() for name, number in LEVELS.items()}
 
 
 @contextmanager
 def status_lines(options: argparse.Namespace) -> Iterator[Callable[[float], None]]:
-    """Yield a function that reports progress, 0 to 1; report success at the end. Warnings become events, too."""
-    events: RhubarbStatus = options.events
+    """Yield a function that reports progress, 0 to 1; report success at the end.
+
+    Warnings become events, too, where events are asked for, and go to the log file, where there is one, which is told
+    how it ended as well. Raises ExportError: that file cannot be written.
+    """
+    events: Events = options.events
     root = logging.getLogger()
-    handlers, root.handlers = root.handlers, [_StatusHandler(events)]
+    handlers, log = root.handlers, _log_file(options)
+    console = [_StatusHandler(events)] if isinstance(events, RhubarbStatus) else handlers
+    root.handlers = [*(console if LEVELS[options.console_level] <= logging.WARNING else ()), log]
+
+    def note(level: str, message: str) -> None:
+        if LEVELS[level] >= log.level:
+            log.handle(logging.LogRecord("", LEVELS[level], "", 0, message, None, None))
+
+    def progress(done: float) -> None:
+        note("trace", f"Progress: {done:.0%}")
+        if isinstance(events, RhubarbStatus):
+            events.emit("progress", "Trace", f"Progress: {done:.0%}", value=done)
+
     try:
-        yield lambda done: events.emit("progress", "Trace", f"Progress: {done:.0%}", value=done)
+        note("info", f"Application startup. Input file: {as_text(options.speech)}.")
+        yield progress
         options.stopper.settle()
-        events.succeed()
+        note("info", "Application terminating normally.")
+        if isinstance(events, RhubarbStatus):
+            events.succeed()
+    except Exception as error:
+        known = outcome(error)
+        note("fatal", f"Application terminating with error: {known[1] if known else error!r}")
+        raise
     finally:
         root.handlers = handlers
+        log.close()
+
+
+def _log_file(options: argparse.Namespace) -> logging.Handler:
+    """Return what writes the log file; without one, what writes nothing."""
+    path: Path | None = options.log_file
+    if path is None:
+        return logging.NullHandler(LEVELS["fatal"] + 1)
+    try:
+        handler = logging.FileHandler(path, mode="w", encoding="utf-8", errors="backslashreplace")
+    except OSError as error:
+        raise ExportError(f"{path}: the log cannot be written: {error.strerror or error}") from error
+    handler.setLevel(LEVELS[options.log_level])
+    handler.setFormatter(_LogFormatter(datefmt="%Y-%m-%d %H:%M:%S"))
+    return handler
+
+
+class _LogFormatter(logging.Formatter):
+    def format(self, record: logging.LogRecord) -> str:
+        name = _NAMES.get(record.levelno, record.levelname.capitalize())
+        return f"[{self.formatTime(record, self.datefmt)}] 1 [{name}] {record.getMessage()}"
 
 
 class _StatusHandler(logging.Handler):
@@ -30,4 +82,4 @@ class _StatusHandler(logging.Handler):
         self._events = events
 
     def emit(self, record: logging.LogRecord) -> None:
-        self._events.emit("log", record.levelname.capitalize(), record.getMessage())
+        self._events.emit("log", _NAMES.get(record.levelno, record.levelname.capitalize()), record.getMessage())

@@ -84,8 +84,7 @@ def run(options: argparse.Namespace) -> None:
 def _write_blank_table(character: Path) -> None:
     """Write the table of a character whose mouth was not found, to be filled in; where there is none yet."""
     from lipmotion.meshes.files.character_files import read_character
-    from lipmotion.meshes.files.character_tables import table_path
-    from lipmotion.meshes.files.rig_tables import write_rig_table
+    from lipmotion.meshes.files.rig_tables import table_path, write_rig_table
     from lipmotion.meshes.fitting.own_curves import rows_found
     from lipmotion.storage.sources import is_file
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from contextlib import nullcontext
+from dataclasses import replace
 from typing import Any
 
 from lipmotion.cli.arguments.declared import add_options, part_of
@@ -29,7 +29,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add_output(parser, "-o", "--output", force=True, help=files, **outputs)
     kinds = ("tsv", "xml", "json", "dat", "pgo", "spine.json")
     told = "(default: that of the suffix; tsv on standard output and in a folder)"
-    add("-f", "--format", "--exportFormat", choices=kinds, help=told)
+    add("-f", "--format", "--exportFormat", type=str.lower, choices=kinds, help=told)
     add("--fps", type=float, default=24.0, help="frames per second of the animation (default: 24)")
     add("--hold", type=int, metavar="FRAMES", help="minimum length of a shape (default: that of two frames at 24 fps)")
     add("--shapes", default="GHX", help="optional shapes that the character has (default: GHX; none: '')")
@@ -37,7 +37,7 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     hold = "hold every shape for at least N ms, as --hold FRAMES"
     add_options(parser, Delivery, but=("stepped", "key_tolerance"), min_hold_ms={"help": hold})
     add_rhubarb_options(parser)
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, letters=False)
 
 
 def run(options: argparse.Namespace) -> None:
@@ -48,10 +48,11 @@ def run(options: argparse.Namespace) -> None:
     from lipmotion.pipeline.outputs.cues import check_cue_options, check_cue_outputs, cue_text, cues, write_cues
     from lipmotion.pipeline.understand.read_request import read_request
 
-    status = status_lines(options) if options.machine_readable else nullcontext(lambda _: None)
     piped = is_pipe(options.speech)
     placed = placed_outputs(options.speech, options.output, options.format or "tsv")
-    with status as set_progress, placed as options.output, read_pipe(options.speech) as speech:
+    with status_lines(options) as set_progress, placed as options.output, read_pipe(options.speech) as speech:
+        if [path.suffix.lower() in {"", ".txt"} for path in options.output] == [True]:
+            options.format = options.format or "tsv"  # as Rhubarb writes whatever the name is
         check_paths(options)  # in a folder it may be a file that is read
         delivery, asked = part_of(options, Delivery()), part_of(options, Request(), recording=speech)
         check_cue_options(options.fps, options.hold, options.shapes)
@@ -64,6 +65,7 @@ def run(options: argparse.Namespace) -> None:
         delivery = edits.edits.delivery(delivery)
         set_progress(0.9)
         sheet = cues(result, fps=options.fps, hold_frames=options.hold, shapes=options.shapes, delivery=delivery)
+        sheet = replace(sheet, blair=options.blair or not options.letters)
         speech_path = "" if piped else speech
         write_cues(sheet, options.output, speech=speech_path, form=options.format)
         set_progress(1.0)

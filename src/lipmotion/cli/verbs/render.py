@@ -30,6 +30,8 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     add_input(parser, "motion", what="motion file", replaceable=True, help=motion)
     sound = "the sound of videos (default: the one that a .glb names; without one the video is silent)"
     add_input(parser, "--sound", what="recording", metavar="FILE", help=sound)
+    rate = "frames a second of the motion, where its file says none (.dat, else 24), or counts 29.97 as 30"
+    parser.add_argument("--motion-rate", type=float, metavar="HZ", help=rate)
     phones = "phones in time for motion without them: they move tongue and lips where the channels do not"
     add_options(parser, Request, "units", units={"help": phones})
     add_outputs(parser, "FILE.mp4 .webm .mov %%05d.png .json .csv .npz .TextGrid .vtt, ... (docs/formats.md)")
@@ -46,12 +48,12 @@ def run(options: argparse.Namespace) -> None:
     with reporting(options) as report:
         with written_pipe(options) as (files, pipe):
             job = opened(part_of(options, Job()).of(options.sound or _sound_named_by(options.motion), files))
-            _render(job, options.motion, report.receive)
+            _render(job, options.motion, options.motion_rate, report.receive)
         written = [] if pipe else list(files)
         report.finish("\n".join(map(printable, written)), files=written)
 
 
-def _render(job: OpenedJob, motion: Path, monitor: Monitor) -> None:
+def _render(job: OpenedJob, motion: Path, rate_hz: float | None, monitor: Monitor) -> None:
     import numpy as np
 
     from lipmotion.pipeline.edit_files import is_edit_file
@@ -65,9 +67,9 @@ def _render(job: OpenedJob, motion: Path, monitor: Monitor) -> None:
         return
     sound: Path | Audio | None = job.job.request.recording
     planned = job.checked(sound)
-    generation = read_generation(motion, job.job.request.units)
+    generation = read_generation(motion, job.job.request.units, rate_hz)
     if isinstance(sound, Path):
-        generation = as_long_as(generation, read_audio(sound).duration_s)
+        generation = as_long_as(generation, read_audio(sound).duration_s, keeps_rate=rate_hz is not None)
     elif any(isinstance(output, VideoOutput) for output in planned):
         samples = round(float(generation.motion.time_s[-1]) * SILENT_HZ)
         sound = Audio(np.zeros(samples, np.float32), SILENT_HZ)

@@ -2,14 +2,15 @@
 
 from lipmotion.corpora.labels.label_files import (
     RecordingLabels,
+    check_plain_text,
     holds_timings,
     label_files_beside,
     labels_beside,
     read_labels,
     read_phones,
     read_transcript,
+    speakers_in,
 )
-from lipmotion.corpora.labels.plain_text import check_plain_text
 
 __all__ = [
     "RecordingLabels",
@@ -20,4 +21,5 @@ __all__ = [
     "read_labels",
     "read_phones",
     "read_transcript",
+    "speakers_in",
 ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from lipmotion.corpora.labels.tier import LabelTier, TimedLabel, check_count, required_time
+from lipmotion.corpora.labels.tier import LabelTier, TimedLabel, check_count, named_tier, required_time
 from lipmotion.errors import InputError, shortened
 
 TOKEN = re.compile(
@@ -53,7 +53,7 @@ def parse_interval_tiers(text: str, where: str) -> list[LabelTier]:
             check_count(total, where)
             labels = [_label(tokens, kind, f"{place}, interval {i + 1}", where) for i in range(count)]
             if kind == INTERVALS:
-                tiers.append(LabelTier(place, tuple(labels)))
+                tiers.append(named_tier(name, labels))
         place = "what follows the last tier"
         if next(tokens, None) is not None:
             raise _DamagedError("more is there than the counts say")

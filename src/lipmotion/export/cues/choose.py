@@ -33,7 +33,7 @@ def choose_cues(
 ) -> CueSheet:
     """Return the cues of generated motion.
 
-    fps         : frames per second of the animation, 1 to 60
+    fps         : frames per second of the animation, 1 to 100
     hold_frames : minimum length of a cue in frames, > 0; a shorter recording has one cue
     optional    : which of the shapes G, H and X the character has
     intensity   : openings and spread so many times as large, before shapes are chosen

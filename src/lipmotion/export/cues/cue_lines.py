@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
 from lipmotion.errors import InputError, shortened
+from lipmotion.export.cues.cue_shapes import PHONE_SHAPES
 from lipmotion.export.cues.sheet import CueSheet
 from lipmotion.types import Span, Timeline
-from lipmotion.units.mouth_chart import REST, SHAPES
+from lipmotion.units.mouth_chart import BLAIR, LETTERS, REST, SHAPES
 
+_FLEMING_DOBBS = "mbp:A nltdr:B fv:G th:B gk:B sh:F o:E ehsz:C aa:D iy:B rest:X"
+FLEMING_DOBBS = dict(pair.split(":") for pair in _FLEMING_DOBBS.split())
+PHONES = {"rest": REST, "hh": "C"} | {
+    f"{phone}{stress}": parts[0].best[0] for phone, parts in PHONE_SHAPES.items() for stress in ("", 0, 1, 2)
+}
+"""Shapes by the names of other sets, for which Moho and Papagayo have switches."""
 LONGEST_S = 86_400.0
 MOST_CUES = 250_000
 
@@ -22,6 +29,15 @@ def shape_of(name: str, names: dict[str, str], place: str) -> str:
         known = " ".join(dict.fromkeys(names))
         raise InputError(f"{place}: no mouth shape is {shortened(name)!r}; the shapes are: {known}")
     return found
+
+
+def chart_of(names: Iterable[str]) -> dict[str, str]:
+    """Return the shapes by the names of one set that programs offer: the first that has all of them.
+
+    Preston Blair's, Rhubarb's letters, Fleming and Dobbs', or the phones of CMU's dictionary, with stress or without.
+    """
+    given = {name.strip().lower() for name in names}
+    return next((chart for chart in (BLAIR, LETTERS, FLEMING_DOBBS, PHONES) if given <= {*chart}), BLAIR)
 
 
 def cue_time(text: str, place: str) -> float:

@@ -24,11 +24,12 @@ from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 from lipmotion.units import SILENCE
 from lipmotion.units.mouth_chart import REST, SHAPES
 
+DAT = ".dat"
 PARSERS: Mapping[str, Callable[[str], CueSheet]] = {
     ".tsv": rhubarb_tsv.parse,
     ".xml": rhubarb_xml.parse,
     ".json": rhubarb_json.parse,
-    ".dat": moho_dat.parse,
+    DAT: moho_dat.parse,
     ".pgo": papagayo_pgo.parse,
 }
 """Texts of cue files to cues, by suffix."""
@@ -36,6 +37,7 @@ PHONE_OF = {"A": "p", "B": "s", "C": "eh", "D": "aa", "E": "ao", "F": "uw", "G":
 """A phone with the mouth of each shape."""
 SHAPE_OF = {phone: shape for shape, phone in PHONE_OF.items()}
 RATE_HZ = 100.0
+FASTEST_FPS = 1000.0
 WIDEST_GAP = 0.25
 """The gap between the lips of a shape whose opening is 1, in eye distances: that of wide vowels of typical talkers."""
 WIDENING = 0.12
@@ -43,17 +45,28 @@ WIDENING = 0.12
 LARGEST_BYTES = 1 << 24
 
 
-def read_cues(path: Path) -> CueSheet:
-    """Return the cues of a file in the form of its suffix. Raises InputError: it cannot be read, or is damaged."""
+def read_cues(path: Path, fps: float | None = None) -> CueSheet:
+    """Return the cues of a file in the form of its suffix.
+
+    fps : frames a second of a ``.dat``, which does not say it; None: ``CUES_FPS``
+    Raises InputError: it cannot be read, or is damaged, or has times and needs no rate.
+    """
     parse = PARSERS.get(path.suffix.lower())
     if parse is None:
         raise InputError(f"{path}: no cues are read from {path.suffix!r}; use one of {' '.join(PARSERS)}")
-    return parse(read_text_file(path, "file of cues", LARGEST_BYTES))
+    text = read_text_file(path, "file of cues", LARGEST_BYTES)
+    if fps is None:
+        return parse(text)
+    if path.suffix.lower() != DAT:
+        raise InputError(f"{path}: its cues have times, and need no rate; leave it out")
+    if not 1 <= fps <= FASTEST_FPS:
+        raise InputError(f"{path}: {fps:g} frames a second, required 1 to {FASTEST_FPS:.0f}")
+    return moho_dat.parse(text, fps)
 
 
-def read_cue_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
+def read_cue_motion(path: Path, fps: float | None = None) -> tuple[Motion, Timeline[Unit]]:
     """Return the cues of a file as motion and phones in time. Raises InputError: as ``read_cues``."""
-    return cue_motion(read_cues(path))
+    return cue_motion(read_cues(path, fps))
 
 
 def cue_motion(sheet: CueSheet) -> tuple[Motion, Timeline[Unit]]:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from lipmotion.errors import InputError
-from lipmotion.export.cues.cue_lines import cue_time, shape_of, sheet_of
+from lipmotion.export.cues.cue_lines import chart_of, cue_time, shape_of, sheet_of
 from lipmotion.export.cues.sheet import CUES_FPS, CueSheet
-from lipmotion.units.mouth_chart import BLAIR, LETTERS, SHAPES
+from lipmotion.units.mouth_chart import SHAPES
 
 MARK = "MohoSwitch1"
 
@@ -15,27 +15,23 @@ def text(sheet: CueSheet, _sound_file: str) -> str:
     frames = {1 + int(sheet.fps * cue.start_s): cue.label for cue in reversed(sheet.cues.spans)}
     end = max(1 + int(sheet.fps * sheet.duration_s), max(frames) + 1)
     rows = [*sorted(frames.items()), (end, sheet.rest)]
-    return f"{MARK}\n" + "".join(f"{frame} {SHAPES[shape].blair}\n" for frame, shape in rows)
+    return f"{MARK}\n" + "".join(f"{frame} {SHAPES[shape].blair if sheet.blair else shape}\n" for frame, shape in rows)
 
 
-def parse(text: str) -> CueSheet:
-    """Return the cues of a file, whose frames count from 1 and are ``CUES_FPS`` a second: it says no rate.
+def parse(text: str, fps: float = CUES_FPS) -> CueSheet:
+    """Return the cues of a file, whose frames count from 1; it does not say how many are a second.
 
-    Names are Preston Blair's, or letters where one is none of his. Raises InputError: another first line, or a line of
-    another form, with its number.
+    Raises InputError: another first line, or a line of another form, with its number.
     """
-    lines = text.splitlines()
-    if not lines or lines[0].strip() != MARK:
+    lines = [(number, line.split()) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
+    if not lines or lines[0][1] != [MARK]:
         raise InputError(f"not switch data of Moho: the first line is no {MARK}; export it again")
-    names = [line.split()[1] for line in lines[1:] if len(line.split()) == 2]
-    known = BLAIR if all(name.lower() in BLAIR for name in names) else LETTERS
-    rows: list[tuple[float, str]] = []
-    for number, line in enumerate(lines[1:], 2):
-        fields = line.split()
-        if not fields:
-            continue
-        if len(fields) != 2:
-            raise InputError(f"line {number}: required a frame and a mouth shape")
-        frame = cue_time(fields[0], f"line {number}")
-        rows.append((max(frame - 1, 0) / CUES_FPS, shape_of(fields[1], known, f"line {number}")))
-    return sheet_of(rows, rows[-1][0] if rows else 0.0, CUES_FPS)
+    wrong = next((number for number, fields in lines[1:] if len(fields) != 2), None)
+    if wrong is not None:
+        raise InputError(f"line {wrong}: required a frame and a mouth shape")
+    chart = chart_of(name for _, (_, name) in lines[1:])
+    rows = [
+        (max(cue_time(frame, f"line {number}") - 1, 0) / fps, shape_of(name, chart, f"line {number}"))
+        for number, (frame, name) in lines[1:]
+    ]
+    return sheet_of(rows, rows[-1][0] if rows else 0.0, fps)

@@ -12,11 +12,11 @@ from dataclasses import replace
 from itertools import islice, takewhile
 
 from lipmotion.errors import InputError, shortened
-from lipmotion.export.cues.cue_lines import cue_time, shape_of, sheet_of
+from lipmotion.export.cues.cue_lines import chart_of, cue_time, shape_of, sheet_of
 from lipmotion.export.cues.sheet import CueSheet, shown_shapes
 from lipmotion.printable import is_line, printable
 from lipmotion.types import Span, Timeline
-from lipmotion.units.mouth_chart import BLAIR, REST, SHAPES
+from lipmotion.units.mouth_chart import REST, SHAPES
 
 MARK = "lipsync version 1"
 FASTEST_FPS = 1000
@@ -128,7 +128,7 @@ def parse(text: str) -> CueSheet:
         )
     lines.next()
     lines.next()
-    rows: list[tuple[float, str]] = []
+    found: list[tuple[float, str, str]] = []
     words: list[Span[str]] = []
     for _ in range(lines.count()):
         for _ in range(3):
@@ -138,8 +138,10 @@ def parse(text: str) -> CueSheet:
             words.append(Span(first / fps, (last + 1) / fps, word))
             for _ in range(count):
                 frame, _, name = lines.next().partition(" ")
-                rows.append((cue_time(frame, lines.place) / fps, shape_of(name, BLAIR, lines.place)))
-            rows.append(((last + 1) / fps, REST))
+                found.append((cue_time(frame, lines.place) / fps, name, lines.place))
+            found.append(((last + 1) / fps, "", ""))
+    chart = chart_of(name for _, name, _ in found if name)
+    rows = [(start_s, shape_of(name, chart, place) if name else REST) for start_s, name, place in found]
     kept = [row for row, after in zip(rows, [*rows[1:], (math.inf, "")], strict=True) if row[0] < after[0]]
     return sheet_of(kept, frames / fps, float(fps), Timeline(tuple(words)))
 

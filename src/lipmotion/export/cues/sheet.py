@@ -22,6 +22,7 @@ class CueSheet:
     fps   : the frame rate that they were chosen for; ``int(fps * start_s)`` is a cue's first frame, the first is 0
     drawn : the shapes that the character has
     words : the words in time, where they are known
+    blair : whether shapes have Preston Blair's names where a format has no letters of its own, ``.dat``
 
     >>> sheet = CueSheet(Timeline((Span(0.0, 0.5, "X"), Span(0.5, 0.62, "A"))), fps=24.0, drawn="ABCDEFX")
     >>> sheet.duration_s, sheet.rest
@@ -32,6 +33,7 @@ class CueSheet:
     fps: float
     drawn: str
     words: Timeline[str] = field(default_factory=lambda: Timeline(()))
+    blair: bool = True
 
     @property
     def rest(self) -> str:
@@ -53,10 +55,11 @@ def start_s(frame: int, fps: float) -> float:
     """Return the first hundredth of a second in which a frame is shown.
 
     Rounded up, so that ``int(fps * start)``, which readers of Rhubarb's and Moho's files compute, is the frame again.
-    Frame 1 at 24 fps, 0.0417 s, becomes 0.05 s; rounded to 0.04 s it would be in frame 0.
+    Frame 1 at 24 fps, 0.0417 s, becomes 0.05 s; rounded to 0.04 s it would be in frame 0. At 100 fps a frame is a
+    hundredth, and none is left to round to.
     """
     hundredths = int(np.ceil(frame / fps * 100 - 1e-6))
-    return (hundredths + (int(fps * (hundredths / 100)) < frame)) / 100
+    return (hundredths + (fps < 100 and int(fps * (hundredths / 100)) < frame)) / 100
 
 
 def cue_frame_count(duration_s: float, fps: float) -> int:

@@ -9,6 +9,7 @@ Source: NVIDIA, "Audio2Face, Export" and "Blendshape conversion"; files of versi
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from lipmotion.meshes.model.shape_names import ARKIT_52
 from lipmotion.storage.json_text import as_json
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Timeline, Unit
 
+LOG = logging.getLogger("lipmotion")
 NAMES, WEIGHTS, RATE, SOUND, POSES, FRAMES = (
     *("facsNames", "weightMat", "exportFps", "trackPath", "numPoses", "numFrames"),
 )
@@ -61,6 +63,9 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
         raise InputError(f"not JSON ({error}); export it again") from error
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"the file of Audio2Face is damaged ({error}); export it again") from error
+    stated = document.get(FRAMES)
+    if isinstance(stated, int) and stated != len(rows):
+        LOG.warning("%s: %d frames are stated, %d are there", path, stated, len(rows))
     return Motion(_checked_rows(names, rows), rate_hz, tuple(Channel(name, WEIGHT) for name in names)), Timeline(())
 
 

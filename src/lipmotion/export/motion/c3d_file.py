@@ -1,11 +1,13 @@
 """The binary format C3D of motion capture: labelled points, and curves beside them as analog channels.
 
-Source: The C3D File Format, A Technical User Guide (Motion Lab Systems). Files in Intel's order of bytes are read,
-points as fractions or as scaled whole numbers; ``c3d_writing`` writes fractions.
+Source: The C3D File Format, A Technical User Guide (Motion Lab Systems); c3d.org, "The C3D frame count". Files of
+Intel's, DEC's and MIPS' processors are read, points as fractions or as scaled whole numbers; written are
+Intel's.
 """
 
 from __future__ import annotations
 
+import logging
 import struct
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,15 +25,31 @@ Values = list[str] | NDArray[np.floating[Any]] | NDArray[np.integer[Any]]
 
 BLOCK = 512
 MARK = 0x50
-INTEL_PROCESSOR = 84
-"""The processor type of files with the lowest byte first; others were written by old workstations."""
-MOST_FRAMES = 65_535
-"""Most frames that the header can number."""
+INTEL_PROCESSOR, DEC_PROCESSOR, MIPS_PROCESSOR = 84, 85, 86
+"""The processor types: the lowest byte first; the same, but fractions of DEC's own kind; the highest byte first."""
+MOST_FRAMES, OVERFLOW = 65_535, 65_536
+"""Most frames that the header can number, and after how many it may begin at 0 again."""
 LARGEST_FILE_BYTES = 1 << 28
 """Most bytes of a file that is read."""
 MOST_POINTS, MOST_ANALOG_CHANNELS = 2_000, 5_000
 LONGEST_LABEL_CHARACTERS = 64
-_KINDS = {1: "u1", 2: "<u2", 4: "<f4"}
+LOG = logging.getLogger("lipmotion")
+
+
+@dataclass(frozen=True)
+class _Numbers:
+    """Reads numbers of a processor: ``kind`` is that of NumPy, without the order of bytes."""
+
+    processor: int
+
+    def read(self, content: bytes, kind: str, count: int, at: int = 0) -> Array:
+        """Return numbers as doubles. Raises ValueError: there are not so many."""
+        order = ">" if self.processor == MIPS_PROCESSOR else "<"
+        if kind == "f4" and self.processor == DEC_PROCESSOR:  # words the other way round, exponents larger by 2
+            words = np.frombuffer(content, "<u2", 2 * count, at).reshape(-1, 2)[:, ::-1]
+            return np.ascontiguousarray(words).view("<f4")[:, 0].astype(np.float64) / 4
+        with np.errstate(invalid="ignore"):  # damaged numbers become NaN, as of markers that were not seen
+            return np.frombuffer(content, order + kind, count, at).astype(np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +85,9 @@ def read_c3d(path: Path) -> C3dFile:
         raise InputError(f"{size} bytes, required at most {LARGEST_FILE_BYTES}: divide the capture into takes")
     try:
         return _parsed(path.read_bytes())
-    except (struct.error, IndexError, UnicodeDecodeError, OverflowError) as error:
+    except InputError:
+        raise
+    except (struct.error, IndexError, ValueError, OverflowError) as error:
         raise InputError(f"not a C3D file ({error}); export the capture again") from error
 
 
@@ -76,32 +96,49 @@ def _parsed(content: bytes) -> C3dFile:
         raise InputError("not a C3D file: its first bytes are not those of the format; export the capture again")
     start = (content[0] - 1) * BLOCK
     processor = content[start + 3]
-    if processor != INTEL_PROCESSOR:
-        raise InputError(
-            f"its processor type is {processor}, required {INTEL_PROCESSOR} (Intel); export the capture so"
-        )
-    found = _parameters(content, start + 4)
-    points, analog, first, last, _, scale, block, samples, rate_hz = struct.unpack("<5HfHHf", content[2:24])
-    rate_hz = _number(found, "POINT.RATE", rate_hz)
-    scale = _number(found, "POINT.SCALE", scale)
-    frames = last - first + 1
-    if last == MOST_FRAMES:
-        frames = int(max(frames, _number(found, "POINT.LONG_FRAMES", 0), _number(found, "POINT.FRAMES", 0) % (1 << 31)))
-    if not (0 <= points <= MOST_POINTS and 0 <= analog <= MOST_ANALOG_CHANNELS and points + analog > 0 and frames > 0):
-        raise InputError(
-            f"{points} points and {analog} analog values in {frames} frames, required at least one of each"
-        )
+    if processor not in {INTEL_PROCESSOR, DEC_PROCESSOR, MIPS_PROCESSOR}:
+        raise InputError(f"its processor type is {processor}, required 84 (Intel), 85 or 86; export the capture so")
+    numbers = _Numbers(processor)
+    found = _parameters(content, start + 4, numbers)
+    words: list[int] = numbers.read(content, "u2", 10).astype(int).tolist()
+    _, points, analog, first, last, _, _, _, block, samples = words
+    rate_hz = _number(found, "POINT.RATE", numbers.read(content, "f4", 1, 20)[0])
+    scale = _number(found, "POINT.SCALE", numbers.read(content, "f4", 1, 12)[0])
+    if not (0 <= points <= MOST_POINTS and 0 <= analog <= MOST_ANALOG_CHANNELS and points + analog > 0):
+        raise InputError(f"{points} points and {analog} analog values a frame, required at least one of each")
     if not 0 < rate_hz <= 1e5 or not np.isfinite(scale) or not scale:
         raise InputError(f"the rate is {rate_hz:g} Hz and the scale {scale:g}, required positive numbers")
-    kind = np.dtype("<f4" if scale < 0 else "<i2")
-    width = points * 4 + analog
-    held, needed = len(content) - (block - 1) * BLOCK, frames * width * kind.itemsize
-    if block < 2 or held < needed:
-        raise InputError(f"cut short: {max(held, 0)} bytes of data, required {needed} for {frames} frames")
-    stored = np.frombuffer(content, kind, frames * width, (block - 1) * BLOCK).reshape(frames, width)
-    with np.errstate(invalid="ignore"):  # damaged numbers become NaN, as of markers that were not seen
-        rows = stored.astype(np.float64)
-    return _content(found, rows, points, scale, rate_hz, samples)
+    kind, width = "f4" if scale < 0 else "i2", points * 4 + analog
+    data = content[(block - 1) * BLOCK :] if block > 1 else b""
+    held, spare = len(data) // (width * int(kind[1])), BLOCK // (width * int(kind[1])) + 1
+    frames = _frames(found, last - first + 1, held, spare)
+    return _content(
+        found, numbers.read(data, kind, frames * width).reshape(frames, width), points, scale, rate_hz, samples
+    )
+
+
+def _frames(found: dict[str, Values], numbered: int, held: int, spare: int) -> int:
+    """Return how many frames there are: the largest number that is stated and held.
+
+    numbered : by the header, which cannot count on from 65,535, as whole parameters cannot
+    held     : as many would fit into the data;  spare : so many of them may be what fills its last block
+    Raises InputError: the data hold less than any number that is stated.
+    """
+    start, end = _number(found, "TRIAL.ACTUAL_START_FIELD", 1), _number(found, "TRIAL.ACTUAL_END_FIELD", 0)
+    counted, long = _number(found, "POINT.FRAMES", 0), _number(found, "POINT.LONG_FRAMES", 0)
+    stated = sorted({int(each) for each in (numbered, counted % (1 << 31), long, end - start + 1) if each >= 1})
+    fitting = [count for count in stated if count <= held]
+    if not fitting:
+        raise InputError(f"cut short: {held} frames of data, required {stated[0] if stated else 1}")
+    frames = fitting[-1]
+    for over in range(frames + OVERFLOW, held + 1, OVERFLOW):
+        if held < over + spare:  # a number that began at 0 again
+            frames = over
+    if frames == MOST_FRAMES and held > frames + spare:  # the end of what can be counted, and nothing beside it
+        frames = held
+    if frames != stated[-1]:
+        LOG.warning("it states %s frames and holds %d: %d are read", " or ".join(map(str, stated)), held, frames)
+    return frames
 
 
 def _content(found: dict[str, Values], rows: Array, points: int, scale: float, rate_hz: float, samples: int) -> C3dFile:
@@ -134,11 +171,14 @@ def _texts(found: dict[str, Values], name: str) -> list[str]:
 
 
 def _number(found: dict[str, Values], name: str, otherwise: float) -> float:
+    """Return a parameter; of two whole numbers the first is the lower half."""
     values = found.get(name)
-    return float(values[0]) if isinstance(values, np.ndarray) and len(values) else float(otherwise)
+    if not isinstance(values, np.ndarray) or not len(values):
+        return float(otherwise)
+    return float(values[0] + (1 << 16) * values[1] if len(values) == 2 else values[0])
 
 
-def _parameters(content: bytes, at: int) -> dict[str, Values]:
+def _parameters(content: bytes, at: int, numbers: _Numbers) -> dict[str, Values]:
     """Return the parameters by ``GROUP.NAME``."""
     groups: dict[int, str] = {}
     found: list[tuple[int, str, Values]] = []
@@ -146,11 +186,11 @@ def _parameters(content: bytes, at: int) -> dict[str, Values]:
         length, group = abs(struct.unpack_from("b", content, at)[0]), struct.unpack_from("b", content, at + 1)[0]
         name = content[at + 2 : at + 2 + length].decode("ascii").strip().upper()
         body = at + 2 + length
-        step = struct.unpack_from("<h", content, body)[0]
+        step = int(numbers.read(content, "i2", 1, body)[0])
         if group < 0:
             groups[-group] = name
         else:
-            found.append((group, name, _values(content, body + 2)))
+            found.append((group, name, _values(content, body + 2, numbers)))
         if step == 0:
             break
         if step < 0:
@@ -159,7 +199,7 @@ def _parameters(content: bytes, at: int) -> dict[str, Values]:
     return {f"{groups.get(group, '')}.{name}": values for group, name, values in found}
 
 
-def _values(content: bytes, at: int) -> Values:
+def _values(content: bytes, at: int, numbers: _Numbers) -> Values:
     """Return the values of a parameter whose type stands at a place."""
     kind, dimensions = struct.unpack_from("bB", content, at)
     sizes = list(content[at + 2 : at + 2 + dimensions])
@@ -169,6 +209,80 @@ def _values(content: bytes, at: int) -> Values:
         width = sizes[0] if sizes else 1
         texts = [data[start : start + width] for start in range(0, len(data), max(width, 1))]
         return [text.decode("latin-1").rstrip("\0 ")[:LONGEST_LABEL_CHARACTERS] for text in texts]
-    if kind not in _KINDS or len(data) < count * kind:
+    if kind not in {1, 2, 4} or len(data) < count * kind:
         raise InputError(f"a parameter of type {kind} and sizes {sizes} does not fit; export the capture again")
-    return np.frombuffer(data, _KINDS[kind], count).astype(np.float64)
+    return numbers.read(data, {1: "u1", 2: "u2", 4: "f4"}[kind], count)
+
+
+def write_c3d(path: Path, content: C3dFile) -> None:
+    """Write a file; texts are ASCII, numbers have single precision.
+
+    More frames than the header can number stand in ``TRIAL`` as two whole numbers each, and in ``POINT:LONG_FRAMES``.
+    """
+    frames, points = content.points.shape[:2]
+    numbered = min(frames, MOST_FRAMES)
+    curves = len(content.analog_labels)
+    groups: dict[str, dict[str, int | float | Values]] = {
+        "POINT": {
+            "USED": points,
+            "SCALE": -1.0,
+            "RATE": content.rate_hz,
+            "DATA_START": 0,
+            "FRAMES": numbered,
+            "LABELS": list(content.labels),
+            "DESCRIPTIONS": ["" for _ in content.labels],
+            "UNITS": [content.unit],
+        },
+        "ANALOG": {
+            "USED": curves,
+            "LABELS": list(content.analog_labels),
+            "DESCRIPTIONS": ["" for _ in content.analog_labels],
+            "GEN_SCALE": 1.0,
+            "OFFSET": np.zeros(curves, np.int16),
+            "SCALE": np.ones(curves, np.float32),
+            "UNITS": list(content.analog_units),
+            "RATE": content.rate_hz,
+        },
+        "MANUFACTURER": {"SOFTWARE": [content.software]},
+    }
+    if frames > numbered:
+        groups["POINT"]["LONG_FRAMES"] = float(frames)
+        start, end = (np.array([number % OVERFLOW, number // OVERFLOW]) for number in (1, frames))
+        groups["TRIAL"] = {"ACTUAL_START_FIELD": start, "ACTUAL_END_FIELD": end}
+    blocks = -(-(4 + len(_section(groups))) // BLOCK)
+    groups["POINT"]["DATA_START"] = 2 + blocks
+    section = bytes([1, MARK, blocks, INTEL_PROCESSOR]) + _section(groups)
+    header = struct.pack("<BB5HfHHf", 2, MARK, points, curves, 1, numbered, 10, -1.0, 2 + blocks, 1, content.rate_hz)
+    seen = np.isfinite(content.points).all(axis=2)
+    data = np.zeros((frames, points * 4 + curves), "<f4")
+    placed = np.concatenate([content.points, np.where(seen, 0.0, -1.0)[..., None]], axis=2)
+    data[:, : points * 4] = np.nan_to_num(placed).reshape(frames, -1)
+    if curves:
+        data[:, points * 4 :] = content.analog
+    with path.open("wb") as file:
+        file.write(header.ljust(BLOCK, b"\0") + section.ljust(blocks * BLOCK, b"\0") + data.tobytes())
+        file.write(b"\0" * (-data.nbytes % BLOCK))
+
+
+def _section(groups: dict[str, dict[str, int | float | Values]]) -> bytes:
+    """Return groups and parameters as bytes."""
+    parts = []
+    for number, (group, parameters) in enumerate(groups.items(), 1):
+        parts.append(struct.pack("<bb", len(group), -number) + group.encode() + struct.pack("<hB", 3, 0))
+        for name, value in parameters.items():
+            body = _stored_parameter(value) + b"\0"
+            head = struct.pack("<bb", len(name), number) + name.encode()
+            parts.append(head + struct.pack("<h", 2 + len(body)) + body)
+    return b"".join(parts) + b"\0\0"
+
+
+def _stored_parameter(value: int | float | Values) -> bytes:
+    """Return type, sizes and values of a parameter as bytes."""
+    if isinstance(value, list):
+        width = max((len(text.encode("ascii", "replace")) for text in value), default=0)
+        texts = b"".join(text.encode("ascii", "replace").ljust(width) for text in value)
+        return struct.pack("<bBBB", -1, 2, width, len(value)) + texts
+    numbers = np.asarray(value)
+    kind = "<u2" if numbers.dtype.kind == "i" else "<f4"
+    sizes = bytes([numbers.ndim, *numbers.shape])
+    return struct.pack("<b", 2 if kind == "<u2" else 4) + sizes + numbers.astype(kind).tobytes()

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion.export.base import MotionFormat
-from lipmotion.meshes.files.live_link_table import read_live_link
+from lipmotion.meshes.files.curve_table import read_curve_motion
 from lipmotion.types import Generation
 
 CURVES = (
@@ -57,4 +57,4 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
             file.write(f"{timecode(time_s)},{len(CURVES)},{form % tuple(row.tolist())}\n")
 
 
-MOTION_FORMAT = MotionFormat(write, read_live_link, curves="face", rate_hz=float(TICKS_HZ))
+MOTION_FORMAT = MotionFormat(write, read_curve_motion, curves="face", rate_hz=float(TICKS_HZ))

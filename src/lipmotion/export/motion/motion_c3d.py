@@ -6,6 +6,7 @@ others become channels ``x_NAME``, ``y_NAME``, ``z_NAME`` in the head's frame (`
 
 from __future__ import annotations
 
+import logging
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,13 +17,13 @@ from numpy.typing import NDArray
 from lipmotion.articulation.lip_points import CHIN, mouth_template
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import MotionFormat
-from lipmotion.export.motion.c3d_file import LONGEST_LABEL_CHARACTERS, MOST_FRAMES, C3dFile, read_c3d
-from lipmotion.export.motion.c3d_writing import write_c3d
+from lipmotion.export.motion.c3d_file import LONGEST_LABEL_CHARACTERS, C3dFile, read_c3d, write_c3d
 from lipmotion.export.motion.marker_frame import MARKER, MILLIMETRES, in_head_frame, motion_of_markers
 from lipmotion.types import EYE_DISTANCE, Channel, Generation, Motion, Timeline, Unit
 
 Array = NDArray[np.float64]
 
+LOG = logging.getLogger("lipmotion")
 SOFTWARE = "lipmotion"
 EYES = (("EYE_L", 0.5), ("EYE_R", -0.5))
 LEAST_SEEN_SHARE = 0.5
@@ -33,9 +34,7 @@ _UNLABELLED = re.compile(r"\*|[uc]_?\d+$|unlabel|point\d+$", re.IGNORECASE)
 
 
 def check(motion: Motion) -> None:
-    """Raise ExportError if motion does not fit: too long, or names that are no labels."""
-    if len(motion.values) > MOST_FRAMES:
-        raise ExportError(f"{len(motion.values)} frames, required at most {MOST_FRAMES} in .c3d; write a lower --rate")
+    """Raise ExportError if motion does not fit: no frames, or names that are no labels."""
     if not len(motion.values):
         raise ExportError("the motion has no frames, required at least one in .c3d")
     if "" in motion.names:
@@ -89,9 +88,13 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
         for name, column in named.items()
         if name and not _UNLABELLED.match(name) and (bridged := _bridged(content.points[:, column])) is not None
     }
+    lost = [name for name in named if name and not _UNLABELLED.match(name) and name not in markers]
     if not markers:
         some = ", ".join(content.labels[:6])
         raise InputError(f"no marker with a name is seen in half of the frames; the labels: {some or 'none'}")
+    if lost:
+        what = f"{len(lost)} of {len(lost) + len(markers)} markers are seen in less than half of the frames"
+        LOG.warning("%s: %s and left out: %s", path, what, ", ".join(lost[:8]))
     return motion_of_markers(in_head_frame(markers, content.unit), content.rate_hz), Timeline(())
 
 
@@ -130,4 +133,4 @@ def _as_written(content: C3dFile) -> Motion:
     return Motion(values, content.rate_hz, tuple(channels))
 
 
-MOTION_FORMAT = MotionFormat(write, read, check, most_frames=MOST_FRAMES)
+MOTION_FORMAT = MotionFormat(write, read, check)

@@ -33,7 +33,7 @@ def write(path: Path, generation: Generation, source: Mapping[str, str], model: 
 def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
     """Return motion and units of a file. Raises InputError: not JSON, or not a motion document."""
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")
         if text.lstrip().startswith("["):
             raise InputError(f"not a motion document: its 'format' must be {FORMAT!r}")
         document = read_members(text, "values", "confidence")
@@ -52,7 +52,7 @@ def read_units(path: Path) -> Timeline[Unit] | None:
     Raises InputError: units that are damaged.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")
         document = json.loads(text) if '"values"' not in text and text.lstrip().startswith("{") else None
     except (ValueError, RecursionError):  # reported by ``read``
         return None

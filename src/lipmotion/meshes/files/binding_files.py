@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,6 +17,7 @@ from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.storage.archive import UNREADABLE, read_archive, read_archive_header, write_archive
 from lipmotion.storage.files import check_source, read_text_file, whole_file
 from lipmotion.storage.schema import ArraySpec, checked_arrays, format_errors
+from lipmotion.storage.text_table import read_table
 
 BINDING_FORMAT, BINDING_VERSION = "lipmotion.binding", 1
 BINDING_SUFFIX = ".binding"
@@ -153,17 +153,18 @@ def _whole(path: Path, line: int, text: str) -> int:
 
 def _rows(path: Path, columns: tuple[str, ...], kind: str) -> Iterator[tuple[int, list[str]]]:
     """Yield the rows of a table with their line numbers; empty lines and lines that begin with # are left out."""
-    reader = csv.reader(io.StringIO(read_text_file(path, kind, LARGEST_TABLE_BYTES)))
     try:
-        table = [(reader.line_num, row) for row in reader]
-    except csv.Error as error:
+        table = read_table(io.StringIO(read_text_file(path, kind, LARGEST_TABLE_BYTES), newline=""))
+        rows = list(table.rows)
+    except ValueError as error:
+        if isinstance(error, InputError):
+            raise
         raise InputError(f"{path}: no table ({shortened(str(error))}); required {','.join(columns)}") from error
-    header = [word.strip() for word in table[0][1]] if table else []
-    if header != list(columns):
-        found = shortened(",".join(header))
+    if table.plain_names != list(columns):
+        found = shortened(",".join(table.plain_names))
         raise InputError(f"{path}: the columns are {found!r}, required {','.join(columns)}")
-    for line, row in table[1:]:
-        if row and not row[0].startswith("#"):
+    for line, row in rows:
+        if not row[0].startswith("#"):
             if len(row) != len(columns):
                 raise InputError(f"{path}: line {line}: {len(row)} columns, required {','.join(columns)}")
             yield line, row

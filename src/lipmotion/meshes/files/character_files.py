@@ -9,6 +9,7 @@ from lipmotion.meshes.files.gltf_scene import read_gltf
 from lipmotion.meshes.files.obj_files import read_obj, read_obj_folder
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.meshes.model.shape_names import is_known
+from lipmotion.storage.sources import check_kind
 
 GLTF_SUFFIXES = (".glb", ".gltf", ".vrm")
 OBJ_SUFFIX = ".obj"
@@ -25,6 +26,7 @@ def read_character(path: str | Path) -> Mesh:
     if path.is_dir():
         names = [each.stem for each in path.glob("*.[oO][bB][jJ]")]
         return read_obj_folder(path, is_known if any(map(is_known, names)) else lambda _: True)
+    check_kind(path, "character")
     if path.suffix.lower() in GLTF_SUFFIXES:
         return read_gltf(path)
     if path.suffix.lower() == OBJ_SUFFIX:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.meshes.files.gltf_container import GltfDocument, read_gltf_document, write_container
-from lipmotion.meshes.files.gltf_scene import target_names
+from lipmotion.meshes.files.gltf_scene import mesh_target_names
 from lipmotion.meshes.files.gltf_sound import sound_extras
 from lipmotion.meshes.model.keys import EVERY_KEY, Thinning, keys_of
 from lipmotion.types import Motion
@@ -76,7 +76,7 @@ def _moved_nodes(document: GltfDocument, weights: Motion) -> list[tuple[int, tup
     found = []
     for number, node in enumerate(document.items("nodes")):
         mesh = document.items("meshes")[node["mesh"]] if "mesh" in node else {}
-        names = tuple(target_names(mesh, mesh["primitives"][0])) if mesh.get("primitives") else ()
+        names = mesh_target_names(document, mesh)
         if set(names) & set(weights.names):
             found.append((number, names))
     return found

@@ -115,7 +115,7 @@ class _SceneSurface:
                 moved = tuple(target.get("POSITION") for target in primitive.get("targets", []))
                 shared = (number, attributes["POSITION"], attributes.get("COLOR_0"), moved)
                 if shared not in self._blocks:
-                    self._blocks[shared] = self._block(number, primitive, target_names(mesh, primitive))
+                    self._blocks[shared] = self._block(number, primitive, target_names(self._document, mesh, primitive))
                 self._add_primitive(primitive, name, self._blocks[shared])
 
     def _add_primitive(self, primitive: dict[str, Any], name: str, block: _SharedVertices) -> None:
@@ -211,12 +211,25 @@ def _mapped(linear: Matrix, vectors: Matrix) -> Matrix:
     return mapped
 
 
-def target_names(mesh: Mapping[str, Any], primitive: Mapping[str, Any]) -> list[str]:
-    """Return the names of the morph targets of a primitive; those without a name are numbered."""
-    count = len(primitive.get("targets", []))
-    for holder in (mesh, primitive):
-        given = holder.get("extras", {}).get("targetNames", [])
-        names = [plain_name(name) or f"target {number}" for number, name in enumerate(given)]
-        if len(names) >= count and len(set(names)) == len(names):
-            return names[:count]
-    return [f"target {number}" for number in range(count)]
+def target_names(document: GltfDocument, mesh: Mapping[str, Any], primitive: Mapping[str, Any]) -> list[str]:
+    """Return the names of the morph targets of a primitive: those of the mesh, or else of its arrays.
+
+    Targets without a name, or with that of another before, are numbered.
+    """
+    targets = primitive.get("targets", [])
+    accessors = document.items("accessors")
+    arrays = [accessors[target["POSITION"]].get("name", "") if "POSITION" in target else "" for target in targets]
+    holders = [holder.get("extras", {}).get("targetNames", []) for holder in (mesh, primitive)]
+    given: list[str] = next((names for names in (*holders, arrays) if any(names)), [])
+    names: list[str] = []
+    for number in range(len(targets)):
+        name = plain_name(given[number]) if number < len(given) else ""
+        names.append(name if name and name not in names else f"target {number}")
+    return names
+
+
+def mesh_target_names(document: GltfDocument, mesh: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the names of the morph targets of a mesh; some of its primitives may have none."""
+    named = [target_names(document, mesh, primitive) for primitive in mesh.get("primitives", [])]
+    longest = max(named, key=len, default=[])
+    return tuple(longest)

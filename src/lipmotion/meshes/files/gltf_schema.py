@@ -93,9 +93,11 @@ def gltf_schema(json: Mapping[str, Any]) -> Schema:
 
 def _animation(node: Schema, accessor: Schema) -> dict[str, Schema]:
     """Return what is used of an animation; channels of other kinds are left out."""
-    target = members({"node": node, "path": _WORD})
+    pointer = members({"KHR_animation_pointer": members({"pointer": _WORD})})
+    target = members({"node": node, "path": _WORD, "extensions": if_fits(pointer)})
     channel = members({"sampler": _SIZE, "target": target}, ["sampler", "target"])
     return {
+        "name": _NAME,
         "channels": items(if_fits(channel)),
         "samplers": items(members({"input": accessor, "output": accessor, "interpolation": _WORD})),
     }
@@ -123,6 +125,7 @@ def _accessor(view: Schema) -> dict[str, Schema]:
     }
     return {
         **{**place, "componentType": one_of(COMPONENTS), "count": _SIZE, "type": one_of(WIDTHS), "normalized": truth},
+        "name": _NAME,
         "sparse": members(sparse, list(sparse)),
     }
 

@@ -6,6 +6,8 @@ weight of an expression is the x of the translation of its node.
 
 from __future__ import annotations
 
+import logging
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,19 +18,21 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.expression import PREFIX
 from lipmotion.errors import InputError
+from lipmotion.meshes.files.curve_table import strongest_columns
 from lipmotion.meshes.files.gltf_accessors import GltfArrays
 from lipmotion.meshes.files.gltf_container import GltfDocument, plain_name, read_gltf_document
 from lipmotion.meshes.files.gltf_nodes import placed_nodes
-from lipmotion.meshes.files.gltf_scene import target_names
+from lipmotion.meshes.files.gltf_scene import mesh_target_names
 from lipmotion.meshes.files.steady_rate import exact_rate
 from lipmotion.meshes.model.bones import HEAD, NECK, bone_kind
 from lipmotion.meshes.model.head_angles import ANGLES, head_angles
-from lipmotion.meshes.model.shape_names import VRM_EMOTIONS
+from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, VRM_EMOTIONS, arkit_name, spoken_name
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
 from lipmotion.types.moods import MOODS
 from lipmotion.types.motion import RADIAN
 
 Array = NDArray[np.float64]
+LOG = logging.getLogger("lipmotion")
 STEP, CUBIC = "STEP", "CUBICSPLINE"
 SAMPLED_HZ = 60.0
 """Frames a second where the keys are not even."""
@@ -46,6 +50,9 @@ KNOWN_AS = {
     **{mood: (PREFIX + mood,) for mood in MOODS if mood in VRM_EMOTIONS},
 }
 """Expressions of VRM that are blendshapes of ARKit, or moods."""
+STILL = 0.01
+"""Weights that change by no more than this do not move."""
+_POINTER = re.compile(r"/(nodes|meshes)/(\d{1,9})/(weights|rotation|translation)(/\d{1,9})?", re.ASCII)
 QUATERNION = ("x", "y", "z", "w")
 TURNING = (NECK, HEAD)
 """The bones whose turns, one after the other, are those of the head."""
@@ -89,19 +96,32 @@ class _Track:
 
 
 def read_gltf_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
-    """Return the first animation of a file that moves morph targets or expressions, as weights; an empty timeline.
+    """Return the first animation of a file that moves a mouth, or else a face, as weights; an empty timeline.
 
-    Channels have the names of the targets; of several meshes with one name the first counts. Keys that are even are the
-    frames, others are sampled 60 times a second, from 0 on.
+    Channels have the names of the targets; of several meshes with one name the one that moves most counts. Keys that
+    are even are the frames, others are sampled 60 times a second, from 0 on. A warning names other animations.
     Raises InputError: the file is damaged or too large, or it has no such animation.
     """
     document = read_gltf_document(path)
     arrays = GltfArrays(document)
-    for animation in document.items("animations"):
-        tracks = list(_tracks(document, arrays, animation))
-        if tracks:
-            return _motion(document, tracks, _turns(document, arrays, animation)), Timeline(())
-    raise InputError("it has no animation of morph targets or expressions; export the animation with the character")
+    found = [
+        (each, tracks) for each in document.items("animations") if (tracks := list(_tracks(document, arrays, each)))
+    ]
+    if not found:
+        raise InputError("it has no animation of morph targets or expressions; export the animation with the character")
+    animation, tracks = next((each for each in found if any(map(_moves_mouth, each[1]))), found[0])
+    if len(found) > 1:
+        named = [plain_name(each.get("name", "")) or "without a name" for each, _ in found]
+        which = [each is animation for each, _ in found].index(True)
+        LOG.warning("%s: %d animations move the face: %s; read: %s", path, len(found), ", ".join(named), named[which])
+    return _motion(document, tracks, _turns(document, arrays, animation)), Timeline(())
+
+
+def _moves_mouth(track: _Track) -> bool:
+    """Return whether a shape of the mouth changes."""
+    keys = track.keys[:, 1] if track.kind == CUBIC else track.keys
+    mouth = [spoken_name(name) is not None or arkit_name(name) in ARKIT_MOUTH for name in track.names]
+    return bool((np.ptp(keys, axis=0) > STILL)[mouth].any())
 
 
 def _motion(document: GltfDocument, tracks: list[_Track], turns: Mapping[int, _Track]) -> Motion:
@@ -112,11 +132,14 @@ def _motion(document: GltfDocument, tracks: list[_Track], turns: Mapping[int, _T
     count = int(np.floor(end_s * hertz + ROUNDING_FRAMES)) + 1
     document.budget.spend("numbers", count * sum(len(track.names) for track in tracks))
     time_s = np.arange(count) / hertz
-    curves: dict[str, Array] = {}
-    for track in tracks:
-        for name, curve in zip(track.names, track.at(time_s).T, strict=True):
-            for known in KNOWN_AS.get(name, (name,)):
-                curves.setdefault(known, curve)
+    every = [
+        (known, curve)
+        for track in tracks
+        for name, curve in zip(track.names, track.at(time_s).T, strict=True)
+        for known in KNOWN_AS.get(name, (name,))
+    ]
+    kept = strongest_columns([arkit_name(name) or name for name, _ in every], np.stack([row for _, row in every], 1))
+    curves = dict(every[column] for column in kept)
     channels = [Channel(name, WEIGHT) for name in curves]
     if turns:
         angles = np.unwrap(head_angles(_turned(document, turns, time_s)), axis=0)
@@ -148,7 +171,7 @@ def _turned(document: GltfDocument, turns: Mapping[int, _Track], time_s: Array) 
 def _turns(document: GltfDocument, arrays: GltfArrays, animation: dict[str, Any]) -> dict[int, _Track]:
     """Return the turns of the first neck and the first head that an animation turns, by the numbers of their nodes."""
     found: dict[str, tuple[int, _Track]] = {}
-    for number, path, sampler in _targets(animation):
+    for number, path, sampler in _targets(document, animation):
         kind = bone_kind(document.items("nodes")[number].get("name", ""))
         if path == "rotation" and kind in TURNING and kind not in found:
             found[kind] = number, _track(arrays, sampler, QUATERNION, 4)
@@ -164,24 +187,36 @@ def _rate(time_s: Array) -> float:
     return exact_rate(round(hertz, 3), 1e-3) if hertz >= SLOWEST_HZ else SAMPLED_HZ
 
 
-def _targets(animation: dict[str, Any]) -> Iterator[tuple[int, str, dict[str, Any]]]:
-    """Yield the node, the path and the sampler of every channel of an animation that has keys."""
+def _targets(document: GltfDocument, animation: dict[str, Any]) -> Iterator[tuple[int, str, dict[str, Any]]]:
+    """Yield the node, the path and the sampler of every channel of an animation that has keys.
+
+    What ``KHR_animation_pointer`` names is the same; ``weights/3`` is one of the weights.
+    """
     samplers = animation.get("samplers", [])
     for channel in animation.get("channels", []):
         target, number = channel.get("target", {}), channel.get("sampler", -1)
         node, path = target.get("node", -1), target.get("path", "")
-        if 0 <= number < len(samplers) and node >= 0 and {"input", "output"} <= samplers[number].keys():
+        pointer = _POINTER.fullmatch(target.get("extensions", {}).get("KHR_animation_pointer", {}).get("pointer", ""))
+        if path == "pointer" and pointer:
+            node, path = int(pointer[2]), pointer[3] + (pointer[4] or "")
+            if pointer[1] == "meshes":
+                node = next((n for n, each in enumerate(document.items("nodes")) if each.get("mesh") == node), -1)
+        if (
+            0 <= number < len(samplers)
+            and 0 <= node < len(document.items("nodes"))
+            and {"input", "output"} <= samplers[number].keys()
+        ):
             yield node, path, samplers[number]
 
 
 def _tracks(document: GltfDocument, arrays: GltfArrays, animation: dict[str, Any]) -> Iterator[_Track]:
     """Yield what moves a face in an animation. Raises InputError: its keys are damaged."""
     expressions = _expressions(document)
-    for node, path, sampler in _targets(animation):
-        if path == "weights":
-            owner = document.items("nodes")[node].get("mesh", -1)
-            mesh = document.items("meshes")[owner] if owner >= 0 else {}
-            names = tuple(target_names(mesh, mesh["primitives"][0])) if mesh.get("primitives") else ()
+    for node, path, sampler in _targets(document, animation):
+        if path.startswith("weights"):
+            owner, one = document.items("nodes")[node].get("mesh", -1), path.partition("/")[2]
+            names = mesh_target_names(document, document.items("meshes")[owner]) if owner >= 0 else ()
+            names = names[int(one) :][:1] if one else names
             if names:
                 yield _track(arrays, sampler, names, 1)
         elif path == "translation" and node in expressions:

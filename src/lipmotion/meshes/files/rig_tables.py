@@ -1,11 +1,14 @@
-"""A user's own rig: a table that says which controls follow which curves, with gain and offset."""
+"""A user's own rig: a table that says which controls follow which curves, with gain and offset.
+
+The table beside a character is the same: its controls are the blendshapes, one row each.
+"""
 
 from __future__ import annotations
 
 import csv
 import io
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -13,7 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
+from lipmotion.meshes.model.mesh import Mesh
+from lipmotion.meshes.model.other_shapes import CLOSED
+from lipmotion.meshes.model.shape_names import ARKIT_52, VISEMES_15, VRM_EMOTIONS, VRM_VOWELS
 from lipmotion.storage.files import read_text_file, whole_file
+from lipmotion.storage.sources import is_file
+from lipmotion.storage.text_table import read_table
 from lipmotion.types import Channel, Motion
 
 COLUMNS = ("control", "source", "gain", "offset", "low", "high")
@@ -21,6 +29,10 @@ CONTROL = "control"
 """The unit of controls of a user's rig."""
 LARGEST_TABLE_BYTES, MOST_CONTROLS = 1 << 20, 2000
 LARGEST_NUMBER = 1e6
+TABLE_SUFFIX = ".character.csv"
+SOURCES = (*ARKIT_52, *(f"viseme_{name}" for name in VISEMES_15), *VRM_VOWELS, CLOSED, *VRM_EMOTIONS)
+"""The curves that blendshapes of a character may follow; besides, each what its own shape fits best: its own name."""
+CLOSED_VISEME = "viseme_PP"
 
 
 @dataclass(frozen=True)
@@ -47,19 +59,20 @@ def read_rig_table(path: Path) -> tuple[RigRow, ...]:
 
     Raises InputError: no such file, other columns, no rows, or a row that is damaged.
     """
-    reader = csv.DictReader(io.StringIO(read_text_file(path, "rig table", LARGEST_TABLE_BYTES)))
     try:
-        found = [name.strip() for name in reader.fieldnames or ()]
-        reader.fieldnames = found
-        table = [(reader.line_num, fields) for fields in reader]
-    except csv.Error as error:
+        table = read_table(io.StringIO(read_text_file(path, "rig table", LARGEST_TABLE_BYTES), newline=""))
+        lines = list(table.rows)
+    except ValueError as error:
+        if isinstance(error, InputError):
+            raise
         raise InputError(f"{path}: no table ({shortened(str(error))}); required {','.join(COLUMNS)}") from error
+    found = table.plain_names
     if found[:2] != list(COLUMNS[:2]) or not set(found) <= set(COLUMNS):
         raise InputError(f"{path}: the columns are {shortened(','.join(found))!r}, required {','.join(COLUMNS)}")
     rows = []
-    for line, fields in table:
-        texts = {name: (fields.get(name) or "").strip() for name in COLUMNS}
-        if texts["control"].startswith("#") or not any(texts.values()):
+    for line, fields in lines:
+        texts = dict.fromkeys(COLUMNS, "") | dict(zip(found, map(str.strip, fields), strict=False))
+        if texts["control"].startswith("#"):
             continue
         try:
             rows.append(_row(texts))
@@ -124,7 +137,47 @@ def _row(texts: Mapping[str, str]) -> RigRow:
 def _number(text: str, default: float) -> float:
     if not text:
         return default
-    value = float(text)
+    value = float(text.replace(",", "."))
     if not abs(value) <= LARGEST_NUMBER:
         raise ValueError(f"the number {text}, required at most {LARGEST_NUMBER:g}")
     return value
+
+
+def table_path(character: Path) -> Path:
+    """Return where the table of a character is: ``head.glb`` has ``head.glb.character.csv`` in the same folder."""
+    named = character.resolve() if character.name in {"", ".."} else character
+    return named.parent / f"{named.name}{TABLE_SUFFIX}"
+
+
+def read_character_table(character: Path, mesh: Mesh) -> dict[str, RigRow]:
+    """Return the rows of the table beside a character by its blendshapes; without limits: 0 to 1. None: no table.
+
+    Raises InputError: a damaged table, no such blendshape or curve, or a blendshape that occurs twice.
+    """
+    path = table_path(character)
+    if not is_file(path):
+        return {}
+    found: dict[str, RigRow] = {}
+    for row in read_rig_table(path):
+        control, source = shortened(row.control), shortened(row.source)
+        if row.control not in mesh.shape_names:
+            raise InputError(f"{path}: there is no blendshape {control!r}; {nearest(row.control, mesh.shape_names)}")
+        if row.source not in {"", row.control, *SOURCES}:
+            raise InputError(
+                f"{path}: {control!r} follows {source!r}, which is no curve; {nearest(row.source, SOURCES)}"
+            )
+        if row.control in found:
+            raise InputError(f"{path}: the blendshape {control!r} occurs twice; leave one row")
+        found[row.control] = replace(row, low=max(row.low, 0.0), high=min(row.high, 1.0))
+    return found
+
+
+def with_sources(mesh: Mesh, table: Mapping[str, RigRow]) -> Mesh:
+    """Return a mesh whose blendshapes follow the curves of a table; those without a row, what their names say."""
+    shapes = [
+        replace(shape, source=CLOSED_VISEME if table[shape.name].source == CLOSED else table[shape.name].source)
+        if shape.name in table
+        else shape
+        for shape in mesh.shapes
+    ]
+    return replace(mesh, shapes=tuple(shapes))

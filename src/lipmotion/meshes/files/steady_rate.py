@@ -19,6 +19,10 @@ EVEN_SHARE = 0.1
 """Times that are this near to an even grid, as a share of a step, are even: the rows are taken as they are."""
 ROUNDING_SHARE = 0.002
 """Rounding of times, as a share of a step: rows that are about as even at a usual rate have that rate."""
+TELEVISION_RATIO, RATIO_OFF = 1.001, 0.0002
+"""By how much sound is longer than motion whose timecode counts 30 where 29.97 frames pass, and how exactly so."""
+SHORTEST_RATIO_S = 100.0
+"""In less sound, 0.001 of it is no more than a frame or two."""
 LONGEST_GAP = 3
 """Most frames of the steady rate for each row: a table whose time is mostly gaps is refused."""
 SPARE_FRAMES = 600
@@ -32,6 +36,20 @@ def exact_rate(hertz: float, off_hz: float = 1e-6) -> float:
     """
     television = float(np.rint(hertz * 1.001)) * 1000 / 1001
     return television if television and abs(television - hertz) <= off_hz else hertz
+
+
+def rate_in_step(rate_hz: float, frames: int, duration_s: float) -> float:
+    """Return the rate of motion that lasts as long as its sound but for 1001 / 1000, else the same rate.
+
+    duration_s : of the sound
+    Timecodes of television count whole numbers of frames a second (30), which pass in 1.001 s (at 29.97).
+    """
+    near = any(abs(rate_hz / each - 1) < 1.5 * (TELEVISION_RATIO - 1) for each in (24, 30, 48, 60, 120))
+    for ratio in (TELEVISION_RATIO, 1 / TELEVISION_RATIO):
+        off = abs(duration_s * rate_hz / ratio - frames)
+        if near and duration_s >= SHORTEST_RATIO_S and off <= max(1.0, RATIO_OFF * frames):
+            return exact_rate(round(rate_hz / ratio, 6), 1e-3)
+    return rate_hz
 
 
 def steady_rows(time_s: Array, rows: Array) -> tuple[Array, float]:

@@ -18,8 +18,7 @@ from lipmotion.articulation.mouth import SpokenMouth
 from lipmotion.errors import InputError
 from lipmotion.meshes.files.binding_files import BINDING_SUFFIX, load_binding, read_points, read_weights
 from lipmotion.meshes.files.character_files import read_character
-from lipmotion.meshes.files.character_tables import read_character_table, table_path, with_sources
-from lipmotion.meshes.files.rig_tables import RigRow
+from lipmotion.meshes.files.rig_tables import RigRow, read_character_table, table_path, with_sources
 from lipmotion.meshes.fitting.lip_placement import LipPlacement, placed_by_points, placed_by_shape, surface_of_named
 from lipmotion.meshes.fitting.mood_weights import expression_weights
 from lipmotion.meshes.fitting.own_curves import OwnCurves, own_curves, plain_row, rows_found

@@ -35,9 +35,16 @@ _ARKIT = {name.lower(): name for name in (*ARKIT_MOUTH, *ARKIT_OTHERS)}
 _SIDES = {"l": "left", "r": "right", "left": "left", "right": "right"}
 
 
+_COPY = re.compile(r"[._ ]\d{1,4}$")
+"""What programs add to a name that is there already: ``jawOpen.001``."""
+
+
 def arkit_name(name: str) -> str | None:
-    """Return ARKit's name of a blendshape as files spell it, or None: ``head.mouthSmile_L`` is ``mouthSmileLeft``."""
-    text = re.split(r"[.:|]", name)[-1]
+    """Return ARKit's name of a blendshape as files spell it, or None.
+
+    ``head.mouthSmile_L``, ``Face_mouthSmileL`` and ``mouth_smile_left.001`` are ``mouthSmileLeft``.
+    """
+    text = re.sub(r"(?<=[a-z])([LR])$", r"_\1", re.split(r"[.:|]", _COPY.sub("", name))[-1])
     words = [word for word in re.split(r"[\s_\-]+", text) if word]
     for first in range(len(words)):
         rest = [word.lower() for word in words[first:]]
@@ -49,13 +56,13 @@ def arkit_name(name: str) -> str | None:
 
 def viseme_name(name: str) -> str | None:
     """Return the Oculus name of a viseme as files spell it, or None: ``viseme_I`` and ``vrc.v_ih`` are ``ih``."""
-    found = re.search(r"(?:viseme|vrc\.v|v)[_.\-](\w+)$", name, re.IGNORECASE)
+    found = re.search(r"(?:viseme|vrc\.v|v)[_.\-](\w+?)$", _COPY.sub("", name), re.IGNORECASE)
     return _VISEME_SPELLINGS.get(found[1].lower()) if found else None
 
 
 def vowel_name(name: str) -> str | None:
     """Return the VRM name of a vowel as files spell it, or None: ``Fcl_MTH_A``, ``あ`` and ``aa`` are ``aa``."""
-    found = re.search(r"(?:^|mth_|mouth_)(aa|ih|ou|ee|oh|[aiueoあいうえお])$", name, re.IGNORECASE)
+    found = re.search(r"(?:^|mth_|mouth_)(aa|ih|ou|ee|oh|[aiueoあいうえお])$", _COPY.sub("", name), re.IGNORECASE)
     return _VOWEL_SPELLINGS[found[1].lower()] if found else None
 
 

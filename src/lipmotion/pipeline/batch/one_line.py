@@ -21,7 +21,7 @@ from lipmotion.export.base import motion_suffix
 from lipmotion.extensions import failed_extension
 from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.measures.closures import CLOSED_SHARE
-from lipmotion.meshes.files.character_tables import table_path
+from lipmotion.meshes.files.rig_tables import table_path
 from lipmotion.motion.closure import OPENING, closable_ranges
 from lipmotion.motion.rest import speech_intervals
 from lipmotion.motion.speaker_maps import SpeakerMap

@@ -17,7 +17,7 @@ from lipmotion.export.timed_labels import LABEL_SUFFIXES
 from lipmotion.extensions import installed_version
 from lipmotion.faces.cut_out import picture_files
 from lipmotion.faces.registry import is_drawings
-from lipmotion.meshes.files.character_tables import table_path
+from lipmotion.meshes.files.rig_tables import table_path
 from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.job import Job
 from lipmotion.pipeline.model import shipped_path

@@ -13,8 +13,9 @@ from lipmotion.corpora.facegood import read_bare_motion
 from lipmotion.corpora.source_recordings import MotionFile, SourceRecording
 from lipmotion.errors import InputError
 from lipmotion.export.base import read_motion
-from lipmotion.meshes.files.live_link_table import is_live_link_file, speech_curves
+from lipmotion.meshes.files.curve_table import is_live_link_file, read_curve_table, speech_curves
 from lipmotion.pipeline.corpus.mesh_motion import SUFFIX, mesh_files, read_mesh_motion
+from lipmotion.pipeline.outputs.motion_input import in_step
 from lipmotion.storage.files import sha256_of
 from lipmotion.types import Span, Timeline, Track, Unit
 from lipmotion.units import PAUSE, SILENCE, check_phones, is_silent
@@ -52,25 +53,32 @@ def _motion_digest(file: Path) -> str:
 
 
 def supplied_track(curves: MotionFile, duration_s: float | None) -> Track:
-    """Return the motion in a file as a track that is valid in all frames, without mouth pictures.
+    """Return the motion in a file as a track, without mouth pictures.
 
     duration_s : of the sound that is in step with it; None: there is none, so any length is right
-    Of a table of Live Link Face, the curves that speech moves.
+    Of a table of Live Link Face, the curves that speech moves; frames without a face are not seen.
     Raises InputError: not a motion file, or of another length than the sound.
     """
-    if curves.file.suffix == SUFFIX and curves.rate_hz:
+    seen = None
+    if is_live_link_file(curves.file):
+        try:
+            motion, seen = read_curve_table(curves.file)
+        except InputError as error:
+            raise InputError(f"{curves.file}: {error}") from error
+        motion = speech_curves(motion)
+    elif curves.file.suffix == SUFFIX and curves.rate_hz:
         motion = read_mesh_motion(curves.file, curves.rate_hz)
     else:
         motion = read_bare_motion(curves) if curves.channels else read_motion(curves.file)[0]
-    if is_live_link_file(curves.file):
-        motion = speech_curves(motion)
+    if duration_s is not None:
+        motion = in_step(motion, duration_s, f" ({curves.file})")
     length_s = len(motion.values) / motion.rate_hz
     if duration_s is not None and abs(length_s - duration_s) > max(CURVES_MARGIN_S, CURVES_MARGIN_SHARE * duration_s):
         raise InputError(
             f"{curves.file}: {len(motion.values)} frames at {motion.rate_hz:g} Hz last {length_s:.2f} s, the sound "
             f"lasts {duration_s:.2f} s; required: the same time from the same start"
         )
-    return Track(motion, np.ones(len(motion.values), bool))
+    return Track(motion, np.ones(len(motion.values), bool) if seen is None else seen)
 
 
 def supplied_phones(recording: SourceRecording, duration_s: float) -> Timeline[Unit] | None:

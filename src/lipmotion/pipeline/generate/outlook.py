@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.understand.spoken_language import confidence_of
 from lipmotion.pipeline.understand.transcribe import is_other_language
 from lipmotion.pipeline.understand.understood_speech import UnderstoodSpeech
 from lipmotion.speech.recognition.agreement import LEAST_FITTING_SHARE
-from lipmotion.speech.recognition.recognised_speech import NOISY_DB, Recognition
+from lipmotion.speech.recognition.recognised_speech import NOISY_DB
 from lipmotion.speech.recognition.recogniser import FULL_WEIGHT_SCORE, own_model_weight
 from lipmotion.speech.voices.pronunciations import MAPPED_CONFIDENCE
 from lipmotion.types import Outlook
@@ -33,12 +34,7 @@ def outlook_of(request: SpeechRequest, understood: UnderstoodSpeech) -> Outlook:
         return Outlook(words, share, 1.0 if words == "own model" else None, understood.range_db, _advice(understood))
     words = "words" if found.word_s > found.phone_s else "phones"
     voice = own_model_weight(found.similarity) if found.similarity is not None else None
-    return Outlook(words, _confidence(found), voice, understood.range_db, _advice(understood))
-
-
-def _confidence(found: Recognition) -> float:
-    """Return the confidence of recognised words times their share of the speech, 0 to 1."""
-    return (found.confidence or 0.0) * found.word_s / max(found.word_s + found.phone_s, 1e-9)
+    return Outlook(words, confidence_of(found), voice, understood.range_db, _advice(understood))
 
 
 def _known_share(request: SpeechRequest, understood: UnderstoodSpeech) -> float:
@@ -55,7 +51,7 @@ def _advice(understood: UnderstoodSpeech) -> tuple[str, ...]:
     found, advice = understood.recognition, []
     if understood.fit is not None and understood.fit.share < LEAST_FITTING_SHARE:
         advice.append(WHOLE_TRANSCRIPT)
-    if found is not None and _confidence(found) < SURE_CONFIDENCE:
+    if found is not None and confidence_of(found) < SURE_CONFIDENCE:
         advice.append(TRANSCRIPT)
     if understood.range_db < NOISY_DB:
         advice.append(LESS_NOISE)

@@ -11,7 +11,7 @@ import numpy as np
 
 from lipmotion.articulation.delivery import Delivery, moved_in_time
 from lipmotion.errors import ExportError, InputError
-from lipmotion.export.cues import CUE_FORMATS, OPTIONAL, CueSheet, choose_cues, format_of, write_cue_file
+from lipmotion.export.cues import CUE_FORMATS, OPTIONAL, SHAPES, CueSheet, choose_cues, format_of, write_cue_file
 from lipmotion.export.cues.sheet import CUES_FPS
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
@@ -20,7 +20,7 @@ from lipmotion.types import Generation
 
 SHEET = ".cues."
 """What the name of a cue sheet among other outputs has before its format."""
-FASTEST_FPS = 60.0
+FASTEST_FPS = 100.0
 """Largest frame rate: times in cue files are in hundredths of a second, and two frames must not share one."""
 
 
@@ -35,9 +35,9 @@ def cues(
     """Return the mouth shapes of generated motion for 2D animation, each held for a least number of frames.
 
     generation  : from ``animate``; without a channel ``opening``, shapes are chosen from the phones alone
-    fps         : frames per second of the animation, 1 to 60
+    fps         : frames per second of the animation, 1 to 100
     hold_frames : smallest number of frames of a shape; None: as many as last two frames at 24 frames per second
-    shapes      : the optional shapes among ``G``, ``H`` and ``X`` that the character has, besides A to F
+    shapes      : the optional shapes among ``G``, ``H`` and ``X`` that the character has, besides A to F, in any case
     delivery    : intensity, anticipation and offset of the shapes, and the least time of each (docs/controls.md); of
                   this and ``hold_frames`` the longer one counts. None: as generated
     Raises InputError: an argument out of its range.
@@ -57,7 +57,7 @@ def cues(
     if chosen.hold_ms:
         hold_frames = max(hold_frames or 1, chosen.hold_frames(fps))
     generation = replace(generation, motion=with_mouth(generation.motion))
-    return choose_cues(moved_in_time(generation, chosen), fps, hold_frames, shapes, intensity=chosen.intensity)
+    return choose_cues(moved_in_time(generation, chosen), fps, hold_frames, shapes.upper(), intensity=chosen.intensity)
 
 
 def write_cues(
@@ -102,7 +102,7 @@ def check_cue_options(fps: float, hold_frames: int | None, shapes: str) -> None:
         raise InputError(f"the frame rate is {fps}, required 1 to {FASTEST_FPS:.0f} a second")
     if hold_frames is not None and hold_frames < 1:
         raise InputError(f"the hold is {hold_frames} frames, required 1 or more")
-    if set(shapes) - set(OPTIONAL):
+    if set(shapes.upper()) - set(SHAPES):
         raise InputError(f"the optional shapes are {shapes!r}, required letters out of {OPTIONAL!r}, or none")
 
 

@@ -31,7 +31,6 @@ from lipmotion.pipeline.outputs.living_curves import living_curves
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
 from lipmotion.pipeline.outputs.prosody import recorded_prosody
 from lipmotion.pipeline.outputs.scenes import sound_reference
-from lipmotion.speech.sound.audio_files import stated_length_s
 from lipmotion.storage.files import as_text
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Prosody
 from lipmotion.types.motion import RADIAN
@@ -59,8 +58,6 @@ class MotionOutput(Output):
     def check(self) -> None:  # noqa: D102
         settings = self.settings
         check_rate(self.path, settings.rate_hz)
-        if settings.recording is not None:
-            check_length(self.path, settings.recording, settings.rate_hz, settings.delivery.offset_ms / 1000)
 
     def prepared(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
         settings = self.settings
@@ -223,22 +220,6 @@ def check_rate(path: Path, rate_hz: float | None) -> None:
     if form.fixed_rate and rate_hz is not None and rate_hz != form.rate_hz:
         required = f"required {form.rate_hz:g}: leave --rate out"
         raise ExportError(f"{path}: {rate_hz:g} frames a second in {motion_suffix(path)}, {required}")
-
-
-def check_length(path: Path, speech: Path, rate_hz: float | None, later_s: float = 0.0) -> None:
-    """Raise ExportError if a motion file has no room for all frames of a recording, by the length that this states.
-
-    rate_hz : the rate that the user asked for; None: that of the format, or else ``MODEL_HZ``
-    later_s : how much later than the recording the motion ends, by its offset; negative: earlier
-    """
-    form = motion_format(path)
-    if form.most_frames is None:
-        return
-    frames = int((stated_length_s(speech) + later_s) * (rate_hz or form.rate_hz or MODEL_HZ))
-    if frames > form.most_frames + MODEL_HZ:  # a second less may be said than stated
-        kind = motion_suffix(path)
-        required = f"required at most {form.most_frames} in {kind}; give a lower --rate"
-        raise ExportError(f"{path}: about {frames} frames, {required}")
 
 
 def _curves(generation: Generation, name: str, staging: Staging | None, prosody: Prosody | None) -> Motion:

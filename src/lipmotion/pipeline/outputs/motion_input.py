@@ -11,6 +11,8 @@ import numpy as np
 from lipmotion.articulation.expression import is_mood
 from lipmotion.errors import InputError
 from lipmotion.export.base import read_motion
+from lipmotion.export.cues.cue_motion import read_cue_motion
+from lipmotion.meshes.files.steady_rate import rate_in_step
 from lipmotion.meshes.model.shape_names import is_known
 from lipmotion.pipeline.understand.given_units import read_units
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Generation, Motion, StateTrace
@@ -22,19 +24,25 @@ SLOWEST_HZ, FASTEST_HZ = 1.0, 10_000.0
 """Smallest and largest frame rate of motion that is read: a mistyped one must not fill the memory."""
 LONGEST_S = 86_400.0
 """Longest motion that is read."""
+CUE_SUFFIXES = (".dat", ".tsv", ".xml", ".pgo")
 STATE = "file"
 """The state of every frame of motion that was read."""
 
 
-def read_generation(path: str | Path, units: str | Path | None = None) -> Generation:
+def read_generation(path: str | Path, units: str | Path | None = None, rate_hz: float | None = None) -> Generation:
     """Return the motion of a file as ``write`` takes it: with its phones, if it has them, and without variance.
 
     path  : ``.json``, ``.csv``, ``.npz``, or another motion file that can be read
     units : a file with phones in time (``read_units``), for motion files that have none; None: those of the motion file
+    rate_hz : frames a second, where the file states them wrong, or not at all, as Moho's ``.dat``; None: as it says
     Blendshapes, visemes, vowels and moods count as weights, whatever unit the file gives them.
     Raises InputError: a file that cannot be read, motion without frames, of an unlikely rate, or of more than a day.
     """
-    motion, found = read_motion(path)
+    if rate_hz is not None and Path(path).suffix.lower() in CUE_SUFFIXES:
+        motion, found = read_cue_motion(Path(path), rate_hz)
+    else:
+        motion, found = read_motion(path)
+        motion = motion if rate_hz is None else replace(motion, rate_hz=rate_hz)
     if not len(motion.values):
         raise InputError(f"{path}: the motion has no frames; export it again")
     if not SLOWEST_HZ <= motion.rate_hz <= FASTEST_HZ:
@@ -58,12 +66,27 @@ def _is_weight(name: str) -> bool:
     return is_known(name) or is_mood(name)
 
 
-def as_long_as(generation: Generation, duration_s: float) -> Generation:
+def in_step(motion: Motion, duration_s: float, advice: str = "") -> Motion:
+    """Return motion at the rate that its sound shows, where it is off by 1001 / 1000 (``rate_in_step``); a warning."""
+    rate_hz = rate_in_step(motion.rate_hz, len(motion.values), duration_s)
+    if rate_hz != motion.rate_hz:
+        lasts_s = len(motion.values) / motion.rate_hz
+        what = (
+            f"the motion lasts {lasts_s:.2f} s, the sound {duration_s:.2f} s, {duration_s / lasts_s:.4f} times as long"
+        )
+        LOG.warning("%s: read at %.3f frames a second, not at %.3f%s", what, rate_hz, motion.rate_hz, advice)
+    return replace(motion, rate_hz=rate_hz)
+
+
+def as_long_as(generation: Generation, duration_s: float, *, keeps_rate: bool = False) -> Generation:
     """Return a generation that lasts as long as its sound: the last pose stays, or the rest is cut.
 
+    keeps_rate : whether its rate is right; otherwise one that is off by 1001 / 1000 is corrected, if it has no phones
     A difference of more than ``TOLERATED_S`` is logged as a warning.
     """
     motion = generation.motion
+    if not keeps_rate and not len(generation.units):
+        motion = in_step(motion, duration_s, "; --motion-rate says another")
     lasts_s = (len(motion.values) - 1) / motion.rate_hz
     if abs(lasts_s - duration_s) > TOLERATED_S:
         what = "the last pose stays" if lasts_s < duration_s else "what comes after the sound is left out"

@@ -42,7 +42,7 @@ from lipmotion.pipeline.outputs.drawn_video import (
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance
 from lipmotion.pipeline.outputs.prosody import moved_prosody, prosody_of_speech
 from lipmotion.pipeline.outputs.scenes import character_scene, head_scene
-from lipmotion.storage.sources import is_file
+from lipmotion.storage.sources import check_kind, is_file
 from lipmotion.types import Generation, Prosody
 from lipmotion.types.moods import MOODS
 from lipmotion.types.progress import with_reports
@@ -252,6 +252,7 @@ def _opened(face: AnyFace) -> Face | FilmedFace | CutOut:
         return read_cut_out(Path(face))
     if Path(face).suffix.lower() == SUFFIX:
         return load_face(face)
+    check_kind(Path(face), "face")
     beside = Path(f"{face}{SUFFIX}")
     if str(face) not in FACES.names and is_file(beside):
         raise InputError(f"no drawn face {str(face)!r}; for the filmed face give its file: {beside}")

@@ -38,6 +38,7 @@ def in_language(request: SpeechRequest) -> SpeechRequest:
         return replace(request, language=language)
     lexicon = LanguageLexicon(request.lexicon.user if request.lexicon else {}, language)
     if transcript is not None and request.units is None:
+        transcript = transcript.with_words(lambda word: written_words(word) if any(map(str.isalnum, word)) else ())
         lexicon = lexicon.with_words(transcript.words)
     return replace(request, language=language, transcript=transcript, lexicon=lexicon)
 

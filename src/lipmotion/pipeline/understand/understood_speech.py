@@ -19,6 +19,7 @@ from lipmotion.pipeline.generate.prior import with_prior
 from lipmotion.pipeline.job import DETECTED
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.understand.spoken_language import warn_of_another_language
 from lipmotion.pipeline.understand.transcribe import read_transcript, transcribe, warn_of_guesses
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.f0 import log_f0
@@ -66,8 +67,9 @@ from lipmotion.types import (
 )
 from lipmotion.types.languages import ENGLISH
 from lipmotion.types.moods import MoodTag
-from lipmotion.units import SILENCE, Lexicon, check_phones, check_text, is_silent, without_gaps, words_of
+from lipmotion.units import SILENCE, Lexicon, check_phones, check_text, is_silent, without_gaps
 from lipmotion.units.mood_tags import tagged_text
+from lipmotion.units.text_normalisation import checked_tokens
 
 ItemT = TypeVar("ItemT")
 ResultT = TypeVar("ResultT")
@@ -140,6 +142,8 @@ def understood_speech(
     if understood.is_without_speech and not understood.events:
         LOG.warning("no speech found in the recording: the mouth rests; give a recording in which something is said")
     speech, found = understood.speech, understood.recognition
+    if found is not None and request.language == ENGLISH:
+        warn_of_another_language(found)
     voice = known_voice(model.phones, audio, speech, found, given=request.units is not None)
     speech = replace(_with_voices(model.phones, audio, speech, voice), voice=voice)
     return replace(understood, speech=replace(with_prior(model.prior, speech), voice=voice))
@@ -220,7 +224,7 @@ def aligned_within(
         (round(time_s * FRAME_RATE_HZ) for time_s in (start_s, end_s)),
         request.lexicon or Lexicon(),
     )
-    words = words_of(word)
+    words = checked_tokens(word)
     warn_of_guesses(words, lexicon)
     piece = audio.stretch(first, stop)
     if stop > len(audio.samples) // HOP:
@@ -420,7 +424,7 @@ def _words(
         raise InputError(f"the transcript {text!r} is the name of a file; give Path({text!r}), or the words themselves")
     check_text(text, duration_s)
     plain, tags = tagged_text(text)
-    words = words_of(plain)
+    words = checked_tokens(plain)
     return TimedTranscript((TranscriptLine(tuple(map(TimedWord, words))),), tags) if tags else words
 
 

@@ -201,9 +201,10 @@ class Recogniser:
         """Return the phones of a known transcript in time: forced alignment.
 
         audio, features : as of ``recognise``
-        words           : of the transcript, lower case
+        words           : of the transcript, in lower case, and written forms (``1995``), in whose place the words stand
+                          that are said
         anchors         : times of the words, within which they are aligned (``recognition.anchors``); None: anywhere
-        The pronunciation of each word, and the pauses between words, are those with the most probable path. A phone
+        The reading and the pronunciation of each word, and the pauses, are those with the most probable path. A phone
         without a model borrows that of the most similar phone with one (``units.SIMILAR_PHONES``).
         Raises AlignmentError: the transcript does not fit into the recording.
         Raises MissingDependencyError: as ``recognise``.
@@ -211,18 +212,20 @@ class Recogniser:
         audio = analysed(audio, features)
         hmm, log_likelihoods = self._log_likelihoods(audio, aligning=True)
         log_likelihoods = penalise_silence(hmm, log_likelihoods, frames_above(audio.log_energy))
-        variants_of = {word: lexicon.pronunciations(word) for word in set(words)}
-        modelled = [unit for unit in hmm.table.units if not is_silent(unit)]
+        forms_of = {word: lexicon.spoken_forms(word) for word in set(words)}
+        modelled = {PAUSE, *(unit for unit in hmm.table.units if not is_silent(unit))}
         units_of = {
-            word: [tuple(most_similar_phone(phone, modelled) for phone in variant) for variant in variants]
-            for word, variants in variants_of.items()
+            word: [tuple(most_similar_phone(phone, modelled) for phone, _ in form) for form in forms]
+            for word, forms in forms_of.items()
         }
         spoken, bounds = _aligned(hmm, log_likelihoods, [units_of[word] for word in words], anchors)
-        labels = [
-            (phone, words[item.word] if item.word >= 0 else "")
-            for item in spoken
-            for phone in (variants_of[words[item.word]][item.variant] if item.word >= 0 else item.units)
-        ]
+        labels: list[tuple[str, str]] = []
+        for item in spoken:
+            said = len(labels)
+            form = forms_of[words[item.word]][item.variant] if item.word >= 0 else [(unit, "") for unit in item.units]
+            for phone, word in form:
+                if phone != PAUSE or item.units[len(labels) - said] == PAUSE:  # else it was not made
+                    labels.append((phone, word))
         return _timeline(labels, bounds, features.duration_s)
 
     def best_path_densities(self, audio: Audio, features: Features) -> NDArray[np.intp]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+import mmap
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +15,7 @@ from lipmotion.errors import InputError
 from lipmotion.speech.sound.audio_decoding import DecodedAudio, check_sound_format, decode_audio
 from lipmotion.storage.files import check_source
 from lipmotion.storage.media import open_media, stated_duration_s
+from lipmotion.storage.sources import is_text
 from lipmotion.types import Audio
 
 LOG = logging.getLogger("lipmotion")
@@ -28,6 +31,8 @@ LEAST_HOLES_S = 0.005
 """Holes that last less together are not mentioned: they would be rounded to 0."""
 CUT_SHORT_SHARE = 0.9
 """A recording is called cut short when it holds less than this share of the duration that it states."""
+PCM, FLOAT, EXTENSIBLE = 1, 3, 0xFFFE
+"""Forms of samples in a WAVE file; the last one says its form, and how many bits are valid, in a longer header."""
 
 
 def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ, *, warn: bool = True) -> Audio:
@@ -65,7 +70,7 @@ def stated_length_s(path: Path) -> float:
     import av
 
     try:
-        with open_media(path) as container:
+        with open_media(path, content=_corrected_wave(path)) as container:
             return stated_duration_s(container, container.streams.audio[0])
     except (av.FFmpegError, OSError, ValueError, IndexError):
         return 0.0
@@ -75,12 +80,15 @@ def _decoded(path: Path, rate_hz: int, channel: int | None) -> DecodedAudio:
     import av
 
     try:
-        with open_media(path) as container:
+        with open_media(path, content=_corrected_wave(path)) as container:
             _first_track(path, container)
             return decode_audio(container, rate_hz, channel)
     except (av.FFmpegError, ValueError) as error:
         if isinstance(error, InputError):
             raise
+        if is_text(path):
+            told = f"is text, required a recording; give the recording first, its words with --transcript {path}"
+            raise InputError(f"{path}: {told}") from error
         raise InputError(f"{path}: not a readable recording ({_reason(error)}); give an audio or video file") from error
 
 
@@ -126,3 +134,78 @@ def _is_finite(samples: NDArray[np.float32]) -> bool:
 
 def _reason(error: Exception) -> str:
     return str(getattr(error, "strerror", None) or error)
+
+
+class _Wave(mmap.mmap):
+    """A WAVE file as it is read: from ``start`` on, where a header of ours is; the file itself stays as it is."""
+
+    name = ""
+    start = 0
+
+    def seek(self, place: int, whence: int = 0) -> None:  # type: ignore[override]
+        base = (self.start, super().tell(), len(self))[whence]
+        super().seek(min(max(base + place, self.start), len(self)))
+
+    def tell(self) -> int:
+        return super().tell() - self.start
+
+
+def _corrected_wave(path: Path) -> _Wave | None:
+    """Return a WAVE file under a header that FFmpeg understands; None: its own is one, or it is no WAVE file.
+
+    FFmpeg reads samples of as many bits as are valid, without the zeros that fill their container: 24 bits in 32 as 24,
+    20 as another format, 17 as 24. It also loses its way at a chunk of odd length that no byte follows.
+    Raises ValueError: numbers with the high byte first, which FFmpeg would read as the other ones.
+    """
+    with path.open("rb") as file:
+        kind = file.read(4)
+        if kind == b"RIFX":
+            raise ValueError("a WAVE file with the high byte first (RIFX); export it as .wav or .flac")
+        if kind not in {b"RIFF", b"RF64", b"BW64", b"riff"}:
+            return None
+        whole = _Wave(file.fileno(), 0, access=mmap.ACCESS_COPY)
+    form, body, size, moved = _sound_of_wave(whole)
+    if len(form) < 16:
+        return None
+    coding, channels, rate_hz, per_second, block, bits = struct.unpack_from("<HHIIHH", form)
+    valid = bits
+    if coding == EXTENSIBLE:
+        whole_form = len(form) >= 40
+        valid, coding = struct.unpack_from("<H4xH", form, 18) if whole_form else (-1, PCM)
+    least = -(-bits // 8) * channels
+    frame = block if block * rate_hz == per_second and block >= least else least
+    if coding not in {PCM, FLOAT} or not channels or frame % channels:
+        return None
+    container = 8 * frame // channels
+    if not moved and bits == container and valid in {0, container}:
+        return None
+    size = min(size or len(whole), len(whole) - body)
+    header = struct.pack("<HHIIHH", coding, channels, rate_hz, frame * rate_hz, frame, container)
+    lengths = [min(length, 0xFFFFFFFF) for length in (36 + size, size)]
+    header = struct.pack("<4sI8sI16s4sI", b"RIFF", lengths[0], b"WAVEfmt ", 16, header, b"data", lengths[1])
+    whole.start, whole.name = body - len(header), str(path)
+    whole[whole.start : body] = header
+    whole.seek(0)
+    return whole
+
+
+def _sound_of_wave(whole: _Wave) -> tuple[bytes, int, int, bool]:
+    """Return the content of the chunk of the form, where the samples are, how many bytes of them, and whether a chunk
+    of odd length lacks the byte after it. The form is empty where there is none, or there are no samples."""
+    long = whole[:4] == b"riff"  # Sony's Wave64: 16 bytes of a name, 8 of a length that counts itself
+    head, body, name, size = (24 if long else 8), (40 if long else 12), b"", 0
+    form, stated, moved = b"", 0, False
+    while name != b"data":
+        place = body + size + (-size % 8 if long else size % 2)
+        if not long and size % 2 and whole[body + size : body + size + 4] in {b"fmt ", b"data", b"LIST", b"fact"}:
+            place, moved = body + size, True
+        if size < 0 or place + head > len(whole):
+            return b"", 0, 0, False
+        body, name = place + head, whole[place : place + 4]
+        (size,) = struct.unpack_from("<16xQ" if long else "<4xI", whole, place)
+        size -= 24 if long else 0
+        if name == b"fmt ":
+            form = whole[body : body + size]
+        elif name == b"ds64":
+            stated = int.from_bytes(whole[body + 8 : body + 16], "little")
+    return form, body, stated or size, moved

@@ -13,7 +13,7 @@ from lipmotion.speech.voices.phone_maps import PhoneMap
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import PAUSE, SILENCE, VISEME_OF, Lexicon, Pronunciation, is_silent, phone_classes, words_in
 from lipmotion.units.phones import REDUCED_VOWELS, SHORT_PAUSE_S
-from lipmotion.units.text_normalisation import normalised_text
+from lipmotion.units.spelling import normalised_text
 
 GAP_COST, OWN_FORM_COST, OWN_KIND_COST, OTHER_KIND_COST = 0.7, 0.3, 0.8, 1.5
 """Costs of matching a phone with none, with a form of itself, with another of its kind (vowel or consonant), and with

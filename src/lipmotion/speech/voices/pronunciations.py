@@ -12,6 +12,7 @@ from lipmotion.speech.voices.espeak import EXTRA, pronounced_words
 from lipmotion.types.languages import ENGLISH, LANGUAGES, foreign_letters
 from lipmotion.units import Lexicon, Pronunciation
 from lipmotion.units.ipa_phones import ipa_phones
+from lipmotion.units.lexicon import SpokenForm
 
 MAPPED_CONFIDENCE = 0.8
 """Most confidence in words of another language: their phones are the nearest ones of English, on which models are
@@ -33,11 +34,12 @@ class LanguageLexicon(Lexicon):
 
     def known(self, word: str) -> bool:
         """Return whether the word has a pronunciation: none is guessed. Raises as ``with_words``."""
-        return bool(self.pronunciations(word))
+        return bool(self.spoken_forms(word))
 
-    def pronunciations(self, word: str) -> tuple[Pronunciation, ...]:
-        """Return every pronunciation of a lower-case word. Raises as ``with_words``."""
-        return self.user.get(word) or self.with_words((word,)).user[word]
+    def spoken_forms(self, word: str) -> tuple[SpokenForm, ...]:
+        """Return every pronunciation of a lower-case word, each phone with the word. Raises as ``with_words``."""
+        variants = self.user.get(word) or self.with_words((word,)).user[word]
+        return tuple(tuple((phone, word) for phone in variant) for variant in variants)
 
     def with_words(self, words: Sequence[str]) -> LanguageLexicon:
         """Return the same lexicon that holds the pronunciations of some words; espeak-ng is asked once for all.

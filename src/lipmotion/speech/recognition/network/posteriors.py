@@ -232,8 +232,9 @@ def token_posteriors(name: str, audio: Audio, each: ParallelMap = map) -> TokenP
     audio      : an ``AnalysedAudio`` shares them with what recognises its phones
     name, each : as of ``posterior_stretches``, whose errors it raises
     """
-    values = recording_posteriors(name, analysed(audio), each).values.astype(np.float16)
-    mean = mean_posterior(posterior_stretches(name, analysed(audio), each))
+    audio = analysed(audio)
+    values = recording_posteriors(name, audio, each).values.astype(np.float16)
+    mean = mean_posterior(posterior_stretches(name, audio, each))
     return TokenPosteriors(values, phone_recogniser(name).source, mean)
 
 

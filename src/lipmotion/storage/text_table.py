@@ -1,0 +1,89 @@
+"""Tables of text as programs and spreadsheets save them.
+
+Fields stand between commas, semicolons or tabs, with or without quotes; numbers have a point or a comma. A byte order
+mark, blank lines, comments (``#``) and Excel's ``sep=;`` may stand above the names of the columns.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from itertools import chain
+from pathlib import Path
+
+LONGEST_LINE = 1 << 20
+"""Most characters of a line."""
+SEPARATORS = ",;\t"
+MISSING = frozenset(("", "nan", "na", "n/a", "none", "null", "-", "-nan", "nan(ind)", "-nan(ind)"))
+"""Fields that hold no number, in lower case."""
+
+
+@dataclass(frozen=True)
+class TextTable:
+    """The names of the columns, and the rows below: each with the number of its last line, and its fields."""
+
+    names: list[str]
+    rows: Iterator[tuple[int, list[str]]]
+
+    @property
+    def plain_names(self) -> list[str]:
+        """The names without blanks around them, and without empty ones at the end."""
+        names = [name.strip() for name in self.names]
+        while len(names) > 1 and not names[-1]:
+            names.pop()
+        return names
+
+
+@contextmanager
+def open_table(path: Path) -> Iterator[TextTable]:
+    """Open a table to read its rows one by one; rows without any field are left out.
+
+    Raises OSError: it cannot be opened. Raises ValueError, also from the rows: it is no table of text.
+    """
+    with path.open("rb") as file:
+        start = file.read(2)
+    encoding = "utf-16" if start in {b"\xff\xfe", b"\xfe\xff"} else "utf-16-le" if start[1:] == b"\0" else "utf-8-sig"
+    with path.open(encoding=encoding, newline="") as text:
+        yield read_table(iter(partial(text.readline, LONGEST_LINE), ""))
+
+
+def read_table(lines: Iterable[str]) -> TextTable:
+    """Return the table in some lines, with their ends. Raises ValueError, also from the rows: it is none."""
+    lines = iter(lines)
+    above, head, separator = 0, "", ""
+    for head in lines:
+        stated = re.match(r'"?sep=([,;\t])', head)
+        separator = stated[1] if stated else separator
+        if not (stated or head.startswith("#") or not head.strip(SEPARATORS + '" \r\n')):
+            break
+        above += 1
+    bare = re.sub(r'"[^"]*"', "", head)
+    rows = _rows(csv.reader(chain([head], lines), delimiter=separator or max(SEPARATORS, key=bare.count)), above)
+    return TextTable(next(rows, (0, [""]))[1], rows)
+
+
+def _rows(reader: Iterator[list[str]], above: int) -> Iterator[tuple[int, list[str]]]:
+    try:
+        for row in reader:
+            if any(map(str.strip, row)):
+                yield above + reader.line_num, row  # type: ignore[attr-defined]
+    except csv.Error as error:
+        raise ValueError(str(error)) from error
+
+
+def numbers_in(fields: Sequence[str], line: int) -> list[float]:
+    """Return fields as numbers; those that are missing are NaN. Raises ValueError: another text, with its line."""
+    try:
+        return list(map(float, fields))
+    except ValueError:
+        pass
+    try:
+        return [
+            float("nan") if field.strip().lower() in MISSING else float(field.replace(",", ".")) for field in fields
+        ]
+    except ValueError as error:
+        raise ValueError(f"line {line}: {error}") from error
