@@ -41,11 +41,6 @@ FORBIDDEN = [
         "import lipmotion.export.cues.rhubarb_tsv",
     ),
     (
-        "Timings of services never import one another",
-        "corpora/labels/timings/gentle.py",
-        "import lipmotion.corpora.labels.timings.mfa",
-    ),
-    (
         "Engines know predictors by their interface alone",
         "engines/selection/engine.py",
         "from lipmotion.motion import acoustic_network",

@@ -82,6 +82,11 @@ class Request(Configuration):
         "phones in time from an earlier .json, .npz or .TextGrid, edited or not, or from Audacity labels",
         replaceable=True,
     )
+    tier: str = option(
+        "",
+        metavar="NAME",
+        help="of labels with several tiers or speakers, the tier or the speaker that is read (default: all speakers)",
+    )
     edits: Path | None = _file(
         "edits", "FILE", "what is changed of the motion: of lipmotion edit (docs/edit.md)", replaceable=True
     )

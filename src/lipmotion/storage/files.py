@@ -5,10 +5,12 @@ Everything is written under a temporary name beside its target, and renamed at t
 
 from __future__ import annotations
 
+import codecs
 import errno
 import hashlib
 import os
 import platform
+import re
 import shutil
 import sys
 import uuid
@@ -72,6 +74,17 @@ def check_listable(folder: Path) -> None:
         raise InputError(f"{folder}: cannot be read: {error.strerror or error}; ask its owner, or copy it") from error
 
 
+PACKED = {b"\x1f\x8b": "a file packed with gzip", b"PK\x03\x04": "a ZIP archive (as Word's files are)"}
+MARKS_OF_TEXT = {
+    codecs.BOM_UTF8: "utf-8-sig",
+    codecs.BOM_UTF32_LE: "utf-32",
+    codecs.BOM_UTF16_LE: "utf-16",
+    codecs.BOM_UTF16_BE: "utf-16",
+}
+CONTROL = re.compile(r"[\x00-\x08\x0e-\x1a\x1c-\x1f]")
+"""Characters that no text has."""
+
+
 def read_text_file(path: Path, kind: str, largest: int = LARGEST_TEXT_BYTES) -> str:
     """Return the text of a UTF-8 file, without a byte order mark.
 
@@ -83,11 +96,41 @@ def read_text_file(path: Path, kind: str, largest: int = LARGEST_TEXT_BYTES) -> 
         size = path.stat().st_size
         if size > largest:
             raise InputError(f"{path}: {size} bytes, required at most {largest}: is it a {kind}?")
-        return path.read_text(encoding="utf-8-sig")
+        return decoded_text(path.read_bytes(), str(path), kind, western=False)[0]
     except FileNotFoundError as error:
         raise InputError(f"{path}: no such {kind} file") from error
-    except (OSError, UnicodeDecodeError) as error:
+    except OSError as error:
         raise InputError(f"{path}: not a readable UTF-8 {kind} ({error}); save it as UTF-8 text") from error
+
+
+def decoded_text(content: bytes, where: str, kind: str, *, western: bool = True) -> tuple[str, bool]:
+    """Return the text of a file's bytes, and whether its encoding is sure.
+
+    It is UTF-8, UTF-16 or UTF-32, with their marks; UTF-16 without one, where every other byte of most letters is 0; or
+    else, not surely, the code page of Windows in western Europe and America.
+    where, kind : the file, and what it should be, for messages
+    western     : whether such a code page is read
+    Raises InputError: it is none of these, or holds control characters.
+    """
+    packed = next((name for start, name in PACKED.items() if content.startswith(start)), None)
+    if packed:
+        raise InputError(f"{where}: is {packed}, required a {kind} as text; unpack it, or save it as text")
+    marked = next((name for mark, name in MARKS_OF_TEXT.items() if content.startswith(mark)), None)
+    odd, even = content[1::2].count(0), content[::2].count(0)
+    if marked is None and len(content) > 3 and max(odd, even) > len(content) // 4 > 4 * min(odd, even):
+        marked = "utf-16-le" if odd > even else "utf-16-be"
+    try:
+        return content.decode(marked or "utf-8"), True
+    except UnicodeDecodeError as error:
+        try:
+            text = content.decode("cp1252") if western and marked is None else "\0"
+        except UnicodeDecodeError:
+            text = "\0"
+        if CONTROL.search(text):
+            raise InputError(
+                f"{where}: not a readable {marked or 'UTF-8'} {kind} ({error}); save it as UTF-8"
+            ) from error
+        return text, False
 
 
 def check_target(target: Path, source: str | Path | None = None) -> None:

@@ -12,6 +12,7 @@ Source: International Phonetic Association, the chart of 2020; J. C. Catford, "A
 
 from __future__ import annotations
 
+import re
 import unicodedata
 from collections.abc import Sequence
 from functools import cache
@@ -52,8 +53,8 @@ _OTHERS: dict[str, str] = {
     # lip and teeth
     "f": "f", "v ʋ ɱ ⱱ": "v",
     # tip of the tongue: at the teeth, behind them, further back (ʃ and its like round the lips)
-    "θ": "th", "ð": "dh", "t ʈ ǀ ǃ ǁ": "t", "d ɖ ɗ": "d", "n ɲ ɳ": "n", "s": "s", "z": "z", "ʦ": "t s", "ʣ": "d z",
-    "l ɫ ɭ ʎ ɬ ɮ ɺ ʟ": "l", "r ɹ ɾ ɽ ɻ": "r", "ʃ ɕ ʂ S": "sh", "ʒ ʑ ʐ": "zh", "tʃ tɕ tʂ ʧ": "ch", "dʒ dʑ dʐ ʤ": "jh",
+    "θ": "th", "ð": "dh", "t ʈ ǀ ǃ ǁ": "t", "d ɖ ɗ ɾ": "d", "n ɲ ɳ": "n", "s": "s", "z": "z", "ʦ": "t s", "ʣ": "d z",
+    "l ɫ ɭ ʎ ɬ ɮ ɺ ʟ": "l", "r ɹ ɽ ɻ": "r", "ʃ ɕ ʂ S": "sh", "ʒ ʑ ʐ": "zh", "tʃ tɕ tʂ ʧ": "ch", "dʒ dʑ dʐ ʤ": "jh",
     # back of the tongue, throat: the lips are those of the vowels beside
     "j ç ʝ": "y", "k c q x χ ɧ": "k", "g ɡ ɟ ɢ ɠ ɣ ɰ ʛ ʄ": "g", "ŋ ɴ": "ng", "h ɦ ħ ʕ ʁ ʀ ʜ ʢ": "hh",
     # consonants that are a syllable; a stop of the throat
@@ -68,11 +69,44 @@ IPA_PHONES: dict[str, tuple[str, ...]] = {letter: (vowel.phone,) for letter, vow
 }
 """IPA symbols to phones of the inventory; the longest symbol counts."""
 _LONGEST = max(map(len, IPA_PHONES))
+_SAMPA = (
+    "A ɑ B β C ç D ð E ɛ F ɱ G ɣ H ɥ I ɪ J ɲ K ɬ L ʎ M ɯ N ŋ O ɔ P ʋ Q ɒ R ʁ S ʃ T θ U ʊ V ʌ W ʍ X χ Y ʏ Z ʒ @ ə { æ "
+    "} ʉ 1 ɨ 2 ø 3 ɜ 4 ɾ 5 ɫ 6 ɐ 7 ɤ 8 ɵ 9 œ & ɶ ? ʔ g ɡ = ̩ ~ ̃ : ː ' ʲ \" ˈ % ˌ ! ꜜ | | . . "
+    "B\\ ʙ G\\ ɢ H\\ ʜ I\\ ᵻ J\\ ɟ K\\ ɮ L\\ ʟ M\\ ɰ N\\ ɴ O\\ ʘ R\\ ʀ U\\ ʊ X\\ ħ h\\ ɦ j\\ ʝ l\\ ɺ p\\ ɸ r\\ ɹ "
+    "s\\ ɕ v\\ ʋ x\\ ɧ z\\ ʑ 3\\ ɞ @\\ ɘ ?\\ ʕ <\\ ʢ >\\ ʡ |\\ ǀ |\\|\\ ǁ !\\ ǃ =\\ ǃ :\\ ˑ -\\ ‿ r\\` ɻ "
+    "d` ɖ l` ɭ n` ɳ r` ɽ s` ʂ t` ʈ z` ʐ @` ɚ 3` ɝ b_< ɓ d_< ɗ g_< ɠ G\\_< ʛ J\\_< ʄ _= ̩ _~ ̃ _w ʷ _j ʲ _h ʰ tS tʃ dZ dʒ"
+).split()  # fmt: skip
+XSAMPA = dict(zip(_SAMPA[::2], _SAMPA[1::2], strict=True)) | {letter: letter for letter in "abcdefhijklmnopqrstuvwxyz"}
+"""X-SAMPA's symbols, and so SAMPA's of WebMAUS, in IPA. Source: J. C. Wells, "Computer-coding the IPA", 1995, 2000."""
+_XSAMPA_SYMBOL = re.compile("|".join(map(re.escape, sorted(XSAMPA, key=len, reverse=True))) + r"|_[^\s\\]\\?|[`^-]")
 _IGNORED = frozenset("'#\"ˈˌː.|‿^-_*!?;:,~%<>ˑʰʲˤˠʼʱⁿˡ0123456789()¹²³⁰⁴⁵⁻⁽⁾")
 """Marks that no mouth shape depends on; further ones are combining marks and tones."""
 _TIES = str.maketrans("", "", "͜͡")
 UNKNOWN = ("ax",)
 """What a letter becomes of which nothing is known: the mouth at ease, slightly open."""
+
+
+@cache
+def xsampa_as_ipa(label: str) -> str:
+    """Return a phone in X-SAMPA in IPA; empty: it is no single phone in X-SAMPA.
+
+    A phone is one consonant or vowel with its marks, a stop with the fricative that it opens to, or a diphthong.
+
+    >>> xsampa_as_ipa("@U"), xsampa_as_ipa("t_h"), xsampa_as_ipa("4"), xsampa_as_ipa("word")
+    ('əʊ', 't', 'ɾ', '')
+    """
+    found, at = [], 0
+    while at < len(label):
+        symbol = _XSAMPA_SYMBOL.match(label, at)
+        if symbol is None:
+            return ""
+        found.append(XSAMPA.get(symbol[0], ""))
+        at = symbol.end()
+    bases = [symbol for symbol in found if symbol not in ("", "ʷ") and not is_mark(symbol[0])]
+    vowels = all(symbol[0] in VOWEL_CHART for symbol in bases) and len(bases) < 4
+    opened = len(bases) == 2 and bases[0] in "ptdkb" and bases[1] in "fvθðszʃʒxçhʂʐɕʑ"
+    single = len(bases) == 1 or opened or (vowels and len({*bases}) == len(bases))
+    return "".join(found).replace("ʰ", "") if single else ""
 
 
 @cache

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from lipmotion.errors import InputError, MissingDependencyError, shortened
 from lipmotion.storage.files import read_text_file
-from lipmotion.units.phones import PHONES, REDUCED_VOWELS, is_silent
+from lipmotion.units.phones import OTHER_NAMES, PHONES, REDUCED_VOWELS, is_silent
 from lipmotion.units.spelling import guess_pronunciation, without_accents
 from lipmotion.units.spelling_network import network_pronunciation
 from lipmotion.units.text_normalisation import normalised_text
@@ -34,9 +34,13 @@ six."""
 
 @lru_cache(maxsize=4096)
 def phone_named(label: str) -> str | None:
-    """Return the phone that a label names, or None: ARPAbet in either case, stressed or not, or our own name."""
-    name = re.sub(r"\d$", "", label.lower())
-    name = REDUCED_VOWELS.get(name, name) if label.endswith("0") else name
+    """Return the phone that a label names, or None.
+
+    A label is ARPAbet in either case, stressed or not, TIMIT's, with its place in the word as in Kaldi (``hh_B``), or
+    our own name.
+    """
+    name = re.sub(r"\d?(_[bies])?$", "", label.lower())
+    name = REDUCED_VOWELS.get(name, name) if label[len(name) :].startswith("0") else OTHER_NAMES.get(name, name)
     return name if name in PHONES else None
 
 

@@ -19,6 +19,21 @@ UNKNOWN_PHONES = "spn"
 """The unit, without a phone, of a span in which somebody speaks and nobody says what: as aligners label a word that is
 in no dictionary. Its word, where it is given, is that of the whole span."""
 
+CLOSURES = {
+    "pcl": ("p",),
+    "bcl": ("b",),
+    "tcl": ("t", "ch", "dx"),
+    "dcl": ("d", "jh", "dx"),
+    "kcl": ("k",),
+    "gcl": ("g",),
+}
+"""Closures of TIMIT to the phones that they open to; alone, a closure is the first of these."""
+OTHER_NAMES = {closure: phones[0] for closure, phones in CLOSURES.items()} | dict(
+    zip("dx nx eng ux hv ax-h axh tq epi pau h#".split(), "d n ng uw hh ax ax t sil sil sil".split(), strict=True)
+)
+"""Phones that TIMIT and Buckeye name otherwise: the tap of *city* is a d, of *winner* an n.
+Source: TIMIT, phoncode.doc; the Buckeye corpus manual."""
+
 REDUCED_VOWELS = {"ah": "ax", "er": "axr", "ih": "ix"}
 """Vowels to their unstressed forms."""
 FULL_FORMS = {reduced: vowel for vowel, reduced in REDUCED_VOWELS.items()} | {"el": "l", "em": "m", "en": "n"}

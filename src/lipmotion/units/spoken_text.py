@@ -1,4 +1,4 @@
-"""What is spoken of a subtitle or of recognised text: without tags, descriptions of sounds, and names of speakers."""
+"""What is a word, a sound or markup in labels, subtitles and recognised text: the one place that decides."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ import html
 import re
 from collections import Counter
 from collections.abc import Iterable
+from enum import Enum
 
 from lipmotion.errors import InputError
-from lipmotion.types import TimedWord, TranscriptLine
+from lipmotion.types import TimedWord
 from lipmotion.units.text_normalisation import words_in
 
 TAG = re.compile(r"</?[a-zA-Z!][^<>]{0,200}>|<[\d:.]{1,20}>|\{[^{}]{0,200}\}")
@@ -21,20 +22,50 @@ SPEAKER = re.compile(
 """A name in capitals, or ``Speaker 1``, before a colon at the start of a line."""
 NAME = re.compile(r"^[ \t>\-–—]{0,8}([A-Z][\w.'-]{0,30}(?: [A-Z][\w.'-]{0,30}){0,3})[ \t]*:(?=\s)", re.MULTILINE)
 """What may be the name of a speaker, as programs for meetings write it."""
+SYMBOLS = re.compile(r"&=\S+|%hesitation\b|\b(?:xxx|yyy)\b|&[-+~](?=\w)|(?<!\w)%(?=[^\W\d])", re.IGNORECASE)
+"""CHAT's sounds (``&=laughs``) and words that nobody understood; of hesitations (``%uh``) the mark alone."""
 SPEAKER_NAME_LINES = 3
 """A name that begins so many lines is that of a speaker."""
-LONGEST_PAUSE_S = 0.5
-"""Words in time that are further apart are not of one line."""
 LONGEST_LINE = 1 << 18
 """Most characters of a line: a label may hold four hours of speech."""
 MOST_WORDS = 500_000
 """Most words of a transcript: twelve hours of the fastest speech on record."""
 
 
+class SpokenAs(Enum):
+    """What a label stands for."""
+
+    SPEECH = "speech"
+    SILENCE = "silence"
+    UNKNOWN = "unknown"
+
+
+SILENCES = frozenset(["", *"sil sp pau ssil nsn h# #h # ## _ - silence = vocnoise iver".split()])
+"""Labels of silence, pauses and noise that is not speech; so is anything in brackets that is not of speech."""
+UNKNOWN_WORDS = frozenset("spn unk oov xxx yyy usb".split())
+"""Labels of speech of which nobody knows the words, also in brackets: of aligners, of CHAT, of WebMAUS (``<usb>``)."""
+IN_BRACKETS = re.compile(r"<[^<>]*>|\[[^\[\]]*\]|\([^()]*\)|\{[^{}]*\}|\+\+?\w+\+\+?|&=\S+|♪+|\*+")
+UNKNOWN_SPEECH = re.compile(r"unknown|unintelligible|inaudible|indistinct|garbage|spoken.?noise", re.IGNORECASE)
+
+
+def spoken_as(label: str) -> SpokenAs:
+    """Return whether a whole label stands for silence or a sound, speech of unknown words, or speech.
+
+    >>> spoken_as("[laughs]"), spoken_as("<unk>"), spoken_as("hello")
+    (<SpokenAs.SILENCE: 'silence'>, <SpokenAs.UNKNOWN: 'unknown'>, <SpokenAs.SPEECH: 'speech'>)
+    """
+    name = label.strip().lower()
+    bracketed = IN_BRACKETS.fullmatch(name) is not None
+    inner = name.strip("<>[](){}+&=* ") if bracketed else name
+    if inner in UNKNOWN_WORDS or (bracketed and UNKNOWN_SPEECH.search(inner)):
+        return SpokenAs.UNKNOWN
+    return SpokenAs.SILENCE if bracketed or name in SILENCES else SpokenAs.SPEECH
+
+
 def spoken_text(text: str, names: frozenset[str] = frozenset()) -> str:
     """Return what is spoken of a text; ``names``: of speakers, as ``speaker_names`` returns them."""
     text = SOUND.sub(" ", TAG.sub("", html.unescape(TAG.sub("", text))))
-    text = SPEAKER.sub("", text)
+    text = SPEAKER.sub("", SYMBOLS.sub(" ", text))
     return NAME.sub(lambda found: "" if found[1] in names else found[0], text) if names else text
 
 
@@ -67,19 +98,6 @@ def timed_words(
         first, done = done, done + len(word)
         timed.append(TimedWord(word, *(start_s + (end_s - start_s) * share / letters for share in (first, done))))
     return timed
-
-
-def lines_by_pauses(words: list[TimedWord]) -> list[TranscriptLine]:
-    """Return words in time as lines, each up to a pause."""
-    lines: list[list[TimedWord]] = []
-    for word in words:
-        last_s = lines[-1][-1].end_s if lines else None
-        joined = last_s is not None and word.start_s is not None and word.start_s - last_s <= LONGEST_PAUSE_S
-        if joined:
-            lines[-1].append(word)
-        else:
-            lines.append([word])
-    return [TranscriptLine(tuple(line), line[0].start_s, line[-1].end_s) for line in lines]
 
 
 def check_word_count(count: int, where: str) -> None:

@@ -95,7 +95,6 @@ def test_plain_text(read):
             "0 1300000 hh\n1400000 2000000 iy\n",
             "line 2 starts at 0.14 s, the one before it ends at 0.13 s; phones must",
         ),
-        ("0 1300000 Hello\n1200000 2000000 world\n", "line 2 starts at 0.12 s, before"),
         ("1300000 20000 Hello\n", "line 1 ends at 0.002 s, before its start at 0.13 s"),
         ("hh\niy\nsil\n", "a list of phones without times"),
         ("0 20000000 ...\n", "holds no word"),
@@ -145,7 +144,7 @@ def test_without_stress_the_word_decides(tmp_path):
 
 
 def test_other_names_of_silence(read):
-    names = ["SIL", "sp", "spn", "pau", "h#", "#"]
+    names = ["SIL", "sp", "nsn", "pau", "h#", "#", "<p:>", "[laughs]"]
     lines = [
         f"{2 * i}000000 {2 * i + 1}000000 {n}\n{2 * i + 1}000000 {2 * i + 2}000000 aa" for i, n in enumerate(names)
     ]
@@ -156,7 +155,7 @@ def test_names_of_phones():
     for phone in SPOKEN:
         for stress in ("", "1", "2"):
             assert phone_named(phone + stress) == phone_named(phone.upper() + stress) == phone
-        assert phone_named(phone + "x9") is None
+        assert phone_named(phone + "!9") is None
 
 
 def test_a_file_that_cannot_be_read(tmp_path, monkeypatch):

@@ -11,20 +11,18 @@ OTHER = {
     "master labels": ('#!MLF!#\n"*/a.lab"\n0 1000000 sil\n.\n', "is a master label file"),
     "RTF": ("{\\rtf1\\ansi hello}", "begins with '{"),
     "HTML": ("\n<html><body>hello</body></html>", "begins with '<html>"),
-    "JSON of another kind": ('{"name": "hello", "size": 3}', "begins with '{"),
-    "NUL": ("h\0e\0l\0l\0o\0", "holds NUL characters: is it UTF-16 without its mark"),
+    "ESPS with a header": ("signal b\nnfields 1\n#\n 0.0500 26 sil\n 0.1 26 p\n 0.2 26 aa\n", "its lines hold times"),
+    "NUL": ("hello you\0 there", "holds NUL characters"),
     "ESPS": ("signal a\nnfields 1\n#\n 0.0500 26 sil\n 0.1 26 p\n 0.2 26 aa\n", "its lines hold times"),
     "mixed seconds": ("0 0.5 p\n0.5 1 aa\n", "its lines hold times"),
-    "a table": ("start,end,label\n0.0,0.5,p\n0.5,0.75,aa\n", "its lines hold times"),
     "a start of NaN": ("nan 1000000 sil\n1000000 2000000 p\n2000000 3500000 aa\n", "its lines hold times"),
-    "an end of 0": ("0 0 sil\n1000000 2000000 p\n2000000 3500000 aa\n", "its lines hold times"),
     "a last start of 0": ("0 sil\n1000000 p\n0 aa\n", "its lines hold times"),
 }
 TIMED = {
     "SubRip": ("1\n00:00:01,000 --> 00:00:02,000\nhello\n", "is a file of subtitles"),
     "WebVTT": ("WEBVTT\n\n00:01.000 --> 00:02.000\nhello\n", "is a file of subtitles"),
     "JSON": ('{"words": [{"start": 0.0, "word": "hello"}]}', "begins with '{"),
-    "CTM": ("a 1 0.00 0.5 hello\na 1 0.5 0.5 you\n", "its lines hold times"),
+    "CTM": ("a 1 0.00 0.5 hello\na 1 0.5 0.5 you\n", "labels in time"),
 }
 """What is read as a transcript, but is no plain text."""
 WORDS = [

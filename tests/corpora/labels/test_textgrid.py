@@ -70,7 +70,7 @@ def test_texts_may_hold_anything():
 
 def test_comments_are_passed_over():
     text = short_form(TIERS).replace("<exists>", "<exists> ! are there 7 tiers?")
-    assert [tier.name for tier in parse_interval_tiers(text, "a")] == ["tier 'words'", "tier 'phones'"]
+    assert [tier.name for tier in parse_interval_tiers(text, "a")] == ["words", "phones"]
 
 
 def test_a_grid_without_tiers(tmp_path):
@@ -114,7 +114,7 @@ def test_what_cannot_be_used_is_named(tmp_path, old, new, words):
 
 def test_two_tiers_of_phones_are_refused(tmp_path):
     (tmp_path / "a.TextGrid").write_text(short_form({"one": PHONES, "two": PHONES}))
-    with pytest.raises(InputError, match="tier 'one' and tier 'two' both hold phones; keep one"):
+    with pytest.raises(InputError, match=r"tier 'one' and tier 'two' both hold phones; .*--tier"):
         read_labels(tmp_path / "a.TextGrid")
 
 

@@ -8,6 +8,7 @@ from lipmotion.corpora.labels.label_files import (
     read_labels,
     read_phones,
     read_transcript,
+    speakers_in,
 )
 from lipmotion.corpora.labels.plain_text import check_plain_text
 
@@ -20,4 +21,5 @@ __all__ = [
     "read_labels",
     "read_phones",
     "read_transcript",
+    "speakers_in",
 ]

@@ -2,54 +2,57 @@
 
 from __future__ import annotations
 
-import codecs
 import logging
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from lipmotion.corpora.labels.json_documents import DamagedJsonError, is_json
+from lipmotion.corpora.labels.phone_symbols import in_inventory
 from lipmotion.corpora.labels.plain_text import check_no_labels
-from lipmotion.corpora.labels.recognised_words import parse_recognised
-from lipmotion.corpora.labels.subtitles import is_subtitles, parse_subtitles
+from lipmotion.corpora.labels.services import DamagedJsonError, described, is_json, service_tiers
+from lipmotion.corpora.labels.subtitles import is_subtitles, subtitle_tier
 from lipmotion.corpora.labels.textgrid import MARK, is_textgrid, parse_interval_tiers
 from lipmotion.corpora.labels.tier import (
+    LINES,
+    OTHER,
+    PHONE_LABELS,
+    RECOGNISED_PHONES,
+    WORDS,
     LabelTier,
+    TimedLabel,
     holds_phones,
-    is_named_as_phones,
-    is_named_as_recognised,
-    is_named_as_words,
+    in_seconds,
+    merged_timelines,
     phone_timeline,
     tier_transcript,
+    tiers_of_speakers,
     with_recognised,
     with_words,
 )
-from lipmotion.corpora.labels.timed_lines import parse_timed_lines
-from lipmotion.corpora.labels.timings.ipa import in_inventory
-from lipmotion.corpora.labels.timings.services import timing_tiers
-from lipmotion.corpora.labels.word_lists import is_ctm, is_lrs, parse_ctm, parse_lrs
-from lipmotion.errors import InputError
-from lipmotion.storage.files import check_regular
+from lipmotion.corpora.labels.timed_lines import line_tiers
+from lipmotion.corpora.labels.xml_labels import is_timed_xml, xml_tiers
+from lipmotion.errors import InputError, shortened
+from lipmotion.storage.files import check_regular, decoded_text
 from lipmotion.types import TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
-from lipmotion.units import phone_named, words_of
+from lipmotion.units import UNKNOWN_PHONES, phone_named, words_of
 from lipmotion.units.length_limits import LARGEST_TRANSCRIPT_BYTES
 from lipmotion.units.mood_tags import tagged_text, without_known_tags
 
 LOG = logging.getLogger("lipmotion")
-RECOGNISED = (".srt", ".vtt", ".ass", ".ssa", ".json", ".ctm", ".tsv")
+RECOGNISED = (".srt", ".vtt", ".ass", ".ssa", ".sbv", ".ttml", ".dfxp", ".json", ".jsonl", ".ctm", ".stm", ".tsv")
 """Suffixes of subtitles and of what recognisers write."""
-FOR_WORDS = (".txt", ".TextGrid", ".textgrid", ".lab", *RECOGNISED)
+FOR_WORDS = (".txt", ".TextGrid", ".textgrid", ".eaf", ".lab", ".wrd", *RECOGNISED)
 """Suffixes in whose files words are searched, in order: plain text first, as labels in time may not be words, and what
 may be recognised last."""
-FOR_PHONES = (".TextGrid", ".textgrid", ".lab", ".txt")
+FOR_PHONES = (".TextGrid", ".textgrid", ".eaf", ".lab", ".phn", ".txt")
 """Suffixes in whose files phones are searched, in order."""
-CONTROL = re.compile(r"[\x00-\x08\x0e-\x1a\x1c-\x1f]")
-"""Characters that no text has."""
 LARGEST_LABELS = 1 << 24
 """Most bytes of a label file: labels of a day."""
 MOTION, MOTION_HEAD = re.compile(rb'"lipmotion\.motion"|time_s,'), 64
 """How our own motion files begin, and in how many bytes: a quick answer for large ones."""
+NAMED_TIERS = 12
+"""Most names in a message."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +95,7 @@ def each_labels_beside(
     Raises InputError: one of them cannot be read.
     """
     seen: list[Path] = []
-    for suffix in FOR_WORDS:
+    for suffix in dict.fromkeys((*FOR_WORDS, *FOR_PHONES)):
         for path in _named(recording, suffix):
             if path in ignored or any(path.samefile(other) for other in seen):
                 continue
@@ -104,7 +107,7 @@ def each_labels_beside(
 
 def label_files_beside(recording: Path) -> list[Path]:
     """Return the files beside a recording that ``labels_beside`` reads, in the order of ``FOR_WORDS``."""
-    return [path for suffix in FOR_WORDS for path in _named(recording, suffix)]
+    return [path for suffix in dict.fromkeys((*FOR_WORDS, *FOR_PHONES)) for path in _named(recording, suffix)]
 
 
 def _named(recording: Path, suffix: str) -> list[Path]:
@@ -118,63 +121,73 @@ def _named(recording: Path, suffix: str) -> list[Path]:
 def read_labels(path: Path) -> RecordingLabels:
     """Return the words and phones of one file.
 
-    Read are TextGrids, labels with times (HTK, Audacity), subtitles (SubRip, WebVTT, SubStation), the JSON and tables
-    of recognisers (Whisper, Vosk), NIST's CTM, the texts of LRS, and plain text; the content decides, not the name.
-    Raises InputError: not text, damaged, overlapping labels, or labels among phones that are no phones.
+    Read are TextGrids, ELAN's ``.eaf``, labels with times (HTK, Audacity, TIMIT), tables, subtitles, the JSON of
+    recognisers, voices and aligners, CTM, the texts of LRS, and plain text; the content decides, not the name.
+    Phones of which some are unknown are left out, with a warning.
+    Raises InputError: not text, damaged, overlapping phones, or labels among phones that are no phones.
     """
     return _read(path, unknown_json=False) or RecordingLabels()
 
 
-def read_transcript(path: Path) -> str | TimedTranscript:
+def read_transcript(path: Path, tier: str = "", speaker: str = "") -> str | TimedTranscript:
     """Return the text of a file of plain text, or the words in time of one of another kind that ``read_labels`` reads.
 
-    Raises InputError: as ``read_labels``, no such file, or phones without words.
+    tier, speaker : which tier and whose words; empty: all that hold words are read, and a warning names the speakers
+    Raises InputError: as ``read_labels``, no such file, phones without words, or no such tier or speaker.
     """
     check_regular(path, "transcript file")
     if not path.exists():
         raise InputError(f"{path}: no such transcript file")
     text = _text(path)
-    labels = _timed(text, path)
-    if labels is None:
-        check_size(path, text)
-        check_no_labels(without_known_tags(text), str(path))
+    tiers = _timed_tiers(text, str(path))
+    if tiers is None:
+        _check_plain(text, path)
         return text
-    if labels.transcript is None:
-        what = "phones in time, but no words; give them as units" if labels.phones else "no word"
+    transcript = _transcript(tiers, str(path), tier, speaker)
+    if transcript is None:
+        what = "phones in time, but no words; give them as units" if any(map(holds_phones, tiers)) else "no word"
         raise InputError(f"{path}: the transcript holds {what}")
-    return labels.transcript
+    return transcript
 
 
-def read_phones(path: Path) -> Timeline[Unit]:
-    """Return the phones in time of a TextGrid or of a file of labels with times; they may have gaps.
+def read_phones(path: Path, tier: str = "", speaker: str = "") -> Timeline[Unit]:
+    """Return the phones in time of a TextGrid or of another file of labels with times; they may have gaps.
 
-    Those of a TextGrid have the words of its tier of words, and are recognised, not known, where its tier of recognised
-    phones has the same.
-    Vowels stay as they are labelled, whatever words another tier has; the end of the last phone may be infinite.
-    Raises InputError: no such file, as ``read_labels``, or no phones in time.
+    They have the words of the tier of words, and are recognised, not known, where the tier of recognised phones has the
+    same. Vowels stay as they are labelled, whatever words another tier has; the end of the last phone may be infinite.
+    Speech of which the phones are not known (``spn``, ``<unk>``) has the unit ``units.UNKNOWN_PHONES``, and its word
+    where that is known.
+    tier, speaker : which tier and whose phones; empty: those of all speakers, whom a warning names
+    Raises InputError: no such file or tier or speaker, as ``read_labels``, or no phones in time.
     """
     check_regular(path, "units file")
     if not path.exists():
         raise InputError(f"{path}: no such units file")
     text, where = _text(path), str(path)
-    tiers = _tiers(text, where)
-    if tiers is None:
-        lines = parse_timed_lines(text, where)
-        tiers = [] if lines is None else [lines]
-    silent = [tier for tier in tiers if is_named_as_phones(tier) and tier.labels]
-    phones = _tiers_of_phones(tiers, where) or silent
-    if not phones and any(map(is_named_as_words, tiers)):
+    tiers = _chosen(_timed_tiers(text, where) or [], where, tier, speaker)
+    phones = _tiers_of_phones(tiers, where)
+    if not phones and any(each.role in (WORDS, LINES) for each in tiers):
         raise InputError(f"{where}: holds words in time, but no phones; give it as a transcript (--transcript)")
     if not phones:
+        found = f"{described(text, where)}; " if is_json(text) else "holds no phones in time, "
         raise InputError(
-            f"{where}: holds no phones in time, required a motion file (.json, .npz), a TextGrid with a tier of "
+            f"{where}: {found}required a motion file (.json, .npz), a TextGrid with a tier of "
             "phones, or labels with times, one phone a line"
         )
-    units = phone_timeline(phones[0], None, where, with_gaps=True)
-    words = next(filter(is_named_as_words, tiers), None)
-    recognised = next(filter(is_named_as_recognised, tiers), None)
-    units = units if words is None else with_words(units, words)
+    _name_speakers(phones, where)
+    units = merged_timelines(
+        [with_words(phone_timeline(each, (), where, with_gaps=True), _words_of(each, tiers)) for each in phones]
+    )
+    recognised = next((each for each in tiers if each.role == RECOGNISED_PHONES), None)
     return units if recognised is None else with_recognised(units, recognised)
+
+
+def speakers_in(path: Path) -> tuple[str, ...]:
+    """Return the speakers whom a file of labels names, none of another file. Raises InputError: it is damaged."""
+    if not path.is_file() or path.stat().st_size > LARGEST_LABELS:
+        return ()
+    tiers = _timed_tiers(_text(path), str(path)) or []
+    return tuple(dict.fromkeys(tier.speaker for tier in tiers_of_speakers(tiers) if tier.speaker))
 
 
 def holds_timings(path: Path) -> bool:
@@ -187,30 +200,24 @@ def holds_timings(path: Path) -> bool:
     with path.open("rb") as file:
         if MOTION.search(file.read(MOTION_HEAD)):
             return False
+    text, where = _text(path), str(path)
     try:
-        return timing_tiers(_text(path), str(path)) is not None
+        return bool(service_tiers(text, where)) if is_json(text) else line_tiers(text, where) is not None
     except DamagedJsonError:  # said by the reader of motion
         return False
-
-
-def _tiers_of_phones(tiers: list[LabelTier], where: str) -> list[LabelTier]:
-    """Return the tier of phones, or an empty list. Raises InputError: there are several."""
-    phones = [tier for tier in tiers if holds_phones(tier)]
-    if len(phones) > 1:
-        raise InputError(f"{where}: {phones[0].name} and {phones[1].name} both hold phones; keep one")
-    return phones
 
 
 def _read(path: Path, *, unknown_json: bool) -> RecordingLabels | None:
     """Return the labels of a file; None for JSON of another kind, if that is expected, else an error."""
     if unknown_json and path.stat().st_size > LARGEST_LABELS:
         return None
-    text = _text(path)
-    labels = _timed(text, path) if is_json(text) or not unknown_json else None
-    if labels is not None or unknown_json:
-        return labels
-    check_size(path, text)
-    check_no_labels(without_known_tags(text), str(path))
+    text, where = _text(path), str(path)
+    if unknown_json and (not is_json(text) or service_tiers(text, where) is None):
+        return None
+    tiers = _timed_tiers(text, where)
+    if tiers is not None:
+        return _labels(tiers, where)
+    _check_plain(text, path)
     text, tags = tagged_text(text)
     tokens = text.split()
     one_a_line = len(tokens) == sum(bool(line.strip()) for line in text.splitlines())
@@ -222,68 +229,139 @@ def _read(path: Path, *, unknown_json: bool) -> RecordingLabels | None:
     return RecordingLabels(TimedTranscript((TranscriptLine(tuple(map(TimedWord, words_of(text)))),), tags))
 
 
-def _timed(text: str, path: Path) -> RecordingLabels | None:
-    """Return the labels of a text whose form has times; None of any other text."""
-    where = str(path)
-    tiers = _tiers(text, where)
-    if tiers is not None:
-        return _chosen(tiers, where)
+def _labels(tiers: list[LabelTier], where: str) -> RecordingLabels:
+    """Return the words and the phones of tiers. Raises InputError: there are labels, and none is a phone or a word."""
+    chosen = _chosen(tiers, where)
+    phones = _tiers_of_phones(chosen, where)
+    transcript = _transcript(tiers, where)
+    if not phones:
+        if transcript is None and any(tier.role != LINES and tier.labels for tier in chosen):
+            raise InputError(f"{where}: {chosen[0].name} holds no word; remove the file if the words are not known")
+        return RecordingLabels(transcript)
+    several = len(phones) > 1
+    timeline = merged_timelines(
+        [phone_timeline(tier, _words_of(tier, chosen), where, with_gaps=several) for tier in phones]
+    )
+    unknown = [span for span in timeline if span.label.unit == UNKNOWN_PHONES]
+    if unknown:
+        LOG.warning(
+            "%s: the phones of %d stretches of speech are not known, the first at %.2f s; its phones are left out, and "
+            "its words are aligned",
+            where,
+            len(unknown),
+            unknown[0].start_s,
+        )
+    return RecordingLabels(transcript, None if unknown else timeline)
+
+
+def _timed_tiers(text: str, where: str) -> list[LabelTier] | None:
+    """Return the tiers of a text whose form has times; None of any other text."""
+    if is_textgrid(text):
+        return in_seconds(parse_interval_tiers(text, where), where)
+    if is_timed_xml(text):
+        return xml_tiers(text, where)
     if is_subtitles(text):
-        return _spoken(parse_subtitles(text, where))
-    if is_lrs(text):
-        return _spoken(parse_lrs(text, where))
-    transcript = parse_recognised(text, where) if is_json(text) else None
-    if transcript is not None:
-        return _spoken(transcript)
-    lines = parse_timed_lines(text, where)
-    if lines is not None:
-        return _chosen([lines], where)
-    return _spoken(parse_ctm(text, where)) if is_ctm(text) else None
+        return [subtitle_tier(text, where)]
+    return service_tiers(text, where) if is_json(text) else line_tiers(text, where)
 
 
-def _tiers(text: str, where: str) -> list[LabelTier] | None:
-    """Return the tiers of a TextGrid, or of the timings of a service; None: of another text.
+def _chosen(tiers: list[LabelTier], where: str, tier: str = "", speaker: str = "") -> list[LabelTier]:
+    """Return the tiers that are said or seen, of those the ones that are asked for.
 
-    Phones in IPA are those of the inventory that look like them.
+    tier, speaker : names, in any case; of a tier, all of its speaker stay that hold something else
+    Raises InputError: there is no such tier or speaker.
     """
-    if not is_textgrid(text):
-        return timing_tiers(text, where)
-    return [
-        replace(tier, labels=tuple(in_inventory(tier.labels, where))) if is_named_as_phones(tier) else tier
-        for tier in parse_interval_tiers(text, where)
-    ]
+    tiers = tiers_of_speakers(tiers)
+    if speaker:
+        tiers = [each for each in tiers if each.speaker.lower() == speaker.lower()] or _refuse(
+            "speaker", speaker, [each.speaker for each in tiers], where
+        )
+    if tier:
+        named = next((each for each in tiers if each.name.lower() == tier.lower()), None)
+        if named is None:
+            return (
+                _chosen(tiers, where, speaker=tier)
+                if any(each.speaker.lower() == tier.lower() for each in tiers)
+                else _refuse("tier", tier, [each.name for each in tiers], where)
+            )
+        if not named.role or named.role == OTHER:
+            named = replace(named, role=PHONE_LABELS if holds_phones(replace(named, role="")) else LINES)
+        same = (WORDS, LINES, "", OTHER) if named.role in (WORDS, LINES) else (PHONE_LABELS,)
+        others = [each for each in tiers if each.role not in same and each.speaker == named.speaker]
+        return [in_inventory(named, where), *(each for each in others if each.role and each.name != named.name)]
+    return [each for each in tiers if each.role != OTHER]
 
 
-def _spoken(transcript: TimedTranscript) -> RecordingLabels:
-    """Return the labels of a transcript, without it if it has no word."""
-    return RecordingLabels(transcript if transcript.lines else None)
+def _refuse(kind: str, name: str, known: list[str], where: str) -> list[LabelTier]:
+    """Raise InputError: there is no such speaker or tier."""
+    names = ", ".join(map(repr, list(dict.fromkeys(filter(None, known)))[:NAMED_TIERS])) or "none with a name"
+    raise InputError(f"{where}: has no {kind} {shortened(name)!r}; it has: {names}")
 
 
-def check_size(path: Path, text: str) -> None:
-    """Raise InputError for more plain text than a transcript has."""
+def _tiers_of_phones(tiers: list[LabelTier], where: str) -> list[LabelTier]:
+    """Return the tiers of phones, one of each speaker. Raises InputError: a speaker has several."""
+    phones: dict[str, LabelTier] = {}
+    for tier in filter(holds_phones, tiers):
+        if tier.speaker in phones:
+            first = phones[tier.speaker].name
+            raise InputError(f"{where}: tier {first!r} and tier {tier.name!r} both hold phones; choose one with --tier")
+        phones[tier.speaker] = tier
+    return list(phones.values())
+
+
+def _transcript(tiers: list[LabelTier], where: str, tier: str = "", speaker: str = "") -> TimedTranscript | None:
+    """Return the words of the best tier of each speaker: one of words, of lines, or else the first of another kind."""
+    chosen = [each for each in _chosen(tiers, where, tier, speaker) if not holds_phones(each)]
+    best: dict[str, LabelTier] = {}
+    for role in (WORDS, LINES, ""):
+        for each in chosen:
+            if each.role == role and any(label.text or label.parts for label in each.labels):
+                best.setdefault(each.speaker, each)
+    if any(best):
+        best.pop("", None)
+    first = best.get("")
+    passed_over = [each.name for each in chosen if first and not first.role and each is not first and each.labels]
+    if passed_over:
+        names = ", ".join(map(repr, passed_over[:NAMED_TIERS]))
+        LOG.warning(
+            "%s: the words of tier %r are read; others are %s; --tier chooses", where, first and first.name, names
+        )
+    _name_speakers(list(best.values()), where)
+    transcript = tier_transcript(list(best.values()), where)
+    return transcript if transcript.lines else None
+
+
+def _name_speakers(tiers: list[LabelTier], where: str) -> None:
+    """Log a warning if tiers are of several speakers."""
+    speakers = [tier.speaker for tier in tiers if tier.speaker]
+    if len(speakers) > 1:
+        names = ", ".join(map(shortened, speakers[:NAMED_TIERS]))
+        LOG.warning("%s: %d people speak: %s; all are read; --tier NAME chooses one", where, len(speakers), names)
+
+
+def _words_of(phones: LabelTier, tiers: list[LabelTier]) -> tuple[TimedLabel, ...]:
+    """Return the words in time of the speaker of some phones; none where labels hold several."""
+    said = [tier for tier in tiers if tier.speaker == phones.speaker and not holds_phones(tier)]
+    words = next((tier.labels for role in (WORDS, "") for tier in said if tier.role == role), ())
+    return words if all(len(label.text.split()) < 2 for label in words) else ()
+
+
+def _check_plain(text: str, path: Path) -> None:
+    """Raise InputError for a text that is no plain text, or more than a transcript has."""
     if len(text) > LARGEST_TRANSCRIPT_BYTES:
         raise InputError(
             f"{path}: {len(text)} characters, required at most {LARGEST_TRANSCRIPT_BYTES}: is it a transcript?"
         )
-
-
-def _chosen(tiers: list[LabelTier], where: str) -> RecordingLabels:
-    """Return the phones of the only tier of phones, and the words of the tier named so, else of the first other."""
-    phones = _tiers_of_phones(tiers, where)
-    passed_over = (*phones, *filter(is_named_as_recognised, tiers))
-    others = [tier for tier in tiers if tier not in passed_over and any(label.text for label in tier.labels)]
-    words = next(filter(is_named_as_words, others), others[0] if others else None)
-    if not phones and words is None:
-        return RecordingLabels()
-    timed = words if words is not None and all(len(label.text.split()) < 2 for label in words.labels) else None
-    return RecordingLabels(
-        tier_transcript(words, where) if words else None,
-        phone_timeline(phones[0], timed, where) if phones else None,
-    )
+    if is_json(text):
+        raise InputError(f"{path}: {described(text, str(path))}")
+    check_no_labels(without_known_tags(text), str(path))
 
 
 def _text(path: Path) -> str:
-    """Return the text of a label file, in UTF-8 or UTF-16. Raises InputError: it is not such a text, or too large."""
+    """Return the text of a label file, in UTF-8, UTF-16 or, with a warning, Windows-1252.
+
+    Raises InputError: it is not such a text, or too large.
+    """
     try:
         size = path.stat().st_size
         if size > LARGEST_LABELS:
@@ -291,30 +369,10 @@ def _text(path: Path) -> str:
         content = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
-    wide = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
-    try:
-        text = content.decode("utf-16" if wide else "utf-8-sig")
-    except UnicodeDecodeError as error:
-        if wide:
-            raise InputError(f"{path}: is not UTF-16 text, as its first bytes say; save it as UTF-8") from error
-        text = _western(path, content, error)
-    if text.startswith("ooBinaryFile"):
+    found = MARK.match(content[:40].decode("latin-1"))
+    if found and found[1] == "Binary":
         raise InputError(f"{path}: is a binary TextGrid; save it as a text file")
-    return text
-
-
-def _western(path: Path, content: bytes, error: UnicodeDecodeError) -> str:
-    """Return the text of a file that is not UTF-8, in the code page of Windows in western Europe and America.
-
-    Logs a warning. Raises InputError: it has bytes that stand for no character there, or control characters.
-    """
-    if MARK.match(content[:40].decode("latin-1")):
-        raise InputError(f"{path}: is a binary TextGrid; save it as a text file") from error
-    try:
-        text = content.decode("cp1252")
-    except UnicodeDecodeError:
-        text = "\0"
-    if CONTROL.search(text):
-        raise InputError(f"{path}: is not UTF-8 text; save it as UTF-8") from error
-    LOG.warning("%s: not UTF-8; read as Windows-1252 (western Europe); save it as UTF-8 if letters are wrong", path)
+    text, is_sure = decoded_text(content, str(path), "label file")
+    if not is_sure:
+        LOG.warning("%s: not UTF-8; read as Windows-1252 (western Europe); save it as UTF-8 if letters are wrong", path)
     return text

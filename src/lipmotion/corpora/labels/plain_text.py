@@ -9,7 +9,7 @@ from itertools import islice
 
 from lipmotion.corpora.labels.subtitles import NO_ARROW, is_subtitles
 from lipmotion.corpora.labels.textgrid import is_textgrid
-from lipmotion.corpora.labels.timed_lines import parse_timed_lines
+from lipmotion.corpora.labels.timed_lines import line_tiers
 from lipmotion.errors import InputError, shortened
 
 MASTER = "#!MLF!#"
@@ -28,7 +28,7 @@ def check_plain_text(text: str, where: str) -> None:
 
     where : the file's name, for messages
     """
-    if is_textgrid(text) or parse_timed_lines(text, where) is not None:
+    if is_textgrid(text) or line_tiers(text, where) is not None:
         raise InputError(f"{where}: holds labels in time, required the words alone; write them into a text file")
     check_no_labels(text, where)
 

@@ -1,19 +1,20 @@
-"""Subtitles: SubRip (``.srt``), WebVTT (``.vtt``), SubStation (``.ass``), and Whisper's table of lines (``.tsv``)."""
+"""Subtitles: SubRip (``.srt``), WebVTT (``.vtt``), SubStation Alpha (``.ass``, ``.ssa``), YouTube's ``.sbv``, and
+Whisper's table of lines (``.tsv``).
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from io import StringIO
 
-from lipmotion.corpora.labels.cue import CLOCK, SubtitleCue, checked_cue, clock_seconds
-from lipmotion.corpora.labels.substation import is_substation, substation_cues
-from lipmotion.corpora.labels.tier import check_count
+from lipmotion.corpora.labels.tier import LINES, LabelTier, TimedLabel, check_count
 from lipmotion.errors import InputError, shortened
-from lipmotion.types import TimedTranscript, TimedWord, TranscriptLine, in_order
-from lipmotion.units.spoken_text import check_word_count, line_words, speaker_names, spoken_text, timed_words
+from lipmotion.units.spoken_text import line_words, spoken_text
 
+CLOCK = r"(?:(\d{1,4}):)?(\d{1,2}):(\d{1,2})(?:[.,](\d{1,6}))?"
+"""A time as subtitles write it: hours (which may be missing), minutes, seconds, and their fraction."""
 ARROW = r"(?:(?:[-=–—−]\s?){1,3}(?:[>›»]|&gt;)|→)"
 """The arrow between the times, also as people and programs damage it: ``->``, ``- ->``, ``–>``, ``--&gt;``."""
 CUE = re.compile(
@@ -25,6 +26,8 @@ FULL_CLOCK = r"(?:\d{1,4}:\d{1,2}:\d{1,2}(?:[.,]\d{1,6})?|\d{1,2}:\d{1,2}[.,]\d{
 NO_ARROW = re.compile(rf"^\s{{0,20}}{FULL_CLOCK}[^\w\n]{{1,12}}{FULL_CLOCK}\s{{0,20}}$", re.MULTILINE)
 """A line of two times without an arrow that is known; times of day, as 5:30, do not count."""
 TIMES = re.compile(rf"\s*{CLOCK}\s*{ARROW}\s*{CLOCK}(?:\s.*)?")
+SBV = re.compile(rf"{CLOCK}\s?,\s?{CLOCK}\s*?$", re.MULTILINE)
+"""The times of YouTube's own format, ``0:00:01.000,0:00:02.500``."""
 WORD_TIME = re.compile(rf"<{CLOCK}>")
 """The time at which the words after it are said, as in the captions that YouTube makes."""
 NO_CUE = re.compile(r"(?:NOTE|STYLE|REGION)(?:\s|$)")
@@ -35,44 +38,78 @@ ROW = re.compile(r"(\d{1,12})\t(\d{1,12})\t(.*)")
 BRIDGE_S, BRIDGES_SHARE, NEAR_S = 0.1, 0.2, 0.1
 """Captions that scroll repeat each line, and between them are bridges shorter than this; if so large a share of cues
 of a file are bridges, lines that the cue before, which ends so near, showed already are left out."""
+SUBSTATION = re.compile(r"\s*\[Script Info\]", re.IGNORECASE)
+"""The start of a file of SubStation Alpha."""
+DIALOGUE = re.compile(rf"^Dialogue:[^,\n]{{0,40}},\s*{CLOCK}\s*,\s*{CLOCK}\s*,", re.MULTILINE)
+"""The start of a line that is shown: its layer, its start, its end. Editors may save the lines without the header."""
+FORMAT_LINE, DIALOGUE_LINE = "format:", "dialogue:"
+DEFAULT_FIELDS = "layer start end style name marginl marginr marginv effect text".split()
+"""The fields of a line where no line ``Format:`` says them."""
+STYLES = re.compile(r"(\{[^{}]{0,200}\})")
+DRAWING_MODE = re.compile(r"\\p(\d)")
+"""Begins a drawing (``{\\p1}``) or ends it (``{\\p0}``): the numbers in between are no words."""
+BREAK = re.compile(r"\\[Nnh]")
+"""Line breaks and hard blanks within the text."""
+
+
+@dataclass(frozen=True)
+class SubtitleCue:
+    """Some lines of text that are shown together.
+
+    number : of the line of the file that holds its times
+    """
+
+    number: int
+    start_s: float
+    end_s: float
+    lines: tuple[str, ...]
+
+
+def clock_seconds(match: re.Match[str], group: int) -> float:
+    """Return the time in seconds of the four groups of ``CLOCK`` in a match; ``group``: the first of them."""
+    hours, minutes, seconds, fraction = match.group(group, group + 1, group + 2, group + 3)
+    return int(hours or 0) * 3600 + int(minutes) * 60 + float(f"{seconds}.{fraction or 0}")
 
 
 def is_subtitles(text: str) -> bool:
     """Return whether a text is a file of subtitles, or Whisper's table of lines."""
-    begins = text.startswith(("WEBVTT", HEADER))
-    return begins or is_substation(text) or CUE.search(text) is not None
+    return (
+        text.startswith(("WEBVTT", HEADER))
+        or _is_substation(text)
+        or CUE.search(text) is not None
+        or SBV.match(text) is not None
+    )
 
 
-def parse_subtitles(text: str, where: str) -> TimedTranscript:
-    """Return the words of subtitles; every cue is a line.
+def _is_substation(text: str) -> bool:
+    return SUBSTATION.match(text) is not None or DIALOGUE.search(text) is not None
 
-    Left out are tags, descriptions of sounds, names of speakers (``spoken_text``), notes and styles, the repetitions of
-    captions that scroll, and what stands before the first cue. Numbers of cues may be missing, and blank lines too.
+
+def subtitle_tier(text: str, where: str) -> LabelTier:
+    """Return the lines of subtitles, a cue each; words that have times of their own are parts of it.
+
+    Left out are notes and styles, the repetitions of captions that scroll, and what stands before the first cue.
+    Numbers of cues may be missing, and blank lines too.
     where : the file's name, for messages
     Raises InputError: times that are damaged or end before they start, with their line; too many cues or words.
     """
-    cues = list(_all_cues(text, where))
-    names = speaker_names("\n".join(cue.lines) for cue in cues)
-    lines, count = [], 0
-    for cue in _without_repetitions(cues):
-        words = _words(cue, names, f"{where}: line {cue.number}")
-        count += len(words)
-        check_word_count(count, where)
-        lines.append(TranscriptLine(tuple(words), cue.start_s, cue.end_s))
-    return in_order(lines)
-
-
-def _all_cues(text: str, where: str) -> Iterator[SubtitleCue]:
     if text.startswith(HEADER):
-        return _rows(text, where)
-    return substation_cues(text, where) if is_substation(text) else _cues(text, where)
+        cues = _rows(text, where)
+    else:
+        cues = _substation_cues(text, where) if _is_substation(text) else _cues(text, where)
+    labels = []
+    for cue in _without_repetitions(list(cues)):
+        place, shown = f"line {cue.number}", "\n".join(cue.lines)
+        line_words(shown, f"{where}: {place}")
+        labels.append(TimedLabel(cue.start_s, cue.end_s, shown, place, _words(cue, shown)))
+    return LabelTier("subtitles", tuple(labels), LINES)
 
 
 def _cues(text: str, where: str) -> Iterator[SubtitleCue]:
     cue, lines, count = None, list[str](), 0
     for number, row in enumerate(StringIO(text), 1):
         line = row.rstrip("\r\n")
-        times = TIMES.fullmatch(line) if ":" in line else None
+        times = (TIMES.fullmatch(line) or SBV.fullmatch(line)) if ":" in line else None
         if times is None and (CUE.match(line) or NO_ARROW.match(line)):
             wanted = "00:00:01,000 --> 00:00:02,500"
             raise InputError(f"{where}: line {number} is {shortened(line.strip())!r}; required times as in {wanted}")
@@ -83,7 +120,7 @@ def _cues(text: str, where: str) -> Iterator[SubtitleCue]:
             yield replace(cue, lines=_shown(lines))
         count += 1
         check_count(count, where)
-        cue, lines = checked_cue(SubtitleCue(number, clock_seconds(times, 1), clock_seconds(times, 5), ()), where), []
+        cue, lines = SubtitleCue(number, clock_seconds(times, 1), clock_seconds(times, 5), ()), []
     if cue is not None:
         yield replace(cue, lines=_shown([*lines, "", ""]))
 
@@ -112,7 +149,7 @@ def _rows(text: str, where: str) -> Iterator[SubtitleCue]:
         found = ROW.fullmatch(line)
         if found is None:
             raise InputError(f"{where}: line {number} is {shortened(line)!r}; required: start, end and text, with tabs")
-        yield checked_cue(SubtitleCue(number, int(found[1]) / 1000, int(found[2]) / 1000, (found[3],)), where)
+        yield SubtitleCue(number, int(found[1]) / 1000, int(found[2]) / 1000, (found[3],))
 
 
 def _without_repetitions(cues: list[SubtitleCue]) -> list[SubtitleCue]:
@@ -137,17 +174,59 @@ def _repeated(shown: tuple[str, ...], lines: tuple[str, ...]) -> int:
     return next((n for n in range(min(len(lines), len(shown)), 0, -1) if shown[-n:] == lines[:n]), 0)
 
 
-def _words(cue: SubtitleCue, names: frozenset[str], where: str) -> list[TimedWord]:
-    """Return the words of a cue, with times where these stand between them."""
-    text = "\n".join(cue.lines)
-    if WORD_TIME.search(text) is None:
-        return [TimedWord(word) for word in line_words(spoken_text(text, names), where)]
+def _words(cue: SubtitleCue, text: str) -> tuple[TimedLabel, ...]:
+    """Return the words of a cue with times, where these stand between them."""
     marks = list(WORD_TIME.finditer(text))
+    if not marks:
+        return ()
     edges = [0, *(mark.end() for mark in marks)]
     ends = [*(mark.start() for mark in marks), len(text)]
     times_s = [cue.start_s, *(min(max(clock_seconds(mark, 1), cue.start_s), cue.end_s) for mark in marks), cue.end_s]
-    return [
-        word
+    return tuple(
+        TimedLabel(start_s, max(start_s, end_s), text[first:end], f"line {cue.number}")
         for first, end, start_s, end_s in zip(edges, ends, times_s, times_s[1:], strict=False)
-        for word in timed_words(spoken_text(text[first:end], names), start_s, max(start_s, end_s), where)
-    ]
+    )
+
+
+def _substation_cues(text: str, where: str) -> Iterator[SubtitleCue]:
+    """Yield the dialogue of a file, without drawings; comments, styles and what else it holds are left out.
+
+    The tags of styles (``{\\an8}``, ``{\\i1}``) stay in the text: ``spoken_text`` takes them out, as of all subtitles.
+    where : the file's name, for messages
+    Raises InputError: a line of dialogue with too few fields, times that are none, or an end before the start, with its
+    line; too many lines.
+    """
+    fields, in_events = DEFAULT_FIELDS, True
+    for number, row in enumerate(StringIO(text), 1):
+        line = row.strip()
+        if line.startswith("["):
+            in_events = line.lower() == "[events]"
+        elif in_events and line.lower().startswith(FORMAT_LINE):
+            fields = [name.strip().lower() for name in line[len(FORMAT_LINE) :].split(",")]
+        elif in_events and line.lower().startswith(DIALOGUE_LINE):
+            check_count(number, where)
+            yield _dialogue(line, number, fields, where)
+
+
+def _dialogue(line: str, number: int, fields: list[str], where: str) -> SubtitleCue:
+    """Return one line of dialogue; the text is the last field, and may hold commas."""
+    values = line[len(DIALOGUE_LINE) :].split(",", maxsplit=len(fields) - 1)
+    by_name = dict(zip(fields, values, strict=False))
+    start, end = (re.fullmatch(CLOCK, by_name.get(name, "").strip()) for name in ("start", "end"))
+    if start is None or end is None or len(values) < len(fields):
+        wanted = "Dialogue: 0,0:00:01.00,0:00:02.50,Default,,0,0,0,,Words"
+        raise InputError(f"{where}: line {number} is {shortened(line)!r}; required a line as {wanted}")
+    shown = BREAK.sub("\n", _without_drawings(by_name.get("text", values[-1])))
+    return SubtitleCue(number, clock_seconds(start, 1), clock_seconds(end, 1), tuple(shown.split("\n")))
+
+
+def _without_drawings(text: str) -> str:
+    """Return a text without drawings and without tags."""
+    shown, drawing = [], False
+    for number, part in enumerate(STYLES.split(text)):
+        if number % 2:  # a tag
+            modes = DRAWING_MODE.findall(part)
+            drawing = modes[-1] != "0" if modes else drawing
+        elif not drawing:
+            shown.append(part)
+    return "".join(shown)

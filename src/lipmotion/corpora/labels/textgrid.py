@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from lipmotion.corpora.labels.tier import LabelTier, TimedLabel, check_count, required_time
+from lipmotion.corpora.labels.phone_symbols import in_inventory
+from lipmotion.corpora.labels.tier import LabelTier, TimedLabel, check_count, named_tier, required_time
 from lipmotion.errors import InputError, shortened
 
 TOKEN = re.compile(
@@ -28,7 +29,7 @@ def is_textgrid(text: str) -> bool:
 
 
 def parse_interval_tiers(text: str, where: str) -> list[LabelTier]:
-    """Return the interval tiers of a TextGrid; point tiers are ignored.
+    """Return the interval tiers of a TextGrid, in the phones of the inventory; point tiers are ignored.
 
     where : the file's name, for messages
     Raises InputError: not a whole TextGrid.
@@ -53,7 +54,7 @@ def parse_interval_tiers(text: str, where: str) -> list[LabelTier]:
             check_count(total, where)
             labels = [_label(tokens, kind, f"{place}, interval {i + 1}", where) for i in range(count)]
             if kind == INTERVALS:
-                tiers.append(LabelTier(place, tuple(labels)))
+                tiers.append(in_inventory(named_tier(name, labels), where))
         place = "what follows the last tier"
         if next(tokens, None) is not None:
             raise _DamagedError("more is there than the counts say")

@@ -1,60 +1,111 @@
-"""Tiers of labels as in a file, and the phones or words that they stand for."""
+"""Tiers of labels as in a file: what each holds, who speaks in it, and the phones or words that it stands for."""
 
 from __future__ import annotations
 
+import logging
 import math
 import re
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from statistics import median
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.printable import is_line
-from lipmotion.types import Span, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
+from lipmotion.types import Span, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit, in_order
 from lipmotion.units import (
     PHONES,
     RECOGNISED,
     SILENCE,
+    UNKNOWN_PHONES,
     RecognisedPhone,
     is_silent,
     phone_named,
     with_confidences,
     with_reduced_vowels,
 )
-from lipmotion.units.phones import REDUCED_VOWELS
-from lipmotion.units.spoken_text import line_words
+from lipmotion.units.phones import CLOSURES, REDUCED_VOWELS
+from lipmotion.units.spoken_text import (
+    SpokenAs,
+    check_word_count,
+    line_words,
+    speaker_names,
+    spoken_as,
+    spoken_text,
+    timed_words,
+)
 
-SILENCES = frozenset(["", *"sil sp spn pau ssil nsn h# #h # _ - silence <sil> <p:> {sil} [sil] <eps>".split()])
-"""Labels of other tools for silence, pauses and noise that is not speech."""
+LOG = logging.getLogger("lipmotion")
+WORDS, LINES, PHONE_LABELS, RECOGNISED_PHONES, OTHER = "words", "lines", "phones", "recognised", "other"
+"""What a tier holds. ``OTHER`` is neither said nor seen: pronunciations, syllables, translations, notes."""
+ROLES = (
+    (OTHER, r"^(kan|kas|mas|pho)\b|canonical|syll|tones?\b|tobi|gloss|transl|comment|notes?\b|pos\b|lemma|gesture"),
+    (PHONE_LABELS, r"phon([eéè]|$|s\b)|fonem|fones?\b|segment|(?<!-)\bmau\b|^laute?\b|ipa\b|x?-?sampa|音素|фонем"),
+    (WORDS, r"\b_?words?\b|\bort\b|orthogr|\bmots?\b|\bw(ö|oe)rter\b|\bwort\b|palabras?|parole\b|tokens?\b|単語|слов"),
+    (LINES, r"\btrn\b|transcri|utteranc|sentence|phrase|\btext\b|äußerung|énoncé|enunciado"),
+)  # fmt: skip
+"""What names of tiers say that they hold: those of Praat's users, of WebMAUS (``ORT-MAU``, ``KAN-MAU``, ``MAU``), of
+aligners, of ELAN's users, in some languages."""
+SPEAKERS = (r"(?P<speaker>.+?)\s*[-_/:]\s*(?:words?|phones?|phonemes?)", r"[^@]+@(?P<speaker>.+)")
+"""Names of tiers that hold a speaker's, too: ``ann - words`` of the Montreal Forced Aligner, ``words@ANN`` of ELAN."""
 PHONES_SHARE = 0.75
 """A tier of which this share of the labels are phones is one of phones; the other labels are errors."""
+SHARED_TIME = 0.5
+"""Tiers of unknown kinds of which so much is at the same time are versions of one text; else they are of speakers."""
 ROUNDING_S = 1e-3
 """Times may differ by this much: they are written with three digits or more."""
+WHOLE_WORD_S = 0.03
+"""A span of unknown phones whose ends are so near to those of a word is all of it."""
 IN_CONTEXT = re.compile(r"[^-+]*-([^-+]+)\+.*")
 """Triphones and full-context labels of HTK and HTS: ``t-iy+n``, ``x^sil-hh+iy=t@...``."""
+GLOTTAL_STOP = "q"
+"""TIMIT's: a sound of the throat, with any lips."""
 STATE_NUMBER = re.compile(r"\[(\d{1,9})\]$")
 RECOGNISED_LABEL = re.compile(r"(\S+) (0|1|1\.0|0\.\d+|\d(?:\.\d+)?e-\d+)")
 """A phone or unit, and its confidence from 0 to 1."""
 MOST_LABELS = 250_000
 """Most labels of a file: phones of five hours of speech."""
+TYPICAL_S = {PHONE_LABELS: 0.08}
+TYPICAL_WORD_S = 0.3
+"""How long a phone, and a word, alone or of a line, last."""
+UNIT_LIMITS = ((150, 1), (6000, 1000), (300_000, 0), (3_200_000, 1_000_000))
+"""If they last up to so many times as long as is typical, so many units are a second; 0: these are samples."""
+TICKS_PER_S = 10_000_000
+UNITS = {1: "seconds", 1000: "milliseconds", 1_000_000: "microseconds", TICKS_PER_S: "ticks of 100 ns"}
 
 
 @dataclass(frozen=True, slots=True)
 class TimedLabel:
-    """One label: its time, its text, and its position in the file, for messages. An unknown end is infinite."""
+    """One label: its time, its text, and its position in the file, for messages.
+
+    start_s, end_s : NaN where they are not known; an end that is open is infinite
+    parts          : the words of a line, where these have times of their own
+    """
 
     start_s: float
     end_s: float
     text: str
     position: str
+    parts: tuple[TimedLabel, ...] = ()
 
 
 @dataclass(frozen=True)
 class LabelTier:
-    """A series of labels, and its name for messages."""
+    """A series of labels; its name as in the file, what it holds, and who speaks. Empty: the file does not say."""
 
     name: str
     labels: tuple[TimedLabel, ...]
+    role: str = ""
+    speaker: str = ""
+
+
+def named_tier(name: str, labels: Sequence[TimedLabel], speaker: str = "") -> LabelTier:
+    """Return a tier whose name says what it holds and perhaps who speaks."""
+    found = next(filter(None, (re.fullmatch(form, name, re.IGNORECASE) for form in SPEAKERS)), None)
+    role = next((role for role, form in ROLES if re.search(form, name.lower())), "")
+    if name == RECOGNISED:
+        role = RECOGNISED_PHONES
+    return LabelTier(name, tuple(labels), role, speaker or (found["speaker"].strip() if found else ""))
 
 
 def check_count(count: int, where: str) -> None:
@@ -64,36 +115,88 @@ def check_count(count: int, where: str) -> None:
 
 
 def required_time(text: str, place: str, where: str) -> float:
-    """Return a time from its text. Raises InputError: it is not finite."""
-    time = float(text)
+    """Return a time from its text, also with a decimal comma. Raises InputError: it is not finite."""
+    time = float(text.replace(",", "."))
     if not math.isfinite(time):
         raise InputError(f"{where}: {place} has the time {shortened(text)}, required a finite one")
     return time
 
 
+def unit_of_times(spans: Sequence[tuple[float, float, str]], role: str, where: str, usual: int = 1) -> int:
+    """Return how many units of time are a second, by how long words, of a line each of them, or phones last.
+
+    spans : start, end and text, in the unit; where one is no whole number these are seconds
+    usual : how many it usually is, where one span says nothing; a warning names what is neither this nor seconds
+    Raises InputError: the times are samples, whose rate is not known.
+    """
+    lengths = [
+        (end - start) / (1 if role == PHONE_LABELS else max(len(text.split()), 1))
+        for start, end, text in spans
+        if math.inf > end > start and spoken_as(text) is SpokenAs.SPEECH
+    ]
+    if any(math.isfinite(time) and time != int(time) for span in spans for time in span[:2]):
+        return 1
+    if len(lengths) < 1 + (usual == 1):
+        return usual
+    times = median(lengths) / TYPICAL_S.get(role, TYPICAL_WORD_S)
+    per_s = next((per_s for limit, per_s in UNIT_LIMITS if times < limit), TICKS_PER_S)
+    if per_s == 0:
+        raise InputError(
+            f"{where}: its times seem to be samples of the sound (one lasts {median(lengths):g}), required seconds"
+        )
+    if per_s not in (1, usual):
+        LOG.warning("%s: its times are taken for %s; write seconds if they are not", where, UNITS[per_s])
+    return per_s
+
+
+def in_seconds(tiers: list[LabelTier], where: str) -> list[LabelTier]:
+    """Return tiers in seconds; whole numbers of which a word would last a minute are in the unit that they seem to be.
+
+    Raises InputError: as ``unit_of_times``.
+    """
+    judged = next((tier for tier in tiers if tier.role == WORDS or holds_phones(tier)), None)
+    spans = [(label.start_s, label.end_s, label.text) for label in judged.labels] if judged else []
+    role = PHONE_LABELS if judged and holds_phones(judged) else WORDS
+    per_s = unit_of_times(spans, role, where)
+    return (
+        [
+            replace(
+                tier,
+                labels=tuple(
+                    replace(label, start_s=label.start_s / per_s, end_s=label.end_s / per_s) for label in tier.labels
+                ),
+            )
+            for tier in tiers
+        ]
+        if per_s != 1
+        else tiers
+    )
+
+
 def holds_phones(tier: LabelTier) -> bool:
     """Return whether a tier's name says that it holds phones, or most of its labels other than silence are phones."""
-    spoken = [label for label in tier.labels if not is_silence(label.text)]
-    if not spoken or is_named_as_words(tier):
-        return False
-    if is_named_as_phones(tier):
-        return True
-    return sum(phone_of(label.text) is not None for label in spoken) >= PHONES_SHARE * len(spoken)
+    spoken = [label for label in tier.labels if spoken_as(label.text) is SpokenAs.SPEECH]
+    if tier.role:
+        return tier.role == PHONE_LABELS and any(label.text for label in tier.labels)
+    return bool(spoken) and sum(phone_of(label.text) is not None for label in spoken) >= PHONES_SHARE * len(spoken)
 
 
-def is_named_as_phones(tier: LabelTier) -> bool:
-    """Return whether a tier's name says that it holds phones."""
-    return re.search(r"phone|segment|\bmau\b", tier.name.lower()) is not None
-
-
-def is_named_as_words(tier: LabelTier) -> bool:
-    """Return whether a tier's name says that it holds words."""
-    return re.search(r"\bwords?\b|transcript|\bort", tier.name.lower()) is not None
-
-
-def is_named_as_recognised(tier: LabelTier) -> bool:
-    """Return whether a tier's name says that it holds the phones as they were recognised (``units.recognised``)."""
-    return tier.name == f"tier {RECOGNISED!r}"
+def tiers_of_speakers(tiers: list[LabelTier]) -> list[LabelTier]:
+    """Return tiers; those of unknown kinds that hold words at other times than each other are named as speakers."""
+    unknown = [tier for tier in tiers if not tier.role and any(label.text for label in tier.labels)]
+    if len(unknown) < 2 or any(tier.speaker or tier.role in (WORDS, LINES) for tier in tiers):
+        return tiers
+    said = [[label for label in tier.labels if line_words(spoken_text(label.text), tier.name)] for tier in unknown]
+    if any(map(holds_phones, unknown)) or not all(said):
+        return tiers
+    first, others = said[0], [label for labels in said[1:] for label in labels]
+    shared_s = sum(
+        max(min(a.end_s, b.end_s) - max(a.start_s, b.start_s), 0.0) for a in first[:1000] for b in others[:1000]
+    )
+    spoken_s = sum(min(label.end_s - label.start_s, 60.0) for label in first[:1000])
+    if shared_s > SHARED_TIME * spoken_s:
+        return tiers
+    return [replace(tier, speaker=tier.name, role=LINES) if tier in unknown else tier for tier in tiers]
 
 
 def with_recognised(units: Timeline[Unit], tier: LabelTier) -> Timeline[Unit]:
@@ -103,85 +206,122 @@ def with_recognised(units: Timeline[Unit], tier: LabelTier) -> Timeline[Unit]:
     return with_confidences(units, rows)
 
 
-def with_words(units: Timeline[Unit], tier: LabelTier) -> Timeline[Unit]:
-    """Return phones in time, each with the word of a tier in which its middle lies; silence has none."""
-    starts_s = [label.start_s for label in tier.labels]
-    spans = []
+def with_words(units: Timeline[Unit], labels: Sequence[TimedLabel]) -> Timeline[Unit]:
+    """Return phones in time, each with the word of a tier in which its middle lies; silence has none.
+
+    A span of unknown phones has a word only if it is all of it.
+    """
+    timed = [label for label in labels if not math.isnan(label.start_s + label.end_s)]
+    starts_s = [label.start_s for label in timed]
+    spans: list[Span[Unit]] = []
     for span in units:
         middle_s = (span.start_s + span.end_s) / 2
         place = bisect_right(starts_s, middle_s) - 1
-        inside = place >= 0 and middle_s < tier.labels[place].end_s and not is_silent(span.label.phone)
-        word = tier.labels[place].text if inside else ""
-        said = word if is_line(word) and not is_silence(word) else ""
+        inside = place >= 0 and middle_s < timed[place].end_s and not is_silent(span.label.phone)
+        if inside and span.label.unit == UNKNOWN_PHONES:
+            edges = (span.start_s - timed[place].start_s, span.end_s - timed[place].end_s)
+            inside = max(map(abs, edges)) <= WHOLE_WORD_S
+        word = timed[place].text if inside else ""
+        said = word if is_line(word) and spoken_as(word) is SpokenAs.SPEECH else ""
         spans.append(replace(span, label=replace(span.label, word=said)))
     return Timeline(tuple(spans))
 
 
-def tier_transcript(tier: LabelTier, where: str) -> TimedTranscript:
-    """Return the words of a tier with their times, silence left out; each label is a line.
+def tier_transcript(tiers: Sequence[LabelTier], where: str) -> TimedTranscript:
+    """Return the words of tiers with their times, in order; silence, sounds and markup are left out.
 
-    Raises InputError: labels overlap, or there is no word.
+    Each label is a line; words have its time where it is one of words, or a single word.
+    Raises InputError: a label ends before it starts, or there are too many words.
     """
-    _check_order(tier, where)
-    lines = []
-    for label in tier.labels:
-        words = () if is_silence(label.text) else line_words(label.text, f"{where}: {label.position}")
-        end_s = label.end_s if math.isfinite(label.end_s) else None
-        times_s = (label.start_s, end_s) if len(words) == 1 else (None, None)
-        if words:
-            lines.append(TranscriptLine(tuple(TimedWord(word, *times_s) for word in words), label.start_s, end_s))
-    if not lines:
-        raise InputError(f"{where}: {tier.name} holds no word; remove the file if the words are not known")
-    return TimedTranscript(tuple(lines))
+    names = speaker_names(label.text for tier in tiers for label in tier.labels)
+    lines: list[TranscriptLine] = []
+    count = 0
+    for tier in tiers:
+        for label in tier.labels:
+            place = f"{where}: {label.position}"
+            start_s, end_s = _times(label, where)
+            words: list[TimedWord] = []
+            for part in label.parts or (label,):
+                text = spoken_text(part.text, names) if spoken_as(part.text) is SpokenAs.SPEECH else ""
+                single = not tier.role and len(line_words(text, place)) == 1
+                timed = bool(label.parts) or tier.role == WORDS or single
+                words += timed_words(text, *(_times(part, where) if timed else (None, None)), where=place)
+            lines.append(TranscriptLine(tuple(words), start_s, end_s))
+            count += len(words)
+            check_word_count(count, where)
+    return in_order(lines)
 
 
-def phone_timeline(tier: LabelTier, words: LabelTier | None, where: str, *, with_gaps: bool = False) -> Timeline[Unit]:
-    """Return the phones of a tier in time.
+def _times(label: TimedLabel, where: str) -> tuple[float | None, float | None]:
+    """Return the times of a label, None where they are not known. Raises InputError: it ends before it starts."""
+    if label.end_s < label.start_s:
+        raise _reversed(label, where)
+    return tuple(time_s if math.isfinite(time_s) else None for time_s in (label.start_s, label.end_s))
 
-    words : the words of the same recording in time, or None; if the phones have no stress marks, the lexicon's rule
-            reduces the vowels of each word
+
+def _reversed(label: TimedLabel, where: str) -> InputError:
+    return InputError(
+        f"{where}: {label.position} ends at {label.end_s:g} s, before its start at {label.start_s:g} s; correct it"
+    )
+
+
+def phone_timeline(
+    tier: LabelTier, words: Sequence[TimedLabel], where: str, *, with_gaps: bool = False
+) -> Timeline[Unit]:
+    """Return the phones of a tier in time; speech of unknown phones has the unit ``UNKNOWN_PHONES``.
+
+    words : the words of the same recording in time; if the phones have no stress marks, the lexicon's rule reduces the
+            vowels of each word
     with_gaps : gaps between labels are allowed, and stay
     Raises InputError: a label that is no phone, or labels that overlap or leave a gap.
     """
-    _check_order(tier, where)
-    for before, label in zip(tier.labels, tier.labels[1:], strict=False):
-        if not with_gaps and label.start_s > before.end_s + ROUNDING_S:
-            raise InputError(
-                f"{where}: {label.position} starts at {label.start_s:g} s, the one before it ends at {before.end_s:g} "
-                "s; phones must follow each other without a gap: label silence as sil"
-            )
-    labels = _without_states(tier.labels)
+    _check_order(tier.labels, where, with_gaps=with_gaps)
+    labels = _whole_phones(tier.labels)
     phones = [_required_phone(label, where) for label in labels]
     marked = any(re.search(r"\d$", label.text) for label in labels) or set(REDUCED_VOWELS.values()) & set(phones)
-    if words is not None and not marked:
+    if words and not marked:
         phones = _reduced(labels, phones, words)
     starts_s = [max(label.start_s, 0.0) for label in labels]
     ends_s = [
         label.end_s if following_s > label.end_s + ROUNDING_S else following_s
         for label, following_s in zip(labels, starts_s[1:], strict=False)
     ] + [max(labels[-1].end_s, 0.0)]
-    return Timeline(tuple(Span(*row) for row in zip(starts_s, ends_s, map(Unit, phones), strict=True)))
+    units = (Unit("", UNKNOWN_PHONES) if phone == UNKNOWN_PHONES else Unit(phone) for phone in phones)
+    return Timeline(tuple(Span(*row) for row in zip(starts_s, ends_s, units, strict=True)))
 
 
-def _check_order(tier: LabelTier, where: str) -> None:
-    """Raise InputError for labels that overlap or end before they start."""
+def _check_order(labels: Sequence[TimedLabel], where: str, *, with_gaps: bool) -> None:
+    """Raise InputError for labels without times, that overlap or end before they start, or that leave a gap."""
     end_s = 0.0
-    for label in tier.labels:
+    for number, label in enumerate(labels):
+        if math.isnan(label.start_s + label.end_s):
+            raise InputError(f"{where}: {label.position} has no time, required the start and the end of a phone")
         if label.end_s < label.start_s:
-            raise InputError(
-                f"{where}: {label.position} ends at {label.end_s:g} s, before its start at {label.start_s:g} s"
-            )
+            raise _reversed(label, where)
         if label.start_s < end_s - ROUNDING_S:
             raise InputError(
                 f"{where}: {label.position} starts at {label.start_s:g} s, before the one ahead of it ends ({end_s:g} "
                 "s); labels must not overlap"
             )
+        if number and not with_gaps and label.start_s > end_s + ROUNDING_S:
+            raise InputError(
+                f"{where}: {label.position} starts at {label.start_s:g} s, the one before it ends at {end_s:g} "
+                "s; phones must follow each other without a gap: label silence as sil"
+            )
         end_s = label.end_s
 
 
-def is_silence(text: str) -> bool:
-    """Return whether a label of another tool stands for silence."""
-    return (_inner(text) or text).lower() in SILENCES
+def merged_timelines(timelines: Sequence[Timeline[Unit]]) -> Timeline[Unit]:
+    """Return what several speakers say in order, without silence; where two speak at once, who began goes on."""
+    if len(timelines) == 1:
+        return timelines[0]
+    merged: list[Span[Unit]] = []
+    spoken = (span for units in timelines for span in units if not is_silent(span.label.phone))
+    for span in sorted(spoken, key=lambda span: span.start_s):
+        end_s = merged[-1].end_s if merged else -math.inf
+        if span.end_s > end_s:
+            merged.append(replace(span, start_s=max(span.start_s, end_s)))
+    return Timeline(tuple(merged))
 
 
 def _inner(text: str) -> str | None:
@@ -191,14 +331,17 @@ def _inner(text: str) -> str | None:
 
 
 def phone_of(text: str) -> str | None:
-    """Return the phone that a label stands for, or None."""
+    """Return the phone that a label stands for, ``UNKNOWN_PHONES`` for speech of unknown ones, or None."""
     text = STATE_NUMBER.sub("", text)
     name = phone_named(text) or phone_named(_inner(text) or "")
-    return SILENCE if name is None and is_silence(text) else name
+    if name is not None or text == GLOTTAL_STOP:
+        return name or "hh"
+    kind = spoken_as(_inner(text) or text)
+    return {SpokenAs.SILENCE: SILENCE, SpokenAs.UNKNOWN: UNKNOWN_PHONES}.get(kind)
 
 
 def _required_phone(label: TimedLabel, where: str) -> str:
-    phone = phone_of(label.text)
+    phone = phone_of(label.text) or phone_of(label.text.lower().removesuffix("n"))  # nasal vowels of Buckeye
     if phone is None:
         raise InputError(
             f"{where}: {label.position} is {label.text[:40]!r}, which is no phone; the phones are: {' '.join(PHONES)}"
@@ -206,30 +349,33 @@ def _required_phone(label: TimedLabel, where: str) -> str:
     return phone
 
 
-def _without_states(labels: Sequence[TimedLabel]) -> list[TimedLabel]:
-    """Return labels of whole phones: labels of the states of a phone (``...[2]``, ``...[3]``, ...) become one."""
+def _whole_phones(labels: Sequence[TimedLabel]) -> list[TimedLabel]:
+    """Return labels of whole phones: states of a phone (``...[2]``, ``...[3]``, ...) become one, and a closure of
+    TIMIT's with what it opens to (``pcl``, ``p``).
+    """
     whole: list[TimedLabel] = []
     last = -1
     for label in labels:
         match = STATE_NUMBER.search(label.text)
         state = int(match[1]) if match else -1
         name = STATE_NUMBER.sub("", label.text)
-        if whole and state > last >= 0 and whole[-1].text == name:
-            whole[-1] = TimedLabel(whole[-1].start_s, label.end_s, name, whole[-1].position)
+        before = whole[-1].text.lower() if whole else ""
+        if (whole and state > last >= 0 and before == name.lower()) or name.lower() in CLOSURES.get(before, ()):
+            whole[-1] = replace(whole[-1], end_s=label.end_s, text=name)
         else:
-            whole.append(TimedLabel(label.start_s, label.end_s, name, label.position))
+            whole.append(replace(label, text=name))
         last = state
     return whole
 
 
-def _reduced(labels: Sequence[TimedLabel], phones: Sequence[str], words: LabelTier) -> list[str]:
+def _reduced(labels: Sequence[TimedLabel], phones: Sequence[str], words: Sequence[TimedLabel]) -> list[str]:
     """Return the phones with the unstressed vowels of every word reduced by the lexicon's rule."""
     result = list(phones)
     middles_s = [(label.start_s + label.end_s) / 2 for label in labels]
     in_time = sorted(range(len(labels)), key=middles_s.__getitem__)
     sorted_s = [middles_s[i] for i in in_time]
     end = 0
-    for word in words.labels:
+    for word in words:
         start, end = max(end, bisect_left(sorted_s, word.start_s)), max(end, bisect_left(sorted_s, word.end_s))
         inside = [i for i in sorted(in_time[start:end]) if not is_silent(phones[i])]
         reduced = with_reduced_vowels(word.text.lower(), tuple(phones[i] for i in inside))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from lipmotion.corpora.labels import labels_beside
+from lipmotion.corpora.labels import labels_beside, speakers_in
 from lipmotion.errors import InputError
 from lipmotion.pipeline.job import Request
 from lipmotion.pipeline.understand.given_units import read_units
@@ -27,8 +27,10 @@ def read_request(request: Request, *, words_beside: bool = False) -> SpeechReque
     """
     if request.recording is None:
         raise InputError("the job names no recording; required: [request] recording = 'FILE'")
-    transcript = text_or_file_content(request.transcript) if request.transcript is not None else None
-    units = read_units(request.units) if request.units else None
+    spoken_by = _speaker_of_labels(request)
+    given = request.transcript
+    transcript = text_or_file_content(given, request.tier, spoken_by) if given is not None else None
+    units = read_units(request.units, request.tier, spoken_by) if request.units else None
     labels = labels_beside(request.recording) if words_beside and transcript is None and units is None else None
     if labels is not None:
         transcript, units = labels.transcript, labels.phones if labels.transcript is None else None
@@ -39,7 +41,7 @@ def read_request(request: Request, *, words_beside: bool = False) -> SpeechReque
         lexicon=read_lexicon(request),
         language=request.language,
         recogniser=request.recogniser,
-        speaker=request.speaker,
+        speaker="" if spoken_by else request.speaker,
         onto=request.onto,
         onto_speaker=request.onto_speaker,
         pauses=request.pauses,
@@ -53,14 +55,23 @@ def read_lexicon(request: Request) -> Lexicon | None:
     return Lexicon.from_file(request.lexicon) if request.lexicon else None
 
 
-def text_or_file_content(argument: str) -> str | TimedTranscript:
+def _speaker_of_labels(request: Request) -> str:
+    """Return the speaker of a request if its labels have one of that name: it then is whose words are read."""
+    files = (Path(name) for name in (request.transcript, request.units) if name is not None and request.speaker)
+    named = (name.lower() for file in files if _file_exists(file) for name in speakers_in(file))
+    return request.speaker if request.speaker.lower() in named else ""
+
+
+def text_or_file_content(argument: str, tier: str = "", speaker: str = "") -> str | TimedTranscript:
     """Return the content of the file that the argument names, else the argument itself.
+
+    tier, speaker : of a file of labels, which tier and whose words
 
     Raises InputError: the argument looks like a file name but no such file exists, or the file cannot be read.
     """
     path = Path(argument)
     looks_like_path = _may_be_name(argument) and (_SUFFIX.fullmatch(path.suffix) or _is_in_a_folder(argument))
-    return read_transcript(path) if looks_like_path or _file_exists(path) else argument
+    return read_transcript(path, tier, speaker) if looks_like_path or _file_exists(path) else argument
 
 
 def _may_be_name(argument: str) -> bool:

@@ -1,0 +1,622 @@
+"""JSON of services: words and phones in time of recognisers, voices and aligners, by one table of their shapes.
+
+What a file is follows from the names in it, whatever their spelling (``start_time``, ``StartTime``, ``privStartTime``),
+and the unit of its times from how long its words last. Whatever else a service writes is passed over.
+
+Source: the public documentation of each service; figures and names of fields alone.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import math
+import re
+from bisect import bisect_right
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import accumulate, zip_longest
+from typing import Any, NamedTuple
+
+from lipmotion.corpora.labels.phone_symbols import in_inventory, inventory_labels, ipa_labels, with_pauses
+from lipmotion.corpora.labels.tier import (
+    LINES,
+    PHONE_LABELS,
+    TICKS_PER_S,
+    WORDS,
+    LabelTier,
+    TimedLabel,
+    check_count,
+    named_tier,
+    unit_of_times,
+)
+from lipmotion.errors import InputError, shortened
+from lipmotion.units import SILENCE
+from lipmotion.units.spoken_text import check_word_count, spoken_text
+from lipmotion.units.text_normalisation import words_in
+
+LOG = logging.getLogger("lipmotion")
+Objects = list[tuple[str, dict[str, Any]]]
+"""Objects of a file, each with its place, for messages."""
+LATEST_S = 1e6
+"""Times beyond eleven days are an error, or in another unit."""
+EARLIEST_S = -1.0
+"""A time before this is none; recognisers write others a little before 0."""
+SINGLE_SHARE, LONGEST_JUDGED, DEEPEST = 0.9, 1000, 12
+"""A list is one of words where so many of its texts are single ones; letters of a text that are judged; how deep lists
+are searched in lists."""
+ROUNDING_S = 1.0
+"""An end may be so much before its start; recognisers write that at the edges of their windows."""
+
+
+class Times(NamedTuple):
+    """The names of the times of an item; ``per_s``: how many are a second, 0: how long words last decides.
+
+    usual : how many usually are, where nothing can be told
+    """
+
+    start: str
+    end: str = ""
+    duration: str = ""
+    per_s: int = 0
+    usual: int = 1
+
+
+TIMES = (
+    Times("start", "end", "duration"),  # Whisper, Vosk, Deepgram, AssemblyAI (ms), Gladia, ElevenLabs, Gentle
+    Times("starttime", "endtime", "duration"),  # AWS, Google, Yandex, Speechmatics, Qwen3-ASR, servers of Kokoro
+    Times("startts", "endts", per_s=1),  # Kokoro
+    Times("ts", "endts", "duration", 1),  # Rev.ai
+    Times("begin", "end", "dur"),  # aeneas
+    Times("startms", "endms", "durationms", 1000),
+    Times("starttimems", "endtimems", "durationms", 1000),
+    Times("tstartms", "", "ddurationms", 1000),  # YouTube, json3
+    Times("offsetinticks", "", "durationinticks", TICKS_PER_S),  # Azure, batch transcription
+    Times("offsetmilliseconds", "", "durationmilliseconds", 1000),  # Azure, fast transcription
+    Times("audiooffset", "", "duration", usual=TICKS_PER_S),  # Azure, speech synthesis
+    Times("offset", "", "duration", usual=TICKS_PER_S),  # Azure, speech recognition
+    Times("startoffset", "endoffset"),  # Google, version 2
+    Times("timestart", "timeend"),
+    Times("from", "to"),
+    Times("timeseconds", per_s=1),  # Google, text to speech
+    Times("time", "", "duration", usual=1000),  # Amazon Polly
+    Times("", "resultendtime", per_s=1),  # Google, a result without words
+    Times("", "resultendoffset", per_s=1),
+)
+TEXTS = (
+    "punctuatedword word text content value transcript sentence display lexical markname token lines displaytext segs "
+    "alternatives nbest"
+).split()
+"""The names of what is said, in order; of alternatives it is the first one."""
+ALTERNATIVES = ("alternatives", "nbest")
+WORD_LISTS = ("words", "items", "elements", "tokens", "timestamps", "timepoints")
+"""Members that hold words in time, within a line or alone."""
+LINE_LISTS = (
+    "segments transcription utterances monologues events chunks fragments channels recognizedphrases sentences phrases "
+    "paragraphs result results transcript alternatives nbest data response output prediction predictions documents"
+).split()
+"""Members in which lines or further lists are searched, in this order."""
+KINDS = ("type", "boundarytype", "kind", "category")
+NOT_SAID = re.compile(r"punct|spac|audio.?event|sentence|ssml|pause|silence|non.?speech|blank|laugh|noise|session")
+"""Kinds of items that are no words."""
+SPEAKERS = "speaker speakerid speakerlabel speakertag channellabel channeltag channel".split()
+POLLY_VISEMES = {
+    "sil": SILENCE, "p": "p", "t": "t", "S": "sh", "T": "th", "f": "f", "k": "k", "i": "iy", "r": "r", "s": "s",
+    "l": "l", "u": "uw", "@": "ax", "a": "aa", "e": "ey", "E": "eh", "o": "ow", "O": "ao",
+    "B": "v", "D": "dh", "J": "n", "G": "g", "x": "k", "w": "w",
+}  # fmt: skip
+"""A phone with the mouth of each viseme of Amazon Polly; those of the last row are of other languages than English."""
+AZURE_VISEMES = "sil ah aa ao eh er ih uw ow aw oy ay hh r l s sh th f t k p".split()
+"""A phone with the mouth of each of Azure's 22 visemes, by its number."""
+KOKORO_LETTERS = {"A": "eɪ", "I": "aɪ", "W": "aʊ", "Y": "ɔɪ", "O": "oʊ", "Q": "əʊ", "ᵊ": "ə", "T": "ɾ"}
+KOKORO_FRAMES_PER_S = 40
+"""Durations are in frames of 600 samples at 24 kHz."""
+EVENTS = (
+    ("audiooffset", TICKS_PER_S, "visemeid", "text"),  # Azure, speech synthesis: boundaries and visemes
+    ("time", 1000, "value", "value"),  # Amazon Polly, speech marks
+    ("timeseconds", 1, "", "markname"),  # Google, marks of SSML that are named as the word after them
+)
+"""Events: names of their start, the usual unit, and the names of a viseme and of a word."""
+POLLY_KINDS = ("sentence", "word", "viseme", "ssml")
+MARK = re.compile(r"[^\W\d_]+(?:['’-][^\W\d_]+)*[.,;:!?]?")
+"""A name of a mark that is a word."""
+COLUMNS = (
+    ("characters", ("characters", "characterstarttimesseconds", "characterendtimesseconds"), 1),  # ElevenLabs
+    ("characters", ("chars", "charstarttimesms", "chardurationsms"), 1000),  # ElevenLabs' web socket
+    ("characters", ("chars", "charstarttimesms", "charsdurationsms"), 1000),
+    (WORDS, ("words", "start", "end"), 1),  # Cartesia, word_timestamps
+    (PHONE_LABELS, ("phonemes", "start", "end"), 1),  # Cartesia, phoneme_timestamps
+)
+"""Parallel lists of texts, starts and ends (durations where they are named so), and how many units are a second."""
+COLUMN_OWNERS = ("normalizedalignment", "alignment", "wordtimestamps", "phonemetimestamps")
+SPOKEN_WORD = re.compile(r"\[[^\[\]]*\]|[^\s\[]+")
+"""A word of characters, or a direction in brackets (``[whispers]``), which is not said."""
+KNOWN_SHAPES = "segments, words, results, utterances, monologues, alignment, tiers, fragments, ..."
+BLANK = re.compile(r"\s*")
+DIGITS = re.compile(r"(?:PT)?([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d{1,3})?)\s*(s|ms)?", re.IGNORECASE)
+CLOCK_TEXT = re.compile(r"(?:(\d{1,4}):)?(\d{1,2}):(\d{1,2}(?:[.,]\d{1,9})?)")
+
+
+class DamagedJsonError(InputError):
+    """A text that begins as JSON is none."""
+
+
+UNTIMED = Times("")
+
+
+@dataclass(frozen=True)
+class Row:
+    """An item of a list: its times as they stand, NaN where they are missing, and what their unit is."""
+
+    start: float
+    end: float
+    text: str
+    place: str
+    times: Times = UNTIMED
+    speaker: str = ""
+    is_word: bool = False
+    parts: tuple[Row, ...] = ()
+
+
+def is_json(text: str) -> bool:
+    """Return whether a text begins as an object or a list of objects does."""
+    return re.match(r'\s*(?:\{\s*["}]|\[\s*[\[{\]])', text) is not None
+
+
+def service_tiers(text: str, where: str) -> list[LabelTier] | None:
+    """Return the tiers of words, lines and phones of the JSON of a service; None: it has none.
+
+    where : the file's name, for messages
+    Raises InputError: it is damaged (with its line), a symbol in it is not known, or a time is none.
+    """
+    documents = list(_documents(text, where))
+    numbered = [(f"line {line}", value) for line, value in documents]
+    if len(documents) == 1 and isinstance(documents[0][1], list):
+        numbered = [(f"item {number}", value) for number, value in enumerate(documents[0][1], 1)]
+    objects = [(place, item) for place, item in numbered if isinstance(item, dict)]
+    if not objects or any("mouthcues" in item or {"format", "channels"} <= item.keys() for _, item in objects):
+        return None
+    readers = (_event_tiers, _column_tiers, _duration_tiers, _aligned_tiers, _named_tiers)
+    for tiers in (reader(objects, where) for reader in readers):
+        if tiers is not None and not any(tier.labels for tier in tiers):
+            raise InputError(f"{where}: holds no word and no phone in time; ask the service for them")
+        if tiers is not None:
+            return [replace(t, labels=with_pauses(t.labels)) if t.role == PHONE_LABELS else t for t in tiers]
+    if len(objects) < len(numbered):
+        return None
+    rows = [row for place, item in objects for row in _rows(item, place if len(objects) > 1 else "", where)]
+    if not rows:
+        return [] if all(_heard_nothing(item) for _, item in objects) else None
+    return _tiers(rows, where)
+
+
+def described(text: str, where: str) -> str:
+    """Return what JSON is that holds no words in time, for a message."""
+    value = next(_documents(text, where), (1, None))[1]
+    first = value[0] if isinstance(value, list) and value else value
+    names = list(first) if isinstance(first, dict) else []
+    if "blendshapes" in names:
+        return "holds weights of blendshapes (as Azure's 55), which is motion and no labels; render it"
+    if "mouthcues" in names:
+        return "holds mouth cues, which are motion and no labels; render it"
+    named = ", ".join(map(shortened, names[:8])) or "no names"
+    return f"is JSON in which no words in time are found (it has {named}; known are {KNOWN_SHAPES})"
+
+
+def _documents(text: str, where: str) -> Iterator[tuple[int, Any]]:
+    """Yield the values of a text, one after another, each with the number of its first line.
+
+    Names of members are in lower case, without underscores and JavaScript's ``priv``; those of tiers stay.
+    Raises DamagedJsonError: with the line.
+    """
+    decoder = json.JSONDecoder(object_pairs_hook=lambda pairs: {_plain_name(name): value for name, value in pairs})
+    at, line, counted = _next(text, 0), 1, 0
+    while at < len(text):
+        line, counted = line + text.count("\n", counted, at), at
+        try:
+            value, at = decoder.raw_decode(text, at)
+        except json.JSONDecodeError as error:
+            raise DamagedJsonError(
+                f"{where}: line {error.lineno}: damaged JSON ({error.msg}); write it again"
+            ) from error
+        except (ValueError, RecursionError) as error:
+            raise DamagedJsonError(f"{where}: damaged JSON: nested too deeply, or a number too long") from error
+        yield line, value
+        at = _next(text, at)
+
+
+def _plain_name(name: str) -> str:
+    return name if " " in name else name.replace("_", "").lower().removeprefix("priv")
+
+
+def _next(text: str, at: int) -> int:
+    """Return the position of the next character that is not blank."""
+    found = BLANK.match(text, at)
+    return found.end() if found else at
+
+
+def _number(value: Any, where: str, per_s: int = 0) -> tuple[float, int]:
+    """Return a time, NaN where it is missing, and how many such are a second where its form says that, else ``per_s``.
+
+    Times are numbers, texts (``"1.5"``, ``"1.500s"``, ``"PT1.5S"``, ``"00:00:01,500"``), or seconds with nanos.
+    Raises InputError: it is none of these.
+    """
+    if isinstance(value, dict) and value.keys() & {"seconds", "nanos"}:
+        seconds, nanos = (_number(value.get(name, 0), where)[0] for name in ("seconds", "nanos"))
+        return seconds + nanos / 1e9, 1
+    if isinstance(value, str):
+        found, clock = DIGITS.fullmatch(value.strip()), CLOCK_TEXT.fullmatch(value.strip())
+        if found:
+            value, per_s = found[1].replace(",", "."), {"s": 1, "ms": 1000}.get((found[2] or "").lower(), per_s)
+        elif clock:
+            seconds = float(clock[3].replace(",", "."))
+            return int(clock[1] or 0) * 3600 + int(clock[2]) * 60 + seconds, 1
+        elif value.strip().lower() in ("", "nan", "null", "none", "n/a"):
+            value = None
+    if value is None:
+        return math.nan, per_s
+    try:
+        time = float([] if isinstance(value, bool) else value)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"{where}: a time is {shortened(repr(value)[:200])}, required a number of seconds") from error
+    return (time if math.isfinite(time) else math.nan), per_s
+
+
+def _row(item: dict[str, Any], place: str, where: str) -> Row | None:
+    """Return an item with its text and the times that it has; None: it has no text."""
+    text = next((text for name in TEXTS if name in item and (text := _text(item[name])) is not None), None)
+    if text is None and any(item.get(name) for name in ("text", "word")):
+        found = shortened(repr(item.get("text") or item.get("word"))[:200])
+        raise InputError(f"{where}: {place}: its text is {found}, required a text")
+    speaker, stamp, offsets = _speaker(item), item.get("timestamp"), item.get("offsets")
+    if isinstance(offsets, dict) and "from" in offsets:  # whisper.cpp
+        item, times = offsets, Times("from", "to", per_s=1000)
+    elif isinstance(stamp, list) and len(stamp) == 2:  # transformers
+        item, times = dict(zip(("start", "end"), stamp, strict=True)), Times("start", "end", per_s=1)
+    else:
+        times = next((row for row in TIMES if (row.start or row.end) in item), UNTIMED)
+    start, per_s = _number(item.get(times.start), f"{where}: {place}", times.per_s)
+    end, per_s = _number(item.get(times.end), f"{where}: {place}", per_s)
+    if math.isnan(end) and times.duration in item:
+        end = start + _number(item[times.duration], f"{where}: {place}")[0]
+    return None if text is None else Row(start, end, text, place, times._replace(per_s=per_s), speaker)
+
+
+def _text(value: Any) -> str | None:
+    """Return the text of a member: of a list its lines, of alternatives the first; None: it is no text."""
+    if isinstance(value, list) and value:
+        if all(isinstance(line, str) for line in value):
+            return " ".join(value)
+        if all(isinstance(part, dict) and "utf8" in part for part in value):
+            return "".join(str(part["utf8"]) for part in value)
+        value = value[0]
+    if isinstance(value, dict):
+        return next((_text(value[name]) for name in TEXTS if name in value), None)
+    return value if isinstance(value, str) else None
+
+
+def _rows(value: Any, place: str, where: str, name: str = "", depth: int = 0) -> list[Row]:
+    """Return the lines and words in a value, in order; ``name``: of the member that it is."""
+    if depth > DEEPEST:
+        return []
+    if isinstance(value, dict):
+        said = not any(NOT_SAID.search(str(value.get(kind, "")).lower()) for kind in KINDS)
+        return _rows_of_object(value, place, where, name, depth) if said else []
+    rows: list[Row] = []
+    items = value if isinstance(value, list) else []
+    for number, each in enumerate(items[:1] if name in ALTERNATIVES else items, 1):
+        is_stamp = isinstance(each, list) and len(each) == 3 and isinstance(each[0], str)  # IBM's
+        item = dict(zip(("word", "start", "end"), each, strict=True)) if is_stamp else each
+        if isinstance(item, dict):
+            rows += _rows(item, f"{place}, {name or 'item'} {number}".strip(", "), where, name, depth + 1)
+        elif name in ("segments", "words"):
+            found = shortened(repr(item)[:200])
+            raise InputError(f"{where}: {name!r}, item {number} is {found}, required an object with text and times")
+        check_count(len(rows), where)
+    return rows
+
+
+def _rows_of_object(item: dict[str, Any], place: str, where: str, name: str, depth: int) -> list[Row]:
+    """Return an object's lines with words in time, else its words, alone or within its own time, else its lines."""
+
+    def first_of(names: Iterable[str]) -> list[Row]:
+        members = (each for each in names if isinstance(item.get(each), dict | list))
+        return next((rows for each in members if (rows := _rows(item[each], place, where, each, depth + 1))), [])
+
+    own = _row(item, place, where)
+    if own is not None and (name in WORD_LISTS or "word" in item):
+        own = replace(own, is_word=True)
+    timed = own is not None and not math.isnan(own.start)
+    if name == "words" and own is None:
+        raise InputError(f"{where}: {place}: no text; required a member 'word'")
+    words = [row for row in first_of(each for each in WORD_LISTS if not (timed and each == "tokens")) if row.text]
+    lines = first_of(LINE_LISTS)
+    if words and not any(line.parts for line in lines):
+        lines = [replace(own, parts=tuple(words))] if own is not None and timed else words
+    elif not lines and not timed:  # under a name that is not known
+        lines = first_of(each for each in item if each not in (*WORD_LISTS, *LINE_LISTS))
+        lines = [line for line in lines if line.parts or not math.isnan(line.start)]
+    if not lines:
+        return [own] if own is not None else []
+    if len(lines) == 1 and math.isnan(lines[0].start) and own is not None:  # one alternative, whose owner has the time
+        lines = [replace(lines[0], start=own.start, end=own.end, times=own.times)]
+    speaker = own.speaker if own is not None else _speaker(item)
+    return [line if line.speaker else replace(line, speaker=speaker) for line in lines]
+
+
+def _speaker(item: dict[str, Any]) -> str:
+    return next((str(item[name]) for name in SPEAKERS if item.get(name) not in (None, "")), "")
+
+
+def _tiers(rows: list[Row], where: str) -> list[LabelTier]:
+    """Return rows as tiers, one for each speaker, with times in seconds."""
+    if any(len({part.speaker for part in row.parts}) > 1 for row in rows):
+        rows = [part for row in rows for part in row.parts or (row,)]
+    counts = [len(words_in(spoken_text(row.text[:LONGEST_JUDGED]))) for row in rows]
+    single = sum(row.is_word or count < 2 for row, count in zip(rows, counts, strict=True)) >= SINGLE_SHARE * len(rows)
+    role = WORDS if single and not any(row.parts for row in rows) else LINES
+    check_word_count(sum(counts) + sum(len(row.parts) for row in rows), where)
+    leaves = [part for row in rows for part in row.parts or (row,)]
+    per_s = _per_s(leaves, role, where)
+    speakers = list(dict.fromkeys(row.speaker or (row.parts[0].speaker if row.parts else "") for row in rows))
+    by_speaker: dict[str, list[TimedLabel]] = {speaker: [] for speaker in speakers}
+    for row in rows:
+        parts = tuple(_label(part, per_s, where) for part in row.parts)
+        label = replace(_label(row, per_s, where), parts=parts)
+        by_speaker[row.speaker or (row.parts[0].speaker if row.parts else "")].append(label)
+    return [LabelTier(speaker or role, tuple(labels), role, speaker) for speaker, labels in by_speaker.items()]
+
+
+def _label(row: Row, per_s: int, where: str) -> TimedLabel:
+    """Return a row in seconds. Raises InputError: it ends long before it starts, or its time is none."""
+    start_s, end_s = (time / (row.times.per_s or per_s) for time in (row.start, row.end))
+    for time, time_s in ((row.start, start_s), (row.end, end_s)):
+        if abs(time_s) > LATEST_S:
+            raise InputError(f"{where}: {row.place}: a time is {time:g}, required seconds, up to {LATEST_S:g}")
+    start_s = math.nan if start_s < EARLIEST_S else start_s
+    if end_s < start_s - ROUNDING_S:
+        raise InputError(f"{where}: {row.place} ends at {end_s:g} s, before its start at {start_s:g} s; correct it")
+    return TimedLabel(start_s, max(end_s, start_s) if end_s < start_s else end_s, row.text, row.place)
+
+
+def _per_s(rows: Sequence[Row], role: str, where: str) -> int:
+    """Return how many units are a second in rows whose names do not say it; one without an end lasts to the next."""
+    judged = [row for row in rows if not row.times.per_s and not math.isnan(row.start)]
+    if not judged:
+        return 1
+    spans = [
+        (row.start, following.start if following is not None and math.isnan(row.end) else row.end, row.text)
+        for row, following in zip_longest(judged, judged[1:])
+    ]
+    return unit_of_times(spans, role, where, judged[0].times.usual)
+
+
+def _heard_nothing(item: dict[str, Any]) -> bool:
+    """Return whether an object is of a recogniser that heard nothing: its lists are empty."""
+    members = [item[name] for name in (*LINE_LISTS, *WORD_LISTS) if isinstance(item.get(name), list)]
+    return bool(members) and not any(members)
+
+
+def _seconds(value: Any, where: str, per_s: float = 1) -> float:
+    """Return a time in seconds. Raises InputError: it is missing, or no number."""
+    time, own = _number(value, where)
+    if math.isnan(time):
+        raise InputError(f"{where} has no time")
+    if abs(time / (own or per_s)) > LATEST_S:
+        raise InputError(f"{where}: a time is {time:g}, required seconds, up to {LATEST_S:g}")
+    return time / (own or per_s)
+
+
+def _required_text(value: Any, where: str) -> str:
+    if not isinstance(value, str):
+        raise InputError(f"{where} is {shortened(repr(value)[:200])}, required a text")
+    return value
+
+
+def _word_and_phone_tiers(words: Sequence[TimedLabel], phones: Sequence[TimedLabel], where: str) -> list[LabelTier]:
+    check_count(max(len(words), len(phones)), where)
+    tiers = (LabelTier(WORDS, tuple(words), WORDS), LabelTier(PHONE_LABELS, tuple(phones), PHONE_LABELS))
+    return [tier for tier in tiers if tier.labels]
+
+
+def _event_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
+    """Return words and visemes of events with a start alone, which last to the next: of Azure, Polly and Google."""
+    if len(objects) == 1 and isinstance(objects[0][1].get("timepoints"), list):
+        points = enumerate(objects[0][1]["timepoints"], 1)
+        objects = [(f"time point {number}", point) for number, point in points if isinstance(point, dict)]
+        objects = [(place, {"timeseconds": 0, **point}) for place, point in objects]
+    for start, usual, viseme, text in EVENTS:  # noqa: B007 (the one that fits is used)
+        named = all(start in item and {viseme, text, "type"} & item.keys() for _, item in objects)
+        if objects and named and (start != "time" or all(item.get("type") in POLLY_KINDS for _, item in objects)):
+            break
+    else:
+        return [] if not objects else None
+    words: list[Row] = []
+    visemes: list[Row] = []
+    for place, item in objects:
+        kind = str(item.get("type", item.get("boundarytype", ""))).rpartition(".")[2].lower()
+        time = _number(item[start], f"{where}: {place}")[0]
+        if math.isnan(time):
+            raise InputError(f"{where}: {place} has no time")
+        duration = _number(item.get("duration"), f"{where}: {place}")[0]
+        row = Row(time, time + duration, "", place, Times(start, usual=usual))
+        if viseme in item and kind in ("", "viseme"):
+            visemes.append(replace(row, text=_viseme(item[viseme], f"{where}: {place}")))
+        elif kind in ("", "word", "wordboundary"):
+            words.append(replace(row, text=_required_text(item.get(text), f"{where}: {place}")))
+            if text == "markname" and not MARK.fullmatch(item[text]):
+                raise InputError(
+                    f"{where}: {place} is the mark {shortened(item[text])!r}, which is no word; name every mark as the "
+                    'word that follows it, <mark name="hello"/>hello, or give the words as a transcript'
+                )
+    silences = [row for row in visemes if row.text == SILENCE]
+    timed = [_until_next(rows, edges, role, where) for rows, edges, role in (
+        (words, silences, WORDS), (visemes, (), PHONE_LABELS)
+    )]  # fmt: skip
+    return _word_and_phone_tiers(timed[0], timed[1], where)
+
+
+def _viseme(value: Any, where: str) -> str:
+    """Return the phone with the mouth of a viseme of Azure (a number) or of Polly (a name)."""
+    if isinstance(value, str):
+        if value not in POLLY_VISEMES:
+            known = " ".join(POLLY_VISEMES)
+            raise InputError(f"{where}: no viseme of Polly is {shortened(value)!r}; known are: {known}")
+        return POLLY_VISEMES[value]
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < len(AZURE_VISEMES):
+        found = shortened(repr(value)[:200])
+        raise InputError(f"{where}: the viseme is {found}, required 0 to {len(AZURE_VISEMES) - 1}")
+    return AZURE_VISEMES[value]
+
+
+def _until_next(rows: list[Row], silences: Sequence[Row], role: str, where: str) -> list[TimedLabel]:
+    """Return rows in order of time, s; one without an end lasts to the next, or to a silence; the last is open."""
+    ordered = sorted(rows, key=lambda row: row.start)
+    per_s = _per_s(ordered, role, where)
+    edges = sorted([row.start for row in (*rows, *silences)])
+    return [
+        TimedLabel(
+            row.start / per_s,
+            (row.end if not math.isnan(row.end) else next(iter(edges[bisect_right(edges, row.start) :]), math.inf))
+            / per_s,
+            row.text,
+            row.place,
+        )
+        for row in ordered
+    ]
+
+
+def _column_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
+    """Return words and phones of parallel lists: of ElevenLabs' characters, of Cartesia's messages."""
+    found: list[tuple[str, str, list[TimedLabel]]] = []
+    for place, item in objects:
+        owners = [(name, item[name]) for name in COLUMN_OWNERS if isinstance(item.get(name), dict)]
+        for name, owner in [*owners, ("", item)] if not owners or owners[0][0].endswith("s") else owners[:1]:
+            for role, names, per_s in COLUMNS:
+                if isinstance(owner.get(names[0]), list) and names[1] in owner and names[2] in owner:
+                    labels = _columns(owner, names, per_s, f"{where}: {place}{f', {name}' if name else ''}")
+                    found.append((role, names[1], labels))
+    if not found:
+        return None
+    pieces = sum(start == "charstarttimesms" for _, start, _ in found)
+    if pieces > 1:
+        raise InputError(f"{where}: holds {pieces} pieces whose times each begin at 0; save the sound of each apart")
+    by_role = {role: [label for kind, _, labels in found if kind == role for label in labels] for role, *_ in COLUMNS}
+    words = [*by_role[WORDS], *_words_of_characters(by_role["characters"])]
+    return _word_and_phone_tiers(words, ipa_labels(by_role[PHONE_LABELS], where), where)
+
+
+def _columns(owner: dict[str, Any], names: tuple[str, ...], per_s: int, where: str) -> list[TimedLabel]:
+    """Return the items of parallel lists. Raises InputError: they are no lists, or of several lengths."""
+    lists = [owner[name] for name in names]
+    if not all(isinstance(each, list) for each in lists) or len({len(each) for each in lists}) > 1:
+        raise InputError(f"{where}: required are the lists {', '.join(names)}, all of one length")
+    check_count(len(lists[0]), where)
+    labels = []
+    for number, (text, start, end) in enumerate(zip(*lists, strict=True), 1):
+        start_s, end_s = (_seconds(time, f"{where} {number}", per_s) for time in (start, end))
+        end_s += start_s if "duration" in names[2] else 0.0
+        labels.append(TimedLabel(start_s, end_s, _required_text(text, f"{where} {number}"), f"{names[0]} {number}"))
+    return labels
+
+
+def _words_of_characters(characters: list[TimedLabel]) -> list[TimedLabel]:
+    """Return the words that characters in time make, without directions in brackets."""
+    owner = [number for number, label in enumerate(characters) for _ in label.text]
+    words = []
+    for match in SPOKEN_WORD.finditer("".join(label.text for label in characters)):
+        first, last = characters[owner[match.start()]], characters[owner[match.end() - 1]]
+        words.append(replace(first, end_s=last.end_s, text=match[0]))
+    return words
+
+
+def _duration_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
+    """Return the phones of Piper (samples) and Kokoro (frames), whose durations alone are given, and Kokoro's words."""
+    piper = [(place, item) for place, item in objects if isinstance(item.get("phonemealignments"), list)]
+    kokoro = [item for _, item in objects if "phonemes" in item and isinstance(item.get("preddur"), list)]
+    if len(kokoro) > 1:
+        raise InputError(f"{where}: holds {len(kokoro)} sentences, whose times each begin at 0; give those of one")
+    if not kokoro and (len(piper) < len(objects)):
+        return None
+    rows: list[tuple[str, Any, Any, float]] = []
+    for place, item in piper:
+        rate = item.get("samplerate")
+        if isinstance(rate, bool) or not isinstance(rate, int | float) or not 1000 <= rate <= 1_000_000:
+            found = shortened(repr(rate)[:200])
+            raise InputError(f"{where}: {place}: the sample rate is {found}, required that of the sound in hertz")
+        for number, each in enumerate(item["phonemealignments"], 1):
+            fields = each if isinstance(each, dict) else {}
+            rows.append((f"{place}, phoneme {number}", fields.get("phoneme"), fields.get("numsamples"), rate))
+    for item in kokoro:
+        letters = f"^{_required_text(item['phonemes'], f'{where}: phonemes')}$"
+        if len(item["preddur"]) != len(letters):
+            raise InputError(
+                f"{where}: {len(item['preddur'])} durations of {len(letters) - 2} phonemes, required two more than "
+                "phonemes"
+            )
+        pairs = enumerate(zip(letters, item["preddur"], strict=True))
+        rows += [(f"phoneme {n}", KOKORO_LETTERS.get(a, a), frames, KOKORO_FRAMES_PER_S) for n, (a, frames) in pairs]
+    check_count(len(rows), where)
+    lengths_s = [_seconds(length, f"{where}: {place}", per_s) for place, _, length, per_s in rows]
+    edges_s = [0.0, *accumulate(lengths_s)]
+    phones = [
+        TimedLabel(start_s, end_s, _required_text(text, f"{where}: {place}"), place)
+        for (place, text, *_), start_s, end_s in zip(rows, edges_s, edges_s[1:], strict=False)
+    ]
+    words = [row for item in kokoro for row in _rows({"tokens": item.get("tokens")}, "", where)]
+    timed = [_label(row, 1, where) for row in words if not math.isnan(row.start)]
+    return _word_and_phone_tiers(timed, ipa_labels(phones, where), where)
+
+
+def _aligned_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
+    """Return the words and phones of Gentle; a word without phones that are known is speech of unknown ones.
+
+    Words that are not in the transcript are said; those that are not in the sound are left out, with a warning.
+    """
+    items = objects[0][1].get("words") if len(objects) == 1 else None
+    if not isinstance(items, list) or not items or not all(isinstance(word, dict) and "case" in word for word in items):
+        return None
+    words: list[TimedLabel] = []
+    phones: list[TimedLabel] = []
+    missed = 0
+    for number, word in enumerate(items, 1):
+        place = f"word {number}"
+        if word["case"] == "not-found-in-audio" or "start" not in word:
+            missed += 1
+            continue
+        start_s, end_s = (_seconds(word.get(name), f"{where}: {place}") for name in ("start", "end"))
+        text = _required_text(word.get("word", word.get("alignedword")), f"{where}: {place}")
+        words.append(TimedLabel(start_s, end_s, text, place))
+        for count, item in enumerate(word["phones"] if isinstance(word.get("phones"), list) else [], 1):
+            at, fields = f"{place}, phone {count}", item if isinstance(item, dict) else {}
+            until_s = start_s + _seconds(fields.get("duration"), f"{where}: {at}")
+            name = _required_text(fields.get("phone"), f"{where}: {at}").partition("_")[0]
+            phones.append(TimedLabel(start_s, until_s, name, at))
+            start_s = until_s
+    if missed:
+        LOG.warning("%s: %d of %d words were not found in the sound and are left out", where, missed, len(items))
+    return _word_and_phone_tiers(words, inventory_labels(phones, where), where)
+
+
+def _named_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
+    """Return the tiers of the JSON of the Montreal Forced Aligner and of praatIO, by their names."""
+    named = objects[0][1].get("tiers") if len(objects) == 1 else None
+    if isinstance(named, list) and all(isinstance(tier, dict) and "name" in tier for tier in named):
+        named = {str(tier["name"]): tier for tier in named}
+    if not isinstance(named, dict) or not all(
+        isinstance(tier, dict) and isinstance(tier.get("entries"), list) for tier in named.values()
+    ):
+        return None
+    tiers = []
+    for name, tier in named.items():
+        check_count(len(tier["entries"]), where)
+        labels = []
+        for number, entry in enumerate(tier["entries"], 1):
+            place = f"tier {name!r}, entry {number}"
+            if not isinstance(entry, list) or len(entry) not in (2, 3):
+                raise InputError(f"{where}: {place} is no list of start, end and label")
+            *times_s, text = (*(_seconds(time, f"{where}: {place}") for time in entry[:-1]), entry[-1])
+            labels.append(TimedLabel(times_s[0], times_s[-1], _required_text(text, f"{where}: {place}"), place))
+        if len(tier["entries"][0] if tier["entries"] else ()) == 3:
+            tiers.append(in_inventory(named_tier(name, sorted(labels, key=lambda label: label.start_s)), where))
+    return tiers
