@@ -18,7 +18,7 @@ from lipmotion.hmm.loudness import loud_frames
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.mfcc import LOG_ENERGY
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit, transcript_fit
-from lipmotion.speech.recognition.anchors import WORD_TOLERANCE_S, Anchors, anchors_of, fitted
+from lipmotion.speech.recognition.anchors import anchors_of, fitted
 from lipmotion.speech.recognition.network.posteriors import (
     POSTERIOR_STEP,
     WORD_BOUNDARY,
@@ -85,7 +85,7 @@ def transcribe(
     phones     : the recogniser
     features   : of the audio, from ``mfcc``
     words      : the spoken words in lower case, also with times, within which they are aligned; or None
-    recognised : recognises phones in time with their confidence; None: as ``phones`` does
+    recognised : recognises phones in time with their confidence; None: nothing is corrected
     Warnings are logged for guessed pronunciations and, with general phone models, for words that do not agree with the
     sound, and speech that the words leave out. Of English words, a phone recogniser judges, where one is installed: if
     it is sure, words that nobody says are left out, and speech that has no words is recognised.
@@ -108,7 +108,7 @@ def transcribe(
         units = phones_in_time(phones, audio, features, words, lexicon)
     except AlignmentError as error:  # too much for the recording: some of the words may be said all the same
         check_words(spoken, audio.duration_s)
-        if name is None or heard_phones(name, analysed(audio))[1] < PHONE_POSTERIORS[0]:
+        if name is None or recognised is None or heard_phones(name, analysed(audio))[1] < PHONE_POSTERIORS[0]:
             raise
         refused = error
         units = _evenly_spread(spoken, lexicon, audio.duration_s)
@@ -120,11 +120,11 @@ def transcribe(
         return Transcription(units, fit)
     heard, sure = heard_phones(name, analysed(audio))
     evidence = transcript_evidence(heard, POSTERIOR_STEP / FRAME_RATE_HZ, units)
-    if refused is None and not (evidence.others and sure >= PHONE_POSTERIORS[0]):
+    if recognised is None or (refused is None and not (evidence.others and sure >= PHONE_POSTERIORS[0])):
         fit = fit.with_evidence(evidence)
         warn_of_misfit(fit)
         return Transcription(units, fit)
-    found = recognised() if recognised is not None else phones.recognise(audio, features)
+    found = recognised()
     evidence = _confirmed(evidence, found)
     fit = fit.with_evidence(evidence)
     warn_of_misfit(fit, corrected=True)
@@ -202,35 +202,26 @@ def _corrected(
     recognised: Timeline[Unit],
     lexicon: Lexicon,
 ) -> Timeline[Unit]:
-    """Return the words of a transcript that are said, and what is recognised beside them, aligned near their places.
+    """Return the words of a transcript that are said, and what is recognised beside them, aligned.
 
     Raises AlignmentError: as ``transcribe``.
     """
-    rows: list[tuple[tuple[Pronunciation, ...], str, float | None, float, float]] = []
+    labels: list[tuple[str, float | None]] = []
+    variants: dict[str, tuple[Pronunciation, ...]] = {}
     for number, word in enumerate((*evidence.words, None)):
-        for run in (
-            run
-            for other in evidence.others
-            if other.first == number
-            for run in _recognised_within(recognised, evidence, other)
-        ):
-            label = run[0].label
-            said = tuple(span.label.phone for span in run)
-            rows.append(((said,), label.word, label.confidence, run[0].start_s, run[-1].end_s))
+        for other in (each for each in evidence.others if each.first == number):
+            for run in _recognised_within(recognised, evidence, other):
+                variants[str(len(labels))] = (tuple(span.label.phone for span in run),)
+                labels.append((run[0].label.word, run[0].label.confidence))
         if word is not None and word.is_said:
-            variants = lexicon.pronunciations(word.word)
-            variants = variants if word.phones in variants else (word.phones,)
-            rows.append((variants, word.word, None, word.start_s, word.end_s))
-    names = [str(number) for number in range(len(rows))]
-    variants, texts, confidences, starts_s, ends_s = zip(*rows, strict=True)
-    tolerances_s = np.full(len(rows), WORD_TOLERANCE_S)
-    anchors = Anchors(np.array(starts_s), np.array(ends_s), tolerances_s, np.arange(len(rows)))
-    aligned = phones.align(audio, features, names, Lexicon(dict(zip(names, variants, strict=True))), anchors)
-    labels = {name: (text, sure) for name, text, sure in zip(names, texts, confidences, strict=True)} | {"": ("", None)}
-    spans = [(span, *labels[span.label.word]) for span in aligned]
-    return Timeline(
-        tuple(replace(span, label=replace(span.label, word=text, confidence=sure)) for span, text, sure in spans)
-    )
+            known = lexicon.pronunciations(word.word)
+            variants[str(len(labels))] = known if word.phones in known else (word.phones,)
+            labels.append((word.word, None))
+    spans = list[Span[Unit]]()
+    for span in phones.align(audio, features, tuple(variants), Lexicon(variants)):
+        text, confidence = labels[int(span.label.word)] if span.label.word else ("", None)
+        spans.append(replace(span, label=replace(span.label, word=text, confidence=confidence)))
+    return Timeline(tuple(spans))
 
 
 def phones_in_time(

@@ -76,6 +76,10 @@ ResultT = TypeVar("ResultT")
 
 LATE_S = 0.1
 """Seconds by which given units may end after the sound; editing programs round times."""
+TIME_UNITS = {"milliseconds": 1e3, "samples": 16e3, "samples of 48 kHz": 48e3, "ticks of 100 ns": 1e7}
+"""How many of them a second has: given times that end near so many times the recording are in this unit."""
+SHORTEST_PHONE_S, FEWEST_TIMED = 0.02, 5
+"""Given phones, of which half are shorter, are faster than speech; so many are needed to tell."""
 REACH_S = 0.1
 """Phones are recognised so far around the first and the last one that is heard."""
 LATEST_S = 1e15
@@ -389,16 +393,16 @@ def _followed(
     given = request.units or Timeline(())
     _check_units(given, audio.duration_s)
     spans, aligned, guessed = list[Span[Unit]](), list[str](), list[tuple[float, float]]()
-    for span in given:
-        end_s = min(span.end_s, max(audio.duration_s, span.start_s))
+    for span in (span for span in given if span.start_s < audio.duration_s):
+        end_s = min(span.end_s, audio.duration_s)
         if span.label.phone or span.label.unit != UNKNOWN_PHONES:
-            spans.append(span)
+            spans.append(replace(span, end_s=end_s) if span.end_s > audio.duration_s + LATE_S else span)
             continue
         try:
             word = span.label.word
-            inside = aligned_within(model, request, audio, word, span.start_s, end_s) if words_of(word) else []
+            inside = aligned_within(model, request, audio, word, span.start_s, end_s) if word else []
             aligned += [f"{word!r} at {span.start_s:.1f} s"] if inside else []
-        except AlignmentError:
+        except (AlignmentError, InputError):
             inside = []
         if not inside:
             guessed.append((span.start_s, end_s))
@@ -446,11 +450,20 @@ def _check_units(units: Timeline[Unit], duration_s: float) -> None:
         )
     check_phones(len(units), duration_s)
     first_s, last_s, end_s = units[0].start_s, units[-1].start_s, units[-1].end_s
+    if duration_s <= first_s <= LATEST_S:
+        raise InputError(f"the units begin at {first_s:.2f} s, the recording ends at {duration_s:.2f} s; give its own")
     if not -LATEST_S <= first_s <= last_s <= LATEST_S or LATEST_S < end_s < np.inf:
         raise InputError(f"the units last from {first_s} to {end_s} s, required times of this recording")
+    spoken_s = sorted(span.duration_s for span in units if not is_silent(span.label.phone))
     if duration_s + LATE_S < end_s < np.inf:
+        unit = next((name for name, ratio in TIME_UNITS.items() if 0.3 < end_s / duration_s / ratio < 1.3), "")
+        guess = f"their times in {unit}, where seconds are required" if unit else "they those of another recording"
         LOG.warning(
-            "the units go on to %.2f s, the recording ends at %.2f s: are they those of another recording?",
-            units[-1].end_s,
-            duration_s,
+            "the units go on to %.2f s, the recording ends at %.2f s: are %s?", units[-1].end_s, duration_s, guess
+        )
+    elif len(spoken_s) >= FEWEST_TIMED and spoken_s[len(spoken_s) // 2] < SHORTEST_PHONE_S:
+        LOG.warning(
+            "the units last %.1f ms each and end at %.2f s of %.2f s, faster than anybody speaks: are their times in "
+            "seconds?",
+            *(1000 * spoken_s[len(spoken_s) // 2], end_s, duration_s),
         )
