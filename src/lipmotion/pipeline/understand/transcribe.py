@@ -57,6 +57,8 @@ FOREIGN_SHARE, LEAST_FOREIGN = 0.25, 3
 """A text of which so large a share, and so many different words, are not in the dictionary is not English."""
 MOST_STRETCHES = 3
 """Largest number of stretches without words that are named in one warning."""
+REACH_S = 0.1
+"""A phone of a word may be heard so far from the middle that its recognition has."""
 ALIKE_SHARE = 0.34
 """Words are said all the same where recognition finds their phones, but for so small a share."""
 
@@ -141,7 +143,8 @@ def _evenly_spread(words: Sequence[str], lexicon: Lexicon, duration_s: float) ->
     """Return the phones of words, each for the same time."""
     said = [(phone, word) for word in words for phone in lexicon.pronunciations(word)[0]]
     edges_s = np.linspace(0, duration_s, len(said) + 1).tolist()
-    return Timeline(tuple(Span(*edges_s[n : n + 2], Unit(phone, word=word)) for n, (phone, word) in enumerate(said)))
+    timed = zip(edges_s[:-1], edges_s[1:], said, strict=True)
+    return Timeline(tuple(Span(start_s, end_s, Unit(phone, word=word)) for start_s, end_s, (phone, word) in timed))
 
 
 def heard_phones(name: str, audio: AnalysedAudio) -> tuple[NDArray[np.float64], float]:
@@ -163,8 +166,9 @@ def _confirmed(evidence: TranscriptEvidence, recognised: Timeline[Unit]) -> Tran
         left_out = words[other.first : other.stop]
         wanted = [phone for word in left_out for phone in word.phones]
         if wanted and phone_edits(wanted, found) <= ALIKE_SHARE * len(wanted):
-            times = {"start_s": other.start_s, "end_s": other.end_s, "is_said": True}
-            words[other.first : other.stop] = [word._replace(**times) for word in left_out]
+            words[other.first : other.stop] = [
+                word._replace(start_s=other.start_s, end_s=other.end_s, is_said=True) for word in left_out
+            ]
         elif wanted or (found and other.end_s - other.start_s >= LEAST_GAP_S):
             others.append(other if found else other._replace(end_s=other.start_s))
     return TranscriptEvidence(tuple(words), tuple(others))
@@ -175,22 +179,33 @@ def _recognised_within(
 ) -> list[list[Span[Unit]]]:
     """Return the recognised phones where something else is said than the transcript has, by words.
 
-    They reach half of the way to the words beside it: a network hears a phone somewhere in its time, not all along.
+    Whole words count by their middle, half of the way to the words beside them. Phones without words do from the last
+    one on that may be the end of the word before, to the first one that may be the beginning of the word after.
     """
     if other.start_s == other.end_s:
         return []
-    before_s = evidence.words[other.first - 1].end_s if other.first > 0 else -other.start_s
-    after_s = evidence.words[other.stop].start_s if other.stop < len(evidence.words) else np.inf
-    runs = [[*run] for _, run in groupby(recognised, key=lambda span: (is_silent(span.label.phone), span.label.word))]
+    words, spans = evidence.words, [span for span in recognised if not is_silent(span.label.phone)]
+    middles_s = np.array([(span.start_s + span.end_s) / 2 for span in spans])
+    before_s, after_s, first, stop = 0.0, np.inf, 0, len(spans)
+    if other.first > 0:
+        before_s = words[other.first - 1].end_s
+        first = int(np.searchsorted(middles_s, before_s))
+        near = range(*np.searchsorted(middles_s, [before_s - REACH_S, before_s + REACH_S]))
+        first = max([n + 1 for n in near if spans[n].label.phone == words[other.first - 1].phones[-1]], default=first)
+    if other.stop < len(words):
+        after_s = words[other.stop].start_s
+        stop = int(np.searchsorted(middles_s, after_s))
+        near = range(*np.searchsorted(middles_s, [after_s - REACH_S, after_s + REACH_S]))
+        stop = min([n for n in near if spans[n].label.phone == words[other.stop].phones[0]], default=stop)
     found: list[list[Span[Unit]]] = []
-    for run in runs:
-        parts = [run] if run[0].label.word else [[span] for span in run if not is_silent(span.label.phone)]
-        inside = [
-            part
-            for part in parts
-            if before_s + other.start_s <= part[0].start_s + part[-1].end_s <= other.end_s + after_s
-        ]
-        found += [[span for part in inside for span in part]] if inside else []
+    numbered = groupby(enumerate(spans), key=lambda pair: pair[1].label.word)
+    for word, group in numbered:
+        run = list(group)
+        middle_s = (run[0][1].start_s + run[-1][1].end_s) / 2
+        if word and (before_s + other.start_s) / 2 <= middle_s <= (other.end_s + after_s) / 2:
+            found.append([span for _, span in run])
+        elif not word and (inside := [span for number, span in run if first <= number < stop]):
+            found.append(inside)
     return found
 
 

@@ -274,9 +274,9 @@ def _understood(model: Model, request: SpeechRequest, audio: AnalysedAudio, each
         words = recognise_words(audio, request.recogniser)
     if words is not None:
         lexicon = request.lexicon or Lexicon()
-        units, fit = transcribe(phones, audio, features, words, lexicon, lambda: recognised().units)
-        if units is not None:
-            speech = speech_of(model.engine, audio, features, units, phones.kind, each)
+        said, fit = transcribe(phones, audio, features, words, lexicon, lambda: recognised().units)
+        if said is not None:
+            speech = speech_of(model.engine, audio, features, said, phones.kind, each)
             tags = words.tags if isinstance(words, TimedTranscript) else ()
             return UnderstoodSpeech(speech, None, range_db, fit, tags)
     return UnderstoodSpeech(recognised(), found[0] if found else None, range_db, fit)

@@ -120,15 +120,14 @@ def transcript_evidence(log_posteriors: Array, frame_s: float, units: Timeline[U
     for part in _parts(units, divided=len(log_posteriors) * len(units) > LARGEST_SEARCH):
         at, stop = round(part.start_s / frame_s), round(part.end_s / frame_s)
         path = _best_path(log_posteriors[at : None if part.is_last else stop], part.columns())
-        for frames, left_out in path.free:
-            times_s = ((at + frame) * frame_s for frame in frames)
-            others.append(OtherSpeech(*times_s, *(len(words) + word for word in left_out)))
+        for (begin, end), (left, back) in path.free:
+            start_s, end_s = (at + begin) * frame_s, (at + end) * frame_s
+            others.append(OtherSpeech(start_s, end_s, len(words) + left, len(words) + back))
         for spans, heard in zip(part.words, path.words, strict=True):
-            said = tuple(span.label.phone for span in spans)
-            times = (
-                (spans[0].start_s, spans[-1].end_s) if heard is None else ((at + frame) * frame_s for frame in heard)
-            )
-            words.append(WordEvidence(spans[0].label.word, said, *times, heard is not None))
+            said, (start_s, end_s) = tuple(span.label.phone for span in spans), (spans[0].start_s, spans[-1].end_s)
+            if heard is not None:
+                start_s, end_s = (at + heard[0]) * frame_s, (at + heard[1]) * frame_s
+            words.append(WordEvidence(spans[0].label.word, said, start_s, end_s, heard is not None))
     return TranscriptEvidence(tuple(words), tuple(others))
 
 
@@ -280,11 +279,12 @@ def label_evidence(log_posteriors: Array, frame_s: float, units: Timeline[Unit])
     A phone is compared with what is heard at most ``LABEL_REACH_S`` away from it.
     """
     spoken = [span for span in units if not is_silent(span.label.phone)]
-    starts_s, ends_s = (np.array([getattr(span, name) for span in spoken]) for name in ("start_s", "end_s"))
+    starts_s = np.array([span.start_s for span in spoken], float)
+    ends_s = np.array([span.end_s for span in spoken], float)
     phones = np.array([PHONES.index(span.label.phone) for span in spoken], np.intp)
     best = log_posteriors.argmax(axis=1)
     heard = np.flatnonzero(~np.isin(best, _silent_columns()) & (np.diff(best, prepend=-1) != 0))
-    times_s = (heard + 0.5) * frame_s
+    times_s: Array = ((heard + 0.5) * frame_s).astype(float)
     first = np.searchsorted(ends_s, times_s - LABEL_REACH_S)
     stop = np.searchsorted(starts_s, times_s + LABEL_REACH_S, "right")
     is_near, agrees = np.zeros(len(spoken), bool), np.zeros(len(spoken), bool)
@@ -294,7 +294,7 @@ def label_evidence(log_posteriors: Array, frame_s: float, units: Timeline[Unit])
         alike = _taken_for()[column, phones[nearby]] > 0
         is_near[nearby], agrees[nearby], confirmed[number] = True, agrees[nearby] | alike, alike.any()
     alone = first >= stop
-    middles_s = (starts_s + ends_s) / 2
+    middles_s: Array = (starts_s + ends_s) / 2
     compared_s = np.concatenate([times_s[~alone], middles_s[is_near]])
     order = compared_s.argsort()
     right = np.concatenate([confirmed[~alone], agrees[is_near]])[order].astype(float)
