@@ -2,6 +2,7 @@
 
     python benchmarks/transcripts.py [--minutes 60] [--cases lines,none] [--grid FOLDER]
     python benchmarks/transcripts.py --doubt CORPORA
+    python benchmarks/transcripts.py --hint CORPORA [--every 5]
 
 Sentences in the voices of flite, whose words' times are known, follow one another with pauses of up to three seconds,
 in noise 30 dB under the speech. The transcript is written as a file and read as a user's is; its times differ as the
@@ -13,6 +14,10 @@ With ``--doubt`` short recordings get right and wrong transcripts: sentences in 
 GRID s1. One JSON object per set and kind of transcript: ``doubted``: as being of something else; ``left_out``: as
 leaving out words; ``either``, or refused as too long. ``heard_…``: the same by the posteriors of a phone
 recogniser, where one is installed; ``heard_words``: where words are named that are not said.
+
+With ``--hint`` the phones in time that ``animate`` takes, of the same recordings with right and wrong transcripts and
+none, are compared with those of the right transcript: ``phones``: phone accuracy; ``visemes``: share of the frames with
+the same viseme; ``warned``: recordings with a warning. ``--every``: of so many recordings one.
 """
 
 from __future__ import annotations
@@ -39,7 +44,9 @@ import lipmotion
 from lipmotion.corpora.grid import words_of_name
 from lipmotion.errors import AlignmentError
 from lipmotion.pipeline.corpus.prompts import prompts
+from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.transcribe import read_transcript, transcribe
+from lipmotion.pipeline.understand.understood_speech import understood_speech
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, transcript_fit
 from lipmotion.speech.recognition.network.posteriors import (
@@ -54,7 +61,8 @@ from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.installed import installed_voices, speak_sentences
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
 from lipmotion.types import FRAME_RATE_HZ, Audio, TimedTranscript, Timeline, Unit
-from lipmotion.units import Lexicon, words_of
+from lipmotion.units import VISEME_OF, Lexicon, is_silent, words_of
+from lipmotion.units.phones import phone_edits
 
 RATE_HZ, NOISE_DB, LONGEST_PAUSE_S, LOST_S = 16_000, -30, 3.0, 0.5
 Row = tuple[str, float, float]
@@ -105,6 +113,8 @@ def main() -> None:
     parser.add_argument("--cases", default=",".join(CASES))
     parser.add_argument("--grid", type=Path, metavar="FOLDER", help="GRID speaker s1 in place of flite's voices")
     parser.add_argument("--doubt", type=Path, metavar="CORPORA", help="whether wrong transcripts are doubted")
+    parser.add_argument("--hint", type=Path, metavar="CORPORA", help="what wrong transcripts make of the phones")
+    parser.add_argument("--every", type=int, default=1, metavar="N")
     parser.add_argument("--one", nargs=3, metavar=("FOLDER", "CASE", "RECOGNISER"), help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.one:
@@ -113,6 +123,9 @@ def main() -> None:
         return
     if options.doubt:
         _print_doubts(options.doubt)
+        return
+    if options.hint:
+        _print_hints(options.hint, options.every)
         return
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -194,7 +207,7 @@ def _measured(folder: Path, name: str, recogniser: str) -> dict[str, object]:
     transcript = read_transcript(path)
     words = transcript if isinstance(transcript, TimedTranscript) else words_of(transcript)
     analysed_audio = analysed(audio)
-    units = transcribe(phones, analysed_audio, analysed_audio.mfcc(), words, Lexicon())
+    units = transcribe(phones, analysed_audio, analysed_audio.mfcc(), words, Lexicon()).units or Timeline(())
     wall_s, cpu_s = time.perf_counter() - start, time.process_time() - start_cpu
     peak_mb = _peak_mb()
     errors_s = _errors(_word_times(units), [row for rows in kept for row in rows])
@@ -215,12 +228,7 @@ def _print_doubts(corpora: Path) -> None:
     """Print how many transcripts of each kind are doubted."""
     logging.getLogger("lipmotion").setLevel(logging.ERROR)
     phones, hear = Recogniser(lipmotion.load_model().phones), _network()
-    grid = corpora / "grid-s1"
-    sets = {f"GRID s1, {split}": _clips(grid, split) for split in ("val", "test")}
-    sets |= {"speech-open": _open_recordings(corpora / "speech-open")}
-    for makers in (("flite", "festival"), ("espeak-ng",)):
-        sets[" and ".join(makers)] = _voiced([voice for voice in installed_voices() if voice.synthesiser in makers])
-    for name, recordings in sets.items():
+    for name, recordings in _sets(corpora).items():
         counts: dict[str, Counter[str]] = {}
         for kind, samples, words in _transcripts(recordings):
             audio = analysed(Audio(samples, RATE_HZ))
@@ -228,6 +236,64 @@ def _print_doubts(corpora: Path) -> None:
             counts.setdefault(kind, Counter()).update(found | {"count": 1})
         for kind, count in counts.items():
             print(json.dumps({"set": name, "transcript": kind, **count}), flush=True)
+
+
+def _sets(corpora: Path) -> dict[str, list[Said]]:
+    """Return sets of short recordings with their words."""
+    sets = {f"GRID s1, {split}": _clips(corpora / "grid-s1", split) for split in ("val", "test")}
+    sets |= {"speech-open": _open_recordings(corpora / "speech-open")}
+    for makers in (("flite", "festival"), ("espeak-ng",)):
+        sets[" and ".join(makers)] = _voiced([voice for voice in installed_voices() if voice.synthesiser in makers])
+    return sets
+
+
+def _print_hints(corpora: Path, every: int) -> None:
+    """Print how far the phones of wrong transcripts are from those of the right ones."""
+    warnings = list[str]()
+    handler = logging.Handler()
+    handler.emit = lambda record: warnings.append(record.getMessage())  # type: ignore[method-assign]
+    logging.getLogger("lipmotion").addHandler(handler)
+    logging.getLogger("lipmotion").propagate = False
+    model = lipmotion.load_model()
+    for name, recordings in _sets(corpora).items():
+        sums: dict[str, Counter[str]] = {}
+        for number in range(0, len(recordings), every):
+            audio, wanted = analysed(Audio(recordings[number][0], RATE_HZ)), Timeline[Unit](())
+            for kind, words in _hints(recordings, number).items():
+                warnings.clear()
+                units = understood_speech(model, SpeechRequest(audio, transcript=" ".join(words) or None)).speech.units
+                wanted = units if kind == "right" else wanted
+                said, found = ([s.label.phone for s in u if not is_silent(s.label.phone)] for u in (wanted, units))
+                sums.setdefault(kind, Counter()).update(
+                    count=1,
+                    warned=bool([text for text in warnings if "dictionary" not in text]),
+                    phones=1 - phone_edits(said, found) / len(said),  # type: ignore[arg-type]
+                    visemes=float(np.mean(_visemes(wanted) == _visemes(units))),  # type: ignore[arg-type]
+                )
+        for kind, total in sums.items():
+            means = {key: round(total[key] / total["count"], 3) for key in ("phones", "visemes")}
+            print(json.dumps({"set": name, "transcript": kind, **total, **means}), flush=True)
+
+
+def _hints(recordings: Sequence[Said], number: int) -> dict[str, tuple[str, ...]]:
+    """Return right and wrong words of a recording, and none."""
+    words = recordings[number][1]
+    others = [other for _, other in recordings[number:] + recordings[:number] if other != words]
+    other, half = others[3 % len(others)], (len(words) + 1) // 2
+    draw = np.random.default_rng(number)
+    replaced = list(words)
+    for place in draw.choice(len(words), max(1, len(words) // 4), replace=False):
+        replaced[place] = str(draw.choice([word for each in others for word in each if word != words[place]]))
+    return {"right": words, "none": (), "first half": words[:half], "last half": words[half:] or words,
+            "every other word": words[::2], "a sentence too many, last": words + other,
+            "a sentence too many, first": other + words, "one word in four replaced": tuple(replaced),
+            "another sentence": other}  # fmt: skip
+
+
+def _visemes(units: Timeline[Unit]) -> NDArray[np.str_]:
+    """Return the viseme of every frame."""
+    edges = np.round([FRAME_RATE_HZ * span.end_s for span in units]).astype(int)
+    return np.repeat([VISEME_OF[span.label.phone] for span in units], np.diff(edges, prepend=0))
 
 
 def _doubts(phones: Recogniser, audio: AnalysedAudio, words: tuple[str, ...], hear: Hearing | None) -> dict[str, bool]:
@@ -241,7 +307,7 @@ def _doubts(phones: Recogniser, audio: AnalysedAudio, words: tuple[str, ...], he
     found["either"] = any(found.values())
     if hear is not None:
         evidence = transcript_evidence(hear(audio.samples), HEARD_S, units)
-        heard = {"doubted": evidence.is_doubtful, "left_out": evidence.gaps, "words": evidence.doubtful_words}
+        heard = {"doubted": evidence.is_doubtful, "left_out": evidence.gaps, "words": evidence.unsaid}
         found |= {f"heard_{key}": bool(value) for key, value in heard.items()}
         found["heard_either"] = any(heard.values())
     return found

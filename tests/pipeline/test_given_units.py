@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
+from lipmotion.pipeline.generate.outlook import outlook_of
+from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.understand.given_units import read_units
-from lipmotion.types import Span, Timeline, Unit
-from lipmotion.units import without_gaps
+from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.pipeline.understand.understood_speech import UnderstoodSpeech, understood_speech
+from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
+from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.types import Audio, Span, Timeline, Unit
+from lipmotion.units import UNKNOWN_PHONES, is_silent, without_gaps
 
 ROWS = [(0.0, 0.4, "sil"), (0.4, 0.5, "m"), (0.5, 0.7, "aa")]
 
@@ -74,3 +83,119 @@ def test_other_files_are_no_units(tmp_path: Path) -> None:
         InputError, match=r"a\.wav: cannot read phones from '\.wav'; use one of \.json, \.npz, \.TextGrid"
     ):
         read_units(tmp_path / "a.wav")
+
+
+WELCOME = Path("examples/welcome.flac")
+
+
+@pytest.fixture(scope="module")
+def audio() -> AnalysedAudio:
+    """Real speech of five seconds."""
+    return analysed(read_audio(WELCOME))
+
+
+@pytest.fixture(scope="module")
+def right(audio: AnalysedAudio) -> Timeline[Unit]:
+    """Its phones in time."""
+    words = WELCOME.with_suffix(".txt").read_text()
+    return understood_speech(load_model(), SpeechRequest(audio, transcript=words)).speech.units
+
+
+def followed(audio: Audio, units: Timeline[Unit]) -> tuple[UnderstoodSpeech, float]:
+    """Return speech of given phones, and the confidence in the outlook."""
+    request = SpeechRequest(audio, units=units)
+    understood = understood_speech(load_model(), request)
+    return understood, outlook_of(request, understood).confidence
+
+
+def test_right_phones_are_followed_without_a_word(
+    audio: AnalysedAudio, right: Timeline[Unit], caplog: pytest.LogCaptureFixture
+) -> None:
+    understood, confidence = followed(audio, right)
+    assert understood.speech.units == right
+    assert confidence == pytest.approx(1)
+    assert not caplog.records
+
+
+needs_network = pytest.mark.skipif(installed_phone_recogniser() is None, reason="no phone recogniser is installed")
+
+
+@needs_network
+@pytest.mark.parametrize("explicit", [False, True])
+def test_phones_that_end_while_somebody_speaks(
+    audio: AnalysedAudio, right: Timeline[Unit], explicit: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    """What they leave open is recognised, what they call silence stays silent; both are named with their times."""
+    half = [span for span in right if span.end_s < 2.5]
+    end_s = half[-1].end_s
+    silence = [Span(end_s, audio.duration_s, Unit("sil"))] if explicit else []
+    understood, confidence = followed(audio, Timeline((*half, *silence)))
+    units = understood.speech.units
+    assert list(units)[: len(half)] == half
+    spoken = [span for span in list(units)[len(half) :] if not is_silent(span.label.phone)]
+    assert bool(spoken) != explicit
+    assert all(span.label.confidence is not None for span in spoken)
+    assert 0.3 < confidence < 0.8
+    assert understood.fit is not None
+    fits = understood.fit.of_frames(len(understood.speech.features.values))
+    assert fits[: round(100 * end_s) - 10].mean() > 0.95
+    assert fits[round(100 * end_s) :].mean() < 0.6
+    (record,) = caplog.records
+    assert "leave out speech at" in record.getMessage()
+    assert ("recognised" in record.getMessage()) != explicit
+
+
+@needs_network
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        pytest.param(lambda units: units.shifted(0.6), "are not what is said", id="late"),
+        pytest.param(lambda units: scaled(units, 0.5), "are not what is said", id="too fast"),
+        pytest.param(lambda units: scaled(units, 1e-3), "seconds?", id="a thousandth"),
+        pytest.param(lambda units: scaled(units, 1e3), "in milliseconds", id="milliseconds"),
+        pytest.param(lambda units: scaled(units, 1e7), "in ticks of 100 ns", id="ticks"),
+    ],
+)
+def test_phones_at_other_times_than_they_are_said(
+    audio: AnalysedAudio,
+    right: Timeline[Unit],
+    change: Callable[[Timeline[Unit]], Timeline[Unit]],
+    problem: str,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    _, confidence = followed(audio, change(right))
+    assert any(problem in text for text in caplog.messages)
+    assert confidence < 0.7
+
+
+def scaled(units: Timeline[Unit], factor: float) -> Timeline[Unit]:
+    return Timeline(tuple(Span(factor * s.start_s, factor * s.end_s, s.label) for s in units))
+
+
+def test_phones_where_nothing_is_said(right: Timeline[Unit], caplog: pytest.LogCaptureFixture) -> None:
+    silence = Audio(np.random.default_rng(0).normal(0, 1e-4, 5 * 16_000).astype(np.float32), 16_000)
+    understood, confidence = followed(silence, right)
+    assert understood.speech.units[: len(right) - 1] == right[: len(right) - 1]
+    assert confidence < 0.2
+    assert any("where nothing is said" in text for text in caplog.messages)
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_unknown_phones_are_those_of_the_word_or_recognised(
+    audio: AnalysedAudio, right: Timeline[Unit], known: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    word = "welcome" if any(span.label.word == "welcome" for span in right) else right[1].label.word
+    there = [span for span in right if span.label.word == word]
+    start_s, end_s = there[0].start_s, there[-1].end_s
+    unknown = Span(start_s, end_s, Unit("", UNKNOWN_PHONES, word if known else ""))
+    others = [span for span in right if span.label.word != word]
+    units = Timeline(tuple(sorted([*others, unknown], key=lambda span: span.start_s)))
+    found = followed(audio, units)[0].speech.units
+    inside = [span for span in found if start_s - 1e-6 <= span.start_s and span.end_s <= end_s + 1e-6]
+    if known:
+        assert [span.label.phone for span in inside] == [span.label.phone for span in there]
+        assert (inside[0].start_s, inside[-1].end_s) == pytest.approx((start_s, end_s))
+    else:
+        assert len([span for span in inside if not is_silent(span.label.phone)]) > len(there) / 2
+    assert any(f"at {start_s:.1f} " in text for text in caplog.messages)
+    assert [span for span in found if span not in inside][: len(others) // 2] == others[: len(others) // 2]

@@ -7,7 +7,14 @@ import pytest
 
 from lipmotion.errors import AlignmentError
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.understand.transcribe import MOST_WARNINGS, transcribe, warn_of_guesses, warn_of_misfit
+from lipmotion.pipeline.understand.transcribe import (
+    MOST_WARNINGS,
+    Transcription,
+    transcribe,
+    warn_of_guesses,
+    warn_of_misfit,
+)
+from lipmotion.pipeline.understand.understood_speech import recognised_with
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.mfcc import mfcc
 from lipmotion.speech.recognition.agreement import TranscriptFit
@@ -15,7 +22,7 @@ from lipmotion.speech.recognition.network.posteriors import installed_phone_reco
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence
-from lipmotion.types import Audio, Features, TimedTranscript, TimedWord, TranscriptLine
+from lipmotion.types import Audio, Features, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
 from lipmotion.units import Lexicon, lexicon, words_of
 
 
@@ -83,11 +90,14 @@ def test_a_transcript_of_something_else_is_doubted(
         pytest.skip("no phone recogniser is installed")
     if not network:
         monkeypatch.setattr("lipmotion.pipeline.understand.transcribe.network_of", lambda _: None)
-    transcribe(Recogniser(toy_model.phones, "auto"), audio, features, WRONG, Lexicon())
+    phones = Recogniser(toy_model.phones, "auto")
+    recognised = lambda: phones.recognise(audio, features)  # noqa: E731
+    units, _ = transcribe(phones, audio, features, WRONG, Lexicon(), recognised)
+    assert (units is None) == network  # what is said is to be recognised
     (record,) = caplog.records
     assert (record.name, record.levelname) == ("lipmotion", "WARNING")
-    why = r"missed by \d+\.\d nats each, required 1\.6 or less" if network else r"at -\d+\.\d, required -4\.2 or more"
-    message = rf"the transcript seems not to be what is said \(.* {why}\).*; check it, or .*"
+    why = r"0 of its 4 words are heard" if network else r"at -\d+\.\d, required -4\.2 or more"
+    message = rf"the transcript seems not to be what is said \(.*{why}\).*check it, or .*"
     assert re.fullmatch(message, record.getMessage())
 
 
@@ -108,6 +118,16 @@ def welcome() -> tuple[AnalysedAudio, tuple[str, ...]]:
     return analysed(read_audio(WELCOME)), words_of(WELCOME.with_suffix(".txt").read_text())
 
 
+def corrected(audio: AnalysedAudio, words: tuple[str, ...]) -> Transcription:
+    """Return what the shipped model makes of words, with what it recognises where they are wrong."""
+    phones = Recogniser(load_model().phones, "auto")
+
+    def recognised() -> Timeline[Unit]:
+        return recognised_with(phones.recognise(audio, audio.mfcc()), 0.7)
+
+    return transcribe(phones, audio, audio.mfcc(), words, Lexicon(), recognised)
+
+
 @pytest.mark.parametrize("kept", [slice(0, 7), slice(7, None)])
 def test_speech_that_the_transcript_leaves_out_is_reported_with_its_times(
     welcome: tuple[AnalysedAudio, tuple[str, ...]], kept: slice, caplog: pytest.LogCaptureFixture
@@ -118,7 +138,7 @@ def test_speech_that_the_transcript_leaves_out_is_reported_with_its_times(
     assert whole.fit.missing == ()
     assert whole.fit.share == pytest.approx(1)
     assert not caplog.records
-    part = transcribe(phones, audio, audio.mfcc(), words[kept], Lexicon())
+    part = corrected(audio, words[kept])
     assert part.fit is not None
     assert part.fit.share < 0.8
     (record,) = caplog.records
@@ -126,9 +146,30 @@ def test_speech_that_the_transcript_leaves_out_is_reported_with_its_times(
         r"to leave out words at \d\.\d to \d\.\d s.* \(\d\.\d of \d\.\d s of speech\)", record.getMessage()
     )
     said = {span.label.word: span for span in whole.units}
+    assert part.units is not None
+    recognised = {span.label.word for span in part.units if span.label.confidence is not None}
+    assert recognised & (set(words) - set(words[kept]))  # there
+    assert {*words[kept]} <= {span.label.word for span in part.units if span.label.confidence is None}
     left_out = [said[word] for word in set(words) - set(words[kept])]
     for start_s, end_s in part.fit.missing:  # each stretch covers a part of what was left out
         assert any(start_s < span.end_s and span.start_s < end_s for span in left_out)
+
+
+@pytest.mark.parametrize("first", [False, True])
+def test_a_sentence_that_nobody_says_is_left_out(
+    welcome: tuple[AnalysedAudio, tuple[str, ...]], first: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    (audio, words), phones = welcome, Recogniser(load_model().phones, "auto")
+    extra = words_of("nobody answered the bell")
+    whole = transcribe(phones, audio, audio.mfcc(), words, Lexicon()).units
+    longer = corrected(audio, (*extra, *words) if first else (*words, *extra))
+    assert longer.units is not None
+    assert whole is not None
+    assert [span.label for span in longer.units] == [span.label for span in whole]
+    assert longer.fit is not None
+    assert tuple(word.word for word in longer.fit.unsaid) == extra
+    (record,) = caplog.records
+    assert "words that are not said: 'nobody' at " in record.getMessage()
 
 
 def test_speech_outside_of_the_times_of_a_transcript_is_reported(

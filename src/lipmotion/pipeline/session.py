@@ -540,7 +540,8 @@ def generation_of(
 
     paused = generate_for(person, model.engine, model.learned, understood.speech, constraints, finish)
     speech, fit = understood.speech, understood.fit
-    knowledge = SpeechKnowledge(speech.voice, float(np.mean(speech.confidence)), fit.share if fit else 1.0)
+    fits = fit.of_frames(len(speech.features.values)) if fit else 1.0
+    knowledge = SpeechKnowledge(speech.voice, float(np.mean(speech.confidence)), fits)
     moods = moods_in_time(understood.tags, speech.units)
     told = replace(paused, moods=moods, events=understood.events, about=model.about, knowledge=knowledge)
     return replace(told, outlook=outlook_of(request, understood))

@@ -26,7 +26,7 @@ class SpeechKnowledge:
 
     voice  : 0 to 1, how well training knows the voice (``Speech.voice``)
     phones : 0 to 1, how sure the phones are (``Speech.confidence``), on average; 1 where they are known
-    fit    : 0 to 1, the share of the speech that its transcript fits; 1 where there is none
+    fit    : 0 to 1, how far the transcript or given phones fit, in all or in each frame; 1 where there are none
 
     >>> import numpy as np
     >>> curve, variance = np.array([0.0, 0.1, 0.2, 0.1]), np.full(4, 1e-4)
@@ -38,7 +38,7 @@ class SpeechKnowledge:
 
     voice: float
     phones: float
-    fit: float = 1.0
+    fit: float | Curve = 1.0
 
     def confidence(self, curve: NDArray[np.floating], variance: NDArray[np.floating]) -> Curve:
         """Return how sure each frame of a curve is, 0 to 1 [shape=(T,)]: 1 / (1 + expected squared error).
@@ -48,7 +48,8 @@ class SpeechKnowledge:
         movement. Its weights were measured on recordings whose motion is known (docs/results/voices.md).
         """
         weights = (VARIANCE_FACTOR, STRANGER, STRANGER_MOVEMENT, STRANGER_DOUBT)
-        return 1 / (1 + weights @ self.causes(curve, variance) + OTHER_WORDS * (1 - self.fit))
+        fit = np.atleast_1d(self.fit)[np.linspace(0, np.size(self.fit) - 1, len(curve)).round().astype(int)]
+        return 1 / (1 + weights @ self.causes(curve, variance) + OTHER_WORDS * (1 - fit))
 
     def causes(self, curve: NDArray[np.floating], variance: NDArray[np.floating]) -> Curve:
         """Return the causes of squared error in each frame, before they are weighed [shape=(4, T)].

@@ -316,8 +316,8 @@ class Outlook:
                  English phones), ``given units``, ``own model`` (the engine's own
                  recognition of a speaker that it was trained on), ``words`` or ``phones`` (recognised, for the most
                  part), ``no speech`` (none was found)
-    confidence : 0 to 1, of recognised words, by their share of the speech; of a transcript, the share of the speech
-                 that it fits (1 where that is not known), of a mapped one at most 0.8; 1 where units were given
+    confidence : 0 to 1, of recognised words, by their share of the speech; of a transcript and of given units, the
+                 share of the speech that they fit (1 where that is not known), of a mapped one at most 0.8
     voice      : 0 (unknown) to 1 (as in the training); None where it was not needed
     range_db   : decibels between loud and quiet moments; under 20 the recording is noisy
     advice     : what would help, the most helpful first
@@ -341,7 +341,7 @@ class Outlook:
             parts = [f"words: transcript, mapped to English phones, confidence {self.confidence:.2f}"]
         if self.words == "no speech":
             parts = ["no speech found"]
-        elif self.words == "transcript" and self.confidence < FULL_FIT_SHARE:
+        elif self.words in ("transcript", "given units") and self.confidence < FULL_FIT_SHARE:
             parts[0] += f", which fits {self.confidence:.0%} of the speech"
         if self.voice is not None:
             parts.append(f"voice {self.voice:.2f}")

@@ -80,7 +80,7 @@ def doubt_of(record: Record) -> float:
     doubt += 5 * (record.get("range_db", NOISY_DB) < NOISY_DB)
     if words in ("words", "phones"):
         doubt += 10 * max(SURE_CONFIDENCE - record["confidence"], 0) / SURE_CONFIDENCE
-    if words in ("transcript", "mapped transcript") and record["confidence"] < FULL_FIT_SHARE:
+    if words in ("transcript", "mapped transcript", "given units") and record["confidence"] < FULL_FIT_SHARE:
         doubt += 10 * (1 - record["confidence"])
     if (motion := record.get("motion")) is not None:
         doubt += 5 * (1 - motion)

@@ -141,7 +141,7 @@ def _of_parts(
         inside = [pin for pin in inside if 0 <= round((pin.time_s - start_s) * FRAME_RATE_HZ) < part.frames]
         shifted = Constraints(tuple(replace(pin, time_s=pin.time_s - start_s) for pin in inside))
         try:
-            generation = generate(part.speech, shifted)
+            generation = generate(replace(part.speech, times_given=speech.times_given), shifted)
         except InputError as error:
             raise InputError(f"{error} (in the passage that begins at {start_s:.2f} s)") from error
         first, *others = generation.units

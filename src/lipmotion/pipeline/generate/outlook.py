@@ -27,7 +27,8 @@ def outlook_of(request: SpeechRequest, understood: UnderstoodSpeech) -> Outlook:
     if understood.is_without_speech:
         return Outlook("no speech", 0.0, None, understood.range_db, ())
     if found is None:
-        words = "given units" if request.units is not None else "transcript" if speech.units_known else "own model"
+        is_used = speech.units_known if understood.fit is None else not understood.fit.is_doubtful
+        words = "given units" if request.units is not None else "transcript" if is_used else "own model"
         share = understood.fit.share if understood.fit else 1.0
         if words == "transcript" and (known := _known_share(request, understood)) < 1:
             words, share = "mapped transcript", share * known

@@ -3,24 +3,42 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import groupby
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from lipmotion.corpora.labels import check_plain_text, read_transcript
-from lipmotion.errors import shortened
+from lipmotion.errors import AlignmentError, shortened
 from lipmotion.hmm.loudness import frames_above
-from lipmotion.speech.features.analysed_audio import analysed
+from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit, transcript_fit
 from lipmotion.speech.recognition.anchors import anchors_of, fitted
-from lipmotion.speech.recognition.network.posteriors import POSTERIOR_STEP, recording_posteriors
+from lipmotion.speech.recognition.network.posteriors import (
+    POSTERIOR_STEP,
+    WORD_BOUNDARY,
+    mean_posterior,
+    posterior_stretches,
+    recording_posteriors,
+)
+from lipmotion.speech.recognition.recognised_speech import PHONE_POSTERIORS
 from lipmotion.speech.recognition.recogniser import Recogniser, network_of
-from lipmotion.speech.recognition.transcript_evidence import DOUBTFUL_LOSS, transcript_evidence
+from lipmotion.speech.recognition.transcript_evidence import (
+    LEAST_GAP_S,
+    OtherSpeech,
+    TranscriptEvidence,
+    transcript_evidence,
+)
 from lipmotion.speech.voices.pronunciations import LanguageLexicon
 from lipmotion.storage.files import read_text_file
-from lipmotion.types import FRAME_RATE_HZ, Audio, Features, TimedTranscript, Timeline, Unit
-from lipmotion.units import Lexicon, Pronunciation, check_words
+from lipmotion.types import FRAME_RATE_HZ, Audio, Features, Span, TimedTranscript, Timeline, Unit
+from lipmotion.units import Lexicon, Pronunciation, check_words, is_silent
 from lipmotion.units.length_limits import LARGEST_TRANSCRIPT_BYTES
+from lipmotion.units.phones import phone_edits
 
 __all__ = [
     "Transcription",
@@ -38,15 +56,20 @@ FOREIGN_SHARE, LEAST_FOREIGN = 0.25, 3
 """A text of which so large a share, and so many different words, are not in the dictionary is not English."""
 MOST_STRETCHES = 3
 """Largest number of stretches without words that are named in one warning."""
+REACH_S = 0.1
+"""A phone of a word may be heard so far from the middle that its recognition has."""
+ALIKE_SHARE = 0.34
+"""Words are said all the same where recognition finds their phones, but for so small a share."""
 
 
 class Transcription(NamedTuple):
     """Phones in time of a recording, and how well the transcript fits.
 
-    fit : None where there was no transcript, or it was not compared with the sound (general phone models are needed)
+    units : None where the transcript is of something else: what is said is to be recognised
+    fit   : None where there was no transcript, or it was not compared with the sound (general phone models are needed)
     """
 
-    units: Timeline[Unit]
+    units: Timeline[Unit] | None
     fit: TranscriptFit | None
 
 
@@ -56,14 +79,17 @@ def transcribe(
     features: Features,
     words: Sequence[str] | TimedTranscript | None,
     lexicon: Lexicon,
+    recognised: Callable[[], Timeline[Unit]] | None = None,
 ) -> Transcription:
     """Return the phones in time of a recording, with warnings for the user.
 
-    phones   : the recogniser
-    features : of the audio, from ``mfcc``
-    words    : the spoken words in lower case, also with times, within which they are aligned; or None
+    phones     : the recogniser
+    features   : of the audio, from ``mfcc``
+    words      : the spoken words in lower case, also with times, within which they are aligned; or None
+    recognised : recognises phones in time with their confidence; None: nothing is corrected
     Warnings are logged for guessed pronunciations and, with general phone models, for words that do not agree with the
-    sound, and speech that the words leave out. Of English words, a phone recogniser judges, where one is installed.
+    sound, and speech that the words leave out. Of English words, a phone recogniser judges, where one is installed: if
+    it is sure, words that nobody says are left out, and speech that has no words is recognised.
     Raises AlignmentError: the words cannot be aligned with the recording.
     """
     if isinstance(words, TimedTranscript):
@@ -76,16 +102,139 @@ def transcribe(
         )
     else:
         warn_of_guesses(spoken, lexicon)
-    units = phones_in_time(phones, audio, features, words, lexicon)
+    name = None if isinstance(lexicon, LanguageLexicon) else network_of(phones.kind)
+    refused: AlignmentError | None = None
+    try:
+        units = phones_in_time(phones, audio, features, words, lexicon)
+    except AlignmentError as error:  # too much for the recording: some of the words may be said all the same
+        check_words(spoken, audio.duration_s)
+        if name is None or recognised is None or heard_phones(name, analysed(audio))[1] < PHONE_POSTERIORS[0]:
+            raise
+        refused = error
+        units = _evenly_spread(spoken, lexicon, audio.duration_s)
     if words is None or phones.kind == "own":
         return Transcription(units, None)
     fit = transcript_fit(audio, units)
-    name = None if isinstance(lexicon, LanguageLexicon) else network_of(phones.kind)
-    if name is not None:
-        posteriors = recording_posteriors(name, analysed(audio)).of_phones.astype(float)
-        fit = fit.with_evidence(transcript_evidence(posteriors, POSTERIOR_STEP / FRAME_RATE_HZ, units))
-    warn_of_misfit(fit)
+    if name is None:
+        warn_of_misfit(fit)
+        return Transcription(units, fit)
+    heard, sure = heard_phones(name, analysed(audio))
+    evidence = transcript_evidence(heard, POSTERIOR_STEP / FRAME_RATE_HZ, units)
+    if recognised is None or (refused is None and not (evidence.others and sure >= PHONE_POSTERIORS[0])):
+        fit = fit.with_evidence(evidence)
+        warn_of_misfit(fit)
+        return Transcription(units, fit)
+    found = recognised()
+    evidence = _confirmed(evidence, found)
+    fit = fit.with_evidence(evidence)
+    warn_of_misfit(fit, corrected=True)
+    if fit.is_doubtful:
+        return Transcription(None, fit)
+    if refused is not None and not evidence.unsaid:
+        raise refused
+    if evidence.gaps or evidence.unsaid:
+        units = _corrected(phones, audio, features, evidence, found, lexicon)
     return Transcription(units, fit)
+
+
+def _evenly_spread(words: Sequence[str], lexicon: Lexicon, duration_s: float) -> Timeline[Unit]:
+    """Return the phones of words, each for the same time."""
+    said = [(phone, word) for word in words for phone in lexicon.pronunciations(word)[0]]
+    edges_s = np.linspace(0, duration_s, len(said) + 1).tolist()
+    timed = zip(edges_s[:-1], edges_s[1:], said, strict=True)
+    return Timeline(tuple(Span(start_s, end_s, Unit(phone, word=word)) for start_s, end_s, (phone, word) in timed))
+
+
+def heard_phones(name: str, audio: AnalysedAudio) -> tuple[NDArray[np.float64], float]:
+    """Return the log posteriors of a phone recogniser, and how sure it is of what is said, or of nothing, 0 to 1."""
+    posteriors = recording_posteriors(name, audio)
+    hears = any(found.token != WORD_BOUNDARY for found in posteriors.best_tokens)
+    sure = mean_posterior(posterior_stretches(name, audio)) if hears else 1.0
+    return posteriors.of_phones.astype(float), sure
+
+
+def _confirmed(evidence: TranscriptEvidence, recognised: Timeline[Unit]) -> TranscriptEvidence:
+    """Return evidence without what recognition does not confirm.
+
+    Where it finds the phones of words that are left out, they are said; where it finds nothing, nothing is missing.
+    """
+    words, others = list(evidence.words), list[OtherSpeech]()
+    for other in evidence.others:
+        found = [span.label.phone for run in _recognised_within(recognised, evidence, other) for span in run]
+        left_out = words[other.first : other.stop]
+        wanted = [phone for word in left_out for phone in word.phones]
+        if wanted and phone_edits(wanted, found) <= ALIKE_SHARE * len(wanted):
+            words[other.first : other.stop] = [
+                word._replace(start_s=other.start_s, end_s=other.end_s, is_said=True) for word in left_out
+            ]
+        elif wanted or (found and other.end_s - other.start_s >= LEAST_GAP_S):
+            others.append(other if found else other._replace(end_s=other.start_s))
+    return TranscriptEvidence(tuple(words), tuple(others))
+
+
+def _recognised_within(
+    recognised: Timeline[Unit], evidence: TranscriptEvidence, other: OtherSpeech
+) -> list[list[Span[Unit]]]:
+    """Return the recognised phones where something else is said than the transcript has, by words.
+
+    Whole words count by their middle, half of the way to the words beside them. Phones without words do from the last
+    one on that may be the end of the word before, to the first one that may be the beginning of the word after.
+    """
+    if other.start_s == other.end_s:
+        return []
+    words, spans = evidence.words, [span for span in recognised if not is_silent(span.label.phone)]
+    middles_s = np.array([(span.start_s + span.end_s) / 2 for span in spans])
+    before_s, after_s, first, stop = 0.0, np.inf, 0, len(spans)
+    if other.first > 0:
+        before_s = words[other.first - 1].end_s
+        first = int(np.searchsorted(middles_s, before_s))
+        near = range(*np.searchsorted(middles_s, [before_s - REACH_S, before_s + REACH_S]))
+        first = max([n + 1 for n in near if spans[n].label.phone == words[other.first - 1].phones[-1]], default=first)
+    if other.stop < len(words):
+        after_s = words[other.stop].start_s
+        stop = int(np.searchsorted(middles_s, after_s))
+        near = range(*np.searchsorted(middles_s, [after_s - REACH_S, after_s + REACH_S]))
+        stop = min([n for n in near if spans[n].label.phone == words[other.stop].phones[0]], default=stop)
+    found: list[list[Span[Unit]]] = []
+    numbered = groupby(enumerate(spans), key=lambda pair: pair[1].label.word)
+    for word, group in numbered:
+        run = list(group)
+        middle_s = (run[0][1].start_s + run[-1][1].end_s) / 2
+        if word and (before_s + other.start_s) / 2 <= middle_s <= (other.end_s + after_s) / 2:
+            found.append([span for _, span in run])
+        elif not word and (inside := [span for number, span in run if first <= number < stop]):
+            found.append(inside)
+    return found
+
+
+def _corrected(
+    phones: Recogniser,
+    audio: Audio,
+    features: Features,
+    evidence: TranscriptEvidence,
+    recognised: Timeline[Unit],
+    lexicon: Lexicon,
+) -> Timeline[Unit]:
+    """Return the words of a transcript that are said, and what is recognised beside them, aligned.
+
+    Raises AlignmentError: as ``transcribe``.
+    """
+    labels: list[tuple[str, float | None]] = []
+    variants: dict[str, tuple[Pronunciation, ...]] = {}
+    for number, word in enumerate((*evidence.words, None)):
+        for other in (each for each in evidence.others if each.first == number):
+            for run in _recognised_within(recognised, evidence, other):
+                variants[str(len(labels))] = (tuple(span.label.phone for span in run),)
+                labels.append((run[0].label.word, run[0].label.confidence))
+        if word is not None and word.is_said:
+            known = lexicon.pronunciations(word.word)
+            variants[str(len(labels))] = known if word.phones in known else (word.phones,)
+            labels.append((word.word, None))
+    spans = list[Span[Unit]]()
+    for span in phones.align(audio, features, tuple(variants), Lexicon(variants)):
+        text, confidence = labels[int(span.label.word)] if span.label.word else ("", None)
+        spans.append(replace(span, label=replace(span.label, word=text, confidence=confidence)))
+    return Timeline(tuple(spans))
 
 
 def phones_in_time(
@@ -115,42 +264,66 @@ def read_plain_text(path: Path) -> str:
     return text
 
 
-def warn_of_misfit(fit: TranscriptFit) -> None:
-    """Log a warning if a transcript seems to be of something else, or to leave out speech."""
+def warn_of_misfit(fit: TranscriptFit, corrected: bool = False) -> None:
+    """Log a warning if a transcript seems to be of something else, to leave out speech, or to have too many words.
+
+    corrected : whether what is said instead is recognised
+    """
     if fit.is_doubtful:
         LOG.warning(
-            "the transcript seems not to be what is said (%s)%s; check it, or leave it out",
+            "the transcript seems not to be what is said (%s)%s; %scheck it, or leave it out",
             *(_judgement(fit), f" or to leave out words {_places(fit)}" if fit.missing else ""),
+            "the sound is recognised instead: " if corrected else "",
         )
-    elif fit.missing:
-        LOG.warning(
-            "the transcript seems to leave out words %s: the lips are wrong there; add the words, or leave the whole "
-            "transcript out",
-            _places(fit),
-        )
-    elif fit.unsaid:
+        return
+    if fit.unsaid:
         named = [f"{shortened(word.word)!r} at {word.start_s:.1f} s" for word in fit.unsaid[:MOST_STRETCHES]]
         more = len(fit.unsaid) - MOST_STRETCHES
         LOG.warning(
-            "the transcript seems to have words that are not said: %s%s; correct it",
+            "the transcript seems to have words that are not said: %s%s%s; correct it",
             *(", ".join(named), f" and {more} more" if more > 0 else ""),
+            ", which are left out" if corrected else "",
         )
+    if fit.missing:
+        done = "what is said there is recognised" if corrected else "the lips are wrong there"
+        LOG.warning(
+            "the transcript seems to leave out words %s: %s; add the words, or leave the whole transcript out",
+            *(_places(fit), done),
+        )
+
+
+def warn_of_label_misfit(fit: TranscriptFit, filled: bool) -> None:
+    """Log warnings where given phones do not fit the sound; ``filled``: where they are open, phones are recognised."""
+    problems = {
+        "leave out speech": fit.missing,
+        "lie where nothing is said": fit.idle,
+        "are not what is said": fit.wrong,
+    }
+    for problem, places in problems.items():
+        if places:
+            done = "; what is said there is recognised" if filled and places is fit.missing else ""
+            LOG.warning("the units %s at %s%s; correct them, or leave them out", problem, named_places(places), done)
+
+
+def named_places(places: Sequence[tuple[float, float]]) -> str:
+    """Return the longest of some stretches of time, for a message."""
+    longest = sorted(places, key=lambda place: place[0] - place[1])[:MOST_STRETCHES]
+    named = ", ".join(f"{start_s:.1f} to {end_s:.1f} s" for start_s, end_s in sorted(longest))
+    more = len(places) - MOST_STRETCHES
+    return named + (f" and at {more} more places" if more > 0 else "")
 
 
 def _judgement(fit: TranscriptFit) -> str:
     """Return why a transcript is doubtful: value found, value required."""
     if fit.evidence is not None:
-        return f"its phones are missed by {fit.evidence.loss:.1f} nats each, required {DOUBTFUL_LOSS} or less"
+        said = sum(word.is_said for word in fit.evidence.words)
+        return f"{said} of its {len(fit.evidence.words)} words are heard"
     return f"its phones agree with the sound at {fit.score:.1f}, required {DOUBTFUL_SCORE} or more"
 
 
 def _places(fit: TranscriptFit) -> str:
     """Return where words are missing, the longest stretches, and how much of the speech that is, for a message."""
-    longest = sorted(fit.missing, key=lambda stretch: stretch[0] - stretch[1])[:MOST_STRETCHES]
-    named = ", ".join(f"{start_s:.1f} to {end_s:.1f} s" for start_s, end_s in sorted(longest))
-    more = len(fit.missing) - MOST_STRETCHES
-    others = f" and at {more} more places" if more > 0 else ""
-    return f"at {named}{others} ({fit.missing_s:.1f} of {fit.speech_s:.1f} s of speech)"
+    return f"at {named_places(fit.missing)} ({fit.missing_s:.1f} of {fit.speech_s:.1f} s of speech)"
 
 
 def is_other_language(words: Sequence[str], lexicon: Lexicon) -> bool:

@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -20,17 +21,25 @@ from lipmotion.pipeline.job import DETECTED
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.spoken_language import warn_of_another_language
-from lipmotion.pipeline.understand.transcribe import read_transcript, transcribe, warn_of_guesses
+from lipmotion.pipeline.understand.transcribe import (
+    heard_phones,
+    named_places,
+    read_transcript,
+    transcribe,
+    warn_of_guesses,
+    warn_of_label_misfit,
+)
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.features.mfcc import HOP
 from lipmotion.speech.features.speaker_similarity import speaker_similarity
 from lipmotion.speech.features.voice_events import voice_events, without_laughter
-from lipmotion.speech.recognition.agreement import TranscriptFit
+from lipmotion.speech.recognition.agreement import TranscriptFit, label_fit
 from lipmotion.speech.recognition.installed_recognisers import INSTALLED_RECOGNISERS, recognise_words
 from lipmotion.speech.recognition.network.posteriors import token_posteriors
 from lipmotion.speech.recognition.network.word_tree import english_words
 from lipmotion.speech.recognition.recognised_speech import (
+    WORD_POSTERIORS,
     Recognition,
     joined_units,
     level_range_db,
@@ -44,6 +53,7 @@ from lipmotion.speech.recognition.recogniser import (
     network_of,
     voice_knowledge,
 )
+from lipmotion.speech.recognition.transcript_evidence import LEAST_GAP_S
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ, read_audio
 from lipmotion.storage.sources import is_file
 from lipmotion.types import (
@@ -67,7 +77,15 @@ from lipmotion.types import (
 )
 from lipmotion.types.languages import ENGLISH
 from lipmotion.types.moods import MoodTag
-from lipmotion.units import SILENCE, Lexicon, check_phones, check_text, is_silent, without_gaps
+from lipmotion.units import (
+    SILENCE,
+    UNKNOWN_PHONES,
+    Lexicon,
+    check_phones,
+    check_text,
+    is_silent,
+    without_gaps,
+)
 from lipmotion.units.mood_tags import tagged_text
 from lipmotion.units.text_normalisation import checked_tokens
 
@@ -78,6 +96,12 @@ UNHEARD_S = 0.05
 """Phones may last so long outside of all passages, and half of their time: alignment is no surer."""
 LATE_S = 0.1
 """Seconds by which given units may end after the sound; editing programs round times."""
+TIME_UNITS = {"milliseconds": 1e3, "samples": 16e3, "samples of 48 kHz": 48e3, "ticks of 100 ns": 1e7}
+"""How many of them a second has: given times that end near so many times the recording are in this unit."""
+SHORTEST_PHONE_S, FEWEST_TIMED = 0.02, 5
+"""Given phones, of which half are shorter, are faster than speech; so many are needed to tell."""
+REACH_S = 0.1
+"""Phones are recognised so far around the first and the last one that is heard."""
 LATEST_S = 1e15
 """Later units are refused: frames of such times cannot be counted."""
 LEAST_SPEECH_S = 0.2
@@ -144,7 +168,8 @@ def understood_speech(
     speech, found = understood.speech, understood.recognition
     if found is not None and request.language == ENGLISH:
         warn_of_another_language(found)
-    voice = known_voice(model.phones, audio, speech, found, given=request.units is not None)
+    given = request.units is not None or understood.fit is not None
+    voice = known_voice(model.phones, audio, speech, found, given=given)
     speech = replace(_with_voices(model.phones, audio, speech, voice), voice=voice)
     return replace(understood, speech=replace(with_prior(model.prior, speech), voice=voice))
 
@@ -267,30 +292,34 @@ def _understood(model: Model, request: SpeechRequest, audio: AnalysedAudio, each
     range_db = level_range_db(audio.log_energy)
     installed = request.recogniser in INSTALLED_RECOGNISERS
     phones = cached_recogniser(model.phones, "auto" if installed else request.recogniser, model.adaptation)
-    if request.units is not None:
-        if request.transcript is not None:
-            LOG.warning("the transcript is not used: the units already say what is spoken; leave one of them out")
-        _check_units(request.units, audio.duration_s)
-        units = without_gaps(request.units, audio.duration_s)
-        speech = speech_of(model.engine, audio, audio.mfcc(), units, phones.kind, each)
-        return UnderstoodSpeech(replace(speech, times_given=True), None, range_db)
-    words = _words(request.transcript, audio.duration_s)
-    if installed and words is None:
-        words = recognise_words(audio, request.recogniser)
-    features = audio.mfcc()
-    if words is not None:
-        units, fit = transcribe(phones, audio, features, words, request.lexicon or Lexicon())
-        speech = speech_of(model.engine, audio, features, units, phones.kind, each)
-        tags = words.tags if isinstance(words, TimedTranscript) else ()
-        return UnderstoodSpeech(speech, None, range_db, fit, tags)
+    features, fit = audio.mfcc(), None
     found: list[Recognition] = []
 
     def recognise() -> Recognition:
         found.append(phones.recognition(audio, features, each, english=request.language == ENGLISH))
         return found[-1]
 
-    speech = recognised_speech(model.engine, model.learned, audio, features, phones, recognise, each)
-    return UnderstoodSpeech(speech, found[0] if found else None, range_db)
+    @cache
+    def recognised() -> Speech:
+        return recognised_speech(model.engine, model.learned, audio, features, phones, recognise, each)
+
+    if request.units is not None:
+        if request.transcript is not None:
+            LOG.warning("the transcript is not used: the units already say what is spoken; leave one of them out")
+        units, fit = _followed(model, request, audio, phones.kind, lambda: recognised().units)
+        speech = speech_of(model.engine, audio, features, units, phones.kind, each)
+        return UnderstoodSpeech(replace(speech, times_given=True), None, range_db, fit)
+    words = _words(request.transcript, audio.duration_s)
+    if installed and words is None:
+        words = recognise_words(audio, request.recogniser)
+    if words is not None:
+        lexicon = request.lexicon or Lexicon()
+        said, fit = transcribe(phones, audio, features, words, lexicon, lambda: recognised().units)
+        if said is not None:
+            speech = speech_of(model.engine, audio, features, said, phones.kind, each)
+            tags = words.tags if isinstance(words, TimedTranscript) else ()
+            return UnderstoodSpeech(speech, None, range_db, fit, tags)
+    return UnderstoodSpeech(recognised(), found[0] if found else None, range_db, fit)
 
 
 def audio_of(request: SpeechRequest) -> Audio:
@@ -428,6 +457,66 @@ def _words(
     return TimedTranscript((TranscriptLine(tuple(map(TimedWord, words))),), tags) if tags else words
 
 
+def _followed(
+    model: Model, request: SpeechRequest, audio: AnalysedAudio, kind: str, recognised: Callable[[], Timeline[Unit]]
+) -> tuple[Timeline[Unit], TranscriptFit | None]:
+    """Return the given phones of a request, completed, and how well they fit; None: they were not compared.
+
+    kind : of the recogniser
+    Given phones are followed, right or wrong. Spans of unknown phones have those of their word, aligned in them, or
+    else what is recognised; so have stretches that the phones leave open, where a phone recogniser hears speech.
+    """
+    given = request.units or Timeline(())
+    _check_units(given, audio.duration_s)
+    spans, aligned, guessed = list[Span[Unit]](), list[str](), list[tuple[float, float]]()
+    for span in (span for span in given if span.start_s < audio.duration_s):
+        end_s = min(span.end_s, audio.duration_s)
+        if span.label.phone or span.label.unit != UNKNOWN_PHONES:
+            spans.append(replace(span, end_s=end_s) if span.end_s > audio.duration_s + LATE_S else span)
+            continue
+        try:
+            word = span.label.word
+            inside = aligned_within(model, request, audio, word, span.start_s, end_s) if word else []
+            aligned += [f"{word!r} at {span.start_s:.1f} s"] if inside else []
+        except (AlignmentError, InputError):
+            inside = []
+        if not inside:
+            guessed.append((span.start_s, end_s))
+        spans += inside or _within(recognised(), span.start_s, end_s)
+    if aligned:
+        LOG.warning("the units do not say the phones of %s: they are those of the dictionary", ", ".join(aligned))
+    if guessed:
+        LOG.warning("the units do not say which phones are said at %s: they are recognised", named_places(guessed))
+    units = without_gaps(Timeline(tuple(spans)), audio.duration_s)
+    if kind == "own" or not all(span.label.phone for span in units):
+        return units, None
+    name = network_of(kind) if request.language == ENGLISH else None
+    heard, sure = heard_phones(name, audio) if name is not None else (None, 0.0)
+    is_sure = sure >= WORD_POSTERIORS[0]
+    fit = label_fit(audio, units, heard if is_sure else None)
+    edges_s = [0.0, *(time_s for span in spans for time_s in (span.start_s, span.end_s)), audio.duration_s]
+    filling = [
+        phone
+        for open_s, close_s in zip(edges_s[::2], edges_s[1::2], strict=True)
+        for start_s, end_s in (fit.missing if is_sure else ())
+        if min(close_s, end_s) - max(open_s, start_s) >= LEAST_GAP_S
+        for phone in _within(recognised(), max(open_s, start_s - REACH_S), min(close_s, end_s + REACH_S))
+    ]
+    warn_of_label_misfit(fit, filled=bool(filling))
+    spans = sorted([*spans, *filling], key=lambda span: span.start_s)
+    units = without_gaps(Timeline(tuple(spans)), audio.duration_s) if filling else units
+    return units, replace(fit, missing=(*fit.missing, *guessed))
+
+
+def _within(units: Timeline[Unit], start_s: float, end_s: float) -> list[Span[Unit]]:
+    """Return the phones, without silence, whose middle is within some time, cut to it."""
+    return [
+        replace(span, start_s=max(span.start_s, start_s), end_s=min(span.end_s, end_s))
+        for span in units
+        if start_s <= (span.start_s + span.end_s) / 2 < end_s and not is_silent(span.label.phone)
+    ]
+
+
 def _check_units(units: Timeline[Unit], duration_s: float) -> None:
     """Raise InputError if given units are empty or too many; log a warning if they end after the recording."""
     if not len(units):
@@ -437,11 +526,20 @@ def _check_units(units: Timeline[Unit], duration_s: float) -> None:
         )
     check_phones(len(units), duration_s)
     first_s, last_s, end_s = units[0].start_s, units[-1].start_s, units[-1].end_s
+    if duration_s <= first_s <= LATEST_S:
+        raise InputError(f"the units begin at {first_s:.2f} s, the recording ends at {duration_s:.2f} s; give its own")
     if not -LATEST_S <= first_s <= last_s <= LATEST_S or LATEST_S < end_s < np.inf:
         raise InputError(f"the units last from {first_s} to {end_s} s, required times of this recording")
+    spoken_s = sorted(span.duration_s for span in units if not is_silent(span.label.phone))
     if duration_s + LATE_S < end_s < np.inf:
+        unit = next((name for name, ratio in TIME_UNITS.items() if 0.3 < end_s / duration_s / ratio < 1.3), "")
+        guess = f"their times in {unit}, where seconds are required" if unit else "they those of another recording"
         LOG.warning(
-            "the units go on to %.2f s, the recording ends at %.2f s: are they those of another recording?",
-            units[-1].end_s,
-            duration_s,
+            "the units go on to %.2f s, the recording ends at %.2f s: are %s?", units[-1].end_s, duration_s, guess
+        )
+    elif len(spoken_s) >= FEWEST_TIMED and spoken_s[len(spoken_s) // 2] < SHORTEST_PHONE_S:
+        LOG.warning(
+            "the units last %.1f ms each and end at %.2f s of %.2f s, faster than anybody speaks: are their times in "
+            "seconds?",
+            *(1000 * spoken_s[len(spoken_s) // 2], end_s, duration_s),
         )

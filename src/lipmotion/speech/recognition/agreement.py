@@ -8,10 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.hmm.loudness import frames_above
+from lipmotion.hmm.loudness import frames_above, quiet_frames
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.recognition.general.acoustic import STATES, density_column, general_model
-from lipmotion.speech.recognition.transcript_evidence import TranscriptEvidence, WordLoss
+from lipmotion.speech.recognition.network.posteriors import POSTERIOR_STEP
+from lipmotion.speech.recognition.transcript_evidence import TranscriptEvidence, WordEvidence, label_evidence
 from lipmotion.types import FRAME_RATE_HZ, Audio, Span, Timeline, Unit
 from lipmotion.units import is_silent
 
@@ -27,6 +28,8 @@ LONG_PHONE_S, LONG_PHONE_SCORE, LEAST_LOUD_S = 0.35, -4.0, 0.2
 transcript leaves out. A sound that is drawn out lasts longer, too, but agrees; a pause before a word is quiet."""
 LEAST_VOICE_S = 1.0
 """Silence with so much loud sound in it is speech that the transcript leaves out; breath and coughs are shorter."""
+LEAST_IDLE_S = 0.3
+"""Given phones in silence for so long are doubted."""
 LEAST_FITTING_SHARE = 0.9
 """A transcript that fits less of the speech is worth a remark."""
 JOINED_S = 0.5
@@ -41,12 +44,15 @@ class TranscriptFit:
     missing  : stretches with speech that the transcript leaves out: their starts and ends in seconds, in order
     speech_s : seconds of speech in the recording, those that are missing included
     evidence : what a phone recogniser says of the transcript, which then decides (None: there is none)
+    idle, wrong : of phones that are given with their times: stretches in which nothing is said, or other phones
     """
 
     score: float
     missing: tuple[tuple[float, float], ...]
     speech_s: float
     evidence: TranscriptEvidence | None = None
+    idle: tuple[tuple[float, float], ...] = ()
+    wrong: tuple[tuple[float, float], ...] = ()
 
     @property
     def is_doubtful(self) -> bool:
@@ -54,14 +60,13 @@ class TranscriptFit:
         return self.evidence.is_doubtful if self.evidence is not None else self.score < DOUBTFUL_SCORE
 
     @property
-    def unsaid(self) -> tuple[WordLoss, ...]:
+    def unsaid(self) -> tuple[WordEvidence, ...]:
         """The words that seem not to be said."""
-        return self.evidence.doubtful_words if self.evidence is not None else ()
+        return self.evidence.unsaid if self.evidence is not None else ()
 
     def with_evidence(self, evidence: TranscriptEvidence) -> TranscriptFit:
         """Return the fit as a phone recogniser judges it."""
-        missing = tuple((gap.start_s, gap.end_s) for gap in evidence.gaps)
-        return replace(self, missing=missing, evidence=evidence)
+        return replace(self, missing=evidence.gaps, evidence=evidence)
 
     @property
     def missing_s(self) -> float:
@@ -73,7 +78,15 @@ class TranscriptFit:
         """The share of the speech that the transcript fits, 0 to 1; 0 where the transcript is of something else."""
         if self.is_doubtful:
             return 0.0
-        return 1.0 - min(self.missing_s / max(self.speech_s, 1e-9), 1.0)
+        doubted_s = self.missing_s + sum(end_s - start_s for start_s, end_s in (*self.idle, *self.wrong))
+        return 1.0 - min(doubted_s / max(self.speech_s, 1e-9), 1.0)
+
+    def of_frames(self, count: int) -> NDArray[np.float64]:
+        """Return in which frames the transcript fits: 1; 0 where it does not [shape=(count,)]."""
+        fits = np.full(count, 0.0 if self.is_doubtful else 1.0)
+        for start_s, end_s in (*self.missing, *self.idle, *self.wrong):
+            fits[_first_frame(start_s) : _first_frame(end_s)] = 0
+        return fits
 
 
 def transcript_fit(audio: Audio, units: Timeline[Unit]) -> TranscriptFit:
@@ -101,6 +114,26 @@ def transcript_fit(audio: Audio, units: Timeline[Unit]) -> TranscriptFit:
                 if float(scored.scores[inside].mean()) < LONG_PHONE_SCORE:
                     missing.append((span.start_s, span.end_s))
     return TranscriptFit(scored.mean(), _joined(missing), speech_s)
+
+
+def label_fit(audio: AnalysedAudio, units: Timeline[Unit], log_posteriors: NDArray[np.float64] | None) -> TranscriptFit:
+    """Return how well phones that are given with their times fit a recording.
+
+    log_posteriors : of a phone recogniser that is sure of what is said, every ``POSTERIOR_STEP`` frames; None: there is
+                     none, and only the loudness is compared
+    Raises MissingDependencyError: pocketsphinx is not installed.
+    """
+    spoken = [span for span in units if not is_silent(span.label.phone)]
+    if log_posteriors is not None:
+        found = label_evidence(log_posteriors, POSTERIOR_STEP / FRAME_RATE_HZ, units)
+        missing, idle, wrong = found.missing, found.idle, found.wrong
+    else:
+        quiet = quiet_frames(audio.log_energy)
+        silent = _joined([(span.start_s, span.end_s) for span in spoken if quiet[_frames_of(span)].all()])
+        idle = tuple((start_s, end_s) for start_s, end_s in silent if end_s - start_s >= LEAST_IDLE_S)
+        missing, wrong = transcript_fit(audio, units).missing, ()
+    fit = TranscriptFit(0.0, missing, sum(span.duration_s for span in spoken), None, idle, wrong)
+    return replace(fit, speech_s=fit.speech_s + fit.missing_s)
 
 
 def _joined(places: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:

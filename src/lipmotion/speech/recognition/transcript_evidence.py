@@ -1,11 +1,10 @@
-"""Whether a transcript is what is said, by the posteriors of a network that hears phones.
+"""Which words of a transcript are said, and where something else is, by the posteriors of a network that hears phones.
 
 The network is trained with connectionist temporal classification (CTC): in a frame it gives the probability of every
 phone, and of none (blank). A path through the frames says the phones of the transcript in their order, each in one
-frame or several, with blanks before, between and after them. How much worse the best such path is than the best path
-that says anything is the loss of the transcript. The loss of a word is what is won where anything may be said in its
-place, less what is won where anything may be said beside it. A gap is where something is said between two words, and
-much is won if it may be.
+frame or several, with blanks before, between and after them. Before, between and after the words it may also say
+anything, at a cost, and leave out words there, at a further cost. The best path decides: a word that it leaves out is
+not said, and where it says anything, speech is left out of the transcript.
 
 Source: Graves, Fernández, Gomez and Schmidhuber 2006, "Connectionist temporal classification". Deviations: the best
 path counts, not the sum of all; a phone may be taken for any that is similar to it (``units.SIMILAR_PHONES``).
@@ -16,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
-from itertools import groupby, pairwise
+from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
@@ -25,61 +24,80 @@ from numpy.typing import NDArray
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import PHONES, SIMILAR_PHONES, is_silent
 
-DOUBTFUL_LOSS = 1.6
-"""A transcript with a higher loss per phone, in nats, is not what is said: right ones have 0 to 1.4, those of other
-sentences 1 to 8 (docs/robustness.md)."""
-DOUBTFUL_WORD_LOSS = 22.0
-"""A word with a higher loss, in nats, is not said: those of right transcripts reach 20."""
-MISSING_GAIN, LEAST_GAP_S = 6.0, 0.2
-"""Where more is won between two words, in nats, over so long a time, speech is left out: right transcripts reach 5."""
+GAP_COST, WORD_COST, PHONE_COST = 6.0, 9.0, 1.0
+"""What it costs, in nats, that anything is said; that words are left out there; and each phone of these words."""
+LEAST_HEARD = 1.0
+"""Something is said in a frame in which any phone is so many nats more probable than none."""
+LEAST_GAP_S = 0.1
+"""Where something else is said for a shorter time, no speech is missing."""
+LEAST_SAID_SHARE = 0.25
+"""A transcript of which so small a share of the phones is said is not that of the recording."""
 LEAST_LOG_POSTERIOR = -23.0
 """No frame counts for less: what the network holds for impossible is as good as any other mistake."""
+LARGEST_SEARCH = 20_000_000
+"""Frames times phones that are searched at once, about three minutes of speech."""
 LEAST_STRETCH_S, LONGEST_STRETCH_S = 10.0, 30.0
-"""A long recording is divided at the first silence after so many seconds, or else at the first word after so many."""
+"""A longer recording is divided at the first silence after so many seconds, or else at the first word after so many."""
+
+LABEL_REACH_S, COMPARED, LEAST_AGREEING = 0.1, 9, 0.4
+"""Given phones are compared with what is heard so near to them; of so many together fewer agree if they are wrong."""
+RUN_PAUSE_S, LEAST_RUN, LEAST_DOUBT_S = 0.5, 3, 0.3
+"""What is doubted is a stretch if it is nearer to one another, and so much and so long together."""
 
 Array = NDArray[np.float64]
 Columns = NDArray[np.intp]
 
 
-class WordLoss(NamedTuple):
-    """A word of a transcript, where it was aligned, and its loss in nats."""
+class WordEvidence(NamedTuple):
+    """A word of a transcript, its phones, and its times: where it is heard, or was aligned if it is not said."""
 
     word: str
+    phones: tuple[str, ...]
     start_s: float
     end_s: float
-    loss: float
+    is_said: bool
 
 
-class Gap(NamedTuple):
-    """Where something is said that the transcript leaves out, in seconds, and the nats that are won by it."""
+class OtherSpeech(NamedTuple):
+    """Where something else is said than the transcript has: times in seconds, and words that are left out there.
+
+    first, stop : numbers of these words; the same where speech is added alone
+    If nothing at all is said in place of the words, it has no duration.
+    """
 
     start_s: float
     end_s: float
-    gain: float
+    first: int
+    stop: int
 
 
 @dataclass(frozen=True)
 class TranscriptEvidence:
-    """What the posteriors say of a transcript.
+    """What the posteriors say of a transcript: its words, and where something else is said, in their order."""
 
-    loss  : mean loss per phone in nats, about 0 or more; infinite where the phones do not fit into the frames
-    words : the words in time, each with its loss
-    gaps  : the places between words where speech is left out
-    """
-
-    loss: float
-    words: tuple[WordLoss, ...]
-    gaps: tuple[Gap, ...]
+    words: tuple[WordEvidence, ...]
+    others: tuple[OtherSpeech, ...]
 
     @property
-    def doubtful_words(self) -> tuple[WordLoss, ...]:
+    def gaps(self) -> tuple[tuple[float, float], ...]:
+        """Where speech is left out of the transcript, in seconds."""
+        return tuple((each.start_s, each.end_s) for each in self.others if each.end_s - each.start_s >= LEAST_GAP_S)
+
+    @property
+    def unsaid(self) -> tuple[WordEvidence, ...]:
         """The words that are not said."""
-        return tuple(word for word in self.words if word.loss > DOUBTFUL_WORD_LOSS)
+        return tuple(word for word in self.words if not word.is_said)
+
+    @property
+    def said_share(self) -> float:
+        """The share of the transcript's phones whose words are said, 0 to 1; 1 without words."""
+        said, count = (sum(len(word.phones) for word in self.words if word.is_said or every) for every in (False, True))
+        return said / count if count else 1.0
 
     @property
     def is_doubtful(self) -> bool:
         """Whether the transcript as a whole is something else than what is said."""
-        return self.loss > DOUBTFUL_LOSS
+        return self.said_share < LEAST_SAID_SHARE
 
 
 def transcript_evidence(log_posteriors: Array, frame_s: float, units: Timeline[Unit]) -> TranscriptEvidence:
@@ -88,7 +106,7 @@ def transcript_evidence(log_posteriors: Array, frame_s: float, units: Timeline[U
     log_posteriors : natural logarithms, of ``PHONES`` in their order and of the blank, the last [shape=(T, 48)]
     frame_s : seconds from frame to frame
     units   : the phones of the transcript, aligned with the recording; of their times only the silences count, where a
-              long recording is divided, and the words', which are returned
+              long recording is divided, and those of words that are not said
     Raises ValueError: the posteriors are not of all phones, or end before the phones.
     """
     spoken_s = max((span.end_s for span in units if not is_silent(span.label.phone)), default=0.0)
@@ -96,31 +114,21 @@ def transcript_evidence(log_posteriors: Array, frame_s: float, units: Timeline[U
         raise ValueError(f"posteriors of {len(log_posteriors) * frame_s:.2f} s, required {spoken_s:.2f}")
     if log_posteriors.shape[1] != len(PHONES) + 1:
         raise ValueError(f"posteriors of {log_posteriors.shape[1]} classes, required {len(PHONES) + 1}")
-    total, phones = 0.0, 0
-    words: list[WordLoss] = []
-    gaps: list[Gap] = []
-    for stretch in _parts(units):
-        first, stop = round(stretch.start_s / frame_s), round(stretch.end_s / frame_s)
-        if stretch.is_last:
-            stop = len(log_posteriors)
-        losses = _losses(log_posteriors[first:stop], stretch.columns())
-        total, phones = total + losses.total, phones + sum(len(spans) for spans in stretch.words)
-        words += [
-            WordLoss(spans[0].label.word, spans[0].start_s, spans[-1].end_s, float(loss))
-            for spans, loss in zip(stretch.words, losses.of_words, strict=True)
-        ]
-        gaps += [Gap((first + begin) * frame_s, (first + end) * frame_s, gain) for begin, end, gain in losses.gaps]
-    return TranscriptEvidence(total / max(phones, 1), tuple(words), _largest(gaps))
-
-
-def _largest(gaps: Sequence[Gap]) -> tuple[Gap, ...]:
-    """Return the gaps that count, in order: of those that overlap, the one where most is won."""
-    kept: list[Gap] = []
-    long = [gap for gap in gaps if gap.gain > MISSING_GAIN and gap.end_s - gap.start_s >= LEAST_GAP_S]
-    for gap in sorted(long, key=lambda gap: -gap.gain):
-        if all(gap.end_s <= each.start_s or each.end_s <= gap.start_s for each in kept):
-            kept.append(gap)
-    return tuple(sorted(kept))
+    log_posteriors = np.maximum(log_posteriors, LEAST_LOG_POSTERIOR)
+    words: list[WordEvidence] = []
+    others: list[OtherSpeech] = []
+    for part in _parts(units, divided=len(log_posteriors) * len(units) > LARGEST_SEARCH):
+        at, stop = round(part.start_s / frame_s), round(part.end_s / frame_s)
+        path = _best_path(log_posteriors[at : None if part.is_last else stop], part.columns())
+        for (begin, end), (left, back) in path.free:
+            start_s, end_s = (at + begin) * frame_s, (at + end) * frame_s
+            others.append(OtherSpeech(start_s, end_s, len(words) + left, len(words) + back))
+        for spans, heard in zip(part.words, path.words, strict=True):
+            said, (start_s, end_s) = tuple(span.label.phone for span in spans), (spans[0].start_s, spans[-1].end_s)
+            if heard is not None:
+                start_s, end_s = (at + heard[0]) * frame_s, (at + heard[1]) * frame_s
+            words.append(WordEvidence(spans[0].label.word, said, start_s, end_s, heard is not None))
+    return TranscriptEvidence(tuple(words), tuple(others))
 
 
 class _Part(NamedTuple):
@@ -136,8 +144,8 @@ class _Part(NamedTuple):
         return [np.array([PHONES.index(span.label.phone) for span in spans]) for spans in self.words]
 
 
-def _parts(units: Timeline[Unit]) -> Iterator[_Part]:
-    """Yield a recording in parts that are short enough to be searched, cut in silence where there is some."""
+def _parts(units: Timeline[Unit], divided: bool) -> Iterator[_Part]:
+    """Yield a recording; ``divided``: in parts that are short enough to be searched, cut in silence if possible."""
     start_s = before_s = 0.0
     words: list[list[Span[Unit]]] = []
     for (silent, _), group in groupby(units, key=lambda span: (is_silent(span.label.phone), span.label.word)):
@@ -145,7 +153,7 @@ def _parts(units: Timeline[Unit]) -> Iterator[_Part]:
         if silent:
             continue
         pause_s, so_far_s = spans[0].start_s - before_s, before_s - start_s
-        if words and so_far_s > (LEAST_STRETCH_S if pause_s > 0 else LONGEST_STRETCH_S):
+        if divided and words and so_far_s > (LEAST_STRETCH_S if pause_s > 0 else LONGEST_STRETCH_S):
             cut_s = before_s + pause_s / 2
             yield _Part(start_s, cut_s, words, is_last=False)
             start_s, words = cut_s, []
@@ -154,63 +162,162 @@ def _parts(units: Timeline[Unit]) -> Iterator[_Part]:
     yield _Part(start_s, units[-1].end_s if len(units) else 0.0, words, is_last=True)
 
 
-class _Losses(NamedTuple):
-    """Losses in nats.
+class _Path(NamedTuple):
+    """The best path through some frames.
 
-    total    : of the whole stretch
-    of_words : of each word [shape=(W,)]
-    gaps     : before each word and after the last: first frame, the one after the last, and what is won
+    words : the first frame of each word and the one after its last; None: it is left out
+    free  : where anything is said: the first frame in which a phone is heard and the one after the last; the first word
+            that is left out there and the one after the last
     """
 
-    total: float
-    of_words: Array
-    gaps: list[tuple[int, int, float]]
+    words: list[tuple[int, int] | None]
+    free: list[tuple[tuple[int, int], tuple[int, int]]]
 
 
-def _losses(log_posteriors: Array, words: Sequence[Columns]) -> _Losses:
-    """Return the losses of the words of a stretch."""
-    log_posteriors = np.maximum(log_posteriors, LEAST_LOG_POSTERIOR)
+BLANK, PHONE, FREE, INSTEAD = range(4)
+"""How a path is after n phones: in a blank; in the nth of them; it says anything between words, or in place of some."""
+STAYED, BEGAN, SKIPPED = range(3)
+"""How it came to say anything there: it did before; it begins; a word more is left out."""
+
+
+def _best_path(log_posteriors: Array, words: Sequence[Columns]) -> _Path:
+    """Return the best path that says words, leaves some of them out, and says anything between them."""
     columns = np.concatenate([np.zeros(0, np.intp), *words])
+    frames, count = len(log_posteriors), len(columns)
+    edges = np.cumsum([0, *map(len, words)])
     spoken = np.log(np.exp(log_posteriors) @ _taken_for())[:, columns]
     silent = np.logaddexp.reduce(log_posteriors[:, _silent_columns()], axis=1)
-    before = _best_paths(spoken, silent, columns)
-    after = _best_paths(spoken[::-1, ::-1], silent[::-1], columns[::-1])[::-1, ::-1]
-    free = np.concatenate([[0.0], np.cumsum(np.maximum(log_posteriors.max(axis=1), silent))])
-    path = before[-1, -1]
-    edges = np.cumsum([0, *map(len, words)])
-    if not np.isfinite(path):
-        return _Losses(np.inf, np.full(len(words), np.inf), [])
+    anything = np.maximum(log_posteriors.max(axis=1), silent)
+    same = np.concatenate([[False], columns[1:] == columns[:-1]])[:count] & ~np.isin(np.arange(count), edges)
+    entered = np.zeros((frames, count), bool)
+    arrivals = np.zeros((frames + 1, count + 1), np.int8)
+    ways = np.zeros((frames, 2, len(edges)), np.int8)
+    blank, phone = np.full(count + 1, -np.inf), np.full(count + 1, -np.inf)
+    free, instead = np.full(len(edges), -np.inf), np.full(len(edges), -np.inf)
+    blank[0] = 0.0
+    for t in range(frames + 1):
+        arrived = np.maximum(blank, phone)
+        arrivals[t] = np.where(phone >= blank, PHONE, BLANK)
+        either = np.maximum(free, instead)
+        arrivals[t, edges] = np.where(
+            either > arrived[edges], np.where(free > instead, FREE, INSTEAD), arrivals[t, edges]
+        )
+        arrived[edges] = np.maximum(arrived[edges], either)
+        if t == frames:
+            break
+        begun = arrived[edges] - GAP_COST
+        ways[t, 0] = np.where(begun > free, BEGAN, STAYED)
+        free = np.maximum(free, begun)
+        first = np.append(-np.inf, free[:-1] + PHONE_COST * edges[:-1] - WORD_COST)  # one word is left out
+        going = instead + PHONE_COST * edges
+        further = np.maximum.accumulate(np.maximum(going, first))
+        ways[t, 1] = np.where(going >= further, STAYED, np.where(first >= further, BEGAN, SKIPPED))
+        instead = further - PHONE_COST * edges + anything[t]
+        free = free + anything[t]
+        before = np.where(same, blank[:-1], arrived[:-1])
+        entered[t] = before > phone[1:]
+        phone[1:] = np.maximum(phone[1:], before) + spoken[t]
+        blank = arrived + silent[t]
+    return _traced(arrivals, entered, ways, same, edges, anything - silent)
 
-    def freed(first: int, stop: int) -> tuple[int, int, float]:
-        """Return where anything is best said in place of some phones: the frames, and the nats that are won."""
-        until = before[:, first] - free
-        through = free + after[:, stop] + np.maximum.accumulate(until)
-        end = int(through.argmax())
-        return int(until[: end + 1].argmax()), end, float(through[end] - path)
 
-    gaps = [freed(edge, edge) for edge in edges]
-    won = np.array([gain for *_, gain in gaps])
-    of_words = [freed(first, stop)[2] for first, stop in pairwise(edges)]
-    return _Losses(float(free[-1] - path), np.array(of_words) - np.maximum(won[:-1], won[1:]), gaps)
+def _traced(
+    arrivals: NDArray[np.int8],
+    entered: NDArray[np.bool_],
+    ways: NDArray[np.int8],
+    same: NDArray[np.bool_],
+    edges: Columns,
+    heard: Array,
+) -> _Path:
+    """Return the words and free stretches of the best path, which is followed from its end.
 
-
-def _best_paths(spoken: Array, silent: Array, columns: Columns) -> Array:
-    """Return the log probability of the best path through the first t frames that says the first n phones.
-
-    spoken  : log probability of every phone in every frame [shape=(T, N)];  silent : of none [shape=(T,)]
-    columns : which phone each is: between two that are the same there is a blank [shape=(N,)]
-    Returns [shape=(T + 1, N + 1)]; −∞ where there is no such path.
+    heard : how much more probable anything is than nothing, in every frame [shape=(T,)]
     """
-    paths = np.full((len(spoken) + 1, len(columns) + 1), -np.inf)
-    paths[0, 0] = 0.0
-    in_blank, in_phone = paths[0].copy(), np.full(len(columns) + 1, -np.inf)
-    same = np.concatenate([[False], columns[1:] == columns[:-1]]) if len(columns) else np.zeros(0, bool)
-    for t in range(len(spoken)):
-        entered = np.maximum(in_blank[:-1], np.where(same, -np.inf, in_phone[:-1]))
-        in_blank = np.maximum(in_blank, in_phone) + silent[t]
-        in_phone[1:] = np.maximum(in_phone[1:], entered) + spoken[t]
-        paths[t + 1] = np.maximum(in_blank, in_phone)
-    return paths
+    place, how = int(edges[-1]), int(arrivals[-1, -1])
+    words: list[tuple[int, int] | None] = [None] * (len(edges) - 1)
+    free: list[tuple[tuple[int, int], tuple[int, int]]] = []
+    last: tuple[int, int] | None = None  # the end of a free stretch: its frame, the word after it
+    for t in reversed(range(len(heard))):
+        word = int(np.searchsorted(edges, place))  # the one that ends at this place is before it
+        if how == BLANK:
+            how = int(arrivals[t, place])
+        elif how == PHONE:
+            words[word - 1] = (t, (words[word - 1] or (t, t + 1))[1])
+            if entered[t, place - 1]:
+                place -= 1
+                how = BLANK if same[place] else int(arrivals[t, place])
+        else:
+            last = last or (t + 1, word)
+            while how == INSTEAD and ways[t, 1, word] != STAYED:
+                how = FREE if ways[t, 1, word] == BEGAN else INSTEAD
+                word -= 1
+            place = int(edges[word])
+            if how == FREE and ways[t, 0, word] == BEGAN:
+                loud = t + np.flatnonzero(heard[t : last[0]] > LEAST_HEARD)
+                where = (int(loud[0]), int(loud[-1]) + 1) if len(loud) else (t, t)
+                free.append((where, (word, last[1])))
+                last, how = None, int(arrivals[t, place])
+    return _Path(words, free[::-1])
+
+
+class LabelEvidence(NamedTuple):
+    """Where phones with given times are not what is said [each: starts and ends in seconds].
+
+    missing : something is said where they have silence
+    idle    : nothing is said where they have phones
+    wrong   : other phones are said
+    """
+
+    missing: tuple[tuple[float, float], ...]
+    idle: tuple[tuple[float, float], ...]
+    wrong: tuple[tuple[float, float], ...]
+
+
+def label_evidence(log_posteriors: Array, frame_s: float, units: Timeline[Unit]) -> LabelEvidence:
+    """Return where the posteriors contradict phones with given times (as of ``transcript_evidence``).
+
+    A phone is compared with what is heard at most ``LABEL_REACH_S`` away from it.
+    """
+    spoken = [span for span in units if not is_silent(span.label.phone)]
+    starts_s = np.array([span.start_s for span in spoken], float)
+    ends_s = np.array([span.end_s for span in spoken], float)
+    phones = np.array([PHONES.index(span.label.phone) for span in spoken], np.intp)
+    best = log_posteriors.argmax(axis=1)
+    heard = np.flatnonzero(~np.isin(best, _silent_columns()) & (np.diff(best, prepend=-1) != 0))
+    times_s: Array = ((heard + 0.5) * frame_s).astype(float)
+    first = np.searchsorted(ends_s, times_s - LABEL_REACH_S)
+    stop = np.searchsorted(starts_s, times_s + LABEL_REACH_S, "right")
+    is_near, agrees = np.zeros(len(spoken), bool), np.zeros(len(spoken), bool)
+    confirmed = np.zeros(len(heard), bool)
+    for number, column in enumerate(best[heard]):
+        nearby = slice(first[number], stop[number])
+        alike = _taken_for()[column, phones[nearby]] > 0
+        is_near[nearby], agrees[nearby], confirmed[number] = True, agrees[nearby] | alike, alike.any()
+    alone = first >= stop
+    middles_s: Array = (starts_s + ends_s) / 2
+    compared_s = np.concatenate([times_s[~alone], middles_s[is_near]])
+    order = compared_s.argsort()
+    right = np.concatenate([confirmed[~alone], agrees[is_near]])[order].astype(float)
+    window = np.ones(min(COMPARED, max(len(right), 1)))
+    share = (
+        np.convolve(right, window, "same") / np.convolve(np.ones(len(right)), window, "same") if len(right) else right
+    )
+    doubted_s = compared_s[order][share < LEAST_AGREEING]
+    idle, wrong = _runs(starts_s[~is_near], ends_s[~is_near]), _runs(doubted_s, doubted_s)
+    return LabelEvidence(_runs(times_s[alone], times_s[alone], LEAST_GAP_S), idle, wrong)
+
+
+def _runs(starts_s: Array, ends_s: Array, least_s: float = LEAST_DOUBT_S) -> tuple[tuple[float, float], ...]:
+    """Return stretches of at least ``LEAST_RUN`` times near one another."""
+    if not len(starts_s):
+        return ()
+    cuts = np.flatnonzero(starts_s[1:] - ends_s[:-1] > RUN_PAUSE_S) + 1
+    runs = zip(np.split(starts_s, cuts), np.split(ends_s, cuts), strict=True)
+    return tuple(
+        (float(first[0]), float(last[-1]))
+        for first, last in runs
+        if len(first) >= LEAST_RUN and last[-1] - first[0] >= least_s
+    )
 
 
 @cache
