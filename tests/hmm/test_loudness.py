@@ -6,7 +6,21 @@ from hypothesis import strategies as st
 from hmm.synthetic import PAUSE, SILENCE, known_hmm, speaker
 from lipmotion.hmm.align import align_units, choose_pronunciations
 from lipmotion.hmm.log_likelihoods import log_likelihoods_of, penalise_silence, penalise_speech
-from lipmotion.hmm.loudness import QUIET_DISTANCE, QUIET_REACH_FRAMES, loud_frames, quiet_frames
+from lipmotion.hmm.loudness import (
+    LEAST_FRAMES,
+    PAUSE_FRAMES,
+    QUIET_DROP,
+    QUIET_REACH_FRAMES,
+    frames_above,
+    levels_of,
+    quiet_frames,
+    silence_weights,
+    sound_runs,
+    spoken_frames,
+)
+
+ROOM = -10.0
+"""The level of the room in ``line``, in which the loudest moments have 0."""
 
 
 def energy(seed: int = 0) -> np.ndarray:
@@ -14,9 +28,21 @@ def energy(seed: int = 0) -> np.ndarray:
     return np.repeat([0.0, 10.0, 0.0], [40, 60, 40]) + np.random.default_rng(seed).normal(0, 0.5, 140)
 
 
-@given(gain=st.floats(0.01, 100), offset=st.floats(-50, 50))
-def test_loud_is_relative_to_the_recording(gain, offset):
-    loud = np.nonzero(loud_frames(gain * energy() + offset, 5))[0]
+def line(before: int = 60, after: int = 60, seed: int = 1) -> np.ndarray:
+    """Eight syllables with closures between them in a room that is heard."""
+    syllable = np.r_[-6 * np.cos(np.linspace(0.5, 2 * np.pi - 0.5, 25)) ** 2, np.full(6, ROOM + 1)]
+    level = np.r_[np.full(before, ROOM), np.tile(syllable, 8), np.full(after, ROOM)]
+    return level + np.random.default_rng(seed).normal(0, 0.3, len(level))
+
+
+def around(frames: int, level: float, seed: int = 2) -> np.ndarray:
+    """Another silence: digital, or of another noise."""
+    return level + np.random.default_rng(seed).normal(0, 0.3, frames)
+
+
+@given(offset=st.floats(-50, 50))
+def test_loud_is_relative_to_the_recording(offset):
+    loud = np.nonzero(frames_above(energy() + offset, smoothing=5))[0]
     assert (loud[0], loud[-1]) == pytest.approx((40, 99), abs=1)
     assert len(loud) == loud[-1] - loud[0] + 1
 
@@ -24,18 +50,55 @@ def test_loud_is_relative_to_the_recording(gain, offset):
 def test_clicks_shorter_than_the_smoothing_are_not_loud():
     clicks = energy()
     clicks[[10, 120]] = 12.0
-    assert loud_frames(clicks, 1)[[10, 120]].all()
-    assert not loud_frames(clicks, 5)[[10, 120]].any()
+    assert frames_above(clicks, smoothing=1)[[10, 120]].all()
+    assert not frames_above(clicks, smoothing=5)[[10, 120]].any()
 
 
 def test_nothing_is_loud_in_the_shortest_recordings_and_where_nothing_changes():
     for frames in (1, 2, 3):
-        assert not loud_frames(np.full(frames, -3.0), 21).any()
+        assert not frames_above(np.full(frames, -3.0), smoothing=21).any()
     for level in (-69.0, 20.0):
         steady = (level * (1 + 1e-7 * np.random.default_rng(0).uniform(-1, 1, 300))).astype(np.float32)
-        assert not loud_frames(steady, 11).any()
+        assert not frames_above(steady).any()
     for frames in (1, 40):
         assert not quiet_frames(np.full(frames, -9.0, np.float32)).any()
+
+
+@pytest.mark.parametrize("frames", [50, 500, 6000])
+@pytest.mark.parametrize("other", [ROOM - 15, ROOM - 3, ROOM + 3])
+def test_another_silence_around_a_recording_changes_no_level_and_no_weight(frames: int, other: float):
+    alone = line()
+    pad = around(frames, other)
+    padded = np.r_[pad, alone, pad]
+    own = slice(frames, frames + len(alone))
+    assert levels_of(padded) == pytest.approx(levels_of(alone), abs=0.1)
+    assert levels_of(alone) == pytest.approx((-2, ROOM), abs=1.5)
+    assert np.array_equal(spoken_frames(padded)[own], spoken_frames(alone))
+    assert silence_weights(padded)[own] == pytest.approx(silence_weights(alone), abs=1e-9)
+    assert quiet_frames(padded)[: frames - 60].all() == (other < -QUIET_DROP - 2)
+
+
+@pytest.mark.parametrize("silence", [0, 10, 60, 300, 3000])
+def test_silence_counts_half_however_long_it_is(silence: int):
+    level = line(silence, silence)
+    weights, sound = silence_weights(level), spoken_frames(level)
+    assert weights.sum() == pytest.approx(1)
+    assert weights[sound].sum() == pytest.approx(0.5 if silence > 20 else 1, abs=0.01)
+    assert weights.min() >= 0
+    assert weights @ level == pytest.approx(silence_weights(line()) @ line(), abs=1.0)
+
+
+def test_all_frames_count_the_same_where_none_has_sound():
+    assert silence_weights(np.full(40, -3.0)) == pytest.approx(1 / 40)
+
+
+def test_short_pauses_are_part_of_the_sound_and_clicks_are_none():
+    sound = np.zeros(400, bool)
+    sound[100:150] = sound[150 + PAUSE_FRAMES - 1 : 250] = True
+    sound[300 : 300 + LEAST_FRAMES - 1] = True
+    assert sound_runs(sound) == [(100, 250)]
+    assert sound_runs(sound, 10) == [(100, 150), (150 + PAUSE_FRAMES - 1, 250)]
+    assert sound_runs(np.zeros(9, bool)) == []
 
 
 def stranger():
@@ -73,9 +136,9 @@ def test_loud_frames_are_not_chosen_as_pauses():
 
 
 def test_quiet_frames_are_far_under_the_loud_ones_and_away_from_them():
-    level = np.full(200, -QUIET_DISTANCE - 1)
+    level = np.full(200, -QUIET_DROP - 1)
     level[50:120] = 0
-    level[70:76] = -QUIET_DISTANCE - 9  # the closure of a stop
+    level[70:76] = -QUIET_DROP - 9  # the closure of a stop
     quiet = quiet_frames(level.astype(np.float32))
     assert quiet[: 50 - QUIET_REACH_FRAMES].all()
     assert quiet[120 + QUIET_REACH_FRAMES :].all()

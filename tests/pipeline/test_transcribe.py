@@ -14,7 +14,7 @@ from lipmotion.pipeline.understand.transcribe import (
     warn_of_guesses,
     warn_of_misfit,
 )
-from lipmotion.pipeline.understand.understood_speech import recognised_with
+from lipmotion.pipeline.understand.understood_speech import relied_on
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.mfcc import mfcc
 from lipmotion.speech.recognition.agreement import TranscriptFit
@@ -123,7 +123,7 @@ def corrected(audio: AnalysedAudio, words: tuple[str, ...]) -> Transcription:
     phones = Recogniser(load_model().phones, "auto")
 
     def recognised() -> Timeline[Unit]:
-        return recognised_with(phones.recognise(audio, audio.mfcc()), 0.7)
+        return relied_on(phones.recognise(audio, audio.mfcc()), 0.7)
 
     return transcribe(phones, audio, audio.mfcc(), words, Lexicon(), recognised)
 

@@ -15,6 +15,7 @@ from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import Engine
 from lipmotion.errors import AlignmentError, CorpusError
 from lipmotion.measures.evaluation_table import figures_table
+from lipmotion.pipeline.evaluation import held_out as held_out_module
 from lipmotion.pipeline.evaluation.evaluate import _was_trained_on
 from lipmotion.pipeline.evaluation.evaluate import evaluate as evaluated
 from lipmotion.pipeline.evaluation.figures import figures_of
@@ -24,8 +25,9 @@ from lipmotion.pipeline.evaluation.held_out import (
     held_out_recordings,
     speech_of_condition,
 )
+from lipmotion.pipeline.generate.generation_for import generate_for
 from lipmotion.pipeline.model import Model
-from lipmotion.speech.recognition.recogniser import cached_recogniser
+from lipmotion.speech.recognition.recogniser import NO_WEIGHT_SCORE, OWN_VOICE_SCORE, cached_recogniser
 from lipmotion.testing.toy import toy_motion, toy_sentences
 from lipmotion.types import Channel, Generation, Motion, Speech, StateTrace, Timeline, Unit, Utterance
 from lipmotion.units import Lexicon
@@ -38,7 +40,7 @@ FIGURES = "channels acc amse leading lag_ms opening_acc_95 closures closures_p_b
 
 @dataclass(frozen=True, eq=False)
 class Medium(Engine[Mapping[float, Motion]]):
-    """Knows the motion of every recording by the recording's length."""
+    """Knows the motion of every recording by the recording's length, which has one passage."""
 
     config: Any
     name: ClassVar[str] = "medium"
@@ -64,6 +66,16 @@ class Shut(Medium):
         return Medium(self.config)
 
 
+@pytest.fixture(autouse=True)
+def _whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The medium knows recordings, not passages."""
+
+    def whole(person: Any, engine: Any, model: Any, speech: Speech) -> Generation:
+        return generate_for(person, engine, model, replace(speech, parts=None))
+
+    monkeypatch.setattr(held_out_module, "generate_for", whole)
+
+
 @pytest.fixture(scope="module")
 def known() -> dict[float, Motion]:
     """The true motion of the toy sentences at 100 Hz."""
@@ -74,7 +86,7 @@ def test_a_voice_is_as_well_known_as_in_animation(toy_model: Model, toy_corpus: 
     """Whatever engine recognises nothing itself generates the motion of strangers as such."""
     phones = cached_recogniser(toy_model.phones, "own")
     recordings = held_out_recordings(toy_corpus, phones, selection=Selection(split="val"), lexicon=Lexicon())
-    for score, voice in ((-9.0, 0.0), (-6.0, 0.5), (0.0, 1.0)):
+    for score, voice in ((NO_WEIGHT_SCORE, 0.0), ((NO_WEIGHT_SCORE + OWN_VOICE_SCORE) / 2, 0.5), (0.0, 1.0)):
         found = [replace(each, similarity=score) for each in recordings.recognitions]
         speeches = speech_of_condition(replace(recordings, recognitions=found), AUDIO_ONLY, Medium(None), {})
         assert [speech.voice for speech in speeches] == pytest.approx([voice] * len(found))

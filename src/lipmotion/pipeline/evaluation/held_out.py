@@ -22,7 +22,7 @@ from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.training.channels import GEOMETRY, with_visual_channels
 from lipmotion.pipeline.training.train import phones_of
 from lipmotion.pipeline.understand.transcribe import warn_of_guesses
-from lipmotion.pipeline.understand.understood_speech import known_voice, recognised_speech, speech_of
+from lipmotion.pipeline.understand.understood_speech import recognised_speech, speech_of, with_voice
 from lipmotion.speech.recognition.recognised_speech import Recognition
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.types import (
@@ -236,7 +236,7 @@ def speech_of_condition(
             for u, units in zip(recordings.utterances, recordings.conditions[condition], strict=True)
         ]
     return [
-        replace(with_prior(prior, speech), voice=known_voice(phones.own, utterance.audio, speech, found))
+        with_prior(prior, with_voice(phones.own, utterance.audio, speech, found))
         for utterance, (speech, found) in zip(recordings.utterances, pairs, strict=True)
     ]
 

@@ -76,6 +76,7 @@ def explain_session(session: Session, edits: Edits, times: Sequence[float]) -> t
         first, _, part = within[0] if within else (frame + 1, None, speech)
         by_engine = None
         if 0 <= frame - first < len(part.features.values):  # not in the silence between passages
+            part = replace(part, times_given=speech.times_given)
             by_engine = session.model.engine.explain(session.model.learned, part, [frame - first])
         if by_engine is None:
             found.append(explain_by_trace(generation, frame))

@@ -167,6 +167,8 @@ def _of_parts(
     motion = replace(rest.motion, values=values)
     held = [(pinned_frame(pin, motion, is_weight=False), motion.column(pin.channel), pin.value) for pin in pins]
     bend_through_pins(values, held, REACH_FRAMES)  # those in silence; the others hold but for the way to rest
+    bounded = [_is_never_negative(channel) for channel in motion.channels]
+    values[:, bounded] = np.maximum(values[:, bounded], 0)
     if not isinstance(spread, ReducedVariance):
         for frame, column, _ in held:
             spread[frame, column] = 0

@@ -169,23 +169,27 @@ def understood_speech(
     if found is not None and request.language == ENGLISH:
         warn_of_another_language(found)
     given = request.units is not None or understood.fit is not None
-    voice = known_voice(model.phones, audio, speech, found, given=given)
-    speech = replace(_with_voices(model.phones, audio, speech, voice), voice=voice)
-    return replace(understood, speech=replace(with_prior(model.prior, speech), voice=voice))
+    speech = with_voice(model.phones, audio, speech, found, given=given)
+    return replace(understood, speech=with_prior(model.prior, speech))
 
 
-def _with_voices(phones: UnitHmm, audio: AnalysedAudio, speech: Speech, voice: float) -> Speech:
-    """Return speech in whose passages it is known how well the model knows each voice.
+def with_voice(
+    phones: UnitHmm, audio: Audio, speech: Speech, found: Recognition | None, *, given: bool = False
+) -> Speech:
+    """Return speech that says how well a model knows its voice, that of the recording and that of each passage.
 
-    voice : 0 to 1, that of the recording; 1: the engine recognised the speaker
+    phones, found, given : as of ``known_voice``
     """
-    parts = [
-        part._replace(speech=replace(part.speech, voice=1.0 if voice == 1 else _voice_of(phones, passage.audio)))
-        for part in speech.parts or ()
-        for passage in audio.passages
-        if passage.first == part.first
-    ]
-    return replace(speech, parts=None if speech.parts is None else tuple(parts))
+    voice, parts = known_voice(phones, audio, speech, found, given=given), speech.parts
+    if parts is not None and len(parts) > 1 and voice < 1:
+        sounds = {passage.first: passage.audio for passage in analysed(audio).passages}
+        voices = [_voice_of(phones, sounds[part.first]) for part in parts]
+    else:
+        voices = [voice] * len(parts or ())
+    if parts is not None:
+        known = zip(parts, voices, strict=True)
+        parts = tuple(part._replace(speech=replace(part.speech, voice=each)) for part, each in known)
+    return replace(speech, voice=voice, parts=parts)
 
 
 def _voice_of(phones: UnitHmm, audio: AnalysedAudio) -> float:
