@@ -18,7 +18,7 @@ from lipmotion.testing.toy import ToySentence
 WORDS = "See Bob, papa & mama!"
 
 
-def test_it_explains_what_animate_makes(coupled_model: Model, toy_sentence: ToySentence, toy_speech: Path) -> None:
+def test_it_explains_what_animate_makes(coupled_model: Model, toy_speech: Path) -> None:
     result = lipmotion.animate(toy_speech, model=coupled_model, transcript=WORDS)
     one, other = lipmotion.explain(toy_speech, at=[0.804, 1.0], model=coupled_model, transcript=WORDS)
     assert (one.frame, one.time_s, other.frame) == (80, 0.8, 100)
@@ -27,7 +27,7 @@ def test_it_explains_what_animate_makes(coupled_model: Model, toy_sentence: ToyS
     assert one.span in result.units.spans
     assert result.confidence is not None
     assert [one.confidence, other.confidence] == pytest.approx(result.confidence[[80, 100]].tolist(), abs=1e-6)
-    (same,) = lipmotion.explain(SpeechRequest(toy_sentence.audio, units=result.units), at=0.8, model=coupled_model)
+    (same,) = lipmotion.explain(SpeechRequest(toy_speech, units=result.units), at=0.8, model=coupled_model)
     assert same.state == one.state
     assert [chain.name for chain in one.chains] == ["sVis", "2vis"]
     assert sum(one.chains[1].lead.values()) == pytest.approx(1, abs=1e-4)

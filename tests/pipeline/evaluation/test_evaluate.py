@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -66,14 +66,16 @@ class Shut(Medium):
         return Medium(self.config)
 
 
-@pytest.fixture(autouse=True)
-def _whole(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture(scope="module", autouse=True)
+def _whole() -> Iterator[None]:
     """The medium knows recordings, not passages."""
 
     def whole(person: Any, engine: Any, model: Any, speech: Speech) -> Generation:
         return generate_for(person, engine, model, replace(speech, parts=None))
 
-    monkeypatch.setattr(held_out_module, "generate_for", whole)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(held_out_module, "generate_for", whole)
+        yield
 
 
 @pytest.fixture(scope="module")
