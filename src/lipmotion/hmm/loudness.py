@@ -28,12 +28,6 @@ NEAR_LOUD = 20 * DECIBEL
 """The noise is measured around frames no further beneath the loud level."""
 PAUSE_FRAMES, LEAST_FRAMES = 30, 6
 """Shorter pauses are part of the sound around them; shorter sounds are clicks."""
-SILENCE_SHARE = 0.5
-"""How much silence counts: it is half of GRID's sentences (0.50 ± 0.08 in 150 of speaker s1)."""
-SILENCE_FROM, SILENCE_TO = 10, 30
-"""Silence is measured so many frames beside sound: further away it may be another room's, or digital."""
-QUIETEST = 0.1
-"""Where there is none, as many of the quietest frames of the sound stand for it."""
 QUIET_REACH_FRAMES = 10
 """A frame is quiet only if all frames within so many are: the closure of a stop is part of speech."""
 
@@ -106,27 +100,6 @@ def spoken_frames(log_energy: NDArray[np.floating]) -> NDArray[np.bool_]:
     for first, end in sound_runs(frames_above(log_energy)):
         spoken[first:end] = True
     return spoken
-
-
-def silence_weights(log_energy: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Return how much each frame counts in statistics of a passage, 1 in all [shape=(T,)].
-
-    Sound and the room's silence beside it count half each, as in the sentences on which models were trained, however
-    long it is silent. All frames count the same where none has sound.
-    """
-    from scipy.ndimage import distance_transform_edt
-
-    sound = spoken_frames(log_energy)
-    if not sound.any():
-        return np.full(len(log_energy), 1 / max(len(log_energy), 1))
-    distance = distance_transform_edt(~sound)
-    silence = (distance > SILENCE_FROM) & (distance <= SILENCE_TO)
-    if silence.sum() < LEAST_FRAMES:  # cut at once: the closures of stops are the most silent that there is
-        silence = smooth_level(log_energy) <= np.quantile(smooth_level(log_energy)[sound], QUIETEST)
-    weights = np.zeros(len(log_energy))
-    weights[sound] = (1 - SILENCE_SHARE) / sound.sum()
-    weights[silence] += SILENCE_SHARE / silence.sum()
-    return weights
 
 
 def quiet_frames(log_energy: NDArray[np.floating]) -> NDArray[np.bool_]:

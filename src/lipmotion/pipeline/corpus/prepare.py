@@ -25,7 +25,7 @@ from lipmotion.pipeline.corpus.long_videos import DIVIDING_SHARE, VideoPart, sin
 from lipmotion.pipeline.corpus.separate_sound import earlier_phones, in_step, separate_sound
 from lipmotion.pipeline.corpus.supplied_motion import DIGESTS, source_digests, supplied_phones, supplied_track
 from lipmotion.pipeline.workers import worker_pool
-from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.files import locked, remove_unfinished, sha256_of
 from lipmotion.storage.sources import Source, check_apart, is_folder
@@ -327,7 +327,7 @@ def _utterance(job: _Job, source: dict[str, str]) -> Utterance:
     return Utterance(
         name=recording.name,
         audio=audio,
-        features=mfcc(audio),
+        features=analysed(audio).mfcc(),
         track=found,
         words=recording.words,
         split=recording.split,

@@ -13,8 +13,9 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.kernels.threads import one_thread
 from lipmotion.measures.offset import Offset, best_offset, pooled_offset, shift_scores
 from lipmotion.motion.resample import to_model_frames
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.lip_speed import measured_opening_speed, predicted_opening_speed
-from lipmotion.speech.features.mfcc import WINDOW, mfcc
+from lipmotion.speech.features.mfcc import WINDOW
 from lipmotion.storage.files import locked
 from lipmotion.types import FRAME_RATE_HZ, Audio, Timeline, Unit, Utterance
 
@@ -137,7 +138,7 @@ def _moved(utterance: Utterance, late_s: float) -> Utterance:
     total_ms = float(utterance.source.get(REMOVED_MS, 0)) + 1000 * shift / audio.rate_hz
     source = utterance.source | {REMOVED_MS: f"{total_ms:.1f}"}
     phones = utterance.phones and _phones_moved(utterance.phones, shift / audio.rate_hz)
-    return replace(utterance, audio=moved, features=mfcc(moved), source=source, phones=phones)
+    return replace(utterance, audio=moved, features=analysed(moved).mfcc(), source=source, phones=phones)
 
 
 def _phones_moved(phones: Timeline[Unit], late_s: float) -> Timeline[Unit]:

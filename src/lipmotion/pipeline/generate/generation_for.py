@@ -151,12 +151,16 @@ def _of_parts(
         apart = Timeline((*apart.spans[:-1], replace(last, end_s=last.end_s + LONG_SILENCE_S)))
         generations.append(replace(finish(replace(generation, units=apart), start_s), units=units))
     dtype = np.float32 if frames > DOUBLE_FRAMES else rest.motion.values.dtype
-    values = _joined(parts, [each.motion.values for each in generations], rest.motion.values, frames, dtype)
+    silent_rows = [each.motion.values[row] for each in generations for row in (0, -1)] or rest.motion.values
+    still = np.mean(silent_rows, axis=0)  # as the mouth is at the ends of passages, beside which it stays
+    values = _joined(parts, [each.motion.values for each in generations], still, frames, dtype)
     if isinstance(rest.spread, ReducedVariance):
         reduced = [each.spread.reduced for each in generations if isinstance(each.spread, ReducedVariance)]
-        spread: Any = replace(rest.spread, reduced=_joined(parts, reduced, rest.spread.reduced, frames, dtype))
+        spread: Any = replace(
+            rest.spread, reduced=_joined(parts, reduced, rest.spread.reduced.mean(axis=0), frames, dtype)
+        )
     else:
-        spread = _joined(parts, [each.variance for each in generations], rest.variance, frames, dtype)
+        spread = _joined(parts, [each.variance for each in generations], rest.variance.mean(axis=0), frames, dtype)
     states = tuple(dict.fromkeys(state for each in (rest, *generations) for state in each.trace.states))
     number = {state: n for n, state in enumerate(states)}
     trace = np.full(frames, number[rest.trace.states[rest.trace.frames[REST_FRAMES // 2]]], np.intp)
@@ -181,16 +185,15 @@ def _of_parts(
 def _joined(
     parts: Sequence[SpeechPart],
     rows: Sequence[NDArray[np.floating[Any]]],
-    rest: NDArray[np.floating[Any]],
+    still: NDArray[np.floating[Any]],
     frames: int,
     dtype: Any,
 ) -> NDArray[Any]:
     """Return the rows of all passages in their places; the mouth goes to rest and comes from it beside them.
 
-    rows : of each passage [shape=(T', P)]
-    rest : rows in which nothing is said
+    rows  : of each passage [shape=(T', P)]
+    still : the row of silence [shape=(P,)]
     """
-    still = rest[len(rest) // 2]
     whole = np.tile(still, (frames, 1)).astype(dtype)
     ramp = (1 - np.cos(np.pi * np.arange(1, RAMP_FRAMES + 1) / (RAMP_FRAMES + 1))) / 2
     for part, inside in zip(parts, rows, strict=True):

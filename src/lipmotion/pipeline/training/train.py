@@ -37,8 +37,8 @@ from lipmotion.pipeline.training.sound_inputs import with_sound_inputs
 from lipmotion.pipeline.training.transcripts import warn_of_doubtful_transcripts, warn_of_missing_transcripts
 from lipmotion.pipeline.understand.transcribe import phones_in_time, warn_of_guesses
 from lipmotion.pipeline.workers import worker_pool
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.f0 import log_f0
-from lipmotion.speech.features.spectrum import spectrum
 from lipmotion.speech.recognition.phone_models import train_phone_models
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
@@ -333,7 +333,8 @@ def _examples(
             continue
         labelled.append((utterance, units))
         motion, valid = model_motion(utterance.track, len(utterance.features.values))
-        speech = Speech(utterance.features, units, log_f0(utterance.audio), spectrum=spectrum(utterance.audio))
+        spectrum = analysed(utterance.audio).spectrum
+        speech = Speech(utterance.features, units, log_f0(utterance.audio), spectrum=spectrum)
         examples.append(Example(utterance.name, speech, motion, valid))
     if not examples:
         name, reason = next(iter(skipped.items()))

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.hmm.loudness import QUIETEST, silence_weights, smooth_level, spoken_frames
+from lipmotion.hmm.loudness import smooth_level, spoken_frames
 from lipmotion.speech.features.mfcc import HOP, checked_samples, frame_count, log_energy, mfcc_of_warps
 from lipmotion.speech.features.spectrum import spectrum
 from lipmotion.speech.recognition.general.front_end import general_features
@@ -21,6 +21,8 @@ from lipmotion.types import Audio, Features
 MadeT = TypeVar("MadeT")
 SILENT_FRAMES = 50
 """Frames of silence before and after the sound of each passage, recorded or not: the mouth opens before the sound."""
+QUIETEST = 0.1
+"""So large a share of a passage, its most silent frames, say what silence is like in it."""
 SILENT_ENERGY = -17.0
 """The log energy between passages: 80 dB beneath their loudest moments."""
 
@@ -110,11 +112,6 @@ class AnalysedAudio(Audio):
         return self.joined(lambda audio: audio.log_energy, SILENT_ENERGY)
 
     @cached_property
-    def weights(self) -> NDArray[np.float64]:
-        """How much each frame counts in means over the recording [shape=(T,)] (``hmm.loudness.silence_weights``)."""
-        return silence_weights(self.log_energy)
-
-    @cached_property
     def general_features(self) -> NDArray[np.float32]:
         """The features of the general models [shape=(T, 39)], as of ``speech.recognition.general.front_end``."""
         return self.joined(lambda audio: audio.general_features)
@@ -164,10 +161,6 @@ class _PassageAudio(AnalysedAudio):
     def _energy(self) -> NDArray[np.float32]:
         return log_energy(checked_samples(self._sound))
 
-    @cached_property
-    def _weights(self) -> NDArray[np.float64]:
-        return silence_weights(self._energy)
-
     def _with_silence(self, rows: NDArray[Any]) -> NDArray[Any]:
         """Return the rows of the sound, and before and after them their mean where it is the most silent."""
         if not self.lead and not self.tail:
@@ -175,10 +168,6 @@ class _PassageAudio(AnalysedAudio):
         level = smooth_level(self._energy)
         silence = rows[level <= np.quantile(level, QUIETEST)].mean(axis=0)[None].astype(rows.dtype)
         return np.concatenate([np.repeat(silence, self.lead, axis=0), rows, np.repeat(silence, self.tail, axis=0)])
-
-    @cached_property
-    def weights(self) -> NDArray[np.float64]:
-        return np.pad(self._weights, (self.lead, self.tail))
 
     def _new_mfcc(self, warps: Sequence[float]) -> list[Features]:
         found = mfcc_of_warps(self._sound, warps, self._energy)
@@ -190,11 +179,11 @@ class _PassageAudio(AnalysedAudio):
 
     @cached_property
     def general_features(self) -> NDArray[np.float32]:
-        return self._with_silence(general_features(self._sound, self._weights))
+        return self._with_silence(general_features(self._sound))
 
     @cached_property
     def spectrum(self) -> NDArray[np.float32]:
-        return self._with_silence(spectrum(self._sound, weights=self._weights))
+        return self._with_silence(spectrum(self._sound))
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,11 +211,6 @@ class _Stretch(AnalysedAudio):
     @cached_property
     def spectrum(self) -> NDArray[np.float32]:
         return self._rows(self.whole.spectrum)
-
-    @cached_property
-    def weights(self) -> NDArray[np.float64]:
-        rows = self._rows(self.whole.weights)
-        return rows / max(rows.sum(), 1e-9)
 
     def _rows(self, rows: NDArray[np.float32]) -> NDArray[np.float32]:
         return rows[self.first : self.first + len(self.samples) // HOP + 1]

@@ -11,7 +11,6 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
-from lipmotion.hmm.loudness import silence_weights
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.types import ENERGY_FEATURE, FRAME_RATE_HZ, Audio, Features
 
@@ -44,7 +43,7 @@ def mfcc(audio: Audio, warp: float = 1.0) -> Features:
 
     warp : factor by which frequencies are stretched before the filters, to make vocal tracts of other lengths alike
     Frame n is centred at n · 10 ms, the signal reflected at both ends: T = floor(duration · 100) + 1.
-    Mean and variance are normalised over the recording, in which silence counts half (``hmm.loudness``).
+    Mean and variance are normalised over the recording.
     Raises InputError: the rate is not 16 kHz, the recording is shorter than one window, or not one channel of
     finite samples.
     Source: Xie & Liu 2007, §5.1; details in the project's conventions.
@@ -61,11 +60,10 @@ def mfcc_of_warps(audio: Audio, warps: Sequence[float], energy: NDArray[np.float
     """
     log_powers = log_mels(checked_samples(audio), [_filters(warp) for warp in warps])
     features = []
-    weights = silence_weights(energy)
     while log_powers:
         cepstra, rounding = _cepstra(log_powers.pop(0))  # the log powers of a long recording are freed here
         static = np.concatenate([cepstra, energy[:, None]], axis=1)
-        features.append(Features(normalised(_with_deltas(static), rounding, weights), audio.duration_s))
+        features.append(Features(normalised(_with_deltas(static), rounding), audio.duration_s))
     return features
 
 
@@ -116,14 +114,13 @@ def regression_delta(values: NDArray[np.float32], reach: int = 2) -> NDArray[np.
     return slope
 
 
-def normalised(values: NDArray[np.float32], rounding: float, weights: NDArray[np.float64]) -> NDArray[np.float32]:
+def normalised(values: NDArray[np.float32], rounding: float) -> NDArray[np.float32]:
     """Return the columns with mean 0 and standard deviation 1 [shape=(T, D)]; a constant column becomes exactly 0.
 
     rounding : the standard deviation up to which a column is constant but for rounding
-    weights  : how much each frame counts (``hmm.loudness.silence_weights``) [shape=(T,)]
     """
-    scaled = values - (weights @ values).astype(np.float32)
-    deviation = np.sqrt(weights @ np.square(scaled))
+    scaled = values - values.mean(axis=0, dtype=np.float64).astype(np.float32)
+    deviation = np.sqrt(np.square(scaled).mean(axis=0, dtype=np.float64))  # single precision loses count in an hour
     moves = deviation > rounding
     scaled /= np.where(moves, deviation, 1).astype(np.float32)
     scaled[:, ~moves] = 0

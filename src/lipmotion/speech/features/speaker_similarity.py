@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lipmotion.hmm.loudness import spoken_frames
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
 from lipmotion.stats.mixture import QuadraticForm
@@ -22,8 +21,8 @@ class SpeakerSimilarity(NamedTuple):
     """The similarity of a recording to the training data of some models.
 
     warp  : factor by which the frequencies of the recording are stretched to make it most similar
-    score : mean log density per frame of the recording, so warped, less that of the training data. Silence counts half
-            (``hmm.loudness.silence_weights``), and not at all where it is more silent than that of the training data
+    score : mean log density per frame of the recording, so warped, less that of the training data. It depends on the
+            speaker in speech, on the room and the microphone in silence
     """
 
     warp: float
@@ -41,14 +40,10 @@ def speaker_similarity(hmm: UnitHmm, audio: AnalysedAudio) -> SpeakerSimilarity:
 
     def judge() -> SpeakerSimilarity:
         part = stretch if stretch.frames <= JUDGED_FRAMES else stretch.stretch(0, JUDGED_FRAMES)
-        form, sound = _densities(hmm), spoken_frames(part.log_energy)
-        spoken, silent = part.weights * sound, part.weights * ~sound
-        fits = {}
-        for warp, features in zip(WARPS, part.mfcc_of_warps(WARPS), strict=True):
-            beyond = form.log_likelihood(features.values).max(axis=1) - hmm.typical_fit
-            fits[warp] = float(spoken @ beyond + min(silent @ beyond, 0.0))
+        form, warped = _densities(hmm), zip(WARPS, part.mfcc_of_warps(WARPS), strict=True)
+        fits = {warp: float(form.log_likelihood(features.values).max(axis=1).mean()) for warp, features in warped}
         warp = best_warp(fits)
-        return SpeakerSimilarity(warp, fits[warp])
+        return SpeakerSimilarity(warp, fits[warp] - hmm.typical_fit)
 
     return stretch.once(f"similarity to {id(hmm)}", judge)
 

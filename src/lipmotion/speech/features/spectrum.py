@@ -7,8 +7,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.hmm.loudness import silence_weights
-from lipmotion.speech.features.mfcc import FFT_SIZE, checked_samples, log_energy, log_mel, mel, triangles, warped
+from lipmotion.speech.features.mfcc import FFT_SIZE, checked_samples, log_mel, mel, triangles, warped
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.types import SPECTRUM_BANDS, Audio
 
@@ -18,21 +17,18 @@ DYNAMIC_RANGE_DB = 60.0
 LEAST_DEVIATION = 1e-3
 
 
-def spectrum(audio: Audio, warp: float = 1.0, weights: NDArray[np.float64] | None = None) -> NDArray[np.float32]:
+def spectrum(audio: Audio, warp: float = 1.0) -> NDArray[np.float32]:
     """Return the log power in ``SPECTRUM_BANDS`` mel bands [shape=(T, 40)], frames as in ``mfcc``.
 
-    warp    : factor by which frequencies are stretched, as in ``mfcc``
-    weights : how much each frame counts, where that is known
-    Each band has mean 0 over the recording, in which silence counts half (``hmm.loudness``); it is divided by the mean
-    of its own standard deviation and that of the whole spectrum, so that bands without speech stay small.
+    warp : factor by which frequencies are stretched, as in ``mfcc``
+    Each band has mean 0 over the recording; it is divided by the mean of its own standard deviation and that of the
+    whole spectrum, so that bands without speech stay small.
     Raises InputError: as ``mfcc``.
     """
-    samples = checked_samples(audio)
-    weights = silence_weights(log_energy(samples)) if weights is None else weights
-    powers = log_bands(samples, warp)
+    powers = log_bands(checked_samples(audio), warp)
     powers = np.maximum(powers, powers.max() - np.float32(DYNAMIC_RANGE_DB / 10 * np.log(10)))
-    powers -= (weights @ powers).astype(np.float32)
-    squares = weights @ np.square(powers)
+    powers -= powers.mean(axis=0, dtype=float).astype(np.float32)
+    squares = np.square(powers).mean(axis=0, dtype=float)
     powers /= (np.sqrt(squares) / 2 + np.sqrt(squares.mean()) / 2 + LEAST_DEVIATION).astype(np.float32)
     return powers
 

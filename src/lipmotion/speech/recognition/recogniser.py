@@ -54,11 +54,11 @@ RECOGNISER_KINDS = ("auto", "words", "fast", "own", "general")
 words are recognised by pocketsphinx and aligned. ``auto``: by a phone recogniser, where one is installed and sure; else
 as ``fast``, and words where they fit."""
 USING_WORDS, WEIGHTED = ("auto", "words"), ("auto", "words", "fast")
-OWN_VOICE_SCORE, SMALL_PERPLEXITY = -5.2, 9.0
+OWN_VOICE_SCORE, SMALL_PERPLEXITY = -3.0, 9.0
 """A voice with the first speaker similarity score or more is that of the own models; if the perplexity of their bigram
 is less than the second one, their corpus has few words, which no language model of English expects. Then the phones
 alone decide. The perplexity is 5.3 for GRID's 51 words, 18.6 for English."""
-NO_WEIGHT_SCORE, FULL_WEIGHT_SCORE = -9.6, -7.5
+NO_WEIGHT_SCORE, FULL_WEIGHT_SCORE = -9.0, -5.0
 """Own models have no weight for recordings with the first speaker similarity score or less, and the weight of the
 general models from the second one on. The score of another speaker in the same studio is -4 to -6 for GRID's models, of
 other voices in other rooms -7 to -15."""

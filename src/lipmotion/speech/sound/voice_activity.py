@@ -19,7 +19,7 @@ from lipmotion.types.audio import sixteen_bits
 
 PAUSE_FRAMES = 40
 """Sound with shorter pauses is one stretch."""
-MARGIN_FRAMES = 30
+MARGIN_FRAMES = 40
 """Frames before and after the sound that belong to its stretch: recognisers expect a little silence."""
 JOINED_FRAMES = 60
 """Stretches nearer than this, with their margins, are joined: words say more of one another than of nothing."""
@@ -32,10 +32,11 @@ SHORT_FRAMES, NEAR_FRAMES = 150, 150
 """A passage shorter than the first belongs to a neighbour nearer than the second: one word says little of a voice."""
 LEVEL_STEP = 15 * DECIBEL
 """Voices with a dip between them are passages of their own where their levels differ by more."""
-PASSAGE_MARGIN = 50
+PASSAGE_MARGIN = 75
 """Frames before and after the sound of a passage that belong to it, where they are not digital silence."""
-CUT_FROM, CUT_FRAMES, CUT_STEP = 10, 6, 3 * DECIBEL
-"""So many frames beside sound and more, a steady level that changes at once by the last of these is another sound's."""
+CUT_FROM, CUT_FRAMES, CUT_STEP = 6, 6, 6 * DECIBEL
+"""So many frames beside sound and more, a level that changes at once by the last of these, and for good, is of another
+recording."""
 LOCAL_FRAMES, LOCAL_DROP, SOFTEST_DROP = 301, 30 * DECIBEL, 42 * DECIBEL
 """Sound lies less than the second below the loudest within the first, and less than the third below all of it."""
 STEADY, STEADY_FRAMES = 10 * DECIBEL, 201
@@ -120,8 +121,8 @@ def _margin(log_energy: NDArray[np.float32], floor: float, reaching: int) -> int
     count = max(int(zeros[0]) - reaching, 0) if len(zeros) else len(log_energy)
     for cut in range(CUT_FROM, count - CUT_FRAMES):
         room, other = log_energy[cut - CUT_FRAMES : cut - 1], log_energy[cut + 1 : count]
-        steady = np.ptp(room) < LEAST_RANGE
-        if steady and (other.max() < room.min() - CUT_STEP or other.min() > room.max() + CUT_STEP):
+        step = CUT_STEP if np.ptp(room) < LEAST_RANGE else 2 * CUT_STEP  # a sound that fades becomes softer by itself
+        if other.max() < room.min() - step or other.min() > room.max() + step:
             return cut - 1
     return count
 
@@ -179,7 +180,7 @@ def level_passage(samples: NDArray[np.float32], log_energy: NDArray[np.float32])
     loud = float(level.max())
     gain = np.full(len(level), SAME_LEVEL / np.exp((loud - np.log(WINDOW)) / 2))
     lower = loud - maximum_filter1d(level, 2 * STEADY_FRAMES // 2 + 1, mode="nearest") - STEADY
-    sound = np.flatnonzero(frames_above(log_energy, LOCAL_DROP + STEADY))
+    sound = np.flatnonzero(smooth_level(log_energy) > loud - LOCAL_DROP - STEADY)
     if len(sound) and lower[sound].max() > 0:
         raised = np.clip(lower[sound], 0, LOCAL_DROP) / 2
         gain *= np.exp(np.interp(np.arange(len(level)), sound, raised))

@@ -7,15 +7,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.hmm.loudness import silence_weights
-from lipmotion.speech.features.mfcc import (
-    FFT_SIZE,
-    checked_samples,
-    liftered_cosine,
-    log_energy,
-    log_mel,
-    triangles,
-)
+from lipmotion.speech.features.mfcc import FFT_SIZE, checked_samples, liftered_cosine, log_mel, triangles
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
 from lipmotion.types import Audio
 
@@ -24,18 +16,15 @@ LOWEST_HZ, HIGHEST_HZ = 130.0, 6800.0
 CEPSTRA = 13
 
 
-def general_features(audio: Audio, weights: NDArray[np.float64] | None = None) -> NDArray[np.float32]:
+def general_features(audio: Audio) -> NDArray[np.float32]:
     """Return c0–c12 less their mean, Δ over ±2 frames, and Δ of Δ [shape=(T, 39)], frames as in ``mfcc``.
 
-    weights : how much each frame counts in the mean (``hmm.loudness.silence_weights``), where that is known
     Raises InputError: as ``mfcc``.
     Source: the model's own feat.params and CMU Sphinx's ``1s_c_d_dd``. Deviations: windows of 25 instead of
     25.6 ms, centred on their time; no noise removal.
     """
-    samples = checked_samples(audio)
-    cepstra = log_mel(samples, _filters()) @ liftered_cosine(FILTERS, 0, CEPSTRA)
-    weights = silence_weights(log_energy(samples)) if weights is None else weights
-    cepstra -= (weights @ cepstra).astype(np.float32)
+    cepstra = log_mel(checked_samples(audio), _filters()) @ liftered_cosine(FILTERS, 0, CEPSTRA)
+    cepstra -= cepstra.mean(axis=0, dtype=np.float64).astype(np.float32)
     features = np.empty((len(cepstra), 3 * CEPSTRA), np.float32)
     features[:, :CEPSTRA] = cepstra
     padded = np.pad(cepstra, ((3, 3), (0, 0)), mode="edge")
