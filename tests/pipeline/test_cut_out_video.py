@@ -46,8 +46,8 @@ def test_what_drawings_cannot_show_is_refused(result: Generation, tmp_path: Path
     with pytest.raises(ExportError, match="has no phones, from which drawings are chosen"):
         lipmotion.write(silent, [tmp_path / "a.json", tmp_path / "a.webm"], speech=SOUND, face=drawings)
     assert not (tmp_path / "a.json").exists()
-    with pytest.raises(InputError, match="the frame rate is 100"):
-        lipmotion.write(result, tmp_path / "a.webm", speech=SOUND, face=drawings, fps=100)
+    with pytest.raises(InputError, match="the frame rate is 101"):
+        lipmotion.write(result, tmp_path / "a.webm", speech=SOUND, face=drawings, fps=101)
     clear = Staging(background="transparent")
     with pytest.raises(ExportError, match="cannot be transparent"):
         lipmotion.write(result, tmp_path / "a.mp4", speech=SOUND, face=drawings, staging=clear)

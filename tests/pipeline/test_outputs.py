@@ -75,8 +75,8 @@ def test_what_no_kind_writes_is_refused(settings: OutputSettings, tmp_path: Path
             plan(name, settings)
     with pytest.raises(ExportError, match=r"unknown format '\.wav'"):
         plan("a.wav", replace(settings, sounded=False))
-    with pytest.raises(InputError, match="the frame rate is 61"):
-        checked_outputs([tmp_path / "a.cues.tsv"], replace(settings, fps=61.0))
+    with pytest.raises(InputError, match="the frame rate is 101"):
+        checked_outputs([tmp_path / "a.cues.tsv"], replace(settings, fps=101.0))
 
 
 def test_cues_beside_other_outputs_are_those_of_the_function(result: Generation, tmp_path: Path) -> None:

@@ -83,7 +83,7 @@ def test_the_outputs_are_those_of_animate(sounds: Path, settings: Job, tmp_path:
     rows = {row["name"]: row for row in ledger_rows(out)}
     assert rows["one"]["words"] == "transcript"
     assert rows["three"]["words"] != "transcript"
-    assert "not a readable recording" in rows["broken"]["error"]
+    assert "is text, required a recording" in rows["broken"]["error"]
     assert rows["one"]["closures_heard"] >= rows["one"]["closures_made"] >= 1
 
 

@@ -77,9 +77,7 @@ def test_each_of_many_unusable_files_is_reported_once(tmp_path: Path, monkeypatc
     for name in names:
         (tmp_path / "clips" / f"{name}.mp4").write_bytes(b"not a video")
     items: list[Item] = []
-    with pytest.raises(
-        CorpusError, match=r"none of 30 recordings is usable; the first, clip000: .*not a readable"
-    ) as e:
+    with pytest.raises(CorpusError, match=r"none of 30 recordings is usable; the first, clip000: .*is text") as e:
         prepare(
             tmp_path / "clips",
             tmp_path / "corpus",
