@@ -14,7 +14,6 @@ from lipmotion.hmm.loudness import (
     frames_above,
     levels_of,
     quiet_frames,
-    silence_weights,
     sound_runs,
     spoken_frames,
 )
@@ -67,7 +66,7 @@ def test_nothing_is_loud_in_the_shortest_recordings_and_where_nothing_changes():
 
 @pytest.mark.parametrize("frames", [50, 500, 6000])
 @pytest.mark.parametrize("other", [ROOM - 15, ROOM - 3, ROOM + 3])
-def test_another_silence_around_a_recording_changes_no_level_and_no_weight(frames: int, other: float):
+def test_another_silence_around_a_recording_changes_no_level(frames: int, other: float):
     alone = line()
     pad = around(frames, other)
     padded = np.r_[pad, alone, pad]
@@ -75,22 +74,7 @@ def test_another_silence_around_a_recording_changes_no_level_and_no_weight(frame
     assert levels_of(padded) == pytest.approx(levels_of(alone), abs=0.1)
     assert levels_of(alone) == pytest.approx((-2, ROOM), abs=1.5)
     assert np.array_equal(spoken_frames(padded)[own], spoken_frames(alone))
-    assert silence_weights(padded)[own] == pytest.approx(silence_weights(alone), abs=1e-9)
-    assert quiet_frames(padded)[: frames - 60].all() == (other < -QUIET_DROP - 2)
-
-
-@pytest.mark.parametrize("silence", [0, 10, 60, 300, 3000])
-def test_silence_counts_half_however_long_it_is(silence: int):
-    level = line(silence, silence)
-    weights, sound = silence_weights(level), spoken_frames(level)
-    assert weights.sum() == pytest.approx(1)
-    assert weights[sound].sum() == pytest.approx(0.5) if silence >= 60 else weights[sound].sum() > 0.49
-    assert weights.min() >= 0
-    assert weights @ level == pytest.approx(silence_weights(line()) @ line(), abs=1.0)
-
-
-def test_all_frames_count_the_same_where_none_has_sound():
-    assert silence_weights(np.full(40, -3.0)) == pytest.approx(1 / 40)
+    assert quiet_frames(padded)[: frames - 20].all() == (other < -QUIET_DROP - 2)
 
 
 def test_short_pauses_are_part_of_the_sound_and_clicks_are_none():

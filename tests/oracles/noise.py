@@ -8,12 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 HOP, HALF, REACH = 160, 200, 5
+DECIBEL = math.log(10) / 10
 
 
 def ratio_db(speech: NDArray[np.floating], noise: NDArray[np.floating]) -> float:
     """Return the ratio of powers in dB over the 10 ms around the frames that are loud in the speech.
 
-    Loud: the log energy of 25 ms, averaged over the 11 frames around, exceeds the mean of its 10th and 95th percentile.
+    Loud: the log energy of 25 ms, averaged over the 11 frames around, is less than 20 dB beneath the loudest quarter of
+    a second, and exceeds the noise by 6 dB or 30 % of the way to that. The noise: of the lowest energies within a
+    second before and after, the higher one; the median of these in frames less than 20 dB beneath the loudest.
     """
     signal = [float(value) for value in speech]
     frames = len(signal) // HOP + 1
@@ -27,8 +30,12 @@ def ratio_db(speech: NDArray[np.floating], noise: NDArray[np.floating]) -> float
         sum(log_energy[min(max(near, 0), frames - 1)] for near in range(frame - REACH, frame + REACH + 1)) / 11
         for frame in range(frames)
     ]
-    low, high = np.quantile(smooth, 0.1), np.quantile(smooth, 0.95)
-    loud = [value > (low + high) / 2 for value in smooth]
+    powers = [math.exp(value) for value in log_energy]
+    loudest = max(math.log(sum(powers[max(n - 12, 0) : n + 13]) / 25) for n in range(frames))
+    beneath = [max(min(smooth[max(n - 100, 0) : n + 1]), min(smooth[n : n + 101])) for n in range(frames)]
+    room = float(np.median([beneath[n] for n in range(frames) if smooth[n] > loudest - 20 * DECIBEL]))
+    threshold = max(loudest - 20 * DECIBEL, room + min(6 * DECIBEL, 0.3 * (loudest - room)))
+    loud = [value > threshold for value in smooth]
     loud_samples = [index for index in range(len(signal)) if loud[min((index + HOP // 2) // HOP, frames - 1)]]
     power = sum(signal[index] ** 2 for index in loud_samples)
     return 10 * math.log10(power / sum(float(noise[index]) ** 2 for index in loud_samples))

@@ -7,14 +7,12 @@ import pytest
 
 from lipmotion.errors import ModelFormatError
 from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.features.mfcc import mfcc
 from lipmotion.speech.recognition.adaptation import (
     Adaptation,
     adaptation_arrays,
     adaptation_from_arrays,
     identity_adaptation,
 )
-from lipmotion.speech.recognition.general.front_end import general_features
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Audio
 
@@ -31,18 +29,18 @@ def some() -> Adaptation:
 
 def test_no_adaptation_changes_nothing(audio: Audio) -> None:
     nothing = identity_adaptation(1.0, 0.5)
-    assert np.array_equal(nothing.own_features(analysed(audio)), mfcc(audio).values)
-    assert np.array_equal(nothing.general_features(analysed(audio)), general_features(audio))
+    assert np.array_equal(nothing.own_features(analysed(audio)), analysed(audio).mfcc().values)
+    assert np.array_equal(nothing.general_features(analysed(audio)), analysed(audio).general_features)
 
 
 def test_own_features_are_warped_then_transformed(audio: Audio) -> None:
     one = some()
-    expected = mfcc(audio, 1.06).values @ one.own[:, :-1].T + one.own[:, -1]
+    expected = analysed(audio).mfcc(1.06).values @ one.own[:, :-1].T + one.own[:, -1]
     np.testing.assert_allclose(one.own_features(analysed(audio)), expected, rtol=1e-4, atol=1e-3)
 
 
 def test_general_features_are_transformed_stream_by_stream(audio: Audio) -> None:
-    one, plain = some(), general_features(audio)
+    one, plain = some(), analysed(audio).general_features
     found = one.general_features(analysed(audio))
     for number in range(3):
         columns = slice(13 * number, 13 * number + 13)
@@ -80,7 +78,7 @@ def test_damaged_arrays() -> None:
 
 
 def test_a_warp_of_one_needs_no_other_features(audio: Audio, monkeypatch: pytest.MonkeyPatch) -> None:
-    features = mfcc(audio)
+    features = analysed(audio).mfcc()
     monkeypatch.setattr(
         "lipmotion.speech.features.analysed_audio.mfcc_of_warps", lambda *_: pytest.fail("computed twice")
     )

@@ -13,11 +13,13 @@ from lipmotion.pipeline.model import Model, load_model
 from lipmotion.speech.features import analysed_audio as module
 from lipmotion.speech.features import mfcc as front_end
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
-from lipmotion.speech.features.mfcc import log_energy, mfcc
+from lipmotion.speech.features.mfcc import HOP, log_energy, mfcc
 from lipmotion.speech.features.speaker_similarity import JUDGED_FRAMES, WARPS
+from lipmotion.speech.features.spectrum import spectrum
 from lipmotion.speech.recognition.agreement import agreement_score
 from lipmotion.speech.recognition.general.front_end import general_features
 from lipmotion.speech.recognition.recogniser import Recogniser
+from lipmotion.speech.sound.voice_activity import find_passages
 from lipmotion.testing.toy import ToySentence, toy_sentences
 from lipmotion.types import Audio
 from lipmotion.units import Lexicon
@@ -47,14 +49,122 @@ def computed(monkeypatch: pytest.MonkeyPatch) -> Counter[tuple[str, bytes, int]]
     return counts
 
 
-def test_every_kind_is_that_of_its_own_function(sentence: ToySentence) -> None:
+def of_samples(*parts: np.ndarray) -> AnalysedAudio:
+    return analysed(Audio(np.concatenate(parts).astype(np.float32), 16_000))
+
+
+def whole_frames(number: int) -> np.ndarray:
+    samples = toy_sentences(3)[number].audio.samples
+    return samples[: len(samples) // HOP * HOP]
+
+
+def silence(seconds: float, units: float = 0.0) -> np.ndarray:
+    return np.random.default_rng(0).uniform(-units, units, round(16_000 * seconds)) / 32768
+
+
+def kinds(audio: AnalysedAudio) -> list[np.ndarray]:
+    return [audio.mfcc().values, audio.mfcc(0.88).values, audio.spectrum, audio.general_features, audio.log_energy]
+
+
+def test_every_kind_is_that_of_the_passage_at_its_level(sentence: ToySentence) -> None:
     audio = analysed(sentence.audio)
+    (passage,) = audio.passages
+    first, end = find_passages(log_energy(sentence.audio.samples))[0]
+    lead, end = first - passage.first, min(end, len(sentence.audio.samples) // HOP)
+    rows = slice(lead, lead + end - first)
+    sound = Audio(passage.audio.samples[lead * HOP : rows.stop * HOP], 16_000)
+    assert np.corrcoef(sound.samples, sentence.audio.samples[first * HOP : end * HOP])[0, 1] == pytest.approx(1)
     for warp, features in zip(WARPS, audio.mfcc_of_warps(WARPS), strict=True):
-        assert np.array_equal(features.values, mfcc(sentence.audio, warp).values)
+        assert passage.audio.mfcc(warp).values[rows] == pytest.approx(mfcc(sound, warp).values[:-1], abs=1e-5)
         assert features is audio.mfcc(warp)
         assert features.duration_s == sentence.audio.duration_s
-    assert np.array_equal(audio.general_features, general_features(sentence.audio))
-    assert np.array_equal(audio.log_energy, log_energy(sentence.audio.samples))
+    assert passage.audio.general_features[rows] == pytest.approx(general_features(sound)[:-1], abs=1e-5)
+    assert passage.audio.spectrum[rows] == pytest.approx(spectrum(sound)[:-1], abs=1e-5)
+    assert passage.audio.log_energy[rows] == pytest.approx(log_energy(sound.samples)[:-1], abs=1e-5)
+
+
+def test_features_are_normalised_over_the_passage_alone() -> None:
+    audio = of_samples(silence(5), whole_frames(0), silence(20))
+    (passage,) = audio.passages
+    ((first, end),) = find_passages(log_energy(audio.samples))
+    values = passage.audio.mfcc().values[first - passage.first :][: end - first + 1]
+    assert values.mean(axis=0) == pytest.approx(0, abs=1e-3)
+    assert values.std(axis=0) == pytest.approx(1, abs=1e-3)
+    assert np.abs(mfcc(audio).values[first:end].mean(axis=0)).max() > 1  # over the whole recording it would not be
+
+
+@pytest.mark.parametrize(
+    ("before_s", "after_s", "units", "decibels"),
+    [
+        (0.5, 0.5, 0, 0),
+        (0, 5, 0, 0),
+        (5, 0, 0, 0),
+        pytest.param(60, 0, 0, 0, marks=pytest.mark.long),
+        (5, 0.5, 1, 0),
+        (5, 0.5, 25, 0),
+        (0, 0, 0, -40),
+        (2, 2, 5, -6),
+    ],
+)
+def test_silence_and_gain_change_no_features(before_s: float, after_s: float, units: float, decibels: float) -> None:
+    line = whole_frames(0)
+    """But that two frames at either end are left out, whose windows reach into it, and those of a noise as loud."""
+    alone = of_samples(line)
+    padded = of_samples(silence(before_s, units), line * 10 ** (decibels / 20), silence(after_s, units))
+    (passage,), (found,) = alone.passages, padded.passages
+    place = round(100 * before_s)
+    assert found.first - place == pytest.approx(passage.first, abs=25 if units > 4 else 5)
+    heard = slice(passage.first + 60, passage.first + 60 + 100)
+    for was, now in zip(kinds(alone), kinds(padded), strict=True):
+        differences = now[place + heard.start : place + heard.stop] - was[heard]
+        assert np.abs(differences).mean() < (0.3 if units > 4 else 0.05) * was[heard].std()
+
+
+@pytest.mark.parametrize("decibels", [0, -30])
+def test_features_are_joined_from_those_of_passages(decibels: float) -> None:
+    """As long as the recording, each passage in its place, and those of silence between and around them."""
+    one, other = whole_frames(1) * 10 ** (decibels / 20), whole_frames(0)
+    audio = of_samples(silence(2), one, silence(3), other, silence(4))
+    first, second = audio.passages
+    alone = of_samples(other, silence(4))
+    place = 500 + len(one) // HOP
+    assert 200 < first.own.stop == second.own.start < place
+    assert (first.own.start, second.own.stop) == (0, audio.frames)
+    assert audio.frames == len(audio.samples) // HOP + 1
+    for whole, of_first, of_second, was in zip(*map(kinds, (audio, first.audio, second.audio, alone)), strict=True):
+        assert len(whole) == audio.frames
+        assert np.isfinite(whole).all()
+        for passage, part in ((first, of_first), (second, of_second)):
+            inside = slice(max(passage.first, 0), min(passage.first + len(part), audio.frames))
+            assert np.array_equal(whole[inside], part[inside.start - passage.first : inside.stop - passage.first])
+        assert np.ptp(whole[: first.first], axis=0) == pytest.approx(0)
+        assert np.ptp(whole[second.first + len(of_second) :], axis=0) == pytest.approx(0)
+        assert whole[place + 60 : place + 200] == pytest.approx(was[60:200], abs=2e-3)
+
+
+def test_where_nothing_is_said_all_features_are_0() -> None:
+    for samples in (np.zeros(16_000), 0.1 * np.sin(np.arange(16_000) / 5)):
+        audio = of_samples(samples)
+        assert audio.passages == ()
+        for values in kinds(audio)[:-1]:
+            assert len(values) == 101
+            assert not values.any()
+
+
+def test_a_passage_is_not_divided_further(sentence: ToySentence) -> None:
+    audio = analysed(sentence.audio)
+    (passage,) = audio.passages
+    assert not audio.is_passage
+    assert passage.audio.is_passage
+    assert passage.audio.frames == len(passage.audio.mfcc().values)
+
+
+def test_a_stretch_has_the_features_of_the_whole(sentence: ToySentence) -> None:
+    audio = analysed(sentence.audio)
+    stretch = audio.stretch(60, 160)
+    assert len(stretch.samples) == 16_000
+    for whole, part in zip(kinds(audio), kinds(stretch), strict=True):
+        assert np.array_equal(part, whole[60:161])
 
 
 def test_features_that_are_known_are_not_computed(sentence: ToySentence, computed: Counter[Any]) -> None:
@@ -69,15 +179,6 @@ def test_a_recording_that_keeps_its_features_stays_the_same_object(sentence: Toy
     assert analysed(audio) is audio
     assert audio.samples is sentence.audio.samples
     assert audio.duration_s == sentence.audio.duration_s
-
-
-def test_the_loudest_stretch(sentence: ToySentence) -> None:
-    audio = analysed(sentence.audio)
-    assert audio.loudest_stretch(JUDGED_FRAMES) is audio
-    stretch = audio.loudest_stretch(100)
-    assert stretch is audio.loudest_stretch(100)
-    assert len(stretch.samples) == 16_000
-    assert np.square(stretch.samples).sum() > 0.5 * np.square(audio.samples).sum()
 
 
 def test_what_has_no_features() -> None:

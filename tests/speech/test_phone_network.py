@@ -168,6 +168,7 @@ def loud(monkeypatch: pytest.MonkeyPatch) -> str:
 def noise_after_silence(seconds: float) -> Audio:
     rng = np.random.default_rng(0)
     samples = rng.normal(0, 0.1, int(16_000 * seconds)).astype(np.float32)
+    samples *= np.where(np.arange(len(samples)) % 8000 < 2400, 1e-3, 1).astype(np.float32)  # two syllables a second
     samples[:16_000] *= 1e-3
     return Audio(samples, 16_000)
 

@@ -1,26 +1,40 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
+from lipmotion.hmm.loudness import DECIBEL, LEAST_FRAMES, power_level, spoken_frames
+from lipmotion.pipeline.generate.animate import animate
+from lipmotion.speech.features.mfcc import DYNAMIC_RANGE, HOP, WINDOW, log_energy
+from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.voice_activity import (
-    LEAST_FRAMES,
     LONGEST_FRAMES,
     MARGIN_FRAMES,
+    PASSAGE_MARGIN,
+    SAME_LEVEL,
     Stretch,
+    find_passages,
+    level_passage,
     stretches_of_sound,
 )
+from lipmotion.testing.toy import toy_sentences
+from lipmotion.types import Audio
+from lipmotion.units import is_silent
 
-QUIET_ENERGY, LOUD_ENERGY = -8.0, 2.0
+QUIET_ENERGY, CLOSURE_ENERGY, LOUD_ENERGY = -8.0, -5.0, 2.0
+RATE_HZ = 16_000
+Samples = NDArray[np.float32]
 
 
 def energy(frames: int, *sounds: tuple[int, int]) -> np.ndarray:
-    """Return a quiet recording with loud frames."""
+    """Return a quiet recording with syllables of 0.38 s."""
     values = np.full(frames, QUIET_ENERGY, np.float32)
     for first, end in sounds:
-        values[first:end] = LOUD_ENERGY
+        values[first:end] = np.where(np.arange(frames) % 50 // 12 == 2, CLOSURE_ENERGY, LOUD_ENERGY)[first:end]
     return values
 
 
@@ -50,7 +64,7 @@ def test_constant_energy_holds_no_stretch() -> None:
 
 def test_a_long_stretch_is_cut_where_it_is_quietest() -> None:
     values = energy(5000, (400, 4600))
-    values[1000:1030] = -1.0
+    values[1000:1030] = QUIET_ENERGY
     first, second, *_ = stretches_of_sound(values)
     assert 1000 <= first.end <= 1030
     assert second.first == first.end
@@ -70,7 +84,211 @@ def test_stretches_are_in_order_bounded_and_hold_all_sound() -> None:
         inside = np.zeros(frames, bool)
         for stretch in found:
             inside[slice(*stretch)] = True
-        loud = values > (QUIET_ENERGY + LOUD_ENERGY) / 2
-        middle = np.convolve(loud, np.ones(41), "same") > 40  # all around it is loud
-        if np.quantile(values, 0.1) < QUIET_ENERGY + 1 and loud.mean() > 0.1:
-            assert inside[middle].all()
+        loud = np.zeros(frames, bool)
+        for first, end in sounds:
+            loud[first:end] = True
+        middle = np.convolve(loud, np.ones(41), "same") > 40  # all around it is sound
+        assert inside[middle].all()
+
+
+def spoken(number: int) -> Samples:
+    """Return a sentence of the toy corpus, in whole frames."""
+    samples = toy_sentences(12)[number].audio.samples
+    return samples[: len(samples) // HOP * HOP]
+
+
+def noise(seconds: float, units: float) -> Samples:
+    """Return noise of so many units of 16 bits; 0: digital silence."""
+    values = np.random.default_rng(0).uniform(-units, units, round(seconds * RATE_HZ))
+    return (values / 32768).astype(np.float32)
+
+
+def louder(samples: Samples, decibels: float) -> Samples:
+    return (samples * 10 ** (decibels / 20)).astype(np.float32)
+
+
+def passages(*parts: Samples) -> list[Stretch]:
+    """Return the passages of sounds that follow one another."""
+    return find_passages(log_energy(np.concatenate(parts)))
+
+
+def moved(found: list[Stretch], frames: int) -> list[Stretch]:
+    return [Stretch(first + frames, end + frames) for first, end in found]
+
+
+@pytest.mark.parametrize(
+    ("before_s", "after_s", "units"),
+    [(0, 0, 0), (5, 0, 0), (0, 5, 0), (20, 20, 0), (60, 60, 0), (5, 5, 1), (5, 5, 4)],
+)
+def test_a_passage_is_the_same_whatever_silence_is_around_it(before_s: float, after_s: float, units: float) -> None:
+    """But for the frames whose windows reach into the silence."""
+    (alone,) = moved(passages(noise(0.5, 0), spoken(0), noise(0.5, 0)), -50)
+    (found,) = moved(passages(noise(before_s, units), spoken(0), noise(after_s, units)), -round(100 * before_s))
+    assert found == pytest.approx(alone, abs=3)
+    if before_s and after_s and not units:
+        assert found == alone
+
+
+def test_a_noise_as_loud_as_the_room_may_be_its_margin_and_nothing_more() -> None:
+    (found,) = moved(passages(noise(5, 25), spoken(0), noise(5, 25)), -500)
+    sound = np.flatnonzero(spoken_frames(log_energy(spoken(0))))
+    assert sound[0] - PASSAGE_MARGIN - 2 <= found.first <= sound[0] - 10
+    assert sound[-1] + 10 <= found.end <= sound[-1] + PASSAGE_MARGIN + 3
+
+
+@pytest.mark.parametrize("decibels", [-40, -20, -6])
+def test_a_passage_is_the_same_at_any_level(decibels: float) -> None:
+    assert passages(louder(spoken(0), decibels)) == passages(spoken(0))
+
+
+@pytest.mark.parametrize("gap_s", [0.3, 0.5, 1, 5])
+@pytest.mark.parametrize("decibels", [0, -30])
+def test_lines_are_passages_of_their_own_whatever_their_levels(gap_s: float, decibels: float) -> None:
+    """The room of a line 30 dB softer is more than 80 dB beneath the other: its margins hold nothing, or all of it."""
+    one, other = spoken(1), spoken(0)
+    place = len(one) // HOP + round(100 * gap_s)
+    (first_alone,), (second_alone,) = passages(one, noise(9, 0)), passages(other)
+    first, second = passages(one, noise(gap_s, 0), louder(other, decibels))
+    assert first == first_alone
+    (second,) = moved([second], -place)
+    if decibels:
+        sound = np.flatnonzero(spoken_frames(log_energy(other)))
+        assert second_alone.first <= second.first <= sound[0] + 3
+        assert sound[-1] - 3 <= second.end <= second_alone.end
+    else:
+        assert second == second_alone
+    soft, loud = passages(louder(one, decibels), noise(gap_s, 0), other)
+    assert moved([loud], -place) == [second_alone]
+    assert soft.first >= first_alone.first
+    assert soft.end <= first_alone.end
+
+
+def test_a_pause_within_a_line_does_not_divide_it() -> None:
+    samples = spoken(0)
+    half = len(samples) // HOP // 2 * HOP
+    assert len(passages(samples[:half], noise(0.4, 0), samples[half:])) == 1
+
+
+def test_every_line_of_a_stem_of_ten_minutes_is_a_passage() -> None:
+    energies = [log_energy(spoken(number)) for number in range(12)]
+    loudest = max(float(values.max()) for values in energies)
+    stem = np.full(60_000, loudest + np.log(DYNAMIC_RANGE), np.float32)
+    starts = [300 + 4900 * number for number in range(12)]
+    for start, values in zip(starts, energies, strict=True):
+        stem[start : start + len(values)] = values
+    found = find_passages(stem)
+    assert len(found) == len(starts)
+    for (first, end), start, values in zip(found, starts, energies, strict=True):
+        sound = start + np.flatnonzero(spoken_frames(values))
+        assert start <= first <= sound[0]
+        assert sound[-1] < end <= start + len(values)
+
+
+SECONDS = np.arange(5 * RATE_HZ) / RATE_HZ
+CLICK = np.where(np.arange(len(SECONDS)) == 40_000, 0.9, 0.0)
+DRAWN = np.random.default_rng(0).normal(size=len(SECONDS))
+
+
+@pytest.mark.parametrize(
+    "sound",
+    [
+        pytest.param(0 * SECONDS, id="zeros"),
+        pytest.param(CLICK, id="click"),
+        pytest.param(CLICK + 1e-4 * DRAWN, id="click in noise"),
+        pytest.param(0.5 * DRAWN * ((SECONDS > 2) & (SECONDS < 2.05)), id="clap"),
+        pytest.param(0.3 * np.sin(2 * np.pi * 440 * SECONDS), id="tone"),
+        pytest.param(0.05 * np.sin(2 * np.pi * 50 * SECONDS), id="hum"),
+        pytest.param(0.1 * DRAWN, id="noise"),
+    ],
+)
+@pytest.mark.parametrize("units", [None, 0, 25])
+def test_what_is_no_voice_is_no_passage(sound: NDArray[np.float64], units: float | None) -> None:
+    around = noise(5, units) if units is not None else noise(0, 0)
+    assert passages(around, sound.astype(np.float32), around) == []
+
+
+def loudness_db(samples: Samples, seconds: slice) -> float:
+    """Return the level of the loudest quarter of a second in some seconds of a recording."""
+    level = power_level(log_energy(samples)) - np.log(WINDOW)
+    return float(level[100 * seconds.start : 100 * seconds.stop].max() / DECIBEL)
+
+
+@pytest.mark.parametrize("decibels", [0, -40])
+def test_a_passage_has_one_gain_and_the_level_of_all(decibels: float) -> None:
+    samples = louder(spoken(0), decibels)
+    levelled = level_passage(samples, log_energy(samples))
+    heard = np.abs(samples) > np.abs(samples).max() / 100
+    assert np.ptp(levelled[heard] / samples[heard]) < 1e-3 * np.mean(levelled[heard] / samples[heard])
+    assert loudness_db(levelled, slice(0, 9)) == pytest.approx(20 * np.log10(SAME_LEVEL), abs=0.1)
+
+
+def test_a_voice_that_becomes_softer_is_raised() -> None:
+    """It falls by 28 dB within two seconds."""
+    samples = np.concatenate([spoken(number)[40 * HOP : 240 * HOP] for number in range(4)])
+    fall_db = np.interp(np.arange(len(samples)) / RATE_HZ, [2, 4], [0, 28])
+    falling = (samples * 10 ** (-fall_db / 20)).astype(np.float32)
+    levelled = level_passage(falling, log_energy(falling))
+    start, last = slice(0, 2), slice(5, 7)
+    assert loudness_db(levelled, start) == pytest.approx(20 * np.log10(SAME_LEVEL), abs=0.1)
+    assert loudness_db(falling, start) - loudness_db(falling, last) > 24
+    assert loudness_db(levelled, start) - loudness_db(levelled, last) < 14
+
+
+VOICES = (
+    "speech-open/arctic_a0009.wav",
+    "speech-open/61-70968-0000.flac",
+    "speech-open/sense_and_sensibility_01_austen_64kb-0880.wav",
+    "speech-open/13697_11991_000000.opus",
+    "grid-others/lbax4n.mpg",
+)
+
+
+def in_frames(path: Path) -> Samples:
+    samples = read_audio(path).samples
+    return samples[: len(samples) // HOP * HOP]
+
+
+def assert_same_motion(line: Samples, samples: Samples, place: int) -> None:
+    """A line has the motion of the line alone, and the same phones within a frame; around it the mouth rests.
+
+    place : the frame in which the line begins
+    """
+    alone, found = (animate(Audio(each, RATE_HZ)) for each in (line, samples))
+    opening, other = alone.motion["opening"], found.motion["opening"][place:]
+    frames = min(len(opening), len(other))
+    difference = np.abs(opening[:frames] - other[:frames])
+    assert difference.max() < 0.02
+    assert difference.mean() < 0.004
+    end_s = place / 100 + len(line) / RATE_HZ
+    sounds = [span for span in found.units if not is_silent(span.label.phone)]
+    sounds = [span for span in sounds if place / 100 - 0.05 <= span.start_s < end_s]
+    expected = [span for span in alone.units if not is_silent(span.label.phone)]
+    assert [span.label.phone for span in sounds] == [span.label.phone for span in expected]
+    for now, was in zip(sounds, expected, strict=True):
+        assert now.start_s - place / 100 == pytest.approx(was.start_s, abs=0.011)
+
+
+@pytest.mark.long
+@pytest.mark.recordings
+@pytest.mark.parametrize("voice", VOICES)
+def test_silence_and_gain_change_no_motion_of_a_real_voice(recordings: Path, voice: str) -> None:
+    line = in_frames(recordings / voice)
+    for seconds, units in ((0.5, 0), (5, 0), (20, 0), (5, 1), (5, 25)):
+        around = noise(seconds, units)
+        samples = np.concatenate([around, line, around])
+        assert_same_motion(line, samples, round(100 * seconds))
+        if seconds > 2:
+            assert np.ptp(animate(Audio(samples, RATE_HZ)).motion["opening"][: round(100 * seconds) - 60]) < 0.02
+    for decibels in (-40, -20):
+        assert_same_motion(line, louder(line, decibels), 0)
+
+
+@pytest.mark.long
+@pytest.mark.recordings
+@pytest.mark.parametrize("voice", VOICES)
+def test_another_line_changes_no_motion_of_a_real_voice(recordings: Path, voice: str) -> None:
+    line, other = in_frames(recordings / voice), in_frames(recordings / VOICES[2 if voice == VOICES[1] else 1])
+    for gap_s, decibels in ((0.5, 0), (1, -30), (5, 30)):
+        before, after = louder(other, -max(decibels, 0)), louder(line, min(decibels, 0))
+        samples = np.concatenate([before, noise(gap_s, 0), after])
+        assert_same_motion(line, samples, len(other) // HOP + round(100 * gap_s))
