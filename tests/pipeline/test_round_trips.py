@@ -17,7 +17,8 @@ from lipmotion.pipeline.outputs.motion_input import read_generation
 from lipmotion.pipeline.outputs.write import write
 from lipmotion.pipeline.understand.given_units import read_units
 from lipmotion.pipeline.understand.request import SpeechRequest
-from lipmotion.pipeline.understand.understood_speech import recognised_with, understand
+from lipmotion.pipeline.understand.understood_speech import understand
+from lipmotion.speech.recognition.recognised_speech import relied_on
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Generation, Span, StateTrace, Timeline, Unit
 from meshes.speech import motion, units
@@ -74,7 +75,7 @@ def test_phones_of_a_recording_say_what_is_known_of_them(
 def test_corrected_phones_are_known_and_all_others_as_doubtful_as_before(
     toy_model: Model, toy_sentence: ToySentence, generation: Generation, tmp_path: Path, name: str
 ) -> None:
-    found = recognised_with(toy_sentence.units, 0.25)
+    found = relied_on(toy_sentence.units, 0.25)
     write(replace(generation, units=found), tmp_path / name)
     read = read_units(tmp_path / name)
     assert [span.label.confidence for span in read] == [0.25] * len(found)

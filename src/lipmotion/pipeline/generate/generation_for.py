@@ -151,8 +151,10 @@ def _of_parts(
         apart = Timeline((*apart.spans[:-1], replace(last, end_s=last.end_s + LONG_SILENCE_S)))
         generations.append(replace(finish(replace(generation, units=apart), start_s), units=units))
     dtype = np.float32 if frames > DOUBLE_FRAMES else rest.motion.values.dtype
-    silent_rows = [each.motion.values[row] for each in generations for row in (0, -1)] or rest.motion.values
-    still = np.mean(silent_rows, axis=0)  # as the mouth is at the ends of passages, beside which it stays
+    resting = rest.motion.values.mean(axis=0)
+    ends = [each.motion.values[[0, -1]] for each in generations]
+    nearest = [rows[np.abs(rows - resting).sum(axis=1).argmin()] for rows in ends]  # a pin may hold the other one
+    still = np.mean(nearest or [resting], axis=0)  # beside passages the mouth stays as it is at their ends
     values = _joined(parts, [each.motion.values for each in generations], still, frames, dtype)
     if isinstance(rest.spread, ReducedVariance):
         reduced = [each.spread.reduced for each in generations if isinstance(each.spread, ReducedVariance)]
