@@ -142,7 +142,7 @@ class _Wave(mmap.mmap):
     name = ""
     start = 0
 
-    def seek(self, place: int, whence: int = 0) -> None:  # type: ignore[override]
+    def seek(self, place: int, whence: int = 0) -> None:
         base = (self.start, super().tell(), len(self))[whence]
         super().seek(min(max(base + place, self.start), len(self)))
 
