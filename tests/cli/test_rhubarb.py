@@ -32,8 +32,8 @@ def shapes_of(document: str) -> list[str]:
 @pytest.mark.parametrize("dialogue", ["dialog.txt", "empty.txt"])
 def test_after_effects(rhubarb: Rhubarb, here: Path, dialogue: str) -> None:
     """It always names a dialogue, and reads the log file: what is in it is an error."""
-    line = ("--dialogFile", dialogue, "--recognizer", "phonetic", "--extendedShapes", "GX", "--exportFormat", "json")
-    line += ("--logFile", "log.txt", "--logLevel", "fatal", "--output", "output.json")
+    line: tuple[str, ...] = ("--dialogFile", dialogue, "--recognizer", "phonetic", "--extendedShapes", "GX")
+    line += ("--exportFormat", "json", "--logFile", "log.txt", "--logLevel", "fatal", "--output", "output.json")
     assert rhubarb(*line, "take.wav").code == 0
     assert (here / "log.txt").read_text() == ""
     assert set(shapes_of((here / "output.json").read_text())) <= set("ABCDEFGX")

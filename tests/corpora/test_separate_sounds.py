@@ -43,6 +43,11 @@ def test_without_them_nothing_changes(studio):
     assert {(item.recorder, item.offset_s) for item in found.recordings} == {(None, None)}
 
 
+def test_a_spreadsheet_writes_its_own_marks(tmp_path):
+    (tmp_path / "offsets.csv").write_text("sep=;\nname;offset_ms;\nanna/c;-12,5\n;\n", encoding="utf-8-sig")
+    assert read_offsets(tmp_path / "offsets.csv") == {"anna-c": pytest.approx(-0.0125)}
+
+
 def test_what_is_wrong_with_a_table_is_said(tmp_path):
     for text, message in (
         ("", "the columns are '', required name,offset_ms"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from collections.abc import Iterable
 from dataclasses import replace
@@ -11,6 +10,7 @@ from pathlib import Path
 from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES, RecordingFolder, SourceRecording
 from lipmotion.errors import CorpusError, InputError, shortened
 from lipmotion.storage.files import read_text_file
+from lipmotion.storage.text_table import read_table
 
 RECORDER = ".recorder"
 """``take.recorder.wav`` is the sound that a recorder of its own made of ``take.mp4``, or of ``take.wav``."""
@@ -67,19 +67,15 @@ def read_offsets(path: Path) -> dict[str, float]:
     Raises CorpusError: other columns, a row that is damaged, or a name twice.
     """
     try:
-        rows = list(csv.reader(io.StringIO(read_text_file(path, "table of offsets", LARGEST_TABLE_BYTES))))
-        if not rows or [field.strip() for field in rows[0]] != COLUMNS:
-            raise InputError(
-                f"{path}: the columns are {shortened(','.join(rows[0] if rows else []))!r}, required name,offset_ms"
-            )
+        table = read_table(io.StringIO(read_text_file(path, "table of offsets", LARGEST_TABLE_BYTES), newline=""))
+        if table.plain_names != COLUMNS:
+            raise InputError(f"{path}: the columns are {shortened(','.join(table.names))!r}, required name,offset_ms")
         found: dict[str, float] = {}
-        for number, row in enumerate(rows[1:], 2):
-            if not any(field.strip() for field in row):
-                continue
+        for number, row in table.rows:
             name, offset_s = row[0].strip().replace("/", "-"), _offset_s(row, f"{path}: line {number}")
             if found.setdefault(name, offset_s) != offset_s:
                 raise InputError(f"{path}: line {number}: {shortened(name)!r} has another offset above; keep one")
-    except (InputError, csv.Error) as error:
+    except ValueError as error:
         raise CorpusError(str(error)) from error
     return found
 
@@ -88,7 +84,7 @@ def _offset_s(row: list[str], where: str) -> float:
     try:
         if len(row) != len(COLUMNS):
             raise ValueError(f"{len(row)} fields")
-        offset_s = float(row[1]) / 1000
+        offset_s = float(row[1].replace(",", ".")) / 1000
     except ValueError as error:
         raise InputError(f"{where}: {shortened(str(error))}, required a name and milliseconds") from error
     _check(offset_s)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -52,7 +53,7 @@ def write(tmp_path: Path) -> Any:
     return writer
 
 
-def grid(end: float = 2, **tiers: list[tuple[float, float, str]]) -> str:
+def grid(end: float = 2, /, **tiers: Sequence[tuple[float, float, str]]) -> str:
     rows = (
         f'"IntervalTier"\n"{name.replace("__", " - ").replace("_", "-")}"\n0\n{end}\n{len(labels)}\n'
         + "".join(f'{start}\n{stop}\n"{text}"\n' for start, stop, text in labels)
@@ -105,7 +106,7 @@ def test_tiers_of_webmaus_have_their_roles(write: Any) -> None:
         units = read_phones(CASES / name)
         assert [span.label.phone for span in units][1:3] == ["m", "ay"]
         assert {span.label.word for span in units} == {"", *MOTHER.split()}
-    rows = {"KAN": [(0, 0.5, "m a")], "KAS": [(0, 0.5, "m.a")], "MAS": [(0, 0.5, "m a")], "TRN": [(0, 2, "ma")]}
+    rows = {"KAN": [(0, 0.5, "m a")], "KAS": [(0, 0.5, "m.a")], "MAS": [(0, 0.5, "m a")], "TRN": [(0, 2.0, "ma")]}
     mau = [(0, 0.2, "<p:>"), (0.2, 0.3, "m"), (0.3, 0.5, "a:"), (0.5, 0.6, "?"), (0.6, 0.8, "<usb>"), (0.8, 2, "<p:>")]
     path = write(grid(ORT=[(0.2, 0.6, "ma")], **rows, MAU=mau), "a.TextGrid")
     assert (words(path), phones(path)) == ("ma", ["sil", "m", "aa", UNKNOWN_PHONES, "sil"])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import logging
 import os
@@ -16,6 +15,7 @@ from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES, VIDEO_SUFFIXES
 from lipmotion.errors import ExportError, InputError, shortened
 from lipmotion.export.base import motion_suffixes
 from lipmotion.storage.files import check_listable, read_text_file
+from lipmotion.storage.text_table import read_table
 
 LOG = logging.getLogger("lipmotion")
 FILE_COLUMNS = ("file", "path", "recording", "audio", "wav")
@@ -199,21 +199,20 @@ def _table(source: Path, text: str) -> list[dict[str, str]] | None:
 
     Raises InputError: a row without a recording, or one that is longer than the header.
     """
-    first = text.split("\n", 1)[0]
-    delimiter = max("\t;,", key=first.count)
     try:
-        header = [name.strip().lower() for name in next(csv.reader([first], delimiter=delimiter), [])]
+        table = read_table(io.StringIO(text, newline=""))
+        header = [name.lower() for name in table.plain_names]
         file = next((name for name in header if name in FILE_COLUMNS), None)
         if file is None:
             return None
-        rows = list(csv.reader(io.StringIO(text, newline=""), delimiter=delimiter))[1:]
-    except csv.Error as error:
+        rows = list(table.rows)
+    except ValueError as error:
         raise InputError(f"{source}: not a readable table ({error}); export it again as CSV") from error
     unused = [name for name in header if name and name != file and name not in COLUMNS]
     if unused:
         named = ", ".join(map(shortened, unused[:MOST_NAMED_LINES]))
         LOG.warning("%s: columns that are not used: %s; used are %s", source, named, ", ".join((file, *COLUMNS)))
-    return [_row(source, number, header, file, cells) for number, cells in enumerate(rows, 2) if any(cells)]
+    return [_row(source, number, header, file, cells) for number, cells in rows]
 
 
 def _row(source: Path, number: int, header: Sequence[str], file: str, cells: Sequence[str]) -> dict[str, str]:

@@ -13,6 +13,7 @@ from lipmotion.pipeline.batch.fields import as_field, from_field
 from lipmotion.pipeline.batch.lines import LARGEST_LIST_BYTES
 from lipmotion.pipeline.batch.record import Record
 from lipmotion.storage.files import read_text_file, whole_file
+from lipmotion.storage.text_table import read_table
 
 APPROVE, REDO, NO_MARK = "approve", "redo", ""
 KINDS = (APPROVE, REDO, NO_MARK)
@@ -39,25 +40,26 @@ def read_marks(path: Path) -> dict[str, Mark]:
     path : a table whose first row names the columns ``name`` and ``mark`` and, if there is, ``when``
     Raises InputError: the file cannot be read, lacks a column, or has an unknown mark, or two marks of one line.
     """
-    text = read_text_file(path, "file of marks", LARGEST_LIST_BYTES)
-    delimiter = max("\t;,", key=text.partition("\n")[0].count)
     marks: dict[str, Mark] = {}
     try:
-        rows = csv.DictReader(io.StringIO(text, newline=""), delimiter=delimiter)
-        missing = [name for name in COLUMNS[:2] if name not in (rows.fieldnames or ())]
+        table = read_table(io.StringIO(read_text_file(path, "file of marks", LARGEST_LIST_BYTES), newline=""))
+        missing = [name for name in COLUMNS[:2] if name not in table.plain_names]
         if missing:
             raise InputError(
                 f"{path}: no column {missing[0]!r}; required a first row name,mark (and when, if you like)"
             )
-        for number, row in enumerate(rows, 2):
-            name, kind, when = (from_field(row.get(column) or "") for column in COLUMNS)
+        for number, fields in table.rows:
+            row = dict(zip(table.plain_names, fields, strict=False))
+            name, kind, when = (from_field(row.get(column, "")) for column in COLUMNS)
             kind = kind.strip().lower()
             if kind not in KINDS:
                 raise InputError(f"{path}, row {number}: the mark is {shortened(kind)!r}, required approve or redo")
             if name in marks:
                 raise InputError(f"{path}, row {number}: {shortened(name)!r} is marked twice; remove one of the rows")
             marks[name] = Mark(kind, when)
-    except csv.Error as error:
+    except ValueError as error:
+        if isinstance(error, InputError):
+            raise
         raise InputError(f"{path}: not a readable table ({error}); export it again as CSV") from error
     return marks
 

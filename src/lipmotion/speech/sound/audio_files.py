@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.speech.sound.audio_decoding import DecodedAudio, check_sound_format, decode_audio
 from lipmotion.storage.files import check_source
-from lipmotion.storage.media import open_media, stated_duration_s
+from lipmotion.storage.media import open_media
 from lipmotion.storage.sources import is_text
 from lipmotion.types import Audio
 
@@ -63,17 +63,6 @@ def read_audio(path: Path, rate_hz: int = SPEECH_RATE_HZ, *, warn: bool = True) 
         sound = _decoded(path, rate_hz, loudest)
     _check_damage(path, sound, logging.WARNING if warn else logging.DEBUG)
     return _checked(path, Audio(sound.samples, rate_hz))
-
-
-def stated_length_s(path: Path) -> float:
-    """Return the length that a recording states, in seconds; 0 if it states none, or cannot be read."""
-    import av
-
-    try:
-        with open_media(path, content=_corrected_wave(path)) as container:
-            return stated_duration_s(container, container.streams.audio[0])
-    except (av.FFmpegError, OSError, ValueError, IndexError):
-        return 0.0
 
 
 def _decoded(path: Path, rate_hz: int, channel: int | None) -> DecodedAudio:
@@ -142,7 +131,7 @@ class _Wave(mmap.mmap):
     name = ""
     start = 0
 
-    def seek(self, place: int, whence: int = 0) -> None:  # type: ignore[override]
+    def seek(self, place: int, whence: int = 0) -> None:
         base = (self.start, super().tell(), len(self))[whence]
         super().seek(min(max(base + place, self.start), len(self)))
 
