@@ -3,6 +3,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 import pytest
@@ -37,7 +38,7 @@ def computed(monkeypatch: pytest.MonkeyPatch) -> Counter[tuple[str, bytes, int]]
 
     def counting(kind: str, function: Callable[..., Any]) -> Callable[..., Any]:
         def counted(samples: np.ndarray, banks: Sequence[np.ndarray] = (np.zeros(0),)) -> Any:
-            counts.update((kind, bank.tobytes(), len(samples)) for bank in banks)
+            counts.update((kind, bank.tobytes(), crc32(samples)) for bank in banks)
             return function(samples, banks) if kind == "filters" else function(samples)
 
         return counted
@@ -70,17 +71,17 @@ def test_every_kind_is_that_of_the_passage_at_its_level(sentence: ToySentence) -
     audio = analysed(sentence.audio)
     (passage,) = audio.passages
     first, end = find_passages(log_energy(sentence.audio.samples))[0]
-    lead, end = first - passage.first, min(end, len(sentence.audio.samples) // HOP)
-    rows = slice(lead, lead + end - first)
-    sound = Audio(passage.audio.samples[lead * HOP : rows.stop * HOP], 16_000)
-    assert np.corrcoef(sound.samples, sentence.audio.samples[first * HOP : end * HOP])[0, 1] == pytest.approx(1)
+    lead, recorded = first - passage.first, sentence.audio.samples[first * HOP : end * HOP]
+    sound = Audio(passage.audio.samples[lead * HOP :][: len(recorded)], 16_000)
+    rows = slice(lead, lead + len(recorded) // HOP + 1)
+    assert np.corrcoef(sound.samples, recorded)[0, 1] == pytest.approx(1)
     for warp, features in zip(WARPS, audio.mfcc_of_warps(WARPS), strict=True):
-        assert passage.audio.mfcc(warp).values[rows] == pytest.approx(mfcc(sound, warp).values[:-1], abs=1e-5)
+        assert passage.audio.mfcc(warp).values[rows] == pytest.approx(mfcc(sound, warp).values, abs=1e-5)
         assert features is audio.mfcc(warp)
         assert features.duration_s == sentence.audio.duration_s
-    assert passage.audio.general_features[rows] == pytest.approx(general_features(sound)[:-1], abs=1e-5)
-    assert passage.audio.spectrum[rows] == pytest.approx(spectrum(sound)[:-1], abs=1e-5)
-    assert passage.audio.log_energy[rows] == pytest.approx(log_energy(sound.samples)[:-1], abs=1e-5)
+    assert passage.audio.general_features[rows] == pytest.approx(general_features(sound), abs=1e-5)
+    assert passage.audio.spectrum[rows] == pytest.approx(spectrum(sound), abs=1e-5)
+    assert passage.audio.log_energy[rows] == pytest.approx(log_energy(sound.samples), abs=1e-5)
 
 
 def test_features_are_normalised_over_the_passage_alone() -> None:
@@ -146,7 +147,7 @@ def test_where_nothing_is_said_all_features_are_0() -> None:
     for samples in (np.zeros(16_000), 0.1 * np.sin(np.arange(16_000) / 5)):
         audio = of_samples(samples)
         assert audio.passages == ()
-        for values in kinds(audio)[:-1]:
+        for values in kinds(audio):
             assert len(values) == 101
             assert not values.any()
 
