@@ -6,17 +6,13 @@ import ast
 import re
 from collections.abc import Callable, Iterator
 from functools import cache
-from io import StringIO
 from pathlib import Path
-from tokenize import NAME, generate_tokens
 
 SOURCE = Path(__file__).parents[2] / "src" / "lipmotion"
 EMPTY_NAMES = {"utils", "util", "helpers", "helper", "common", "core", "misc"}
 """Module names without meaning."""
 FRAGMENTS = {"And", "But", "Less", "Of", "Or"}
 """Words with which a docstring does not begin: it is read alone."""
-HEARING = re.compile(r"(^|[^sS])[hH](ear(?!t)|EAR)")
-"""A program does not hear: it recognises, decodes, measures (``shear`` and ``heart`` are other words)."""
 ADVERBS = set(
     "ALMOST ALONE APART AWAY BELOW DEEP ENOUGH EXACT FAR FEW LARGE LOUD MANY MOST NEAR NEARLY NONE OFTEN".split()
 )
@@ -120,13 +116,6 @@ def fragmentary(text: str) -> Iterator[int]:
             yield node.lineno
 
 
-def heard(text: str) -> Iterator[int]:
-    """Identifiers have the words of the field (names in files, such as ``closures_heard``, are strings)."""
-    for token in generate_tokens(StringIO(text).readline) if HEARING.search(text) else ():
-        if token.type == NAME and HEARING.search(token.string):
-            yield token.start[0]
-
-
 def adverbial(text: str) -> Iterator[int]:
     """A constant that is a number is a noun."""
     for node in parsed(text).body:
@@ -150,7 +139,7 @@ def offences(rule: Rule, under: str = "**/*.py", but: str = "none") -> list[str]
 
 
 def test_rules_are_kept() -> None:
-    for rule in (without_docstring, asserted, pickled, changeable, by_chance, fragmentary, heard):
+    for rule in (without_docstring, asserted, pickled, changeable, by_chance, fragmentary):
         assert offences(rule) == [], rule.__name__
     assert offences(adverbial, but="addons") == []  # their text is part of files that are written
 
@@ -185,8 +174,6 @@ OFFENCES: list[tuple[Rule, str, list[int]]] = [
     (fragmentary, 'A = 1\n"""Of all, the first."""\n', [2]),
     (fragmentary, 'def f():\n    """But less."""\n', [2]),
     (fragmentary, '"""Often, and of all."""\nA = "Of"\n', []),
-    (heard, "def _heard(): ...\nclass A(HearsB): ...\nUNHEARD = b.hearing\n", [1, 2, 3, 3]),
-    (heard, 'shear, heart = record["closures_heard"], 1\n', []),
     (adverbial, "NEAR, WIDTH = 1, -2.0\n_FAR: Final = 3\n", [1, 2]),
     (adverbial, 'NEAR_S = 1\nFEW = ("a", "b")\ndef f():\n    FAR = 1\n', []),
 ]

@@ -14,11 +14,11 @@ from lipmotion.pipeline.understand.transcribe import (
     warn_of_guesses,
     warn_of_misfit,
 )
-from lipmotion.pipeline.understand.understood_speech import relied_on
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.mfcc import mfcc
 from lipmotion.speech.recognition.agreement import TranscriptFit
 from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser
+from lipmotion.speech.recognition.recognised_speech import relied_on
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence

@@ -168,8 +168,8 @@ def _of_parts(
     trace = np.full(frames, number[rest.trace.states[rest.trace.frames[REST_FRAMES // 2]]], np.intp)
     for part, each in zip(parts, generations, strict=True):
         named = np.array([number[state] for state in each.trace.states], np.intp)[each.trace.frames]
-        first, end = max(part.first, 0), min(part.first + part.frames, frames)
-        trace[first:end] = named[first - part.first : end - part.first]
+        start, stop = max(part.first, 0), min(part.first + part.frames, frames)
+        trace[start:stop] = named[start - part.first : stop - part.first]
     motion = replace(rest.motion, values=values)
     held = [(pinned_frame(pin, motion, is_weight=False), motion.column(pin.channel), pin.value) for pin in pins]
     bend_through_pins(values, held, REACH_FRAMES)  # those in silence; the others hold but for the way to rest

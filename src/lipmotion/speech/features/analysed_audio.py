@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import Any, NamedTuple, TypeVar
 
@@ -104,7 +104,7 @@ class AnalysedAudio(Audio):
     def _new_mfcc(self, warps: Sequence[float]) -> list[Features]:
         for passage in self.passages:
             passage.audio.mfcc_of_warps(warps)  # the spectra are computed once for all
-        return [Features(self.joined(lambda audio, w=warp: audio.mfcc(w).values), self.duration_s) for warp in warps]
+        return [Features(self.joined(partial(_mfcc_values, warp=warp)), self.duration_s) for warp in warps]
 
     @cached_property
     def log_energy(self) -> NDArray[np.float32]:
@@ -124,6 +124,10 @@ class AnalysedAudio(Audio):
     def stretch(self, first: int, stop: int) -> AnalysedAudio:
         """Return some frames of the recording, with the features that they have in the whole."""
         return _Stretch(self.samples[first * HOP : stop * HOP], self.rate_hz, whole=self, first=first)
+
+
+def _mfcc_values(audio: AnalysedAudio, warp: float) -> NDArray[np.float32]:
+    return audio.mfcc(warp).values
 
 
 class Passage(NamedTuple):
@@ -194,7 +198,7 @@ class _Stretch(AnalysedAudio):
     first: int = field(default=0, kw_only=True)
 
     @property
-    def passages(self) -> tuple[Passage, ...]:  # type: ignore[override]
+    def passages(self) -> tuple[Passage, ...]:
         return (Passage(0, slice(0, self.frames), self),)
 
     def mfcc_of_warps(self, warps: Sequence[float]) -> list[Features]:

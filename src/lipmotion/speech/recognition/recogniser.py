@@ -117,11 +117,11 @@ class Recogniser:
         if not audio.is_passage:
             if (network := network_of(self.kind)) is not None:
                 posterior_stretches(network, audio, each)  # of all passages at once: several processes work on them
-            parts = [
+            passages = [
                 (passage, self.recognition(passage.audio, passage.audio.mfcc(), each, english=english))
                 for passage in audio.passages
             ]
-            return joined_recognition(parts, features.duration_s)
+            return joined_recognition(passages, features.duration_s)
         similarity = self._similarity(audio)
         known = self._knows_voice_and_words(similarity)
         network = None if known else network_of(self.kind)

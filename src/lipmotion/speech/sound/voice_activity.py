@@ -105,8 +105,8 @@ def find_passages(log_energy: NDArray[np.float32]) -> list[Stretch]:
             before = (runs[number - 1].end + run.first + 1) // 2 if number else region.first
             after = (run.end + runs[number + 1].first + 1) // 2 if number + 1 < len(runs) else region.end
             first, end = max(before, run.first - PASSAGE_MARGIN), min(after, run.end + PASSAGE_MARGIN)
-            before, after = log_energy[first : run.first][::-1], log_energy[run.end : end]
-            passages.append(Stretch(run.first - _margin(before, floor, 1), run.end + _margin(after, floor, 2)))
+            lead = _margin(log_energy[first : run.first][::-1], floor, 1)
+            passages.append(Stretch(run.first - lead, run.end + _margin(log_energy[run.end : end], floor, 2)))
     return passages
 
 

@@ -183,7 +183,7 @@ def posterior_stretches(name: str, audio: AnalysedAudio, each: ParallelMap = map
         if audio.is_passage:
             return by_passage[0]
         for part in audio.passages:
-            part.audio.once(key, lambda part=part: by_passage[part.first])
+            part.audio.once(key, partial(by_passage.__getitem__, part.first))
         return [each_of for part in audio.passages for each_of in _placed(by_passage[part.first], part)]
 
     return audio.once(key, found)
