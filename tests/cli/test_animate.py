@@ -70,7 +70,7 @@ UNUSABLE = [
     (["--rate", "0"], 3, "frame rate is 0 a second, required 1 to 1000"),
     (["--fps", "1e9"], 3, "frame rate is 1e+09"),
     (["--transcript", "missing.txt"], 3, "missing.txt: no such transcript file"),
-    (["--transcript", "five " * 100], 5, "too short for what should be said"),
+    (["--transcript", "five " * 10_000], 5, "the transcript has 50000 characters"),
     (["--lexicon", "missing.txt"], 3, "missing.txt: no such lexicon file"),
     (["--model", "missing.lipmotion"], 3, "missing.lipmotion: no such model"),
     (["-o", "a.xyz"], 7, "unknown format '.xyz'; required one of: .json .csv .npz "),

@@ -55,7 +55,7 @@ def test_words_beside_recordings_are_used(
 def test_what_fails_does_not_stop_the_others(run: RunCommand, takes: Path, toy_model_file: Path) -> None:
     """The exit code is the highest of those that failed."""
     (takes / "0.wav").write_text("no sound")
-    (takes / "a.txt").write_text("five " * 100)
+    (takes / "a.txt").write_text("five " * 10_000)
     done = run("animate", takes, "--model", toy_model_file, "-o", "out/")
     assert (done.code, done.out) == (5, ["out/b.json"])
     assert len(done.err) == 3

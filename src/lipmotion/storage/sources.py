@@ -163,7 +163,7 @@ _KINDS: tuple[tuple[str, str, tuple[tuple[int, bytes], ...]], ...] = (
 is packed with gzip is unpacked."""
 _NO_MISTAKE = {
     "recording": {"sound"},
-    "video": {"sound", "picture"},
+    "video": {"sound", "picture", "archive"},
     "text": set[str](),
     "motion file": {"archive", "picture"},
 }
