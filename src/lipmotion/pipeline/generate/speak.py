@@ -120,6 +120,7 @@ def speak(  # noqa: PLR0913
         pauses=pauses,
         asymmetry=asymmetry,
         manner=ASKED,
+        spoken_so=True,
     )
     return SpokenText(sound, _tagged(animate(request, model=loaded, constraints=constraints), tags))
 

@@ -50,6 +50,7 @@ class SpeechRequest:
                  ``natural``: the mouth does in pauses what the model learned
     manner     : ``detected``: the mouth opens for laughter and breaths in the sound, and moves as far as whispered and
                  shouted phrases ask for, unless a mood or a manner is asked for (docs/expression.md); ``asked``: not
+    spoken_so  : whether a synthesiser has spoken the units: they are not compared with the sound
     asymmetry  : 0 to 1: the share that is left of the difference between both sides of the speaker's own mouth, in the
                  lip and jaw points; the mouth of another person (``onto``) stays as it is
 
@@ -71,6 +72,7 @@ class SpeechRequest:
     pauses: str = REST
     asymmetry: float = 0.0
     manner: str = DETECTED
+    spoken_so: bool = False
 
     def __post_init__(self) -> None:
         for each in fields(Request):

@@ -492,7 +492,7 @@ def _followed(
     if guessed:
         LOG.warning("the units do not say which phones are said at %s: they are recognised", named_places(guessed))
     units = without_gaps(Timeline(tuple(spans)), audio.duration_s)
-    if kind == "own" or not all(span.label.phone for span in units):
+    if kind == "own" or request.spoken_so or not all(span.label.phone for span in units):
         return units, None
     name = network_of(kind) if request.language == ENGLISH else None
     heard, sure = heard_phones(name, audio) if name is not None else (None, 0.0)

@@ -149,14 +149,16 @@ def joined_units(parts: Iterable[Timeline[Unit]], silence: Unit, end_s: float) -
     end_s : of the recording
     """
     joined: list[Span[Unit]] = []
-    for span in [*(span for part in parts for span in part), Span(end_s, end_s, silence)]:
-        before_s = joined[-1].end_s if joined else 0.0
-        gap = [Span(before_s, span.start_s, silence)] if span.start_s - before_s > GAP_S else []
-        for each in [*gap, replace(span, end_s=min(span.end_s, end_s))]:
-            if joined and is_silent(each.label.phone) and is_silent(joined[-1].label.phone):
-                joined[-1] = replace(joined[-1], end_s=max(each.end_s, joined[-1].end_s))
-            elif each.end_s > each.start_s:
-                joined.append(each)
+    for part in [*parts, Timeline((Span(end_s, end_s, silence),))]:
+        for number, span in enumerate(part):
+            before_s = joined[-1].end_s if joined else 0.0
+            gap = [Span(before_s, span.start_s, silence)] if span.start_s - before_s > GAP_S else []
+            for each in [*gap, replace(span, end_s=min(span.end_s, end_s))]:
+                at_seam = number == 0 or gap  # two silences that somebody has split stay two
+                if at_seam and joined and is_silent(each.label.phone) and is_silent(joined[-1].label.phone):
+                    joined[-1] = replace(joined[-1], end_s=max(each.end_s, joined[-1].end_s))
+                elif each.end_s > each.start_s:
+                    joined.append(each)
     if joined:
         joined[-1] = replace(joined[-1], end_s=end_s)
     return Timeline(tuple(joined) or (Span(0.0, end_s, silence),))
