@@ -178,7 +178,9 @@ def _write_sentence_with_motion(bench: Bench, name: str = "a") -> None:
 NONE = "none of 1 recordings is usable; the first, a:"
 _recordings_case("an empty folder", 4, "no videos in it, and no sounds with motion")(lambda bench: bench)
 _recordings_case("an empty video", 4, NONE, "the file is empty")(lambda bench: (bench.folder / "a.mp4").touch())
-_recordings_case("a text named .mp4", 4, NONE, "not a readable")(lambda bench: bench.file("a.mp4", "hello " * 500))
+_recordings_case("a text named .mp4", 4, NONE, "is text, required a recording")(
+    lambda bench: bench.file("a.mp4", "hello " * 500)
+)
 
 
 def _label_file(name: str, suffix: str, content: bytes | str, *messages: str) -> None:
@@ -188,9 +190,7 @@ def _label_file(name: str, suffix: str, content: bytes | str, *messages: str) ->
         bench.file(f"a{suffix}", content)
 
 
-_label_file(
-    "binary", ".TextGrid", b"ooBinaryFile\x08TextGrid\x00\xff", "is a binary TextGrid", "save it as a text file"
-)
+_label_file("binary", ".TextGrid", b"ooBinaryFile\x08TextGrid\x00\xff", "is a binary TextGrid", "save it as plain text")
 _label_file("a billion tiers", ".TextGrid", '"ooTextFile"\n"TextGrid"\n0 1 <exists> 1000000000\n', "tier 1 is damaged")
 _label_file("phones that overlap", ".lab", "0 2000000 p\n1000000 3000000 aa\n", "before the one ahead of it ends")
 _label_file("an unknown phone", ".lab", "0 1000000 p\n1000000 2000000 aa\n2000000 3000000 b\n3000000 4000000 qq\n",
@@ -207,7 +207,9 @@ _label_file(
 )
 _label_file("damaged JSON", ".json", '{"segments": [\n', "a.json: line 2: damaged JSON")
 _label_file("two recordings", ".ctm", "a 1 0.0 0.5 hi\nb 1 0.5 0.5 you\n", "a.ctm: line 2: words of two recordings")
-_label_file("a word processor's file", ".txt", "{\\rtf1\\ansi hello}", "required the words alone; save it as text")
+_label_file(
+    "a word processor's file", ".txt", "{\\rtf1\\ansi hello}", "is a rich-text file (RTF)", "save it as plain text"
+)
 _label_file("a file of 5 MB", ".txt", "a" * 5_000_000, "5000000 characters, required at most 4194304: is it a tran")
 _label_file("a file of 20 MB", ".TextGrid", b" " * 20_000_000, "20000000 bytes, required at most 16777216")
 

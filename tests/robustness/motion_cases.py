@@ -51,7 +51,7 @@ _json("no units", {"units": []}, 3, "the units are an empty list", "or leave the
 _json("a unit without a phone", {"units": [{"start_s": 0}]}, 3, "has no 'end_s'; export it again")
 _json("a newer version", {"version": 2}, 3, "version 2, this lipmotion reads up to 1: upgrade lipmotion")
 _json("another format", {"format": "other"}, 3, "its 'format' must be 'lipmotion.motion'")
-_json("NaN among the values", {"values": [[0.1], [float("nan")]]}, 3, "not finite; interpolate them first")
+_json("NaN among the values", {"values": [[0.1], [float("nan")]]}, 3, "the first is 'opening' in frame 1; interpolate")
 _json("rows that are too long", {"values": [[0.1, 0.2]]}, 3, "values have shape (1, 2), required (T, 1)")
 _json("an infinite rate", {"rate_hz": float("inf")}, 3, "motion rate is inf Hz, required more than 0 and finite")
 _json("a channel that is a spreadsheet's formula", {"channels": [{"name": "=1+1", "unit": "weight"}]}, 3,
@@ -98,7 +98,7 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(None, "--units", bench.folder / "units.json")
 
 
-@case(GROUP, "a recording as units", 3, "cannot read phones from '.wav'; use one of .json, .npz, .TextGrid")
+@case(GROUP, "a recording as units", 3, "is a recording, required a units file")
 def _(bench: Bench) -> list[object]:
     return bench.animate(None, "--units", bench.speech)
 

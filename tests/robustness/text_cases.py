@@ -60,7 +60,7 @@ _transcript_file("a subtitle of a million words", b"0:1 --> 0:2\n" + b"a " * 1_0
                  "line 1: a line of 2000000 characters, required at most 262144")  # fmt: skip
 _transcript_file("recognised words, cut off", b'{"segments": [\n{"start": 0.5,', 3, "line 2: damaged JSON (", "again")
 _transcript_file("100,000 brackets", b'{"segments": ' + b"[" * 100_000, 3, "damaged JSON: nested too deeply")
-_transcript_file("a time of centuries", b'{"words": [{"word": "papa", "end": 1e99}]}', 3,
+_transcript_file("a time of centuries", b'{"words": [{"word": "papa", "start": 0, "end": 1e99}]}', 3,
                  "a time is 1e+99, required seconds")  # fmt: skip
 _transcript_file("UTF-16 without its mark", "papa mama".encode("utf-16-le"), 0)
 _transcript_file("SubStation subtitles with damaged times",

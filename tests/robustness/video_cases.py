@@ -51,7 +51,7 @@ _pictures(
 )
 
 
-@case(GROUP, "a moving GIF, named .mp4", 4, NONE, "has no sound track; give a recording with sound")
+@case(GROUP, "a moving GIF, named .mp4", 4, NONE, "is a picture, required a recording")
 def _(bench: Bench) -> list[object]:
     grey = [Image.new("L", (64, 64), level) for level in range(0, 250, 50)]
     grey[0].save(bench.folder / "a.gif", save_all=True, append_images=grey[1:], duration=40)

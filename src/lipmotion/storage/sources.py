@@ -154,6 +154,8 @@ _KINDS: tuple[tuple[str, str, tuple[tuple[int, bytes], ...]], ...] = (
     ),
     ("archive", "an archive", ((0, b"\xfd7zXZ"), (257, b"ustar"))),
     ("stand-in", "a web page", ((0, b"<!DOCTYPE html"), (0, b"<!doctype html"), (0, b"<html"), (0, b"<HTML"))),
+    ("stand-in", "a list or an index of other files", ((0, b"#EXTM3U"), (0, b"[playlist]"), (0, b"# VobSub"))),
+    ("stand-in", "a session description", ((0, b"v=0\no="), (0, b"v=0\r\no="))),
     ("stand-in", "a pointer of Git LFS", ((0, b"version https://git-lfs"),)),
     ("stand-in", "a note of macOS beside a file", ((0, b"\0\x05\x16\x07"),)),
     ("sound", "a recording", ((8, b"WAVE"), (8, b"AIFF"), (8, b"AIFC"), (8, b"AVI "), (4, b"ftyp"), (0, b"fLaC"))),

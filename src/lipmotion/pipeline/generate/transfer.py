@@ -167,7 +167,7 @@ def _opened(onto: str | Path | Corpus | Model | FilmedFace) -> tuple[_Opened, st
     path = Path(onto)
     if path.is_dir():
         return Corpus.open(path), str(path)
-    check_source(path, "video")
+    check_source(path, "video, face or model")
     if path.suffix.lower() == SUFFIX:
         return load_face(path), str(path)
     return (load_model(path) if is_zipfile(path) else path), str(path)
