@@ -18,10 +18,10 @@ NO_RECORDING = ("not a readable recording", "give an audio or video file")
 NO_SPEECH = ("no speech found in the recording: the mouth rests; give a recording in which something is said",)
 CUT = ("cut short: it states 3", "s of sound and holds")
 CONTAINERS: dict[str, tuple[str, dict[float, Any]]] = {
-    "wav": ("pcm_s16le", {0.6: (0,), 0.004: (3, "holds", "required at least 100 ms")}),
+    "wav": ("pcm_s16le", {0.6: (0, *NO_SPEECH), 0.004: (3, "holds", "required at least 100 ms")}),
     "flac": ("flac", {0.6: (0, *CUT), 0.01: (3, *NO_RECORDING)}),
     "mp3": ("libmp3lame", {0.6: (0, *CUT)}),
-    "ogg": ("libopus", {0.6: (0,)}),
+    "ogg": ("libopus", {0.6: (0, *NO_SPEECH)}),
     "mp4": ("aac", {0.6: (3, *NO_RECORDING)}),
     "mkv": ("aac", {0.6: (0, *CUT)}),
 }
@@ -96,12 +96,12 @@ for _name, _samples in {
     "all but inaudible": lambda samples: samples * np.float32(1e-12),
 }.items():
 
-    @case(GROUP, _name, 0, *(NO_SPEECH if _name == "digital silence" else ()))
+    @case(GROUP, _name, 0, *(NO_SPEECH if _name in ("digital silence", "white noise") else ()))
     def _(bench: Bench, change=_samples) -> list[object]:
         return bench.animate(bench.sound(change(bench.samples())))
 
 
-@case(GROUP, "an mp3 named .wav", 0)
+@case(GROUP, "an mp3 named .wav", 0, *NO_SPEECH)
 def _(bench: Bench) -> list[object]:
     path = write_sound(bench.folder / "a.mp3", tone(16_000), 16_000, "libmp3lame")
     return bench.animate(path.rename(bench.folder / "a.wav"))
