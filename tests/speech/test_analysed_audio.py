@@ -38,7 +38,7 @@ def computed(monkeypatch: pytest.MonkeyPatch) -> Counter[tuple[str, bytes, int]]
 
     def counting(kind: str, function: Callable[..., Any]) -> Callable[..., Any]:
         def counted(samples: np.ndarray, banks: Sequence[np.ndarray] = (np.zeros(0),)) -> Any:
-            counts.update((kind, bank.tobytes(), crc32(samples)) for bank in banks)
+            counts.update((kind, bank.tobytes(), crc32(samples.tobytes())) for bank in banks)
             return function(samples, banks) if kind == "filters" else function(samples)
 
         return counted
