@@ -1,12 +1,13 @@
 """Speakers, words and lengths outside the training data of the shipped model: accuracy, speed, memory.
 
-    python benchmarks/robust.py [--corpora FOLDER] [--model FILE] [--only others|phones|noise|foreign|whole|hour|calls]
+    python benchmarks/robust.py [--corpora FOLDER] [--model FILE] [--only others|phones|noise|silence|foreign|whole|hour|calls]
 
 others : GRID clips of other speakers, correlation of opening per clip, audio only and with the words of the file's name
 phones : recordings with transcripts of ``speech-open``, phone accuracy against their forced alignment by the general
          models, real-time factors (recognition in one process, warm, median of five), and the share of the speech of
          which words decided
 noise  : sounds that are not speech: share of the time that is recognised as speech, and mean opening of the mouth
+silence: a line beside zeros, noise and another voice, against the line alone: phones, difference of the opening
 foreign: speech that is not English: share of the speech of which words decided, and their confidence
 whole  : time of ``lipmotion animate`` on a minute of speech, whole processes, the second of two
 hour   : peak memory and time of ``lipmotion animate`` on an hour of speech, a process of its own
@@ -165,6 +166,39 @@ def not_speech() -> dict[str, np.ndarray]:
     }
 
 
+def silence(corpora: Path, model: Model, _: Path | None) -> None:
+    """Print by how much what stands around a line changes its phones and its opening."""
+    names = ("arctic_a0009.wav", "61-70968-0000.flac", "sense_and_sensibility_01_austen_64kb-0880.wav")
+    files = [corpora / "speech-open" / name for name in (*names, "13697_11991_000000.opus")]
+    lines = [read_audio(path).samples for path in [*files, corpora / "grid-others" / "lbax4n.mpg"]]
+    lines = [samples[: len(samples) // 160 * 160] for samples in lines]
+    rng = np.random.default_rng(0)
+
+    def quiet(duration_s: float, units: int = 0) -> np.ndarray:
+        return rng.uniform(-units, units, int(duration_s * RATE_HZ)) / 32_768
+
+    for number, line in enumerate(lines):
+        alone = animate(Audio(line, RATE_HZ), model=model)
+        other = lines[0 if number == 1 else 1]
+        around = {f"{units} units, {s} s": (quiet(s, units), line, quiet(s, units))
+                  for s, units in ((0.5, 0), (5, 0), (20, 0), (5, 1), (5, 5), (5, 25))}  # fmt: skip
+        around |= {f"gain {db} dB": (quiet(0), line * 10 ** (db / 20), quiet(0)) for db in (-20, -40)}
+        around |= {f"after another voice, {s} s": (np.concatenate([other * 10 ** (-max(db, 0) / 20), quiet(s)]),
+                                                   line * 10 ** (min(db, 0) / 20), quiet(0))
+                   for s, db in ((0.5, 0), (1, -30), (5, 30))}  # fmt: skip
+        for name, parts in around.items():
+            start = len(parts[0]) // 160
+            result = animate(Audio(np.concatenate(parts).astype(np.float32), RATE_HZ), model=model)
+            own = result.units.between(start / 100, (start + len(line) // 160) / 100)
+            said = [[span.label.phone for span in units if not is_silent(span.label.phone)]
+                    for units in (alone.units, own)]  # fmt: skip
+            difference = np.abs(
+                result.motion["opening"][start : start + len(alone.motion.values)] - alone.motion["opening"]
+            )
+            show(f"line {number}, {name}", same_phones=said[0] == said[1], largest=round(float(difference.max()), 4),
+                 mean=round(float(difference.mean()), 4))  # fmt: skip
+
+
 def foreign(corpora: Path, model: Model, _: Path | None) -> None:
     """Print how far words decide of speech that is not English."""
     recogniser = cached_recogniser(model.phones, "auto")
@@ -249,6 +283,7 @@ PARTS = {
     "others": others,
     "phones": phones,
     "noise": noise,
+    "silence": silence,
     "foreign": foreign,
     "whole": whole,
     "hour": hour,
