@@ -191,6 +191,7 @@ def service_tiers(text: str, where: str) -> list[LabelTier] | None:
     tiers = next((tiers for reader in readers if (tiers := reader(objects, where)) is not None), None)
     if tiers is None and len(objects) == len(numbered):
         rows = [row for place, item in objects for row in _rows(item, place if len(objects) > 1 else "", where)]
+        check_count(len(rows), where)
         timed = any(row.parts or not math.isnan(row.start) or row.times.end for row in rows)
         lists_of_words = [item["words"] for _, item in objects if isinstance(item.get("words"), list)]
         missed = sum(isinstance(word, dict) and word.get("case") == MISSED for each in lists_of_words for word in each)
