@@ -1,6 +1,7 @@
 """Speakers, words and lengths outside the training data of the shipped model: accuracy, speed, memory.
 
-    python benchmarks/robust.py [--corpora FOLDER] [--model FILE] [--only others|phones|noise|silence|foreign|whole|hour|calls]
+    python benchmarks/robust.py [--corpora FOLDER] [--model FILE]
+        [--only others|phones|noise|silence|foreign|whole|hour|calls]
 
 others : GRID clips of other speakers, correlation of opening per clip, audio only and with the words of the file's name
 phones : recordings with transcripts of ``speech-open``, phone accuracy against their forced alignment by the general
