@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -187,7 +188,20 @@ def _of_parts(
     end_s = speech.units[-1].end_s if len(speech.units) else speech.features.duration_s
     placed = (placed_units(each.units, part.first, part.own) for part, each in zip(parts, generations, strict=True))
     units = joined_units(placed, rest.units[0].label, end_s)
+    pairs = ((part.speech.units, each.units) for part, each in zip(parts, generations, strict=True))
+    if all([s.start_s for s in given] == [s.start_s for s in made] for given, made in pairs):
+        units = _with_names(speech.units, units)  # the engine moved none: a phone over two passages stays one
     return replace(rest, motion=motion, spread=spread, units=units, trace=StateTrace(states, trace))
+
+
+def _with_names(units: Timeline[Unit], named: Timeline[Unit]) -> Timeline[Unit]:
+    """Return phones in time with the names of the engine's units that stand there."""
+    starts_s = [span.start_s for span in named]
+    spans = []
+    for span in units:
+        there = named[max(bisect_right(starts_s, (span.start_s + span.end_s) / 2) - 1, 0)].label
+        spans.append(replace(span, label=replace(span.label, unit=there.unit)))
+    return Timeline(tuple(spans))
 
 
 def _joined(
