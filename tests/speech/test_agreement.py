@@ -63,7 +63,7 @@ def test_right_words_agree_and_wrong_ones_do_not(sentences: list[ToySentence], t
             agreement_score(said.audio, phones.align(said.audio, features, words, Lexicon()))
             for words in (said.words, said.words[::-1], ("squash", "six", "fish", "chefs"))
         )
-        assert right > DOUBTFUL_SCORE - 0.5 > wrong  # one voice of espeak-ng has -4.4
+        assert right > DOUBTFUL_SCORE - 0.8 > wrong  # one voice of espeak-ng has -4.9
         assert right > order
 
 

@@ -90,7 +90,7 @@ def speak_from_corpus(  # noqa: PLR0913
     audio = Audio(joined.samples[first:last], rate_hz)
     edges_s = np.clip(begin_s - begin_s[0], 0, audio.duration_s).tolist()
     spoken = Timeline(tuple(Span(a, b, s.label) for a, b, s in zip(edges_s, edges_s[1:], units, strict=False)))
-    request = SpeechRequest(audio, units=spoken, speaker=speaker, pauses=pauses, asymmetry=asymmetry)
+    request = SpeechRequest(audio, units=spoken, speaker=speaker, pauses=pauses, asymmetry=asymmetry, spoken_so=True)
     return SpokenText(audio, animate(request, model=model, constraints=constraints))
 
 

@@ -28,7 +28,7 @@ def adapt(model: Model | str | Path | None, recordings: Sequence[str | Path | Au
     >>> import lipmotion
     >>> adapted = lipmotion.adapt(None, ["examples/welcome.flac"])
     >>> adapted.about["adapted"]
-    {'recordings': 1, 'speech_s': 4.2}
+    {'recordings': 1, 'speech_s': 4.3}
     """
     if isinstance(recordings, str | Path | Audio) or not len(recordings):
         raise InputError("recordings are not a list, or it is empty; required: one or more recordings of the speaker")

@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 from lipmotion.hmm.loudness import smooth_level, spoken_frames
 from lipmotion.speech.features.mfcc import HOP, checked_samples, frame_count, log_energy, mfcc_of_warps
 from lipmotion.speech.features.spectrum import spectrum
-from lipmotion.speech.recognition.general.front_end import general_features
+from lipmotion.speech.recognition.general.front_end import CEPSTRA, general_features
 from lipmotion.speech.sound.voice_activity import find_passages, level_passage
 from lipmotion.types import Audio, Features
 
 MadeT = TypeVar("MadeT")
 SILENT_FRAMES = 50
 """Frames of silence before and after the sound of each passage, recorded or not: the mouth opens before the sound."""
-QUIET_FRAMES = 6
-"""Where less is recorded, so much of the passage where it is the quietest is repeated: stops' closures at least."""
+QUIETEST = 0.1
+"""So large a share of a passage, its most silent frames, say what silence is like in it."""
 SILENT_ENERGY = -17.0
 """The log energy between passages: 80 dB beneath their loudest moments."""
 
@@ -57,12 +57,9 @@ class AnalysedAudio(Audio):
         passages = []
         for number, (first, end) in enumerate(found):
             samples = level_passage(self.samples[first * HOP : end * HOP], energy[first:end])
-            sound, level = spoken_frames(energy[first:end]), smooth_level(energy[first:end])
+            sound = spoken_frames(energy[first:end])
             lead, tail = (max(SILENT_FRAMES - int(side.argmax()), 0) // 4 * 4 for side in (sound, sound[::-1]))
-            quiet = max(int(level.argmin()) - QUIET_FRAMES // 2, 0)
-            room = samples[quiet * HOP : (quiet + QUIET_FRAMES) * HOP]
-            silence = [np.pad(room, (0, frames * HOP), mode="symmetric")[: frames * HOP] for frames in (lead, tail)]
-            padded = _PassageAudio(np.concatenate([silence[0], samples, silence[1]]), self.rate_hz)
+            padded = _PassageAudio(np.pad(samples, (lead * HOP, tail * HOP)), self.rate_hz, lead=lead, tail=tail)
             passages.append(Passage(first - lead, slice(bounds[number], bounds[number + 1]), padded))
         return tuple(passages)
 
@@ -148,26 +145,51 @@ class Passage(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _PassageAudio(AnalysedAudio):
-    """The sound of one passage, of which features are computed."""
+    """The sound of one passage, of which features are computed.
+
+    lead, tail : frames of silence before and after what is recorded, with the features of the quietest moment
+    """
+
+    lead: int = 0
+    tail: int = 0
 
     @cached_property
     def passages(self) -> tuple[Passage, ...]:
         return (Passage(0, slice(0, self.frames), self),)
 
+    @cached_property
+    def _sound(self) -> Audio:
+        return Audio(self.samples[self.lead * HOP : len(self.samples) - self.tail * HOP], self.rate_hz)
+
+    @cached_property
+    def _energy(self) -> NDArray[np.float32]:
+        return log_energy(checked_samples(self._sound))
+
+    def _with_silence(self, rows: NDArray[Any]) -> NDArray[Any]:
+        """Return the rows of the sound, and before and after them their mean where it is the most silent."""
+        if not self.lead and not self.tail:
+            return rows
+        level = smooth_level(self._energy)
+        silence = rows[level <= np.quantile(level, QUIETEST)].mean(axis=0)[None].astype(rows.dtype)
+        return np.concatenate([np.repeat(silence, self.lead, axis=0), rows, np.repeat(silence, self.tail, axis=0)])
+
     def _new_mfcc(self, warps: Sequence[float]) -> list[Features]:
-        return mfcc_of_warps(self, warps, self.log_energy)
+        found = mfcc_of_warps(self._sound, warps, self._energy)
+        return [Features(self._with_silence(each.values), self.duration_s) for each in found]
 
     @cached_property
     def log_energy(self) -> NDArray[np.float32]:
-        return log_energy(checked_samples(self))
+        return self._with_silence(self._energy)
 
     @cached_property
     def general_features(self) -> NDArray[np.float32]:
-        return general_features(self)
+        rows = self._with_silence(general_features(self._sound))
+        rows[:, :CEPSTRA] -= rows[:, :CEPSTRA].mean(axis=0, dtype=np.float64).astype(np.float32)
+        return rows  # its models were trained on sentences with silence
 
     @cached_property
     def spectrum(self) -> NDArray[np.float32]:
-        return spectrum(self)
+        return self._with_silence(spectrum(self._sound))
 
 
 @dataclass(frozen=True, eq=False)
