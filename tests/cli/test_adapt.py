@@ -41,7 +41,7 @@ def test_what_cannot_be_adapted_to(run: RunCommand, here: Path, toy_model_file: 
     (tmp_path / "text.wav").write_bytes(b"words")
     for path, words in (
         (tmp_path / "missing.wav", "no such file"),
-        (tmp_path / "text.wav", "not a readable recording"),
+        (tmp_path / "text.wav", "is text, required a recording"),
         (silent, "no speech found in the recordings"),
     ):
         done = run("adapt", path, "--model", toy_model_file, "-o", "voice.lipmotion")

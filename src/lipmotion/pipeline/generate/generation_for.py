@@ -133,10 +133,17 @@ def _of_parts(
     generate : returns the motion of the speech of one passage
     finish   : as of ``generate_for``; to it, silence at the ends of a passage is long
     """
-    parts, frames, pins = speech.parts or (), len(speech.features.values), constraints.pins if constraints else ()
+    parts, frames, said = speech.parts or (), len(speech.features.values), speech.posteriors
+    pins = constraints.pins if constraints else ()
     silent = Features(np.zeros((REST_FRAMES, speech.features.values.shape[1]), np.float32), REST_FRAMES / FRAME_RATE_HZ)
-    rest = generate(Speech(silent, Timeline((Span(0.0, silent.duration_s, Unit(SILENCE)),))), Constraints())
-    rest = finish(rest, -NOWHERE_S)
+    resting = Speech(
+        silent,
+        Timeline((Span(0.0, silent.duration_s, Unit(SILENCE)),)),
+        None if speech.log_f0 is None else np.full(REST_FRAMES, np.nan, np.float32),
+        spectrum=None if speech.spectrum is None else np.zeros((REST_FRAMES, speech.spectrum.shape[1]), np.float32),
+        posteriors=None if said is None else replace(said, values=np.repeat(said.values[:1], REST_FRAMES // 2, axis=0)),
+    )
+    rest = finish(generate(resting, Constraints()), -NOWHERE_S)
     generations = []
     for part in parts:
         start_s = part.first / FRAME_RATE_HZ
