@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from itertools import pairwise
@@ -39,9 +39,9 @@ class AnalysedAudio(Audio):
     """
 
     _mfcc: dict[float, Features] = field(default_factory=dict, repr=False)
-    _made: dict[str, Any] = field(default_factory=dict, repr=False)
+    _made: dict[Hashable, Any] = field(default_factory=dict, repr=False)
 
-    def once(self, name: str, make: Callable[[], MadeT]) -> MadeT:
+    def once(self, name: Hashable, make: Callable[[], MadeT]) -> MadeT:
         """Return what a function makes of this recording; it is made once, and kept under a name."""
         if name not in self._made:
             self._made[name] = make()

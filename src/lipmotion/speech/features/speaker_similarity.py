@@ -45,7 +45,7 @@ def speaker_similarity(hmm: UnitHmm, audio: AnalysedAudio) -> SpeakerSimilarity:
         warp = best_warp(fits)
         return SpeakerSimilarity(warp, fits[warp] - hmm.typical_fit)
 
-    return stretch.once(f"similarity to {id(hmm)}", judge)
+    return stretch.once(("similarity to", hmm), judge)
 
 
 @lru_cache(maxsize=2)

@@ -179,7 +179,7 @@ def level_passage(samples: NDArray[np.float32], log_energy: NDArray[np.float32])
     level = power_level(log_energy)
     loud = float(level.max())
     gain = np.full(len(level), SAME_LEVEL / np.exp((loud - np.log(WINDOW)) / 2))
-    lower = loud - maximum_filter1d(level, 2 * STEADY_FRAMES // 2 + 1, mode="nearest") - STEADY
+    lower = loud - maximum_filter1d(level, STEADY_FRAMES + 1, mode="nearest") - STEADY
     sound = np.flatnonzero(smooth_level(log_energy) > loud - LOCAL_DROP - STEADY)
     if len(sound) and lower[sound].max() > 0:
         raised = np.clip(lower[sound], 0, LOCAL_DROP) / 2
