@@ -20,7 +20,7 @@ from lipmotion.corpora.grid import words_of_name
 from lipmotion.errors import InputError
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.understand.request import SpeechRequest
-from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, Recogniser
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio
@@ -74,7 +74,7 @@ def adapted_if_possible(model: Model, recordings: list[Audio]) -> Model:
 
 def phone_errors(model: Model, adapted: Model, audio: Audio, wanted: list[str]) -> dict[str, int]:
     """Return the number of phone errors of every recogniser before and after adaptation."""
-    features = mfcc(audio)
+    features = analysed(audio).mfcc()
     return {
         f"{kind} {when}": edits(
             wanted,
@@ -92,7 +92,7 @@ def phones_of(model: Model, path: Path) -> list[str]:
     text = path.with_suffix(".txt")
     words = words_of((text if text.exists() else path.with_suffix(".lab")).read_text())
     audio = read_audio(path)
-    aligned = Recogniser(model.phones, "general").align(audio, mfcc(audio), words, Lexicon())
+    aligned = Recogniser(model.phones, "general").align(audio, analysed(audio).mfcc(), words, Lexicon())
     return spoken(span.label.phone for span in aligned)
 
 
@@ -110,7 +110,7 @@ def grid_others(folder: Path, model: Model) -> None:
     for clip in sorted(folder.glob("*.mpg")):
         tracked, audio = track(clip, crops=False), read_audio(clip)
         adapted, words = adapt(model, [audio]), " ".join(words_of_name(clip.stem) or ())
-        aligned = Recogniser(model.phones, "general").align(audio, mfcc(audio), words.split(), Lexicon())
+        aligned = Recogniser(model.phones, "general").align(audio, analysed(audio).mfcc(), words.split(), Lexicon())
         wanted = spoken(span.label.phone for span in aligned)
         for key, count in phone_errors(model, adapted, audio, wanted).items():
             errors.setdefault(key, []).append((count, len(wanted)))

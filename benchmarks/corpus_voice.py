@@ -40,7 +40,6 @@ from lipmotion.experiments.minnis_breen2000.joins import velocity_change
 from lipmotion.measures.bootstrap import bootstrap_interval
 from lipmotion.pipeline.generate.corpus_voice import speak_from_corpus
 from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.features.mfcc import mfcc
 from lipmotion.speech.recognition.network.posteriors import recording_posteriors
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.installed import speak_sentences, voice_named
@@ -162,7 +161,7 @@ def own_changes(utterance: Utterance) -> tuple[Array, Array]:
 
 def changes_around(opening: NDArray[np.floating[Any]], audio: Audio) -> tuple[Array, Array]:
     """Return the largest changes of the velocity, and of the cepstrum, around every frame [each shape=(T,)]."""
-    cepstra = np.pad(np.asarray(mfcc(audio).values)[:, :STATIC], ((STEP, STEP), (0, 0)), mode="edge")
+    cepstra = np.pad(np.asarray(analysed(audio).mfcc().values)[:, :STATIC], ((STEP, STEP), (0, 0)), mode="edge")
     apart = np.linalg.norm(cepstra[2 * STEP :] - cepstra[: -2 * STEP], axis=1)
     return maximum_filter1d(velocity_change(opening), AROUND), maximum_filter1d(apart, AROUND)
 

@@ -331,7 +331,8 @@ class DynamicVisemeSystem(Animator[JointModel]):
         motion, variance = model.motion.generate(
             lambda frames: (means[frames], precisions[frames]), observed.frames, units, constraints, close=False
         )
-        return Generation(motion, variance, units, StateTrace((), path.frames))
+        states = tuple(f"{left}-{unit}+{right}.{state}" for (left, unit, right), state in path.states.triphones)
+        return Generation(motion, variance, units, StateTrace(states, path.frames))
 
 
 def silent_frames(example: Example) -> NDArray[np.bool_]:

@@ -31,7 +31,7 @@ from lipmotion.articulation.contact import gap_in
 from lipmotion.corpora.facegood import read_bare_motion, read_channels
 from lipmotion.corpora.source_recordings import MotionFile
 from lipmotion.pipeline.outputs.curve_sets import curves_of
-from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.espeak import ESPEAK_NG
 from lipmotion.speech.voices.inventory_phones import inventory_timeline
@@ -206,13 +206,13 @@ def captured(folder: Path, name: str) -> tuple[Audio, np.ndarray]:
     audio = Audio(whole.samples[: int(MINUTE_S * whole.rate_hz)], whole.rate_hz)
     channels = read_channels(next(folder.glob("*_bs_name.npy")))
     motion = read_bare_motion(MotionFile(folder / f"bs_value_{name}.npy", 30.0, channels))
-    times = np.arange(len(mfcc(audio).values)) * PITCH_S
+    times = np.arange(len(analysed(audio).mfcc().values)) * PITCH_S
     return audio, motion.at(times)[:, motion.column(JAW)]
 
 
 def contexts(audio: Audio) -> np.ndarray:
     """Return the cepstra of every frame and of frames around it [shape=(T, D)]."""
-    values = mfcc(audio).values.astype(float)
+    values = analysed(audio).mfcc().values.astype(float)
     padded = np.pad(values, ((REACH, REACH), (0, 0)), mode="edge")
     return np.hstack([padded[start : start + len(values)] for start in range(0, 2 * REACH + 1, STEP)])
 

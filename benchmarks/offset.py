@@ -17,7 +17,7 @@ import numpy as np
 import lipmotion
 from lipmotion.measures.offset import Offset, best_offset, pooled_offset
 from lipmotion.pipeline.corpus.sync import clip_scores
-from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.types import FRAME_RATE_HZ, Audio, Utterance
 
 
@@ -55,7 +55,7 @@ def late(utterance: Utterance, by_ms: float) -> Utterance:
     samples = utterance.audio.samples
     moved = np.pad(samples, (shift, 0), mode="reflect") if shift > 0 else samples[-shift:]
     audio = Audio(np.ascontiguousarray(moved), utterance.audio.rate_hz)
-    return replace(utterance, audio=audio, features=mfcc(audio))
+    return replace(utterance, audio=audio, features=analysed(audio).mfcc())
 
 
 def parts(row: list[np.ndarray], count: int) -> list[list[np.ndarray]]:

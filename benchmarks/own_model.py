@@ -28,7 +28,7 @@ from lipmotion import Corpus, animate, load_model, train
 from lipmotion.corpora.store import Selection
 from lipmotion.errors import CorpusError
 from lipmotion.pipeline.model import Model
-from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.spectrum import spectrum
 from lipmotion.types import Audio, Motion, Track, Utterance
 
@@ -76,7 +76,9 @@ def compare(training: list[Utterance], judged: list[Utterance], prior: Model) ->
 
 def utterance(name: str, audio: Audio, track: Track) -> Utterance:
     """Return a piece as an utterance without transcript."""
-    return Utterance(name.replace(" ", "-"), audio, mfcc(audio), track, None, "train", {"collection": "open"})
+    return Utterance(
+        name.replace(" ", "-"), audio, analysed(audio).mfcc(), track, None, "train", {"collection": "open"}
+    )
 
 
 def trained(training: list[Utterance], prior: Model | None) -> Model:

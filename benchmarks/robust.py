@@ -34,7 +34,7 @@ from lipmotion import animate, load_model
 from lipmotion.corpora.grid import words_of_name
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.understand.request import SpeechRequest
-from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, cached_recogniser
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio
@@ -95,18 +95,21 @@ def phones(corpora: Path, model: Model, _: Path | None) -> None:
         text = (folder / name).with_suffix(".txt")
         words = words_of((text if text.exists() else text.with_suffix(".lab")).read_text())
         audio = read_audio(folder / name)
-        aligned = cached_recogniser(model.phones, "general").align(audio, mfcc(audio), words, Lexicon())
+        aligned = cached_recogniser(model.phones, "general").align(audio, analysed(audio).mfcc(), words, Lexicon())
         recordings.append((audio, spoken(span.label.phone for span in aligned)))
     for kind in RECOGNISER_KINDS:
         phone_recogniser = cached_recogniser(model.phones, kind)
-        found = [phone_recogniser.recognition(audio, mfcc(audio)) for audio, _ in recordings]
+        found = [phone_recogniser.recognition(audio, analysed(audio).mfcc()) for audio, _ in recordings]
         errors = [
             phone_edits(wanted, spoken(s.label.phone for s in each.units))
             for each, (_, wanted) in zip(found, recordings, strict=True)
         ]
         count = sum(len(wanted) for _, wanted in recordings)
         total_s = sum(audio.duration_s for audio, _ in recordings)
-        times = [seconds(lambda: [phone_recogniser.recognise(a, mfcc(a)) for a, _ in recordings]) for _ in range(5)]  # noqa: B023
+        times = [
+            seconds(lambda: [phone_recogniser.recognise(a, analysed(a).mfcc()) for a, _ in recordings])  # noqa: B023
+            for _ in range(5)
+        ]
         show(
             f"speech-open, {kind}: phone accuracy",
             value=round(1 - sum(errors) / count, 3),
@@ -210,7 +213,7 @@ def foreign(corpora: Path, model: Model, _: Path | None) -> None:
     ):
         audio = read_audio(corpora / name)
         audio = Audio(audio.samples[: 40 * RATE_HZ], RATE_HZ)
-        found = recogniser.recognition(audio, mfcc(audio))
+        found = recogniser.recognition(audio, analysed(audio).mfcc())
         share = found.word_s / max(found.word_s + found.phone_s, 1e-9)
         show(f"foreign: {name}", by_words=round(share, 2), confidence=round(found.confidence or 0.0, 2))
 

@@ -48,7 +48,7 @@ from lipmotion.pipeline.training.other_speakers import (
 from lipmotion.pipeline.training.train import examples_without_motion
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.understood_speech import understand
-from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.installed import installed_voices
@@ -153,7 +153,7 @@ def example(utterance: Utterance, phones: Recogniser) -> Example:
 
 def aligned(utterance: Utterance, phones: Recogniser) -> VoiceExample:
     """Return an utterance of GRID with aligned phones."""
-    features, words = mfcc(utterance.audio), utterance.words or words_of_name(utterance.name)
+    features, words = analysed(utterance.audio).mfcc(), utterance.words or words_of_name(utterance.name)
     return VoiceExample(features, phones.align(utterance.audio, features, words or (), Lexicon()), utterance.speaker)
 
 
@@ -166,7 +166,7 @@ def own_acc(model: Model, corpus: Corpus) -> dict[str, float]:
 def grid_utterance(path: Path, tracks: Path | None) -> Utterance:
     """Return a clip of GRID."""
     audio, words = read_audio(path), words_of_name(path.stem)
-    return Utterance(path.stem, audio, mfcc(audio), kept_track(path, tracks), words, "test", {}, path.stem)
+    return Utterance(path.stem, audio, analysed(audio).mfcc(), kept_track(path, tracks), words, "test", {}, path.stem)
 
 
 def grid_acc(model: Model, clips: Sequence[Utterance]) -> dict[str, float]:

@@ -26,7 +26,7 @@ from lipmotion.pipeline.training.other_speakers import (
     synthetic_sentences,
     voice_examples,
 )
-from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.voices.installed import installed_voices
 from lipmotion.types import Span, Timeline, Unit
@@ -75,7 +75,7 @@ def start_differences(sentences: Sequence[SpokenSentence], general: Recogniser) 
     late_ms, misfits = defaultdict(list), 0
     for sentence in sentences:
         try:
-            placed = general.align_phones(sentence.audio, mfcc(sentence.audio), sentence.phones)
+            placed = general.align_phones(sentence.audio, analysed(sentence.audio).mfcc(), sentence.phones)
         except AlignmentError:
             misfits += 1
             continue

@@ -10,7 +10,7 @@ from lipmotion.errors import InputError
 from lipmotion.experiments.noise import LONGEST_S, read_talkers, recordings_in_noise
 from lipmotion.pipeline.evaluation.held_out import HeldOutRecordings, held_out_recordings
 from lipmotion.pipeline.model import Model
-from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.noise import noisy_audio
 
@@ -27,7 +27,7 @@ def test_faces_stay_and_the_sound_is_noisy(clean: HeldOutRecordings) -> None:
     for number, (one, before) in enumerate(zip(noisy_recordings.utterances, clean.utterances, strict=True)):
         wanted = noisy_audio(before.audio, "white", 10, seed=4 + number)
         assert np.array_equal(one.audio.samples, wanted.samples)
-        assert np.array_equal(one.features.values, mfcc(wanted).values)
+        assert np.array_equal(one.features.values, analysed(wanted).mfcc().values)
         assert one.track is before.track
         assert noisy_recordings.conditions["audio only"][number] == clean.phones.recognise(one.audio, one.features)
 

@@ -15,7 +15,6 @@ from lipmotion.pipeline.understand.transcribe import (
     warn_of_misfit,
 )
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
-from lipmotion.speech.features.mfcc import mfcc
 from lipmotion.speech.recognition.agreement import TranscriptFit
 from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser
 from lipmotion.speech.recognition.recognised_speech import relied_on
@@ -28,7 +27,7 @@ from lipmotion.units import Lexicon, lexicon, words_of
 
 @pytest.fixture
 def features(toy_sentence: ToySentence) -> Features:
-    return mfcc(toy_sentence.audio)
+    return analysed(toy_sentence.audio).mfcc()
 
 
 @pytest.fixture

@@ -22,8 +22,8 @@ from lipmotion.pipeline.understand.understood_speech import (
     understand,
     understood_speech,
 )
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.f0 import log_f0
-from lipmotion.speech.features.mfcc import mfcc
 from lipmotion.speech.recognition.agreement import TranscriptFit
 from lipmotion.speech.recognition.recognised_speech import RecognisedWord, Recognition
 from lipmotion.speech.recognition.recogniser import Recogniser
@@ -57,7 +57,7 @@ RECOGNITION = Recognition(RECOGNISED, Timeline(()), 0.0, 0.0, None)
 
 
 def recognised(engine: Engine[Any], model: Model, sentence: ToySentence, kind: str = "own") -> Speech:
-    phones, features = Recogniser(model.phones, kind), mfcc(sentence.audio)
+    phones, features = Recogniser(model.phones, kind), analysed(sentence.audio).mfcc()
     return recognised_speech(engine, None, sentence.audio, features, phones, lambda: RECOGNITION)
 
 
@@ -95,7 +95,7 @@ def test_phones_that_do_not_fit_are_not_taken(toy_model: Model, toy_sentence: To
 
 
 def test_f0_is_computed_for_engines_that_want_it(toy_sentence: ToySentence) -> None:
-    features = mfcc(toy_sentence.audio)
+    features = analysed(toy_sentence.audio).mfcc()
     found = speech_of(RecognisingEngine(), toy_sentence.audio, features, toy_sentence.units).log_f0
     assert found is not None
     np.testing.assert_allclose(found, log_f0(toy_sentence.audio), rtol=1e-5)

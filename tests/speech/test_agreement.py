@@ -8,7 +8,7 @@ import pytest
 
 from lipmotion.corpora.grid import words_of_name
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.agreement import (
     DOUBTFUL_SCORE,
     FRAME_STEP,
@@ -58,7 +58,7 @@ def test_it_is_the_mean_over_phones_and_their_frames_of_the_best_state_of_what_i
 def test_right_words_agree_and_wrong_ones_do_not(sentences: list[ToySentence], toy_model: Model) -> None:
     phones = Recogniser(toy_model.phones, "auto")
     for said in sentences:
-        features = mfcc(said.audio)
+        features = analysed(said.audio).mfcc()
         right, order, wrong = (
             agreement_score(said.audio, phones.align(said.audio, features, words, Lexicon()))
             for words in (said.words, said.words[::-1], ("squash", "six", "fish", "chefs"))
@@ -122,7 +122,7 @@ def test_a_part_of_a_transcript_is_noticed_and_a_whole_one_is_not(recordings: Pa
         audio, words = read_audio(recordings / "grid-s1" / "clips" / f"{name}.mkv"), words_of_name(name)
         assert words is not None
         for said, kept in ((words, True), (words[:3], False)):
-            units = phones.align(audio, mfcc(audio), said, Lexicon())
+            units = phones.align(audio, analysed(audio).mfcc(), said, Lexicon())
             noticed = bool(transcript_fit(audio, units).missing)
             whole, half = whole + (kept and noticed), half + (noticed and not kept)
     assert whole == 0
@@ -137,7 +137,7 @@ def test_real_recordings(recordings: Path) -> None:
     right, wrong = [], []
     for name, other in zip(names, [*names[7:], *names[:7]], strict=True):
         audio = read_audio(recordings / "grid-s1" / "clips" / f"{name}.mkv")
-        features = mfcc(audio)
+        features = analysed(audio).mfcc()
         for clip, found in ((name, right), (other, wrong)):
             words = words_of_name(clip)
             assert words is not None
@@ -155,6 +155,7 @@ def test_synthetic_voices_are_believed() -> None:
     for voice in installed_voices()[::2]:
         audio, _ = speak_sentence(texts[0], voice)
         right, wrong = (
-            agreement_score(audio, phones.align(audio, mfcc(audio), words_of(text), Lexicon())) for text in texts
+            agreement_score(audio, phones.align(audio, analysed(audio).mfcc(), words_of(text), Lexicon()))
+            for text in texts
         )
         assert right > DOUBTFUL_SCORE - 0.5 > wrong  # one voice of espeak-ng has -4.4

@@ -9,8 +9,8 @@ from scipy.signal import butter, lfilter
 
 from lipmotion.errors import InputError
 from lipmotion.speech.features import f0 as module
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.f0 import candidates, correlations, lags, log_f0
-from lipmotion.speech.features.mfcc import mfcc
 from lipmotion.testing.formant_synthesiser import PHONE_TARGETS, synthesise
 from lipmotion.types import Audio
 from speech import f0_oracle
@@ -75,7 +75,7 @@ def test_the_best_peaks_are_the_candidates() -> None:
 def test_the_number_of_frames_is_that_of_the_features() -> None:
     for count in (400, 479, 480, 559, 560, 561, 4001):
         result = log_f0(Audio(noise(count), RATE_HZ))
-        assert result.shape == (len(mfcc(Audio(noise(count), RATE_HZ)).values),)
+        assert result.shape == (len(analysed(Audio(noise(count), RATE_HZ)).mfcc().values),)
         assert result.dtype == np.float32
 
 

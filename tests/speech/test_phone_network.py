@@ -14,7 +14,6 @@ from lipmotion.errors import InputError, MissingDependencyError
 from lipmotion.hmm.log_likelihoods import log_likelihoods_from
 from lipmotion.pipeline.model import load_model
 from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.speech.features.mfcc import mfcc
 from lipmotion.speech.recognition.network import network_search, posteriors
 from lipmotion.speech.recognition.network.beam_search import decoded_words, scored
 from lipmotion.speech.recognition.network.hama import Hama
@@ -210,12 +209,12 @@ def test_unsure_posteriors_leave_phones_to_the_models(monkeypatch: pytest.Monkey
     audio = read_audio(WELCOME)
     with monkeypatch.context() as without:
         without.setattr("lipmotion.speech.recognition.recogniser.installed_phone_recogniser", lambda: None)
-        alone = Recogniser(load_model().phones, "fast").recognition(audio, mfcc(audio))
+        alone = Recogniser(load_model().phones, "fast").recognition(audio, analysed(audio).mfcc())
     monkeypatch.setattr("lipmotion.speech.recognition.recogniser.installed_phone_recogniser", lambda: "hama")
     unsure = [PosteriorStretch(Stretch(0, 100), said("b", "iː", sure=0.51))]
     monkeypatch.setattr("lipmotion.speech.recognition.recogniser.posterior_stretches", lambda *_: unsure)
     monkeypatch.setattr("lipmotion.speech.recognition.word_search.words_in", lambda _: ())
-    found = Recogniser(load_model().phones).recognition(audio, mfcc(audio))
+    found = Recogniser(load_model().phones).recognition(audio, analysed(audio).mfcc())
     assert found.units == alone.units
     assert found.posterior is None
 
@@ -223,7 +222,7 @@ def test_unsure_posteriors_leave_phones_to_the_models(monkeypatch: pytest.Monkey
 @pytest.mark.skipif(not Hama.is_installed(), reason="hama has no library here")
 def test_the_welcome_is_understood() -> None:
     audio = read_audio(WELCOME)
-    found = Recogniser(load_model().phones).recognition(audio, mfcc(audio))
+    found = Recogniser(load_model().phones).recognition(audio, analysed(audio).mfcc())
     assert [span.label.text for span in found.words][:7] == "please speak and my lips will move".split()
     assert found.confidence is not None
     assert found.confidence > 0.6

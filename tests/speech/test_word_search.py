@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lipmotion.pipeline.model import load_model
-from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition import recogniser, word_search
 from lipmotion.speech.recognition.recognised_speech import Recognition
 from lipmotion.speech.recognition.recogniser import Recogniser
@@ -33,7 +33,7 @@ def welcome() -> Audio:
 
 
 def recognition(audio: Audio, kind: str = "auto") -> Recognition:
-    return Recogniser(load_model().phones, kind).recognition(audio, mfcc(audio))
+    return Recogniser(load_model().phones, kind).recognition(audio, analysed(audio).mfcc())
 
 
 @cache
@@ -47,7 +47,7 @@ def texts(found: Recognition) -> list[str]:
 
 
 def test_words_decide_the_phones_of_english(welcome: Audio) -> None:
-    aligned = Recogniser(load_model().phones).align(welcome, mfcc(welcome), SAID, Lexicon())
+    aligned = Recogniser(load_model().phones).align(welcome, analysed(welcome).mfcc(), SAID, Lexicon())
     for found in (of_welcome("auto"), of_welcome("words")):
         assert texts(found) == SAID
         assert found.word_s > 9 * found.phone_s

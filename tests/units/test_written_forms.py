@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from lipmotion.pipeline.model import load_model
-from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.testing.formant_synthesiser import synthesise
 from lipmotion.units import Lexicon, words_in, words_in_time, words_of
@@ -269,7 +269,7 @@ def test_the_sound_chooses_the_reading() -> None:
             [("sil", 0.2), *((phone, 0.09) for phone in phones), ("sil", 0.2)], rate_hz=16_000, seed=1
         )
         given = ("mother", "saw", *tokens_in(text), "to", "baby")
-        units = recogniser.align(audio, mfcc(audio), given, lexicon)
+        units = recogniser.align(audio, analysed(audio).mfcc(), given, lexicon)
         found = tuple(span.label for span in words_in_time(units) if span.label)
         wrong += [(text, found)] if found != words else []
     assert not wrong

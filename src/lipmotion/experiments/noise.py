@@ -8,7 +8,7 @@ from pathlib import Path
 
 from lipmotion.errors import InputError
 from lipmotion.pipeline.evaluation.held_out import AUDIO_ONLY, HeldOutRecordings
-from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ, read_audio
 from lipmotion.speech.sound.noise import FEWEST_TALKERS, NOISE_KINDS, noisy_audio
 from lipmotion.storage.files import check_listable
@@ -57,7 +57,7 @@ def recordings_in_noise(
     utterances, recognitions = [], []
     for number, utterance in enumerate(with_progress(recordings.utterances, "adding noise", monitor)):
         audio = noisy_audio(utterance.audio, kind, snr_db, talkers, seed + number)
-        utterances.append(replace(utterance, audio=audio, features=mfcc(audio)))
+        utterances.append(replace(utterance, audio=audio, features=analysed(audio).mfcc()))
         recognitions.append(recordings.phones.recognition(audio, utterances[-1].features))
     phones = [found.units for found in recognitions]
     return replace(recordings, utterances=utterances, conditions={AUDIO_ONLY: phones}, recognitions=recognitions)

@@ -21,6 +21,7 @@ from lipmotion.types import (
     Pin,
     PriorOutput,
     Speech,
+    SpeechPart,
     Timeline,
     Unit,
 )
@@ -84,11 +85,23 @@ def excerpt_of_change(
 
 def speech_within(understood: UnderstoodSpeech, frames: slice) -> UnderstoodSpeech:
     """Return understood speech of some frames alone, without phones; its first frame is a multiple of 4."""
-    speech = understood.speech
+    return replace(understood, speech=_within(understood.speech, frames), tags=(), events=())
+
+
+def _within(speech: Speech, frames: slice) -> Speech:
+    """Return the speech of some frames, and of the passages in them."""
     some = Features(speech.features.values[frames], (frames.stop - 1 - frames.start) / FRAME_RATE_HZ)
     steps, halves = (slice(frames.start // each, -(-frames.stop // each)) for each in (STEP, 2))
-    posteriors, prior, confidence = speech.posteriors, speech.prior, speech.confidence
-    part = Speech(
+    posteriors, prior, confidence, parts = speech.posteriors, speech.prior, speech.confidence, None
+    if speech.parts is not None:
+        begin = [max(part.own.start, part.first) for part in speech.parts]
+        end = [min(part.own.stop, part.first + part.frames) for part in speech.parts]
+        parts = tuple(
+            _part_within(part, frames)
+            for part, first, stop in zip(speech.parts, begin, end, strict=True)
+            if max(first, frames.start) < min(stop, frames.stop)
+        )
+    return Speech(
         some,
         Timeline(()),
         log_f0=None if speech.log_f0 is None else speech.log_f0[frames],
@@ -101,8 +114,16 @@ def speech_within(understood: UnderstoodSpeech, frames: slice) -> UnderstoodSpee
         voice=speech.voice,
         posteriors=None if posteriors is None else replace(posteriors, values=posteriors.values[halves]),
         times_given=True,
+        parts=parts,
     )
-    return replace(understood, speech=part, tags=(), events=())
+
+
+def _part_within(part: SpeechPart, frames: slice) -> SpeechPart:
+    """Return a passage without what lies outside of some frames of the recording, in which its time is counted."""
+    first = max(frames.start - part.first, 0) // STEP * STEP
+    inside = _within(part.speech, slice(first, min(frames.stop - part.first, part.frames)))
+    own = slice(max(part.own.start - frames.start, 0), min(part.own.stop, frames.stop) - frames.start)
+    return SpeechPart(part.first + first - frames.start, own, inside)
 
 
 def with_excerpt(

@@ -18,7 +18,7 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.export.video import write_mp4
 from lipmotion.faces import Staging
 from lipmotion.faces.portrait import Woman
-from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.storage.files import whole_file
 from lipmotion.testing.formant_synthesiser import synthesise
 from lipmotion.testing.toy_mouth import toy_mouths
@@ -210,7 +210,9 @@ def _utterance(sentence: ToySentence) -> Utterance:
     motion = toy_motion(sentence.units, CAMERA_HZ)
     track = Track(motion, np.ones(len(motion.values), dtype=bool), toy_mouths(motion))
     source = {"file": "", "licence": "synthesised by lipmotion"}
-    return Utterance(sentence.name, sentence.audio, mfcc(sentence.audio), track, sentence.words, sentence.split, source)
+    return Utterance(
+        sentence.name, sentence.audio, analysed(sentence.audio).mfcc(), track, sentence.words, sentence.split, source
+    )
 
 
 def _check_units(units: Timeline[Unit], rate_hz: float) -> None:

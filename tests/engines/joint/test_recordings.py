@@ -16,8 +16,9 @@ from lipmotion.hmm.multistream.recognise import JointRecogniser
 from lipmotion.hmm.multistream.streams import stream_observations
 from lipmotion.hmm.multistream.unit_frames import units_in_frames
 from lipmotion.hmm.multistream.unit_states import Inventory
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.f0 import log_f0
-from lipmotion.speech.features.mfcc import LOG_ENERGY, mfcc
+from lipmotion.speech.features.mfcc import LOG_ENERGY
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Progress, Span, Timeline, Unit
 from lipmotion.units import PHONES, Lexicon
@@ -29,7 +30,7 @@ TRAIN, TEST = 30, 6
 def transcribed(grid: Path, name: str) -> TrainingUtterance:
     """Return a sentence; its phones share the time of their word."""
     audio, lexicon = read_audio(grid / "clips" / f"{name}.mkv"), Lexicon()
-    features = mfcc(audio).values
+    features = analysed(audio).mfcc().values
     spans = []
     for line in (grid / "align" / f"{name}.align").read_text().split("\n"):
         if line.strip():

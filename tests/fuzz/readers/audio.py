@@ -9,7 +9,7 @@ import numpy as np
 
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import LONGEST_S, require
-from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
 from speech.sounds import tone, write_sound
 
@@ -50,4 +50,4 @@ def read(folder: Path, _: Good) -> None:
     audio = read_audio(path)
     require(bool(np.isfinite(audio.samples).all()), "samples that are not finite")
     require(audio.duration_s <= LONGEST_S, "hours of sound")
-    require(bool(np.isfinite(mfcc(audio).values).all()), "features that are not finite")
+    require(bool(np.isfinite(analysed(audio).mfcc().values).all()), "features that are not finite")

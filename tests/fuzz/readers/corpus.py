@@ -12,7 +12,7 @@ import numpy as np
 from fuzz.inputs import Files, Good, picked_up
 from fuzz.readers.plausible import check_motion, require
 from lipmotion.corpora.store import Corpus
-from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.types import Audio, Motion, Timeline, Track, Utterance
 
 SAMPLES, FRAMES = 8000, 13
@@ -41,7 +41,7 @@ def _half_a_second(utterance: Utterance) -> Utterance:
     audio = Audio(utterance.audio.samples[:SAMPLES].copy(), utterance.audio.rate_hz)
     motion = utterance.track.motion
     short = Motion(motion.values[:FRAMES], motion.rate_hz, motion.channels)
-    return replace(utterance, audio=audio, features=mfcc(audio), track=Track(short, np.ones(FRAMES, bool)))
+    return replace(utterance, audio=audio, features=analysed(audio).mfcc(), track=Track(short, np.ones(FRAMES, bool)))
 
 
 def _phones() -> Timeline:

@@ -13,7 +13,7 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.measures.offset import best_offset
 from lipmotion.pipeline.corpus import sync as module
 from lipmotion.pipeline.corpus.sync import clip_scores, offsets, sync
-from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Motion, Span, Timeline, Track, Unit, Utterance
 from lipmotion.vision.track import track
@@ -40,7 +40,13 @@ def utterance(seed: int, late_s: float, collection: str) -> Utterance:
     audio = Audio(samples, RATE_HZ)
     found = Track(Motion(opening[:, None], 25.0, (Channel("opening"),)), np.ones(75, bool))
     return Utterance(
-        f"{collection}{seed}", audio, mfcc(audio), found, ("a",), "train", {"collection": collection, "sha256": "0"}
+        f"{collection}{seed}",
+        audio,
+        analysed(audio).mfcc(),
+        found,
+        ("a",),
+        "train",
+        {"collection": collection, "sha256": "0"},
     )
 
 
@@ -136,7 +142,9 @@ def test_other_speakers_on_video(recordings: Path, tmp_path: Path, late_s: float
         shift = round(late_s * RATE_HZ)
         sound = np.pad(sound, (shift, 0), mode="reflect") if shift > 0 else sound[-shift:]
         audio = Audio(np.ascontiguousarray(sound), RATE_HZ)
-        one = Utterance(path.stem, audio, mfcc(audio), track(path, crops=False), None, "test", {"collection": "others"})
+        one = Utterance(
+            path.stem, audio, analysed(audio).mfcc(), track(path, crops=False), None, "test", {"collection": "others"}
+        )
         corpus.add(one)
         found = best_offset(clip_scores(one), 100.0)
         assert not found.known or found.late_s == pytest.approx(late_s, abs=0.05)

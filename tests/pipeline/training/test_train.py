@@ -16,7 +16,7 @@ from lipmotion.pipeline.model import Model, save_model
 from lipmotion.pipeline.training import train as module
 from lipmotion.pipeline.training.other_speakers import VoiceExample
 from lipmotion.pipeline.training.train import Run, about_training, phones_of, train
-from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Channel, Motion, Timeline, Track, Unit, Utterance
@@ -190,7 +190,7 @@ def test_camera_frames_become_model_frames() -> None:
 def others() -> Iterator[VoiceExample]:
     """Two speakers of whom nothing was seen."""
     for number, sentence in enumerate(toy_sentences(4)):
-        yield VoiceExample(mfcc(sentence.audio), sentence.units, ("bert", "anna")[number % 2])
+        yield VoiceExample(analysed(sentence.audio).mfcc(), sentence.units, ("bert", "anna")[number % 2])
 
 
 def test_voices_of_others_teach_engines_that_have_a_use_for_them(toy_corpus: Corpus) -> None:

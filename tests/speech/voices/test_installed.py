@@ -11,7 +11,7 @@ import pytest
 
 from lipmotion.errors import InputError, LipMotionError, MissingDependencyError
 from lipmotion.pipeline.model import Model
-from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.noise import noisy_audio
 from lipmotion.speech.voices import espeak_events
@@ -220,7 +220,7 @@ def test_the_times_of_real_voices_are_those_of_the_aligner(real: SyntheticVoice,
     recogniser, late_s = Recogniser(toy_model.phones, "general"), []
     for audio, units in speak_sentences(TEXTS, real):
         room = noisy_audio(audio, "white", 50)
-        placed = recogniser.align_phones(room, mfcc(room), units)
+        placed = recogniser.align_phones(room, analysed(room).mfcc(), units)
         said, aligned = ([span for span in part if not is_silent(span.label.phone)] for part in (units, placed))
         late_s += [a.start_s - b.start_s for a, b in zip(said, aligned, strict=True)]
     assert np.median(np.abs(late_s)) < 0.02  # two frames; flite 0.013, festival with kal 0.015

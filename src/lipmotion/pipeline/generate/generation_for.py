@@ -46,8 +46,6 @@ NOWHERE_S = 1e6
 """Nothing that is detected or pinned lies so long before a recording."""
 LONG_SILENCE_S = 10.0
 """A passage has silence before and after it; it counts as so much more."""
-PINNED_S = 0.2
-"""A pin bends motion so far around it."""
 REST_FRAMES = 100
 """So much silence is animated to know the rest between passages."""
 REACH_FRAMES = 10
@@ -161,15 +159,9 @@ def _of_parts(
         apart = Timeline((*apart.spans[:-1], replace(last, end_s=last.end_s + LONG_SILENCE_S)))
         generations.append(replace(finish(replace(generation, units=apart), start_s), units=units))
     dtype = np.float32 if frames > DOUBLE_FRAMES else rest.motion.values.dtype
-    held_s = np.array([pin.time_s for pin in pins])
-    ends = [
-        each.motion.values[row]
-        for part, each in zip(parts, generations, strict=True)
-        for row, end in ((0, part.first), (-1, part.first + part.frames))
-        if not (np.abs(held_s - end / FRAME_RATE_HZ) < PINNED_S).any()
-    ]
-    still = np.mean(ends or rest.motion.values, axis=0)  # beside passages the mouth stays as it is at their ends
-    values = _joined(parts, [each.motion.values for each in generations], still, frames, dtype)
+    values = _joined(
+        parts, [each.motion.values for each in generations], rest.motion.values.mean(axis=0), frames, dtype
+    )
     if isinstance(rest.spread, ReducedVariance):
         reduced = [each.spread.reduced for each in generations if isinstance(each.spread, ReducedVariance)]
         spread: Any = replace(

@@ -21,7 +21,7 @@ from lipmotion.errors import AlignmentError, CorpusError, InputError, MissingDep
 from lipmotion.pipeline.corpus.prompts import prompts
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.understand.transcribe import phones_in_time
-from lipmotion.speech.features.mfcc import mfcc
+from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, agreement_score
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.audio_files import read_audio
@@ -60,7 +60,7 @@ class SpokenSentence:
 class VoiceExample(NamedTuple):
     """A sentence of a speaker as training data: acoustic features and phones in time.
 
-    features : 39 coefficients a frame at 100 Hz, normalised over the sentence
+    features : 39 coefficients a frame at 100 Hz, normalised over its passage
     units    : phones in time
     speaker  : name of the speaker
     """
@@ -156,7 +156,7 @@ def _check_language(words: Sequence[str], lexicon: Lexicon) -> None:
 
 def voice_examples(sentences: Iterable[SpokenSentence]) -> Iterator[VoiceExample]:
     """Yield sentences as training data; features are computed when an item is taken, and not kept."""
-    return (VoiceExample(mfcc(sentence.audio), sentence.phones, sentence.speaker) for sentence in sentences)
+    return (VoiceExample(analysed(sentence.audio).mfcc(), sentence.phones, sentence.speaker) for sentence in sentences)
 
 
 def other_voices(
@@ -213,7 +213,7 @@ def _speaker(name: str, inner: Path, speakers: Mapping[str, str]) -> str:
 def _aligned(path: Path, words: Sequence[str], phones: Recogniser, lexicon: Lexicon) -> tuple[Audio, Timeline[Unit]]:
     """Return the sound of a recording and its aligned phones. Raises InputError: they do not agree."""
     audio = read_audio(path)
-    units = phones_in_time(phones, audio, mfcc(audio), words, lexicon)
+    units = phones_in_time(phones, audio, analysed(audio).mfcc(), words, lexicon)
     score = agreement_score(audio, units)
     if score < DOUBTFUL_SCORE:
         raise InputError(

@@ -73,6 +73,11 @@ class AnalysedAudio(Audio):
         """T, the number of frames at 100 Hz."""
         return frame_count(self.samples)
 
+    @property
+    def recorded(self) -> slice:
+        """Its frames without those of silence that was added to it."""
+        return slice(0, self.frames)
+
     def joined(self, of_passage: Callable[[AnalysedAudio], NDArray[Any]], silence: float | None = None) -> NDArray[Any]:
         """Return features of the whole recording, joined from those of its passages [shape=(T, ...)].
 
@@ -156,6 +161,10 @@ class _PassageAudio(AnalysedAudio):
     @cached_property
     def passages(self) -> tuple[Passage, ...]:
         return (Passage(0, slice(0, self.frames), self),)
+
+    @property
+    def recorded(self) -> slice:
+        return slice(self.lead, self.frames - self.tail)
 
     @cached_property
     def _sound(self) -> Audio:

@@ -32,14 +32,16 @@ class SpeakerSimilarity(NamedTuple):
 def speaker_similarity(hmm: UnitHmm, audio: AnalysedAudio) -> SpeakerSimilarity:
     """Return the speaker similarity of a recording to the training data of some models, at the best of ``WARPS``.
 
-    A recording is judged by its longest passage, of which ``JUDGED_FRAMES`` are enough.
+    A recording is judged by what is recorded of its longest passage, of which ``JUDGED_FRAMES`` are enough: silence
+    that was added to it would be like that of every voice.
     Source: Lee & Rose 1996 (vocal tract length normalisation); the best density of each frame stands for the
     state path, so that the warp is chosen before anything is recognised.
     """
     stretch = max((passage.audio for passage in audio.passages), key=lambda part: part.frames, default=audio)
 
     def judge() -> SpeakerSimilarity:
-        part = stretch if stretch.frames <= JUDGED_FRAMES else stretch.stretch(0, JUDGED_FRAMES)
+        recorded = stretch.recorded
+        part = stretch.stretch(recorded.start, min(recorded.stop, recorded.start + JUDGED_FRAMES))
         form, warped = _densities(hmm), zip(WARPS, part.mfcc_of_warps(WARPS), strict=True)
         fits = {warp: float(form.log_likelihood(features.values).max(axis=1).mean()) for warp, features in warped}
         warp = best_warp(fits)

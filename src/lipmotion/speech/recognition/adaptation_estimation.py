@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError
 from lipmotion.hmm.model import UnitHmm
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
-from lipmotion.speech.features.mfcc import FEATURES, mfcc
+from lipmotion.speech.features.mfcc import FEATURES
 from lipmotion.speech.features.speaker_similarity import WARPS, SpeakerSimilarity, best_warp
 from lipmotion.speech.recognition.adaptation import Adaptation, identity_adaptation
 from lipmotion.speech.recognition.combined_phones import NOISES
@@ -107,7 +107,7 @@ def _common_similarity(own: UnitHmm, audios: Sequence[AnalysedAudio]) -> Speaker
 
 def _features_once(audio: AnalysedAudio, warp: float) -> Features:
     """Return the features at a warp; only those without one are needed again, others would fill the memory."""
-    return audio.mfcc() if warp == 1 else mfcc(audio, warp)
+    return audio.mfcc() if warp == 1 else analysed(audio).mfcc(warp)
 
 
 def _own_prior(own: UnitHmm, *, short: bool) -> tuple[AffineStatistics, NDArray[np.bool_]]:

@@ -7,7 +7,8 @@ from itertools import cycle
 
 from lipmotion.hmm.model import HmmConfig, UnitHmm
 from lipmotion.hmm.unit_training import TranscribedUtterance, UnitInventory, train_hmm
-from lipmotion.speech.features.mfcc import LOG_ENERGY, mfcc
+from lipmotion.speech.features.analysed_audio import analysed
+from lipmotion.speech.features.mfcc import LOG_ENERGY
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
 from lipmotion.types import Audio, Monitor, ParallelMap
 from lipmotion.units import PAUSE, SILENCE, Lexicon
@@ -36,7 +37,7 @@ def train_phone_models(
     """
     turns = WARP_CYCLE if len(spoken) >= FEWEST_WARPED_RECORDINGS else (1.0,)
     utterances = [
-        TranscribedUtterance(mfcc(audio, warp).values, tuple(lexicon.pronunciations(word) for word in words))
+        TranscribedUtterance(analysed(audio).mfcc(warp).values, tuple(lexicon.pronunciations(word) for word in words))
         for (audio, words), warp in zip(spoken, cycle(turns), strict=False)
     ]
     return train_hmm(utterances, UnitInventory(SILENCE, PAUSE, LOG_ENERGY), config, monitor, checkpoint, each)
