@@ -22,7 +22,8 @@ from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Audio, Features, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit
-from lipmotion.units import Lexicon, lexicon, words_of
+from lipmotion.units import Lexicon, is_silent, lexicon, words_of
+from lipmotion.units.phones import phone_edits
 
 
 @pytest.fixture
@@ -152,6 +153,21 @@ def test_speech_that_the_transcript_leaves_out_is_reported_with_its_times(
     left_out = [said[word] for word in set(words) - set(words[kept])]
     for start_s, end_s in part.fit.missing:  # each stretch covers a part of what was left out
         assert any(start_s < span.end_s and span.start_s < end_s for span in left_out)
+
+
+@pytest.mark.parametrize("kept", [slice(None, None, 2), slice(1, None, 2), slice(None, None, 3)])
+def test_words_here_and_there_are_no_worse_than_none(
+    welcome: tuple[AnalysedAudio, tuple[str, ...]], kept: slice
+) -> None:
+    """Words beside those that are left out are not stretched over them, however short they are."""
+    (audio, words), phones = welcome, Recogniser(load_model().phones, "auto")
+    right, none = phones.align(audio, audio.mfcc(), words, Lexicon()), phones.recognise(audio, audio.mfcc())
+    some = corrected(audio, words[kept]).units
+    assert some is not None
+    wanted, with_some, with_none = (
+        [span.label.phone for span in units if not is_silent(span.label.phone)] for units in (right, some, none)
+    )
+    assert phone_edits(wanted, with_some) <= phone_edits(wanted, with_none)
 
 
 @pytest.mark.parametrize("first", [False, True])

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.types import FRAME_RATE_HZ, Example, Timeline, Unit
+from lipmotion.types import FRAME_RATE_HZ, WEIGHT, Channel, Example, Motion, Timeline, Unit
 from lipmotion.units import closing_phones
 
 OPENING = "opening"
@@ -32,6 +32,17 @@ class Closure:
     column: int
     closed: float
     follow: NDArray[np.float64]
+
+
+def is_never_negative(channel: Channel) -> bool:
+    """Return whether a channel has no values under 0: the opening, and weights."""
+    return channel.name == OPENING or channel.unit == WEIGHT
+
+
+def clip_at_zero(motion: Motion) -> None:
+    """Raise values under 0 to 0, in place, in the channels that have none."""
+    bounded = [is_never_negative(channel) for channel in motion.channels]
+    motion.values[:, bounded] = np.maximum(motion.values[:, bounded], 0)
 
 
 def closable_ranges(

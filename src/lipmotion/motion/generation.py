@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from lipmotion.errors import InputError, shortened
 from lipmotion.kernels.sequences.banded import generate
 from lipmotion.motion.articulation import ArticulationPrior
-from lipmotion.motion.closure import OPENING, REACH_S, Closure, closable_ranges, frames_to_close
+from lipmotion.motion.closure import REACH_S, Closure, closable_ranges, frames_to_close, is_never_negative
 from lipmotion.motion.limits import MotionLimits
 from lipmotion.motion.modulation_filter import ModulationFilter
 from lipmotion.motion.space import MotionSpace
@@ -186,8 +186,7 @@ def resolved_pins(constraints: Constraints | None, space: MotionSpace, frames: i
             raise InputError(f"pin at {pin.time_s} s has the value {pin.value}, required a finite number")
         column = names.index(pin.channel)
         check_magnitude(space.channels[space.direct[column]], pin.value, pin.value)
-        never_negative = pin.channel == OPENING or space.channels[space.direct[column]].unit == WEIGHT
-        if never_negative and pin.value < 0:
+        if is_never_negative(space.channels[space.direct[column]]) and pin.value < 0:
             raise InputError(f"pin at {pin.time_s} s sets {pin.channel} to {pin.value}, required at least 0")
         pins[frame, column] = pin.value
     return pins

@@ -8,12 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lipmotion.motion.closure import OPENING
+from lipmotion.motion.closure import clip_at_zero
 from lipmotion.motion.network_steps import STEP
 from lipmotion.pipeline.understand.understood_speech import UnderstoodSpeech
 from lipmotion.types import (
     FRAME_RATE_HZ,
-    WEIGHT,
     Constraints,
     Features,
     Generation,
@@ -138,8 +137,7 @@ def with_excerpt(
     """
     values, frames, (first, last) = whole.motion.values.copy(), excerpt.frames, excerpt.kept
     changed = values[frames] + (after.motion.values - before.motion.values)
-    never_negative = [channel.unit == WEIGHT or channel.name == OPENING for channel in whole.motion.channels]
-    changed[:, never_negative] = np.maximum(changed[:, never_negative], 0)
+    clip_at_zero(Motion(changed, whole.motion.rate_hz, whole.motion.channels))
     values[frames] = changed
     named = whole.units.spans
     spans = (*named[:first], *units.spans[first : len(units) - last], *named[len(named) - last :])

@@ -5,7 +5,8 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import groupby
+from difflib import SequenceMatcher
+from itertools import groupby, pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -58,6 +59,8 @@ MOST_STRETCHES = 3
 """Largest number of stretches without words that are named in one warning."""
 REACH_S = 0.1
 """A phone of a word may be heard so far from the middle that its recognition has."""
+LEAST_INSERTED = 2
+"""Fewer phones between words than this belong to them: recognition errs by one."""
 ALIKE_SHARE = 0.34
 """Words are said all the same where recognition finds their phones, but for so small a share."""
 
@@ -125,7 +128,7 @@ def transcribe(
         warn_of_misfit(fit)
         return Transcription(units, fit)
     found = recognised()
-    evidence = _confirmed(evidence, found)
+    evidence = _compared(evidence, found)
     fit = fit.with_evidence(evidence)
     warn_of_misfit(fit, corrected=True)
     if fit.is_doubtful:
@@ -153,22 +156,46 @@ def heard_phones(name: str, audio: AnalysedAudio) -> tuple[NDArray[np.float64], 
     return posteriors.of_phones.astype(float), sure
 
 
-def _confirmed(evidence: TranscriptEvidence, recognised: Timeline[Unit]) -> TranscriptEvidence:
-    """Return evidence without what recognition does not confirm.
+def _compared(evidence: TranscriptEvidence, recognised: Timeline[Unit]) -> TranscriptEvidence:
+    """Return evidence of a transcript that is wrong somewhere, compared with what is recognised.
 
-    Where it finds the phones of words that are left out, they are said; where it finds nothing, nothing is missing.
+    Words are said, and there, where recognition finds most of their phones. Where it finds nothing, nothing is missing.
+    Short words that are left out go unnoticed by themselves, for their neighbours are stretched over them: once a
+    transcript is known to leave out something, recognised phones between those of its words are more of it.
     """
-    words, others = list(evidence.words), list[OtherSpeech]()
-    for other in evidence.others:
-        found = [span.label.phone for run in _recognised_within(recognised, evidence, other) for span in run]
-        left_out = words[other.first : other.stop]
-        wanted = [phone for word in left_out for phone in word.phones]
-        if wanted and phone_edits(wanted, found) <= ALIKE_SHARE * len(wanted):
-            words[other.first : other.stop] = [
-                word._replace(start_s=other.start_s, end_s=other.end_s, is_said=True) for word in left_out
-            ]
-        elif wanted or (found and other.end_s - other.start_s >= LEAST_GAP_S):
-            others.append(other if found else other._replace(end_s=other.start_s))
+    spans = [span for span in recognised if not is_silent(span.label.phone)]
+    words, phones = list(evidence.words), [span.label.phone for span in spans]
+    wanted = [(number, phone) for number, word in enumerate(words) for phone in word.phones]
+    matcher = SequenceMatcher(None, [phone for _, phone in wanted], phones, autojunk=False)
+    matched: dict[int, list[int]] = {}
+    for first, at, size in matcher.get_matching_blocks():
+        for (number, _), place in zip(wanted[first : first + size], range(at, at + size), strict=True):
+            matched.setdefault(number, []).append(place)
+    taken, end = set[int](), 0
+    for number, word in enumerate(words):
+        stop = next((matched[later][0] for later in range(number + 1, len(words)) if later in matched), len(spans))
+        most = ALIKE_SHARE * len(word.phones)
+        if not word.is_said and len(matched.get(number, ())) < len(word.phones) - most:
+            continue
+        lengths = range(max(len(word.phones) - 1, 1), len(word.phones) + 2)
+        runs = [range(first, first + length) for length in lengths for first in range(end, stop - length + 1)]
+        edits = [(phone_edits(word.phones, phones[run.start : run.stop]), run.start, run.stop) for run in runs]
+        if edits and min(edits)[0] <= most:
+            _, first, end = min(edits)
+            words[number] = word._replace(start_s=spans[first].start_s, end_s=spans[end - 1].end_s, is_said=True)
+            taken.update(range(first, end))
+    others = []
+    said = [-1, *(number for number, word in enumerate(words) if word.is_said), len(words)]
+    for before, after in pairwise(said):
+        before_s = words[before].end_s if before >= 0 else 0.0
+        after_s = words[after].start_s if after < len(words) else np.inf
+        beside = (span for place, span in enumerate(spans) if place not in taken)
+        between = [span for span in beside if before_s <= (span.start_s + span.end_s) / 2 < after_s]
+        known = any(other.first == before + 1 and other.stop == after for other in evidence.others)
+        lasts = between and between[-1].end_s - between[0].start_s >= LEAST_GAP_S
+        if after > before + 1 or (lasts and (known or (evidence.gaps and len(between) >= LEAST_INSERTED))):
+            start_s, end_s = (between[0].start_s, between[-1].end_s) if between else (before_s, before_s)
+            others.append(OtherSpeech(start_s, end_s, before + 1, after))
     return TranscriptEvidence(tuple(words), tuple(others))
 
 
