@@ -159,7 +159,8 @@ def heard_phones(name: str, audio: AnalysedAudio) -> tuple[NDArray[np.float64], 
 def _compared(evidence: TranscriptEvidence, recognised: Timeline[Unit]) -> TranscriptEvidence:
     """Return evidence of a transcript that is wrong somewhere, compared with what is recognised.
 
-    Words are said, and there, where recognition finds most of their phones. Where it finds nothing, nothing is missing.
+    Words are said, and there, where recognition finds most of their phones; words that were doubted together, if it
+    finds all of them. Where it finds nothing, nothing is missing.
     Short words that are left out go unnoticed by themselves, for their neighbours are stretched over them: once a
     transcript is known to leave out something, recognised phones between those of its words are more of it.
     """
@@ -171,11 +172,16 @@ def _compared(evidence: TranscriptEvidence, recognised: Timeline[Unit]) -> Trans
     for first, at, size in matcher.get_matching_blocks():
         for (number, _), place in zip(wanted[first : first + size], range(at, at + size), strict=True):
             matched.setdefault(number, []).append(place)
+    doubted = set[int]()
+    for other in evidence.others:
+        left_out = range(other.first, other.stop)
+        shares = [len(matched.get(number, ())) / len(words[number].phones) for number in left_out]
+        doubted.update(left_out if min(shares, default=1.0) < 1 - ALIKE_SHARE else ())
     taken, end = set[int](), 0
     for number, word in enumerate(words):
         stop = next((matched[later][0] for later in range(number + 1, len(words)) if later in matched), len(spans))
         most = ALIKE_SHARE * len(word.phones)
-        if not word.is_said and len(matched.get(number, ())) < len(word.phones) - most:
+        if number in doubted:
             continue
         lengths = range(max(len(word.phones) - 1, 1), len(word.phones) + 2)
         runs = [range(first, first + length) for length in lengths for first in range(end, stop - length + 1)]
