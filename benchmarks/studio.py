@@ -38,7 +38,7 @@ from lipmotion.faces.mesh import MeshFace  # noqa: E402
 from lipmotion.faces.registry import face_named  # noqa: E402
 from lipmotion.kernels.choice import expect_more  # noqa: E402
 from lipmotion.meshes.fitting.driven import driven_character  # noqa: E402
-from lipmotion.pipeline.edit_files import EditFile, read_edits, write_edits  # noqa: E402
+from lipmotion.pipeline.edit_files import EditFile  # noqa: E402
 from lipmotion.pipeline.edits import step_of  # noqa: E402
 from lipmotion.pipeline.job import Request  # noqa: E402
 from lipmotion.pipeline.model import load_model  # noqa: E402
@@ -98,8 +98,8 @@ def times_of(sound: Path, seconds: float) -> dict[str, Any]:
     else:
         line = repeated(sound, part, each_s, seconds)
     drawn = shown_face("head")
-    for _ in range(4):  # loads what edits and faces need
-        timed_edit(line, f"phone 3 is {'pm'[line.revision % 2]}")
+    for phone in "mpmp":  # loads what edits and faces need
+        timed_edit(line, f"phone 3 is {phone}")
         line.weights(drawn, slice(0, 20))
     if seconds <= RECOGNISED_S:
         found |= {"the head, all of it, s": round(timed(lambda: line.weights(drawn)) / 1000, 2)}
@@ -173,8 +173,7 @@ def repeated(sound: Path, part: Path, each_s: float, seconds: float) -> OpenLine
     spans[-1] = replace(spans[-1], end_s=seconds)
     with opened_folder(part) as folder:
         line, model = folder.line(1), load_model()
-        folder.edits(line).parent.mkdir(exist_ok=True)
-        write_edits(EditFile(named=Request(part), units=Timeline(tuple(spans))), folder.edits(line))
+        folder.write_edits(line, EditFile(named=Request(part), units=Timeline(tuple(spans)), sha256=line.sha256))
         return open_line(folder, line, model)
 
 
@@ -232,7 +231,7 @@ def forks(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
         os.waitpid(child, 0)
         with os.fdopen(reading, encoding="utf-8") as file:
             told = [json.loads(row) for row in file.read().splitlines(keepends=True) if row.endswith("\n")]
-        line.file = replace(read_edits(line.path), named=line.file.named)
+        line.file = replace(line.folder.read_edits(line.folder.line(line.number)), named=line.file.named)
         steps = list(line.file.edits.sentences)
         done = [each["done"] for each in told if "done" in each]
         found["kills"] += 1

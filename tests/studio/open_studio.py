@@ -44,6 +44,14 @@ class OpenStudio(NamedTuple):
             time.sleep(0.02)
         raise AssertionError(f"line {number} is not ready after {PATIENCE_S} s")
 
+    def row(self, number: int = 1) -> dict[str, Any]:
+        """Return what the list says of a line."""
+        return self.studio.row(self.folder.line(number))
+
+    def change(self, what: str, number: int = 1, **content: Any) -> Reply:
+        """Return the reply to a change of a line by somebody who sees it as it is."""
+        return self.ask(f"/api/lines/{number}/{what}", {"revision": self.row(number)["revision"], **content})
+
     def edit(self, *steps: str, **more: Any) -> Reply:
         """Return the reply to edits of the first line as it is."""
         revision = self.ready()["revision"]
