@@ -5,6 +5,7 @@ python benchmarks/studio.py browser RECORDING [SECONDS ...] [--count 20]  from a
 python benchmarks/studio.py kills RECORDING [--count 100]     of the server; forks: of a process that edits
 python benchmarks/studio.py hostile RECORDING [--count 2000]
 python benchmarks/studio.py undo RECORDING [--count 1000]
+python benchmarks/studio.py clients RECORDING [--count 2000]  steps of two clients; sounds are those of the toy corpus
 
 Recordings are repeated, or cut, to the seconds. Times are of the processor, in one process, without the network and the
 browser: a minute of the clock on a machine that does other work says nothing. ``browser`` gives both.
@@ -48,13 +49,16 @@ from lipmotion.storage.json_text import as_json  # noqa: E402
 from lipmotion.studio.folder import opened_folder  # noqa: E402
 from lipmotion.studio.line import OpenLine  # noqa: E402
 from lipmotion.studio.understanding import open_line, understand_line  # noqa: E402
+from lipmotion.testing.toy import toy_sentences  # noqa: E402
 from lipmotion.types import Audio, Timeline  # noqa: E402
 from meshes.heads import head, write_glb  # noqa: E402
 from studio.attack import attacked  # noqa: E402
 from studio.served import lost_edits, random_edit, served, undone_edits  # noqa: E402
+from studio.two_clients import walk  # noqa: E402
 
 RECOGNISED_S = 100.0
 """In longer recordings phones are repeated, not recognised."""
+STEPS_OF_A_WALK = 80
 UNDO_LIMIT_S = 7200.0
 """How long a server may be asked for edits, until it is ended."""
 EDITS, FEW_EDITS = 40, 10
@@ -281,7 +285,17 @@ def undo(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
     return found | {"tracebacks": tracebacks, "minutes": round((time.monotonic() - started_s) / 60, 1)}
 
 
+def clients(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
+    """Let two clients change a project that is changed behind their backs; an AssertionError: something was lost."""
+    started_s, count = time.monotonic(), options.count or 2000
+    walked = walk(load_model(), toy_sentences(3)[0], sound.parent, -(-count // (STEPS_OF_A_WALK - 5)), STEPS_OF_A_WALK)
+    found = {"steps": walked.steps, "acknowledged": walked.acknowledged, "late, and told so": walked.late}
+    found |= {"refused": walked.refused, "lost": 0, "mixed up": 0, "tracebacks": 0}
+    return found | {"minutes": round((time.monotonic() - started_s) / 60, 1)}
+
+
 WHAT = {"times": times, "browser": in_browsers, "kills": kills, "forks": forks, "hostile": hostile, "undo": undo}
+WHAT |= {"clients": clients}
 
 if __name__ == "__main__":
     main()

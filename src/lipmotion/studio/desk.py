@@ -21,7 +21,7 @@ from starlette.exceptions import HTTPException
 from lipmotion.errors import InputError, LipMotionError
 from lipmotion.pipeline.model import Model
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
-from lipmotion.studio.folder import NO_EDITS, ProjectFolder, summary_of
+from lipmotion.studio.folder import NO_EDITS, ProjectFolder
 from lipmotion.studio.line import OpenLine
 from lipmotion.studio.project import ProjectLine
 from lipmotion.studio.understanding import open_line, understand_line
@@ -145,9 +145,9 @@ class Desk:
         return work
 
     def _is_behind(self, line: OpenLine) -> bool:
-        """Return whether others than the studio have changed the edits of an open line."""
+        """Return whether others than the studio have changed the file of an open line."""
         with self.folder.lock:
-            return self.folder.summary(self.folder.line(line.number)).state != summary_of(line.file).state
+            return self.folder.summary(self.folder.line(line.number)) is not line.summary
 
     async def at(self, number: int, do: Callable[[OpenLine], ResultT]) -> ResultT:
         """Do something with an open line, in its thread; return the result.

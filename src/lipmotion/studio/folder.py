@@ -146,7 +146,7 @@ class ProjectFolder:
     def summary(self, line: ProjectLine) -> EditsSummary:
         """Return what is said of a line's edits; ``NO_EDITS`` where it is not understood yet.
 
-        What this process writes is known; a file is read again where others have written it.
+        What this process writes is known; a file is read again where others have written it: else it is the same value.
         """
         with self.lock:
             written, known = self._written(line), self._summaries.get(line.number)
@@ -197,6 +197,10 @@ class ProjectFolder:
             )
         return file
 
+    def has_edits(self, line: ProjectLine) -> bool:
+        """Return whether a line is understood, and edited since. Raises InputError: as ``read_edits``."""
+        return self.summary(line) is not NO_EDITS and bool(self.read_edits(line).edits.steps)
+
     def write_edits(self, line: ProjectLine, file: EditFile) -> None:
         """Write a line's file of edits, and the copy of it. Raises ExportError: it cannot be written."""
         path, copy = self.edits(line), self._copy(line)
@@ -233,29 +237,33 @@ class ProjectFolder:
                 except OSError as error:
                     raise ExportError(f"{path}: cannot be removed: {error.strerror}") from error
 
+    def is_restorable(self, line: ProjectLine) -> bool:
+        """Return whether a line's edits are damaged, or those of another sound, and there is a good copy."""
+        with self.lock:
+            try:
+                self.read_edits(line)
+            except InputError:
+                try:
+                    return read_edits(self._copy(line)).sha256 == line.sha256
+                except InputError:
+                    pass
+            return False
+
     def restore_edits(self, line: ProjectLine) -> None:
         """Put the last good copy in the place of a damaged file of edits, which stays beside it under another name.
 
         Raises InputError: the file is not damaged, or there is no good copy. ExportError: it cannot be written.
         """
-        path, copy = self.edits(line), self._copy(line)
+        path = self.edits(line)
         with self.lock:
-            try:
-                self.read_edits(line)
-            except InputError as damaged:
-                try:
-                    is_good = read_edits(copy).sha256 == line.sha256
-                except InputError:
-                    is_good = False
-                if not is_good:
-                    raise
-                with whole_file(path) as temporary:
-                    shutil.copyfile(copy, temporary)
-                    if path.exists():
-                        path.replace(path.with_name(f"{path.name}.damaged-{uuid4().hex[:8]}"))
-                LOG.warning("%s; it is restored", damaged)
-            else:
+            if not self.is_restorable(line):
+                self.read_edits(line)  # says what is damaged
                 raise InputError("the edits of the line are not damaged; nothing is restored")
+            with whole_file(path) as temporary:
+                shutil.copyfile(self._copy(line), temporary)
+                if path.exists():
+                    path.replace(path.with_name(f"{path.name}.damaged-{uuid4().hex[:8]}"))
+        LOG.warning("%s: was damaged, and is restored from %s", path, self._copy(line))
 
     def change(self, changed: Callable[[Project], Project], *, save: bool = True) -> None:
         """Replace the project by what a function makes of it; ``save``: write it at once.

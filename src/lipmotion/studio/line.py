@@ -30,7 +30,7 @@ from lipmotion.pipeline.session import own_pronunciations
 from lipmotion.pipeline.understand.read_request import read_request
 from lipmotion.pipeline.understand.transcribe import guesses
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
-from lipmotion.studio.folder import ProjectFolder, RevisionError, revision_of, summary_of
+from lipmotion.studio.folder import ProjectFolder, RevisionError, revision_of
 from lipmotion.studio.meshes import with_turn
 from lipmotion.studio.project import digest_of
 from lipmotion.types import Audio, Channel, Explanation, Generation, Motion, Span, Timeline, Unit
@@ -52,6 +52,7 @@ class OpenLine:
 
     file    : its edits; what is written at each change
     folder, number : the project that it is a line of
+    summary : of the file as it was read, or written last
     audio   : the sound, which has been read
     onto    : the person onto whose face the motion is mapped; None: it stays as it is
     settled  : whether the motion is that of the whole line, as files get it; else only what lies around the last edits
@@ -70,6 +71,7 @@ class OpenLine:
     ) -> None:
         self.file, self.folder, self.number, self.model, self.audio = file, folder, number, model, audio
         self.recording, self.settled = folder.sound(folder.line(number)), True
+        self.summary = folder.summary(folder.line(number))
         self._others: dict[tuple[int, int], OpenLine] = {}
         asked = replace(read_request(file.named), onto=onto) if onto is not None else None
         self.session = file.session(asked, model=model, audio=audio)
@@ -173,7 +175,7 @@ class OpenLine:
     @property
     def revision(self) -> int:
         """The number of the line as it is now; another one after each change (``folder.revision_of``)."""
-        return revision_of(self.folder.line(self.number), summary_of(self.file))
+        return revision_of(self.folder.line(self.number), self.summary)
 
     def _check(self, revision: int) -> None:
         if revision != self.revision:
@@ -195,7 +197,7 @@ class OpenLine:
                     self.folder.change_line(self.number, lambda _: kept)
                 if is_other:
                     self.folder.write_edits(line, file)
-                    self.file = file
+                    self.file, self.summary = file, self.folder.summary(line)
         self.settled = settled
         return {"changed": moved_stretch(before, after)}
 

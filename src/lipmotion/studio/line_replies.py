@@ -20,6 +20,7 @@ from lipmotion.pipeline.outputs.shown_faces import ShownPerson
 from lipmotion.storage.json_text import as_json
 from lipmotion.studio.access import Access
 from lipmotion.studio.asked import content_of, objects, seconds, stretch, text, texts, whole
+from lipmotion.studio.desk import READY, WORKING
 from lipmotion.studio.folder import RevisionError
 from lipmotion.studio.line import OpenLine, transcript_step
 from lipmotion.studio.studio import Studio
@@ -256,6 +257,8 @@ class LineReplies:
     def _waiting(self, number: int) -> Response:
         """Return what is said of a line that is not ready."""
         document = self._studio.line_document(number) | {"media": self._media(number)}
+        if document["status"] == READY:  # since it was looked up: its state comes with the next request
+            document["status"] = WORKING
         return json_bytes(as_json(document).encode())
 
     def _media(self, number: int) -> dict[str, Any]:

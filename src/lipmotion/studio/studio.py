@@ -27,7 +27,7 @@ from lipmotion.pipeline.opened_job import opened
 from lipmotion.pipeline.outputs.curve_sets import SHAPE_SETS
 from lipmotion.pipeline.outputs.drawn_video import VideoOutput, read_sound
 from lipmotion.storage.files import TEMPORARY, made_folders, sha256_of
-from lipmotion.studio.desk import READY, WAITING, WORKING, Desk, NotReadyError, Work
+from lipmotion.studio.desk import FAILED, READY, WAITING, WORKING, Desk, NotReadyError, Work
 from lipmotion.studio.folder import EXPORTS, NO_EDITS, ProjectFolder, revision_of
 from lipmotion.studio.known_model import KnownModel, known_model
 from lipmotion.studio.line import LONGEST_VIDEO_S, OpenLine
@@ -144,8 +144,10 @@ class Studio:
             {"name": each.name, "number": each.number, "edits": len(each.steps), "digest": each.digest}
             for each in line.versions
         ]
-        if work is None:
-            return known | {"status": self.desk.status(line), "progress": None, "error": self.desk.error(line)}
+        status, error = self.desk.status(line), self.desk.error(line)
+        if work is None or status == FAILED:
+            restorable = status == FAILED and self.folder.is_restorable(line)
+            return known | {"status": status, "progress": None, "error": error, "restorable": restorable}
         status = WORKING if work.status == READY and work.line is None else work.status
         return known | {"status": status, "progress": _progress(work), "error": work.error}
 
@@ -252,12 +254,9 @@ class Studio:
         are damaged. ExportError: it cannot be written.
         """
         with self.folder.changing(number, revision) as line:
-            summary = self.folder.summary(line)
             if self.desk.status(line) in (WAITING, WORKING):
                 raise NotReadyError
-            if summary.error:
-                raise InputError(summary.error)
-            if summary.count:
+            if self.folder.has_edits(line):
                 return False
             self.folder.remove_edits(line)
             self.folder.change_line(number, lambda now: replace(now, transcript=transcript.strip()))
@@ -270,10 +269,8 @@ class Studio:
         edits are damaged. RevisionError: somebody else has changed it.
         """
         with self.folder.changing(number, revision) as line:
-            summary = self.folder.summary(line)
-            if summary.error:
-                raise InputError(summary.error)
-            marked = replace(line, mark=mark, marked=summary.digest)
+            self.folder.has_edits(line)
+            marked = replace(line, mark=mark, marked=self.folder.summary(line).digest)
             self.folder.change_line(number, lambda _: marked)
             return self.row(marked)
 

@@ -17,28 +17,15 @@ export class Comparison {
 
   /** Keep the edits as they are, and compare with them from now on. */
   async keep() {
-    const line = await this.told("versions", {});
-    const version = line?.versions.find(({ digest }) => digest === line.edits_digest);
+    if (!await this.studio.request("versions", {}, "")) return;
+    const { line } = this.store, version = line?.versions?.find(({ digest }) => digest === line.edits_digest);
     if (version) await this.with(version.name);
   }
 
   /** Keep a version no longer. */
   async forget(name) {
     if (this.store.other?.by === name) this.stop();
-    await this.told("versions/forget", { version: name });
-  }
-
-  async told(path, content) {
-    const { store, studio: { server } } = this, { lineId } = store;
-    try {
-      const line = await server.told(`lines/${lineId}/${path}`, content);
-      if (lineId !== store.lineId) return null;
-      store.set({ line });
-      return line;
-    } catch (error) {
-      this.studio.refuse(error);
-      return null;
-    }
+    await this.studio.request("versions/forget", { version: name }, "");
   }
 
   /** What a motion is called, by what the server calls it. */
