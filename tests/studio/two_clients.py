@@ -241,8 +241,10 @@ class TwoClients(RuleBasedStateMachine):
             del line.versions[name]
         elif line.steps not in line.versions.values():
             line.versions[reply["versions"][-1]["name"]] = list(line.steps)
-        if what == "back" and line.steps != line.versions[name]:
-            line.steps, line.undone = list(line.versions[name]), []
+        if what == "back" and line.steps != (steps := list(line.versions[name])):
+            is_undone = line.steps[: len(steps)] == steps
+            line.undone = [*line.steps[len(steps) :], *line.undone] if is_undone else []
+            line.steps = steps
         self.ready(line)
 
     @rule(client=st.integers(0, 1), pick=st.integers(0, 9))

@@ -95,10 +95,9 @@ class Desk:
 
     def status(self, line: ProjectLine) -> str:
         """Return what is to be said of a line."""
-        work = self._works.get(line.number)
-        if work is not None:
+        work, summary = self._works.get(line.number), self.folder.summary(line)
+        if work is not None and not (work.status == READY and summary.error):
             return work.status
-        summary = self.folder.summary(line)
         return FAILED if summary.error else NEW if summary is NO_EDITS else READY
 
     def work(self, number: int) -> Work | None:
@@ -108,7 +107,7 @@ class Desk:
     def error(self, line: ProjectLine) -> str:
         """Return why a line has failed; empty: it has not."""
         work = self._works.get(line.number)
-        return self.folder.summary(line).error if work is None else work.error
+        return (work.error if work is not None else "") or self.folder.summary(line).error
 
     def at_work(self) -> list[Work]:
         """Return the lines that wait or are at work, and those that were until a short while ago."""
