@@ -474,7 +474,7 @@ def _voted(studio: OpenStudio) -> None:
     assert studio.ask("/api/project").content["forms"]["against"] == f"toy ({OTHER_DIGEST[:8]})"
 
     def vote(better: int | None, *shown: dict[str, str]) -> Reply:
-        return studio.ask("/api/lines/1/votes", {"shown": list(shown), "better": better})
+        return studio.change("votes", shown=list(shown), better=better)
 
     (version,) = studio.change("versions").content["versions"]
     now, other, kept = {"by": ""}, {"by": "other"}, {"by": version["name"]}
@@ -489,7 +489,7 @@ def _voted(studio: OpenStudio) -> None:
     assert [each.model for each in votes[1].shown] == [OTHER_DIGEST, TOY_DIGEST]
     assert [each.edits for each in votes[3].shown] == [studio.ready()["edits_digest"], version["digest"]]
     for wrong in ([now], [now, now], [now, {"by": "another"}], [now, {"by": "version-2"}], [now, "other"]):
-        assert studio.ask("/api/lines/1/votes", {"shown": wrong, "better": 0}).status == 422
+        assert studio.change("votes", shown=wrong, better=0).status == 422
     for better in (2, "toy", -1):
-        assert studio.ask("/api/lines/1/votes", {"shown": [now, other], "better": better}).status == 422
+        assert studio.change("votes", shown=[now, other], better=better).status == 422
     assert len(read_votes(studio.folder.path / "votes.json")) == 4

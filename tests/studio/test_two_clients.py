@@ -155,6 +155,5 @@ def test_nothing_that_was_acknowledged_is_lost(toy_model: Model, toy_sentence: T
 @pytest.mark.long
 def test_hundreds_of_steps_lose_nothing(toy_model: Model, toy_sentence: ToySentence, tmp_path: Path) -> None:
     found = walk(toy_model, toy_sentence, tmp_path, 6, 60)
-    print(found.steps, found.acknowledged)
     assert found.steps > 300
-    assert found.acknowledged > 100
+    assert min(found.acknowledged, found.late, found.refused) > 10

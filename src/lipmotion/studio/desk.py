@@ -118,6 +118,7 @@ class Desk:
         """Let lines be understood that are new, after those that wait already; return how many wait."""
         for number in numbers:
             if self.status(self.folder.line(number)) in (NEW, FAILED):
+                self.forget(number)
                 work = self._works[number] = Work(number)
                 self._waiting.append(work)
                 self._background.submit(self._understand_next)

@@ -205,14 +205,16 @@ class ProjectFolder:
         """Write a line's file of edits, and the copy of it. Raises ExportError: it cannot be written."""
         path, copy = self.edits(line), self._copy(line)
         with self.lock, made_folders([path.parent, copy.parent]):
-            write_edits(file, copy)  # first: where it cannot be written, the edits are as before
-            _copy_file(copy, path)
+            # What fails between the two leaves what was acknowledged, and never a copy alone: that would be a damage.
+            first, second = (copy, path) if path.exists() else (path, copy)
+            write_edits(file, first)
+            _copy_file(first, second)
             self._summaries[line.number] = self._written(line), summary_of(file)
 
     def adopt(self, line: ProjectLine, file: EditFile) -> EditFile:
         """Return a line's edits with the digest of its sound, where a project of an earlier version has none, or half.
 
-        From then on another sound is refused; a warning says so. What has no copy yet gets one.
+        From then on another sound is refused; a warning says so. The copy becomes that of the file.
         Raises InputError: the recording cannot be read. ExportError: it cannot be written.
         """
         path, copy, digest = self.edits(line), self._copy(line), line.sha256 or file.sha256
@@ -223,7 +225,7 @@ class ProjectFolder:
         if not file.sha256:
             file = replace(file, sha256=digest)
             self.write_edits(line, file)
-        elif not copy.exists():
+        elif not copy.exists() or copy.read_bytes() != path.read_bytes():  # others may have edited it
             with self.lock, made_folders([copy.parent]):
                 _copy_file(path, copy)
         return file

@@ -103,11 +103,15 @@ class LineReplies:
     async def vote(self, request: Request) -> Response:
         """Which of two motions somebody found better."""
         number, content = self._number(request), await content_of(request)
-        sides = tuple(self._studio.side(number, text(side, "by", "")) for side in objects(content, "shown"))
+        revision, shown = whole(content, "revision"), [text(side, "by", "") for side in objects(content, "shown")]
         better = None if content.get("better") is None else whole(content, "better", most=1)
-        vote = Vote(self._studio.folder.line(number).name, sides, better)
-        found = await self._desk.beside(lambda: self._studio.folder.add_vote(vote))
-        return json_bytes(as_json(tally(found, vote)).encode())
+
+        def found() -> str:
+            with self._studio.folder.changing(number, revision) as line:
+                vote = Vote(line.name, tuple(self._studio.side(number, by) for by in shown), better)
+                return as_json(tally(self._studio.folder.add_vote(vote), vote))
+
+        return json_bytes((await self._desk.beside(found)).encode())
 
     async def keep(self, request: Request) -> Response:
         """The edits as they are, to be kept as a version."""

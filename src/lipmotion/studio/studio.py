@@ -265,11 +265,12 @@ class Studio:
         return True
 
     def mark(self, number: int, revision: int, mark: str) -> dict[str, Any]:
-        """Mark a line as its edits are now; return what the list says of it. Raises InputError: no such mark, or its
-        edits are damaged. RevisionError: somebody else has changed it.
+        """Mark a line as its edits are now; return what the list says of it.
+
+        Raises InputError: no such mark, or its edits are damaged. RevisionError: somebody else has changed it.
         """
         with self.folder.changing(number, revision) as line:
-            self.folder.has_edits(line)
+            self.folder.has_edits(line)  # which is refused where they are damaged
             marked = replace(line, mark=mark, marked=self.folder.summary(line).digest)
             self.folder.change_line(number, lambda _: marked)
             return self.row(marked)
