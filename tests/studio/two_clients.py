@@ -268,7 +268,11 @@ class TwoClients(RuleBasedStateMachine):
         if line.damage or len(self.lines) < 2:
             return
         self.look(0, line)
-        contents = {"edits": {"steps": [EDITS[0]]}, "transcript": {"text": self.words[1]}, "mark": {"mark": "redo"}}
+        contents: dict[str, dict[str, Any]] = {
+            "edits": {"steps": [EDITS[0]]},
+            "transcript": {"text": self.words[1]},
+            "mark": {"mark": "redo"},
+        }
         requests = [self.request(0, line, way, **contents.get(way, {})) for way in ways[:number]]
         replies = self.studio.ask_together(*requests, ("/api/project", None), *requests)
         listed = replies.pop(number)

@@ -30,7 +30,7 @@ from lipmotion.pipeline.session import own_pronunciations
 from lipmotion.pipeline.understand.read_request import read_request
 from lipmotion.pipeline.understand.transcribe import guesses
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
-from lipmotion.studio.folder import ProjectFolder, RevisionError, revision_of
+from lipmotion.studio.folder import ProjectFolder, RevisionError, revision_of, summary_of
 from lipmotion.studio.meshes import with_turn
 from lipmotion.studio.project import digest_of
 from lipmotion.types import Audio, Channel, Explanation, Generation, Motion, Span, Timeline, Unit
@@ -71,7 +71,9 @@ class OpenLine:
     ) -> None:
         self.file, self.folder, self.number, self.model, self.audio = file, folder, number, model, audio
         self.recording, self.settled = folder.sound(folder.line(number)), True
-        self.summary = folder.summary(folder.line(number))
+        known, self.summary = folder.summary(folder.line(number)), summary_of(file)
+        if known.state == self.summary.state:  # else others have changed the file since it was read
+            self.summary = known
         self._others: dict[tuple[int, int], OpenLine] = {}
         asked = replace(read_request(file.named), onto=onto) if onto is not None else None
         self.session = file.session(asked, model=model, audio=audio)

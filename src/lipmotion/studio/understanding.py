@@ -46,11 +46,13 @@ def understand_line(
     file, generation = begun_with(replace(named, lexicon=None), session)
     digest = line.sha256 or file.sha256
     folder.checked_sound(replace(line, sha256=digest))  # and not another one meanwhile
-    heard = {"duration_s": audio.duration_s, "doubt": doubt_of(generation), "sha256": digest}
+    duration_s, doubt = audio.duration_s, doubt_of(generation)
     with folder.lock:
         folder.line(line.number)  # it may have been removed meanwhile
         folder.write_edits(line, replace(file, sha256=digest))
-        folder.change_line(line.number, lambda now: replace(now, **heard), save=False)
+        folder.change_line(
+            line.number, lambda now: replace(now, duration_s=duration_s, doubt=doubt, sha256=digest), save=False
+        )
     return audio
 
 
@@ -67,6 +69,6 @@ def open_line(folder: ProjectFolder, line: ProjectLine, model: Model, audio: Ana
     named = replace(file.named, recording=folder.sound(line), model=folder.model_file)
     opened = OpenLine(replace(file, named=named), folder, line.number, model, audio)
     if line.duration_s is None:  # it was understood by a studio that was killed before the project was written
-        heard = {"duration_s": audio.duration_s, "doubt": doubt_of(opened.generation)}
-        folder.change_line(line.number, lambda now: replace(now, **heard))
+        duration_s, doubt = audio.duration_s, doubt_of(opened.generation)
+        folder.change_line(line.number, lambda now: replace(now, duration_s=duration_s, doubt=doubt))
     return opened
