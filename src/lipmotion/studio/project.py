@@ -69,7 +69,7 @@ class ProjectLine:
     number     : of the line in the project; never used again
     name       : path of its files without suffix, with ``/`` between folders; unique
     sound      : path of the recording from the folder of the project, or absolute
-    sha256     : digest of the recording
+    sha256     : digest of the recording; empty: of an earlier version's project, until the line is opened
     transcript : its words, where they were given here; empty: those of a file beside it, or it is recognised
     duration_s : of the sound; None: not known yet
     doubt      : how unsure the motion of its speech is, 0 to 1; None: not known yet
@@ -206,7 +206,7 @@ def _line(row: Any) -> ProjectLine:
     numbers = {name: None if row.get(name) is None else float(row[name]) for name in ("duration_s", "doubt")}
     exports = tuple(ExportRecord(**each) for each in row.get("exports", ()))
     versions = tuple(KeptVersion(int(each["number"]), _sentences(each["steps"])) for each in row.get("versions", ()))
-    return ProjectLine(**{**row, **numbers, "exports": exports, "versions": versions})
+    return ProjectLine(**{"sha256": "", **row, **numbers, "exports": exports, "versions": versions})
 
 
 def _sentences(steps: Any) -> tuple[str, ...]:
