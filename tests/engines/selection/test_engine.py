@@ -121,20 +121,23 @@ def test_without_recorded_silence_the_mouth_rests(engine: SelectionEngine) -> No
     assert np.abs(opening[:40] - learned.rest[0]).max() < 0.03
 
 
-@pytest.mark.parametrize("damage", ["nothing stored", "late units", "silence without end"])
+@pytest.mark.parametrize("damage", ["nothing stored", "rows beyond", "late units", "silence without end", "old"])
 def test_models_that_contradict_themselves_are_refused(
     model: SelectionModel, engine: SelectionEngine, damage: str
 ) -> None:
     arrays = engine.to_arrays(model)
     if damage == "nothing stored":
-        arrays["store_kept"] = arrays["store_kept"][:0]
+        arrays["recorded_motion"] = arrays["recorded_motion"][:0]
+    elif damage == "rows beyond":
+        arrays["recorded_rows"] = arrays["recorded_rows"] + 10**5
     elif damage == "late units":
         arrays["unit_times"] = arrays["unit_times"] * 1e3
-    else:
+    elif damage == "silence without end":
         arrays["recording_first"] = arrays["recording_first"].copy()
         arrays["recording_first"][-1] += 10**7
-        arrays["store_frames"] = arrays["store_frames"] + 10**7
-    with pytest.raises(ModelFormatError):
+    else:
+        arrays["store_kept"] = arrays.pop("recorded_rows")
+    with pytest.raises(ModelFormatError, match="train the model again" if damage == "old" else None):
         engine.from_arrays(arrays)
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.selection.windows import PHONE_NUMBER, SYMBOLS, PhoneWindows
-from lipmotion.motion.motion_store import MotionStore
 from lipmotion.types import FRAME_RATE_HZ
 from lipmotion.units import PHONES, most_similar_lips
 
@@ -25,8 +25,9 @@ class RecordedUnits:
     names     : of the recordings
     windows   : the units, recording by recording; times are seconds in their recording
     usable    : whether the motion of each unit was measured throughout [shape=(U,)]
-    first     : the row of ``motion`` at which each recording begins; the last number is that of all rows [shape=(R+1,)]
-    motion    : of all recordings in the motion space, 100 rows a second [shape=(F, Q)]
+    first     : the row of ``values`` at which each recording begins; the last number is that of all rows [shape=(R+1,)]
+    kept      : the first row and the one after the last of each range whose motion is stored, in order [shape=(K, 2)]
+    motion    : there, in the motion space, 100 rows a second; stored in half precision [shape=(N, Q)]
     predicted : what the guide predicts at ``POINTS`` of each unit, reduced [shape=(U, POINTS, D)]; None: no guide
     """
 
@@ -34,17 +35,18 @@ class RecordedUnits:
     windows: PhoneWindows
     usable: NDArray[np.bool_]
     first: NDArray[np.intp]
-    motion: MotionStore
+    kept: NDArray[np.intp]
+    motion: NDArray[np.floating[Any]]
     predicted: NDArray[np.float16] | None
 
     @cached_property
     def values(self) -> Array:
-        """The motion of all recordings, decoded [shape=(F, Q)].
+        """The motion of all recordings [shape=(F, Q)].
 
         Where silence is not stored, it is a line between its edges in the recording.
         """
-        stored = np.concatenate([np.arange(first, stop) for first, stop in self.motion.kept.tolist()])
-        rows, frames = self.motion.rows(stored), np.arange(len(self.motion))
+        stored = np.concatenate([np.arange(first, stop) for first, stop in self.kept.tolist()])
+        rows, frames = self.motion.astype(float), np.arange(self.first[-1])
         if len(rows) == len(frames):
             return rows
         edges = [self.first[:-1], self.first[1:] - 1]

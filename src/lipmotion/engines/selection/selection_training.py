@@ -23,7 +23,6 @@ from lipmotion.hmm.multistream.phone_recogniser import fit_phone_recogniser
 from lipmotion.motion.closure import OPENING
 from lipmotion.motion.fit import fit_motion
 from lipmotion.motion.modulation_filter import learned_filter
-from lipmotion.motion.motion_store import LIP_WIDTH_SHARE, MotionStore, compress, lip_tolerance
 from lipmotion.motion.predictors import PredictorTraining, predictor_class, suitable_predictor
 from lipmotion.motion.rest import away_from_speech, runs, speech_intervals
 from lipmotion.motion.space import MotionSpace
@@ -66,7 +65,7 @@ def fit_selection(
         training = PredictorTraining(examples, values, direct, config.epochs, of_guide, checkpoint)
         guide = fit_guide(kind.fit(training).predictor, examples, values)
     monitor(Progress(_STAGE, 1, 3, 0.9))
-    inventory = inventory_of(examples, values, motion.space, guide)
+    inventory = inventory_of(examples, values, guide)
     monitor(Progress(_STAGE, 2, 3, 0.92))
     recorded = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
     scale = comparison_scale(recorded, motion.space)
@@ -85,9 +84,7 @@ def fit_selection(
     return model, np.sqrt(model.variances[0])
 
 
-def inventory_of(
-    examples: Sequence[Example], values: Sequence[Array], space: MotionSpace, guide: Guide | None
-) -> RecordedUnits:
+def inventory_of(examples: Sequence[Example], values: Sequence[Array], guide: Guide | None) -> RecordedUnits:
     """Return the inventory of some examples.
 
     values : motion of each in the motion space [each shape=(T, Q)]
@@ -117,7 +114,9 @@ def inventory_of(
             ]
         ).astype(np.float16)
     names = tuple(example.name for example in examples)
-    return RecordedUnits(names, windows, usable, first, _stored(examples, values, first, space), predicted)
+    kept = _kept(examples, first)
+    motion = np.concatenate(values)[np.concatenate([np.arange(start, stop) for start, stop in kept])].astype(np.float16)
+    return RecordedUnits(names, windows, usable, first, np.array(kept, np.intp), motion, predicted)
 
 
 def comparison_scale(recorded: Array, space: MotionSpace) -> Array:
@@ -134,21 +133,14 @@ def comparison_scale(recorded: Array, space: MotionSpace) -> Array:
     return np.sqrt(weights) / deviations
 
 
-def _stored(
-    examples: Sequence[Example], values: Sequence[Array], first: NDArray[np.intp], space: MotionSpace
-) -> MotionStore:
-    """Return the motion, compressed; without the middle of long silences, and without what was not measured."""
-    ranges = []
-    for example, begin, x in zip(examples, first[:-1].tolist(), values, strict=True):
-        time_s = np.arange(len(x)) / FRAME_RATE_HZ
+def _kept(examples: Sequence[Example], first: NDArray[np.intp]) -> list[list[int]]:
+    """Return the ranges of rows that are stored: not the middle of long silences, nor what was not measured."""
+    ranges = list[list[int]]()
+    for example, begin in zip(examples, first[:-1].tolist(), strict=True):
+        time_s = np.arange(len(example.valid)) / FRAME_RATE_HZ
         near = example.valid & ~away_from_speech(time_s, speech_intervals(example.speech.units), KEPT_SILENCE_S)
         ranges += (runs(near) + begin).tolist()
-    everything = np.concatenate(values)
-    measured = np.concatenate([everything[start:stop] for start, stop in ranges])
-    spread = np.ptp(np.percentile(measured, [1, 99], axis=0), axis=0)
-    if "width" in space.direct_names:
-        spread[:] = lip_tolerance(measured, [space.channels[column] for column in space.direct]) / LIP_WIDTH_SHARE
-    return compress(everything, FRAME_RATE_HZ, np.maximum(LIP_WIDTH_SHARE * spread, 1e-6), kept=ranges)
+    return ranges
 
 
 def _rest_pose(examples: Sequence[Example], values: Sequence[Array], space: MotionSpace) -> Array:

@@ -110,8 +110,9 @@ def _with_sound(inventory: RecordedUnits, recorded_features: Mapping[str, NDArra
             )
     features = np.concatenate([np.asarray(recorded_features[name], float) for name in inventory.names])
     return AcousticUnits(
-        inventory.names, inventory.windows, inventory.usable, inventory.first, inventory.motion, None, features
-    )
+        inventory.names, inventory.windows, inventory.usable, inventory.first, inventory.kept, inventory.motion, None,
+        features,
+    )  # fmt: skip
 
 
 def _source_piece(inventory: RecordedUnits, target: Target, piece: Piece, following: Piece | None) -> SourcePiece:
