@@ -11,7 +11,7 @@ import pytest
 from cli.conftest import RunCommand, is_one_error
 from lipmotion.corpora.store import Corpus
 from lipmotion.experiments import comparison, folds, learning_curve, runner
-from lipmotion.experiments.engines import disagreement, text
+from lipmotion.experiments.engines import text
 from lipmotion.experiments.hofer2008 import table1, table1_text
 from lipmotion.experiments.minnis_breen2000 import minnis2000 as minnis_2000
 from lipmotion.experiments.minnis_breen2000 import text as minnis_text
@@ -28,7 +28,7 @@ def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
     """Few draws of the bootstrap intervals, small phone models, and only two of the paper's unit sets."""
     for module in (runner, table1, six_systems):
         monkeypatch.setattr(module, "HmmConfig", partial(HmmConfig, mixtures=1, iterations=1))
-    for module in (comparison, evaluation_figures, disagreement):
+    for module in (comparison, evaluation_figures):
         monkeypatch.setattr(module, "bootstrap_interval", partial(bootstrap_interval, draws=20))
     monkeypatch.setattr(table1, "PAPER_SCORES", {name: table1.PAPER_SCORES[name] for name in ("2vis", "phone")})
 

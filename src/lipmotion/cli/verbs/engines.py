@@ -1,4 +1,4 @@
-"""``lipmotion experiment engines``: all engines, the hybrid, and how far they disagree."""
+"""``lipmotion experiment engines``: all engines on the same recordings."""
 
 from __future__ import annotations
 
@@ -16,9 +16,7 @@ if TYPE_CHECKING:
 
 def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the experiment to ``lipmotion experiment``."""
-    parser = actions.add_parser(
-        "engines", help="all engines and a hybrid in one table, and how far they disagree in every second"
-    )
+    parser = actions.add_parser("engines", help="all engines in one table")
     parser.add_argument("--split", default="val", help="compare on val or test (default: val)")
     kept = "the engines' models: what is not there yet is trained and kept (default: train all, keep none)"
     add_output(parser, "--models", is_folder=True, metavar="FOLDER", help=kept)

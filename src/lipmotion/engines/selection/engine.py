@@ -22,7 +22,6 @@ from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.selection_training import fit_selection
 from lipmotion.engines.selection.source_recordings import source_pieces, typical_duration_s, with_sources
 from lipmotion.engines.selection.targets import target_of
-from lipmotion.errors import InputError
 from lipmotion.motion.predictors import conditions_of
 from lipmotion.printable import printable
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
@@ -38,7 +37,6 @@ from lipmotion.types import (
     Unit,
 )
 
-Array = NDArray[np.float64]
 LOG = logging.getLogger("lipmotion")
 NAMED_UNITS = 3
 """Units that one warning names."""
@@ -79,35 +77,7 @@ class SelectionEngine(Engine[SelectionModel]):
 
     def generate(self, model: SelectionModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         costs = model.costs(self.config)
-        return self._generated(model, costs, target_of(model, costs, speech), speech, constraints)
-
-    def generate_guided(
-        self, model: SelectionModel, speech: Speech, guide: Array, constraints: Constraints | None = None
-    ) -> Generation:
-        """Return the motion of one recording, as ``generate``, from units that resemble somebody else's motion of it.
-
-        guide       : motion in the model's motion space, as wide as recorded motion [shape=(T, Q)]; it takes the place
-                      of what the model's own guide predicts. How far it counts for a unit still depends on how much
-                      the sounds differ for the own guide (option ``trust``).
-        constraints : values that the motion must take
-        Raises InputError: as ``generate``; a guide of another shape; or a model or speech without a guide of its own.
-        """
-        wanted = len(speech.features.values), model.motion.space.dimensions
-        if guide.shape != wanted:
-            raise InputError(f"a guide of shape {guide.shape}, required {wanted}: frames, dimensions of the motion")
-        costs = model.costs(self.config)
-        target = target_of(model, costs, speech, guide)
-        if target.guided is None:
-            raise InputError(
-                "the model of recorded units does not compare motion; train one with the option guide more than 0, "
-                "and give speech with its spectrum"
-            )
-        return self._generated(model, costs, target, speech, constraints)
-
-    def _generated(
-        self, model: SelectionModel, costs: Costs, target: Target, speech: Speech, constraints: Constraints | None
-    ) -> Generation:
-        """Return the motion of the units that are selected for a target."""
+        target = target_of(model, costs, speech)
         frames = len(speech.features.values)
         given = _given(costs, target, speech.units)
         units = select(costs, target, given=given).units

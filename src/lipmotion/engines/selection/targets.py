@@ -5,7 +5,6 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lipmotion.engines.selection.costs import Costs, Target
 from lipmotion.engines.selection.guide import at_points
@@ -21,13 +20,9 @@ LEAST_RELIABILITY = 0.5
 """Mean reliability of the phones from which on they choose."""
 
 
-def target_of(
-    model: SelectionModel, costs: Costs, speech: Speech, guiding: NDArray[np.float64] | None = None
-) -> Target:
+def target_of(model: SelectionModel, costs: Costs, speech: Speech) -> Target:
     """Return the phones of speech, with the motion that the guide predicts from its sound.
 
-    guiding : motion in the motion space, as wide as recorded motion, that guides instead of the prediction
-              [shape=(T, Q)]; what is ``predicted`` is still the model's own prediction. None: the prediction guides
     Where noise makes the recognised phones of a recording unreliable on the whole, the target is segments of equal
     duration, for which the sound alone chooses.
     Raises InputError: an unknown phone.
@@ -41,8 +36,7 @@ def target_of(
     by_sound = bool(phone_reliability(speech, distortion, frames).mean() < LEAST_RELIABILITY)
     windows = phone_windows([_segments(duration_s)]) if by_sound else costs.shown(phone_windows([units]))
     predicted = at_points(motion, windows.times_s)
-    guided = guide.expanded(predicted) if guiding is None else at_points(guiding, windows.times_s)
-    return costs.target(windows, guided, predicted, by_sound=by_sound)
+    return costs.target(windows, guide.expanded(predicted), predicted, by_sound=by_sound)
 
 
 def _segments(duration_s: float) -> Timeline[Unit]:

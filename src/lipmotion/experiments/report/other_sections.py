@@ -37,7 +37,7 @@ def engines_section(figures: Mapping[str, Any]) -> Section:
     }
     minutes = ", ".join(sorted({f"{row['minutes']}" for row in figures["models"].values()}))
     about = (
-        f"All engines with their defaults, trained on {minutes} minutes, and what combines them, on {figures['clips']} "
+        f"All engines with their defaults, trained on {minutes} minutes, on {figures['clips']} "
         f"recordings of {figures['split']}, with closed lips forced in p, b and m."
     )
     charts = [dots("ACC of the opening", "ACC", [Dot(n, r["acc"], r["acc_95"]) for n, r in main.rows.items()])]
