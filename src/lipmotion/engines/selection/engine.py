@@ -15,7 +15,7 @@ from lipmotion.engines.base import Arrays, Engine, Fit, Inputs, SourcePiece
 from lipmotion.engines.selection.concatenation import pieces_of, shown_units
 from lipmotion.engines.selection.config import SelectionConfig
 from lipmotion.engines.selection.costs import Costs, Target
-from lipmotion.engines.selection.inventory_text import inventory_text, is_source, source_of, units_by_source
+from lipmotion.engines.selection.inventory import inventory_text, is_source, source_of, units_by_source
 from lipmotion.engines.selection.model import SelectionModel, model_arrays, model_from_arrays
 from lipmotion.engines.selection.motion_of_units import Chosen, motion_of_units
 from lipmotion.engines.selection.search import select

@@ -17,8 +17,7 @@ from lipmotion.engines.base import SourcePiece
 from lipmotion.engines.selection.concatenation import Piece, TimeMap, pieces_of
 from lipmotion.engines.selection.config import SelectionConfig
 from lipmotion.engines.selection.costs import JOIN_AFTER, JOIN_BEFORE, Costs, Target
-from lipmotion.engines.selection.inventory import RecordedUnits
-from lipmotion.engines.selection.inventory_text import source_of
+from lipmotion.engines.selection.inventory import RecordedUnits, source_of
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.windows import PHONE_NUMBER, phone_windows

@@ -8,10 +8,9 @@ from typing import Any
 from lipmotion.experiments.hofer2008.table1 import PAPER_SCORES, PINS, REFERENCE_SET
 from lipmotion.experiments.hofer2008.table1_text import what_held
 from lipmotion.experiments.report.charts import Dot, dots
-from lipmotion.experiments.report.columns import ACC, JERK, NRMSE, PRECISION, RECALL, SCORE, VARIANCE
 from lipmotion.experiments.report.order import PaperOrder, PaperPair
 from lipmotion.experiments.report.section import Section, difference, warning_of
-from lipmotion.experiments.report.table import Column, Table
+from lipmotion.experiments.report.table import ACC, JERK, NRMSE, PRECISION, RECALL, SCORE, VARIANCE, Column, Table
 from lipmotion.pipeline.evaluation.held_out import AUDIO_ONLY
 
 AS_PRINTED = next(iter(PINS))

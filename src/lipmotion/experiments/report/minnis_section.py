@@ -9,9 +9,8 @@ from typing import Any
 from lipmotion.experiments.comparison import sign_of_difference
 from lipmotion.experiments.minnis_breen2000.minnis2000 import ADDITIONS, EVERYTHING, PRINTED, UNGUIDED, VARIANTS
 from lipmotion.experiments.report.charts import Dot, dots
-from lipmotion.experiments.report.columns import ACC, ELSEWHERE, NRMSE, RECALL, SCORE, VARIANCE
 from lipmotion.experiments.report.section import Section, difference, named, warning_of
-from lipmotion.experiments.report.table import Column, Row, Table
+from lipmotion.experiments.report.table import ACC, ELSEWHERE, NRMSE, RECALL, SCORE, VARIANCE, Column, Row, Table
 from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.pipeline.evaluation.held_out import AUDIO_ONLY
 

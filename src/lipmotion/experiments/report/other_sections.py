@@ -7,9 +7,8 @@ from typing import Any
 
 from lipmotion.experiments.comparison import sign_of_difference
 from lipmotion.experiments.report.charts import Dot, dots, rising
-from lipmotion.experiments.report.columns import ELSEWHERE, JERK, OPENING
 from lipmotion.experiments.report.section import Section, difference, named, warning_of
-from lipmotion.experiments.report.table import Column, Table
+from lipmotion.experiments.report.table import ELSEWHERE, JERK, OPENING, Column, Table
 from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.pipeline.evaluation.held_out import AUDIO_ONLY
 

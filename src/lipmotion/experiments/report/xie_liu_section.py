@@ -6,10 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from lipmotion.experiments.report.charts import Dot, dots
-from lipmotion.experiments.report.columns import RECALL, SCORE, VARIANCE
 from lipmotion.experiments.report.order import PaperOrder, PaperPair
 from lipmotion.experiments.report.section import Section, warning_of
-from lipmotion.experiments.report.table import Column, Table
+from lipmotion.experiments.report.table import RECALL, SCORE, VARIANCE, Column, Table
 from lipmotion.experiments.xie_liu2007.systems import PAPER_FIGURES, REFERENCE_SYSTEM, TUNED
 from lipmotion.pipeline.evaluation.held_out import AUDIO_ONLY
 

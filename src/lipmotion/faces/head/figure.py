@@ -10,21 +10,64 @@ from numpy.typing import NDArray
 
 from lipmotion.faces.head import palette
 from lipmotion.faces.head.body import clothing, collar, ear, earring, neck
+from lipmotion.faces.head.eyelids import LID_SIDE
 from lipmotion.faces.head.eyes import LASHES, brow, brow_shift, catchlights, eyeball, lash_triangles, lashes
 from lipmotion.faces.head.forms import EYE
 from lipmotion.faces.head.hair import hair
 from lipmotion.faces.head.inside import lower_drop, lower_teeth, tongue, tongue_triangles, upper_teeth
-from lipmotion.faces.head.lips import RINGS, VISIBLE_RINGS, closed_share
+from lipmotion.faces.head.lips import ACROSS, RINGS, VISIBLE_RINGS, closed_share
 from lipmotion.faces.head.part import part
 from lipmotion.faces.head.pose import CharacterPose
 from lipmotion.faces.head.skin import AT_CORNER, REST, Skin, jaw_moved
-from lipmotion.faces.head.tint import skin_colours
 from lipmotion.faces.turning import turned
-from lipmotion.meshes.rendering.lighting import Lighting
+from lipmotion.meshes.rendering.lighting import Lighting, linear
 from lipmotion.meshes.rendering.occlusion import reaches
 from lipmotion.meshes.rendering.rasteriser import normals_of
 
 Real = NDArray[np.float64]
+CORNER_FADE_SHARE = 0.4
+"""How far the colour of the lips fades to that of the skin towards the corners."""
+
+
+def skin_colours(skin: Skin) -> Real:
+    """Return the diffuse reflection of all vertices of the skin, linear [shape=(V, 3)]."""
+    x, y, z = np.abs(skin.rest[:, 0]), skin.rest[:, 1], skin.rest[:, 2]
+    colour = np.broadcast_to(np.array(palette.SKIN), skin.rest.shape).copy()
+
+    def tint(strength: float, middle: tuple[float, float], radii: tuple[float, float], wanted: palette.Triple) -> None:
+        spot = np.exp(-(((x - middle[0]) / radii[0]) ** 2) - ((y - middle[1]) / radii[1]) ** 2)
+        share = strength * spot[:, None] * (z > -0.85)[:, None]
+        colour[:] = (1 - share) * colour + share * np.array(wanted)
+
+    tint(0.5, (0, 0.45), (0.5, 0.3), palette.SKIN_LIGHT)
+    tint(0.4, (0.44, -0.36), (0.21, 0.15), palette.BLUSH)
+    tint(0.25, (0, -0.40), (0.12, 0.09), palette.BLUSH)
+    tint(0.12, (0, -1.05), (0.15, 0.1), palette.BLUSH)
+    tint(0.25, (0.33, 0.17), (0.2, 0.06), palette.BLUSH)
+    tint(0.8, (0.055, -0.495), (0.028, 0.018), palette.SKIN_DEEP)
+    _lips(skin, colour)
+    for eye in range(2):
+        lids = skin.lid_rows(eye)
+        colour[lids[0]] = palette.EYE_CORNER
+        colour[lids[1]] = 0.5 * np.array(palette.EYE_CORNER) + 0.5 * np.array(palette.SKIN)
+        for ring, share in ((2, 0.12), (3, 0.30), (4, 0.12)):
+            upper = lids[ring, LID_SIDE > 0]
+            colour[upper] = (1 - share) * np.array(palette.SKIN) + share * np.array(palette.SKIN_DEEP)
+    return linear(colour)
+
+
+def _lips(skin: Skin, colour: Real) -> None:
+    lips = skin.lip_rows()
+    bare = colour[lips[0]]
+    colour[lips[1]] = 0.45 * colour[lips[1]] + 0.55 * np.array(palette.LIP)
+    colour[lips[2 : VISIBLE_RINGS - 1].ravel()] = palette.LIP
+    for ring in range(VISIBLE_RINGS - 2, VISIBLE_RINGS + 1):
+        share = 0.3 * (ring - VISIBLE_RINGS + 3)
+        colour[lips[ring]] = (1 - share) * np.array(palette.LIP) + share * np.array(palette.LIP_DEEP)
+    faded = (CORNER_FADE_SHARE * np.clip((np.abs(ACROSS) - 0.8) / 0.2, 0, 1) ** 2)[:, None]
+    colour[lips[1:VISIBLE_RINGS]] += faded * (bare - colour[lips[1:VISIBLE_RINGS]])
+    colour[lips[VISIBLE_RINGS + 1 :].ravel()] = palette.MOUTH
+
 
 PIVOT = np.array([0.0, -0.75, -0.9])
 """The head turns about this place, the top of the neck."""

@@ -91,7 +91,7 @@ class Woman(DrawnFace):
 
     @property
     def design(self) -> Design:  # noqa: D102
-        from lipmotion.faces.portrait.woman import WOMAN
+        from lipmotion.faces.portrait.characters import WOMAN
 
         return WOMAN
 
@@ -106,7 +106,7 @@ class Man(DrawnFace):
 
     @property
     def design(self) -> Design:  # noqa: D102
-        from lipmotion.faces.portrait.man import MAN
+        from lipmotion.faces.portrait.characters import MAN
 
         return MAN
 
@@ -117,6 +117,6 @@ class Cartoon(DrawnFace):
 
     @property
     def design(self) -> Design:  # noqa: D102
-        from lipmotion.faces.portrait.cartoon import CARTOON
+        from lipmotion.faces.portrait.characters import CARTOON
 
         return CARTOON

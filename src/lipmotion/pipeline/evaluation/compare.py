@@ -15,7 +15,7 @@ from lipmotion.errors import InputError
 from lipmotion.export.motion.marker_frame import MILLIMETRES
 from lipmotion.measures import curves, vertices
 from lipmotion.measures.closures import closed_threshold, closure_figures
-from lipmotion.measures.modulation import modulation_distance_db
+from lipmotion.measures.curves import modulation_distance_db
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, arkit_name
 from lipmotion.pipeline.outputs.motion_input import read_generation
 from lipmotion.storage.json_text import nan_as_null
