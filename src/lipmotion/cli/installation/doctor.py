@@ -2,35 +2,25 @@
 
 from __future__ import annotations
 
-import ast
 import math
-import operator
 import os
 import platform
 import re
-import sys
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
+
+from packaging import requirements
+from packaging.markers import Marker
+from packaging.specifiers import SpecifierSet
 
 from lipmotion.errors import LipMotionError, MissingDependencyError, ModelFormatError
 from lipmotion.extensions import install_command, installed_version
 
-EXTRA = re.compile(r"\s*(?:\band\b)?\s*extra == '([\w-]+)'")
-REQUIREMENT = re.compile(r"\s*([\w.-]+)\s*((?:\(?[<>=!][^;@]*)?)\s*(?:;\s*(.*))?")
-SPECIFIER = re.compile(r"(==|>=|<=|!=|<|>)\s*([\w.]+)")
-COMPARISONS: Mapping[str, Callable[[Any, Any], bool]] = {
-    "==": operator.eq,
-    "!=": operator.ne,
-    ">=": operator.ge,
-    "<=": operator.le,
-    ">": operator.gt,
-    "<": operator.lt,
-}
-_OF_NODES: Mapping[type, str] = {ast.Eq: "==", ast.NotEq: "!=", ast.GtE: ">=", ast.LtE: "<=", ast.Gt: ">", ast.Lt: "<"}
+EXTRA = re.compile(r'\s*(?:\band\b)?\s*extra == "([\w-]+)"')
 
 
 @dataclass(frozen=True)
@@ -51,7 +41,7 @@ class Requirement:
     @property
     def applies(self) -> bool:
         """Whether this Python and this system have it."""
-        return not self.marker or _holds(ast.parse(self.marker, mode="eval").body)
+        return not self.marker or Marker(self.marker).evaluate()
 
     @property
     def installed(self) -> str:
@@ -64,20 +54,15 @@ class Requirement:
     @property
     def is_met(self) -> bool:
         """Whether a version is installed that is required."""
-        found = _numbers(self.installed)
-        return bool(found) and all(
-            COMPARISONS[sign](found, _numbers(version)) for sign, version in SPECIFIER.findall(self.versions)
-        )
+        return bool(self.installed) and SpecifierSet(self.versions).contains(self.installed, prereleases=True)
 
 
 def requirement(text: str) -> Requirement:
     """Return a requirement from its text in the metadata of a package: ``NAME>=1 ; MARKER``."""
-    found = REQUIREMENT.fullmatch(text)
-    if found is None:
-        raise ValueError(f"not a requirement: {text!r}")
-    name, versions, marker = found[1], found[2].strip("() "), found[3] or ""
+    found = requirements.Requirement(text)
+    marker = str(found.marker or "")
     extra = EXTRA.search(marker)
-    return Requirement(name, versions, EXTRA.sub("", marker).strip(), extra[1] if extra else "")
+    return Requirement(found.name, str(found.specifier), EXTRA.sub("", marker).strip(), extra[1] if extra else "")
 
 
 def declared_requirements() -> tuple[Requirement, ...]:
@@ -86,35 +71,6 @@ def declared_requirements() -> tuple[Requirement, ...]:
         return tuple(map(requirement, metadata.requires("lipmotion") or ()))
     except metadata.PackageNotFoundError:
         return ()
-
-
-def _numbers(version: str) -> tuple[int, ...]:
-    """Return the whole numbers of a version, zeros at its end left out, so that 2.1 is 2.1.0."""
-    numbers = [int(part) for part in re.match(r"[\d.]*", version)[0].split(".") if part]  # type: ignore[index] # matches
-    while numbers and not numbers[-1]:
-        numbers.pop()
-    return tuple(numbers)
-
-
-def _holds(node: ast.expr) -> bool:
-    """Return whether a marker holds here."""
-    if isinstance(node, ast.BoolOp):
-        return (all if isinstance(node.op, ast.And) else any)(map(_holds, node.values))
-    if not isinstance(node, ast.Compare):
-        raise ValueError(f"not a comparison: {ast.unparse(node)}")
-    here = {
-        "python_version": "{}.{}".format(*sys.version_info),
-        "python_full_version": platform.python_version(),
-        "sys_platform": sys.platform,
-        "platform_machine": platform.machine(),
-        "platform_system": platform.system(),
-        "os_name": os.name,
-    }
-    sides = (node.left, node.comparators[0])
-    one, other = (here[side.id] if isinstance(side, ast.Name) else ast.literal_eval(side) for side in sides)
-    compare = COMPARISONS[_OF_NODES[type(node.ops[0])]]
-    is_version = any(isinstance(side, ast.Name) and "version" in side.id for side in sides)
-    return compare(_numbers(one), _numbers(other)) if is_version else compare(one, other)
 
 
 State = Literal["works", "absent", "broken"]
@@ -281,10 +237,12 @@ def _model() -> str:
 
 
 def _compiled_kernels() -> str:
-    try:
-        from lipmotion.kernels.compiled.compiler import cache_folder
-    except ImportError as error:
-        raise _AbsentError(f"no numba here ({error}): everything works, long work takes longer") from error
+    from lipmotion.kernels.choice import numba_works
+
+    if not numba_works():
+        raise _AbsentError("no numba here: everything works, long work takes longer, drawing much longer")
+    from lipmotion.kernels.compiled.compiler import cache_folder
+
     folder = cache_folder()
     if folder is None:
         raise _AbsentError("nowhere to keep machine code: every long command compiles again; set NUMBA_CACHE_DIR")
