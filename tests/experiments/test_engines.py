@@ -13,9 +13,8 @@ import pytest
 from experiments.copies import copied
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.errors import CorpusError, ExportError, InputError
-from lipmotion.experiments.engines.engine_comparison import engines
+from lipmotion.experiments.engines.engine_comparison import engines, table
 from lipmotion.experiments.engines.models import ENGINES_COMPARED
-from lipmotion.experiments.engines.text import table
 from lipmotion.experiments.runner import ExperimentSettings
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.evaluation.evaluate import evaluate

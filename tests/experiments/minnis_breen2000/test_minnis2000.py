@@ -20,9 +20,9 @@ from lipmotion.experiments.minnis_breen2000.minnis2000 import (
     join_figures,
     minnis2000,
     rows,
+    table,
     velocity_change,
 )
-from lipmotion.experiments.minnis_breen2000.text import table
 from lipmotion.experiments.runner import ExperimentSettings
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.evaluation.evaluate import evaluate

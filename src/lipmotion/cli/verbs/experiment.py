@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from lipmotion.cli.arguments.declared import add_options
-from lipmotion.cli.arguments.experiment_options import add_experiment_arguments, run_experiment, unfinished_parts
+from lipmotion.cli.arguments.figures import add_experiment_arguments, run_experiment, unfinished_parts
 from lipmotion.cli.arguments.options import add_execution, list_or_all, numbers, worker_count
 from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.pipeline.job import Request
@@ -45,8 +45,7 @@ def _add_hofer2008(actions: argparse._SubParsersAction[argparse.ArgumentParser])
 
 def run_hofer2008(options: argparse.Namespace) -> None:
     """Call ``experiment.hofer2008`` and print its tables; with ``--output``, a second run goes on where one stopped."""
-    from lipmotion.experiments.hofer2008.table1 import FULL, QUICK, hofer2008
-    from lipmotion.experiments.hofer2008.table1_text import table
+    from lipmotion.experiments.hofer2008.table1 import FULL, QUICK, hofer2008, table
 
     def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
         with unfinished_parts(options) as work:
@@ -180,8 +179,7 @@ def _add_minnis2000(actions: argparse._SubParsersAction[argparse.ArgumentParser]
 
 def run_minnis2000(options: argparse.Namespace) -> None:
     """Call ``experiment.minnis2000`` and print its table; with ``--output``, a second run goes on where one stopped."""
-    from lipmotion.experiments.minnis_breen2000.minnis2000 import minnis2000
-    from lipmotion.experiments.minnis_breen2000.text import table
+    from lipmotion.experiments.minnis_breen2000.minnis2000 import minnis2000, table
 
     def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
         with unfinished_parts(options) as work:
@@ -201,8 +199,7 @@ def _add_engines(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -
 
 def run_engines(options: argparse.Namespace) -> None:
     """Call ``experiment.engines`` and print its table."""
-    from lipmotion.experiments.engines.engine_comparison import engines
-    from lipmotion.experiments.engines.text import table
+    from lipmotion.experiments.engines.engine_comparison import engines, table
 
     def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
         return engines(corpus, split=list_or_all(options.split), models=options.models, settings=settings)

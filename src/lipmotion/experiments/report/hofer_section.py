@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from lipmotion.experiments.hofer2008.table1 import PAPER_SCORES, PINS, REFERENCE_SET
-from lipmotion.experiments.hofer2008.table1_text import what_held
+from lipmotion.experiments.hofer2008.table1 import PAPER_SCORES, PINS, REFERENCE_SET, what_held
 from lipmotion.experiments.report.charts import Dot, dots
 from lipmotion.experiments.report.order import PaperOrder, PaperPair
 from lipmotion.experiments.report.section import Section, difference, warning_of

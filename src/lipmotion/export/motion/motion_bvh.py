@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import ExportError
 from lipmotion.export.base import MotionFormat
-from lipmotion.export.motion.rounded import formatted_rows
+from lipmotion.export.motion.keys import formatted_rows
 from lipmotion.meshes.fitting.point_motion import point_motion
 from lipmotion.types import Generation, Motion
 

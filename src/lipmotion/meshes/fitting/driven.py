@@ -19,6 +19,7 @@ from lipmotion.errors import InputError
 from lipmotion.meshes.files.binding_files import BINDING_SUFFIX, load_binding, read_points, read_weights
 from lipmotion.meshes.files.character_files import read_character
 from lipmotion.meshes.files.rig_tables import RigRow, read_character_table, table_path, with_sources
+from lipmotion.meshes.fitting.facial_animation import expression_weights
 from lipmotion.meshes.fitting.lip_placement import (
     LipPlacement,
     opening_shape,
@@ -26,7 +27,6 @@ from lipmotion.meshes.fitting.lip_placement import (
     placed_by_shape,
     surface_of_named,
 )
-from lipmotion.meshes.fitting.mood_weights import expression_weights
 from lipmotion.meshes.fitting.own_curves import OwnCurves, own_curves, plain_row, rows_found
 from lipmotion.meshes.fitting.point_motion import point_motion
 from lipmotion.meshes.fitting.shape_weights import shape_weights

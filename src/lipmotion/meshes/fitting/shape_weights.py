@@ -13,7 +13,7 @@ from lipmotion.articulation.lip_points import FACING, LEFT_CORNER, RIGHT_CORNER,
 from lipmotion.articulation.mouth import SpokenMouth
 from lipmotion.meshes.fitting.blendshape_motion import given_weights, with_mouth
 from lipmotion.meshes.fitting.bounded_curves import CurveCosts, bounded_curves
-from lipmotion.meshes.fitting.mood_weights import mood_weights
+from lipmotion.meshes.fitting.facial_animation import mood_weights
 from lipmotion.meshes.fitting.oculus_visemes import NEAREST_VOWEL, viseme_curves
 from lipmotion.meshes.fitting.point_motion import PointMotion, point_motion
 from lipmotion.meshes.model.face_shapes import NOT_FROM_POINTS, FaceShapes
