@@ -5,7 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.kernels.choice import compiled_pays
+
 Real = NDArray[np.float64]
+NORMAL_S = 0.1e-6
+"""Time that NumPy takes for the normal of a triangle."""
 LEAST_FACING_COSINE = -0.35
 """Vertices that face further away than this (the cosine) are not seen, and stay dark."""
 
@@ -14,11 +18,19 @@ def normal_sums(places: Real, triangles: NDArray[np.int32]) -> Real:
     """Return the sum of the normals of the triangles around every vertex, twice as long as their areas [shape=(V, 3)].
 
     places : of the vertices [shape=(V, 3)];  triangles : counterclockwise from outside [shape=(F, 3)]
+    Two forms of the same bits: a scene that is written once must not wait for numba.
     """
-    from lipmotion.kernels.compiled import shading
-
     total = np.zeros(places.shape)
-    shading.add_normals(places, triangles, total)
+    if compiled_pays(len(triangles) * NORMAL_S):
+        from lipmotion.kernels.compiled import shading
+
+        shading.add_normals(places, triangles, total)
+        return total
+    first, second, third = (places[triangles[:, corner]] for corner in range(3))
+    across = np.cross(second - first, third - first)
+    for axis in range(3):
+        for corner in range(3):
+            total[:, axis] += np.bincount(triangles[:, corner], across[:, axis], minlength=len(places))
     return total
 
 
