@@ -10,7 +10,7 @@ import pytest
 from lipmotion.engines import engine_named
 from lipmotion.engines.selection.engine import SelectionEngine
 from lipmotion.engines.selection.model import SelectionModel
-from lipmotion.engines.selection.targets import SEGMENT_S, target_of
+from lipmotion.engines.selection.selection_training import SEGMENT_S, target_of
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.testing.examples import examples, speech, timeline
 from lipmotion.types import Constraints, Pin, Span, Timeline, Unit, silent_monitor

@@ -20,8 +20,7 @@ from lipmotion.engines.selection.inventory import RecordedUnits, inventory_text,
 from lipmotion.engines.selection.model import SelectionModel, model_arrays, model_from_arrays
 from lipmotion.engines.selection.motion_of_units import Chosen, motion_of_units
 from lipmotion.engines.selection.search import select
-from lipmotion.engines.selection.selection_training import fit_selection
-from lipmotion.engines.selection.targets import target_of
+from lipmotion.engines.selection.selection_training import fit_selection, target_of
 from lipmotion.engines.selection.windows import PHONE_NUMBER, phone_windows
 from lipmotion.errors import InputError
 from lipmotion.motion.predictors import conditions_of

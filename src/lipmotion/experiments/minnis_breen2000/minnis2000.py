@@ -23,7 +23,7 @@ from lipmotion.engines.selection.costs import ABUTTING_JOIN
 from lipmotion.engines.selection.engine import SelectionEngine
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.search import select
-from lipmotion.engines.selection.targets import target_of
+from lipmotion.engines.selection.selection_training import target_of
 from lipmotion.experiments.comparison import correlation_statistic, opening_curves, significance_mark
 from lipmotion.experiments.engines.models import EngineModel, engine_models
 from lipmotion.experiments.learning_curve import check_training_names

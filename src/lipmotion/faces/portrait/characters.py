@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from lipmotion.faces.portrait.design import Design, EyeDesign, LipDesign, Lock
+from lipmotion.faces.portrait.design import Design, EyeDesign, LipDesign, Lock, Palette
 from lipmotion.faces.portrait.outlines import closed_curve, symmetric
-from lipmotion.faces.portrait.palette import Palette
 
 MAN = Design(
     palette=Palette(

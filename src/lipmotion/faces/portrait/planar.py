@@ -14,12 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.faces.portrait.design import Design
+from lipmotion.faces.portrait.design import Colour, Design
 from lipmotion.faces.portrait.eyes import GAZE_STEPS, LID_POSITIONS, EyePainter, LidPose, lid_pose
 from lipmotion.faces.portrait.mouth_painting import MouthPainter
 from lipmotion.faces.portrait.mouth_textures import MouthTextures, mouth_textures
 from lipmotion.faces.portrait.movement import BrowField, HeadField, SkinField, brow_pose
-from lipmotion.faces.portrait.palette import Colour
 from lipmotion.faces.portrait.portrait_rasteriser import SCENE, FacePose, moving_parts, still_layers
 from lipmotion.faces.portrait.view import View, Window
 from lipmotion.kernels.compiled.planes import (

@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.liveliness import CALM, UpperFace
 from lipmotion.faces.portrait import surroundings
-from lipmotion.faces.portrait.design import Design
+from lipmotion.faces.portrait.design import WHITE, Colour, Design
 from lipmotion.faces.portrait.eyes import EyePainter
 from lipmotion.faces.portrait.layer import Glow, Layer, Rim
 from lipmotion.faces.portrait.mouth_painting import MouthPainter
 from lipmotion.faces.portrait.movement import STEP, BrowField, BrowPose, HeadField, HeadPlacement, SkinField, brow_pose
 from lipmotion.faces.portrait.outlines import Points, both_sides, ellipse, open_curve, stroke
-from lipmotion.faces.portrait.palette import WHITE, Colour
 from lipmotion.faces.portrait.pose import MouthPose
 from lipmotion.faces.portrait.view import View, Window
 from lipmotion.kernels.pixels.painting import stack, warp, warp_bytes
