@@ -224,16 +224,14 @@ def _sentence(name: str, split: str, vocabulary: Iterator[str], rng: np.random.G
     while sum(durations_s[1:]) < SPEECH_S:
         words.append(next(vocabulary))
         labels += [Unit(phone, word=words[-1]) for phone in WORDS[words[-1]]]
-        durations_s += [_typical_duration_s(phone) * rng.uniform(0.85, 1.15) for phone in WORDS[words[-1]]]
+        durations_s += [
+            (0.17 if phone[0] in "aeiou" else 0.105) * rng.uniform(0.85, 1.15) for phone in WORDS[words[-1]]
+        ]
     labels, durations_s = [*labels, Unit("sil")], [*durations_s, rng.uniform(*SILENCE_S)]
     phones = [(label.phone, duration_s) for label, duration_s in zip(labels, durations_s, strict=True)]
     audio, units = synthesise(phones, pitch_hz=rng.uniform(*PITCH_HZ), seed=int(rng.integers(2**31)))
     spans = tuple(replace(span, label=label) for span, label in zip(units, labels, strict=True))
     return ToySentence(name, tuple(words), audio, Timeline(spans), split)
-
-
-def _typical_duration_s(phone: str) -> float:
-    return 0.17 if phone[0] in "aeiou" else 0.105
 
 
 @lru_cache(maxsize=32)

@@ -175,14 +175,13 @@ def rows() -> dict[str, SelectionConfig]:
     """Return the configuration of every row, by its name; closures are never pinned, so that units alone are judged."""
     printed = SelectionConfig.parsed(MINNIS_2000)
     found = {PRINTED: printed}
-    found |= {name: replace(printed, **{key: _default(key) for key in keys}) for name, keys in ADDITIONS.items()}
+    found |= {
+        name: replace(printed, **{key: getattr(SelectionConfig(), key) for key in keys})
+        for name, keys in ADDITIONS.items()
+    }
     found |= {name: replace(printed, **changes) for name, changes in VARIANTS.items()}
     everything = SelectionConfig(closures=False)
     return found | {UNGUIDED: replace(everything, guide=0.0), EVERYTHING: everything}
-
-
-def _default(option: str) -> Any:
-    return getattr(SelectionConfig(), option)
 
 
 @one_thread()

@@ -343,7 +343,11 @@ def learning_section(figures: Mapping[str, Any]) -> Section:
     main = tables.pop(AUDIO_ONLY)
     first, last = next(iter(main.rows)), list(main.rows)[-1]
     low, high = (figure_text(main.rows[size]["acc"], ".3f") for size in (first, last))
-    steps = [size for size, before in zip(list(main.rows)[1:], main.rows, strict=False) if _fell(main, before, size)]
+    steps = [
+        size
+        for size, before in zip(list(main.rows)[1:], main.rows, strict=False)
+        if (difference(main.rows[size]["acc"], main.rows[before]["acc"]) or 0) < 0
+    ]
     words = warning_of(figures["clips"]) | {
         "More recordings": [
             f"From {first} to {last} recordings the correlation of the opening goes from {low} to {high}.",
@@ -366,10 +370,6 @@ def learning_section(figures: Mapping[str, Any]) -> Section:
     more = [(table.caption, table) for table in tables.values()]
     shown = [f"{size} recordings" for size in dict.fromkeys((first, last))]
     return Section("Learning curve", about, verdict, words, charts, main, more, shown)
-
-
-def _fell(table: Table, before: str, after: str) -> bool:
-    return (difference(table.rows[after]["acc"], table.rows[before]["acc"]) or 0) < 0
 
 
 def folds_section(figures: Mapping[str, Any]) -> Section:

@@ -41,7 +41,7 @@ def write(path: Path, generation: Generation, source: Mapping[str, str], _model:
     """Write a binary glTF without a mesh: bones, a node for each expression, and one animation of them."""
     motion, buffer = generation.motion, GltfBuffer()
     curves = _expressions(motion)
-    stepped = [bool({*_sources(name)} & {*generation.stepped}) for name in curves]
+    stepped = [bool({*(BLINKS if name.startswith("blink") else (name,))} & {*generation.stepped}) for name in curves]
     time_s, rows = with_jumps(motion.time_s, np.stack(list(curves.values()), axis=1), stepped)
     nodes = _bones()
     samplers: list[dict[str, Any]] = []
@@ -90,11 +90,6 @@ def _expressions(motion: Motion) -> dict[str, Array]:
         same = np.array_equal(left, right)
         curves |= {"blink": left} if same else {"blinkLeft": left, "blinkRight": right}
     return {name: np.clip(curve, 0, 1) for name, curve in curves.items()}
-
-
-def _sources(name: str) -> tuple[str, ...]:
-    """Return the channels of an expression."""
-    return BLINKS if name.startswith("blink") else (name,)
 
 
 def _bones() -> list[dict[str, Any]]:

@@ -44,11 +44,6 @@ class Box(NamedTuple):
     x1: int
 
     @property
-    def pixels(self) -> int:
-        """Their number."""
-        return (self.y1 - self.y0) * (self.x1 - self.x0)
-
-    @property
     def area(self) -> tuple[slice, slice]:
         """The index of these pixels in a plane."""
         return slice(self.y0, self.y1), slice(self.x0, self.x1)
