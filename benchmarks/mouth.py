@@ -50,8 +50,8 @@ from lipmotion.meshes.fitting.lip_placement import LipPlacement, placed_by_shape
 from lipmotion.meshes.model.mesh import Blendshape, Mesh
 from lipmotion.meshes.model.scene import Scene
 from lipmotion.meshes.model.surface import mesh_surface
-from lipmotion.motion.acoustic_network import phone_reliability
 from lipmotion.motion.predictors import Predictor
+from lipmotion.motion.reliability import phone_reliability
 from lipmotion.pipeline.generate.generation_for import generate_for
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.curve_sets import curves_of

@@ -20,11 +20,11 @@ from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.windows import covering, phone_windows
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.multistream.phone_recogniser import fit_phone_recogniser
-from lipmotion.motion.acoustic_network import phone_reliability
 from lipmotion.motion.closure import OPENING
 from lipmotion.motion.fit import fit_motion
 from lipmotion.motion.modulation_filter import learned_filter
 from lipmotion.motion.predictors import PredictorTraining, predictor_class, suitable_predictor
+from lipmotion.motion.reliability import phone_reliability
 from lipmotion.motion.rest import away_from_speech, runs, speech_intervals
 from lipmotion.motion.space import MotionSpace
 from lipmotion.stats.delta_windows import dynamics_known, with_dynamics

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.trajectory.emission import Emission
-from lipmotion.motion.acoustic_network import phone_reliability
 from lipmotion.motion.articulation import ArticulationPrior, dynamics_of, strangeness
 from lipmotion.motion.generation import Statistics
 from lipmotion.motion.predictors import Predictor
+from lipmotion.motion.reliability import phone_reliability
 from lipmotion.types import Speech
 
 Array = NDArray[np.float64]
