@@ -23,7 +23,6 @@ from lipmotion.study.analysis.crossed import (
 )
 from lipmotion.study.answers import FIRST, Answer
 
-Array = NDArray[np.float64]
 MOST_STEPS = 20_000
 SMALLEST_STEP = 1e-12
 """Iteration ends when no strength changes by a larger share."""
