@@ -13,9 +13,7 @@ import pytest
 from lipmotion.errors import InputError
 from lipmotion.export.base import MOTION_FORMATS, MotionFormat
 from lipmotion.faces import Face, face_named
-from lipmotion.testing import ContractError
-from lipmotion.testing import contract as check_exporter
-from lipmotion.testing import contract as check_face
+from lipmotion.testing import ContractError, check_exporter, check_face
 
 
 class Bars(Face):
