@@ -179,7 +179,7 @@ def _packed(values: Singles) -> Packed:
     """Return planes of values 0..255, packed."""
     planes, packed = _bytes(values), np.empty(values.shape, np.uint32)
     for plane, into in zip(planes, packed, strict=True):
-        pack(plane, 0, 0, *plane.shape, False, into)
+        pack(plane, 0, 0, plane.shape[0], plane.shape[1], False, into)
     return packed
 
 
