@@ -12,7 +12,7 @@ from lipmotion.faces import Staging, face_named, staged_face
 from lipmotion.faces.portrait.layered import MOUTHS, chosen_mouths, painted
 from lipmotion.faces.portrait.pose import MouthPose
 from lipmotion.faces.portrait.svg_document import drawing_of
-from lipmotion.testing import contract as check_face
+from lipmotion.testing import check_face
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 
 ROBOT = Path(__file__).parents[2] / "examples" / "robot.svg"

@@ -10,7 +10,7 @@ from lipmotion.faces.portrait.movement import NECK_END, NECK_TOP, PIVOT_Y, HeadF
 from lipmotion.faces.portrait.portrait_rasteriser import FacePose, Rasteriser
 from lipmotion.faces.portrait.pose import MouthPose
 from lipmotion.faces.portrait.view import View
-from lipmotion.testing import contract as check_face
+from lipmotion.testing import check_face
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 
 NOTHING_SAID: Timeline[Unit] = Timeline(())

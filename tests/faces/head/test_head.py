@@ -13,7 +13,7 @@ from lipmotion.faces.head import Head, render
 from lipmotion.faces.head.pose import CharacterPose
 from lipmotion.faces.head.stage import Stage, camera_for
 from lipmotion.meshes.rendering.rasteriser import Camera
-from lipmotion.testing import contract as check_face
+from lipmotion.testing import check_face
 
 SMALL: dict[str, Any] = {"width": 160, "height": 120}
 
