@@ -54,6 +54,7 @@ def measured(audio: Audio) -> dict[str, float]:
     model = lipmotion.load_model()
     lipmotion.animate(lipmotion.SpeechRequest(audio, recogniser="fast"), model=model)  # kernels are loaded
     session = Session(lipmotion.SpeechRequest(audio), model=model)
+    pictures = lipmotion.SessionPictures(session)
     found = {"first motion": timed(session.generated)}
     warm = [timed(lambda n=n: session.generated(lipmotion.Edits().then(f"pin width 1 at {n + 1}"))) for n in range(4)]
     found["the slowest of the first edits, which loads kernels"] = max(warm)
@@ -68,11 +69,11 @@ def measured(audio: Audio) -> dict[str, float]:
         if times_s:
             found[kind] = statistics.median(times_s)
     others = sentences(session, audio.duration_s)["another phone"]
-    found["first picture of the portrait"] = timed(lambda: session.picture(audio.duration_s / 2))
-    found["another picture"] = timed(lambda: session.picture(audio.duration_s / 2 + 1))
+    found["first picture of the portrait"] = timed(lambda: pictures.picture(audio.duration_s / 2))
+    found["another picture"] = timed(lambda: pictures.picture(audio.duration_s / 2 + 1))
     edited = [lipmotion.Edits().then(*others[:count]) for count in range(2, 6)]
     found["a picture after another phone"] = statistics.median(
-        timed(lambda: session.picture(audio.duration_s / 2, edits))  # noqa: B023 # called at once
+        timed(lambda: pictures.picture(audio.duration_s / 2, edits))  # noqa: B023 # called at once
         for edits in edited
     )
     return {kind: round(1000 * seconds, 1) for kind, seconds in found.items()}

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from lipmotion.pipeline.job import Job, Outputs, Request
     from lipmotion.pipeline.model import Model, load_model, save_model
     from lipmotion.pipeline.outputs.cues import cues, write_cues
+    from lipmotion.pipeline.outputs.session_pictures import SessionPictures
     from lipmotion.pipeline.outputs.write import write
     from lipmotion.pipeline.session import Session
     from lipmotion.pipeline.training.adapt import adapt
@@ -76,6 +77,7 @@ __all__ = [
     "Run",
     "Selection",
     "Session",
+    "SessionPictures",
     "Span",
     "SpeechRequest",
     "SpokenText",
@@ -110,6 +112,7 @@ _HOMES = {
     "Edits": "lipmotion.pipeline.edits",
     "Run": "lipmotion.pipeline.training.train",
     "Session": "lipmotion.pipeline.session",
+    "SessionPictures": "lipmotion.pipeline.outputs.session_pictures",
     "SpeechRequest": "lipmotion.pipeline.understand.request",
     "Selection": "lipmotion.corpora.store",
     "Corpus": "lipmotion.corpora.store",

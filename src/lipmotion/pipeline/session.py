@@ -15,7 +15,7 @@ from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
 from threading import RLock
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -33,8 +33,6 @@ from lipmotion.articulation.pauses import with_pauses
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
 from lipmotion.articulation.symmetry import symmetrical
 from lipmotion.errors import AlignmentError, InputError, shortened
-from lipmotion.faces.base import DrawnMotion, DrawsSingly, Face, Picture
-from lipmotion.faces.registry import staged_face
 from lipmotion.kernels.choice import expect_more
 from lipmotion.kernels.threads import one_thread
 from lipmotion.meshes.fitting.facial_animation import PARAMETERS
@@ -62,9 +60,7 @@ from lipmotion.pipeline.generate.outlook import outlook_of
 from lipmotion.pipeline.generate.prior import with_prior
 from lipmotion.pipeline.generate.transfer import person_of
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.outputs.delivered import delivered, shown, with_motion
-from lipmotion.pipeline.outputs.drawn_video import DRAWN_HZ, read_sound
-from lipmotion.pipeline.outputs.prosody import moved_prosody, prosody_of_speech
+from lipmotion.pipeline.outputs.delivered import delivered, with_motion
 from lipmotion.pipeline.understand.language import in_language
 from lipmotion.pipeline.understand.request import SpeechInput, SpeechRequest, request_of
 from lipmotion.pipeline.understand.understood_speech import (
@@ -90,13 +86,11 @@ from lipmotion.types import (
     Outlook,
     Pin,
     Progress,
-    Prosody,
     Span,
     Speech,
     SpeechKnowledge,
     Timeline,
     Unit,
-    frame_of,
     silent_monitor,
 )
 from lipmotion.units import Lexicon, Pronunciation, words_in_time, words_of
@@ -131,7 +125,7 @@ UnitStep = PhoneStep | WordStep | LockStep | UnlockStep
 """Edits that change phones, or keep others from changing them."""
 
 
-class _Kept(Generic[KeptT]):
+class Kept(Generic[KeptT]):
     """The last results of a stage, by what they depend on."""
 
     def __init__(self, most: int = KEPT) -> None:
@@ -168,6 +162,7 @@ class Session:
     outlook   : what to expect of the motion, where it is known; None: it follows from the speech
     lasts_s   : duration of the recording that was edited, in seconds: another one is refused; None: not known
     audio     : the sound of the recording, where it has been read already; None: it is read when it is needed
+    is_sketching : whether motion is that of ``sketching``
     A session may be used by several threads, one at a time; several sessions do not disturb one another.
     Raises InputError: the model knows no such speaker.  Raises ModelFormatError: as ``load_model``.
 
@@ -196,22 +191,20 @@ class Session:
         self._work = map_in_processes(workers, self._prepare)
         self._monitor, self._curves, self._outlook = monitor, frozenset(curves), outlook
         self._meanwhile = meanwhile
-        self._understood: _Kept[UnderstoodSpeech] = _Kept()
-        self._units: _Kept[Timeline[Unit]] = _Kept()
-        self._aligned: _Kept[list[Span[Unit]]] = _Kept(ALIGNED)
-        self._moved: _Kept[Generation] = _Kept()
-        self._generated: _Kept[Generation] = _Kept()
-        self._locks: _Kept[MotionStretch] = _Kept(LOCKED)
-        self._delivered: _Kept[Generation] = _Kept()
-        self._faces: _Kept[DrawsSingly] = _Kept()
-        self._drawn: _Kept[DrawnMotion[Any]] = _Kept()
+        self._understood: Kept[UnderstoodSpeech] = Kept()
+        self._units: Kept[Timeline[Unit]] = Kept()
+        self._aligned: Kept[list[Span[Unit]]] = Kept(ALIGNED)
+        self._moved: Kept[Generation] = Kept()
+        self._generated: Kept[Generation] = Kept()
+        self._locks: Kept[MotionStretch] = Kept(LOCKED)
+        self._delivered: Kept[Generation] = Kept()
         self._lasts_s, self._motions, self._given_audio = lasts_s, 0, audio
         self._one_at_a_time = RLock()
-        self._sketching = False
+        self.is_sketching = False
         self._last: tuple[MotionKey, Generation] | None = None
-        self._sketches: _Kept[Generation | None] = _Kept()
-        self._excerpts: _Kept[Generation] = _Kept()
-        self._parts: _Kept[UnderstoodSpeech] = _Kept()
+        self._sketches: Kept[Generation | None] = Kept()
+        self._excerpts: Kept[Generation] = Kept()
+        self._parts: Kept[UnderstoodSpeech] = Kept()
 
     @contextmanager
     def sketching(self) -> Iterator[None]:
@@ -221,11 +214,11 @@ class Session:
         made whole (docs/studio.md). Deviations, states and names of units stay those of before.
         """
         with self._one_at_a_time:
-            before, self._sketching = self._sketching, True
+            before, self.is_sketching = self.is_sketching, True
             try:
                 yield
             finally:
-                self._sketching = before
+                self.is_sketching = before
 
     def units(self, edits: Edits = NO_EDITS) -> Timeline[Unit]:
         """Return the phones in time with the edits of words and phones.
@@ -249,36 +242,8 @@ class Session:
     def delivered(self, edits: Edits = NO_EDITS) -> Generation:
         """Return the motion as files hold it: with its intensity, anticipation and offset (docs/controls.md)."""
         with self._one_at_a_time, one_thread():
-            key = (edits.steps, self._sketching)
+            key = (edits.steps, self.is_sketching)
             return self._delivered.once(key, lambda: delivered(self.generated(edits), edits.delivery()))
-
-    def picture(
-        self, time_s: float, edits: Edits = NO_EDITS, *, face: str | Face = "portrait", fps: float = DRAWN_HZ
-    ) -> Picture:
-        """Return the picture of a drawn face that is shown at a time in a video [shape as of ``Face.render``].
-
-        fps : frames a second of the video
-        What of the face does not move is painted once.
-        Raises InputError: as ``generated``; a time outside the recording, or a face that cannot draw single pictures.
-        """
-        with self._one_at_a_time, one_thread():
-            staging, delivery = edits.staging(), edits.delivery()
-
-            def staged() -> DrawsSingly:
-                found = staged_face(face, staging, moved_prosody(self._prosody, delivery))
-                if not isinstance(found, DrawsSingly):
-                    raise InputError(f"the face {face!r} draws no single pictures; write a video")
-                return found
-
-            def drawn() -> DrawnMotion[Any]:
-                seen = shown(self.generated(edits), delivery, fps)
-                return self._faces.once((face, staging, delivery), staged).drawn(seen.motion, seen.units, fps=fps)
-
-            pictures = self._drawn.once((edits.steps, face, fps, self._sketching), drawn)
-            frame = frame_of(time_s, len(pictures), fps)
-            if frame is None:
-                raise InputError(f"{time_s} s lies outside the video (0 to {(len(pictures) - 1) / fps:.2f} s)")
-            return pictures.picture(frame)
 
     def understood(self, edits: Edits = NO_EDITS) -> UnderstoodSpeech:
         """Return the speech as input of the engine, with the phones of ``units``."""
@@ -313,11 +278,6 @@ class Session:
     @cached_property
     def _audio(self) -> AnalysedAudio:
         return self._given_audio or analysed(audio_of(self.request))
-
-    @cached_property
-    def _prosody(self) -> Prosody:
-        """Loudness and pitch of the sound of videos."""
-        return prosody_of_speech(read_sound(self.request.recording))
 
     def _edited_units(self, steps: tuple[Step, ...]) -> Timeline[Unit]:
         """Return the phones in time after some edits; each edit sees those that the ones before it left."""
@@ -400,10 +360,10 @@ class Session:
             motion = with_gestures(generation.motion, generation.units, names)
             return locked_stretch(with_motion(generation, motion), lock.start_s, lock.end_s)
 
-        return self._locks.once((before, lock, names, self._sketching), stretch)
+        return self._locks.once((before, lock, names, self.is_sketching), stretch)
 
     def _after(self, steps: tuple[Step, ...]) -> Generation:
-        return self._generated.once((steps, self._sketching), lambda: self._with_locks(steps))
+        return self._generated.once((steps, self.is_sketching), lambda: self._with_locks(steps))
 
     def _with_curves(self, steps: tuple[Step, ...]) -> Generation:
         """Return the motion after some edits without locks: the engine's, then gains and what bends single curves."""
@@ -463,7 +423,7 @@ class Session:
 
     def _with_pins(self, phone_steps: tuple[Step, ...], pins: tuple[Pin, ...]) -> Generation:
         key = (phone_steps, pins)
-        if self._sketching and key not in self._moved:
+        if self.is_sketching and key not in self._moved:
             sketch = self._sketches.once(key, lambda: self._sketch(phone_steps, pins))
             if sketch is not None:
                 return sketch

@@ -25,6 +25,7 @@ from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.drawn_video import DRAWN_HZ, read_sound
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance
 from lipmotion.pipeline.outputs.scenes import delivered_scene
+from lipmotion.pipeline.outputs.session_pictures import SessionPictures
 from lipmotion.pipeline.outputs.shown_faces import ShownFace, ShownPerson
 from lipmotion.pipeline.session import own_pronunciations
 from lipmotion.pipeline.understand.read_request import read_request
@@ -77,6 +78,7 @@ class OpenLine:
         self._others: dict[tuple[int, int], OpenLine] = {}
         asked = replace(read_request(file.named), onto=onto) if onto is not None else None
         self.session = file.session(asked, model=model, audio=audio)
+        self._pictures = SessionPictures(self.session)
         self.session.generated(file.edits)
 
     def moved_by(self, model: Model, onto: FilmedFace | None) -> OpenLine:
@@ -249,9 +251,9 @@ class OpenLine:
         return Performance(self.generation, settings, self.audio, None, self.model)
 
     def picture(self, time_s: float, face: str | Face) -> NDArray[np.uint8]:
-        """Return the picture of a drawn face at a time. Raises InputError: as ``Session.picture``."""
+        """Return the picture of a drawn face at a time. Raises InputError: as there."""
         with self._view():
-            return self.session.picture(time_s, self.file.edits, face=face)
+            return self._pictures.picture(time_s, self.file.edits, face=face)
 
     def write_video(self, path: Path, start_s: float, end_s: float, face: str | Face) -> None:
         """Write a stretch as a video of a drawn face. Raises InputError: as ``picture``; or it is too long, or none."""

@@ -24,6 +24,7 @@ from lipmotion.pipeline.outputs.delivered import shown
 from lipmotion.pipeline.outputs.drawn_video import sound_track
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance
 from lipmotion.pipeline.outputs.prosody import prosody_of_speech
+from lipmotion.pipeline.outputs.session_pictures import SessionPictures
 from lipmotion.pipeline.outputs.shown_faces import shown_face
 from lipmotion.pipeline.outputs.write import write
 from lipmotion.pipeline.session import Session
@@ -275,6 +276,7 @@ def test_edits_that_are_not_possible(session: Session, sentence: str, message: s
 
 def test_single_pictures_are_those_of_the_video(session: Session, request_: SpeechRequest) -> None:
     """Any frame, before and after an edit; what is not at that time is refused."""
+    pictures = SessionPictures(session)
     for edits in (Edits(), edited("pin opening 0.2 at 1.0", "set size 64", "set background #40a0ff")):
         performance = Performance(
             session.generated(edits),
@@ -284,9 +286,9 @@ def test_single_pictures_are_those_of_the_video(session: Session, request_: Spee
         seen, prosody = shown(performance.generation, Delivery(), 25.0), prosody_of_speech(sound_track(performance))
         frames = list(staged_face("portrait", edits.staging(), prosody).render(seen.motion, seen.units, fps=25.0))
         for number in (25, 3):
-            assert np.array_equal(session.picture(number / 25, edits), frames[number])
+            assert np.array_equal(pictures.picture(number / 25, edits), frames[number])
     with pytest.raises(InputError, match="9 s lies outside the video"):
-        session.picture(9)
+        pictures.picture(9)
 
 
 def test_sessions_in_two_threads_do_not_disturb_each_other(toy_model: Model, toy_sentence: ToySentence) -> None:
