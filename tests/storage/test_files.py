@@ -18,6 +18,7 @@ from lipmotion.storage.files import (
     TEMPORARY,
     check_distinct,
     check_target,
+    confined,
     locked,
     remove_unfinished,
     unfinished_work,
@@ -238,7 +239,7 @@ def test_a_link_is_written_through(tmp_path: Path) -> None:
 def test_a_link_is_replaced_where_it_must_not_lead_away(tmp_path: Path) -> None:
     (tmp_path / "precious").write_text("old")
     (tmp_path / "corpus.json").symlink_to("precious")
-    with whole_file(tmp_path / "corpus.json", follow=False) as unfinished:
+    with confined(tmp_path), whole_file(tmp_path / "corpus.json") as unfinished:
         unfinished.write_text("new")
     assert not (tmp_path / "corpus.json").is_symlink()
     assert (tmp_path / "precious").read_text() == "old"

@@ -17,7 +17,15 @@ from lipmotion.errors import InputError
 from lipmotion.pipeline.batch.lines import is_recording, read_lines
 from lipmotion.pipeline.outputs.scenes import sound_reference
 from lipmotion.speech.voices.pronunciations import LanguageLexicon
-from lipmotion.storage.files import locked, read_text_file, sha256_of, whole_file
+from lipmotion.storage.files import (
+    is_link,
+    locked,
+    make_folder,
+    read_text_file,
+    remove_unfinished,
+    sha256_of,
+    whole_file,
+)
 from lipmotion.storage.json_text import as_json_rows, from_json
 from lipmotion.studio.project import EDITS_SUFFIX, Project, ProjectLine, check_lines, project_document, project_from
 from lipmotion.studio.votes import Vote, read_votes, votes_text
@@ -128,7 +136,7 @@ class ProjectFolder:
             taken = {_key(line.name) for line in self.project.lines.values()}
             stem = _free(plain_name(Path(name).stem), taken)
             folder = self.path / SOUNDS
-            folder.mkdir(exist_ok=True)
+            make_folder(folder)
             file = folder / f"{stem}{Path(name).suffix.lower()}"
             with whole_file(file) as temporary:
                 content.replace(temporary)
@@ -191,7 +199,7 @@ def folder_for(source: Path | None, out: Path | None = None) -> Path:
     """Return the folder of the project of a recording, of a folder or a list of recordings, or of the project itself.
 
     A path that ends as projects do, and is not there, is that of an empty project.
-    Raises InputError: there is no such file or folder.
+    Raises InputError: there is no such file or folder, or the folder beside the source is a link.
     """
     if source is None:
         return out or UNTITLED
@@ -202,7 +210,10 @@ def folder_for(source: Path | None, out: Path | None = None) -> Path:
     if _is_project(source):
         return source.parent if source.name == PROJECT else source
     place = source.absolute()
-    return out or place.with_name(f"{place.name if place.is_dir() else place.stem}{SUFFIX}")
+    usual = place.with_name(f"{place.name if place.is_dir() else place.stem}{SUFFIX}")
+    if out is None and is_link(usual):
+        raise InputError(f"{usual}: is a link, required a folder beside {source}; open {usual} itself, or give -o")
+    return out or usual
 
 
 def _is_project(source: Path) -> bool:
@@ -222,6 +233,7 @@ def opened_folder(source: Path | None, out: Path | None = None) -> Iterator[Proj
     path = folder_for(source, out)
     recordings = None if source is None or _is_project(source) or _is_new(source) else source
     with locked(path):
+        remove_unfinished(path)  # what was dropped on a studio that was killed
         folder = ProjectFolder(path)
         if recordings is not None:
             folder.add(recordings)

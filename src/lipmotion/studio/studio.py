@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import logging
 import os
-import shutil
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from threading import Lock
@@ -26,7 +24,7 @@ from lipmotion.pipeline.job import Job, Outputs
 from lipmotion.pipeline.opened_job import opened
 from lipmotion.pipeline.outputs.curve_sets import SHAPE_SETS
 from lipmotion.pipeline.outputs.drawn_video import VideoOutput, read_sound
-from lipmotion.storage.files import TEMPORARY, made_folders, read_text_file, sha256_of
+from lipmotion.storage.files import TEMPORARY, made_folders, read_text_file, remove, sha256_of, temporary_folder
 from lipmotion.storage.json_text import from_json
 from lipmotion.studio.desk import NEW, READY, WAITING, WORKING, Desk, NotReadyError, Work
 from lipmotion.studio.folder import EXPORTS, ProjectFolder
@@ -78,7 +76,8 @@ class Studio:
         places = {name: Path(os.path.normpath(folder.path / file)) for name, file in folder.project.characters.items()}
         self.trainer = Trainer(folder)
         self.faces = Faces(places, lambda: self.trainer.made(FACE))
-        self._sounds = Path(tempfile.mkdtemp(prefix="lipmotion-studio-"))
+        self._kept = ExitStack()
+        self._sounds = self._kept.enter_context(temporary_folder())
         self._exporting: dict[str, int] | None = None
         self._summaries: dict[int, tuple[int, EditsSummary]] = {}
 
@@ -86,7 +85,7 @@ class Studio:
         """Write what is not written, and remove what was kept for this run alone."""
         self.trainer.close()
         self.desk.close()
-        shutil.rmtree(self._sounds, ignore_errors=True)
+        self._kept.close()
 
     def number(self, given: str) -> int:
         """Return the number of a line that an address gives. Raises HTTPException: there is no such line."""
@@ -251,7 +250,7 @@ class Studio:
         try:
             yield path
         finally:
-            path.unlink(missing_ok=True)
+            remove(path)
 
     def with_pronunciations(self, sentences: Sequence[str]) -> tuple[str | Step, ...]:
         """Return edits that say words of the project's lexicon with their phones, which then stand in the edits.
@@ -273,8 +272,8 @@ class Studio:
             raise NotReadyError
         edits, work = self.folder.edits(self.folder.line(number)), self.desk.work(number)
         if work is not None and work.line is not None:
-            await self.desk.at(number, lambda _: edits.unlink(missing_ok=True))
-        edits.unlink(missing_ok=True)
+            await self.desk.at(number, lambda _: remove(edits))
+        remove(edits)
         self.folder.change_line(number, lambda line: replace(line, transcript=transcript.strip()))
         self.desk.forget(number)
         self.desk.opened(number)

@@ -12,7 +12,7 @@ from lipmotion.pipeline.session import Session
 from lipmotion.pipeline.understand.read_request import read_request
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.storage.files import sha256_of
+from lipmotion.storage.files import make_folder, sha256_of
 from lipmotion.studio.folder import ProjectFolder
 from lipmotion.studio.line import OpenLine, doubt_of
 from lipmotion.studio.project import ProjectLine
@@ -53,7 +53,7 @@ def understand_line(
     session = Session(request, model=model, monitor=monitor, audio=audio)
     file, generation = begun_with(replace(named, lexicon=None), session)
     path = folder.edits(line)
-    path.parent.mkdir(parents=True, exist_ok=True)
+    make_folder(path.parent)
     write_edits(file, path)
     duration_s, doubt = audio.duration_s, doubt_of(generation)
     folder.change_line(line.number, lambda now: replace(now, duration_s=duration_s, doubt=doubt), save=False)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import argparse
 import stat
 import sys
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
 from lipmotion.cli.terminal.printing import write_bytes
+from lipmotion.storage.files import temporary_folder
 
 PIPE = "-"
 OPENED = ("/dev/fd/", "/dev/stdin", "/proc/self/fd/")
@@ -51,8 +51,8 @@ def read_pipe(path: Path) -> Iterator[Path]:
     if not is_pipe(path):
         yield path
         return
-    with tempfile.TemporaryDirectory(prefix="lipmotion-") as folder:
-        kept = Path(folder) / "standard-input"
+    with temporary_folder() as folder:
+        kept = folder / "standard-input"
         with kept.open("wb") as file:
             if str(path) == PIPE:
                 _copy(_standard_input(), file)
@@ -72,8 +72,8 @@ def written_pipe(options: argparse.Namespace) -> Iterator[tuple[tuple[str, ...],
     if PIPE not in outputs:
         yield outputs, False
         return
-    with tempfile.TemporaryDirectory(prefix="lipmotion-") as folder:
-        kept = Path(folder) / f"motion.{options.format}"
+    with temporary_folder() as folder:
+        kept = folder / f"motion.{options.format}"
         yield tuple(str(kept) if output == PIPE else output for output in outputs), True
         write_bytes(kept)
 

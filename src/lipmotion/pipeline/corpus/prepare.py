@@ -27,7 +27,7 @@ from lipmotion.pipeline.corpus.supplied_motion import DIGESTS, source_digests, s
 from lipmotion.pipeline.workers import worker_pool
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.storage.files import locked, remove_unfinished, sha256_of
+from lipmotion.storage.files import confined, locked, remove_unfinished, sha256_of
 from lipmotion.storage.sources import Source, check_apart, is_folder
 from lipmotion.types import Item, Monitor, Progress, Track, Utterance, silent_monitor
 from lipmotion.units import check_words
@@ -275,7 +275,8 @@ def _process(job: _Job) -> _Outcome:
         if entry is not None:
             return _Outcome(name, kept=True, unseen=int(entry["unseen_frames"]), notes=tuple(entry.get("notes", ())))
         utterance = _utterance(job, source)
-        write_utterance(job.folder, utterance, job.settings)
+        with confined(job.folder.parent.parent):  # the corpus, in this worker
+            write_utterance(job.folder, utterance, job.settings)
     except (MissingDependencyError, ExportError):
         raise  # all other recordings would fail in the same way
     except (InputError, AlignmentError) as error:
