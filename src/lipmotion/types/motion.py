@@ -29,6 +29,11 @@ FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """First characters of a field that a spreadsheet executes as a formula; full-width forms count as well."""
 
 
+def is_formula(text: str) -> bool:
+    """Return whether a spreadsheet would execute a text as a formula."""
+    return text.startswith(FORMULA) or normalize("NFKC", text.lstrip()[:1]).startswith(FORMULA)
+
+
 @dataclass(frozen=True)
 class Channel:
     """Name and unit of one curve.
@@ -40,7 +45,7 @@ class Channel:
     unit: str = EYE_DISTANCE
 
     def __post_init__(self) -> None:
-        if self.name.startswith(FORMULA) or normalize("NFKC", self.name.lstrip()[:1]).startswith(FORMULA):
+        if is_formula(self.name):
             raise InputError(
                 f"the channel name {shortened(self.name)!r} begins as a spreadsheet's formula, required another "
                 "beginning than = + - @; rename it"

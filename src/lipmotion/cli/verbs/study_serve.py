@@ -15,6 +15,8 @@ def add(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     host = "address to listen at (default: 127.0.0.1, which only this machine reaches; see docs/study.md)"
     parser.add_argument("--host", default="127.0.0.1", help=host)
     parser.add_argument("--port", type=int, default=8000, help="0: any that is free (default: 8000)")
+    name = "name by which raters reach the server through another one, as study.example.org; may be repeated"
+    parser.add_argument("--name", action="append", default=[], metavar="HOST", help=name)
     parser.set_defaults(run=run)
 
 
@@ -26,4 +28,4 @@ def run(options: argparse.Namespace) -> None:
         print_line(f"raters begin at {address} (Ctrl-C ends; answers are kept in {options.study})")
         flush_output()
 
-    serve_study(options.study, host=options.host, port=options.port, started=started)
+    serve_study(options.study, host=options.host, port=options.port, names=options.name, started=started)

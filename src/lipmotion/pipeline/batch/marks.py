@@ -9,11 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lipmotion.errors import InputError, shortened
-from lipmotion.pipeline.batch.fields import as_field, from_field
 from lipmotion.pipeline.batch.lines import LARGEST_LIST_BYTES
 from lipmotion.pipeline.batch.record import Record
 from lipmotion.storage.files import read_text_file, whole_file
-from lipmotion.storage.text_table import read_table
+from lipmotion.storage.text_table import as_field, from_field, read_table
 
 APPROVE, REDO, NO_MARK = "approve", "redo", ""
 KINDS = (APPROVE, REDO, NO_MARK)
