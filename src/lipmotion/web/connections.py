@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterable
 from typing import Any
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
@@ -21,7 +20,7 @@ class PunctualConnection(H11Protocol):
 
     _due: asyncio.TimerHandle | None = None
     _stalled: asyncio.TimerHandle | None = None
-    idle_since_s = 0.0
+    idle_since_s, was_read = 0.0, False
 
     @property
     def is_busy(self) -> bool:
@@ -33,9 +32,7 @@ class PunctualConnection(H11Protocol):
         super().connection_made(transport)
         self.idle_since_s = self.loop.time()
         self._due = self.loop.call_later(HEADERS_S, self._end_if_idle)
-        if len(self.connections) > MOST_CONNECTIONS:
-            self._make_room(self.connections)
-        self.loop.call_later(FIRST_READ_S, self._make_room_for_own)
+        self.loop.call_later(FIRST_READ_S, self._make_room)
 
     def data_received(self, data: bytes) -> None:
         """Take a part of a request; the time of its headers begins with its first byte."""
@@ -83,14 +80,15 @@ class PunctualConnection(H11Protocol):
         if not self.is_busy:
             self.transport.abort()
 
-    def _make_room_for_own(self) -> None:
+    def _make_room(self) -> None:
+        """Close a connection, where there are too many: what waits longest, of those that never had a request first.
+
+        Those that are so new that their requests may not have been read stay.
+        """
+        self.was_read = True
         everybody: set[Any] = {*self.connections}
         own = [each for each in everybody if each.client and self.client and each.client[0] == self.client[0]]
-        if self in everybody and len(own) > MOST_OF_ONE:
-            self._make_room(own)
-
-    def _make_room(self, crowd: Iterable[Any]) -> None:
-        """Close the connection that has waited longest, of those that never had a request first; else this one."""
-        idle = [each for each in crowd if not each.is_busy and each is not self and not each.transport.is_closing()]
-        last = min(idle, key=lambda each: (each.cycle is not None, each.idle_since_s), default=self)
-        last._end_if_idle()
+        crowd = own if len(own) > MOST_OF_ONE else everybody if len(everybody) > MOST_CONNECTIONS else ()
+        if self in crowd:
+            idle = [each for each in crowd if each.was_read and not each.is_busy]
+            min(idle, key=lambda each: (each.cycle is not None, each.idle_since_s), default=self).transport.abort()
