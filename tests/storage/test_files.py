@@ -20,6 +20,7 @@ from lipmotion.storage.files import (
     check_target,
     confined,
     locked,
+    portable_name,
     remove_unfinished,
     unfinished_work,
     whole_file,
@@ -273,6 +274,20 @@ def test_two_outputs_that_are_one(tmp_path: Path) -> None:
         with pytest.raises(ExportError, match="is given twice"):
             check_distinct([tmp_path / one, tmp_path / other])
     check_distinct([tmp_path / "a", tmp_path / "b", tmp_path / "c"])
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["CON", "nul", "Aux.wav", "prn.tar.gz", "com1", "LPT9.csv", "COM\u00b2", "conin$", "NUL .txt", "a.", "a "],
+)
+def test_a_name_that_windows_does_not_take_gets_another_one(name: str) -> None:
+    assert portable_name(name) != name
+    assert portable_name(portable_name(name)) == portable_name(name)
+
+
+@pytest.mark.parametrize("name", ["icon.wav", "console", "com10", "lpt", "nul_.wav", "a.b", ".hidden", "null"])
+def test_other_names_stay(name: str) -> None:
+    assert portable_name(name) == name
 
 
 def interrupted(folder: Path, step: int) -> bool:

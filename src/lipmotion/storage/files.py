@@ -150,6 +150,19 @@ def check_distinct(targets: Sequence[Path]) -> None:
             raise ExportError(f"{targets[number]}: is given twice; give every output another name")
 
 
+_DEVICE = re.compile(r"con|prn|aux|nul|conin\$|conout\$|(?:com|lpt)[0-9\u00b9\u00b2\u00b3]", re.IGNORECASE)
+
+
+def portable_name(name: str) -> str:
+    """Return a name of a file or a folder that Windows takes as one, too; as it is, where it does.
+
+    >>> portable_name("nul.wav"), portable_name("Con ."), portable_name("icon.wav")
+    ('nul_.wav', 'Con_', 'icon.wav')
+    """
+    stem, dot, rest = name.rstrip(" .").partition(".")
+    return f"{stem.rstrip()}_{dot}{rest}" if _DEVICE.fullmatch(stem.rstrip()) else name.rstrip(" .")
+
+
 def as_text(path: str | Path) -> str:
     """Return a path as text that UTF-8 can encode: names of files may have any bytes."""
     return str(path).encode("utf-8", "backslashreplace").decode("utf-8")

@@ -21,6 +21,7 @@ from lipmotion.storage.files import (
     is_link,
     locked,
     make_folder,
+    portable_name,
     read_text_file,
     remove_unfinished,
     sha256_of,
@@ -110,7 +111,7 @@ class ProjectFolder:
         with self._lock:
             found = read_lines(source, (EDITS_SUFFIX,)) if source.is_dir() or not is_recording(source) else []
             named = [(Path(line.recording), line.name, line.transcript) for line in found] or [
-                (source, source.stem, "")
+                (source, portable_name(source.stem), "")
             ]
             known = {os.path.realpath(self.sound(line)) for line in self.project.lines.values()}
             new = [each for each in named if os.path.realpath(each[0]) not in known]
@@ -210,7 +211,7 @@ def folder_for(source: Path | None, out: Path | None = None) -> Path:
     if _is_project(source):
         return source.parent if source.name == PROJECT else source
     place = source.absolute()
-    usual = place.with_name(f"{place.name if place.is_dir() else place.stem}{SUFFIX}")
+    usual = place.with_name(portable_name(f"{place.name if place.is_dir() else place.stem}{SUFFIX}"))
     if out is None and is_link(usual):
         raise InputError(f"{usual}: is a link, required a folder beside {source}; open {usual} itself, or give -o")
     return out or usual
@@ -263,4 +264,4 @@ def plain_name(given: str, usual: str = "line") -> str:
     ('Anna_s take', 'voice')
     """
     plain = re.sub(r"[^\w .+()-]", "_", unicodedata.normalize("NFC", given)).strip(" ._")
-    return plain[:LONGEST_NAME] or usual
+    return portable_name(plain[:LONGEST_NAME]) or usual

@@ -81,7 +81,7 @@ def study_application(
 
     async def video(request: Request) -> Response:
         path = videos.get(request.path_params["name"])
-        if path is None:
+        if path is None or not path.is_file():
             raise HTTPException(404, "no such video")
         return FileResponse(path, media_type="video/mp4", headers=WELL_KEPT)
 

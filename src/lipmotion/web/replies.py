@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import sqlite3
 from collections.abc import Callable, Container, Mapping
 from functools import partial
 from typing import Any
@@ -92,7 +93,7 @@ async def _refused(_: Request, error: Exception) -> Response:
 
 
 async def _failed(status: int, _: Request, error: Exception) -> Response:
-    if isinstance(error, ExportError | OSError):
+    if isinstance(error, ExportError | OSError | sqlite3.Error):
         LOG.warning("%s", error)
         return JSONResponse({"error": "cannot be stored now; try again"}, status, FRESH)
     return JSONResponse({"error": str(error)}, status, FRESH)
@@ -103,6 +104,7 @@ ERRORS: dict[type[Exception], Callable[[Request, Any], Any]] = {
     LipMotionError: partial(_failed, 422),
     ExportError: partial(_failed, 503),
     OSError: partial(_failed, 503),
+    sqlite3.Error: partial(_failed, 503),
 }
 """What is replied to errors that are raised on purpose, and to a full disk: JSON, ``{"error": text}``."""
 
