@@ -15,8 +15,8 @@ from functools import partial
 from itertools import chain
 from pathlib import Path
 
+from lipmotion.printable import is_formula
 from lipmotion.storage.files import as_text
-from lipmotion.types.motion import is_formula
 
 LONGEST_LINE = 1 << 20
 """Most characters of a line."""

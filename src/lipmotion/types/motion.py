@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
-from unicodedata import normalize
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
+from lipmotion.printable import is_formula
 
 EYE_DISTANCE = "eye_distance"
 """The unit of all tracked lengths: the distance between the outer eye corners."""
@@ -24,14 +24,6 @@ LARGEST_MAGNITUDE = {EYE_DISTANCE: 1e4, WEIGHT: 255.0, GREY: 1e5}
 """Largest plausible magnitude of motion of a face, by unit; values in pixels, in files without units, are allowed."""
 LARGEST_OTHER = 1e6
 """The same for all other units."""
-
-FORMULA = ("=", "+", "-", "@", "\t", "\r")
-"""First characters of a field that a spreadsheet executes as a formula; full-width forms count as well."""
-
-
-def is_formula(text: str) -> bool:
-    """Return whether a spreadsheet would execute a text as a formula."""
-    return text.startswith(FORMULA) or normalize("NFKC", text.lstrip()[:1]).startswith(FORMULA)
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import IO
 
 from lipmotion.cli.terminal.printing import write_bytes
-from lipmotion.storage.files import temporary_folder
 
 PIPE = "-"
 OPENED = ("/dev/fd/", "/dev/stdin", "/proc/self/fd/")
@@ -51,6 +50,8 @@ def read_pipe(path: Path) -> Iterator[Path]:
     if not is_pipe(path):
         yield path
         return
+    from lipmotion.storage.files import temporary_folder
+
     with temporary_folder() as folder:
         kept = folder / "standard-input"
         with kept.open("wb") as file:
@@ -72,6 +73,8 @@ def written_pipe(options: argparse.Namespace) -> Iterator[tuple[tuple[str, ...],
     if PIPE not in outputs:
         yield outputs, False
         return
+    from lipmotion.storage.files import temporary_folder
+
     with temporary_folder() as folder:
         kept = folder / f"motion.{options.format}"
         yield tuple(str(kept) if output == PIPE else output for output in outputs), True
