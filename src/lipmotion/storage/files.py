@@ -258,9 +258,9 @@ def make_folder(folder: Path) -> None:
     try:
         with _reached(folder, create=True):
             pass
-    except (FileExistsError, NotADirectoryError) as error:
-        raise ExportError(f"{folder}: is a file; give the name of a new or an empty folder") from error
     except OSError as error:
+        if isinstance(error, FileExistsError | NotADirectoryError) and os.path.lexists(folder):
+            raise ExportError(f"{folder}: is a file; give the name of a new or an empty folder") from error
         raise _refused(folder, error) from error
 
 
