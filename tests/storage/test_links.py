@@ -56,23 +56,23 @@ def content_of(folder: Path) -> dict[str, bytes | None]:
 
 
 def drop(folder: Path) -> None:
-    with opened_folder(folder) as project:
+    with opened_folder(None, folder) as project:
         (folder / "came").write_bytes(b"sound")
         project.drop("line.wav", folder / "came", "")
 
 
 def vote(folder: Path) -> None:
-    with opened_folder(folder) as project:
+    with opened_folder(None, folder) as project:
         project.add_vote(Vote("line", (Side("a", "0" * 64, "0" * 64), Side("b", "1" * 64, "0" * 64)), 0))
 
 
 def pronounce(folder: Path) -> None:
-    with opened_folder(folder) as project:
+    with opened_folder(None, folder) as project:
         project.add_pronunciation("bob", ("b", "aa", "b"))
 
 
 def train_voice(folder: Path) -> None:
-    with opened_folder(folder):
+    with opened_folder(None, folder):
         (folder / "came.mp4").write_bytes(b"no video")
         lines = (LearnedLine(folder / "came.mp4", "line", "words"),)
         place = folder / "voices" / "new.lipmotion"
