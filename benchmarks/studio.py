@@ -6,6 +6,7 @@ python benchmarks/studio.py kills RECORDING [--count 100]     of the server; for
 python benchmarks/studio.py hostile RECORDING [--count 2000]
 python benchmarks/studio.py undo RECORDING [--count 1000]
 python benchmarks/studio.py clients RECORDING [--count 2000]  steps of two clients; sounds are those of the toy corpus
+python benchmarks/studio.py crowd RECORDING [--count 1000]    edits beside so many connections without a request
 
 Recordings are repeated, or cut, to the seconds. Times are of the processor, in one process, without the network and the
 browser: a minute of the clock on a machine that does other work says nothing. ``browser`` gives both.
@@ -17,14 +18,17 @@ import argparse
 import json
 import os
 import resource
+import selectors
 import shutil
 import signal
+import socket
 import sys
 import tempfile
 import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from multiprocessing import get_context
 from pathlib import Path
 from random import Random
 from typing import Any, NoReturn
@@ -53,7 +57,7 @@ from lipmotion.testing.toy import toy_sentences  # noqa: E402
 from lipmotion.types import Audio, Timeline  # noqa: E402
 from meshes.heads import head, write_glb  # noqa: E402
 from studio.attack import attacked  # noqa: E402
-from studio.served import lost_edits, random_edit, served, undone_edits  # noqa: E402
+from studio.served import Served, lost_edits, random_edit, served, undone_edits  # noqa: E402
 from studio.two_clients import walk  # noqa: E402
 
 RECOGNISED_S = 100.0
@@ -294,8 +298,79 @@ def clients(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
     return found | {"minutes": round((time.monotonic() - started_s) / 60, 1)}
 
 
-WHAT = {"times": times, "browser": in_browsers, "kills": kills, "forks": forks, "hostile": hostile, "undo": undo}
-WHAT |= {"clients": clients}
+def crowd(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
+    """Return milliseconds of the clock of an edit over HTTP: alone, and beside connections that let the server wait.
+
+    A process of its own holds them, and opens each again that is closed. Edits are made over new connections.
+    """
+    errors, count, found = sound.with_name("errors.txt"), options.count or 1000, {}
+    with served(sound, errors) as server:
+        server.ready()
+        edits_over_http(server)
+        for name, sent in {"alone": None, **WAITING}.items():
+            holder = get_context("spawn").Process(target=hold, args=(server.port, count, sent or b""), daemon=True)
+            if sent is not None:
+                holder.start()
+                time.sleep(3)
+            found[name] = edits_over_http(server)
+            told({name: found[name]})
+            if sent is not None:
+                holder.kill()
+                holder.join()
+    found["slowest, times alone"] = round(max(each[0] for each in found.values()) / found["alone"][0], 2)
+    return found | {"tracebacks": errors.read_text(encoding="utf-8").count("Traceback")}
+
+
+WAITING = {
+    "without a request": b"",
+    "with half a header": b"GET / HTTP/1.1\r\nhost: 127",
+    "with a body that does not come": b"POST /api/lines/1/edits HTTP/1.1\r\nhost: a\r\ncontent-length: 99\r\n\r\n",
+}
+
+
+def edits_over_http(server: Served) -> list[float]:
+    """Return median and 95 % of the times of edits [ms]; each must be acknowledged."""
+    times_ms = []
+    for number in range(EDITS):
+        body = {"revision": server.ready()["revision"], "steps": [f"phone 3 is {'pm'[number % 2]}"]}
+        started_s = time.perf_counter()
+        status, _ = server.ask("/api/lines/1/edits", body)
+        times_ms.append(1000 * (time.perf_counter() - started_s))
+        assert status == 200, status
+    return [round(float(np.percentile(times_ms, share)), 1) for share in (50, 95)]
+
+
+def hold(port: int, count: int, sent: bytes) -> NoReturn:
+    """Hold so many connections, on which so much is sent; open each again that the server closes."""
+    selector = selectors.DefaultSelector()
+    while True:
+        while len(selector.get_map()) < count:
+            with suppress(OSError):
+                client = socket.create_connection(("127.0.0.1", port))
+                client.sendall(sent)
+                client.setblocking(False)
+                selector.register(client, selectors.EVENT_READ)
+        for key, _ in selector.select():
+            try:
+                is_open = bool(key.fileobj.recv(1 << 16))
+            except OSError:
+                is_open = False
+            if not is_open:
+                selector.unregister(key.fileobj)
+                key.fileobj.close()
+        time.sleep(0.05)  # so that the machine is not busy with the crowd alone
+
+
+WHAT = {
+    "crowd": crowd,
+    "times": times,
+    "browser": in_browsers,
+    "kills": kills,
+    "forks": forks,
+    "hostile": hostile,
+    "undo": undo,
+    "clients": clients,
+}
 
 if __name__ == "__main__":
     main()

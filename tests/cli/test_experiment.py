@@ -147,7 +147,7 @@ UNUSABLE = [
     ("xieliu2007 CORPUS --quick --order strange.txt", 3, "--quick takes recordings of its own"),
     ("xieliu2007 CORPUS --plots missing/a", 7, "the folder missing does not exist"),
     ("engines CORPUS --models CORPUS", 7, "is the corpus itself; give another name"),
-    ("engines CORPUS --models empty.txt", 7, "empty.txt: cannot be a folder for models: File exists"),
+    ("engines CORPUS --models empty.txt", 7, "empty.txt: is a file"),
     ("all CORPUS -o empty.txt", 7, "empty.txt: cannot be used: Not a directory; give another folder"),
     ("all CORPUS -o CORPUS/r", 7, "lies in the corpus"),
     ("all CORPUS -o r --only hofer", 3, "no experiment 'hofer'; there are: hofer2008, xieliu2007"),

@@ -34,3 +34,11 @@ def test_outputs_that_would_be_written_twice() -> None:
         planned_outputs([Path("x/a.wav"), Path("y/a.wav")], ["o/"], ["json"])
     with pytest.raises(ExportError, match=r"a\.json: is one file, and there are 2 recordings"):
         planned_outputs([Path("a.wav"), Path("b.wav")], ["a.json"], ["json"])
+
+
+@pytest.mark.parametrize("output", ["out/", "{name}.json", "out/{name}/a.json"])
+def test_a_recording_that_is_called_as_a_device_names_no_output(output: str) -> None:
+    for name in ("CON.wav", "nul .flac"):
+        with pytest.raises(ExportError, match="Windows"):
+            planned_outputs([Path(name)], [output], ["json"])
+    assert planned_outputs([Path("CON.wav")], ["../a.json"], ["json"]) == [["../a.json"]]

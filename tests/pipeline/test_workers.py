@@ -12,7 +12,7 @@ import pytest
 
 from lipmotion.errors import CorpusError, InputError
 from lipmotion.pipeline import workers as module
-from lipmotion.pipeline.workers import map_in_processes, worker_pool
+from lipmotion.pipeline.workers import map_in_processes, process_count, worker_pool
 
 
 def square(number: int) -> int:
@@ -44,6 +44,16 @@ def test_no_worker_and_one_are_this_process() -> None:
             assert set(team.ordered_map(whose, range(3))) == {os.getpid()}
             with pytest.raises(InputError, match="less than nothing"):
                 list(team.ordered_map(square, [1, -1, 2]))
+
+
+@pytest.mark.parametrize("given", [0, -1, -(2**70)])
+def test_fewer_than_one_process_are_refused(given: int) -> None:
+    assert process_count(None) >= 1
+    assert process_count(3) == 3
+    with pytest.raises(InputError, match="required 1 or more"):
+        process_count(given)
+    with pytest.raises(InputError, match="required 1 or more"):
+        map_in_processes(given)
 
 
 def test_several_workers_are_other_processes() -> None:

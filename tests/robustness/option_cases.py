@@ -54,7 +54,7 @@ def _(bench: Bench) -> list[object]:
     return ["corpus", "prompts", "--text", bench.file("text.txt", b"a " * 15_000_000)]
 
 
-@case(GROUP, "corpus prepare --workers -1", 3, "-1 processes, required at least 1")
+@case(GROUP, "corpus prepare --workers -1", 3, "-1 processes, required 1 or more")
 def _(bench: Bench) -> list[object]:
     (bench.folder / "a.mp4").touch()
     return ["corpus", "prepare", bench.folder, "-o", "c", "--workers=-1"]

@@ -18,7 +18,9 @@ from lipmotion.storage.files import (
     TEMPORARY,
     check_distinct,
     check_target,
+    confined,
     locked,
+    portable_name,
     remove_unfinished,
     unfinished_work,
     whole_file,
@@ -238,7 +240,7 @@ def test_a_link_is_written_through(tmp_path: Path) -> None:
 def test_a_link_is_replaced_where_it_must_not_lead_away(tmp_path: Path) -> None:
     (tmp_path / "precious").write_text("old")
     (tmp_path / "corpus.json").symlink_to("precious")
-    with whole_file(tmp_path / "corpus.json", follow=False) as unfinished:
+    with confined(tmp_path), whole_file(tmp_path / "corpus.json") as unfinished:
         unfinished.write_text("new")
     assert not (tmp_path / "corpus.json").is_symlink()
     assert (tmp_path / "precious").read_text() == "old"
@@ -272,6 +274,20 @@ def test_two_outputs_that_are_one(tmp_path: Path) -> None:
         with pytest.raises(ExportError, match="is given twice"):
             check_distinct([tmp_path / one, tmp_path / other])
     check_distinct([tmp_path / "a", tmp_path / "b", tmp_path / "c"])
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["CON", "nul", "Aux.wav", "prn.tar.gz", "com1", "LPT9.csv", "COM\u00b2", "conin$", "NUL .txt", "a.", "a "],
+)
+def test_a_name_that_windows_does_not_take_gets_another_one(name: str) -> None:
+    assert portable_name(name) != name
+    assert portable_name(portable_name(name)) == portable_name(name)
+
+
+@pytest.mark.parametrize("name", ["icon.wav", "console", "com10", "lpt", "nul_.wav", "a.b", ".hidden", "null"])
+def test_other_names_stay(name: str) -> None:
+    assert portable_name(name) == name
 
 
 def interrupted(folder: Path, step: int) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import shutil
+import sys
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
@@ -26,6 +27,7 @@ from lipmotion.units import Lexicon
 
 pytest.importorskip("starlette", reason="the extra 'studio' is not installed")
 
+from lipmotion.storage.files import LOCK
 from lipmotion.studio import line as line_module
 from lipmotion.studio.access import TOKEN_HEADER, Access
 from lipmotion.studio.application import studio_application
@@ -224,6 +226,40 @@ def test_a_line_is_marked_exported_and_then_changed(studio: OpenStudio) -> None:
     )
     for wrong in wrongs:
         assert studio.ask("/api/export", wrong).status == 422
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links as POSIX has them")
+def test_exports_do_not_follow_links(studio: OpenStudio, tmp_path: Path) -> None:
+    (tmp_path / "precious.csv").write_text("precious")
+    exports = studio.folder.path / "exports"
+    exports.mkdir(exist_ok=True)
+    for name in ("line.csv", "line.edits.json"):
+        (exports / name).unlink(missing_ok=True)
+        (exports / name).symlink_to(tmp_path / "precious.csv")
+    assert studio.ask("/api/lines/1/export", {"files": [".csv"]}).content["failed"] == []
+    exports.rename(tmp_path / "moved")
+    exports.symlink_to(tmp_path / "moved")
+    (tmp_path / "moved" / "line.csv").unlink()
+    (failed,) = studio.ask("/api/lines/1/export", {"files": [".csv"]}).content["failed"]
+    assert "is a link" in failed["error"]
+    exports.unlink()
+    assert (tmp_path / "precious.csv").read_text() == "precious"
+    assert not (tmp_path / "moved" / "line.csv").exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of files as POSIX has them")
+def test_a_recording_that_the_disk_cannot_take_is_refused(studio: OpenStudio) -> None:
+    import resource
+
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
+    try:
+        reply = studio.ask("/api/lines?name=large.wav", b"RIFF" * 1000)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert reply.status == 503
+    assert "try again" in reply.content["error"]
+    assert not [path for path in studio.folder.path.iterdir() if path.name.startswith(".part-") and path.name != LOCK]
 
 
 def test_pronunciations_are_offered_and_kept(studio: OpenStudio) -> None:

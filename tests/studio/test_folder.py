@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.sound import write_sound
+from lipmotion.storage.files import portable_name
 from lipmotion.studio.folder import PROJECT, ProjectFolder, folder_for, opened_folder
 from lipmotion.studio.project import ExportRecord, Project, ProjectLine, project_document, project_from
 from lipmotion.testing.toy import ToySentence
@@ -114,3 +116,23 @@ def test_documents_that_are_refused(tmp_path: Path, change: dict[str, object]) -
     (tmp_path / PROJECT).write_text(json.dumps(document | change), encoding="utf-8")
     with pytest.raises((InputError, ExportError)):
         ProjectFolder(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["CON.wav", "nul .wav", "Aux..wav", "com1.take.wav"])
+def test_what_is_called_as_a_device_gets_another_name(lines: Path, tmp_path: Path, name: str) -> None:
+    sound = (lines / "a.wav").rename(tmp_path / name)
+    assert portable_name(folder_for(sound).name) == folder_for(sound).name
+    with opened_folder(sound, tmp_path / "own") as folder:
+        (folder.path / "came").write_text("sound", encoding="utf-8")
+        for number in (1, folder.drop(name, folder.path / "came", "")):
+            line = folder.line(number)
+            assert portable_name(line.name) == line.name
+            assert portable_name(folder.edits(line).name) == folder.edits(line).name
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links as POSIX has them")
+def test_the_usual_folder_of_a_project_is_no_link(lines: Path, tmp_path: Path) -> None:
+    (lines / "a.studio").symlink_to(tmp_path)
+    with pytest.raises(InputError, match="is a link"):
+        folder_for(lines / "a.wav")
+    assert folder_for(lines / "a.wav", lines / "a.studio") == lines / "a.studio"

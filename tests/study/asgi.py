@@ -40,7 +40,7 @@ async def answered(
     body = content if isinstance(content, bytes) else b"" if content is None else json.dumps(content).encode()
     sent = {"content-type": "application/json"} if content is not None else {}
     sent |= {"authorization": f"Bearer {token}"} if token else {}
-    sent |= headers or {}
+    sent = {"host": "127.0.0.1"} | sent | (headers or {})
     scope = {
         "type": "http",
         "asgi": {"version": "3.0", "spec_version": "2.4"},

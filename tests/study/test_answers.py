@@ -1,5 +1,6 @@
 """Tables of answers."""
 
+import csv
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,16 @@ ANSWERS = [
 def test_a_table_is_read_as_it_was_written(tmp_path: Path) -> None:
     write_answers(tmp_path / "answers.csv", ANSWERS)
     assert read_answers(tmp_path / "answers.csv") == ANSWERS
+
+
+@pytest.mark.parametrize("name", ["=1+1", "@SUM(A1)", "+1", "-1", "\tx", "\rx", "'=1", "\uff1d1", " =1"])
+def test_no_name_is_a_formula_in_the_table(tmp_path: Path, name: str) -> None:
+    answer = Answer("r1", "mos", 0, name, "smoothness", name, name, "1", 8.25, 1, False, "")
+    write_answers(tmp_path / "answers.csv", [answer])
+    with (tmp_path / "answers.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.reader(file))
+    assert rows[1][COLUMNS.index("condition")] == f"'{name}"
+    assert read_answers(tmp_path / "answers.csv") == [answer]
 
 
 @pytest.mark.parametrize(

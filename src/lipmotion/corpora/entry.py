@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.splits import SPLITS
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.storage.files import check_regular, read_text_file, whole_folder
+from lipmotion.storage.files import check_regular, portable_name, read_text_file, whole_folder
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.storage.schema import ArraySpec, checked_sizes
 from lipmotion.types import (
@@ -78,8 +78,10 @@ def write_utterance(folder: Path, utterance: Utterance, settings: dict[str, str]
     Raises InputError: the name cannot be a folder's, or the motion cannot be that of a face.
     Raises ExportError: it cannot be written.
     """
-    if not is_utterance_name(utterance.name):
-        raise InputError(f"an utterance cannot be named {utterance.name!r}: required: the name of a visible folder")
+    if not is_utterance_name(utterance.name) or portable_name(utterance.name) != utterance.name:
+        raise InputError(
+            f"an utterance cannot be named {utterance.name!r}: required: the name of a visible folder, on Windows, too"
+        )
     check_curves(utterance.track.motion)
     with whole_folder(folder) as unfinished:
         for name, array in _arrays(utterance).items():

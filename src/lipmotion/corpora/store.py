@@ -9,8 +9,8 @@ from typing import Any
 
 from lipmotion.corpora.entry import LARGEST_NUMBER, is_utterance_name, read_entry, read_utterance, write_utterance
 from lipmotion.corpora.splits import SPLITS
-from lipmotion.errors import CorpusError, ExportError
-from lipmotion.storage.files import TEMPORARY, read_text_file, remove_unfinished, whole_file
+from lipmotion.errors import CorpusError
+from lipmotion.storage.files import TEMPORARY, confined, make_folder, read_text_file, remove_unfinished, whole_file
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types import Utterance
 
@@ -80,10 +80,12 @@ class Corpus:
         Raises CorpusError: the folder holds something else. Raises ExportError: it cannot be created.
         """
         if not (path / MANIFEST).is_file():
-            _make_folder(path)
+            _check_new(path)
+            make_folder(path)
             cls(path, {})._write_manifest()
         corpus = cls.open(path)
-        (path / UTTERANCES).mkdir(exist_ok=True)
+        with confined(path):
+            make_folder(path / UTTERANCES)
         remove_unfinished(path)
         remove_unfinished(path / UTTERANCES)
         return corpus
@@ -194,7 +196,8 @@ class Corpus:
         Raises InputError: its name cannot be a folder's. Raises ExportError: it cannot be written.
         """
         folder = self.folder(utterance.name)
-        write_utterance(folder, utterance, settings or {})
+        with confined(self.path):
+            write_utterance(folder, utterance, settings or {})
         self._index[utterance.name] = _summary(read_entry(folder))
         self._write_manifest()
 
@@ -207,18 +210,14 @@ class Corpus:
 
     def _write_manifest(self) -> None:
         content = {"format": FORMAT, "version": VERSION, "utterances": self._index}
-        with whole_file(self.path / MANIFEST, follow=False) as unfinished:  # a link must not lead out of a corpus
+        with confined(self.path), whole_file(self.path / MANIFEST) as unfinished:
             text = as_json(content, indent=1, sort_keys=True, ensure_ascii=False)
             unfinished.write_text(text + "\n", encoding="utf-8")
 
 
-def _make_folder(path: Path) -> None:
+def _check_new(path: Path) -> None:
     if path.exists() and (not path.is_dir() or any(not inner.name.startswith(TEMPORARY) for inner in path.iterdir())):
         raise CorpusError(f"{path}: exists and is not a corpus; give a new or an empty folder")
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ExportError(f"{path}: cannot be created: {error.strerror or error}") from error
 
 
 def _summary(entry: dict[str, Any]) -> dict[str, Any]:

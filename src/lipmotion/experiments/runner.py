@@ -31,6 +31,7 @@ from lipmotion.pipeline.training.fingerprint import fingerprint
 from lipmotion.pipeline.training.train import Run, train
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
+from lipmotion.storage.files import make_folder
 from lipmotion.types import Monitor, silent_monitor, sub_monitor, with_progress
 from lipmotion.units import Lexicon
 
@@ -173,7 +174,7 @@ def finished_parts(folder: Path | None, corpus: Corpus, settings: ExperimentSett
     """
     if folder is None:
         return NO_CHECKPOINT
-    folder.mkdir(exist_ok=True)
+    make_folder(folder)
     config, lexicon = settings.recogniser or HmmConfig(), settings.lexicon or Lexicon()
     of_input = fingerprint(corpus, key.names, key.engine, config, lexicon, key.visual, key.model)
     return Checkpoint(folder, f"{of_input} {settings.seed} {key.others}")

@@ -18,12 +18,19 @@ from multiprocessing import connection as pipes
 from multiprocessing.process import BaseProcess
 from typing import Any, TypeVar
 
-from lipmotion.errors import CorpusError
+from lipmotion.errors import CorpusError, InputError
 from lipmotion.kernels.threads import one_thread
 from lipmotion.types import ParallelMap
 
 ItemT = TypeVar("ItemT")
 ResultT = TypeVar("ResultT")
+
+
+def process_count(given: int | None) -> int:
+    """Return how many processes share the work; None: one a core. Raises InputError: fewer than one."""
+    if given is not None and given < 1:
+        raise InputError(f"{given} processes, required 1 or more; leave the number out for one a core")
+    return given or os.cpu_count() or 1
 
 
 class Workers:
@@ -102,6 +109,8 @@ def map_in_processes(count: int, meanwhile: Callable[[], None] | None = None) ->
     results.
     meanwhile : is called once, where processes have begun, before the first result is waited for
     """
+
+    count = process_count(count)
 
     def each(function: Callable[[ItemT], ResultT], items: Iterable[ItemT], /) -> Iterator[ResultT]:
         waiting = iter(items)

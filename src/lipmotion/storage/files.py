@@ -13,7 +13,9 @@ import os
 import platform
 import re
 import shutil
+import stat
 import sys
+import tempfile
 import uuid
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -32,6 +34,8 @@ TEMPORARY = ".part-"
 """Prefix of unfinished files' names; a killed run may leave such a file, which the next run removes."""
 LOCK = f"{TEMPORARY}lock"
 """The file that a process locks while it works on a folder."""
+BRIEF = "lipmotion-"
+"""Prefix of folders in the system's place for temporary files."""
 UNFINISHED = ".unfinished"
 """Suffix of a folder of unfinished work, after the name of the file that the work is for."""
 
@@ -146,9 +150,173 @@ def check_distinct(targets: Sequence[Path]) -> None:
             raise ExportError(f"{targets[number]}: is given twice; give every output another name")
 
 
+_DEVICE = re.compile(r"con|prn|aux|nul|conin\$|conout\$|(?:com|lpt)[0-9\u00b9\u00b2\u00b3]", re.IGNORECASE)
+
+
+def portable_name(name: str) -> str:
+    """Return a name of a file or a folder that Windows takes as one, too; as it is, where it does.
+
+    >>> portable_name("nul.wav"), portable_name("Con ."), portable_name("icon.wav")
+    ('nul_.wav', 'Con_', 'icon.wav')
+    """
+    stem, dot, rest = name.rstrip(" .").partition(".")
+    return f"{stem.rstrip()}_{dot}{rest}" if _DEVICE.fullmatch(stem.rstrip()) else name.rstrip(" .")
+
+
 def as_text(path: str | Path) -> str:
     """Return a path as text that UTF-8 can encode: names of files may have any bytes."""
     return str(path).encode("utf-8", "backslashreplace").decode("utf-8")
+
+
+_CONFINED: dict[object, str] = {}
+"""Folders inside which no link is followed, one entry for each block that confines one."""
+_BY_HANDLE = os.open in os.supports_dir_fd and os.mkdir in os.supports_dir_fd and hasattr(os, "O_NOFOLLOW")
+_FOLDER = getattr(os, "O_DIRECTORY", 0) | getattr(os, "O_PATH", 0)
+_NO_LINK = getattr(os, "O_NOFOLLOW", 0)
+_BINARY = getattr(os, "O_BINARY", 0)
+
+
+@contextmanager
+def confined(folder: Path) -> Iterator[None]:
+    """Follow no link inside a folder that strangers may have filled, whatever writes there while the block lasts.
+
+    This holds for all functions of this module, in all threads of the process. The folder itself may be a link, which
+    the user gave. Inside it, a link in the place of a file is replaced, and one in the place of a folder is refused.
+    Folders are reached by handles, so that they cannot be exchanged on the way. Systems without handles (Windows) look
+    at every name first: a process that exchanges a folder at that very moment is not noticed there.
+    """
+    one, other = object(), object()
+    try:
+        _CONFINED.update({one: os.path.abspath(folder), other: os.path.realpath(folder)})  # noqa: PTH100 # links stay
+        yield
+    finally:
+        _CONFINED.pop(one, None)
+        _CONFINED.pop(other, None)
+
+
+def _confined_names(path: Path) -> tuple[str, tuple[str, ...]] | None:
+    """Return the outermost confined folder that holds a path, and the names from there to it; None: there is none."""
+    place = Path(os.path.abspath(path))  # noqa: PTH100 # links are not followed
+    for root in sorted(set(_CONFINED.copy().values()), key=len):
+        if place.is_relative_to(root) and place != Path(root):
+            return root, place.relative_to(root).parts
+    return None
+
+
+def is_link(path: Path) -> bool:
+    """Return whether a path is a link, or what Windows calls a junction."""
+    try:
+        status = path.lstat()
+    except OSError:
+        return False
+    junction = getattr(stat, "IO_REPARSE_TAG_MOUNT_POINT", -1)
+    return stat.S_ISLNK(status.st_mode) or getattr(status, "st_reparse_tag", 0) == junction
+
+
+@contextmanager
+def _reached(folder: Path, *, create: bool = False) -> Iterator[int | None]:
+    """Give a handle of a folder in a confined one; None: it is in none, or the system has no handles of folders.
+
+    Raises ExportError: a link is on the way. OSError: there is no such folder, or it cannot be created.
+    """
+    inside = _confined_names(folder / "name")
+    if inside is None:
+        if create:
+            folder.mkdir(parents=True, exist_ok=True)
+        yield None
+        return
+    root, names = inside
+    place = Path(root)
+    if create:
+        place.mkdir(parents=True, exist_ok=True)
+    handle = os.open(root, _FOLDER) if _BY_HANDLE else None
+    try:
+        for name in names[:-1]:
+            place /= name
+            if create:
+                with suppress(FileExistsError):
+                    os.mkdir(place if handle is None else name, dir_fd=handle)
+            if is_link(place):
+                raise ExportError(
+                    f"{place}: is a link, required a folder: nothing is written outside of {root}; remove the link, or "
+                    "give another name"
+                )
+            if handle is not None:
+                outer, handle = handle, os.open(name, _FOLDER | _NO_LINK, dir_fd=handle)
+                os.close(outer)
+        yield handle
+    finally:
+        if handle is not None:
+            os.close(handle)
+
+
+def make_folder(folder: Path) -> None:
+    """Create a folder, with those that hold it, unless it is there.
+
+    Raises ExportError: it cannot be created, or a link is on the way in a confined folder.
+    """
+    try:
+        with _reached(folder, create=True):
+            pass
+    except OSError as error:
+        if isinstance(error, FileExistsError | NotADirectoryError) and os.path.lexists(folder):
+            raise ExportError(f"{folder}: is a file; give the name of a new or an empty folder") from error
+        raise _refused(folder, error) from error
+
+
+def put_in_place(temporary: Path, target: Path) -> None:
+    """Rename a file, or a folder, to another name in its folder; a file or a link of that name is replaced.
+
+    Raises OSError: it cannot be renamed. ExportError: a link is on the way in a confined folder.
+    """
+    with _reached(target.parent) as folder:
+        if folder is None:
+            temporary.replace(target)
+        else:
+            os.replace(temporary.name, target.name, src_dir_fd=folder, dst_dir_fd=folder)
+
+
+def remove(path: Path) -> None:
+    """Remove a file, a link, or a folder with all that is in it; nothing that a link in a confined folder leads to."""
+    with suppress(OSError, ExportError), _reached(path.parent):
+        if path.is_dir() and not is_link(path):
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink()
+
+
+def check_own(path: Path) -> None:
+    """Raise ExportError unless a path is free, or a file of that name alone: what we write into is not another's."""
+    with suppress(OSError):  # it is free, or cannot be reached
+        _check_own(path, path.lstat())
+
+
+def _check_own(path: Path, status: os.stat_result) -> None:
+    if not stat.S_ISREG(status.st_mode) or status.st_nlink > 1:
+        raise ExportError(
+            f"{path}: is a link, a folder, a pipe or a device, or a file that has another name, too; required a file "
+            "that lipmotion writes itself; remove it, or give another folder"
+        )
+
+
+def open_own(path: Path, buffering: int = -1) -> IO[bytes]:
+    """Return a file that we add to, created if needed, open for reading and writing at its end.
+
+    Raises ExportError: it is no file of that name alone, or a link is on the way. OSError: it cannot be opened.
+    """
+    check_own(path)
+    file = None
+    try:
+        with _reached(path.parent) as folder:
+            flags = os.O_RDWR | os.O_APPEND | os.O_CREAT | _NO_LINK | _BINARY
+            place = path if folder is None else path.name
+            file = os.fdopen(os.open(place, flags, 0o666, dir_fd=folder), "a+b", buffering)
+        _check_own(path, os.fstat(file.fileno()))
+        return file
+    except BaseException:
+        if file is not None:
+            file.close()
+        raise
 
 
 def _check_parent(target: Path) -> None:
@@ -177,7 +345,7 @@ def _sweep(target: Path) -> None:
     with suppress(OSError):  # a folder that may be written to, but not listed
         for left in target.parent.glob(f"{prefix}*"):
             if not _is_alive(left.name[len(prefix) :].split("-")[0]):
-                _remove(left)
+                remove(left)
 
 
 def _is_alive(process: str) -> bool:
@@ -194,7 +362,12 @@ def _is_alive(process: str) -> bool:
 
 
 def _place(target: Path) -> Path:
-    """Return the path that an output is written to; for a link, that of its target, so that the link remains."""
+    """Return the path that an output is written to; for a link, that of its target, so that the link remains.
+
+    In a confined folder no link is followed.
+    """
+    if _confined_names(target):
+        return target
     try:
         place = Path(os.path.realpath(target)) if target.is_symlink() else target
         endless = place.is_symlink()
@@ -206,18 +379,19 @@ def _place(target: Path) -> Path:
 
 
 @contextmanager
-def whole_file(target: Path, *, follow: bool = True) -> Iterator[Path]:
+def whole_file(target: Path) -> Iterator[Path]:
     """Give a temporary path to write to, with the target's suffix (lower case); rename it to ``target`` on success.
 
-    follow : where ``target`` is a link, write the file that it points to; otherwise the file replaces the link
+    Where ``target`` is a link, the file that it points to is written; in a confined folder the file replaces the link.
     Raises ExportError: the folder does not exist, or the file cannot be written (disk full, no permission).
     """
-    place = _place(target) if follow else target
+    place = _place(target)
     temporary = _temporary(place, target.suffix)
     try:
-        _sweep(place)
+        with _reached(place.parent):
+            _sweep(place)
         yield temporary
-        temporary.replace(place)
+        put_in_place(temporary, place)
     except OSError as error:
         raise _refused(target, error) from error
     finally:
@@ -233,9 +407,10 @@ def whole_folder(target: Path) -> Iterator[Path]:
     """
     temporary = _temporary(target, target.suffix)
     try:
-        temporary.mkdir()
+        with _reached(target.parent):
+            temporary.mkdir()
         yield temporary
-        temporary.replace(target)
+        put_in_place(temporary, target)
     except OSError as error:
         raise _refused(target, error) from error
     finally:
@@ -253,9 +428,7 @@ def made_folders(folders: Iterable[Path]) -> Iterator[None]:
         for folder in sorted(folders):
             missing = [each for each in (folder, *folder.parents) if not each.exists()]
             try:
-                folder.mkdir(parents=True, exist_ok=True)
-            except OSError as error:
-                raise _refused(folder, error) from error
+                make_folder(folder)
             finally:
                 made += reversed(missing)
         yield
@@ -276,17 +449,18 @@ def _refused(target: Path, error: OSError) -> ExportError:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Lock a folder, created if needed, for this process.
+    """Lock a folder, created if needed, for this process, and confine it (``confined``).
 
     The system releases the lock when the process ends in any way: no lock is left behind.
-    Raises ExportError: another process has locked it, or it cannot be created.
+    Raises ExportError: another process has locked it, it cannot be created, or its lock is a link.
     """
     path = folder / LOCK
     file = None
     try:
         try:
-            file = _lock_in(folder)
-            yield
+            with confined(folder):
+                file = _lock_in(folder)
+                yield
         finally:
             _release(path, file)
     except BaseException:  # an interrupt may have come during the release; a second one does not follow at once
@@ -295,20 +469,18 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 def _lock_in(folder: Path) -> IO[bytes]:
+    make_folder(folder)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
         return _open_lock(folder / LOCK)
-    except FileExistsError as error:
-        raise ExportError(f"{folder}: is a file; give the name of a new or an empty folder") from error
     except OSError as error:
         raise _refused(folder, error) from error
 
 
 def _release(path: Path, file: IO[bytes] | None) -> None:
     """Delete a lock: that of ``file``, or one that no process holds (after an interrupt while it was created)."""
-    with suppress(OSError):  # there is none, or another process has it
+    with suppress(OSError, ExportError):  # there is none, it is no lock, or another process has it
         is_held = file is not None and not file.closed
-        with file if file is not None and is_held else path.open("r+b", buffering=0) as lock:
+        with file if file is not None and is_held else open_own(path, buffering=0) as lock:
             if not is_held:
                 _lock(lock)
             if sys.platform == "win32":
@@ -321,7 +493,7 @@ def _open_lock(path: Path) -> IO[bytes]:
     while True:
         file = None
         try:
-            file = path.open("a+b", buffering=0)
+            file = open_own(path, buffering=0)
             _lock(file)
             if _is_there(path, file):
                 with suppress(OSError):  # a full disk
@@ -376,6 +548,28 @@ else:
 
 
 @contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """Give a folder in the system's place for temporary files, which is removed at the end.
+
+    Those that killed runs have left there are removed first: nobody holds their locks.
+    """
+    place = Path(tempfile.gettempdir())
+    for left in place.glob(f"{BRIEF}*/{LOCK}"):
+        with suppress(ExportError, OSError), confined(place):  # it is in use, or another user's
+            with locked(left.parent):
+                for path in left.parent.iterdir():
+                    if path != left:
+                        remove(path)
+            left.parent.rmdir()
+    folder = Path(tempfile.mkdtemp(prefix=BRIEF))
+    try:
+        with locked(folder):
+            yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+@contextmanager
 def unfinished_work(target: Path) -> Iterator[Path]:
     """Give a locked folder beside ``target`` for the finished parts of the work on it.
 
@@ -386,6 +580,8 @@ def unfinished_work(target: Path) -> Iterator[Path]:
     check_target(target)
     target = _place(target)
     folder = work_folder(target)
+    if is_link(folder):
+        raise ExportError(f"{folder}: is a link, required a folder of unfinished work; remove it")
     try:
         with locked(folder):
             remove_unfinished(folder)
@@ -396,7 +592,7 @@ def unfinished_work(target: Path) -> Iterator[Path]:
                 raise ExportError(f"{error}; what is finished is kept in {folder}") from error
             for path in folder.iterdir():
                 if path.name != LOCK:
-                    _remove(path)
+                    remove(path)
     finally:
         with suppress(OSError):  # it contains finished parts
             folder.rmdir()
@@ -412,12 +608,4 @@ def remove_unfinished(folder: Path) -> None:
     """Delete the unfinished files that a killed run left in ``folder``."""
     for path in folder.glob(f"{TEMPORARY}*"):
         if path.name != LOCK:
-            _remove(path)
-
-
-def _remove(path: Path) -> None:
-    if path.is_dir():
-        shutil.rmtree(path, ignore_errors=True)
-    else:
-        with suppress(OSError):
-            path.unlink()
+            remove(path)

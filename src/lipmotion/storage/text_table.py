@@ -15,11 +15,28 @@ from functools import partial
 from itertools import chain
 from pathlib import Path
 
+from lipmotion.printable import is_formula
+from lipmotion.storage.files import as_text
+
 LONGEST_LINE = 1 << 20
 """Most characters of a line."""
 SEPARATORS = ",;\t"
 MISSING = frozenset(("", "nan", "na", "n/a", "none", "null", "-", "-nan", "nan(ind)", "-nan(ind)"))
 """Fields that hold no number, in lower case."""
+
+
+QUOTE = "'"
+
+
+def as_field(text: str) -> str:
+    """Return a text as a field that people open with spreadsheets: what would be executed gets an apostrophe first."""
+    text = as_text(text)
+    return QUOTE + text if is_formula(text.lstrip(QUOTE)) else text
+
+
+def from_field(field: str) -> str:
+    """Return the text of a field that ``as_field`` made."""
+    return field[1:] if field.startswith(QUOTE) and is_formula(field.lstrip(QUOTE)) else field
 
 
 @dataclass(frozen=True)

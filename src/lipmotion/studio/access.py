@@ -7,10 +7,7 @@ from dataclasses import dataclass
 from hashlib import sha256
 from urllib.parse import parse_qs
 
-from starlette.responses import JSONResponse
-from starlette.types import ASGIApp, Receive, Scope, Send
-
-from lipmotion.web.replies import FRESH
+from lipmotion.web.replies import foreign_refusal
 
 TOKEN_HEADER = "x-lipmotion-token"  # noqa: S105 # its name
 API = "/api"
@@ -41,34 +38,12 @@ class Access:
 
         headers : by their names in lower case
         """
-        host, origin = headers.get("host", "").lower(), headers.get("origin")
-        if host not in self.hosts or (origin is not None and origin.lower() != f"http://{host}"):
-            return 403, "only the page of this server may ask"
-        if headers.get("sec-fetch-site", "none") not in ("none", "same-origin") and path != "/":
-            return 403, "only the page of this server may ask"
-        if path != API and not path.startswith(f"{API}/"):
-            return None
+        foreign = foreign_refusal(path, headers, self.hosts.__contains__)
+        if foreign or (path != API and not path.startswith(f"{API}/")):
+            return foreign
         if hmac.compare_digest(headers.get(TOKEN_HEADER, "").encode(), self.token.encode()):
             return None
         given = parse_qs(query.decode("latin-1")).get("key", [""])[0] if method in ("GET", "HEAD") else ""
         if hmac.compare_digest(given.encode(), self.key(path).encode()):
             return None
         return 401, "the token is missing, or that of an earlier run; open the address that lipmotion studio printed"
-
-
-class Guard:
-    """Lets through what has access."""
-
-    def __init__(self, application: ASGIApp, access: Access) -> None:
-        self._application, self._access = application, access
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Reply to a request, or refuse it."""
-        if scope["type"] == "http":
-            headers = {name.decode("latin-1").lower(): value.decode("latin-1") for name, value in scope["headers"]}
-            refusal = self._access.refusal(scope["method"], scope["path"], scope["query_string"], headers)
-            if refusal is not None:
-                reply = JSONResponse({"error": refusal[1]}, refusal[0], FRESH)
-                await reply(scope, receive, send)
-                return
-        await self._application(scope, receive, send)

@@ -14,14 +14,14 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
-from lipmotion.studio.access import Access, Guard
+from lipmotion.studio.access import Access
 from lipmotion.studio.folder import RevisionError
 from lipmotion.studio.line_replies import LineReplies
 from lipmotion.studio.page_files import page_files
 from lipmotion.studio.project_replies import ProjectReplies
 from lipmotion.studio.studio import Studio
 from lipmotion.studio.training_replies import TrainingReplies
-from lipmotion.web.replies import ERRORS, FRESH, HEADERS, SecurityHeaders, failed
+from lipmotion.web.replies import ERRORS, FRESH, HEADERS, Guard, SecurityHeaders, failed
 
 PAGE_POLICY = HEADERS["content-security-policy"] + (
     "; img-src 'self' blob: data:; media-src 'self' blob:; worker-src 'self' blob:; connect-src 'self' blob:"
@@ -85,6 +85,6 @@ def studio_application(studio: Studio, access: Access) -> Starlette:
         Route("/{name:path}", packaged),
     ]
     application = Starlette(routes=routes, exception_handlers=ERRORS | {RevisionError: partial(failed, 409)})
-    application.add_middleware(Guard, access=access)
+    application.add_middleware(Guard, refusal=access.refusal)
     application.add_middleware(SecurityHeaders, headers=HEADERS | {"content-security-policy": PAGE_POLICY})
     return application

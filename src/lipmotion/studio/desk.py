@@ -258,7 +258,7 @@ class Desk:
             work.turn(WORKING if work.thread is not None else work.status)
             do()
             work.turn(READY)
-        except LipMotionError as error:
+        except (LipMotionError, OSError) as error:
             work.turn(FAILED, str(error))
         except Exception as error:  # a bug, which must not stop the others
             LOG.error("line %d: %s: %s", work.number, type(error).__name__, error)

@@ -23,7 +23,18 @@ from lipmotion.pipeline.batch.lines import is_recording, read_lines
 from lipmotion.pipeline.edit_files import EditFile, check_sound, read_edits, write_edits
 from lipmotion.pipeline.outputs.scenes import sound_reference
 from lipmotion.speech.voices.pronunciations import LanguageLexicon
-from lipmotion.storage.files import locked, made_folders, read_text_file, sha256_of, whole_file
+from lipmotion.storage.files import (
+    is_link,
+    locked,
+    made_folders,
+    make_folder,
+    portable_name,
+    read_text_file,
+    remove,
+    remove_unfinished,
+    sha256_of,
+    whole_file,
+)
 from lipmotion.storage.json_text import as_json, as_json_rows, from_json
 from lipmotion.studio.project import (
     EDITS_SUFFIX,
@@ -235,7 +246,7 @@ class ProjectFolder:
         with self.lock:
             for path in (self._copy(line), self.edits(line)):  # a copy without its file would be a damage
                 try:
-                    path.unlink(missing_ok=True)
+                    remove(path)
                 except OSError as error:
                     raise ExportError(f"{path}: cannot be removed: {error.strerror}") from error
 
@@ -306,7 +317,7 @@ class ProjectFolder:
         with self.lock:
             found = read_lines(source, (EDITS_SUFFIX,)) if source.is_dir() or not is_recording(source) else []
             named = [(Path(line.recording), line.name, line.transcript) for line in found] or [
-                (source, source.stem, "")
+                (source, portable_name(source.stem), "")
             ]
             known = {os.path.realpath(self.sound(line)) for line in self.project.lines.values()}
             new = [each for each in named if os.path.realpath(each[0]) not in known]
@@ -331,7 +342,7 @@ class ProjectFolder:
         digest, suffix = sha256_of(content), Path(name).suffix.lower()
         with self.lock:
             folder = self.path / SOUNDS
-            folder.mkdir(exist_ok=True)
+            make_folder(folder)
             taken = {_key(line.name) for line in self.project.lines.values()}
             taken |= {_key(each.stem) for each in folder.iterdir()}  # also those of lines that were removed
             line = ProjectLine(self.project.next_number, plain_name(Path(name).stem), "", digest, transcript)
@@ -418,7 +429,7 @@ def folder_for(source: Path | None, out: Path | None = None) -> Path:
     """Return the folder of the project of a recording, of a folder or a list of recordings, or of the project itself.
 
     A path that ends as projects do, and is not there, is that of an empty project.
-    Raises InputError: there is no such file or folder.
+    Raises InputError: there is no such file or folder, or the folder beside the source is a link.
     """
     if source is None:
         return out or UNTITLED
@@ -429,7 +440,10 @@ def folder_for(source: Path | None, out: Path | None = None) -> Path:
     if _is_project(source):
         return source.parent if source.name == PROJECT else source
     place = source.absolute()
-    return out or place.with_name(f"{place.name if place.is_dir() else place.stem}{SUFFIX}")
+    usual = place.with_name(portable_name(f"{place.name if place.is_dir() else place.stem}{SUFFIX}"))
+    if out is None and is_link(usual):
+        raise InputError(f"{usual}: is a link, required a folder beside {source}; open {usual} itself, or give -o")
+    return out or usual
 
 
 def _is_project(source: Path) -> bool:
@@ -449,6 +463,7 @@ def opened_folder(source: Path | None, out: Path | None = None) -> Iterator[Proj
     path = folder_for(source, out)
     recordings = None if source is None or _is_project(source) or _is_new(source) else source
     with locked(path):
+        remove_unfinished(path)  # what was dropped on a studio that was killed
         folder = ProjectFolder(path)
         if recordings is not None:
             folder.add(recordings)
@@ -474,4 +489,4 @@ def plain_name(given: str, usual: str = "line") -> str:
     ('Anna_s take', 'voice')
     """
     plain = re.sub(r"[^\w .+()-]", "_", unicodedata.normalize("NFC", given)).strip(" ._")
-    return plain[:LONGEST_NAME] or usual
+    return portable_name(plain[:LONGEST_NAME]) or usual

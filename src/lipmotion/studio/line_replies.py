@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import io
-import tempfile
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
@@ -17,6 +15,7 @@ from starlette.responses import FileResponse, Response
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.pipeline.outputs.shown_faces import ShownPerson
+from lipmotion.storage.files import temporary_folder
 from lipmotion.storage.json_text import as_json
 from lipmotion.studio.access import Access
 from lipmotion.studio.asked import content_of, objects, seconds, stretch, text, texts, whole
@@ -208,8 +207,8 @@ class LineReplies:
             self._studio.folder.checked_sound(self._studio.folder.line(number))
             shown = self._studio.faces.shown(name)
             line = self._studio.line_as(number, given, by, name)
-            with tempfile.TemporaryDirectory(prefix="lipmotion-studio-") as folder:
-                path = Path(folder) / "stretch.mp4"
+            with temporary_folder() as folder:
+                path = folder / "stretch.mp4"
                 if isinstance(shown, ShownPerson):
                     line.write_film(path, start_s, end_s, shown)
                 else:

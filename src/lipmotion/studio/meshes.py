@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.output import OutputSettings
 from lipmotion.pipeline.outputs.scenes import KEPT, head_scene, write_scene
 from lipmotion.pipeline.outputs.shown_faces import ShownFace, shown_face
+from lipmotion.storage.files import temporary_folder
 from lipmotion.types import FRAME_RATE_HZ, Channel, Generation, Motion, StateTrace, Timeline
 from lipmotion.types.moods import MOODS, MoodKey
 
@@ -87,8 +87,8 @@ class Faces:
             scene = head_scene(_still(*((MoodKey(0.0, MOODS[0]),) if name == HEAD_OF_MOODS else ())))
         else:
             raise InputError(f"no mesh {shortened(repr(name))}; required one of: {HEAD}, {HEAD_OF_MOODS}")
-        with tempfile.TemporaryDirectory(prefix="lipmotion-studio-") as folder:
-            path = Path(folder) / "face.glb"
+        with temporary_folder() as folder:
+            path = folder / "face.glb"
             write_scene(path, scene)
             return path.read_bytes()
 

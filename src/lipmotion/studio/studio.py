@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import logging
 import os
-import shutil
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import fields, replace
 from pathlib import Path
 from threading import Lock
@@ -26,7 +24,7 @@ from lipmotion.pipeline.job import Job, Outputs
 from lipmotion.pipeline.opened_job import opened
 from lipmotion.pipeline.outputs.curve_sets import SHAPE_SETS
 from lipmotion.pipeline.outputs.drawn_video import VideoOutput, read_sound
-from lipmotion.storage.files import TEMPORARY, made_folders, sha256_of
+from lipmotion.storage.files import TEMPORARY, made_folders, remove, sha256_of, temporary_folder
 from lipmotion.studio.desk import FAILED, READY, WAITING, WORKING, Desk, NotReadyError, Work
 from lipmotion.studio.folder import EXPORTS, NO_EDITS, ProjectFolder, revision_of
 from lipmotion.studio.known_model import KnownModel, known_model
@@ -69,14 +67,15 @@ class Studio:
         places = {name: Path(os.path.normpath(folder.path / file)) for name, file in folder.project.characters.items()}
         self.trainer = Trainer(folder)
         self.faces = Faces(places, lambda: self.trainer.made(FACE))
-        self._sounds = Path(tempfile.mkdtemp(prefix="lipmotion-studio-"))
+        self._kept = ExitStack()
+        self._sounds = self._kept.enter_context(temporary_folder())
         self._exporting: dict[str, int] | None = None
 
     def close(self) -> None:
         """Write what is not written, and remove what was kept for this run alone."""
         self.trainer.close()
         self.desk.close()
-        shutil.rmtree(self._sounds, ignore_errors=True)
+        self._kept.close()
 
     def number(self, given: str) -> int:
         """Return the number of a line that an address gives. Raises HTTPException: there is no such line."""
@@ -233,7 +232,7 @@ class Studio:
         try:
             yield path
         finally:
-            path.unlink(missing_ok=True)
+            remove(path)
 
     def with_pronunciations(self, sentences: Sequence[str]) -> tuple[str | Step, ...]:
         """Return edits that say words of the project's lexicon with their phones, which then stand in the edits.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import os
-import shutil
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -19,7 +18,7 @@ from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES
 from lipmotion.errors import ExportError, InputError, shortened
 from lipmotion.faces.filmed.face import SUFFIX as FACE_SUFFIX
 from lipmotion.pipeline.workers import begun_apart
-from lipmotion.storage.files import UNFINISHED, read_text_file, whole_file, work_folder
+from lipmotion.storage.files import UNFINISHED, make_folder, read_text_file, remove, whole_file, work_folder
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.studio.folder import ProjectFolder, plain_name
 from lipmotion.studio.project import ProjectLine
@@ -220,7 +219,7 @@ class Trainer:
         for folder, _ in PLACES.values():
             for left in (self._folder.path / folder).glob(f"*{UNFINISHED}"):
                 if left.name != work_folder(target).name:
-                    shutil.rmtree(left, ignore_errors=True)
+                    remove(left)
 
     def _follow(self, process: BaseProcess, pipe: Connection) -> None:
         """Take what the process tells until it ends."""
@@ -274,7 +273,7 @@ class Trainer:
         return None if self._ends_s is None else max(round(self._ends_s - self._clock()), 0)
 
     def _write(self) -> None:
-        self._file.parent.mkdir(exist_ok=True)
+        make_folder(self._file.parent)
         wanted = {} if self._wanted is None else asdict(self._wanted)
         made = [asdict(job) for job in self._made.values()]
         document = {"format": FORMAT, "version": VERSION, "wanted": wanted, "told": self._told, "made": made}

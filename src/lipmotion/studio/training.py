@@ -27,7 +27,7 @@ from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.film.build import build_face
 from lipmotion.pipeline.model import Model, load_model, save_model
 from lipmotion.pipeline.training.train import Run, train
-from lipmotion.storage.files import made_folders, unfinished_work, whole_file
+from lipmotion.storage.files import confined, made_folders, remove, unfinished_work, whole_file
 from lipmotion.types import Item, Monitor, Progress, sub_monitor
 from lipmotion.types.configuration import Configuration, Rule, option
 from lipmotion.units import Lexicon
@@ -99,7 +99,8 @@ def carry_out(order: TrainingOrder, tell: Tell) -> None:
     handler = _Teller(tell)
     LOG.addHandler(handler)
     try:
-        tell({"report": _made(order, partial(_report, tell))})
+        with confined(order.work.parent):  # the project, in this process
+            tell({"report": _made(order, partial(_report, tell))})
     except (LipMotionError, OSError) as error:
         tell({"error": str(error)})
     except Exception as error:  # a bug, of which the page is told
@@ -140,7 +141,7 @@ def _gathered(order: TrainingOrder) -> Iterator[Path]:
         yield order.source
         return
     place = order.work / GATHERED / order.target.stem
-    shutil.rmtree(place.parent, ignore_errors=True)  # of a process that was killed
+    remove(place.parent)  # of a process that was killed
     with made_folders([place]):
         try:
             taken: set[str] = set()
@@ -160,7 +161,7 @@ def _gathered(order: TrainingOrder) -> Iterator[Path]:
                     _put(labels, place / f"{stem}{labels.name[len(line.recording.stem) :]}")
             yield place
         finally:
-            shutil.rmtree(place.parent, ignore_errors=True)
+            remove(place.parent)
 
 
 def _put(file: Path, place: Path) -> None:

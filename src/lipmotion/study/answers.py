@@ -10,6 +10,7 @@ from pathlib import Path
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.storage.files import read_text_file, whole_file
+from lipmotion.storage.text_table import as_field, from_field
 
 PAIRED, MOS, RANKING = "paired", "mos", "ranking"
 KINDS = (PAIRED, MOS, RANKING)
@@ -80,11 +81,13 @@ COLUMNS = tuple(field.name for field in fields(Answer))
 
 
 def answers_text(answers: Iterable[Answer]) -> str:
-    """Return a table of answers in CSV (RFC 4180), with a line of column names."""
+    """Return a table of answers in CSV (RFC 4180), with a line of column names; no spreadsheet executes a field."""
     file = io.StringIO()
     table = csv.DictWriter(file, COLUMNS)
     table.writeheader()
-    table.writerows(asdict(answer) | {"practice": int(answer.practice)} for answer in answers)
+    for answer in answers:
+        row = asdict(answer) | {"practice": int(answer.practice)}
+        table.writerow({name: as_field(value) if isinstance(value, str) else value for name, value in row.items()})
     return file.getvalue()
 
 
@@ -107,14 +110,17 @@ def read_answers(path: Path) -> list[Answer]:
     for row in table:
         try:
             answers.append(_answer(row))
-        except (ValueError, TypeError) as error:  # InputError among them; TypeError: the line is too short
+        except (ValueError, TypeError, AttributeError) as error:  # InputError among them; others: the line is too short
             raise InputError(f"{path}: line {table.line_num}: {error}") from None
     return answers
 
 
 def _answer(row: dict[str, str]) -> Answer:
     return Answer(
-        **{name: row[name] for name in ("rater", "kind", "sentence", "question", "condition", "other", "value")},
+        **{
+            name: from_field(row[name])
+            for name in ("rater", "kind", "sentence", "question", "condition", "other", "value")
+        },
         trial=int(row["trial"]),
         seconds=float(row["seconds"]),
         plays=int(row["plays"]),

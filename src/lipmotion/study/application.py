@@ -7,11 +7,14 @@ every request. No part of an address is ever used as a path of a file: names are
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import lru_cache, partial
 from importlib.resources import files
+from ipaddress import ip_address
 from pathlib import Path
+from socket import gethostname
 from typing import Any
+from urllib.parse import urlsplit
 
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
@@ -29,7 +32,7 @@ from lipmotion.study.store import StudyStore, rater_name
 from lipmotion.study.submission import submitted_sheet
 from lipmotion.study.trials import questions_of, trials_of
 from lipmotion.web.bodies import json_of
-from lipmotion.web.replies import ERRORS, FRESH, SecurityHeaders
+from lipmotion.web.replies import ERRORS, FRESH, Guard, SecurityHeaders, foreign_refusal
 
 PAGE = {
     "": ("study.html", "text/html; charset=utf-8"),
@@ -46,11 +49,29 @@ JOIN_HZ, JOIN_BURST = 5.0, 200
 WELL_KEPT = {"cache-control": "private, max-age=86400, immutable"}
 
 
-def study_application(study: Study, videos: Mapping[str, Path], store: StudyStore) -> Starlette:
+def study_application(
+    study: Study, videos: Mapping[str, Path], store: StudyStore, names: Collection[str] = ()
+) -> Starlette:
     """Return the application.
 
     videos : paths of the videos by their names, of ``check_videos``
+    names  : by which raters reach the server, besides addresses of numbers and the names of this machine
+    Requests by other names, and of other sites' pages, are refused. Addresses of numbers are not: no other site can let
+    a browser state one.
     """
+    machine = gethostname().lower()
+    known = {"localhost", machine, f"{machine}.local", *(name.lower().partition(":")[0] for name in names)}
+
+    def is_own(host: str) -> bool:
+        try:
+            name = urlsplit(f"//{host}").hostname or ""
+            return name in known or bool(ip_address(name))
+        except ValueError:  # neither a known name nor an address of numbers
+            return False
+
+    def refusal(_method: str, path: str, _query: bytes, headers: Mapping[str, str]) -> tuple[int, str] | None:
+        return foreign_refusal(path, headers, is_own, names)
+
     desk = _Desk(study, store)
     page = {name: _packaged(*each) for name, each in PAGE.items()}
 
@@ -60,7 +81,7 @@ def study_application(study: Study, videos: Mapping[str, Path], store: StudyStor
 
     async def video(request: Request) -> Response:
         path = videos.get(request.path_params["name"])
-        if path is None:
+        if path is None or not path.is_file():
             raise HTTPException(404, "no such video")
         return FileResponse(path, media_type="video/mp4", headers=WELL_KEPT)
 
@@ -76,6 +97,7 @@ def study_application(study: Study, videos: Mapping[str, Path], store: StudyStor
         routes=routes,
         exception_handlers=ERRORS,
     )
+    application.add_middleware(Guard, refusal=refusal)
     application.add_middleware(SecurityHeaders)
     return application
 

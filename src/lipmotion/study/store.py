@@ -14,7 +14,7 @@ from secrets import token_urlsafe
 from typing import Any, TypeVar
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.storage.files import sha256_of
+from lipmotion.storage.files import check_own, sha256_of
 from lipmotion.study.manifest import MANIFEST
 
 ResultT = TypeVar("ResultT")
@@ -78,6 +78,8 @@ class StudyStore:
         if not create and not self.path.is_file():
             raise InputError(f"{folder}: nobody has answered yet; let raters in: lipmotion study serve {folder}")
         digest = sha256_of(folder / MANIFEST)
+        for suffix in ("", "-wal", "-shm", "-journal"):  # which SQLite opens through links
+            check_own(self.path.with_name(f"{ANSWERS}{suffix}"))
         try:
             self._reader = self._opened(digest)
             self._writer = self._connected()

@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.appearance.mouth_region import EYE_DISTANCE_PX, HEIGHT, WIDTH
-from lipmotion.errors import ExportError, InputError
+from lipmotion.errors import InputError
 from lipmotion.export.video import write_mp4
 from lipmotion.faces import Staging
 from lipmotion.faces.portrait import Woman
 from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.storage.files import whole_file
+from lipmotion.storage.files import make_folder, whole_file
 from lipmotion.testing.formant_synthesiser import synthesise
 from lipmotion.types import Audio, Channel, Motion, Timeline, Track, Unit, Utterance
 from lipmotion.units import is_silent
@@ -199,7 +199,7 @@ def write_toy_recordings(directory: Path, *, sentences: int = 12, seed: int = 0,
     Raises InputError: fewer than three sentences, or fps not positive; ExportError: a file cannot be written.
     """
     spoken = toy_sentences(sentences, seed)
-    _make_folder(directory)
+    make_folder(directory)
     videos = [directory / f"{sentence.name}.mp4" for sentence in spoken]
     face = Woman(Staging(size=FACE_HEIGHT, blinks=False, gaze=False, brows=False, head=False))
     for sentence, video in zip(spoken, videos, strict=True):
@@ -273,13 +273,6 @@ def _lip_separation(units: Timeline[Unit], grid_s: NDArray[np.float64]) -> NDArr
             away_s = np.maximum(0, np.maximum(span.start_s - grid_s, grid_s - span.end_s))
             separation = np.minimum(separation, 0.5 - 0.5 * np.cos(np.pi * np.minimum(1, away_s / CLOSING_S)))
     return separation
-
-
-def _make_folder(directory: Path) -> None:
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ExportError(f"{directory}: the folder cannot be made: {error.strerror or error}") from error
 
 
 def _write_lines(path: Path, lines: list[str]) -> None:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
-from unicodedata import normalize
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
+from lipmotion.printable import is_formula
 
 EYE_DISTANCE = "eye_distance"
 """The unit of all tracked lengths: the distance between the outer eye corners."""
@@ -25,9 +25,6 @@ LARGEST_MAGNITUDE = {EYE_DISTANCE: 1e4, WEIGHT: 255.0, GREY: 1e5}
 LARGEST_OTHER = 1e6
 """The same for all other units."""
 
-FORMULA = ("=", "+", "-", "@", "\t", "\r")
-"""First characters of a field that a spreadsheet executes as a formula; full-width forms count as well."""
-
 
 @dataclass(frozen=True)
 class Channel:
@@ -40,7 +37,7 @@ class Channel:
     unit: str = EYE_DISTANCE
 
     def __post_init__(self) -> None:
-        if self.name.startswith(FORMULA) or normalize("NFKC", self.name.lstrip()[:1]).startswith(FORMULA):
+        if is_formula(self.name):
             raise InputError(
                 f"the channel name {shortened(self.name)!r} begins as a spreadsheet's formula, required another "
                 "beginning than = + - @; rename it"

@@ -13,9 +13,6 @@ if TYPE_CHECKING:
     from starlette.types import ASGIApp
 
 HOST = "127.0.0.1"
-MOST_CONNECTIONS = 1000
-IDLE_S = 20
-"""How long a connection without requests is kept open."""
 
 
 def check_installed(purpose: str, extra: str) -> None:
@@ -32,12 +29,14 @@ def check_installed(purpose: str, extra: str) -> None:
 def serve(
     application: ASGIApp, place: socket.socket, *, host: str = HOST, started: Callable[[str], object] | None = None
 ) -> None:
-    """Serve an application until the process is stopped.
+    """Serve an application until the process is stopped; no client can keep it from serving the others.
 
     place   : where connections come to, of ``listening``, at ``host``
     started : called with the address of the page once it can be opened
     """
     import uvicorn
+
+    from lipmotion.web.connections import IDLE_S, PunctualConnection
 
     config = uvicorn.Config(
         application,
@@ -45,7 +44,7 @@ def serve(
         access_log=False,  # no addresses of visitors are kept
         log_level="warning",
         server_header=False,
-        limit_concurrency=MOST_CONNECTIONS,
+        http=PunctualConnection,
         timeout_keep_alive=IDLE_S,
         timeout_graceful_shutdown=5,
         ws="none",

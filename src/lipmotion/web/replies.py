@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping
+import sqlite3
+from collections.abc import Callable, Container, Mapping
 from functools import partial
 from typing import Any
 
@@ -46,6 +47,46 @@ class SecurityHeaders:
         await self._application(scope, receive, secured)
 
 
+class Guard:
+    """Lets through what is not refused.
+
+    refusal : returns for method, path, query and headers (by their names in lower case) why a request is refused, with
+              a status; None: it is not
+    """
+
+    def __init__(self, application: ASGIApp, refusal: Callable[..., tuple[int, str] | None]) -> None:
+        self._application, self._refusal = application, refusal
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Reply to a request, or refuse it."""
+        if scope["type"] == "http":
+            headers = {name.decode("latin-1").lower(): value.decode("latin-1") for name, value in scope["headers"]}
+            refusal = self._refusal(scope["method"], scope["path"], scope["query_string"], headers)
+            if refusal is not None:
+                reply = JSONResponse({"error": refusal[1]}, refusal[0], FRESH)
+                await reply(scope, receive, send)
+                return
+        await self._application(scope, receive, send)
+
+
+def foreign_refusal(
+    path: str, headers: Mapping[str, str], is_own: Callable[[str], bool], names: Container[str] = ()
+) -> tuple[int, str] | None:
+    """Return why a request is refused that another site's page sends, or that came by a foreign name; None: it is not.
+
+    headers : by their names in lower case
+    is_own  : whether the ``Host`` that a request names is this server
+    names   : of this server at another that passes requests on, which may be those of a page's origin
+    """
+    host, origin = headers.get("host", "").lower(), headers.get("origin", "").lower()
+    page = origin.partition("://")[2] if origin.startswith(("http://", "https://")) else origin
+    if not is_own(host) or (page and page != host and page not in names):
+        return 403, "only the page of this server may ask"
+    if headers.get("sec-fetch-site", "none") not in ("none", "same-origin") and path != "/":
+        return 403, "only the page of this server may ask"
+    return None
+
+
 async def _refused(_: Request, error: Exception) -> Response:
     status, headers = getattr(error, "status_code", 400), getattr(error, "headers", None)
     return JSONResponse({"error": str(getattr(error, "detail", ""))}, status, {**FRESH, **(headers or {})})
@@ -53,7 +94,7 @@ async def _refused(_: Request, error: Exception) -> Response:
 
 async def failed(status: int, _: Request, error: Exception) -> Response:
     """Return the reply to an error that was raised on purpose."""
-    if isinstance(error, ExportError):
+    if isinstance(error, ExportError | OSError | sqlite3.Error):
         LOG.warning("%s", error)
         return JSONResponse({"error": "cannot be stored now; try again"}, status, FRESH)
     return JSONResponse({"error": str(error)}, status, FRESH)
@@ -63,8 +104,10 @@ ERRORS: dict[type[Exception], Callable[[Request, Any], Any]] = {
     HTTPException: _refused,
     LipMotionError: partial(failed, 422),
     ExportError: partial(failed, 503),
+    OSError: partial(failed, 503),
+    sqlite3.Error: partial(failed, 503),
 }
-"""What is replied to errors that are raised on purpose: JSON, ``{"error": text}``."""
+"""What is replied to errors that are raised on purpose, and to a full disk: JSON, ``{"error": text}``."""
 
 
 def json_bytes(content: bytes, status: int = 200) -> Response:

@@ -154,3 +154,9 @@ def test_another_file_of_the_same_size_and_time_is_noticed(tmp_path: Path) -> No
     other.replace(path)
     os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
     assert not file.is_unchanged()
+
+
+@pytest.mark.parametrize("name", ["CON", "nul", "a/aux", "aux/a", "com1.take", "NUL .b", "a./b", "a /b"])
+def test_names_that_windows_does_not_take(name: str) -> None:
+    with pytest.raises(ExportError, match="Windows"):
+        check_names([BatchLine(name, "a.wav")], ("json",))

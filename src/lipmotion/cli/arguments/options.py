@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 
 
@@ -36,7 +35,9 @@ def add_execution(parser: argparse.ArgumentParser) -> None:
 
 def worker_count(options: argparse.Namespace) -> int:
     """Return the number of processes of ``--workers``; by default, that of the processor's cores."""
-    return options.workers or os.cpu_count() or 1
+    from lipmotion.pipeline.workers import process_count
+
+    return process_count(options.workers)
 
 
 def list_or_all(split: str) -> str | None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import stat
 import sys
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -51,8 +50,10 @@ def read_pipe(path: Path) -> Iterator[Path]:
     if not is_pipe(path):
         yield path
         return
-    with tempfile.TemporaryDirectory(prefix="lipmotion-") as folder:
-        kept = Path(folder) / "standard-input"
+    from lipmotion.storage.files import temporary_folder
+
+    with temporary_folder() as folder:
+        kept = folder / "standard-input"
         with kept.open("wb") as file:
             if str(path) == PIPE:
                 _copy(_standard_input(), file)
@@ -72,8 +73,10 @@ def written_pipe(options: argparse.Namespace) -> Iterator[tuple[tuple[str, ...],
     if PIPE not in outputs:
         yield outputs, False
         return
-    with tempfile.TemporaryDirectory(prefix="lipmotion-") as folder:
-        kept = Path(folder) / f"motion.{options.format}"
+    from lipmotion.storage.files import temporary_folder
+
+    with temporary_folder() as folder:
+        kept = folder / f"motion.{options.format}"
         yield tuple(str(kept) if output == PIPE else output for output in outputs), True
         write_bytes(kept)
 

@@ -271,13 +271,14 @@ def _main_path() -> str:
     """Animate the made-up speech, and write motion, cues and video; return what came out."""
     from lipmotion.export.sound import write_sound
     from lipmotion.pipeline.job import Job, Outputs, Request
+    from lipmotion.storage.files import temporary_folder
     from lipmotion.testing.formant_synthesiser import synthesise
     from lipmotion.types.staging import Staging
 
-    with tempfile.TemporaryDirectory(prefix="lipmotion-doctor-") as folder:
-        sound = Path(folder) / "mama.wav"
+    with temporary_folder() as folder:
+        sound = folder / "mama.wav"
         write_sound(sound, synthesise(PHONES)[0])
-        files = tuple(str(Path(folder) / name) for name in ("mama.json", "mama.cues.tsv", "mama.mp4"))
+        files = tuple(str(folder / name) for name in ("mama.json", "mama.cues.tsv", "mama.mp4"))
         job = Job(Request(sound, transcript=WORDS), Outputs(files), staging=Staging(size=128))
         motion = job.run().motion
         sizes = [Path(file).stat().st_size for file in files]

@@ -72,6 +72,8 @@ def _add_serve(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
     host = "address to listen at (default: 127.0.0.1, which only this machine reaches; see docs/study.md)"
     parser.add_argument("--host", default="127.0.0.1", help=host)
     parser.add_argument("--port", type=int, default=8000, help="0: any that is free (default: 8000)")
+    name = "name by which raters reach the server through another one, as study.example.org; may be repeated"
+    parser.add_argument("--name", action="append", default=[], metavar="HOST", help=name)
     parser.set_defaults(run=run_serve)
 
 
@@ -83,7 +85,7 @@ def run_serve(options: argparse.Namespace) -> None:
         print_line(f"raters begin at {address} (Ctrl-C ends; answers are kept in {options.study})")
         flush_output()
 
-    serve_study(options.study, host=options.host, port=options.port, started=started)
+    serve_study(options.study, host=options.host, port=options.port, names=options.name, started=started)
 
 
 def _add_export(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

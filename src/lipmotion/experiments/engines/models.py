@@ -9,11 +9,11 @@ from time import perf_counter
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
-from lipmotion.errors import ExportError, InputError
+from lipmotion.errors import InputError
 from lipmotion.experiments.runner import ExperimentSettings
 from lipmotion.pipeline.model import Model, load_model, save_model
 from lipmotion.pipeline.training.train import Run, about_training, train
-from lipmotion.storage.files import unfinished_work
+from lipmotion.storage.files import make_folder, unfinished_work
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import sub_monitor
 
@@ -52,10 +52,7 @@ def engine_models(
     found: dict[str, EngineModel] = {}
     if folder is not None:
         check_apart((), [Source(corpus.path, "corpus")], folders=[folder])
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise ExportError(f"{folder}: cannot be a folder for models: {error.strerror or error}") from error
+        make_folder(folder)
         found = _present(corpus, folder, names)
     missing = [name for name in names if name not in found]
     for number, name in enumerate(missing):

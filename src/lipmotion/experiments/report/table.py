@@ -11,6 +11,7 @@ from typing import Any
 from lipmotion.experiments.comparison import significance_mark
 from lipmotion.export.web_page import Html, element, joined
 from lipmotion.measures.evaluation_table import figure_text
+from lipmotion.storage.text_table import as_field
 
 INTERVAL, DIFFERENCE = "_95", "_gain_95"
 """Endings of the keys under which a row has the interval of a figure, and that of its difference from a reference."""
@@ -73,7 +74,8 @@ class Table:
         text, records = io.StringIO(), self.records()
         rows = csv.DictWriter(text, list(records[0]) if records else [self.head])
         rows.writeheader()
-        rows.writerows(records)
+        for record in records:
+            rows.writerow({key: as_field(value) if isinstance(value, str) else value for key, value in record.items()})
         return text.getvalue()
 
     def as_content(self) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from lipmotion.errors import ExportError, MissingDependencyError
 from lipmotion.experiments.xie_liu2007.tuning import TrainedSystem
 from lipmotion.extensions import install_command
 from lipmotion.pipeline.evaluation.held_out import AUDIO_ONLY, ComparedClip, HeldOutRecordings, compared_clips
-from lipmotion.storage.files import whole_file
+from lipmotion.storage.files import make_folder, whole_file
 from lipmotion.types import GREY
 
 CONVERGENCE_RECORDINGS, PREDICTED_RECORDINGS = 8, 6
@@ -70,7 +70,7 @@ def draw_plots(chains: TrainedSystem, recordings: HeldOutRecordings, folder: Pat
     by_em = compared_clips(some, AUDIO_ONLY, chains.engine, chains.model)
     path_engine = CoupledEngine(replace(chains.engine.config, conversion="viterbi"))
     by_path = compared_clips(some, AUDIO_ONLY, path_engine, chains.model)
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     _save(_conversion(figure, some, by_em[0], by_path[0]), folder / PLOT_FILES["start"])
     _save(_convergence(figure, some, chains), folder / PLOT_FILES["steps"])
     _save(_predicted(figure, some, by_em[:PREDICTED_RECORDINGS]), folder / PLOT_FILES["clips"])

@@ -21,7 +21,7 @@ from lipmotion.meshes.model.other_shapes import CLOSED
 from lipmotion.meshes.model.shape_names import ARKIT_52, VISEMES_15, VRM_EMOTIONS, VRM_VOWELS
 from lipmotion.storage.files import read_text_file, whole_file
 from lipmotion.storage.sources import is_file
-from lipmotion.storage.text_table import read_table
+from lipmotion.storage.text_table import as_field, from_field, read_table
 from lipmotion.types import Channel, Motion
 
 COLUMNS = ("control", "source", "gain", "offset", "low", "high")
@@ -71,7 +71,7 @@ def read_rig_table(path: Path) -> tuple[RigRow, ...]:
         raise InputError(f"{path}: the columns are {shortened(','.join(found))!r}, required {','.join(COLUMNS)}")
     rows = []
     for line, fields in lines:
-        texts = dict.fromkeys(COLUMNS, "") | dict(zip(found, map(str.strip, fields), strict=False))
+        texts = dict.fromkeys(COLUMNS, "") | dict(zip(found, map(from_field, map(str.strip, fields)), strict=False))
         if texts["control"].startswith("#"):
             continue
         try:
@@ -90,7 +90,9 @@ def write_rig_table(path: Path, rows: Iterable[RigRow]) -> None:
         table.writerow(COLUMNS)
         for row in rows:
             limits = [f"{limit:g}" if np.isfinite(limit) else "" for limit in (row.low, row.high)]
-            table.writerow([row.control, row.source, f"{row.gain:.4g}", f"{row.offset:.4g}", *limits])
+            table.writerow(
+                [as_field(row.control), as_field(row.source), f"{row.gain:.4g}", f"{row.offset:.4g}", *limits]
+            )
 
 
 def nearest(name: str, names: Iterable[str]) -> str:

@@ -12,7 +12,6 @@ import json
 import logging
 import os
 import re
-import shutil
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -23,7 +22,17 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.pipeline.batch.lines import OWN_FILES, OWN_FOLDER, BatchLine
 from lipmotion.pipeline.batch.record import DONE, LARGEST_RECORD_BYTES, Record, read_record
 from lipmotion.pipeline.batch.settings import InputFile, input_paths, line_fingerprint
-from lipmotion.storage.files import TEMPORARY, locked, sha256_of, whole_file
+from lipmotion.storage.files import (
+    TEMPORARY,
+    check_own,
+    confined,
+    locked,
+    make_folder,
+    open_own,
+    remove,
+    sha256_of,
+    whole_file,
+)
 from lipmotion.storage.json_text import as_json
 
 LOG = logging.getLogger("lipmotion")
@@ -64,30 +73,6 @@ class Place:
         Beside it, because some formats refer to the sound by its path from their folder.
         """
         return (Path(self.out) / name).parent / f"{STAGED}{self.run[:8]}-{_key(name)[:16]}.{kind}"
-
-    def link_on_the_way(self, name: str) -> Path | None:
-        """Return the first folder of the line ``name`` that is a link; None: there is none."""
-        folder = Path(self.out)
-        for part in PurePosixPath(name).parts[:-1]:
-            folder /= part
-            if folder.is_symlink():
-                return folder
-        return None
-
-    def made_folder(self, name: str) -> Path:
-        """Return the folder of the outputs of the line ``name``, created if needed.
-
-        Raises ExportError: a folder on the way is a link. OSError: it cannot be created.
-        """
-        link = self.link_on_the_way(name)
-        if link is not None:
-            raise ExportError(
-                f"{link}: is a link, required a folder: a batch writes nowhere but into {self.out}; remove the link, "
-                "or give the line another name in a column 'output' of the list"
-            )
-        folder = (Path(self.out) / name).parent
-        folder.mkdir(parents=True, exist_ok=True)
-        return folder
 
     def is_current(self) -> bool:
         """Return whether no later run has begun in this folder."""
@@ -228,19 +213,6 @@ def _name_in(row: bytes) -> str | None:
         return None
 
 
-def _check_own(place: Place) -> None:
-    """Raise ExportError if what a batch writes for itself would be written elsewhere, or into what is no file."""
-    for path in (place.own, *(place.own.iterdir() if place.own.is_dir() else ())):
-        if path.is_symlink():
-            raise ExportError(f"{path}: is a link, where a batch keeps its unfinished work; remove it")
-    for path in (Path(place.out) / name for name in OWN_FILES):
-        if path.is_symlink() or (path.exists() and not path.is_file()):
-            raise ExportError(
-                f"{path}: is a link, a folder, a pipe or a device, required a file that the batch writes itself; "
-                "remove it, or give another folder"
-            )
-
-
 @contextmanager
 def opened_ledger(place: Place, lines: Sequence[BatchLine]) -> Iterator[Ledger]:
     """Open the ledger of a folder of outputs for a new run, and end what an earlier one left undone.
@@ -248,17 +220,19 @@ def opened_ledger(place: Place, lines: Sequence[BatchLine]) -> Iterator[Ledger]:
     lines : those of the batch: what earlier runs did of others stays in the ledger and is not looked at
 
     Receipts whose outputs are in place are entered into the ledger; other unfinished work is deleted.
-    Raises ExportError: another process is at work on the folder, or it cannot be written.
+    The folder is confined, as it is in workers. Raises ExportError: another process is at work on it, or it cannot be
+    written.
     """
-    _check_own(place)
-    with locked(place.own):
+    for path in (place.own / RUN, *(Path(place.out) / name for name in OWN_FILES)):
+        check_own(path)
+    with confined(Path(place.out)), locked(place.own):
         for folder in (place.own / RECEIPTS, place.own / WORK):
-            folder.mkdir(exist_ok=True)
+            make_folder(folder)
         with whole_file(place.own / RUN) as temporary:  # from now on, workers of earlier runs finish nothing
             temporary.write_text(place.run, encoding="ascii")
         path = Path(place.out) / LEDGER
         try:
-            file = path.open("a+b")
+            file = open_own(path)
         except OSError as error:
             raise ExportError(f"{path}: cannot be written: {error.strerror or error}") from error
         with file:
@@ -267,19 +241,18 @@ def opened_ledger(place: Place, lines: Sequence[BatchLine]) -> Iterator[Ledger]:
             _sweep(place, lines)
             yield ledger
         _sweep(place, lines)  # what a worker had begun that died
-        shutil.rmtree(place.own / WORK, ignore_errors=True)
-        for name in (RECEIPTS, RUN):
-            _remove(place.own / name)
-    with suppress(OSError):
-        place.own.rmdir()
+        for name in (WORK, RUN):
+            remove(place.own / name)
+    for folder in (place.own / RECEIPTS, place.own):
+        with suppress(OSError):  # it holds something
+            folder.rmdir()
 
 
 def _sweep(place: Place, lines: Iterable[BatchLine]) -> None:
     """Delete outputs that were never finished, beside those that were."""
     for inner in {PurePosixPath(line.name).parent for line in lines}:
-        if place.link_on_the_way(f"{inner}/line") is None:
-            for path in (Path(place.out) / inner).glob(f"{STAGED}*"):
-                _remove(path)
+        for path in (Path(place.out) / inner).glob(f"{STAGED}*"):
+            remove(path)
 
 
 def _settle(place: Place, ledger: Ledger) -> None:
@@ -288,12 +261,7 @@ def _settle(place: Place, ledger: Ledger) -> None:
         record = read_receipt(path) if path.suffix == ".json" else None
         if record is not None and are_in_place(Path(place.out), record) and ledger.record_of(record["name"]) != record:
             ledger.append(record)
-        _remove(path)
+        remove(path)
     for path in (place.own / WORK).iterdir():
         if path.name != place.run:
-            shutil.rmtree(path, ignore_errors=True)
-
-
-def _remove(path: Path) -> None:
-    with suppress(OSError):
-        path.rmdir() if path.is_dir() else path.unlink()
+            remove(path)

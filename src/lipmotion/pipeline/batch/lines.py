@@ -14,7 +14,7 @@ from pathlib import Path, PurePosixPath
 from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES, VIDEO_SUFFIXES
 from lipmotion.errors import ExportError, InputError, shortened
 from lipmotion.export.base import motion_suffixes
-from lipmotion.storage.files import check_listable, read_text_file
+from lipmotion.storage.files import check_listable, portable_name, read_text_file
 from lipmotion.storage.text_table import read_table
 
 LOG = logging.getLogger("lipmotion")
@@ -92,6 +92,12 @@ def check_names(lines: Iterable[BatchLine], kinds: Sequence[str]) -> None:
             raise ExportError(
                 f"{line.recording}: the output {line.name!r} lies outside the folder of the outputs, or is hidden; "
                 "give a relative name without '..' and '//' and without names that begin with a dot"
+            )
+        device = next((part for part in (*path.parts[:-1], f"{path.name}.x") if portable_name(part) != part), None)
+        if device is not None:
+            raise ExportError(
+                f"{line.recording}: the output {line.name!r} has a name that Windows keeps for a device, or that ends "
+                "with a dot or a blank; rename the recording, or give another name in a column 'output' of the list"
             )
         for folder in path.parents[:-1]:
             folders[_key(str(folder))] = line.recording

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import errno
 import logging
-import shutil
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
@@ -43,7 +42,15 @@ from lipmotion.pipeline.opened_job import OpenedJob, opened
 from lipmotion.pipeline.understand.read_request import read_lexicon, read_request
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.speech.sound.audio_files import SPEECH_RATE_HZ
-from lipmotion.storage.files import check_target, sha256_of
+from lipmotion.storage.files import (
+    check_target,
+    confined,
+    make_folder,
+    put_in_place,
+    remove,
+    sha256_of,
+    temporary_folder,
+)
 from lipmotion.storage.sources import is_file
 from lipmotion.types import Audio, Generation, Span, Timeline, Unit
 from lipmotion.units import Lexicon
@@ -81,15 +88,15 @@ def finished_line(work: LineWork) -> Record:
     if receipt is not None and receipt["run"] == work.place.run and are_in_place(Path(work.place.out), receipt):
         return receipt
     folder = work.place.work(work.line.name)
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
-    try:
-        return _finished(work)
-    finally:
-        for kind in work.job.outputs.kinds:
-            with suppress(OSError):  # there is none, or its folder is none
-                work.place.staged(work.line.name, kind).unlink()
-        shutil.rmtree(folder, ignore_errors=True)
+    with confined(Path(work.place.out)):
+        remove(folder)
+        make_folder(folder)
+        try:
+            return _finished(work)
+        finally:
+            for kind in work.job.outputs.kinds:
+                remove(work.place.staged(work.line.name, kind))
+            remove(folder)
 
 
 def _finished(work: LineWork) -> Record:
@@ -146,13 +153,13 @@ def _put_in_place(work: LineWork, record: Record) -> None:
     for name, path in staged.items():
         target = out / name
         if not is_in_place(target, record["outputs"][name]):
-            path.replace(target)
+            put_in_place(path, target)
 
 
 def _written(work: LineWork) -> Generation:
     """Write the outputs of a line under temporary names; return its motion. Raises as ``animate`` and ``write``."""
     line, kinds = work.line, work.job.outputs.kinds
-    work.place.made_folder(line.name)
+    make_folder((Path(work.place.out) / line.name).parent)
     staged = tuple(str(work.place.staged(line.name, kind)) for kind in kinds)
     for kind in kinds:
         check_target(Path(work.place.out) / f"{line.name}.{kind}")
@@ -307,7 +314,7 @@ def _try_out(opened_job: OpenedJob, model: Model) -> None:
     silence = Audio(np.zeros(round(SPEECH_RATE_HZ * SILENCE_S), np.float32), SPEECH_RATE_HZ)
     units = Timeline((Span(0.0, SILENCE_S, Unit("sil")),))
     request = SpeechRequest(silence, units=units, speaker=job.request.speaker)
-    with tempfile.TemporaryDirectory(prefix="lipmotion-") as folder:
-        files = tuple(str(Path(folder) / f"line.{kind}") for kind in kinds)
+    with temporary_folder() as folder:
+        files = tuple(str(folder / f"line.{kind}") for kind in kinds)
         early = replace(job, delivery=replace(job.delivery, offset_ms=0.0), outputs=replace(job.outputs, files=files))
         replace(opened_job, job=early).write(animate(request, model=model), silence)

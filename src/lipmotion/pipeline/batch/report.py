@@ -22,6 +22,7 @@ from lipmotion.printable import printable
 from lipmotion.speech.recognition.recognised_speech import NOISY_DB
 from lipmotion.storage.files import as_text, whole_file
 from lipmotion.storage.json_text import as_json
+from lipmotion.storage.text_table import as_field
 from lipmotion.types.generation import FULL_FIT_SHARE, SURE_CONFIDENCE
 
 CSV_REPORT, HTML_REPORT = "report.csv", "report.html"

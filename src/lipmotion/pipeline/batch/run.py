@@ -10,7 +10,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from lipmotion.errors import CorpusError, ExportError, InputError, shortened
+from lipmotion.errors import CorpusError, ExportError, shortened
 from lipmotion.pipeline.batch.ledger import Ledger, Place, are_same_inputs, opened_ledger
 from lipmotion.pipeline.batch.lines import MOST_NAMED_LINES, BatchLine, check_names, read_lines
 from lipmotion.pipeline.batch.marks import APPROVE, MARKS, REDO, Mark, is_due, merged, read_marks, write_marks
@@ -20,6 +20,7 @@ from lipmotion.pipeline.batch.record import DONE, FAILED, Record
 from lipmotion.pipeline.batch.report import write_reports
 from lipmotion.pipeline.batch.settings import check_job, fingerprint_of, line_fingerprint
 from lipmotion.pipeline.job import Job
+from lipmotion.pipeline.workers import process_count
 from lipmotion.storage.sources import Source, check_apart
 from lipmotion.types import Item, Monitor, Progress, silent_monitor
 
@@ -91,8 +92,7 @@ def batch(
     """
     job = (job or Job()).at(Path.cwd())
     check_job(job)
-    if jobs is not None and jobs < 1:
-        raise InputError(f"{jobs} processes, required 1 or more; leave the number out for one a core")
+    processes = process_count(jobs)
     place = Place(os.path.abspath(out), uuid.uuid4().hex)  # noqa: PTH100
     if isinstance(source, str | Path):
         lines = read_lines(Path(source), job.outputs.kinds)
@@ -113,7 +113,6 @@ def batch(
         for line in lines:
             if line.name in kept:
                 counter.count(line.name, "kept")
-        processes = jobs or os.cpu_count() or 1
         pool = cluster_pool(cluster, Path(place.out)) if cluster else local_pool(processes)
         if waiting:
             with pool as each, closing(_finished(each, waiting)) as records:

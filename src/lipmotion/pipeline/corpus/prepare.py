@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import os
 import shutil
 import time
 from collections.abc import Iterator
@@ -24,10 +23,10 @@ from lipmotion.extensions import installed_version
 from lipmotion.pipeline.corpus.long_videos import DIVIDING_SHARE, VideoPart, single_video, with_long_videos_divided
 from lipmotion.pipeline.corpus.separate_sound import earlier_phones, in_step, separate_sound
 from lipmotion.pipeline.corpus.supplied_motion import DIGESTS, source_digests, supplied_phones, supplied_track
-from lipmotion.pipeline.workers import worker_pool
+from lipmotion.pipeline.workers import process_count, worker_pool
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.storage.files import locked, remove_unfinished, sha256_of
+from lipmotion.storage.files import confined, locked, portable_name, remove_unfinished, sha256_of
 from lipmotion.storage.sources import Source, check_apart, is_folder
 from lipmotion.types import Item, Monitor, Progress, Track, Utterance, silent_monitor
 from lipmotion.units import check_words
@@ -139,8 +138,7 @@ def prepare(
     """
     directory, output = Path(directory), Path(output)
     start_s = time.monotonic()
-    if workers is not None and workers < 1:
-        raise InputError(f"{workers} processes, required at least 1; leave it out for one a core")
+    processes = process_count(workers)
     check_apart((), [Source(directory, "folder of recordings")], folders=[output])
     folder, place = _found(directory)
     offset_s = None if offset_ms is None else offset_ms / 1000
@@ -155,7 +153,7 @@ def prepare(
             _job(item, place.resolve(), corpus, tracker, packages, crops, parts.get(item.name))
             for item in folder.recordings
         ]
-        with _refreshed(corpus), worker_pool(min(workers or os.cpu_count() or 1, len(jobs))) as team:
+        with _refreshed(corpus), worker_pool(min(processes, len(jobs))) as team:
             outcomes = _collected(
                 folder, team.unordered_map(_process, jobs), len(jobs), monitor, DIVIDING_SHARE if parts else 0.0
             )
@@ -204,7 +202,7 @@ def _job(
     part: VideoPart | None,
 ) -> _Job:
     collection = _collection(directory)
-    name = recording.name
+    name = portable_name(recording.name)
     if _is_taken(corpus.folder(name), recording.file, collection):
         name = f"{collection.replace('/', '-')}-{name}"
     if recording.motion_file is None:
@@ -275,7 +273,8 @@ def _process(job: _Job) -> _Outcome:
         if entry is not None:
             return _Outcome(name, kept=True, unseen=int(entry["unseen_frames"]), notes=tuple(entry.get("notes", ())))
         utterance = _utterance(job, source)
-        write_utterance(job.folder, utterance, job.settings)
+        with confined(job.folder.parent.parent):  # the corpus, in this worker
+            write_utterance(job.folder, utterance, job.settings)
     except (MissingDependencyError, ExportError):
         raise  # all other recordings would fail in the same way
     except (InputError, AlignmentError) as error:

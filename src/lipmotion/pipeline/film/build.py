@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -21,7 +20,7 @@ from lipmotion.faces.filmed.face import FilmedFace, SpokenTake
 from lipmotion.kernels.threads import one_thread
 from lipmotion.pipeline.film.background import best_background, chin_px
 from lipmotion.pipeline.film.takes import Take, takes_of
-from lipmotion.pipeline.workers import worker_pool
+from lipmotion.pipeline.workers import process_count, worker_pool
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import QUIETEST_DB, levels_db_at
 from lipmotion.types import Audio, Item, Monitor, Progress, silent_monitor
@@ -88,9 +87,9 @@ def build_face(
     >>> face = lipmotion.build_face("anna.mp4")  # doctest: +SKIP
     >>> lipmotion.save_face(face, "anna.face")  # doctest: +SKIP
     """
-    source = Path(source)
+    source, processes = Path(source), process_count(workers)
     takes = takes_of(source, None if recordings is None else Path(recordings), speaker)
-    filmed = _filmed(takes, workers or os.cpu_count() or 1, monitor)
+    filmed = _filmed(takes, processes, monitor)
     seconds = sum(len(take.used) / take.footage.rate_hz * _step(take.footage) for take in filmed)
     if seconds < LEAST_FOOTAGE_S:
         raise InputError(

@@ -27,8 +27,8 @@ VIDEO_SUFFIXES = (OPAQUE_SUFFIX, ".webm", ".mov")
 """Videos with sound; all but the first can be transparent."""
 SOUND_RATE_HZ = 48_000
 """Sampling rate of the sound track."""
-DRAWN_HZ = 25.0
-"""Frame rate of videos of drawn faces."""
+DRAWN_HZ, FASTEST_HZ = 25.0, 240.0
+"""Frame rate of videos of drawn faces, and the highest one: each picture is drawn, and no screen shows more."""
 
 
 class VideoOutput(Output):
@@ -42,6 +42,11 @@ class VideoOutput(Output):
 
     def check(self) -> None:  # noqa: D102
         settings = self.settings
+        if settings.fps is not None and settings.fps > FASTEST_HZ:
+            raise ExportError(
+                f"{self.path}: {settings.fps:g} pictures a second, required {FASTEST_HZ:g} or fewer in a video; the "
+                "rate of motion files alone is --rate"
+            )
         if settings.delivery.offset_ms and self.has_sound:
             raise ExportError(
                 f"{self.path}: a video has its own sound, which begins with it; an offset is for files that are put "

@@ -75,7 +75,7 @@ def write(  # noqa: PLR0913
     channels : channels of motion files, in this order, also articulatory ones as ``tongue`` (docs/articulation.md);
                None: all of the motion
     rate_hz  : frames per second of motion files, 1 to 1000; None: the 100 of the model (Live Link Face: 60)
-    fps      : frames per second of videos, 1 to 1000; None: 25 for drawn faces, those of the footage for filmed ones
+    fps      : frames per second of videos, 1 to 240; None: 25 for drawn faces, those of the footage for filmed ones
     face     : the face of videos: ``portrait``, ``woman``, ``man``, ``cartoon``, one of an installed package, or a
                filmed face (a value or a ``.face`` file), which is written as ``.mp4``. ``.glb`` and ``.usda`` hold the
                character of a ``MeshFace``, or else the 3D head

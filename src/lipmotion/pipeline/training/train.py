@@ -39,7 +39,7 @@ from lipmotion.pipeline.training.labels import (
 from lipmotion.pipeline.training.other_speakers import VoiceExample
 from lipmotion.pipeline.training.sound_inputs import with_sound_inputs
 from lipmotion.pipeline.understand.transcribe import phones_in_time, warn_of_guesses
-from lipmotion.pipeline.workers import worker_pool
+from lipmotion.pipeline.workers import process_count, worker_pool
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.features.f0 import log_f0
 from lipmotion.speech.recognition.phone_models import train_phone_models
@@ -169,7 +169,7 @@ def train(  # noqa: PLR0913
     utterances = with_common_channels([with_visual_channels(each, visual, eigenlips) for each in utterances])
     job = fingerprint(corpus, chosen, engine, recogniser, lexicon, visual, prior) if run.work else ""
     checkpoint = Checkpoint(run.work, job) if run.work else NO_CHECKPOINT
-    with worker_pool(min(run.workers, len(chosen) // UTTERANCES_PER_WORKER)) as team:
+    with worker_pool(min(process_count(run.workers), len(chosen) // UTTERANCES_PER_WORKER)) as team:
         monitor = sub_monitor(run.monitor, 0, 0.5)
         phones, examples, skipped = phones_and_examples(
             utterances, recogniser, lexicon, monitor, checkpoint, team.ordered_map

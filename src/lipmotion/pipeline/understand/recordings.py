@@ -8,7 +8,7 @@ from pathlib import Path
 
 from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES, VIDEO_SUFFIXES
 from lipmotion.errors import ExportError, InputError
-from lipmotion.storage.files import check_listable
+from lipmotion.storage.files import check_listable, portable_name
 
 NAME = "{name}"
 """In the path of an output, the name of the recording without its suffix."""
@@ -59,6 +59,11 @@ def planned_outputs(recordings: Sequence[Path], outputs: Sequence[str], kinds: S
             )
         templates += [output] if is_file or NAME in output else [str(Path(output) / f"{NAME}.{kind}") for kind in kinds]
     planned = [[each.replace(NAME, recording.stem) for each in templates] for recording in recordings]
+    named = [part for template in templates for part in Path(template).parts if NAME in part]
+    for recording in recordings:
+        for name in (part.replace(NAME, recording.stem) for part in named):
+            if portable_name(name) != name:
+                raise ExportError(f"{name}: no name of a file on Windows; rename {recording}, or name the output")
     seen: dict[str, Path] = {}
     for recording, files in zip(recordings, planned, strict=True):
         for file in files:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import tempfile
 import wave
 from collections.abc import Generator, Sequence
 from contextlib import closing
@@ -18,6 +17,7 @@ from lipmotion.speech.voices.festival import FESTIVAL
 from lipmotion.speech.voices.flite import FLITE
 from lipmotion.speech.voices.inventory_phones import inventory_timeline
 from lipmotion.speech.voices.synthesiser import Synthesiser, SyntheticVoice
+from lipmotion.storage.files import temporary_folder
 from lipmotion.types import Audio, Timeline, Unit
 from lipmotion.units import Lexicon, words_of
 
@@ -161,9 +161,9 @@ def voiced_sentences(
     synthesiser = _synthesiser(voice)
     words = [words_of(text) for text in texts]
     known = (lexicon or Lexicon()) if voice.is_english else None
-    with tempfile.TemporaryDirectory(prefix="lipmotion-voices-") as folder:
+    with temporary_folder() as folder:
         plain = [" ".join(text.split()) for text in texts]
-        sentences = synthesiser.synthesise(voice.name, plain, Path(folder)) if plain else iter(())
+        sentences = synthesiser.synthesise(voice.name, plain, folder) if plain else iter(())
         for said, its_words in zip(sentences, words, strict=True):
             phone_map = said.phone_map or synthesiser.phone_map
             written = its_words if said.words is None else said.words

@@ -1,0 +1,94 @@
+"""Connections of browsers that keep nobody else waiting: time limits, and room for new ones (needs uvicorn)."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+MOST_CONNECTIONS, MOST_OF_ONE = 800, 256
+"""Connections at the same time, of all clients and of one: beyond these, those without a request are closed."""
+HEADERS_S, IDLE_S, STALLED_S = 5.0, 20, 30.0
+"""How long the headers of a request may take; a connection is kept after a reply; and a reply is not taken."""
+FIRST_READ_S = 0.1
+"""After which the request of a new connection has been read, where it came with it."""
+
+
+class PunctualConnection(H11Protocol):
+    """uvicorn's connection, closed where the client lets the server wait; of too many, what waits longest is closed."""
+
+    _due: asyncio.TimerHandle | None = None
+    _stalled: asyncio.TimerHandle | None = None
+    idle_since_s, was_read = 0.0, False
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a request is being replied to."""
+        return self.cycle is not None and not self.cycle.response_complete
+
+    def connection_made(self, transport: Any) -> None:
+        """Wait for the first request, and make room for the connection."""
+        super().connection_made(transport)
+        self.idle_since_s = self.loop.time()
+        self._due = self.loop.call_later(HEADERS_S, self._end_if_idle)
+        self.loop.call_later(FIRST_READ_S, self._make_room)
+
+    def data_received(self, data: bytes) -> None:
+        """Take a part of a request; the time of its headers begins with its first byte."""
+        if self._due is None and not self.is_busy:
+            self._due = self.loop.call_later(HEADERS_S, self._end_if_idle)
+        super().data_received(data)
+        if self.is_busy:
+            self._stop_waiting()
+
+    def on_response_complete(self) -> None:
+        """Wait for the next request."""
+        self.idle_since_s = self.loop.time()
+        super().on_response_complete()
+        if not self.is_busy and self.conn.trailing_data[0]:  # a part of the next one has come already
+            self._due = self.loop.call_later(HEADERS_S, self._end_if_idle)
+
+    def timeout_keep_alive_handler(self) -> None:
+        """Close a connection that was kept."""
+        self.transport.abort()  # what is left of a reply is not waited for
+
+    def pause_writing(self) -> None:
+        """Wait for a client that does not take its reply."""
+        super().pause_writing()
+        self._stalled = self.loop.call_later(STALLED_S, self.transport.abort)
+
+    def resume_writing(self) -> None:
+        """Go on with a reply that is taken."""
+        super().resume_writing()
+        if self._stalled is not None:
+            self._stalled.cancel()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Forget the connection."""
+        self._stop_waiting()
+        if self._stalled is not None:
+            self._stalled.cancel()
+        super().connection_lost(exc)
+
+    def _stop_waiting(self) -> None:
+        if self._due is not None:
+            self._due.cancel()
+        self._due = None
+
+    def _end_if_idle(self) -> None:
+        if not self.is_busy:
+            self.transport.abort()
+
+    def _make_room(self) -> None:
+        """Close a connection, where there are too many: what waits longest, of those that never had a request first.
+
+        Those that are so new that their requests may not have been read stay.
+        """
+        self.was_read = True
+        everybody: set[Any] = {*self.connections}
+        own = [each for each in everybody if each.client and self.client and each.client[0] == self.client[0]]
+        crowd = own if len(own) > MOST_OF_ONE else everybody if len(everybody) > MOST_CONNECTIONS else ()
+        if self in crowd:
+            idle = [each for each in crowd if each.was_read and not each.is_busy]
+            min(idle, key=lambda each: (each.cycle is not None, each.idle_since_s), default=self).transport.abort()

@@ -1,0 +1,135 @@
+"""Clients that let a server wait: they are closed, and the others are served."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack
+from threading import Thread
+
+import pytest
+
+uvicorn = pytest.importorskip("uvicorn", reason="the extra 'studio' is not installed")
+
+from starlette.applications import Starlette  # noqa: E402
+from starlette.requests import Request  # noqa: E402
+from starlette.responses import Response  # noqa: E402
+from starlette.routing import Route  # noqa: E402
+
+from lipmotion.web import connections  # noqa: E402
+from lipmotion.web.listening import listening  # noqa: E402
+
+LARGE, SMALL = 1 << 26, b"small"
+PATIENCE_S = 60.0
+ASKED = b"GET /small HTTP/1.1\r\nhost: x\r\n"
+
+
+@pytest.fixture(scope="module")
+def port() -> Iterator[int]:
+    """Serve a page in a thread, with limits that tests need not wait for; give the port."""
+
+    async def replied(request: Request) -> Response:
+        return Response(bytes(LARGE) if request.url.path == "/large" else SMALL)
+
+    application = Starlette(routes=[Route("/{name}", replied)])
+    with pytest.MonkeyPatch.context() as patch, listening("127.0.0.1", 0) as place:
+        for name, value in {"HEADERS_S": 0.2, "STALLED_S": 0.2, "FIRST_READ_S": 0.01, "MOST_OF_ONE": 5}.items():
+            patch.setattr(connections, name, value)
+        patch.setattr(connections, "MOST_CONNECTIONS", 8)
+        config = uvicorn.Config(application, lifespan="off", log_level="error", http=connections.PunctualConnection)
+        server = uvicorn.Server(config)
+        thread = Thread(target=server.run, args=([place],), daemon=True)
+        thread.start()
+        while not server.started:
+            time.sleep(0.01)
+        yield place.getsockname()[1]
+        server.should_exit = True
+        thread.join(PATIENCE_S)
+
+
+def connected(port: int) -> socket.socket:
+    return socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S)
+
+
+def send_drops(client: socket.socket) -> None:
+    for _ in range(300):
+        client.sendall(b"x")
+        time.sleep(0.02)
+
+
+def reply_to(client: socket.socket) -> bytes:
+    """Return the reply to a request for the small page."""
+    client.sendall(ASKED + b"\r\n")
+    reply = b""
+    while not reply.endswith(SMALL):
+        part = client.recv(1 << 16)
+        assert part, "closed"
+        reply += part
+    return reply
+
+
+def is_closed(client: socket.socket) -> bool:
+    """Return whether the server closes a connection, after whatever it has sent."""
+    try:
+        while client.recv(1 << 20):
+            pass
+    except ConnectionResetError:
+        pass
+    except TimeoutError:
+        return False
+    return True
+
+
+@pytest.mark.parametrize(
+    "sent",
+    [
+        b"",
+        b"G",
+        ASKED,
+        ASKED + b"x: ",
+        ASKED + b"\r\n" + ASKED,
+        b"GET /small HTTP/1.1\r\nhost: x\r\ncontent-length: 9\r\n\r\n",
+    ],
+    ids=["nothing", "a letter", "no end", "half a header", "half a second request", "no body"],
+)
+def test_who_does_not_end_a_request_is_closed(port: int, sent: bytes) -> None:
+    with connected(port) as client:
+        client.sendall(sent)
+        if sent.endswith(b"9\r\n\r\n"):
+            assert client.recv(1 << 20)
+            client.sendall(b"x")
+        assert is_closed(client)
+
+
+def test_a_request_that_comes_drop_by_drop_is_closed(port: int) -> None:
+    """Each drop does not begin the time anew."""
+    with connected(port) as client:
+        client.sendall(ASKED)
+        with pytest.raises((ConnectionResetError, BrokenPipeError)):
+            send_drops(client)
+
+
+def test_who_does_not_take_a_reply_is_closed(port: int) -> None:
+    with socket.socket() as client:
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        client.settimeout(PATIENCE_S)
+        client.connect(("127.0.0.1", port))
+        client.sendall(b"GET /large HTTP/1.1\r\nhost: x\r\n\r\n")
+        time.sleep(0.4)  # nothing is read
+        taken = 0
+        try:
+            while part := client.recv(1 << 20):
+                taken += len(part)
+        except ConnectionResetError:
+            pass
+        assert 0 < taken < LARGE
+
+
+def test_many_connections_without_a_request_leave_room(port: int) -> None:
+    """The client that asks is served, over one connection and over new ones; the oldest without a request go."""
+    with ExitStack() as stack, connected(port) as client:
+        for _ in range(12):
+            stack.enter_context(connected(port))
+            with connected(port) as other:
+                assert all(reply_to(each).startswith(b"HTTP/1.1 200") for each in (client, other))
