@@ -44,6 +44,7 @@ from lipmotion.cli.verbs import (
     words,
 )
 from lipmotion.errors import ExportError, LipMotionError
+from lipmotion.types.values import number_of, whole_of
 
 VERBS = (
     *(animate, batch, speak, render, edit, studio, explain, cues, words, corpus, train, adapt, face),
@@ -219,6 +220,11 @@ class WrongCommandLineError(LipMotionError):
 class _Parser(argparse.ArgumentParser):
     """Raises an error for a wrong command line, as one line that says where help is; reports help that cannot be
     printed."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        self.register("type", int, whole_of)
+        self.register("type", float, number_of)
 
     def error(self, message: str) -> NoReturn:
         raise WrongCommandLineError(f"{message}{'' if message.endswith('?') else ';'} see: {self.prog} --help")

@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import logging
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError
 from lipmotion.export.motion.document import parse_units, unit_rows
 from lipmotion.pipeline.edits import FORMS, Edits, MoodStep, Step
 from lipmotion.pipeline.job import Request, located
@@ -17,10 +18,11 @@ from lipmotion.pipeline.outputs.scenes import sound_reference
 from lipmotion.pipeline.session import Session
 from lipmotion.pipeline.understand.read_request import read_request
 from lipmotion.pipeline.understand.request import SpeechRequest
-from lipmotion.storage.files import read_text_file, whole_file
+from lipmotion.storage.files import LARGEST_TEXT_BYTES, read_text_file, whole_file
 from lipmotion.storage.json_text import as_json_rows, from_json
 from lipmotion.storage.toml_text import read_toml
 from lipmotion.types import Generation, Outlook, Timeline, Unit
+from lipmotion.types.values import SchemaError, described, items, number, optional, text, tupled, value_of
 
 LOG = logging.getLogger("lipmotion")
 FORMAT, VERSION = "lipmotion.edits", 1
@@ -28,6 +30,11 @@ JSON, TOML = SUFFIXES = (".json", ".toml")
 """Suffixes of files of edits."""
 HELD = ("recording", "model", "lexicon", "language", "recogniser", "speaker", "pauses", "asymmetry")
 """What of a request such a file holds; words and phones that were given are in the phones in time."""
+
+
+_SHARE, _TEXT = number(0, 1), text(1000)
+_OF_OUTLOOK = {"words": _TEXT, "confidence": _SHARE, "range_db": number(), "advice": tupled(items(_TEXT))}
+_OUTLOOK = optional(value_of(partial(Outlook, voice=None), _OF_OUTLOOK | {"voice": _SHARE}, _OF_OUTLOOK))
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,11 +141,11 @@ def read_edits(path: str | Path) -> EditFile:
     if not isinstance(members, dict) or members.get("format") != FORMAT:
         raise InputError(f'{path}: not a file of edits; it must begin with "format": "{FORMAT}"')
     if members.get("version") != VERSION:
-        found = shortened(repr(members.get("version")))
+        found = described(members.get("version"))
         raise InputError(f"{path}: edits of version {found}, required {VERSION}; update lipmotion")
     try:
         return _content(members, path.parent)
-    except (InputError, TypeError, KeyError) as error:
+    except InputError as error:
         raise InputError(f"{path}: {error}") from error
 
 
@@ -154,19 +161,17 @@ def _content(members: dict[str, Any], folder: Path) -> EditFile:
     if unknown := sorted(set(members) - known):
         raise InputError(f"unknown member {unknown[0]!r}; required some of: {', '.join(sorted(known))}")
     steps, undone = (_sentences(members, name) for name in ("steps", "undone"))
-    outlook = members.get("outlook")
     named = located(Request.parsed({name: members[name] for name in HELD if name in members}), folder)
-    units = parse_units(members["units"], members.get("recognised", ())) if "units" in members else None
-    if outlook is not None:
-        outlook = Outlook(**{"voice": None} | outlook | {"advice": tuple(outlook["advice"])})
+    units = parse_units(members["units"], members.get("recognised")) if "units" in members else None
+    outlook = _OUTLOOK(members.get("outlook"))
     return EditFile(Edits().then(*steps), named, units, outlook, Edits().then(*undone).steps)
 
 
 def _sentences(members: dict[str, Any], name: str) -> list[str]:
-    found = members.get(name, [])
-    if not isinstance(found, list) or not all(isinstance(step, str) for step in found):
-        raise InputError(f"the {name} are {shortened(repr(found))}, required a list of sentences: {FORMS[0]!r}")
-    return found
+    try:
+        return items(text(LARGEST_TEXT_BYTES))(members.get(name, []))
+    except SchemaError as error:
+        raise InputError(f"the {name} are {error.found}, required a list of sentences: {FORMS[0]!r}") from error
 
 
 def write_edits(file: EditFile, path: str | Path) -> None:
@@ -186,9 +191,9 @@ def write_edits(file: EditFile, path: str | Path) -> None:
         members |= unit_rows(file.units)
     if file.outlook is not None:
         members["outlook"] = {name: value for name, value in asdict(file.outlook).items() if value is not None}
-    text = _as_toml(members) if kind == TOML else as_json_rows(members)
+    content = _as_toml(members) if kind == TOML else as_json_rows(members)
     with whole_file(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(content, encoding="utf-8")
 
 
 def _as_toml(members: dict[str, Any]) -> str:

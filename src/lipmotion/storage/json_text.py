@@ -12,6 +12,8 @@ from typing import Any, NoReturn
 
 from lipmotion.errors import ExportError
 
+LONGEST_WHOLE = 300
+"""Most digits of a whole number: one of 309 may be larger than any fraction."""
 SURROGATE = re.compile("[\ud800-\udfff]")
 
 
@@ -88,7 +90,8 @@ def from_json(text: str | bytes) -> Any:
     Raises ValueError: it is none, has a key twice, is nested too deeply, or holds a number that is not finite.
     """
     try:
-        return json.loads(text, object_pairs_hook=_distinct_keys, parse_constant=_refused, parse_float=_finite)
+        numbers: Any = {"parse_constant": _refused, "parse_float": finite, "parse_int": _whole}
+        return json.loads(text, object_pairs_hook=_distinct_keys, **numbers)
     except RecursionError as error:
         raise ValueError("nested too deeply") from error
 
@@ -105,7 +108,14 @@ def _refused(constant: str) -> NoReturn:
     raise ValueError(f"the number {constant}, required a finite one")
 
 
-def _finite(text: str) -> float:
+def _whole(text: str) -> int:
+    if len(text) > LONGEST_WHOLE:
+        _refused(text[:20])
+    return int(text)
+
+
+def finite(text: str) -> float:
+    """Return the number of a text of JSON or TOML. Raises ValueError: it is not finite."""
     number = float(text)
     if not math.isfinite(number):
         _refused(text[:20])

@@ -8,6 +8,7 @@ from typing import Any
 
 from lipmotion.errors import InputError
 from lipmotion.storage.files import read_text_file
+from lipmotion.storage.json_text import finite
 
 
 def read_toml(path: Path, kind: str, instead: str) -> dict[str, Any]:
@@ -23,6 +24,17 @@ def read_toml(path: Path, kind: str, instead: str) -> dict[str, Any]:
 
     text = read_text_file(path, kind)
     try:
-        return tomllib.loads(text)
+        found = tomllib.loads(text, parse_float=finite)
+        _check_wholes(found)
+        return found
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: {error}") from error
+
+
+def _check_wholes(content: Any) -> None:
+    """Raise ValueError for a whole number beyond 64 bits, which TOML has none of."""
+    for each in content.values() if isinstance(content, dict) else content:
+        if isinstance(each, dict | list):
+            _check_wholes(each)
+        elif type(each) is int and not -(1 << 63) <= each < 1 << 63:
+            raise ValueError(f"a whole number of {each.bit_length()} bits, required at most 63 and a sign")

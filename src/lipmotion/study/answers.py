@@ -10,6 +10,7 @@ from pathlib import Path
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.storage.files import read_text_file, whole_file
+from lipmotion.types.values import number_of, whole_of
 
 PAIRED, MOS, RANKING = "paired", "mos", "ranking"
 KINDS = (PAIRED, MOS, RANKING)
@@ -99,7 +100,7 @@ def read_answers(path: Path) -> list[Answer]:
 
     Raises InputError: the file cannot be read, lacks a column, or has a value that no answer can have.
     """
-    table = csv.DictReader(io.StringIO(read_text_file(path, "answers")))
+    table = csv.DictReader(io.StringIO(read_text_file(path, "answers")), restval="")
     missing = [name for name in COLUMNS if name not in (table.fieldnames or ())]
     if missing:
         raise InputError(f"{path}: no column {missing[0]!r}; required {', '.join(COLUMNS)}")
@@ -107,7 +108,7 @@ def read_answers(path: Path) -> list[Answer]:
     for row in table:
         try:
             answers.append(_answer(row))
-        except (ValueError, TypeError) as error:  # InputError among them; TypeError: the line is too short
+        except InputError as error:
             raise InputError(f"{path}: line {table.line_num}: {error}") from None
     return answers
 
@@ -115,9 +116,9 @@ def read_answers(path: Path) -> list[Answer]:
 def _answer(row: dict[str, str]) -> Answer:
     return Answer(
         **{name: row[name] for name in ("rater", "kind", "sentence", "question", "condition", "other", "value")},
-        trial=int(row["trial"]),
-        seconds=float(row["seconds"]),
-        plays=int(row["plays"]),
-        practice=bool(int(row["practice"])),
+        trial=whole_of(row["trial"], "trial is"),
+        seconds=number_of(row["seconds"], "seconds is"),
+        plays=whole_of(row["plays"], "plays is"),
+        practice=bool(whole_of(row["practice"], "practice is")),
         expected=row["expected"],
     )

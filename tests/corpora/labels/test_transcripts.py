@@ -292,13 +292,13 @@ DAMAGED = {
     ),
     "CTM of two recordings": ("a 1 0.0 0.5 hi\nb 1 0.5 0.5 you\n", r"line 2: words of two recordings, 'a' and 'b'"),
     "CTM with a broken line": ("a 1 0.0 0.5 hi\na 1 0.5 you\n", r"line 2 is 'a 1 0\.5 you'; required, as in line 1"),
-    "CTM with a time that is none": ("a 1 0.0 0.5 hi\na 1 nan 0.5 you\n", "line 2 has the time nan"),
+    "CTM with a time that is none": ("a 1 0.0 0.5 hi\na 1 nan 0.5 you\n", "line 2 has the time 'nan"),
     "CTM with a negative duration": ("a 1 0.0 0.5 hi\na 1 1.0 -0.5 you\n", r"line 2: a duration of -0\.5 s"),
     "LRS with a broken line": (
         "Text:  HI\n\nWORD START END\nHI 0.1 0.2 9\nYOU 0.2\n",
         r"line 5 is 'YOU.*0\.2'; required",
     ),
-    "LRS with a time that is none": ("Text:  HI\n\nWORD START END\nHI 0.1 nan\n", "line 4 has the time nan"),
+    "LRS with a time that is none": ("Text:  HI\n\nWORD START END\nHI 0.1 nan\n", "line 4 has the time 'nan"),
     "phones alone": ("0 1000000 sil\n1000000 2000000 p\n2000000 3500000 aa\n", "phones in time, but no words"),
 }
 

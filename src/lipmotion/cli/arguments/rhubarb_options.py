@@ -15,6 +15,7 @@ from lipmotion.cli.arguments.paths import add_output
 from lipmotion.cli.terminal.status import LEVELS
 from lipmotion.errors import shortened
 from lipmotion.storage.sources import is_file
+from lipmotion.types.values import whole_of
 
 RECOGNISERS = {"pocketsphinx": "auto", "phonetic": "fast"}
 """The recogniser that takes the place of each of Rhubarb's."""
@@ -71,6 +72,6 @@ def _recogniser(name: str) -> str:
 
 def _threads(text: str) -> int:
     """Return a number of threads. Raises ArgumentTypeError: it is none, or under 1."""
-    if not text.isdecimal() or not int(text):
+    if (count := whole_of(text)) < 1:
         raise argparse.ArgumentTypeError(f"{text!r}, required: 1 or more")
-    return int(text)
+    return count

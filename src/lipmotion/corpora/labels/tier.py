@@ -10,9 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from statistics import median
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError
 from lipmotion.printable import is_line
 from lipmotion.types import Span, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit, in_order
+from lipmotion.types.values import number_of
 from lipmotion.units import (
     PHONES,
     RECOGNISED,
@@ -115,11 +116,8 @@ def check_count(count: int, where: str) -> None:
 
 
 def required_time(text: str, place: str, where: str) -> float:
-    """Return a time from its text, also with a decimal comma. Raises InputError: it is not finite."""
-    time = float(text.replace(",", "."))
-    if not math.isfinite(time):
-        raise InputError(f"{where}: {place} has the time {shortened(text)}, required a finite one")
-    return time
+    """Return a time from its text, also with a decimal comma. Raises InputError: it is none, or not finite."""
+    return number_of(text.replace(",", "."), f"{where}: {place} has the time", "a finite one")
 
 
 def unit_of_times(spans: Sequence[tuple[float, float, str]], role: str, where: str, usual: int = 1) -> int:

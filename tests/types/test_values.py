@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from lipmotion.storage.json_schema import (
+from lipmotion.types.values import (
     SchemaError,
     any_members,
     if_fits,
