@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from hashlib import sha256
 from urllib.parse import parse_qs
 
-from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from lipmotion.web.replies import FRESH
+from lipmotion.web.replies import FRESH, JSONResponse
 
 TOKEN_HEADER = "x-lipmotion-token"  # noqa: S105 # its name
 API = "/api"

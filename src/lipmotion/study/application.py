@@ -16,7 +16,7 @@ from typing import Any
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.responses import FileResponse, Response
 from starlette.routing import Route
 
 from lipmotion.errors import InputError
@@ -29,7 +29,7 @@ from lipmotion.study.store import StudyStore, rater_name
 from lipmotion.study.submission import submitted_sheet
 from lipmotion.study.trials import questions_of, trials_of
 from lipmotion.web.bodies import json_of
-from lipmotion.web.replies import ERRORS, FRESH, SecurityHeaders
+from lipmotion.web.replies import ERRORS, FRESH, JSONResponse, SecurityHeaders
 
 PAGE = {
     "": ("study.html", "text/html; charset=utf-8"),

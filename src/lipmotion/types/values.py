@@ -186,6 +186,11 @@ def value_of(kind: Callable[..., Any], table: Mapping[str, Schema], needed: Coll
     return lambda value: kind(**schema(value))
 
 
+def stated(read: Callable[[str], Any], schema: Schema) -> Schema:
+    """Return the schema of a number that may also be stated as a text, of which a function returns it."""
+    return lambda value: schema(read(value) if isinstance(value, str) else value)
+
+
 def tupled(schema: Schema) -> Schema:
     """Return the schema of a list that becomes a tuple."""
     return lambda value: tuple(schema(value))
