@@ -33,8 +33,8 @@ def read_toml(path: Path, kind: str, instead: str) -> dict[str, Any]:
 
 def _check_wholes(content: Any) -> None:
     """Raise ValueError for a whole number beyond 64 bits, which TOML has none of."""
-    for each in content.values() if isinstance(content, dict) else content:
+    for name, each in content.items() if isinstance(content, dict) else enumerate(content, 1):
         if isinstance(each, dict | list):
             _check_wholes(each)
         elif type(each) is int and not -(1 << 63) <= each < 1 << 63:
-            raise ValueError(f"a whole number of {each.bit_length()} bits, required at most 63 and a sign")
+            raise ValueError(f"{name} is a whole number of {each.bit_length()} bits, required at most 63")

@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 
 from lipmotion.corpora.labels.phone_symbols import ipa_labels, with_pauses
 from lipmotion.corpora.labels.tier import (
+    EARLIEST_S,
     LINES,
     PHONE_LABELS,
     TICKS_PER_S,
@@ -41,8 +42,6 @@ Objects = list[tuple[str, dict[str, Any]]]
 """Objects of a file, each with its place, for messages."""
 LATEST_S = 1e6
 """Times beyond eleven days are an error, or in another unit."""
-EARLIEST_S = -1.0
-"""A time before this is none; recognisers write others a little before 0."""
 SINGLE_SHARE, LONGEST_JUDGED, DEEPEST = 0.9, 1000, 12
 """A list is one of words where so many of its texts are single ones; letters of a text that are judged; how deep lists
 are searched in lists."""
