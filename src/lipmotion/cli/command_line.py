@@ -10,6 +10,7 @@ import sys
 import warnings
 from collections.abc import Sequence
 from difflib import get_close_matches
+from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -224,7 +225,7 @@ class _Parser(argparse.ArgumentParser):
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
         self.register("type", int, whole_of)
-        self.register("type", float, number_of)
+        self.register("type", float, partial(number_of, finite=False))
 
     def error(self, message: str) -> NoReturn:
         raise WrongCommandLineError(f"{message}{'' if message.endswith('?') else ';'} see: {self.prog} --help")

@@ -11,7 +11,7 @@ from typing import Any
 
 from lipmotion.errors import InputError
 from lipmotion.export.motion.document import parse_units, unit_rows
-from lipmotion.pipeline.edits import FORMS, Edits, MoodStep, Step
+from lipmotion.pipeline.edits import Edits, MoodStep, Step
 from lipmotion.pipeline.job import Request, located
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.outputs.scenes import sound_reference
@@ -22,7 +22,7 @@ from lipmotion.storage.files import LARGEST_TEXT_BYTES, read_text_file, whole_fi
 from lipmotion.storage.json_text import as_json_rows, from_json
 from lipmotion.storage.toml_text import read_toml
 from lipmotion.types import Generation, Outlook, Timeline, Unit
-from lipmotion.types.values import SchemaError, described, items, number, optional, text, tupled, value_of
+from lipmotion.types.values import described, items, number, optional, require, text, tupled, value_of
 
 LOG = logging.getLogger("lipmotion")
 FORMAT, VERSION = "lipmotion.edits", 1
@@ -168,10 +168,7 @@ def _content(members: dict[str, Any], folder: Path) -> EditFile:
 
 
 def _sentences(members: dict[str, Any], name: str) -> list[str]:
-    try:
-        return items(text(LARGEST_TEXT_BYTES))(members.get(name, []))
-    except SchemaError as error:
-        raise InputError(f"the {name} are {error.found}, required a list of sentences: {FORMS[0]!r}") from error
+    return list(require(items(text(LARGEST_TEXT_BYTES)), members.get(name, []), name))
 
 
 def write_edits(file: EditFile, path: str | Path) -> None:

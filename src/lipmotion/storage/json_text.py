@@ -6,11 +6,12 @@ import json
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cache
 from typing import Any, NoReturn
 
-from lipmotion.errors import ExportError
+from lipmotion.errors import ExportError, InputError
 
 LONGEST_WHOLE = 300
 """Most digits of a whole number: one of 309 may be larger than any fraction."""
@@ -94,6 +95,19 @@ def from_json(text: str | bytes) -> Any:
         return json.loads(text, object_pairs_hook=_distinct_keys, **numbers)
     except RecursionError as error:
         raise ValueError("nested too deeply") from error
+
+
+@contextmanager
+def json_errors(what: str) -> Iterator[None]:
+    """Turn the errors of reading JSON that are raised inside into an InputError; ``what`` is read."""
+    try:
+        yield
+    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise InputError(f"not JSON ({error}); export it again") from error
+    except (TypeError, KeyError, ValueError, OverflowError) as error:
+        if type(error) is InputError:
+            raise
+        raise InputError(f"{what} is damaged ({error}); export it again") from error
 
 
 def _distinct_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,9 @@ from typing import Any
 from lipmotion.errors import InputError
 from lipmotion.storage.files import read_text_file
 from lipmotion.storage.json_text import finite
+
+DEEP_KEY = re.compile(r"(?:\.[ \t]*[\w\"'-]+[ \t]*){100}")
+"""A name with so many dots; the time to read it grows with the square of their number."""
 
 
 def read_toml(path: Path, kind: str, instead: str) -> dict[str, Any]:
@@ -23,6 +27,8 @@ def read_toml(path: Path, kind: str, instead: str) -> dict[str, Any]:
     import tomllib
 
     text = read_text_file(path, kind)
+    if DEEP_KEY.search(text):
+        raise InputError(f"{path}: a name of more than 100 parts, required one of a table in a table at most")
     try:
         found = tomllib.loads(text, parse_float=finite)
         _check_wholes(found)

@@ -11,7 +11,7 @@ from starlette.requests import Request
 
 from lipmotion.errors import InputError
 from lipmotion.types import values
-from lipmotion.types.values import Schema, SchemaError, any_members, items, number_of, stated, whole_of
+from lipmotion.types.values import Schema, any_members, items, number_of, require, stated, whole_of
 from lipmotion.web.bodies import json_of
 
 LARGEST_JSON_BYTES = 1 << 20
@@ -28,10 +28,7 @@ async def content_of(request: Request) -> dict[str, Any]:
 
 def member(given: Mapping[str, Any], name: str, usual: Any, schema: Schema) -> Any:
     """Return a member of a request, checked. Raises InputError: there is none, and no usual value; or another one."""
-    try:
-        return schema(given.get(name, usual))
-    except SchemaError as error:
-        raise error.within(f".{name}") from error
+    return require(schema, given.get(name, usual), name)
 
 
 def whole(given: Mapping[str, Any], name: str, usual: int | None = None, *, least: int = 0, most: int = 1 << 31) -> int:

@@ -100,16 +100,15 @@ def read_answers(path: Path) -> list[Answer]:
 
     Raises InputError: the file cannot be read, lacks a column, or has a value that no answer can have.
     """
-    table = csv.DictReader(io.StringIO(read_text_file(path, "answers")), restval="")
-    missing = [name for name in COLUMNS if name not in (table.fieldnames or ())]
-    if missing:
-        raise InputError(f"{path}: no column {missing[0]!r}; required {', '.join(COLUMNS)}")
-    answers = []
-    for row in table:
-        try:
+    table, answers = csv.DictReader(io.StringIO(read_text_file(path, "answers")), restval=""), []
+    try:
+        missing = [name for name in COLUMNS if name not in (table.fieldnames or ())]
+        if missing:
+            raise InputError(f"no column {missing[0]!r}; required {', '.join(COLUMNS)}")
+        for row in table:
             answers.append(_answer(row))
-        except InputError as error:
-            raise InputError(f"{path}: line {table.line_num}: {error}") from None
+    except (InputError, csv.Error) as error:
+        raise InputError(f"{path}: line {table.line_num}: {error}") from error
     return answers
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import Field, asdict, dataclass, field, fields
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
 from lipmotion.errors import InputError
-from lipmotion.types.values import described, is_path, is_text, number_of, whole_of
+from lipmotion.types.values import described, is_path, number_of, whole_of
 
 ConfigurationT = TypeVar("ConfigurationT", bound="Configuration")
 LARGEST_NUMBER = 1e6
@@ -175,21 +176,23 @@ def check_value(option_field: Field[Any], value: Any) -> None:
         return
     fits = type(value) is kind or (kind in (float, Path) and isinstance(value, kind))
     fits = fits or (kind is float and type(value) is int)
-    if kind in (str, tuple):
-        fits = fits and all(map(is_text, [value] if kind is str else value))
+    if kind is tuple:
+        fits = fits and all(isinstance(each, str) for each in value)
     if kind is Path:
         fits = fits and is_path(str(value))
-    if fits and kind in (int, float) and not -LARGEST_NUMBER <= value <= LARGEST_NUMBER:
-        required = f"at most {LARGEST_NUMBER:g} in size" if rule.most is None else rule.words
-        raise InputError(f"{option_field.name} is {described(value)}, required {required}")
-    if fits and rule.most is not None and not rule.allows(value):
+    in_range = not fits or kind not in (int, float) or -LARGEST_NUMBER <= value <= LARGEST_NUMBER
+    if fits and rule.most is not None and not (in_range and rule.allows(value)):
         what = option_field.metadata.get("what", option_field.name)
-        raise InputError(f"the {what} is {value:g}{rule.unit}, required {rule.words}")
+        found = described(value) if type(value) is int else f"{value:g}"
+        raise InputError(f"the {what} is {found}{rule.unit}, required {rule.words}")
+    if not in_range:
+        raise InputError(f"{option_field.name} is {described(value)}, required at most {LARGEST_NUMBER:g} in size")
     if not fits or not rule.allows(value):
         is_complete = rule.odd or rule.power_of_two or bool(rule.choices) or rule.most is not None
         words = _WORDS.get(kind, "a table of options")
         required = rule.words if is_complete and fits else words + ("" if is_complete else rule.words)
-        raise InputError(f"{option_field.name} is {described(value)}, required {required}")
+        found = described(str(value) if kind is Path else value)
+        raise InputError(f"{option_field.name} is {found}, required {required}")
 
 
 def kind_of(option_field: Field[Any]) -> type[Any]:
@@ -213,7 +216,7 @@ def _from_text(option_field: Field[Any], text: str) -> Any:
     kind, name = kind_of(option_field), option_field.name
     if kind is bool and text.lower() not in _BOOLEANS:
         raise InputError(f"{name} is {described(text)}, required {_WORDS[kind]}")
-    readers = {int: whole_of, float: number_of}
+    readers = {int: whole_of, float: partial(number_of, finite=False)}
     return (
         readers[kind](text, f"{name} is")
         if kind in readers

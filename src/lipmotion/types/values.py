@@ -18,9 +18,9 @@ Schema = Callable[[Any], Any]
 NAME_BYTES, PATH_BYTES = 255, 4096
 """Most bytes of a name in a path, and of a path, that file systems take."""
 _LEFT_OUT = object()
-_BROKEN = re.compile("[\0\ud800-\udc7f\udd00-\udfff]")
-"""NUL and halves of characters; \\udc80 to \\udcff are bytes of names of files that are not UTF-8."""
-_NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
+_HALVES = re.compile("[\ud800-\udc7f\udd00-\udfff]")
+"""Halves of characters; \\udc80 to \\udcff are bytes of names of files that are not UTF-8."""
+_NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|(?i:nan|[-+]?inf)")
 _WHOLE = re.compile("[-+]?[0-9]{1,18}")
 
 
@@ -36,16 +36,27 @@ class SchemaError(InputError):
         return SchemaError(self.found, self.required, step + self.place)
 
 
-def number_of(text: str, what: str = "the number is", required: str = "a number, as 1.24") -> float:
-    """Return the finite number that a text states in the digits 0 to 9, with a point.
+def require(schema: Schema, value: Any, what: str) -> Any:
+    """Return a value as its schema does; ``what`` says what it is. Raises InputError: it does not fit."""
+    try:
+        return schema(value)
+    except SchemaError as error:
+        raise InputError(f"{what}{error.place} is {error.found}, required {error.required}") from error
 
-    Raises InputError: another text, as ``1_0``, ``nan`` or digits of other scripts.
+
+def number_of(
+    text: str, what: str = "the number is", required: str = "a number, as 1.24", *, finite: bool = True
+) -> float:
+    """Return the number that a text states in the digits 0 to 9, with a point.
+
+    finite : whether ``nan`` and ``inf`` are refused here; else the range that is required says it
+    Raises InputError: another text, as ``1_0`` or digits of other scripts.
 
     >>> number_of(" -1.5e3")
     -1500.0
     """
-    found = float(text) if _NUMBER.fullmatch(text.strip()) else math.nan
-    if not math.isfinite(found):
+    found = float(text) if _NUMBER.fullmatch(text.strip()) else None
+    if found is None or (finite and not math.isfinite(found)):
         raise InputError(f"{what} {described(text)}, required {required}")
     return found
 
@@ -57,14 +68,10 @@ def whole_of(text: str, what: str = "the number is", required: str = "a whole nu
     return int(text)
 
 
-def is_text(value: object) -> bool:
-    """Return whether a value is a text that files and replies can hold: without NUL and halves of characters."""
-    return isinstance(value, str) and not _BROKEN.search(value)
-
-
 def is_path(text: str) -> bool:
-    """Return whether a text can be the path of a file: it and its names are not too long, and it is a text."""
-    sizes = [len(name if os.name == "nt" else os.fsencode(name)) for name in re.split(r"[/\\]", text) if is_text(text)]
+    """Return whether a text can be the path of a file: without NUL and halves, it and its names not too long."""
+    names = [] if "\0" in text or _HALVES.search(text) else re.split(r"[/\\]", text)
+    sizes = [len(name if os.name == "nt" else os.fsencode(name)) for name in names]
     return bool(sizes) and max(sizes) <= NAME_BYTES and sum(sizes) + len(sizes) <= PATH_BYTES
 
 
@@ -104,10 +111,10 @@ def truth(value: Any) -> bool:
 
 
 def text(most: int) -> Schema:
-    """Return the schema of a text of at most so many letters, none of them NUL or half a character."""
+    """Return the schema of a text of at most so many letters, none of them half a character."""
 
     def checked(value: Any) -> str:
-        if type(value) is not str or len(value) > most or not is_text(value):
+        if type(value) is not str or len(value) > most or _HALVES.search(value):
             raise SchemaError(described(value), f"a text of at most {most} letters")
         return value
 

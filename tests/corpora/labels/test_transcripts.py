@@ -281,7 +281,7 @@ DAMAGED = {
     "JSON nested too deeply": ('{"segments": ' + "[" * 100_000, "nested too deeply"),
     "a number of 5,000 digits": ('{"segments": [{"text": "a", "start": ' + "9" * 5000 + "}]}", "a number too long"),
     "a text as a time": ('{"words": [{"word": "b", "start": "soon"}]}', "a time is 'soon', required a number"),
-    "a truth as a time": ('{"words": [{"word": "b", "start": true}]}', "a time is True, required a number"),
+    "a truth as a time": ('{"words": [{"word": "b", "start": true}]}', "a time is true, required a finite number"),
     "a time of years": ('{"words": [{"word": "b", "start": 1e8}]}', "a time is 1e.08, required seconds"),
     "a segment that is a number": ('{"segments": [{"text": "a"}, 7]}', "'segments', item 2 is 7, required an object"),
     "a word without text": ('{"words": [{"start": 7}]}', "words 1: no text"),

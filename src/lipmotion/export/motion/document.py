@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.printable import is_line
+from lipmotion.storage.json_text import json_errors
 from lipmotion.types import Channel, Generation, Motion, Span, Timeline, Unit
-from lipmotion.types.values import SchemaError, items, members, number, text
+from lipmotion.types.values import items, members, number, text
 from lipmotion.units import RECOGNISED, RecognisedPhone, recognised_phones, with_confidences
 
 FORMAT = "lipmotion.motion"
 VERSION = 1
-LARGEST_TIME_S = 1e9
 
 
 def header(generation: Generation) -> dict[str, Any]:
@@ -51,14 +51,10 @@ def parse(document: Any, values: Any) -> tuple[Motion, Timeline[Unit]]:
     Raises InputError: not a motion document, a newer version, or members that are missing or do not fit.
     """
     _check(document)
-    try:
+    with json_errors("the motion document"):
         found = _DOCUMENT(document)
         channels = tuple(Channel(**channel) for channel in found["channels"])
         motion = Motion(_array(values, len(channels)), found["rate_hz"], channels)
-    except (TypeError, ValueError, OverflowError) as error:
-        if type(error) is InputError:
-            raise
-        raise InputError(f"the motion document is damaged ({error}); export it again") from error
     return motion, parse_units(document.get("units"), document.get(RECOGNISED))
 
 
@@ -68,12 +64,9 @@ def parse_units(rows: Any, recognised: Any = None) -> Timeline[Unit]:
     recognised : the member ``recognised``, where there is one: units that are in it, too, are not known
     Raises InputError: rows of another kind, without a time or a name, or with times that no recording has.
     """
-    try:
-        spans = tuple(map(_span, _UNITS(rows)))
+    with json_errors("the motion document"):
         confidences = [_recognised(*row) for row in _ROWS(recognised or [])]
-    except SchemaError as error:
-        raise InputError(f"the phones in time are damaged ({error}); export them again") from error
-    return with_confidences(Timeline(spans), confidences)
+        return with_confidences(Timeline(tuple(map(_span, _UNITS(rows)))), confidences)
 
 
 def _check(document: Any) -> None:
@@ -118,7 +111,7 @@ def _recognised(start_s: Any, end_s: Any, name: Any, confidence: Any) -> Recogni
     return RecognisedPhone(_TIME(start_s), _TIME(end_s), _TEXT(name), number(0, 1)(confidence))
 
 
-_TEXT, _TIME = text(10_000), number(-LARGEST_TIME_S, LARGEST_TIME_S)
+_TEXT, _TIME = text(10_000), number()
 _UNITS = items(
     members(
         {"start_s": _TIME, "end_s": _TIME, "phone": _TEXT, "unit": _TEXT, "word": _TEXT}, ("start_s", "end_s", "phone")
