@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import Field, asdict, dataclass, field, fields
-from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
@@ -214,13 +213,10 @@ def _part(name: str, kind: type[Any], value: Any) -> Any:
 def _from_text(option_field: Field[Any], text: str) -> Any:
     """Return the value of an option that a text holds. Raises InputError: a text of another type."""
     kind, name = kind_of(option_field), option_field.name
+    if kind is int:
+        return whole_of(text, f"{name} is")
+    if kind is float:
+        return number_of(text, f"{name} is", "a number", finite=False)
     if kind is bool and text.lower() not in _BOOLEANS:
         raise InputError(f"{name} is {described(text)}, required {_WORDS[kind]}")
-    readers = {int: whole_of, float: partial(number_of, finite=False)}
-    return (
-        readers[kind](text, f"{name} is")
-        if kind in readers
-        else _BOOLEANS[text.lower()]
-        if kind is bool
-        else kind(text)
-    )
+    return _BOOLEANS[text.lower()] if kind is bool else kind(text)
