@@ -27,7 +27,7 @@ from pipeline.session.test_edit_files import SENTENCES
 from study.small_study import small_study
 
 TRAINING = "training/state.json"
-JOB = {
+JOB: dict[str, dict[str, object]] = {
     "request": {"recording": "a.wav", "recogniser": "fast", "asymmetry": 0.5, "transcript": "mama bites"},
     "outputs": {"files": ["w.csv"], "rate_hz": 25, "channels": ["opening"], "fps": 30.5, "face": "head"},
     "delivery": {"intensity": 1.2, "anticipation_ms": 20, "min_hold_ms": 10, "mood": "happy:0.7 at 1"},
