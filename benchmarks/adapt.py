@@ -16,7 +16,7 @@ import numpy as np
 from robust import SPOKEN, edits, show, spoken
 
 from lipmotion import adapt, animate, load_model
-from lipmotion.corpora.grid import words_of_name
+from lipmotion.corpora.layouts import words_of_name
 from lipmotion.errors import InputError
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.understand.request import SpeechRequest

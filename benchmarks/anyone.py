@@ -25,7 +25,7 @@ from scipy.signal import butter, fftconvolve, sosfilt
 from scipy.stats import spearmanr
 
 from lipmotion import Corpus, animate, load_model
-from lipmotion.corpora.grid import words_of_name
+from lipmotion.corpora.layouts import words_of_name
 from lipmotion.motion.articulation import articulation_table
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.understand.request import SpeechRequest

@@ -169,7 +169,7 @@ def tones_of(face: str) -> NDArray[np.float64]:
         colours = named(face).design.palette
         get = lambda name: getattr(colours, name)  # noqa: E731
     except AttributeError:
-        from lipmotion.faces.portrait import palette
+        from lipmotion.faces.portrait import design as palette
 
         get = lambda name: getattr(palette, name.upper())  # noqa: E731
     names = ("skin", "skin_shade", "lower_lip_light", "upper_lip_dark", "cavity", "tooth", "tongue")

@@ -21,9 +21,9 @@ from anyone import conditions, lag_of, pieces, show
 from kept_tracks import kept_track
 from numpy.typing import NDArray
 from scipy.optimize import nnls
+from scipy.stats import spearmanr
 
 from lipmotion import Corpus, animate, load_model
-from lipmotion.experiments.engines.disagreement import rank_correlation
 from lipmotion.motion.rest import speech_intervals
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.understand.request import SpeechRequest
@@ -119,11 +119,13 @@ def seconds_of(kind: str, generation: Generation, track: Track, lag_s: float) ->
 def figures(found: list[Seconds], doubts: list[Curve]) -> dict[str, object]:
     """Return the rank correlation of doubt and error in all seconds, and in those of every long recording alone."""
     alone = [
-        round(rank_correlation([doubt], [each.error]), 2)
+        round(float(spearmanr(doubt, each.error).statistic), 2)
         for each, doubt in zip(found, doubts, strict=True)
         if len(doubt) >= MANY_SECONDS
     ]
-    pooled = round(rank_correlation(doubts, [each.error for each in found]), 3)
+    pooled = round(
+        float(spearmanr(np.concatenate(doubts), np.concatenate([each.error for each in found])).statistic), 3
+    )
     errors = np.concatenate([each.error for each in found])
     expected = np.concatenate([1 / each.confidence - 1 for each in found])
     means = {"error": round(float(errors.mean()), 2), "expected": round(float(expected.mean()), 2)}

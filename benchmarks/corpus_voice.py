@@ -36,7 +36,7 @@ from lipmotion import Corpus, Model, load_model
 from lipmotion.corpora.labels import labels_beside
 from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES
 from lipmotion.engines.base import SelectsRecordings
-from lipmotion.experiments.minnis_breen2000.joins import velocity_change
+from lipmotion.experiments.minnis_breen2000.minnis2000 import velocity_change
 from lipmotion.measures.bootstrap import bootstrap_interval
 from lipmotion.pipeline.generate.corpus_voice import speak_from_corpus
 from lipmotion.speech.features.analysed_audio import analysed

@@ -41,7 +41,7 @@ from scipy.ndimage import gaussian_filter1d
 from lipmotion import Corpus, load_model
 from lipmotion.kernels.sequences.banded import normal_equations
 from lipmotion.measures import closures, curves
-from lipmotion.measures.modulation import modulation_distance_db
+from lipmotion.measures.curves import modulation_distance_db
 from lipmotion.motion import generation
 from lipmotion.motion.modulation_filter import (
     RESTING_MARGIN_S,

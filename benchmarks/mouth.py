@@ -41,10 +41,9 @@ from lipmotion.articulation.lip_points import CHIN, LOWER_MIDDLE, UPPER_MIDDLE
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.articulation.pauses import PAUSE_STYLES, with_pauses
 from lipmotion.articulation.symmetry import symmetrical
-from lipmotion.faces.head.head_blendshapes import head_mesh
 from lipmotion.faces.head.performance import head_poses
 from lipmotion.faces.head.pose import CharacterPose
-from lipmotion.faces.head.stage import figure
+from lipmotion.faces.head.stage import figure, head_mesh
 from lipmotion.meshes.files.gltf_writer import write_gltf_scene
 from lipmotion.meshes.fitting.driven import driven_character
 from lipmotion.meshes.fitting.lip_placement import LipPlacement, placed_by_shape

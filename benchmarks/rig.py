@@ -26,10 +26,10 @@ from scipy.sparse import csr_array
 import lipmotion
 from lipmotion.articulation.lip_points import LEFT_CORNER, LOWER_MIDDLE, RIGHT_CORNER, UPPER_MIDDLE
 from lipmotion.faces.mesh import MeshFace
-from lipmotion.kernels.pixels.skinning import skinned
 from lipmotion.meshes.files.character_files import read_character
 from lipmotion.meshes.fitting.driven import DrivenCharacter, driven_character
 from lipmotion.meshes.fitting.point_motion import point_motion
+from lipmotion.meshes.model.binding import skinned
 from lipmotion.units import LIP_CLOSING, is_silent
 
 EXAMPLES = Path(__file__).parents[1] / "examples"

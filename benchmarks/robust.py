@@ -31,7 +31,7 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion import animate, load_model
-from lipmotion.corpora.grid import words_of_name
+from lipmotion.corpora.layouts import words_of_name
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.speech.features.analysed_audio import analysed

@@ -35,8 +35,8 @@ from lipmotion.engines.selection.engine import SelectionEngine
 from lipmotion.engines.selection.lip_reading import INVISIBLE, NORMAL, PROTECTED, TABLE_1, lip_reading_class
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.search import select
-from lipmotion.engines.selection.targets import target_of
-from lipmotion.experiments.minnis_breen2000.joins import join_figures
+from lipmotion.engines.selection.selection_training import target_of
+from lipmotion.experiments.minnis_breen2000.minnis2000 import join_figures
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.understood_speech import understand

@@ -19,9 +19,8 @@ import numpy as np
 
 from lipmotion.speech.voices.pronunciations import espeak_pronunciations
 from lipmotion.units import VISEME_OF, Pronunciation
-from lipmotion.units.lexicon import english_data
+from lipmotion.units.lexicon import english_data, network_pronunciation
 from lipmotion.units.spelling import guess_pronunciation
-from lipmotion.units.spelling_network import network_pronunciation
 
 FULL = {"ax": ("ah",), "axr": ("er",), "ix": ("ih",), "el": ("ah", "l"), "en": ("ah", "n"), "em": ("ah", "m")}
 """Phones that the dictionary writes otherwise."""

@@ -5,6 +5,7 @@ python benchmarks/studio.py browser RECORDING [SECONDS ...] [--count 20]  from a
 python benchmarks/studio.py kills RECORDING [--count 100]     of the server; forks: of a process that edits
 python benchmarks/studio.py hostile RECORDING [--count 2000]
 python benchmarks/studio.py undo RECORDING [--count 1000]
+python benchmarks/studio.py clients RECORDING [--count 2000]  steps of two clients; sounds are those of the toy corpus
 
 Recordings are repeated, or cut, to the seconds. Times are of the processor, in one process, without the network and the
 browser: a minute of the clock on a machine that does other work says nothing. ``browser`` gives both.
@@ -38,7 +39,7 @@ from lipmotion.faces.mesh import MeshFace  # noqa: E402
 from lipmotion.faces.registry import face_named  # noqa: E402
 from lipmotion.kernels.choice import expect_more  # noqa: E402
 from lipmotion.meshes.fitting.driven import driven_character  # noqa: E402
-from lipmotion.pipeline.edit_files import EditFile, read_edits, write_edits  # noqa: E402
+from lipmotion.pipeline.edit_files import EditFile  # noqa: E402
 from lipmotion.pipeline.edits import step_of  # noqa: E402
 from lipmotion.pipeline.job import Request  # noqa: E402
 from lipmotion.pipeline.model import load_model  # noqa: E402
@@ -48,13 +49,16 @@ from lipmotion.storage.json_text import as_json  # noqa: E402
 from lipmotion.studio.folder import opened_folder  # noqa: E402
 from lipmotion.studio.line import OpenLine  # noqa: E402
 from lipmotion.studio.understanding import open_line, understand_line  # noqa: E402
+from lipmotion.testing.toy import toy_sentences  # noqa: E402
 from lipmotion.types import Audio, Timeline  # noqa: E402
 from meshes.heads import head, write_glb  # noqa: E402
 from studio.attack import attacked  # noqa: E402
 from studio.served import lost_edits, random_edit, served, undone_edits  # noqa: E402
+from studio.two_clients import walk  # noqa: E402
 
 RECOGNISED_S = 100.0
 """In longer recordings phones are repeated, not recognised."""
+STEPS_OF_A_WALK = 80
 UNDO_LIMIT_S = 7200.0
 """How long a server may be asked for edits, until it is ended."""
 EDITS, FEW_EDITS = 40, 10
@@ -98,8 +102,8 @@ def times_of(sound: Path, seconds: float) -> dict[str, Any]:
     else:
         line = repeated(sound, part, each_s, seconds)
     drawn = shown_face("head")
-    for _ in range(4):  # loads what edits and faces need
-        timed_edit(line, f"phone 3 is {'pm'[line.revision % 2]}")
+    for phone in "mpmp":  # loads what edits and faces need
+        timed_edit(line, f"phone 3 is {phone}")
         line.weights(drawn, slice(0, 20))
     if seconds <= RECOGNISED_S:
         found |= {"the head, all of it, s": round(timed(lambda: line.weights(drawn)) / 1000, 2)}
@@ -173,8 +177,7 @@ def repeated(sound: Path, part: Path, each_s: float, seconds: float) -> OpenLine
     spans[-1] = replace(spans[-1], end_s=seconds)
     with opened_folder(part) as folder:
         line, model = folder.line(1), load_model()
-        folder.edits(line).parent.mkdir(exist_ok=True)
-        write_edits(EditFile(named=Request(part), units=Timeline(tuple(spans))), folder.edits(line))
+        folder.write_edits(line, EditFile(named=Request(part), units=Timeline(tuple(spans)), sha256=line.sha256))
         return open_line(folder, line, model)
 
 
@@ -232,7 +235,7 @@ def forks(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
         os.waitpid(child, 0)
         with os.fdopen(reading, encoding="utf-8") as file:
             told = [json.loads(row) for row in file.read().splitlines(keepends=True) if row.endswith("\n")]
-        line.file = replace(read_edits(line.path), named=line.file.named)
+        line.file = replace(line.folder.read_edits(line.folder.line(line.number)), named=line.file.named)
         steps = list(line.file.edits.sentences)
         done = [each["done"] for each in told if "done" in each]
         found["kills"] += 1
@@ -282,7 +285,17 @@ def undo(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
     return found | {"tracebacks": tracebacks, "minutes": round((time.monotonic() - started_s) / 60, 1)}
 
 
+def clients(sound: Path, options: argparse.Namespace) -> dict[str, Any]:
+    """Let two clients change a project that is changed behind their backs; an AssertionError: something was lost."""
+    started_s, count = time.monotonic(), options.count or 2000
+    walked = walk(load_model(), toy_sentences(3)[0], sound.parent, -(-count // (STEPS_OF_A_WALK - 5)), STEPS_OF_A_WALK)
+    found = {"steps": walked.steps, "acknowledged": walked.acknowledged, "late, and told so": walked.late}
+    found |= {"refused": walked.refused, "lost": 0, "mixed up": 0, "tracebacks": 0}
+    return found | {"minutes": round((time.monotonic() - started_s) / 60, 1)}
+
+
 WHAT = {"times": times, "browser": in_browsers, "kills": kills, "forks": forks, "hostile": hostile, "undo": undo}
+WHAT |= {"clients": clients}
 
 if __name__ == "__main__":
     main()

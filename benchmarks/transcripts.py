@@ -41,7 +41,7 @@ from numpy.typing import NDArray
 from robust import SPOKEN
 
 import lipmotion
-from lipmotion.corpora.grid import words_of_name
+from lipmotion.corpora.layouts import words_of_name
 from lipmotion.errors import AlignmentError
 from lipmotion.pipeline.corpus.prompts import prompts
 from lipmotion.pipeline.understand.request import SpeechRequest

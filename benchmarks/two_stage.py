@@ -30,7 +30,7 @@ from kept_tracks import kept_track
 from transfer import cuts_at_pauses
 
 import lipmotion
-from lipmotion.corpora.grid import words_of_name
+from lipmotion.corpora.layouts import words_of_name
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import engine_named
 from lipmotion.engines.coupled.model import CoupledModel

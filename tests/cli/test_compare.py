@@ -44,9 +44,6 @@ def test_what_cannot_be_used(run: RunCommand, here: Path) -> None:
         assert is_one_error(done, 3)
         assert words in done.err[0]
     assert is_one_error(run("compare", "a.csv", "a.csv", "-o", "a.csv"), 7)
-    done = run("compare", "a.csv", "a.csv", "--sync-weights", "b.csv")
-    assert is_one_error(done, 3)
-    assert "b.csv: not weights in an .npz file" in done.err[0]
     assert not (here / "figures.json").exists()
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import shutil
 import sys
 from pathlib import Path
@@ -11,8 +10,7 @@ import pytest
 
 from children import run_child
 from cli.conftest import RunCommand
-from lipmotion.cli.arguments.shell_completion import SHELLS, places
-from lipmotion.cli.command_line import parser
+from lipmotion.cli.verbs.completion import SHELLS
 
 ASKED: dict[tuple[str, ...], set[str]] = {
     ("cue",): {"cues"},
@@ -20,71 +18,32 @@ ASKED: dict[tuple[str, ...], set[str]] = {
     ("corpus", "prepare", "--no"): {"--no-crops"},
     ("face", "info", "--struc"): set(),
     ("info", "--struc"): {"--structure"},
-    ("cues", "a.wav", "--datF"): {"--datFrameRate"},
     ("animate", "--pauses", ""): {"rest", "natural"},
-    ("animate", "a.wav", "-o", "ou"): set(),
+    ("animate", "a.wav", "-o", "ou"): {"out.json"},
     ("completion", ""): set(SHELLS),
 }
-"""The words of a command line, and what may stand for the last of them; nothing: a file is meant."""
-BASH = 'source "$1"; complete -p lipmotion; shift; COMP_WORDS=(lipmotion "$@"); COMP_CWORD=$#; _lipmotion'
+"""The words of a command line, and what may stand for the last of them."""
+BASH = 'source "$1"; shift; COMP_WORDS=(lipmotion "$@"); COMP_CWORD=$#; _shtab_lipmotion'
 
 
-@pytest.fixture(params=list(SHELLS))
-def shell(request: pytest.FixtureRequest) -> str:
-    return str(request.param)
-
-
-@pytest.fixture
-def script_file(run: RunCommand, shell: str, tmp_path: Path) -> Path:
+@pytest.mark.parametrize("shell", SHELLS)
+def test_a_script_offers_verbs_and_options(run: RunCommand, shell: str) -> None:
     done = run("completion", shell)
     assert (done.code, done.err) == (0, [])
-    path = tmp_path / f"script.{shell}"
-    path.write_text("\n".join(done.out) + "\n")
-    return path
+    text = "\n".join(done.out)
+    assert all(name in text for name in ("animate", "prepare", "no-crops", "machine-readable", "natural"))
 
 
-def test_all_verbs_and_options_are_offered(script_file: Path) -> None:
-    text = script_file.read_text()
-    found = list(places(parser()))
-    assert len(found) > 30
-    for place in found:
-        assert all(f"/{name}" in text for name in place.path)
-        for names, *_ in place.options:
-            assert all(name.lstrip("-") in text for name in names), (place.path, names)
-    assert not re.search("@[A-Z]", text)
-
-
-@pytest.mark.parametrize("shell", ["bash"])
 @pytest.mark.skipif(shutil.which("bash") is None, reason="no bash")
-def test_bash_completes(script_file: Path) -> None:
-    for words, expected in ASKED.items():
-        program = f"{BASH}; printf '%s\\n' \"${{COMPREPLY[@]}}\""
-        done = run_child(["bash", "--norc", "-c", program, "bash", script_file, *words], check=True)
-        registered, *offered = done.stdout.split("\n")
-        assert registered == "complete -o bashdefault -o default -F _lipmotion lipmotion"
-        assert set(filter(None, offered)) == expected, words
-        assert done.stderr == ""
-
-
-@pytest.mark.parametrize("shell", ["zsh"])
-@pytest.mark.skipif(shutil.which("zsh") is None, reason="no zsh")
-def test_zsh_finds_the_same(script_file: Path) -> None:
-    for words, expected in ASKED.items():
-        program = 'compdef() { }; source "$1"; shift; _lipmotion_candidates "$argv[-1]" "${(@)argv[1,-2]}"'
-        done = run_child(["zsh", "-f", "-c", program, "zsh", script_file, *words], check=True)
-        assert {word for word in done.stdout.split() if word.startswith(words[-1])} == expected, words
-        assert done.stderr == ""
-
-
-@pytest.mark.parametrize("shell", ["fish"])
-@pytest.mark.skipif(shutil.which("fish") is None, reason="no fish")
-def test_fish_completes(script_file: Path) -> None:
-    for words, expected in ASKED.items():
-        line = " ".join(["lipmotion", *words])
-        done = run_child(["fish", "--no-config", "-c", 'source $argv[1]; complete -C "$argv[2]"', script_file, line])
-        offered = {word.split("\t")[0] for word in done.stdout.splitlines()}
-        assert offered == expected, words
-        assert done.stderr == ""
+def test_bash_completes(run: RunCommand, here: Path) -> None:
+    (here / "script").write_text("\n".join(run("completion", "bash").out) + "\n")
+    (here / "out.json").touch()
+    program = f"{BASH}; printf '%s\\n' \"${{COMPREPLY[@]}}\""
+    offered = {}
+    for words in ASKED:
+        done = run_child(["bash", "--norc", "-c", program, "bash", here / "script", *words], check=True)
+        offered[words] = {word for word in done.stdout.split("\n") if word}
+    assert offered == ASKED
 
 
 def test_it_loads_no_numpy() -> None:

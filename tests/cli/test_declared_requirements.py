@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.cli.installation.declared_requirements import Requirement, declared_requirements, requirement
-from lipmotion.cli.installation.doctor import EXTRAS
+from lipmotion.cli.installation.doctor import EXTRAS, Requirement, declared_requirements, requirement
 
 PYPROJECT = Path(__file__).parents[2] / "pyproject.toml"
 
@@ -20,7 +19,7 @@ PYPROJECT = Path(__file__).parents[2] / "pyproject.toml"
         ("opencv-python-headless (<5,>=4.10)", Requirement("opencv-python-headless", "<5,>=4.10")),
         (
             "mediapipe==0.10.14; (python_version < '3.13') and extra == 'video'",
-            Requirement("mediapipe", "==0.10.14", "(python_version < '3.13')", "video"),
+            Requirement("mediapipe", "==0.10.14", 'python_version < "3.13"', "video"),
         ),
     ],
 )
@@ -28,17 +27,10 @@ def test_requirements_are_read(text: str, expected: Requirement) -> None:
     assert requirement(text) == expected
 
 
-def test_what_is_no_requirement() -> None:
-    with pytest.raises(ValueError, match="not a requirement: 'a @ b'"):
-        requirement("a @ b")
-    with pytest.raises(ValueError, match="not a comparison: now"):
-        assert Requirement("a", "", "now").applies
-
-
 def test_markers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.platform", "darwin")
     monkeypatch.setattr("platform.machine", lambda: "arm64")
-    monkeypatch.setattr("sys.version_info", (3, 9))
+    monkeypatch.setattr("platform.python_version_tuple", lambda: ("3", "9", "1"))
     for marker, expected in (
         ("", True),
         ("python_version < '3.13'", True),

@@ -11,10 +11,9 @@ import pytest
 from cli.conftest import RunCommand, is_one_error
 from lipmotion.corpora.store import Corpus
 from lipmotion.experiments import comparison, folds, learning_curve, runner
-from lipmotion.experiments.engines import disagreement, text
-from lipmotion.experiments.hofer2008 import table1, table1_text
+from lipmotion.experiments.engines import engine_comparison as text
+from lipmotion.experiments.hofer2008 import table1
 from lipmotion.experiments.minnis_breen2000 import minnis2000 as minnis_2000
-from lipmotion.experiments.minnis_breen2000 import text as minnis_text
 from lipmotion.experiments.report.parts import PARTS
 from lipmotion.experiments.xie_liu2007 import six_systems
 from lipmotion.experiments.xie_liu2007 import text as xieliu2007_text
@@ -28,7 +27,7 @@ def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
     """Few draws of the bootstrap intervals, small phone models, and only two of the paper's unit sets."""
     for module in (runner, table1, six_systems):
         monkeypatch.setattr(module, "HmmConfig", partial(HmmConfig, mixtures=1, iterations=1))
-    for module in (comparison, evaluation_figures, disagreement):
+    for module in (comparison, evaluation_figures):
         monkeypatch.setattr(module, "bootstrap_interval", partial(bootstrap_interval, draws=20))
     monkeypatch.setattr(table1, "PAPER_SCORES", {name: table1.PAPER_SCORES[name] for name in ("2vis", "phone")})
 
@@ -40,7 +39,7 @@ def test_the_table_is_that_of_the_figures(run: RunCommand, toy_corpus: Corpus, h
     )
     assert (done.code, done.err) == (0, [])
     figures = json.loads((here / "a.json").read_text())
-    assert "\n".join(done.out) == table1_text.table(figures)
+    assert "\n".join(done.out) == table1.table(figures)
     assert (figures["split"], figures["clips"], figures["mixtures"]) == ("val", 2, [1, 2])
     assert [path.name for path in here.iterdir()] == ["a.json"]
 
@@ -57,7 +56,7 @@ def test_quick_runs_of_all_experiments_are_of_the_same_recordings(
     monkeypatch.setattr(runner, "QUICK_CLIPS", {"train": 3, "val": 1, "test": 1})
     for module, name in ((table1, "hofer2008"), (six_systems, "xieliu2007"), (minnis_2000, "minnis2000")):
         monkeypatch.setattr(module, name, taking)
-    for module in (table1_text, xieliu2007_text, minnis_text):
+    for module in (table1, xieliu2007_text, minnis_2000):
         monkeypatch.setattr(module, "table", lambda figures: figures["stamp"]["command"])
     monkeypatch.setitem(PARTS, "folds", replace(PARTS["folds"], run=lambda given: taking(given.corpus)))
     for name in ("hofer2008", "xieliu2007", "minnis2000"):

@@ -10,8 +10,7 @@ import pytest
 
 from cli.conftest import RunCommand
 from lipmotion.cli.installation import doctor as doctor_module
-from lipmotion.cli.installation.declared_requirements import Requirement
-from lipmotion.cli.installation.doctor import InstalledPart, doctor
+from lipmotion.cli.installation.doctor import InstalledPart, Requirement, doctor
 from lipmotion.errors import LipMotionError
 from lipmotion.extensions import install_command
 from lipmotion.speech.voices.synthesiser import SyntheticVoice

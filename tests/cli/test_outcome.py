@@ -3,7 +3,7 @@ from __future__ import annotations
 import os
 
 from cli.conftest import RunCommand, is_one_error
-from lipmotion.cli.terminal.outcome import outcome
+from lipmotion.cli.terminal.status import outcome
 from lipmotion.errors import InputError
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from lipmotion.corpora.discover import discover
-from lipmotion.corpora.grid import read_aligned_words, read_grid, words_of_name
+from lipmotion.corpora.layouts import read_aligned_words, read_grid, words_of_name
 from lipmotion.errors import InputError
 
 

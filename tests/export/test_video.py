@@ -8,8 +8,7 @@ import pytest
 
 from lipmotion.errors import ExportError
 from lipmotion.export import write_mp4
-from lipmotion.export.video import TAGS, frame_rate
-from lipmotion.export.xmp import LARGEST_PACKET_BYTES
+from lipmotion.export.video import LARGEST_PACKET_BYTES, TAGS, frame_rate
 from lipmotion.types import Audio
 
 RATES = [24, 29.97, 60]

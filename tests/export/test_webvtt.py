@@ -7,9 +7,7 @@ from pathlib import Path
 import pytest
 
 from lipmotion.corpora.labels import read_labels
-from lipmotion.export.textgrid import write_textgrid
-from lipmotion.export.timed_labels import write_labels
-from lipmotion.export.webvtt import write_webvtt
+from lipmotion.export.timed_labels import write_labels, write_textgrid, write_webvtt
 from lipmotion.types import Span, Timeline, Unit
 
 ROWS = [(0.0, 0.31, "sil", ""), (0.31, 0.4, "m", "ma"), (0.4, 0.52, "aa", "ma"), (0.52, 3599.9996, "dh", "r&d <the>")]

@@ -6,7 +6,7 @@ import pytest
 
 from lipmotion.errors import ExportError
 from lipmotion.export import write_mp4
-from lipmotion.export.xmp import LARGEST_PACKET_BYTES, XMP_UUID, append_xmp
+from lipmotion.export.video import LARGEST_PACKET_BYTES, XMP_UUID, append_xmp
 from lipmotion.types import Audio
 
 

@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
 from lipmotion.faces import Staging, face_named, staged_face
-from lipmotion.faces.portrait.layered import MOUTHS, chosen_mouths
+from lipmotion.faces.portrait.layered import MOUTHS, chosen_mouths, painted
 from lipmotion.faces.portrait.pose import MouthPose
 from lipmotion.faces.portrait.svg_document import drawing_of
-from lipmotion.faces.portrait.svg_painting import painted
 from lipmotion.testing import check_face
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 

@@ -6,13 +6,11 @@ import pytest
 from lipmotion.articulation.liveliness import UpperFace
 from lipmotion.faces import base
 from lipmotion.faces.base import DrawsPlanes, Face, Staging
-from lipmotion.faces.portrait.cartoon import CARTOON
-from lipmotion.faces.portrait.man import MAN
+from lipmotion.faces.portrait.characters import CARTOON, MAN, WOMAN
 from lipmotion.faces.portrait.movement import HeadPlacement
 from lipmotion.faces.portrait.planar import FROM_RGB, OFFSETS, PlanarRasteriser, planes_of
 from lipmotion.faces.portrait.portrait_rasteriser import FacePose, Rasteriser
 from lipmotion.faces.portrait.pose import MouthPose
-from lipmotion.faces.portrait.woman import WOMAN
 from lipmotion.faces.registry import staged_face
 from lipmotion.types import Channel, Motion, Timeline
 

@@ -5,11 +5,11 @@ import pytest
 
 from lipmotion.errors import InputError
 from lipmotion.faces import FACES, Staging, staged_face
+from lipmotion.faces.portrait.characters import WOMAN
 from lipmotion.faces.portrait.movement import NECK_END, NECK_TOP, PIVOT_Y, HeadField, HeadPlacement, grid
 from lipmotion.faces.portrait.portrait_rasteriser import FacePose, Rasteriser
 from lipmotion.faces.portrait.pose import MouthPose
 from lipmotion.faces.portrait.view import View
-from lipmotion.faces.portrait.woman import WOMAN
 from lipmotion.testing import check_face
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
 

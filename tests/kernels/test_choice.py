@@ -1,5 +1,6 @@
 import sys
 
+import numpy as np
 import pytest
 
 from children import run_child
@@ -31,6 +32,32 @@ def test_little_work_again_and_again_is_compiled_in_the_end():
 def test_all_work_is_compiled_where_numba_is_loaded(monkeypatch):
     monkeypatch.setitem(sys.modules, "numba", None)
     assert choice.compiled_pays(0.0)
+
+
+def test_without_numba_a_picture_is_drawn_by_python(tmp_path):
+    code = """
+import sys
+if sys.argv[2] == "none":
+    sys.modules["numba"] = None  # importing it fails
+import numpy as np
+from lipmotion.kernels.pixels.raster import draw
+from lipmotion.kernels.pixels.shading import shade
+random = np.random.default_rng(0)
+picture, behind = np.zeros((12, 16, 3), np.uint8), np.zeros((12, 16, 3), np.float32)
+points, finishes = random.uniform([0, 0, 0], [16, 12, 1], (9, 3)), random.uniform(0, 1, (2, 7))
+given = (random.normal(size=shape) for shape in ((9, 3), (9, 3), 3, (9, 3), (9, 2), (9, 3)))
+light = shade(*given, random.integers(0, 2, 9), finishes, random.uniform(0, 1, (6, 6)))
+triangles = random.integers(0, 9, (20, 3)).astype(np.int32)
+draw(points, np.abs(light), triangles, (0, 0, 16, 12), behind, np.arange(256).astype(np.uint8), picture)
+np.savez(sys.argv[1], light, picture)
+"""
+    told = [
+        run_child([sys.executable, "-c", code, tmp_path / f"{n}.npz", n], check=True).stderr for n in ("none", "it")
+    ]
+    assert ["numba" in each for each in told] == [True, False]
+    python, compiled = (np.load(tmp_path / f"{name}.npz") for name in ("none", "it"))
+    assert python["arr_1"].any()
+    assert all(np.array_equal(python[name], compiled[name]) for name in python.files)
 
 
 def test_without_numba_all_work_is_numpys():

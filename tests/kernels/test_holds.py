@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lipmotion.kernels.sequences.holds import best_holds
+from lipmotion.articulation.delivery import best_holds
 
 
 def error(rows: NDArray[np.float64], borders: list[int], fixed: list[int]) -> float:

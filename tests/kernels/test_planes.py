@@ -1,11 +1,12 @@
 import numpy as np
 import pytest
 
-from lipmotion.kernels.choice import numba_works
-from lipmotion.kernels.pixels import painting, planes
-from lipmotion.kernels.pixels.planes import Box, EyeLayers, StillLayers
+pytest.importorskip("numba")
 
-needs_numba = pytest.mark.skipif(not numba_works(), reason="numba is not installed")
+from lipmotion.kernels.compiled import planes
+from lipmotion.kernels.compiled.planes import Box, EyeLayers, StillLayers
+from lipmotion.kernels.pixels import painting
+
 HEIGHT, WIDTH = 60, 84
 
 
@@ -20,7 +21,7 @@ def packed(pictures: np.ndarray, box: Box | None = None) -> np.ndarray:
     """Return planes packed, all but the first one as means."""
     result = np.zeros(pictures.shape, np.uint32)
     for number, plane in enumerate(pictures):
-        planes.pack(plane, box or Box(0, 0, *plane.shape), result[number], mean=number > 0)
+        planes.pack(plane, *(box or Box(0, 0, *plane.shape)), number > 0, result[number])
     return result
 
 
@@ -46,46 +47,41 @@ def eyes(rng: np.random.Generator, height: int, width: int) -> EyeLayers:
     return EyeLayers(layer(0.7), opening, layer(0.5), layer(1))
 
 
-def test_a_packed_pixel_is_followed_by_its_neighbours(monkeypatch):
-    monkeypatch.setattr(planes, "compiled_pays", lambda _: False)
+def test_a_packed_pixel_is_followed_by_its_neighbours():
     plane = np.arange(12, dtype=np.uint8).reshape(3, 4)
     found = packed(plane[None])[0]
     assert [found[0, 1] >> bits & 255 for bits in (0, 8, 16, 24)] == [1, 2, 5, 6]
     assert [found[2, 3] >> bits & 255 for bits in (0, 8, 16, 24)] == [11, 11, 11, 11]  # the last pixel goes on
 
 
-def test_a_warp_of_planes_is_that_of_pictures(monkeypatch):
-    monkeypatch.setattr(planes, "compiled_pays", lambda _: False)
-    monkeypatch.setattr(painting, "compiled_pays", lambda _: False)
+def test_a_warp_of_planes_is_that_of_pictures():
     rng = np.random.default_rng(3)
     pictures = rng.integers(0, 256, (3, HEIGHT, WIDTH), np.uint8)
     x, y = shifts(rng, HEIGHT, WIDTH)
     target, expected = empty_target(), np.empty((HEIGHT, WIDTH, 4), np.uint8)
-    planes.warp_planes(packed(pictures), Box(0, 0, HEIGHT, WIDTH), x, y, target)
+    planes.warp_planes(packed(pictures), 0, 0, HEIGHT, WIDTH, x, y, *target)
     source = np.dstack([*pictures, pictures[0]]).astype(np.uint16)
     painting.warp_bytes(source, x, y, planes.STEP, expected)
     # warp_bytes rounds shares of pairs of pixels to 1/256 as well: four of them, of up to 255 levels
     assert np.abs(target[0].astype(int) - expected[..., 0]).max() <= 2
 
 
-def test_colours_have_half_the_pixels_and_are_means(monkeypatch):
-    monkeypatch.setattr(planes, "compiled_pays", lambda _: False)
+def test_colours_have_half_the_pixels_and_are_means():
     rng = np.random.default_rng(4)
     pictures, target = rng.integers(0, 256, (3, HEIGHT, WIDTH), np.uint8), empty_target()
     still = np.zeros((HEIGHT // planes.STEP + 2, WIDTH // planes.STEP + 2))
-    planes.warp_planes(packed(pictures), Box(0, 0, HEIGHT, WIDTH), still, still, target)
+    planes.warp_planes(packed(pictures), 0, 0, HEIGHT, WIDTH, still, still, *target)
     means = pictures.reshape(3, HEIGHT // 2, 2, WIDTH // 2, 2).mean(axis=(2, 4))
     assert np.array_equal(target[0][:-1, :-1], pictures[0, :-1, :-1])
     for number in (1, 2):
         assert np.abs(target[number][:-1, :-1] - means[number, :-1, :-1]).max() <= 0.51
 
 
-def test_only_the_box_is_changed(monkeypatch):
-    monkeypatch.setattr(planes, "compiled_pays", lambda _: False)
+def test_only_the_box_is_changed():
     rng = np.random.default_rng(5)
     pictures, target = rng.integers(1, 256, (3, HEIGHT, WIDTH), np.uint8), empty_target()
     box = Box(8, 12, 40, 72)
-    planes.warp_planes(packed(pictures), box, *shifts(rng, 32, 60), target)
+    planes.warp_planes(packed(pictures), *box, *shifts(rng, 32, 60), *target)
     assert target[0][box.area].all()
     outside = target[0].copy()
     outside[box.area] = 0
@@ -95,16 +91,15 @@ def test_only_the_box_is_changed(monkeypatch):
     assert not target[1][:, 36:].any()
 
 
-def test_skin_at_rest_lies_between_its_layers(monkeypatch):
-    monkeypatch.setattr(planes, "compiled_pays", lambda _: False)
+def test_skin_at_rest_lies_between_its_layers():
     rng = np.random.default_rng(6)
     around, still = layers(rng, 24, 40), np.zeros((4, 6))
     skin = rng.integers(0, 100, (5, 24, 40), np.uint8)
     target = np.zeros((3, 30, 50), np.uint8)
     numbers = np.zeros(skin.shape, np.uint32)
     for plane, into in zip(skin, numbers, strict=True):
-        planes.pack(plane, Box(0, 0, 24, 40), into)
-    planes.lay_skin(numbers, still, still, around, 2, 4, target)
+        planes.pack(plane, 0, 0, 24, 40, False, into)
+    planes.lay_skin(numbers, still, still, *around, 2, 4, target)
     cover, shadow = skin[3] / 255, skin[4] / 255
     expected = skin[:3] + (1 - cover) * (around.below + shadow * around.shade)
     expected = around.above[:3] + (1 - around.above[3]) * expected
@@ -114,39 +109,46 @@ def test_skin_at_rest_lies_between_its_layers(monkeypatch):
     assert not target[:, 26:].any()
 
 
-def test_irises_are_seen_only_between_the_lids(monkeypatch):
-    monkeypatch.setattr(planes, "compiled_pays", lambda _: False)
+def test_irises_are_seen_only_between_the_lids():
     clear, iris = np.zeros((8, 12, 4), np.float32), np.zeros((8, 12, 4), np.float32)
     white, opening = np.full_like(clear, 200), np.zeros((8, 12), np.float32)
     white[..., 3], opening[2:6], iris[:, 5] = 1, 1, (50, 60, 70, 1)
     target = np.zeros((3, 10, 20), np.uint8)
-    planes.lay_eyes(EyeLayers(white, opening, clear, iris), -2.0, 0.0, 1, 3, target)
+    planes.lay_eyes(*EyeLayers(white, opening, clear, iris), np.float32(-2), np.float32(0), 1, 3, target)
     assert target[:, 1 + 3, 3 + 7].tolist() == [50, 60, 70]  # two pixels to the right of where it is at rest
     assert (target[:, 1 + 1, 3:15] == 200).all()
     assert not target[:, 9].any()
 
 
-@needs_numba
-@pytest.mark.parametrize("seed", range(2))
-def test_both_forms_give_the_same_bits(monkeypatch, seed):
-    results = []
-    for fast in (False, True):
-        monkeypatch.setattr(planes, "compiled_pays", lambda _, fast=fast: fast)
-        rng = np.random.default_rng(seed)
-        pictures = rng.integers(0, 256, (3, HEIGHT, WIDTH), np.uint8)
-        numbers, target = packed(pictures, Box(3, 5, HEIGHT, WIDTH - 4)), empty_target()
-        box = Box(4, 6, 50, 80)
-        planes.warp_planes(numbers, box, *shifts(rng, 46, 74), target)
-        skin, into = rng.integers(0, 100, (5, 40, 70), np.uint8), np.zeros((5, 40, 70), np.uint32)
-        skin[3, :20] = 255  # nothing but skin is seen there
-        for plane, here in zip(skin, into, strict=True):
-            planes.pack(plane, Box(0, 0, 40, 70), here)
-        planes.lay_skin(into, *shifts(rng, 40, 70), layers(rng, 40, 70), 3, 5, pictures)
-        planes.lay_eyes(eyes(rng, 15, 28), 0.3, -0.7, 9, 4, pictures)
-        layer = np.zeros((15, 28, 4), np.float32)
-        planes.to_layer(pictures, 20, 30, layer)
-        layer *= np.float32(0.7)
-        planes.from_layer(layer, 21, 33, pictures)
-        results.append((numbers, *target, layer, pictures))
-    for slow, quick in zip(*results, strict=True):
-        assert np.array_equal(slow, quick)
+def test_a_layer_goes_to_planes_and_back() -> None:
+    pictures = np.random.default_rng(7).integers(0, 256, (3, 30, 40), np.uint8)
+    layer, again = np.zeros((15, 28, 4), np.float32), np.zeros((3, 30, 40), np.uint8)
+    planes.to_layer(pictures, 4, 6, layer)
+    assert np.array_equal(layer[..., 3], np.ones((15, 28)))
+    planes.from_layer(layer * np.float32(0.998), 5, 8, again)
+    wanted = (pictures[:, 4:19, 6:34] * np.float32(0.998) + np.float32(0.5)).astype(np.uint8)
+    assert np.array_equal(again[:, 5:20, 8:36], wanted)
+    assert not again[:, :5].any()
+
+
+def test_skin_that_moves_is_a_mean_of_its_pixels_between_its_layers() -> None:
+    rng = np.random.default_rng(8)
+    around, skin = layers(rng, 40, 70), rng.integers(0, 100, (5, 40, 70), np.uint8)
+    skin[3, :20] = 255  # nothing but skin is seen there, where no hair is
+    into, target, x, y = np.zeros((5, 40, 70), np.uint32), np.zeros((3, 50, 80), np.uint8), 1.25, -2.5
+    for plane, here in zip(skin, into, strict=True):
+        planes.pack(plane, 0, 0, 40, 70, False, here)
+    grid = np.ones((6, 10))
+    planes.lay_skin(into, x * grid, y * grid, *around, 3, 5, target)
+    rows, columns = np.arange(4, 36), np.arange(2, 66)
+    share = np.array([[0.5 * 0.75, 0.5 * 0.25]])[0]
+    moved = sum(
+        weight * skin[:, rows[:, None] - 3 + down, columns[None] + 1 + right].astype(float)
+        for down in (0, 1)
+        for right, weight in enumerate(share)
+    )
+    cover, shadow = moved[3] / 255, moved[4] / 255
+    inside = np.s_[:, 4:36, 2:66]
+    wanted = moved[:3] + (1 - cover) * (around.below[inside] + shadow * around.shade[inside])
+    wanted = around.above[inside][:3] + (1 - around.above[3:][inside]) * wanted
+    assert np.abs(target[:, 3 + rows[:, None], 5 + columns[None]].astype(float) - wanted).max() <= 1

@@ -3,9 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.kernels.choice import numba_works
-from lipmotion.kernels.pixels import textured
-from lipmotion.kernels.pixels.textured import CLEAR, CUT, SOLID, TexturedTriangles
+from lipmotion.kernels.pixels.textured import CLEAR, CUT, SOLID, TexturedTriangles, draw_textured
+from oracles import textured as oracle
 
 TONE = np.arange(256).astype(np.uint8)
 HEIGHT, WIDTH = 40, 56
@@ -28,23 +27,12 @@ def surface(triangles, uv, texture, *, kind=SOLID, cut=0.5, factor=1.0, row=0) -
     )
 
 
-def drawn(points, light, what, *, shine=None, area=(0, 0, WIDTH, HEIGHT), background=0.0, compiled=False):
+def drawn(points, light, what, *, shine=None, area=(0, 0, WIDTH, HEIGHT), background=0.0, draw=draw_textured):
     picture, opacity = np.full((HEIGHT, WIDTH, 3), 7, np.uint8), np.full((HEIGHT, WIDTH), 7, np.uint8)
     behind = np.full((HEIGHT, WIDTH, 3), background, np.float32)
     glare = np.zeros(np.shape(light)) if shine is None else shine
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(textured, "compiled_pays", lambda _: compiled)
-        textured.draw_textured(
-            np.asarray(points, float),
-            np.asarray(light, np.float32),
-            np.asarray(glare, np.float32),
-            what,
-            area,
-            behind,
-            TONE,
-            picture,
-            opacity,
-        )
+    lights = np.asarray(light, np.float32), np.asarray(glare, np.float32)
+    draw(np.asarray(points, float), *lights, what, area, behind, TONE, picture, opacity)
     return picture, opacity
 
 
@@ -54,9 +42,7 @@ def square(x0: float, y0: float, x1: float, y1: float, near: float = 1.0) -> lis
 
 @given(seed=st.integers(0, 2**32 - 1))
 @settings(max_examples=12)
-def test_both_forms_draw_the_same_bits(seed):
-    if not numba_works():
-        pytest.skip("numba is not installed")
+def test_every_bit_is_that_of_the_definition(seed):
     draw = np.random.default_rng(seed)
     points = draw.uniform([-9, -9, -1], [WIDTH + 9, HEIGHT + 9, -0.2], (40, 3))
     points[::3, :2] = np.rint(points[::3, :2])  # edges through the middles of samples
@@ -72,8 +58,8 @@ def test_both_forms_draw_the_same_bits(seed):
         np.array([[0, 5, 7], [35, 3, 2]]),
     )
     first, second = (
-        drawn(points, light, what, shine=shine, area=(3, 5, 50, 31), background=0.3, compiled=form)
-        for form in (False, True)
+        drawn(points, light, what, shine=shine, area=(3, 5, 50, 31), background=0.3, draw=form)
+        for form in (draw_textured, oracle.draw_textured)
     )
     np.testing.assert_array_equal(first[0], second[0])
     np.testing.assert_array_equal(first[1], second[1])

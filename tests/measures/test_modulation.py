@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from lipmotion.measures.modulation import modulation_distance_db
+from lipmotion.measures.curves import modulation_distance_db
 
 TIME_S = np.arange(200) / 25
 WAVES = np.stack([np.sin(2 * np.pi * 3 * TIME_S), np.sin(2 * np.pi * 7 * TIME_S)], axis=1)

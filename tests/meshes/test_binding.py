@@ -9,7 +9,6 @@ import pytest
 
 from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.kernels.pixels.skinning import skinned
 from lipmotion.meshes.files.binding_files import (
     load_binding,
     read_points,
@@ -19,7 +18,7 @@ from lipmotion.meshes.files.binding_files import (
     write_weights,
 )
 from lipmotion.meshes.fitting.lip_placement import placed_by_points, surface_of_named
-from lipmotion.meshes.model.binding import MOST_WEIGHTS, bind, painted
+from lipmotion.meshes.model.binding import MOST_WEIGHTS, bind, painted, skinned
 from meshes.heads import SEAM, SIZE, head, lip_points
 from oracles.skinning import skinned_vertex_by_vertex
 

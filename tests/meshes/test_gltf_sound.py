@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from lipmotion.meshes.files.gltf_sound import named_sound, sound_extras
+from lipmotion.meshes.files.gltf_writer import named_sound, sound_extras
 
 
 @pytest.mark.parametrize(

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from lipmotion.meshes.files.gltf_scene import read_gltf
-from lipmotion.meshes.fitting.driven import driven_character
+from lipmotion.meshes.fitting.driven import JAW_OPEN, driven_character, with_jaw
 from lipmotion.meshes.model.bones import HEAD, JAW, LEFT_EYE, NECK, RIGHT_EYE, Bone, bone_kind, merged_bones
-from lipmotion.meshes.model.jaw_bone import JAW_OPEN, with_jaw
 from meshes.gltf import POSITIONS, document, glb
 from meshes.heads import SEAM, head, shaped, write_glb
 from meshes.speech import motion, units

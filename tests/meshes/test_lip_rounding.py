@@ -2,10 +2,9 @@ import numpy as np
 import pytest
 
 from lipmotion.articulation.lip_points import LEFT_CORNER, RIGHT_CORNER, mouth_template
-from lipmotion.meshes.fitting.lip_rounding import rounded_weights
 from lipmotion.meshes.fitting.point_motion import point_motion
 from lipmotion.meshes.fitting.reference_mouth import arkit_mouth
-from lipmotion.meshes.fitting.shape_weights import shape_weights
+from lipmotion.meshes.fitting.shape_weights import rounded_weights, shape_weights
 from meshes.speech import motion, units
 
 TIME_S = np.arange(201) / 100

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.faces.head.head_blendshapes import head_mesh
-from lipmotion.faces.head.stage import figure
+from lipmotion.faces.head.stage import figure, head_mesh
 from lipmotion.meshes.files.gltf_scene import read_gltf
 from lipmotion.meshes.files.obj_files import read_obj, read_obj_folder
 from lipmotion.meshes.model.mesh import BLEND, MASK, OPAQUE

@@ -5,7 +5,7 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 
 from lipmotion.errors import ModelFormatError
-from lipmotion.measures.modulation import modulation_distance_db
+from lipmotion.measures.curves import modulation_distance_db
 from lipmotion.motion.modulation_filter import (
     HOLD_FRAMES,
     MODULATION,

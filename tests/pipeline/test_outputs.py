@@ -15,13 +15,11 @@ from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs import output
 from lipmotion.pipeline.outputs.cues import CueOutput, cues, write_cues
 from lipmotion.pipeline.outputs.drawn_video import PicturesOutput, VideoOutput
-from lipmotion.pipeline.outputs.label_files import LabelOutput
 from lipmotion.pipeline.outputs.motion_files import MotionOutput
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, checked_outputs, plan
 from lipmotion.pipeline.outputs.scenes import SceneOutput
 from lipmotion.pipeline.outputs.shown_faces import shown_face
-from lipmotion.pipeline.outputs.sound_files import SoundOutput
-from lipmotion.pipeline.outputs.write import write
+from lipmotion.pipeline.outputs.write import LabelOutput, SoundOutput, write
 from lipmotion.types import Generation
 
 

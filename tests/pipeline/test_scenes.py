@@ -13,9 +13,8 @@ from lipmotion.articulation.delivery import Delivery, closed_times
 from lipmotion.articulation.expression import mood_table, with_moods
 from lipmotion.errors import InputError
 from lipmotion.faces import Staging
-from lipmotion.faces.head.head_blendshapes import head_mesh
 from lipmotion.faces.head.lips import VISIBLE_RINGS
-from lipmotion.faces.head.stage import figure
+from lipmotion.faces.head.stage import figure, head_mesh
 from lipmotion.meshes.files.gltf_accessors import GltfArrays
 from lipmotion.meshes.files.gltf_container import read_gltf_document
 from lipmotion.meshes.fitting.driven import driven_character

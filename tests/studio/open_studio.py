@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import shutil
 import time
 from collections.abc import Iterator
@@ -15,10 +16,11 @@ from lipmotion.studio.application import studio_application
 from lipmotion.studio.folder import ProjectFolder, opened_folder
 from lipmotion.studio.known_model import KnownModel
 from lipmotion.studio.studio import Studio
-from study.asgi import Application, Reply, ask
+from study.asgi import Application, Reply, answered, ask
 
 TOY_DIGEST = "0" * 64
 HOST, TOKEN = "127.0.0.1:8000", "a-token"
+SENT = {"host": HOST, TOKEN_HEADER: TOKEN}
 PATIENCE_S = 120.0
 
 
@@ -31,8 +33,17 @@ class OpenStudio(NamedTuple):
 
     def ask(self, path: str, content: Any = None, **headers: str) -> Reply:
         """Return the reply to a request of the page."""
-        sent = {"host": HOST, TOKEN_HEADER: TOKEN} | {name.replace("_", "-"): value for name, value in headers.items()}
+        sent = SENT | {name.replace("_", "-"): value for name, value in headers.items()}
         return ask(self.application, path, content, headers=sent)
+
+    def ask_together(self, *requests: tuple[str, Any]) -> list[Reply]:
+        """Return the replies to requests that are sent at the same time."""
+
+        async def replies() -> list[Reply]:
+            sent = (answered(self.application, path, content, headers=SENT) for path, content in requests)
+            return list(await asyncio.gather(*sent))
+
+        return asyncio.run(replies())
 
     def ready(self, number: int = 1) -> dict[str, Any]:
         """Return the state of a line once it is understood."""
@@ -43,6 +54,14 @@ class OpenStudio(NamedTuple):
                 return dict(state)
             time.sleep(0.02)
         raise AssertionError(f"line {number} is not ready after {PATIENCE_S} s")
+
+    def row(self, number: int = 1) -> dict[str, Any]:
+        """Return what the list says of a line."""
+        return self.studio.row(self.folder.line(number))
+
+    def change(self, what: str, number: int = 1, **content: Any) -> Reply:
+        """Return the reply to a change of a line by somebody who sees it as it is."""
+        return self.ask(f"/api/lines/{number}/{what}", {"revision": self.row(number)["revision"], **content})
 
     def edit(self, *steps: str, **more: Any) -> Reply:
         """Return the reply to edits of the first line as it is."""

@@ -204,18 +204,18 @@ def test_why_and_doubts(studio: OpenStudio) -> None:
 
 
 def test_a_line_is_marked_exported_and_then_changed(studio: OpenStudio) -> None:
-    assert studio.ask("/api/lines/1/mark", {"mark": "approved"}).content["mark"] == "approved"
-    assert studio.ask("/api/lines/1/mark", {"mark": "perhaps"}).status == 422
-    assert studio.studio.row(1)["marked"] == studio.studio.row(1)["edits_digest"]
+    assert studio.change("mark", mark="approved").content["mark"] == "approved"
+    assert studio.change("mark", mark="perhaps").status == 422
+    assert studio.row()["marked"] == studio.row()["edits_digest"]
     studio.edit("phone 3 is p")
-    assert studio.studio.row(1)["marked"] != studio.studio.row(1)["edits_digest"] == studio.ready()["edits_digest"]
+    assert studio.row()["marked"] != studio.row()["edits_digest"] == studio.ready()["edits_digest"]
     done = studio.ask("/api/export", {"files": [".csv"], "only": "approved"}).content
     assert (done["exported"][0]["files"], done["failed"]) == (["exports/line.csv"], [])
     record = studio.folder.line(1).exports[-1]
     assert read_edits(studio.folder.path / record.edits).edits.sentences == ("phone 3 is p",)
-    assert studio.studio.row(1)["exported"] == "yes"
+    assert studio.row()["exported"] == "yes"
     studio.edit("phone 3 is m")
-    assert studio.studio.row(1)["exported"] == "changed"
+    assert studio.row()["exported"] == "changed"
     wrongs: tuple[dict[str, object], ...] = (
         {"files": ["/../x.csv"]},
         {"files": []},
@@ -287,7 +287,7 @@ def test_what_is_dropped_is_read_by_the_same_readers(studio: OpenStudio) -> None
     assert (state["status"], "recording" in state["error"], state["transcript"]) == ("failed", True, "mama papa")
     assert (studio.folder.path / "sounds" / "no sound.wav").read_bytes() == b"no sound"
     assert studio.ask(f"/api/lines/{reply.content['id']}/doubts").status == 422
-    assert studio.ask(f"/api/lines/{reply.content['id']}/remove", {}).status == 200
+    assert studio.change("remove", reply.content["id"]).status == 200
     assert studio.ask("/api/project").content["count"] == 1
 
 
@@ -330,20 +330,20 @@ def test_lines_that_are_not_used_are_closed_and_open_again_as_they_were(
     studio: OpenStudio, toy_speech: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("lipmotion.studio.desk.MOST_OPEN", 1)
-    studio.edit("phone 3 is p")
+    edited = studio.edit("phone 3 is p").content
     reply = studio.ask("/api/lines?name=other.wav", toy_speech.read_bytes())
     other = reply.content["id"]
     assert studio.ready(other)["status"] == "ready"
     assert studio.studio.desk.work(1) is None
     again = studio.ready()
-    assert (again["steps"], again["revision"]) == (["phone 3 is p"], 0)
+    assert (again["steps"], again["revision"]) == (["phone 3 is p"], edited["revision"])
     assert studio.studio.desk.work(other) is None
     assert studio.ask("/api/understand", {"lines": "all"}).content["waiting"] == 0
     assert studio.ask("/api/understand", {"lines": [99]}).status == 404
-    said = studio.ask(f"/api/lines/{other}/transcript", {"text": "mama"}).content
+    said = studio.change("transcript", other, text="mama").content
     assert said["status"] in ("waiting", "working")
     assert {word["label"] for word in studio.ready(other)["words"]} == {"mama"}
-    assert studio.ask(f"/api/lines/{other}/remove", {}).status == 200
+    assert studio.change("remove", other).status == 200
 
 
 @pytest.mark.long
@@ -444,10 +444,10 @@ def test_versions_are_kept_shown_and_gone_back_to(studio: OpenStudio) -> None:
     """What was there when one goes back is kept, too."""
     assert studio.edit("pin opening 0.3 at 0.5").status == 200
     first = studio.ready()
-    assert studio.ask("/api/lines/1/versions", {}).content["versions"] == [
+    assert studio.change("versions").content["versions"] == [
         {"name": "version-1", "number": 1, "edits": first["undo"], "digest": first["edits_digest"]}
     ]
-    assert len(studio.ask("/api/lines/1/versions", {}).content["versions"]) == 1  # there is one of these edits
+    assert len(studio.change("versions").content["versions"]) == 1  # there is one of these edits
     then = studio.ask("/api/lines/1/motion").body
     assert studio.edit("phone 3 is p").status == 200
     now = studio.ask("/api/lines/1/motion").body
@@ -462,9 +462,9 @@ def test_versions_are_kept_shown_and_gone_back_to(studio: OpenStudio) -> None:
     assert studio.ask("/api/lines/1/motion?by=version-2").body == now
     read = project_from(json.loads((studio.folder.path / "project.json").read_text(encoding="utf-8")))
     assert [len(each.steps) for each in read.lines[1].versions] == [first["undo"], first["undo"] + 1]
-    assert studio.ask("/api/lines/1/versions/forget", {"version": "version-2"}).content["versions"][-1]["number"] == 1
+    assert studio.change("versions/forget", version="version-2").content["versions"][-1]["number"] == 1
     for wrong in ("version-2", "other", ""):
-        assert studio.ask("/api/lines/1/versions/forget", {"version": wrong}).status == 422
+        assert studio.change("versions/forget", version=wrong).status == 422
     old = {"revision": studio.ready()["revision"] - 1, "version": "version-1"}
     assert studio.ask("/api/lines/1/versions/back", old).status == 409
 
@@ -474,9 +474,9 @@ def _voted(studio: OpenStudio) -> None:
     assert studio.ask("/api/project").content["forms"]["against"] == f"toy ({OTHER_DIGEST[:8]})"
 
     def vote(better: int | None, *shown: dict[str, str]) -> Reply:
-        return studio.ask("/api/lines/1/votes", {"shown": list(shown), "better": better})
+        return studio.change("votes", shown=list(shown), better=better)
 
-    (version,) = studio.ask("/api/lines/1/versions", {}).content["versions"]
+    (version,) = studio.change("versions").content["versions"]
     now, other, kept = {"by": ""}, {"by": "other"}, {"by": version["name"]}
     assert vote(0, now, kept).status == 422  # the same motion
     assert vote(1, now, other).content == {"better": [0, 1], "neither": 0}
@@ -489,7 +489,7 @@ def _voted(studio: OpenStudio) -> None:
     assert [each.model for each in votes[1].shown] == [OTHER_DIGEST, TOY_DIGEST]
     assert [each.edits for each in votes[3].shown] == [studio.ready()["edits_digest"], version["digest"]]
     for wrong in ([now], [now, now], [now, {"by": "another"}], [now, {"by": "version-2"}], [now, "other"]):
-        assert studio.ask("/api/lines/1/votes", {"shown": wrong, "better": 0}).status == 422
+        assert studio.change("votes", shown=wrong, better=0).status == 422
     for better in (2, "toy", -1):
-        assert studio.ask("/api/lines/1/votes", {"shown": [now, other], "better": better}).status == 422
+        assert studio.change("votes", shown=[now, other], better=better).status == 422
     assert len(read_votes(studio.folder.path / "votes.json")) == 4

@@ -410,17 +410,49 @@ def test_a_line_that_is_opened_while_the_timeline_is_hidden_is_shown_later(page:
 
 
 def test_what_another_window_did_is_shown(page: Page) -> None:
+    """What was not made can be made then; words that were typed stay in their field; a mark is refused, too."""
     before = page.steps
-    page.window.run_until_done(
-        """const done = arguments[0], { server, store } = studio;
-        const content = { revision: store.line.revision, steps: ["set intensity 1.1"] };
-        server.told(`lines/${store.lineId}/edits`, content).then(() => done());"""
-    )
+
+    def elsewhere(what: str, content: str) -> None:
+        page.window.run_until_done(
+            f"""const done = arguments[0], {{ server, store: {{ line, lineId }} }} = studio;
+            server.told(`lines/${{lineId}}/{what}`, {{ revision: line.revision, {content} }}).then(() => done());"""
+        )
+
+    elsewhere("edits", "steps: ['set intensity 1.1']")
     page.window.click("#tab-edit")
     page.window.click("#mood-set")
     wait_until(lambda: "another window" in page.window.text("#message"), LIMIT_S)
     page.ready()
     assert page.steps == [*before, "set intensity 1.1"]
+    page.window.click("#make-again")
+    wait_until(lambda: len(page.steps) == len(before) + 2, LIMIT_S)
+    page.ready()
+    elsewhere("mark", "mark: 'redo'")
+    page.window.run("studio.leave(); studio.leave(); document.getElementById('transcript').value += ' now'")
+    page.window.click("#align")
+    wait_until(lambda: "another window" in page.window.text("#message"), LIMIT_S)
+    page.ready()
+    assert page.of("document.getElementById('transcript').value").endswith(" now")
+    assert len(page.steps) == len(before) + 2
+    elsewhere("undo", "count: 2")
+    page.window.click("#approve")
+    wait_until(lambda: "another window" in page.window.text("#message"), LIMIT_S)
+    page.ready()
+    assert (page.steps, page.of("studio.store.lines[0].mark")) == (before, "redo")
+
+
+def test_damaged_edits_are_restored(page: Page) -> None:
+    page.edit(lambda: page.window.click("#mood-set"), r"mood \S+ at \S+")
+    steps, (file,) = page.steps, page.project.glob("edits/*.edits.json")
+    file.write_text("{", encoding="utf-8")
+    page.window.run("studio.open(studio.store.lineId, true)")
+    wait_until(lambda: page.of("studio.store.line?.status") == "failed", LIMIT_S)
+    assert "copies" in page.window.text("#cover")
+    page.window.click("#restore")
+    page.ready()
+    assert page.steps == steps
+    assert [each.read_text(encoding="utf-8") for each in page.project.glob("edits/*.damaged-*")] == ["{"]
 
 
 def test_ten_thousand_lines_scroll(page: Page) -> None:

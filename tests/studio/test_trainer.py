@@ -86,7 +86,7 @@ def test_a_voice_is_trained_measured_used_and_taken_back(studio: OpenStudio) -> 
     after = studio.ready()
     assert (after["steps"], after["phones"][4:]) == (["phone 3 is p"], state["phones"][4:])
     assert studio.ask("/api/lines/1/motion").body != before
-    assert studio.studio.row(1)["exported"] == "changed"
+    assert studio.row()["exported"] == "changed"
     assert studio.folder.project.model == "voices/Me.lipmotion"
 
 

@@ -22,7 +22,12 @@ class Reply(NamedTuple):
         return json.loads(self.body)
 
 
-def ask(
+def ask(application: Application, path: str, content: Any = None, **more: Any) -> Reply:
+    """Send one request and return the reply; ``content`` is sent as JSON, bytes as they are; more: as ``answered``."""
+    return asyncio.run(answered(application, path, content, **more))
+
+
+async def answered(
     application: Application,
     path: str,
     content: Any = None,
@@ -31,7 +36,7 @@ def ask(
     token: str = "",
     headers: dict[str, str] | None = None,
 ) -> Reply:
-    """Send one request and return the reply; ``content`` is sent as JSON, bytes as they are."""
+    """Return the reply to a request: several may be on their way at the same time."""
     body = content if isinstance(content, bytes) else b"" if content is None else json.dumps(content).encode()
     sent = {"content-type": "application/json"} if content is not None else {}
     sent |= {"authorization": f"Bearer {token}"} if token else {}
@@ -59,7 +64,7 @@ def ask(
     async def send(message: dict[str, Any]) -> None:
         messages.append(message)
 
-    asyncio.run(application(scope, receive, send))
+    await application(scope, receive, send)
     start = next(message for message in messages if message["type"] == "http.response.start")
     parts = [message.get("body", b"") for message in messages if message["type"] == "http.response.body"]
     return Reply(start["status"], {k.decode(): v.decode() for k, v in start["headers"]}, b"".join(parts))

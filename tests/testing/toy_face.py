@@ -21,8 +21,7 @@ from lipmotion.errors import InputError
 from lipmotion.faces.filmed.face import FilmedFace, SpokenTake, StoredBackground
 from lipmotion.speech.sound.pauses import STEP_S, levels_db
 from lipmotion.storage.coded_video import encode_video
-from lipmotion.testing.toy import CAMERA_HZ, ToySentence, toy_motion, toy_sentences
-from lipmotion.testing.toy_mouth import INNER_WIDTH, INSIDE, LIPS, SKIN
+from lipmotion.testing.toy import CAMERA_HZ, INNER_WIDTH, INSIDE, LIPS, SKIN, ToySentence, toy_motion, toy_sentences
 from lipmotion.types import Audio, Motion
 
 Array = NDArray[np.float64]

@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.units import Lexicon, spelling_network
-from lipmotion.units.spelling_network import network_pronunciation
+from lipmotion.units import Lexicon
+from lipmotion.units import lexicon as spelling_network
+from lipmotion.units.lexicon import network_pronunciation
 
 
 def test_a_made_up_word_is_read_as_people_read_it() -> None:

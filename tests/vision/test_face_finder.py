@@ -8,8 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion.errors import MissingDependencyError
-from lipmotion.vision import face_finder
-from lipmotion.vision.face_finder import FaceFinder, parts
+from lipmotion.vision import mediapipe as face_finder
+from lipmotion.vision.mediapipe import FaceFinder, parts
 
 Box = tuple[float, float, float, float]  # left, top, side, score, px of a picture of 1280 × 720
 

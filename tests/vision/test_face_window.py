@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lipmotion.vision.face_window import REACH, SIZE_PX, FaceWindow, WindowedMesh
+from lipmotion.vision.face_follower import REACH, SIZE_PX, FaceWindow, WindowedMesh
 from lipmotion.vision.trackers import FaceBox, LandmarkTracker
 
 pytest.importorskip("cv2")

@@ -12,9 +12,8 @@ import pytest
 from lipmotion.errors import InputError
 from lipmotion.extensions import GROUPS
 from lipmotion.pipeline.corpus.prepare import prepare
-from lipmotion.vision.face_finder import FaceFinder
 from lipmotion.vision.landmarks import EYE_CORNERS, TRACKED_POINTS
-from lipmotion.vision.mediapipe import MediaPipe
+from lipmotion.vision.mediapipe import FaceFinder, MediaPipe
 from lipmotion.vision.track import track
 from lipmotion.vision.trackers import TRACKERS, LandmarkTracker, tracker_named
 from vision.scripted import NoFinder

@@ -59,7 +59,7 @@ def _run(words: Sequence[str], stopper: Stopper, events: Events) -> int:
         discard_pending_output()
     except Exception as error:
         stopper.check()  # interrupted work may fail in any way
-        from lipmotion.cli.terminal.outcome import outcome
+        from lipmotion.cli.terminal.status import outcome
 
         known = outcome(error)
         stopper.settle()
@@ -69,7 +69,7 @@ def _run(words: Sequence[str], stopper: Stopper, events: Events) -> int:
         code, reason = known
         return _report_failure(events, code, f"error: {reason}")
     except SystemExit as end:  # argparse: help, version, a wrong command line; or an extension
-        from lipmotion.cli.terminal.outcome import outcome
+        from lipmotion.cli.terminal.status import outcome
 
         known = outcome(end)
         stopper.settle()

@@ -17,7 +17,7 @@ READERS: Registry[CorpusReader] = Registry(
     "corpus reader",
     "lipmotion.corpus_readers",
     {
-        "grid": "lipmotion.corpora.grid:read_grid",
+        "grid": "lipmotion.corpora.layouts:read_grid",
         "facegood": "lipmotion.corpora.facegood:read_facegood",
         "vocaset": "lipmotion.corpora.vocaset:read_vocaset",
         "layouts": "lipmotion.corpora.layouts:read_layouts",

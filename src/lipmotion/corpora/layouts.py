@@ -6,17 +6,109 @@ A new corpus is a new row of ``LAYOUTS``.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from lipmotion.corpora import grid
 from lipmotion.corpora.folder import files_in, gathered
 from lipmotion.corpora.labels import labels_beside, read_labels
 from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording, video_files
-from lipmotion.corpora.splits import LISTS
+from lipmotion.corpora.splits import LISTS, assign_splits
+from lipmotion.errors import InputError, shortened
 from lipmotion.storage.files import read_text_file
 from lipmotion.units import words_of
+
+KIND = "GRID corpus"
+RIGHTS = {
+    "licence": "CC BY 4.0",
+    "attribution": "GRID corpus (Cooke, Barker, Cunningham, Shao 2006), CC BY 4.0",
+}
+
+SILENCES = frozenset({"sil", "sp"})
+"""Labels of a word-time file that are not words."""
+WORD = re.compile(r"[^\W\d_]+(?:['-][^\W\d_]+)*")
+LARGEST_ALIGNMENT_BYTES = 1 << 16
+"""Most bytes of a word-time file; GRID's have a hundred."""
+
+COMMANDS = {"b": "bin", "l": "lay", "p": "place", "s": "set"}
+COLOURS = {"b": "blue", "g": "green", "r": "red", "w": "white"}
+PREPOSITIONS = {"a": "at", "b": "by", "i": "in", "w": "with"}
+DIGITS = dict(zip("z123456789", "zero one two three four five six seven eight nine".split(), strict=True))
+ADVERBS = {"a": "again", "n": "now", "p": "please", "s": "soon"}
+NAME = re.compile(r"[blps][bgrw][abiw][a-vx-z][z1-9][anps]")
+"""A letter for each of the six words: command, colour, preposition, letter (there is no w), digit, adverb."""
+
+
+def read_grid(directory: Path) -> RecordingFolder | None:
+    """Return the recordings of one speaker's folder, or None if most videos directly in it are not named like GRID's.
+
+    directory : with clips/ or the videos themselves; align/ or .align files beside the videos; the lists of the splits
+    """
+    clips = directory / "clips"
+    files = video_files((clips if clips.is_dir() else directory).iterdir())
+    if 2 * sum(words_of_name(path.stem) is not None for path in files) <= len(files):
+        return None
+    recordings, problems, speaker = [], {}, speaker_of_folder(directory.resolve().name)
+    for path in files:
+        try:
+            recordings.append(SourceRecording(path.stem, path, _words(directory, path), rights=RIGHTS, speaker=speaker))
+        except InputError as error:
+            problems[path.stem] = str(error)
+    return assign_splits(RecordingFolder(KIND, tuple(recordings), problems), directory)
+
+
+def speaker_of_folder(folder: str) -> str:
+    """Return the speaker that a folder is named after (``s1``, ``grid-s1``), or an empty text."""
+    found = re.search(r"(?:^|[^a-z0-9])(s[1-9]\d?)$", folder.lower())
+    return found[1] if found else ""
+
+
+def words_of_name(name: str) -> tuple[str, ...] | None:
+    """Return the six words that a GRID file name spells out, or None if it is not one."""
+    if not NAME.fullmatch(name):
+        return None
+    command, colour, preposition, letter, digit, adverb = tuple(name)
+    return (
+        *(COMMANDS[command], COLOURS[colour], PREPOSITIONS[preposition]),
+        *(letter, DIGITS[digit], ADVERBS[adverb]),
+    )
+
+
+def _words(directory: Path, video: Path) -> tuple[str, ...] | None:
+    """Return the words of a video: from its word-time file, else from its name; None if neither gives them."""
+    return aligned_words(video, (directory / "align", video.parent)) or words_of_name(video.stem)
+
+
+def aligned_words(video: Path, folders: Iterable[Path]) -> tuple[str, ...] | None:
+    """Return the words of a video from the first of some folders with its word-time file, or None.
+
+    Raises InputError: as ``read_aligned_words``.
+    """
+    files = (folder / f"{video.stem}.align" for folder in folders)
+    return next((read_aligned_words(path) for path in files if path.is_file()), None)
+
+
+def read_aligned_words(path: Path) -> tuple[str, ...]:
+    """Return the words of a word-time file: lines of start, end (unit 1/25000 s) and word.
+
+    Raises InputError: not such a file, or without a word.
+    """
+    size = path.stat().st_size
+    if size > LARGEST_ALIGNMENT_BYTES:
+        raise InputError(
+            f"{path}: {size} bytes, required at most {LARGEST_ALIGNMENT_BYTES}: are they the words of one sentence?"
+        )
+    rows = [line.split() for line in path.read_text(encoding="utf-8", errors="replace").splitlines() if line.strip()]
+    for number, row in enumerate(rows, 1):
+        if len(row) != 3 or not re.fullmatch(r"[0-9]+ [0-9]+", " ".join(row[:2])):
+            raise InputError(f"{path}: line {number} is {shortened(' '.join(row))!r}; required: start end word")
+        if not WORD.fullmatch(row[2]):
+            raise InputError(f"{path}: line {number} has {shortened(row[2])!r} where its word should be")
+    words = tuple(row[2].lower() for row in rows if row[2].lower() not in SILENCES)
+    if not words:
+        raise InputError(f"{path}: holds no word; remove the file if the words are not known")
+    return words
+
 
 LRS = "LRS"
 """The kind whose clips may be longer than a sentence."""
@@ -105,7 +197,7 @@ def _grid_words(directory: Path, video: Path, said: Mapping[str, str]) -> Words 
     above = [folder for folder in video.parents if folder == directory or directory in folder.parents]
     folders = [video.parent, *(folder / "align" for folder in above)]
     folders += [folder / inner / said["speaker"] for folder in above for inner in ("align", "alignments")]
-    return grid.aligned_words(video, folders) or grid.words_of_name(video.stem)
+    return aligned_words(video, folders) or words_of_name(video.stem)
 
 
 def _crema_words(_directory: Path, _video: Path, said: Mapping[str, str]) -> Words | None:
@@ -118,11 +210,11 @@ def _tcd_words(_directory: Path, video: Path, _said: Mapping[str, str]) -> Words
     script = next((path for path in scripts if path.is_file()), None)
     if script is None:
         return None
-    lines = read_text_file(script, "script", grid.LARGEST_ALIGNMENT_BYTES).splitlines()
+    lines = read_text_file(script, "script", LARGEST_ALIGNMENT_BYTES).splitlines()
     rows = [SCRIPT_LINE.fullmatch(line.strip()) for line in lines if line.strip()]
     if not rows or not all(rows):
         return read_labels(script).words
-    spoken = [row[1] for row in rows if row and row[1].lower() not in grid.SILENCES]
+    spoken = [row[1] for row in rows if row and row[1].lower() not in SILENCES]
     return words_of(" ".join(spoken))
 
 
@@ -132,11 +224,11 @@ def _research(attribution: str) -> dict[str, str]:
 
 LAYOUTS = (
     Layout(
-        grid.KIND,
-        re.compile(rf"(?i:(?:.*[^a-z0-9])?(?P<speaker>s[1-9]\d?)/(?:.*/)?)(?P<stem>{grid.NAME.pattern})"),
+        KIND,
+        re.compile(rf"(?i:(?:.*[^a-z0-9])?(?P<speaker>s[1-9]\d?)/(?:.*/)?)(?P<stem>{NAME.pattern})"),
         "{speaker}-{stem}",
         _grid_words,
-        rights=grid.RIGHTS,
+        rights=RIGHTS,
     ),
     Layout(
         "CREMA-D",

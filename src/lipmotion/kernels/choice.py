@@ -1,10 +1,10 @@
 """The rule by which kernels choose between NumPy and their compiled form.
 
-Every kernel has a NumPy form, and most have a compiled one (``kernels.compiled``). Loading numba takes ``START_UP_S``
-in a new process, so NumPy is used until the requested work would have taken that long in all; from then on, or where
-numba is loaded already, the compiled forms are used; without numba always NumPy. So no process takes more than twice as
-long as with the better choice. The forms that are chosen between give the same bits: results do not depend on the
-history of a process.
+What a short line needs has a NumPy form, and most of it a compiled one as well (``kernels.compiled``). Loading numba
+takes ``START_UP_S`` in a new process, so NumPy is used until the requested work would have taken that long in all; from
+then on, or where numba is loaded already, the compiled forms are used; without numba always NumPy. So no process takes
+more than twice as long as with the better choice. The forms that are chosen between give the same bits: results do not
+depend on the history of a process. What draws heads, meshes and planes has the compiled form alone.
 """
 
 from __future__ import annotations

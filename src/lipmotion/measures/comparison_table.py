@@ -22,7 +22,7 @@ COLUMNS = {
 
 def comparison_table(figures: Mapping[str, Any]) -> str:
     """Return the figures of ``lipmotion.compare`` as text."""
-    lines = [f"reference: {figures['reference']}", *_sync_lines(figures)]
+    lines = [f"reference: {figures['reference']}"]
     for pair in figures["others"]:
         lines += ["", f"{pair['name']}: {pair['frames']} frames at {pair['rate_hz']:g} a second"]
         lines += [f"  {note}" for note in pair["notes"]]
@@ -32,17 +32,7 @@ def comparison_table(figures: Mapping[str, Any]) -> str:
         if "upper_face" in pair:
             deviation = figure_text(pair["upper_face"]["deviation"], "+.4f")
             lines.append(f"  upper face: deviation {deviation} over {pair['upper_face']['curves']} curves")
-        lines += _sync_lines(pair)
     return "\n".join(map(printable, lines))
-
-
-def _sync_lines(side: Mapping[str, Any]) -> list[str]:
-    """Return a line on the agreement of a video's lips with its sound, if it was computed."""
-    if "sync" not in side:
-        return []
-    sync = side["sync"]
-    found = f"confidence {sync['confidence']:.3f}, distance {sync['distance']:.3f}"
-    return [f"  lips and sound (SyncNet): {found}, sound late by {sync['late_ms']:+.0f} ms"]
 
 
 def _channel_lines(pair: Mapping[str, Any]) -> list[str]:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import CorpusError, InputError
+from lipmotion.motion.articulation import strangeness
 from lipmotion.motion.network_steps import (
     STEP,
     ConvolutionalShape,
@@ -24,7 +25,6 @@ from lipmotion.motion.network_steps import (
 from lipmotion.motion.posterior_network import PosteriorNetwork, have_posteriors
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining
 from lipmotion.motion.reliability import clearness
-from lipmotion.motion.speaker_knowledge import strangeness
 from lipmotion.stats.convolution import ConvolutionalNetwork
 from lipmotion.stats.network_training import TrainingPlan, TrainingSequence
 from lipmotion.storage.schema import POSITIVE, Arrays, ArraySpec, checked_arrays

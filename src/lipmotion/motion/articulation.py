@@ -18,11 +18,16 @@ from lipmotion.motion.closure import OPENING
 from lipmotion.motion.frame_labels import with_neighbours
 from lipmotion.motion.rest import away_from_speech, speech_intervals
 from lipmotion.motion.space import MotionSpace
-from lipmotion.motion.speaker_knowledge import strangeness
 from lipmotion.stats.delta_windows import with_dynamics
 from lipmotion.storage.schema import Arrays, ArraySpec, checked_arrays
 from lipmotion.types import EYE_DISTANCE, FRAME_RATE_HZ, Example, Timeline, Unit, frames_of
 from lipmotion.units import PHONES, SILENCE, VOWELS, is_silent, most_similar_phone, unknown_phone_message
+
+
+def strangeness(voice: float) -> float:
+    """Return how far the measures for unknown voices apply, 0 to 1; more than half for voices half known."""
+    return float(np.sqrt(1 - voice))
+
 
 Array = NDArray[np.float64]
 Context = tuple[str, str, str]

@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.kernels.sequences.banded import generate
-from lipmotion.motion.articulation import ArticulationPrior
+from lipmotion.motion.articulation import ArticulationPrior, strangeness
 from lipmotion.motion.closure import REACH_S, Closure, closable_ranges, frames_to_close, is_never_negative
 from lipmotion.motion.limits import MotionLimits
 from lipmotion.motion.modulation_filter import ModulationFilter
 from lipmotion.motion.space import MotionSpace
-from lipmotion.motion.speaker_knowledge import strangeness
 from lipmotion.motion.unknown_voice import (
     closing_reach_s,
     typical_range,

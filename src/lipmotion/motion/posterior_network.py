@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.errors import CorpusError, InputError, ModelFormatError
+from lipmotion.motion.articulation import strangeness
 from lipmotion.motion.network_steps import (
     LEAST_DEVIATION,
     STEP,
@@ -30,7 +31,6 @@ from lipmotion.motion.network_steps import (
     standard_poses,
 )
 from lipmotion.motion.predictors import Predictor, PredictorFit, PredictorTraining
-from lipmotion.motion.speaker_knowledge import strangeness
 from lipmotion.stats.convolution import ConvolutionalNetwork
 from lipmotion.stats.network_training import SequenceNetwork, TrainingPlan, TrainingSequence
 from lipmotion.stats.recurrence import RecurrentNetwork

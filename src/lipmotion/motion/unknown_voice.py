@@ -16,10 +16,10 @@ from lipmotion.motion.articulation import (
     class_means,
     dynamics_of,
     smoothed,
+    strangeness,
 )
 from lipmotion.motion.closure import OPENING, REACH_S
 from lipmotion.motion.space import MotionSpace
-from lipmotion.motion.speaker_knowledge import strangeness
 from lipmotion.types import EYE_DISTANCE, FRAME_RATE_HZ, Timeline, Unit, frames_of
 from lipmotion.units import VOWELS, is_silent
 

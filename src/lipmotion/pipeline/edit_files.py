@@ -18,7 +18,7 @@ from lipmotion.pipeline.outputs.scenes import sound_reference
 from lipmotion.pipeline.session import Session
 from lipmotion.pipeline.understand.read_request import read_request
 from lipmotion.pipeline.understand.request import SpeechRequest
-from lipmotion.storage.files import LARGEST_TEXT_BYTES, read_text_file, whole_file
+from lipmotion.storage.files import LARGEST_TEXT_BYTES, check_source, read_text_file, sha256_of, whole_file
 from lipmotion.storage.json_text import as_json_rows, from_json
 from lipmotion.storage.toml_text import read_toml
 from lipmotion.types import Generation, Outlook, Timeline, Unit
@@ -28,6 +28,7 @@ LOG = logging.getLogger("lipmotion")
 FORMAT, VERSION = "lipmotion.edits", 1
 JSON, TOML = SUFFIXES = (".json", ".toml")
 """Suffixes of files of edits."""
+DIGEST = "recording_sha256"
 HELD = ("recording", "model", "lexicon", "language", "recogniser", "speaker", "pauses", "asymmetry")
 """What of a request such a file holds; words and phones that were given are in the phones in time."""
 
@@ -46,6 +47,7 @@ class EditFile:
     units   : its phones in time before the edits, so that no recogniser changes what they mean; None: not known
     outlook : what to expect of the motion; None: not known
     undone  : edits that were taken back and can be made again, the last one that was taken back first
+    sha256  : digest of the recording's file, of which the phones are; empty: not known, as in files of earlier versions
     """
 
     edits: Edits = field(default_factory=Edits)
@@ -53,6 +55,7 @@ class EditFile:
     units: Timeline[Unit] | None = None
     outlook: Outlook | None = None
     undone: tuple[Step, ...] = ()
+    sha256: str = ""
 
     def undo(self, count: int = 1) -> EditFile:
         """Return the file with its last edits taken back. Raises InputError: there are fewer."""
@@ -75,8 +78,9 @@ class EditFile:
     def session(self, asked: SpeechRequest | None = None, *, model: Model | None = None, **more: Any) -> Session:
         """Return a session of the recording; or of a given request, with the phones of the file if it has none.
 
-        more : of ``Session``
-        Raises InputError: the file names no recording, and there is no other request. Others as ``load_model``.
+        more : of ``Session``; who gives its ``audio`` has checked whose it is
+        Raises InputError: the file names no recording, and there is no other request; or its phones are those of
+        another recording. Others as ``load_model``.
         """
         if asked is None:
             if self.named.recording is None:
@@ -88,6 +92,8 @@ class EditFile:
         if asked.units is not None or asked.transcript is not None:
             LOG.warning("the phones that were edited are not used: words or phones are given; numbers may mean others")
             return Session(asked, model=model, **more)
+        if self.sha256 and "audio" not in more and isinstance(asked.recording, str | Path):
+            check_sound(Path(asked.recording), self.sha256)
         request, lasts_s = replace(asked, units=self.units), max((span.end_s for span in self.units), default=0.0)
         return Session(request, model=model, outlook=self.outlook, lasts_s=lasts_s, **more)
 
@@ -105,7 +111,19 @@ def begun_with(asked: Request, session: Session) -> tuple[EditFile, Generation]:
     named = Request(**{name: getattr(asked, name) for name in HELD})
     generation = session.generated()
     moods = (MoodStep(key.label, key.time_s) for key in generation.moods)  # of tags in the words, which are not held
-    return EditFile(Edits(tuple(moods)), named, session.units(), generation.outlook), generation
+    digest = sha256_of(asked.recording) if asked.recording else ""
+    return EditFile(Edits(tuple(moods)), named, session.units(), generation.outlook, sha256=digest), generation
+
+
+def check_sound(recording: Path, sha256: str) -> None:
+    """Raise InputError unless a recording is the one of a digest, whose phones were found, or it cannot be read."""
+    check_source(recording, "recording")
+    found = sha256_of(recording)
+    if found != sha256:
+        raise InputError(
+            f"{recording}: is another recording than when its phones were found (SHA-256 {found[:12]}, required "
+            f"{sha256[:12]}); put the old one back, or begin anew with this one, under another name"
+        )
 
 
 def edit_file(edits: EditFile | Edits | str | Path | None) -> EditFile:
@@ -125,9 +143,10 @@ def is_edit_file(path: Path) -> bool:
         return FORMAT.encode() in file.read(100)
 
 
-def read_edits(path: str | Path) -> EditFile:
+def read_edits(path: str | Path, *, phones: bool = True) -> EditFile:
     """Return the content of a file of edits: ``.json``, or ``.toml`` (Python 3.11 or newer).
 
+    phones : whether its phones in time are read, too: they take most of the time
     Raises InputError: no such file, another suffix, or not a file of edits of this version.
     """
     path = Path(path)
@@ -143,6 +162,8 @@ def read_edits(path: str | Path) -> EditFile:
     if members.get("version") != VERSION:
         found = described(members.get("version"))
         raise InputError(f"{path}: edits of version {found}, required {VERSION}; update lipmotion")
+    if not phones:
+        members.pop("units", None)
     try:
         return _content(members, path.parent)
     except InputError as error:
@@ -157,14 +178,14 @@ def _suffix(path: Path) -> str:
 
 
 def _content(members: dict[str, Any], folder: Path) -> EditFile:
-    known = {"format", "version", *HELD, "steps", "undone", "units", "recognised", "outlook"}
+    known = {"format", "version", *HELD, DIGEST, "steps", "undone", "units", "recognised", "outlook"}
     if unknown := sorted(set(members) - known):
         raise InputError(f"unknown member {unknown[0]!r}; required some of: {', '.join(sorted(known))}")
     steps, undone = (_sentences(members, name) for name in ("steps", "undone"))
     named = located(Request.parsed({name: members[name] for name in HELD if name in members}), folder)
     units = parse_units(members["units"], members.get("recognised")) if "units" in members else None
-    outlook = _OUTLOOK(members.get("outlook"))
-    return EditFile(Edits().then(*steps), named, units, outlook, Edits().then(*undone).steps)
+    outlook, sha256 = _OUTLOOK(members.get("outlook")), require(_TEXT, members.get(DIGEST, ""), DIGEST)
+    return EditFile(Edits().then(*steps), named, units, outlook, Edits().then(*undone).steps, sha256)
 
 
 def _sentences(members: dict[str, Any], name: str) -> list[str]:
@@ -181,6 +202,8 @@ def write_edits(file: EditFile, path: str | Path) -> None:
         value = getattr(file.named, name)
         if value != getattr(usual, name):
             members[name] = sound_reference(value, path) if isinstance(value, Path) else value
+    if file.sha256:
+        members[DIGEST] = file.sha256
     members["steps"] = list(file.edits.sentences)
     if file.undone:
         members["undone"] = list(map(str, file.undone))

@@ -15,12 +15,13 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from lipmotion.studio.access import Access, Guard
+from lipmotion.studio.folder import RevisionError
 from lipmotion.studio.line_replies import LineReplies
 from lipmotion.studio.page_files import page_files
 from lipmotion.studio.project_replies import ProjectReplies
 from lipmotion.studio.studio import Studio
 from lipmotion.studio.training_replies import TrainingReplies
-from lipmotion.web.replies import ERRORS, FRESH, HEADERS, SecurityHeaders
+from lipmotion.web.replies import ERRORS, FRESH, HEADERS, SecurityHeaders, failed
 
 PAGE_POLICY = HEADERS["content-security-policy"] + (
     "; img-src 'self' blob: data:; media-src 'self' blob:; worker-src 'self' blob:; connect-src 'self' blob:"
@@ -55,6 +56,7 @@ def studio_application(studio: Studio, access: Access) -> Starlette:
         post(f"{one}/redo", lines.redo),
         post(f"{one}/settle", lines.settle),
         post(f"{one}/transcript", lines.transcript),
+        post(f"{one}/restore", lines.restore),
         post(f"{one}/versions", lines.keep),
         post(f"{one}/versions/forget", lines.forget),
         post(f"{one}/versions/back", lines.back),
@@ -82,7 +84,7 @@ def studio_application(studio: Studio, access: Access) -> Starlette:
         Route("/", packaged),
         Route("/{name:path}", packaged),
     ]
-    application = Starlette(routes=routes, exception_handlers=ERRORS)
+    application = Starlette(routes=routes, exception_handlers=ERRORS | {RevisionError: partial(failed, 409)})
     application.add_middleware(Guard, access=access)
     application.add_middleware(SecurityHeaders, headers=HEADERS | {"content-security-policy": PAGE_POLICY})
     return application

@@ -21,8 +21,9 @@ from starlette.exceptions import HTTPException
 from lipmotion.errors import InputError, LipMotionError
 from lipmotion.pipeline.model import Model
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
-from lipmotion.studio.folder import ProjectFolder
+from lipmotion.studio.folder import NO_EDITS, ProjectFolder
 from lipmotion.studio.line import OpenLine
+from lipmotion.studio.project import ProjectLine
 from lipmotion.studio.understanding import open_line, understand_line
 from lipmotion.types import Item, Progress
 
@@ -92,20 +93,21 @@ class Desk:
         self._understanding = threading.Lock()
         self._background = ThreadPoolExecutor(1, "understand")
 
-    def status(self, number: int) -> str:
+    def status(self, line: ProjectLine) -> str:
         """Return what is to be said of a line."""
-        work = self._works.get(number)
-        if work is not None:
+        work, summary = self._works.get(line.number), self.folder.summary(line)
+        if work is not None and not (work.status == READY and summary.error):
             return work.status
-        return READY if self.folder.edits(self.folder.line(number)).exists() else NEW
+        return FAILED if summary.error else NEW if summary is NO_EDITS else READY
 
     def work(self, number: int) -> Work | None:
         """Return what happens to a line; None: nothing."""
         return self._works.get(number)
 
-    def error(self, number: int) -> str:
+    def error(self, line: ProjectLine) -> str:
         """Return why a line has failed; empty: it has not."""
-        return self._works[number].error if number in self._works else ""
+        work = self._works.get(line.number)
+        return (work.error if work is not None else "") or self.folder.summary(line).error
 
     def at_work(self) -> list[Work]:
         """Return the lines that wait or are at work, and those that were until a short while ago."""
@@ -115,7 +117,8 @@ class Desk:
     def queue(self, numbers: Iterable[int]) -> int:
         """Let lines be understood that are new, after those that wait already; return how many wait."""
         for number in numbers:
-            if self.status(number) in (NEW, FAILED):
+            if self.status(self.folder.line(number)) in (NEW, FAILED):
+                self.forget(number)
                 work = self._works[number] = Work(number)
                 self._waiting.append(work)
                 self._background.submit(self._understand_next)
@@ -124,6 +127,9 @@ class Desk:
     def opened(self, number: int) -> Work:
         """Return what happens to a line, which is opened if it is not; a new one is understood ahead of others."""
         work = self._works.get(number)
+        if work is not None and work.line is not None and not work.users and self._is_behind(work.line):
+            self.forget(number)
+            work = None
         if work is None:
             work = self._works[number] = Work(number)
         if work.status == FAILED:  # until it is queued again
@@ -137,6 +143,11 @@ class Desk:
             work.thread.submit(self._open, work)
             self._close_others(work)
         return work
+
+    def _is_behind(self, line: OpenLine) -> bool:
+        """Return whether others than the studio have changed the file of an open line."""
+        with self.folder.lock:
+            return self.folder.summary(self.folder.line(line.number)) is not line.summary
 
     async def at(self, number: int, do: Callable[[OpenLine], ResultT]) -> ResultT:
         """Do something with an open line, in its thread; return the result.
@@ -152,6 +163,10 @@ class Desk:
         work.users += 1
         try:
             return await asyncio.get_running_loop().run_in_executor(thread, do, line)
+        except asyncio.CancelledError:
+            if work.stopped:  # the line was closed before its turn came: nothing has been done
+                raise NotReadyError from None
+            raise
         finally:
             work.users -= 1
 
@@ -226,7 +241,10 @@ class Desk:
         """Understand a line that is not yet, and return its sound; one at a time."""
         with self._understanding:
             line = self.folder.line(work.number)
-            if self.folder.edits(line).exists():
+            summary = self.folder.summary(line)
+            if summary.error:
+                raise InputError(summary.error)
+            if summary is not NO_EDITS:
                 return None
             work.turn(WORKING)
             audio = understand_line(self.folder, line, self.model, work.report)

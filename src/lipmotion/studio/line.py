@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.errors import InputError, LipMotionError
+from lipmotion.errors import InputError
 from lipmotion.export.video import write_mp4
 from lipmotion.faces.base import Face
 from lipmotion.faces.filmed.face import FilmedFace
-from lipmotion.pipeline.edit_files import EditFile, write_edits
+from lipmotion.pipeline.edit_files import EditFile
 from lipmotion.pipeline.edits import Edits, Step, WordIs, WordSaid, WordStep, step_of
 from lipmotion.pipeline.film.filmed_video import write_film
 from lipmotion.pipeline.generate.explain import explain_session, explanation_text
@@ -30,6 +30,7 @@ from lipmotion.pipeline.session import own_pronunciations
 from lipmotion.pipeline.understand.read_request import read_request
 from lipmotion.pipeline.understand.transcribe import guesses
 from lipmotion.speech.features.analysed_audio import AnalysedAudio
+from lipmotion.studio.folder import ProjectFolder, RevisionError, revision_of, summary_of
 from lipmotion.studio.meshes import with_turn
 from lipmotion.studio.project import digest_of
 from lipmotion.types import Audio, Channel, Explanation, Generation, Motion, Span, Timeline, Unit
@@ -46,18 +47,14 @@ WITH_TRANSCRIPT = ("transcript", "mapped transcript")
 """Where the words of an ``Outlook`` come from if they were given: for the line, or in a file beside the recording."""
 
 
-class RevisionError(LipMotionError):
-    """An edit was made of a state that is not the last one: another tab was first."""
-
-
 class OpenLine:
     """A line that is open, for one thread at a time.
 
     file    : its edits; what is written at each change
-    path    : where they are written
+    folder, number : the project that it is a line of
+    summary : of the file as it was read, or written last
     audio   : the sound, which has been read
     onto    : the person onto whose face the motion is mapped; None: it stays as it is
-    revision : how often the edits have changed since the line was opened
     settled  : whether the motion is that of the whole line, as files get it; else only what lies around the last edits
                has been made since
     Raises as ``EditFile.session``.
@@ -66,14 +63,17 @@ class OpenLine:
     def __init__(
         self,
         file: EditFile,
-        path: Path,
-        recording: Path,
+        folder: ProjectFolder,
+        number: int,
         model: Model,
         audio: AnalysedAudio,
         onto: FilmedFace | None = None,
     ) -> None:
-        self.file, self.path, self.recording, self.model, self.audio = file, path, recording, model, audio
-        self.revision, self.settled = 0, True
+        self.file, self.folder, self.number, self.model, self.audio = file, folder, number, model, audio
+        self.recording, self.settled = folder.sound(folder.line(number)), True
+        known, self.summary = folder.summary(folder.line(number)), summary_of(file)
+        if known.state == self.summary.state:  # else others have changed the file since it was read
+            self.summary = known
         self._others: dict[tuple[int, int], OpenLine] = {}
         asked = replace(read_request(file.named), onto=onto) if onto is not None else None
         self.session = file.session(asked, model=model, audio=audio)
@@ -86,7 +86,7 @@ class OpenLine:
         """
         key = id(model), id(onto)
         if key not in self._others:
-            self._others[key] = OpenLine(self.file, self.path, self.recording, model, self.audio, onto)
+            self._others[key] = OpenLine(self.file, self.folder, self.number, model, self.audio, onto)
         self._others[key].file = self.file
         return self._others[key]
 
@@ -130,15 +130,21 @@ class OpenLine:
         Raises RevisionError: the edits are no longer those of the revision. InputError: an edit is refused.
         """
         self._check(revision)
-        changed = self._changed(self.file.undo(instead).then(*steps) if steps else self.file.undo(instead))
+        changed = self._changed(self.file.undo(instead).then(*steps) if steps else self.file.undo(instead), revision)
         return changed | {"guessed": self._guessed(steps)}
 
-    def back_to(self, revision: int, sentences: Sequence[str]) -> dict[str, Any]:
-        """Go back to edits as they once were; return what moved. Raises as ``edited``."""
-        now = self.file.edits.sentences
+    def back_to(self, revision: int, version: str) -> dict[str, Any]:
+        """Go back to a version that was kept; the edits as they are become one, too. Raises as ``edited``.
+
+        Raises InputError: no such version, or too many.
+        """
+        self._check(revision)
+        line, now = self.folder.line(self.number), self.file.edits.sentences
+        line.with_version(now)  # refuses one too many before anything has changed
+        sentences = line.version(version).steps
         same = next((n for n, (old, new) in enumerate(zip(now, sentences, strict=False)) if old != new), len(now))
         same = min(same, len(sentences))
-        return self.edited(revision, tuple(sentences[same:]), len(now) - same)
+        return self._changed(self.file.undo(len(now) - same).then(*sentences[same:]), revision, keeps=True)
 
     def _guessed(self, steps: tuple[str | Step, ...]) -> list[dict[str, Any]]:
         """Return the words of edits whose pronunciation is a guess, with it, as objects of JSON."""
@@ -161,26 +167,40 @@ class OpenLine:
     def undone(self, revision: int, count: int) -> dict[str, Any]:
         """Take back the last edits; return what moved. Raises as ``edited``."""
         self._check(revision)
-        return self._changed(self.file.undo(count))
+        return self._changed(self.file.undo(count), revision)
 
     def redone(self, revision: int, count: int) -> dict[str, Any]:
         """Make edits again that were taken back; return what moved. Raises as ``edited``."""
         self._check(revision)
-        return self._changed(self.file.redo(count))
+        return self._changed(self.file.redo(count), revision)
+
+    @property
+    def revision(self) -> int:
+        """The number of the line as it is now; another one after each change (``folder.revision_of``)."""
+        return revision_of(self.folder.line(self.number), self.summary)
 
     def _check(self, revision: int) -> None:
         if revision != self.revision:
-            raise RevisionError("the line has been changed elsewhere: in another tab, or by a request before")
+            raise RevisionError("the line has been changed elsewhere: in another window, or by a request before")
 
-    def _changed(self, file: EditFile) -> dict[str, Any]:
-        """Go over to other edits: compute, then write, then keep them."""
+    def _changed(self, file: EditFile, revision: int, *, keeps: bool = False) -> dict[str, Any]:
+        """Go over to other edits: compute, then write, then keep them; nothing, where somebody else was first.
+
+        keeps : whether the edits from before are kept as a version
+        """
         before, settled = self._delivered, self.audio.duration_s <= LONG_S
         with self._view(settled=settled):
             after = self.session.delivered(file.edits).motion
+        is_other = file.edits.steps != self.file.edits.steps or file.undone != self.file.undone
+        if is_other or keeps:
+            with self.folder.changing(self.number, revision) as line:
+                if keeps:
+                    kept = line.with_version(self.file.edits.sentences)
+                    self.folder.change_line(self.number, lambda _: kept)
+                if is_other:
+                    self.folder.write_edits(line, file)
+                    self.file, self.summary = file, self.folder.summary(line)
         self.settled = settled
-        if file.edits.steps != self.file.edits.steps or file.undone != self.file.undone:
-            write_edits(file, self.path)
-            self.file, self.revision = file, self.revision + 1
         return {"changed": moved_stretch(before, after)}
 
     def state(self) -> dict[str, Any]:
@@ -189,7 +209,6 @@ class OpenLine:
         motion, units = generation.motion, generation.units
         outlook = generation.outlook
         return {
-            "revision": self.revision,
             "settled": self.settled,
             "duration_s": self.audio.duration_s,
             "rate_hz": motion.rate_hz,

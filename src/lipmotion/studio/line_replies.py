@@ -20,7 +20,9 @@ from lipmotion.pipeline.outputs.shown_faces import ShownPerson
 from lipmotion.storage.json_text import as_json
 from lipmotion.studio.access import Access
 from lipmotion.studio.asked import content_of, objects, seconds, stretch, text, texts, whole
-from lipmotion.studio.line import OpenLine, RevisionError, transcript_step
+from lipmotion.studio.desk import READY, WORKING
+from lipmotion.studio.folder import RevisionError
+from lipmotion.studio.line import OpenLine, transcript_step
 from lipmotion.studio.studio import Studio
 from lipmotion.studio.votes import Vote, tally
 from lipmotion.types import Motion
@@ -29,6 +31,7 @@ from lipmotion.web.replies import FRESH, json_reply
 MOST_STEPS = 1000
 LONGEST_TRANSCRIPT = 100_000
 LONGEST_NAMES = 20_000
+BEGINNING = "bytes=0-"
 NUMBERS = ("motion", "delivered", "deviation", "confidence")
 Changed = dict[str, Any]
 
@@ -71,11 +74,10 @@ class LineReplies:
         """Words of a line, or of a stretch of it."""
         content, number = await content_of(request), self._number(request)
         said = text(content, "text", longest=LONGEST_TRANSCRIPT)
-        is_part = "start_s" in content or "end_s" in content
-        if not is_part and not self._studio.summary(number).count:
-            await self._studio.say(number, said)
-            return self._waiting(number)
         revision = whole(content, "revision")
+        is_part = "start_s" in content or "end_s" in content
+        if not is_part and self._studio.say(number, revision, said):
+            return self._waiting(number)
         start_s, end_s = seconds(content, "start_s", 0.0), seconds(content, "end_s", 1e6)
 
         def changed(line: OpenLine) -> Changed:
@@ -93,35 +95,45 @@ class LineReplies:
     async def recorded(self, request: Request) -> Response:
         """The real video, as browsers play it."""
         number = self._number(request)
+        if request.headers.get("range", BEGINNING).startswith(BEGINNING):  # and not again for each part of it
+            await self._desk.beside(lambda: self._studio.folder.checked_sound(self._studio.folder.line(number)))
         path, kind = await self._desk.beside(lambda: self._studio.played_video(number))
         return FileResponse(path, media_type=kind, headers=FRESH)
 
     async def vote(self, request: Request) -> Response:
         """Which of two motions somebody found better."""
         number, content = self._number(request), await content_of(request)
-        sides = tuple(self._studio.side(number, text(side, "by", "")) for side in objects(content, "shown"))
+        revision, shown = whole(content, "revision"), [text(side, "by", "") for side in objects(content, "shown")]
         better = None if content.get("better") is None else whole(content, "better", most=1)
-        vote = Vote(self._studio.folder.line(number).name, sides, better)
-        found = await self._desk.beside(lambda: self._studio.folder.add_vote(vote))
-        return json_reply(tally(found, vote))
+
+        def found() -> dict[str, Any]:
+            with self._studio.folder.changing(number, revision) as line:
+                vote = Vote(line.name, tuple(self._studio.side(number, by) for by in shown), better)
+                return tally(self._studio.folder.add_vote(vote), vote)
+
+        return json_reply(await self._desk.beside(found))
 
     async def keep(self, request: Request) -> Response:
         """The edits as they are, to be kept as a version."""
-        number = self._number(request)
+        revision, number = whole(await content_of(request), "revision"), self._number(request)
 
         def kept(line: OpenLine) -> Changed:
-            steps = line.file.edits.sentences
-            self._studio.folder.change_line(number, lambda now: now.with_version(steps))
+            with self._studio.folder.changing(number, revision) as now:
+                version = now.with_version(line.file.edits.sentences)
+                self._studio.folder.change_line(number, lambda _: version)
             return {}
 
         return await self._state_after(number, kept)
 
     async def forget(self, request: Request) -> Response:
         """A version that is kept no longer."""
-        number, name = self._number(request), text(await content_of(request), "version")
+        content, number = await content_of(request), self._number(request)
+        revision, name = whole(content, "revision"), text(content, "version")
 
         def forgotten(_: OpenLine) -> Changed:
-            self._studio.folder.change_line(number, lambda now: now.without_version(name))
+            with self._studio.folder.changing(number, revision) as now:
+                left = now.without_version(name)
+                self._studio.folder.change_line(number, lambda _: left)
             return {}
 
         return await self._state_after(number, forgotten)
@@ -130,15 +142,13 @@ class LineReplies:
         """A version to go back to; the edits as they are become one, too."""
         content, number = await content_of(request), self._number(request)
         revision, name = whole(content, "revision"), text(content, "version")
+        return await self._state_after(number, lambda line: line.back_to(revision, name))
 
-        def back(line: OpenLine) -> Changed:
-            known, now = self._studio.folder.line(number), line.file.edits.sentences
-            known.with_version(now)  # refuses one too many before anything has changed
-            changed = line.back_to(revision, known.version(name).steps)
-            self._studio.folder.change_line(number, lambda line: line.with_version(now))
-            return changed
-
-        return await self._state_after(number, back)
+    async def restore(self, request: Request) -> Response:
+        """The last good copy of edits that are damaged."""
+        revision, number = whole(await content_of(request), "revision"), self._number(request)
+        self._studio.restore(number, revision)
+        return self._waiting(number)
 
     async def motion(self, request: Request) -> Response:
         """Numbers of the motion."""
@@ -195,6 +205,7 @@ class LineReplies:
         name, by, number = text(content, "face", "woman"), text(content, "by", ""), self._number(request)
 
         def found(given: OpenLine) -> bytes:
+            self._studio.folder.checked_sound(self._studio.folder.line(number))
             shown = self._studio.faces.shown(name)
             line = self._studio.line_as(number, given, by, name)
             with tempfile.TemporaryDirectory(prefix="lipmotion-studio-") as folder:
@@ -237,7 +248,9 @@ class LineReplies:
                 changed, status = do(line), 200
             except RevisionError as error:
                 changed, status = {"error": str(error)}, 409
-            state = self._studio.line_document(number) | {"media": self._media(number)} | line.state()
+            state = {"media": self._media(number)} | line.state()
+            with self._studio.folder.lock:
+                state |= self._studio.line_document(number) | {"revision": line.revision}
             state["transcript"] = state["transcript"] or line.transcript
             return json_reply({**changed, "state": state} if status == 409 else state | changed, status)
 
@@ -245,7 +258,10 @@ class LineReplies:
 
     def _waiting(self, number: int) -> Response:
         """Return what is said of a line that is not ready."""
-        return json_reply(self._studio.line_document(number) | {"media": self._media(number)})
+        document = self._studio.line_document(number) | {"media": self._media(number)}
+        if document["status"] == READY:  # since it was looked up: its state comes with the next request
+            document["status"] = WORKING
+        return json_reply(document)
 
     def _media(self, number: int) -> dict[str, Any]:
         video = self._studio.video_of(number)

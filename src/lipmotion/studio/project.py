@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
+from functools import partial
 from hashlib import sha256
 from typing import Any
 
@@ -84,7 +85,7 @@ class ProjectLine:
     number     : of the line in the project; never used again
     name       : path of its files without suffix, with ``/`` between folders; unique
     sound      : path of the recording from the folder of the project, or absolute
-    sha256     : digest of the recording
+    sha256     : digest of the recording; empty: of an earlier version's project, until the line is opened
     transcript : its words, where they were given here; empty: those of a file beside it, or it is recognised
     duration_s : of the sound; None: not known yet
     doubt      : how unsure the motion of its speech is, 0 to 1; None: not known yet
@@ -219,7 +220,7 @@ _LINE = {
 }
 _PROJECT = members(
     {
-        "lines": items(value_of(ProjectLine, _LINE, ("number", "name", "sound", "sha256"))),
+        "lines": items(value_of(partial(ProjectLine, sha256=""), _LINE, ("number", "name", "sound"))),
         **dict.fromkeys(("model", "recordings", "given_model"), path),
         **dict.fromkeys(("language", "recogniser", "preset"), _TEXT),
         **{"characters": any_members(path), "next_number": _NUMBERED},

@@ -59,20 +59,19 @@ class ProjectReplies:
                 await write_body(request, content, LARGEST_UPLOAD_BYTES, UPLOAD_S)
             number = await self._desk.beside(lambda: self._studio.folder.drop(name, file, said))
         self._desk.queue([number])
-        return JSONResponse(self._studio.row(number), 201, headers=FRESH)
+        return JSONResponse(self._studio.row(self._studio.folder.line(number)), 201, headers=FRESH)
 
     async def mark(self, request: Request) -> Response:
         """A mark of a line."""
         number, content = self._number(request), await content_of(request)
-        mark = text(content, "mark")
-        await self._desk.beside(lambda: self._studio.mark(number, mark))
-        return JSONResponse(self._studio.row(number), headers=FRESH)
+        mark, revision = text(content, "mark"), whole(content, "revision")
+        row = await self._desk.beside(lambda: self._studio.mark(number, revision, mark))
+        return JSONResponse(row, headers=FRESH)
 
     async def remove(self, request: Request) -> Response:
         """A line that leaves the project."""
         number = self._number(request)
-        await content_of(request)
-        self._studio.remove(number)
+        self._studio.remove(number, whole(await content_of(request), "revision"))
         return JSONResponse({"removed": number}, headers=FRESH)
 
     async def export_line(self, request: Request) -> Response:

@@ -8,7 +8,7 @@ import shutil
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from pathlib import Path
 from threading import Lock
 from typing import Any
@@ -20,16 +20,15 @@ from lipmotion.errors import InputError, LipMotionError, shortened
 from lipmotion.export.sound import write_sound
 from lipmotion.extensions import installed_version
 from lipmotion.faces.base import Face
-from lipmotion.pipeline.edit_files import read_edits, write_edits
+from lipmotion.pipeline.edit_files import write_edits
 from lipmotion.pipeline.edits import FORMS, Step, Text, WordIs, WordSaid, WordsSaid, WordsSaidSo, step_of
 from lipmotion.pipeline.job import Job, Outputs
 from lipmotion.pipeline.opened_job import opened
 from lipmotion.pipeline.outputs.curve_sets import SHAPE_SETS
 from lipmotion.pipeline.outputs.drawn_video import VideoOutput, read_sound
-from lipmotion.storage.files import TEMPORARY, made_folders, read_text_file, sha256_of
-from lipmotion.storage.json_text import from_json
-from lipmotion.studio.desk import NEW, READY, WAITING, WORKING, Desk, NotReadyError, Work
-from lipmotion.studio.folder import EXPORTS, ProjectFolder
+from lipmotion.storage.files import TEMPORARY, made_folders, sha256_of
+from lipmotion.studio.desk import FAILED, READY, WAITING, WORKING, Desk, NotReadyError, Work
+from lipmotion.studio.folder import EXPORTS, NO_EDITS, ProjectFolder, revision_of
 from lipmotion.studio.known_model import KnownModel, known_model
 from lipmotion.studio.line import LONGEST_VIDEO_S, OpenLine
 from lipmotion.studio.meshes import Faces
@@ -49,14 +48,6 @@ LOG = logging.getLogger("lipmotion")
 ORDERS = ("", "doubt")
 OTHER = "other"
 """What requests call the model that the project's is compared with."""
-
-
-@dataclass(frozen=True)
-class EditsSummary:
-    """What the list of lines says of edits: how many there are, and a digest of their sentences."""
-
-    count: int
-    digest: str
 
 
 class Studio:
@@ -80,7 +71,6 @@ class Studio:
         self.faces = Faces(places, lambda: self.trainer.made(FACE))
         self._sounds = Path(tempfile.mkdtemp(prefix="lipmotion-studio-"))
         self._exporting: dict[str, int] | None = None
-        self._summaries: dict[int, tuple[int, EditsSummary]] = {}
 
     def close(self) -> None:
         """Write what is not written, and remove what was kept for this run alone."""
@@ -103,34 +93,37 @@ class Studio:
         """
         if order not in ORDERS:
             raise InputError(f"order is {shortened(repr(order))}, required doubt, or nothing")
+        with self.folder.lock:
+            project, revision = self.folder.project, self.folder.revision
         lines = [
             line
-            for line in self.folder.project.lines.values()
-            if (not mark or line.mark == mark) and (not status or self.desk.status(line.number) == status)
+            for line in project.lines.values()
+            if (not mark or line.mark == mark) and (not status or self.desk.status(line) == status)
         ]
         if order == "doubt":
             lines.sort(key=lambda line: -1.0 if line.doubt is None else line.doubt, reverse=True)
         return {
             "name": self.folder.path.absolute().name,
             "folder": str(self.folder.path.absolute()),
-            "revision": self.folder.revision,
+            "revision": revision,
             "count": len(lines),
             "from": first,
-            "lines": [self.row(line.number) for line in lines[first : first + count]],
+            "lines": [self.row(line) for line in lines[first : first + count]],
             "forms": self.forms(),
             "version": installed_version(),
             "model": {"name": self.used.name, "engine": self.used.model.engine.name},
         }
 
-    def row(self, number: int) -> dict[str, Any]:
-        """Return what the list says of a line."""
-        line, summary = self.folder.line(number), self.summary(number)
+    def row(self, line: ProjectLine) -> dict[str, Any]:
+        """Return what the list says of a line, which may have left the project meanwhile."""
+        summary = self.folder.summary(line)
         made = (summary.digest, self.used.digest)
         changed = bool(line.exports) and (line.exports[-1].steps, line.exports[-1].model) != made
         return {
-            "id": number,
+            "id": line.number,
             "name": line.name,
-            "status": self.desk.status(number),
+            "status": self.desk.status(line),
+            "revision": revision_of(line, summary),
             "mark": line.mark,
             "marked": line.marked,
             "edits_digest": summary.digest,
@@ -138,19 +131,23 @@ class Studio:
             "duration_s": line.duration_s,
             "edits": summary.count,
             "exported": "changed" if changed else "yes" if line.exports else "no",
-            "error": self.desk.error(number),
+            "error": self.desk.error(line),
         }
 
     def line_document(self, number: int) -> dict[str, Any]:
         """Return what is said of a line, ready or not."""
-        line, work = self.folder.line(number), self.desk.work(number)
-        known: dict[str, Any] = {"id": number, "name": line.name, "mark": line.mark, "transcript": line.transcript}
+        with self.folder.lock:
+            line, work = self.folder.line(number), self.desk.work(number)
+            known: dict[str, Any] = {"id": number, "name": line.name, "mark": line.mark, "transcript": line.transcript}
+            known["revision"] = revision_of(line, self.folder.summary(line))
         known["versions"] = [
             {"name": each.name, "number": each.number, "edits": len(each.steps), "digest": each.digest}
             for each in line.versions
         ]
-        if work is None:
-            return known | {"status": self.desk.status(number), "progress": None, "error": ""}
+        status, error = self.desk.status(line), self.desk.error(line)
+        if work is None or status == FAILED:
+            restorable = status == FAILED and self.folder.is_restorable(line)
+            return known | {"status": status, "progress": None, "error": error, "restorable": restorable}
         status = WORKING if work.status == READY and work.line is None else work.status
         return known | {"status": status, "progress": _progress(work), "error": work.error}
 
@@ -222,21 +219,6 @@ class Studio:
             "longest_video_s": LONGEST_VIDEO_S,
         }
 
-    def summary(self, number: int) -> EditsSummary:
-        """Return what is said of a line's edits; none, where it is not understood yet."""
-        path = self.folder.edits(self.folder.line(number))
-        try:
-            changed = path.stat().st_mtime_ns
-        except OSError:
-            return EditsSummary(0, digest_of(()))
-        if self._summaries.get(number, (0,))[0] != changed:
-            try:
-                steps = from_json(read_text_file(path, "edits")).get("steps", [])
-                self._summaries[number] = (changed, EditsSummary(len(steps), digest_of(map(str, steps))))
-            except (ValueError, AttributeError, TypeError):  # damaged: it is said once the line is opened
-                self._summaries[number] = (changed, EditsSummary(0, ""))
-        return self._summaries[number][1]
-
     def understand(self, numbers: Sequence[int] | None) -> int:
         """Let lines be understood; None: all that are new. Returns how many wait. Raises HTTPException: no such."""
         known = self.folder.project.lines
@@ -264,30 +246,50 @@ class Studio:
         own = self.folder.lexicon().user
         return tuple(_pronounced(step, own) for step in steps)
 
-    async def say(self, number: int, transcript: str) -> None:
-        """Let a line be understood again, with its words; without any, they are recognised.
+    def say(self, number: int, revision: int, transcript: str) -> bool:
+        """Let a line without edits be understood again, with its words; without any, they are recognised.
 
-        Raises NotReadyError: it is being understood.
+        Returns whether it has no edits; else nothing has been done.
+        Raises NotReadyError: it is being understood. RevisionError: somebody else has changed it. InputError: its edits
+        are damaged. ExportError: it cannot be written.
         """
-        if self.desk.status(number) in (WAITING, WORKING):
-            raise NotReadyError
-        edits, work = self.folder.edits(self.folder.line(number)), self.desk.work(number)
-        if work is not None and work.line is not None:
-            await self.desk.at(number, lambda _: edits.unlink(missing_ok=True))
-        edits.unlink(missing_ok=True)
-        self.folder.change_line(number, lambda line: replace(line, transcript=transcript.strip()))
-        self.desk.forget(number)
+        with self.folder.changing(number, revision) as line:
+            if self.desk.status(line) in (WAITING, WORKING):
+                raise NotReadyError
+            if self.folder.has_edits(line):
+                return False
+            self.folder.remove_edits(line)
+            self.folder.change_line(number, lambda now: replace(now, transcript=transcript.strip()))
+            self.desk.forget(number)
         self.desk.opened(number)
+        return True
 
-    def mark(self, number: int, mark: str) -> None:
-        """Mark a line as its edits are now. Raises InputError: no such mark."""
-        marked = self.summary(number).digest
-        self.folder.change_line(number, lambda line: replace(line, mark=mark, marked=marked))
+    def mark(self, number: int, revision: int, mark: str) -> dict[str, Any]:
+        """Mark a line as its edits are now; return what the list says of it.
 
-    def remove(self, number: int) -> None:
-        """Take a line out of the project; its files stay where they are."""
-        self.desk.forget(number)
-        self.folder.change(lambda project: project.without_line(number))
+        Raises InputError: no such mark, or its edits are damaged. RevisionError: somebody else has changed it.
+        """
+        with self.folder.changing(number, revision) as line:
+            self.folder.has_edits(line)  # which is refused where they are damaged
+            marked = replace(line, mark=mark, marked=self.folder.summary(line).digest)
+            self.folder.change_line(number, lambda _: marked)
+            return self.row(marked)
+
+    def remove(self, number: int, revision: int) -> None:
+        """Take a line out of the project; its files stay where they are. Raises RevisionError: it has been changed."""
+        with self.folder.changing(number, revision):
+            self.folder.change(lambda project: project.without_line(number))
+            self.desk.forget(number)
+
+    def restore(self, number: int, revision: int) -> None:
+        """Put the last good copy in the place of a line's damaged edits, and open it.
+
+        Raises InputError: they are not damaged, or there is no copy. RevisionError: somebody else has changed it.
+        """
+        with self.folder.changing(number, revision) as line:
+            self.folder.restore_edits(line)
+            self.desk.forget(number)
+        self.desk.opened(number)
 
     def drawn(self, name: str) -> str | Face:
         """Return a face of which pictures are drawn. Raises InputError: there is none of that name, or a filmed one."""
@@ -297,10 +299,10 @@ class Studio:
         return getattr(shown, "face", name)
 
     def played(self, number: int) -> Path:
-        """Return the path of a line's sound as it is played. Raises InputError: it cannot be read."""
-        path = self._sounds / f"{number}.wav"
+        """Return the path of a line's sound as it is played. Raises InputError: it cannot be read, or is another."""
+        path, sound = self._sounds / f"{number}.wav", self.folder.checked_sound(self.folder.line(number))
         if not path.exists():
-            write_sound(path, read_sound(self.folder.sound(self.folder.line(number))))
+            write_sound(path, read_sound(sound))
         return path
 
     def video_of(self, number: int) -> tuple[Path, float] | None:
@@ -346,7 +348,7 @@ class Studio:
         if by not in ("", OTHER):
             return Side(self.used.name, self.used.digest, self.folder.line(number).version(by).digest)
         model = self._called(by)
-        return Side(model.name, model.digest, self.summary(number).digest)
+        return Side(model.name, model.digest, self.folder.summary(self.folder.line(number)).digest)
 
     def _called(self, by: str) -> KnownModel:
         """Return the model that requests call so. Raises InputError: there is none."""
@@ -360,19 +362,20 @@ class Studio:
         """Write files of a line, and record what was written from which edits; return their paths.
 
         face : the name of that which videos show; empty: the usual one
-        Raises InputError: it is not understood yet, or there is no such face. ExportError: a file cannot be written.
+        Raises InputError: it is not understood yet, its edits are damaged, its sound is another one, or there is no
+        such face. ExportError: a file cannot be written.
         Others as ``Job.run``.
         """
         line = self.folder.line(number)
-        if self.desk.status(number) in (NEW, WAITING, WORKING) and not self.folder.edits(line).exists():
+        if self.folder.summary(line) is NO_EDITS:
             raise InputError(f"{line.name}: is not understood yet; open it first")
         out = self.folder.path / EXPORTS
         copy = out / f"{line.name}.{EDITS_SUFFIX}"
         files = tuple(str(out / f"{line.name}{suffix}") for suffix in preset.files)
-        file = replace(read_edits(self.folder.edits(line)), undone=())
+        file = replace(self.folder.read_edits(line), undone=(), sha256=line.sha256)
         with made_folders([copy.parent]):
             write_edits(file, copy)
-            request = replace(file.named, recording=self.folder.sound(line), edits=copy)
+            request = replace(file.named, recording=self.folder.checked_sound(line), edits=copy)
             outputs = Outputs(files, curves=preset.curves, fps=preset.fps)
             job = opened(Job(request, outputs))
             if face and any(isinstance(output, VideoOutput) for output in job.checked(request.recording)):

@@ -202,7 +202,9 @@ class Trainer:
                 "--recordings FOLDER"
             )
         chosen = [videos[number] for number in wanted.lines]
-        lines = tuple(LearnedLine(project.sound(line).absolute(), line.name, line.transcript) for line in chosen)
+        lines = tuple(
+            LearnedLine(project.sound(line).absolute(), line.name, line.transcript, line.sha256) for line in chosen
+        )
         place = project.path.absolute()
         return TrainingOrder(
             wanted.kind,

@@ -22,6 +22,7 @@ from lipmotion.faces.filmed.face import save_face
 from lipmotion.measures.evaluation_table import figures_table
 from lipmotion.pipeline.corpus.long_videos import HELD_OUT_SHARE, LEAST_SPLIT_UTTERANCES
 from lipmotion.pipeline.corpus.prepare import prepare
+from lipmotion.pipeline.edit_files import check_sound
 from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.film.build import build_face
 from lipmotion.pipeline.model import Model, load_model, save_model
@@ -57,11 +58,15 @@ class VoiceOptions(Configuration):
 
 @dataclass(frozen=True)
 class LearnedLine:
-    """A line of the project that is learned from: its recording, its name, and its words; empty: those beside it."""
+    """A line of the project that is learned from: its recording, its name, and its words; empty: those beside it.
+
+    sha256 : digest of the recording that the words are of; empty: not known
+    """
 
     recording: Path
     name: str
     transcript: str
+    sha256: str = ""
 
 
 @dataclass(frozen=True)
@@ -144,6 +149,8 @@ def _gathered(order: TrainingOrder) -> Iterator[Path]:
                 while stem.casefold() in taken:
                     stem += "-2"
                 taken.add(stem.casefold())
+                if line.sha256:
+                    check_sound(line.recording, line.sha256)
                 _put(line.recording, place / f"{stem}{line.recording.suffix}")
                 if line.transcript:
                     with whole_file(place / f"{stem}.txt") as text:

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from lipmotion.errors import InputError
-from lipmotion.pipeline.edit_files import begun_with, read_edits, write_edits
+from lipmotion.pipeline.edit_files import begun_with
 from lipmotion.pipeline.job import Request
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.session import Session
 from lipmotion.pipeline.understand.read_request import read_request
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.storage.files import sha256_of
 from lipmotion.studio.folder import ProjectFolder
 from lipmotion.studio.line import OpenLine, doubt_of
 from lipmotion.studio.project import ProjectLine
@@ -21,13 +19,7 @@ from lipmotion.types import Monitor, silent_monitor
 
 def read_sound_of(folder: ProjectFolder, line: ProjectLine) -> AnalysedAudio:
     """Return the sound of a line. Raises InputError: it is not there, cannot be read, or is another one by now."""
-    path = folder.sound(line)
-    if sha256_of(path) != line.sha256:
-        raise InputError(
-            f"{path}: is another recording than when it became a line of this project; put the old one back, or add "
-            "the new one under another name"
-        )
-    return analysed(read_audio(path))
+    return analysed(read_audio(folder.checked_sound(line)))
 
 
 def understand_line(
@@ -52,11 +44,15 @@ def understand_line(
         request = replace(request, transcript=line.transcript)
     session = Session(request, model=model, monitor=monitor, audio=audio)
     file, generation = begun_with(replace(named, lexicon=None), session)
-    path = folder.edits(line)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_edits(file, path)
+    digest = line.sha256 or file.sha256
+    folder.checked_sound(replace(line, sha256=digest))  # and not another one meanwhile
     duration_s, doubt = audio.duration_s, doubt_of(generation)
-    folder.change_line(line.number, lambda now: replace(now, duration_s=duration_s, doubt=doubt), save=False)
+    with folder.lock:
+        folder.line(line.number)  # it may have been removed meanwhile
+        folder.write_edits(line, replace(file, sha256=digest))
+        folder.change_line(
+            line.number, lambda now: replace(now, duration_s=duration_s, doubt=doubt, sha256=digest), save=False
+        )
     return audio
 
 
@@ -67,13 +63,12 @@ def open_line(folder: ProjectFolder, line: ProjectLine, model: Model, audio: Ana
     Raises InputError: its sound or its file of edits cannot be read, or belongs to another recording. ExportError: the
     project cannot be written.
     """
-    file = read_edits(folder.edits(line))
-    recording = folder.sound(line)
-    named = replace(file.named, recording=recording, model=folder.model_file)
-    opened = OpenLine(
-        replace(file, named=named), folder.edits(line), recording, model, audio or read_sound_of(folder, line)
-    )
+    file = folder.read_edits(line)
+    audio = audio or read_sound_of(folder, replace(line, sha256=line.sha256 or file.sha256))
+    file = folder.adopt(line, file)
+    named = replace(file.named, recording=folder.sound(line), model=folder.model_file)
+    opened = OpenLine(replace(file, named=named), folder, line.number, model, audio)
     if line.duration_s is None:  # it was understood by a studio that was killed before the project was written
-        duration_s, doubt = opened.audio.duration_s, doubt_of(opened.generation)
+        duration_s, doubt = audio.duration_s, doubt_of(opened.generation)
         folder.change_line(line.number, lambda now: replace(now, duration_s=duration_s, doubt=doubt))
     return opened

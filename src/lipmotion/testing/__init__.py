@@ -1,9 +1,7 @@
 """Tools for tests and extensions of lipmotion: checks of the contracts, synthetic examples, the toy corpus."""
 
 from lipmotion.testing.check_engine import ENGINE_CHECKS, TrainedEngine, check_engine
-from lipmotion.testing.check_exporter import check_exporter
-from lipmotion.testing.check_face import check_face
-from lipmotion.testing.contract import ContractError
+from lipmotion.testing.contract import ContractError, check_exporter, check_face
 from lipmotion.testing.toy import toy_motion, toy_sentences, toy_utterances, write_toy_recordings
 
 __all__ = [

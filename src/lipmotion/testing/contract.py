@@ -3,8 +3,109 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
-from lipmotion.errors import LipMotionError
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError, LipMotionError
+from lipmotion.export.base import MotionFormat
+from lipmotion.faces.base import TRANSPARENT, Face, Stageable, Staging
+from lipmotion.meshes.fitting.facial_animation import FAP
+from lipmotion.meshes.model.other_shapes import CLOSED
+from lipmotion.meshes.model.shape_names import ARKIT_OTHERS
+from lipmotion.pipeline.outputs.curve_sets import curves_of
+from lipmotion.testing.examples import example
+from lipmotion.types import Generation, StateTrace, Timeline, Unit
+from lipmotion.types.motion import RADIAN
+
+
+def check_face(face: Face) -> None:
+    """Check that a face draws motion as ``Face.render`` says, and is staged as ``Stageable`` says if it can be.
+
+    Raises ContractError: what was found.
+
+    >>> from lipmotion.faces import face_named
+    >>> check_face(face_named("portrait"))
+    """
+    one = example(("m", "aa"))
+    motion, units = one.motion, one.speech.units
+    frames = list(face.render(motion, units, fps=10.0))
+    count = int((len(motion.values) - 1) / motion.rate_hz * 10.0 + 1e-9) + 1
+    require(len(frames) == count, f"{len(frames)} frames, required {count}")
+    shape = frames[0].shape
+    even = len(shape) == 3 and shape[2] == 3 and shape[0] % 2 == 0 and shape[1] % 2 == 0
+    require(even, f"frames of shape {shape}, required (H, W, 3), H and W even")
+    require(all(x.shape == shape and x.dtype == np.uint8 for x in frames), "frames of different shapes, or not uint8")
+    require(any(np.any(x != frames[0]) for x in frames), "the picture does not move")
+    again = face.render(motion, Timeline[Unit](()), fps=10.0)
+    require(next(iter(again)).shape == shape, "without units, frames of another shape")
+    same = zip(islice(face.render(motion, units, fps=10.0), 3), frames, strict=False)
+    require(all(np.array_equal(a, b) for a, b in same), "the same input gives other pixels")
+    broken = replace(motion, values=np.full_like(motion.values, np.nan))
+    require_error(InputError, lambda: list(face.render(broken, units, fps=10.0)), "values that are not finite")
+    require_error(InputError, lambda: list(face.render(motion, units, fps=0.0)), "fps of 0")
+    if isinstance(face, Stageable):
+        _check_staged(face)
+
+
+def _check_staged(face: Stageable) -> None:
+    one = example(("m", "aa"))
+
+    def first(**settings: Any) -> NDArray[np.uint8]:
+        return next(iter(face.staged(Staging(**settings)).render(one.motion, one.speech.units, fps=10.0)))
+
+    small = first(size=64)
+    require(small.shape[0] == 64, f"a picture {small.shape[0]} pixels high, required the 64 that were asked for")
+    clear = first(size=64, background=TRANSPARENT)
+    require(clear.shape == (*small.shape[:2], 4), f"transparent frames of shape {clear.shape}, required RGBA")
+    require(bool(np.any(clear[..., 3] == 0)), "no pixel is transparent")
+    require(isinstance(face.staged(Staging()), Face), "a staged face is no face")
+
+
+def check_exporter(exporter: MotionFormat) -> None:
+    """Check that a motion format writes a result and, if it reads, reads the same motion back to 1e-5.
+
+    Formats of curves are given curves; those of MPEG-4's parameters whole numbers. Channels may come back in another
+    order, and beside others; eyes, brows, head and pressed lips may be left out.
+    Raises ContractError: what was found.
+
+    >>> from lipmotion.export.base import MOTION_FORMATS
+    >>> check_exporter(MOTION_FORMATS.load("csv"))
+    """
+    one = example(("m", "aa"))
+    given = curves_of(one.motion, one.speech.units, exporter.curves) if exporter.curves else one.motion
+    if all(channel.unit == FAP for channel in given.channels):
+        given = replace(given, values=np.rint(given.values))
+    if exporter.fixed_rate and exporter.rate_hz:
+        given = given.resampled(exporter.rate_hz)
+    trace = StateTrace(("state",), np.zeros(len(given.values), np.intp))
+    result = Generation(given, np.zeros_like(given.values), one.speech.units, trace)
+    exporter.check(given)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "motion"
+        exporter.write(path, result, {"file": "speech.wav"}, {"name": "model"})
+        require(path.is_file() and path.stat().st_size > 0, "no file, or an empty one, is written")
+        first = path.read_bytes()
+        exporter.write(path, result, {"file": "speech.wav"}, {"name": "model"})
+        require(path.read_bytes() == first, "the same result gives other bytes")
+        if exporter.read is None:
+            return
+        motion, _ = exporter.read(path)
+    required = [
+        channel.name
+        for channel in given.channels
+        if channel.unit != RADIAN and channel.name not in (*ARKIT_OTHERS, CLOSED)
+    ]
+    require(set(required) <= set(motion.names), f"channels {motion.names} come back, required {required}")
+    require(abs(motion.rate_hz - given.rate_hz) < 1e-6, f"{motion.rate_hz} Hz come back, required {given.rate_hz}")
+    require(len(motion.values) == len(given.values), f"{len(motion.values)} frames come back")
+    difference = max(float(np.abs(motion[name] - given[name]).max()) for name in {*given.names} & {*motion.names})
+    require(difference < 1e-5, f"values come back that differ by {difference:g}")
 
 
 class ContractError(LipMotionError):

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.appearance.mouth_region import EYE_DISTANCE_PX, HEIGHT, WIDTH
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.video import write_mp4
 from lipmotion.faces import Staging
@@ -21,9 +22,39 @@ from lipmotion.faces.portrait import Woman
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.storage.files import whole_file
 from lipmotion.testing.formant_synthesiser import synthesise
-from lipmotion.testing.toy_mouth import toy_mouths
 from lipmotion.types import Audio, Channel, Motion, Timeline, Track, Unit, Utterance
 from lipmotion.units import is_silent
+
+SKIN, LIPS, INSIDE = (206.0, 160.0, 141.0), (172.0, 84.0, 88.0), (58.0, 24.0, 30.0)
+"""Colours, RGB."""
+INNER_WIDTH = 0.8
+"""Width of the inner lips, relative to the width of the mouth."""
+SHADE = 0.15
+"""Share by which the skin is darker at the lower edge of the picture."""
+THINNEST_PX = 0.2
+
+
+def toy_mouths(motion: Motion) -> NDArray[np.uint8]:
+    """Return the mouth pictures [shape=(T, 56, 72, 3)] of the channels ``opening``, ``width`` and ``outer``."""
+    opening, width, outer = (
+        motion[name][:, None, None] * EYE_DISTANCE_PX / 2 for name in ("opening", "width", "outer")
+    )
+    shade = 1 - SHADE * np.arange(HEIGHT)[:, None, None] / HEIGHT
+    picture = np.broadcast_to(np.array(SKIN) * shade, (len(motion.values), HEIGHT, WIDTH, 3))
+    for colour, across, down in ((LIPS, width, outer), (INSIDE, INNER_WIDTH * width, opening)):
+        share = _ellipse(across, down)[..., None]
+        picture = (1 - share) * picture + share * np.array(colour)
+    return np.rint(picture).astype(np.uint8)
+
+
+def _ellipse(across: NDArray[np.float64], down: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the share of each pixel inside a centred ellipse [shape=(T, 56, 72)] of half axes [shape=(T, 1, 1)]."""
+    x = np.arange(WIDTH)[None, None, :] + 0.5 - WIDTH / 2
+    y = np.arange(HEIGHT)[None, :, None] + 0.5 - HEIGHT / 2
+    across, down = np.maximum(across, THINNEST_PX), np.maximum(down, THINNEST_PX)
+    radius = np.hypot(x / across, y / down)
+    return np.clip(0.5 + (1 - radius) * np.minimum(across, down), 0, 1)
+
 
 WORDS: dict[str, tuple[str, ...]] = {
     "baby": ("b", "ey", "b", "iy"),
@@ -193,16 +224,14 @@ def _sentence(name: str, split: str, vocabulary: Iterator[str], rng: np.random.G
     while sum(durations_s[1:]) < SPEECH_S:
         words.append(next(vocabulary))
         labels += [Unit(phone, word=words[-1]) for phone in WORDS[words[-1]]]
-        durations_s += [_typical_duration_s(phone) * rng.uniform(0.85, 1.15) for phone in WORDS[words[-1]]]
+        durations_s += [
+            (0.17 if phone[0] in "aeiou" else 0.105) * rng.uniform(0.85, 1.15) for phone in WORDS[words[-1]]
+        ]
     labels, durations_s = [*labels, Unit("sil")], [*durations_s, rng.uniform(*SILENCE_S)]
     phones = [(label.phone, duration_s) for label, duration_s in zip(labels, durations_s, strict=True)]
     audio, units = synthesise(phones, pitch_hz=rng.uniform(*PITCH_HZ), seed=int(rng.integers(2**31)))
     spans = tuple(replace(span, label=label) for span, label in zip(units, labels, strict=True))
     return ToySentence(name, tuple(words), audio, Timeline(spans), split)
-
-
-def _typical_duration_s(phone: str) -> float:
-    return 0.17 if phone[0] in "aeiou" else 0.105
 
 
 @lru_cache(maxsize=32)

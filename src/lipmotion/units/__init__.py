@@ -1,7 +1,6 @@
 """Phones, visemes, unit sets, and words with their pronunciations. Data and look-ups, no audio."""
 
 from lipmotion.units.classes import phone_classes
-from lipmotion.units.gaps import without_gaps
 from lipmotion.units.length_limits import check_phones, check_text, check_words
 from lipmotion.units.lexicon import Lexicon, Pronunciation, phone_named, with_reduced_vowels
 from lipmotion.units.phones import (
@@ -17,7 +16,7 @@ from lipmotion.units.phones import (
     most_similar_phone,
     unknown_phone_message,
 )
-from lipmotion.units.recognised import RECOGNISED, RecognisedPhone, recognised_phones, with_confidences
+from lipmotion.units.recognised import RECOGNISED, RecognisedPhone, recognised_phones, with_confidences, without_gaps
 from lipmotion.units.text_normalisation import words_in, words_of
 from lipmotion.units.unit_set import UnitSet
 from lipmotion.units.unit_sets import UNIT_SETS, unit_set

@@ -9,13 +9,40 @@ from functools import cache, lru_cache
 from importlib.util import find_spec
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 from lipmotion.errors import InputError, MissingDependencyError, shortened
 from lipmotion.storage.files import read_text_file
+from lipmotion.units.ipa_phones import token_phones
 from lipmotion.units.phones import OTHER_NAMES, PAUSE, PHONES, REDUCED_VOWELS, is_silent
 from lipmotion.units.spelling import guess_pronunciation, normalised_text, without_accents
-from lipmotion.units.spelling_network import network_pronunciation
 from lipmotion.units.written_forms import readings
+
+LONGEST_WORD = 30
+"""Letters of the longest word that is read by the network: longer ones are web addresses and noise."""
+
+
+@lru_cache(maxsize=4096)
+def network_pronunciation(word: str) -> tuple[str, ...]:
+    """Return the phones of a lower-case word in plain letters; empty: ``hama`` is not installed, or has no phones."""
+    network = _network() if len(word) <= LONGEST_WORD else None
+    if network is None:
+        return ()
+    return tuple(phone for phone, _ in token_phones([each.phoneme for each in network.predict(word).alignments]))
+
+
+@cache
+def _network() -> Any:
+    """Return the network; None: it is not installed, or has no library for this system."""
+    if find_spec("hama") is None:
+        return None
+    try:
+        from hama.inference import G2PModel
+
+        return G2PModel()
+    except (ImportError, OSError, RuntimeError):
+        return None
+
 
 Pronunciation = tuple[str, ...]
 SpokenForm = tuple[tuple[str, str], ...]

@@ -72,9 +72,10 @@ def scan_video(path: Path, reached: Callable[[float], None] = lambda _: None, tr
         rate_hz = nominal_rate_hz(np.array(times_s), video.stated_rates_hz)
         damage = tuple(damage_notes(video, np.array(times_s), rate_hz))
     check_rate(rate_hz, path)
-    return VideoScan(np.array(times_s), np.array(cuts_s), rate_hz, tuple(_person(follower)), damage)
-
-
-def _person(follower: FaceFollower) -> list[NDArray[np.float64]]:
-    """Return thumbnails of the person, if other people have a tenth of the faces or more; else none."""
-    return [] if follower.share_of_person() >= ALONE_SHARE else follower.thumbnails()
+    return VideoScan(
+        np.array(times_s),
+        np.array(cuts_s),
+        rate_hz,
+        tuple([] if follower.share_of_person() >= ALONE_SHARE else follower.thumbnails()),
+        damage,
+    )

@@ -63,7 +63,8 @@ async def _refused(_: Request, error: Exception) -> Response:
     return JSONResponse({"error": str(getattr(error, "detail", ""))}, status, {**FRESH, **(headers or {})})
 
 
-async def _failed(status: int, _: Request, error: Exception) -> Response:
+async def failed(status: int, _: Request, error: Exception) -> Response:
+    """Return the reply to an error that was raised on purpose."""
     if isinstance(error, ExportError):
         LOG.warning("%s", error)
         return JSONResponse({"error": "cannot be stored now; try again"}, status, FRESH)
@@ -72,8 +73,8 @@ async def _failed(status: int, _: Request, error: Exception) -> Response:
 
 ERRORS: dict[type[Exception], Callable[[Request, Any], Any]] = {
     HTTPException: _refused,
-    LipMotionError: partial(_failed, 422),
-    ExportError: partial(_failed, 503),
+    LipMotionError: partial(failed, 422),
+    ExportError: partial(failed, 503),
 }
 """What is replied to errors that are raised on purpose: JSON, ``{"error": text}``."""
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,6 @@ from lipmotion.engines.selection.config import SelectionConfig
 from lipmotion.engines.selection.costs import Costs, Target
 from lipmotion.engines.selection.inventory import RecordedUnits
 from lipmotion.engines.selection.windows import phone_windows
-from lipmotion.motion.motion_store import MotionStore, compress
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import Lexicon
 
@@ -22,17 +20,6 @@ FREE = SelectionConfig(
 )
 """Nothing costs anything."""
 PHONE_S = 0.2
-
-
-@dataclass(frozen=True, eq=False)
-class DrawnUnits(RecordedUnits):
-    """Units whose motion is given [shape=(F, 1)]."""
-
-    drawn: NDArray[np.float64]
-
-    @cached_property
-    def values(self) -> NDArray[np.float64]:
-        return self.drawn
 
 
 def timeline(text: str, duration_s: float = PHONE_S) -> Timeline[Unit]:
@@ -51,13 +38,13 @@ def sentence(words: str, duration_s: float = PHONE_S) -> Timeline[Unit]:
     return Timeline(tuple(Span(n * duration_s, (n + 1) * duration_s, unit) for n, unit in enumerate(spoken)))
 
 
-def inventory(*texts: str, levels: Sequence[float] = (), duration_s: float = PHONE_S) -> DrawnUnits:
+def inventory(*texts: str, levels: Sequence[float] = (), duration_s: float = PHONE_S) -> RecordedUnits:
     """Return recordings of phones, without stress; the motion of each stays at its level (0)."""
     units = recorded(*(timeline(text, duration_s) for text in texts), levels=levels)
     return with_stress(units, *[-1] * len(units.windows))
 
 
-def recorded(*spoken: Timeline[Unit], levels: Sequence[float] = ()) -> DrawnUnits:
+def recorded(*spoken: Timeline[Unit], levels: Sequence[float] = ()) -> RecordedUnits:
     """Return recordings of phones; the motion of each stays at its level (0)."""
     lengths = [round(each[-1].end_s * 100) + 1 for each in spoken]
     first = np.cumsum([0, *lengths])
@@ -67,13 +54,7 @@ def recorded(*spoken: Timeline[Unit], levels: Sequence[float] = ()) -> DrawnUnit
     windows = phone_windows(spoken)
     usable = np.ones(len(windows), bool)
     names = tuple(f"r{number}" for number in range(len(spoken)))
-    return DrawnUnits(names, windows, usable, first, no_store(), None, drawn)
-
-
-@cache
-def no_store() -> MotionStore:
-    """Return a store that is not read."""
-    return compress(np.zeros((8, 1)), 100.0, 0.1)
+    return RecordedUnits(names, windows, usable, first, np.array([[0, first[-1]]]), drawn, None)
 
 
 def target_of(costs: Costs, text: str, stress: Sequence[int] | None = None) -> Target:
@@ -91,5 +72,5 @@ def array(*numbers: int) -> NDArray[np.intp]:
     return np.array(numbers, np.intp)
 
 
-def with_stress(units: DrawnUnits, *stress: int) -> DrawnUnits:
+def with_stress(units: RecordedUnits, *stress: int) -> RecordedUnits:
     return replace(units, windows=replace(units.windows, stress=np.array(stress, np.int8)))

@@ -17,7 +17,7 @@ from lipmotion.engines.selection.engine import SelectionEngine
 from lipmotion.engines.selection.lip_reading import OVERLAPS, TABLE_1, lip_reading_class, parsed_invisible
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.search import select
-from lipmotion.engines.selection.targets import target_of
+from lipmotion.engines.selection.selection_training import target_of
 from lipmotion.errors import InputError
 from lipmotion.testing.examples import OPENINGS, example, examples, speech, timeline
 from lipmotion.types import Timeline, silent_monitor

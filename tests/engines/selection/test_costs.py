@@ -139,7 +139,7 @@ def test_units_that_overlap_cost_what_they_differ_by_where_they_overlap() -> Non
             drawn = units.values.copy()
             drawn[:61, 0] = np.clip(np.arange(61) / 20 - 1, 0, 1)  # rises from 0 to 1 within aa
             drawn[61:] = 0
-            costs = costs_of(replace(units, drawn=drawn), join=0.1, hard=9.0, most=9.0)
+            costs = costs_of(replace(units, motion=drawn), join=0.1, hard=9.0, most=9.0)
             assert costs.join_costs(target, 2, array(1), array(5)) == pytest.approx(0.1 * share**2), (before, after)
             assert costs.join_costs(target, 1, array(0), array(4)) == pytest.approx(0.1 * share**2), (before, after)
 
@@ -148,7 +148,7 @@ def test_velocities_that_differ_cost_where_units_are_joined() -> None:
     units = inventory("s aa", "iy s")
     drawn = units.values.copy()
     drawn[:41, 0] = np.arange(41) / 100 - 0.4  # one unit per second, up to 0 at the end
-    costs = costs_of(replace(units, drawn=drawn), join=0.1, velocity=0.05)
+    costs = costs_of(replace(units, motion=drawn), join=0.1, velocity=0.05)
     wanted = 0.1 * 0.05**2 / 4  # at the end the motion stands still: the velocity is half of it
     assert costs.join_costs(target_of(costs, "aa iy"), 1, array(1), array(2)) == pytest.approx(wanted)
 

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from engines.selection.drawn_units import recorded, timeline
 from lipmotion.engines.selection.engine import SelectionEngine
 from lipmotion.engines.selection.inventory import digits, standing_in
 from lipmotion.engines.selection.model import SelectionModel
@@ -17,6 +18,18 @@ from lipmotion.errors import InputError
 from lipmotion.testing.examples import PHONES as SPOKEN
 from lipmotion.testing.examples import examples
 from lipmotion.types import Span, Timeline, Unit, silent_monitor
+
+
+def test_motion_that_is_not_stored_is_a_line_between_its_edges() -> None:
+    units = recorded(timeline("s aa"), timeline("iy s"))
+    assert len(units.values) == 82
+    motion = np.arange(20.0)[:, None]
+    cut = replace(units, kept=np.array([[5, 15], [31, 36], [60, 65]]), motion=motion)
+    assert cut.values[:6, 0] == pytest.approx([0] * 6)
+    assert cut.values[14:32, 0] == pytest.approx(np.linspace(9, 10, 18))
+    assert cut.values[35:41, 0] == pytest.approx([14] * 6)
+    assert cut.values[41:60, 0] == pytest.approx([15] * 19)
+    assert cut.values[64:, 0] == pytest.approx([19] * 18)
 
 
 def spoken(text: str, word: str = "") -> Timeline[Unit]:

@@ -11,10 +11,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from engines.selection.drawn_units import DrawnUnits, costs_of, inventory, recorded, sentence, target_of, with_stress
+from engines.selection.drawn_units import costs_of, inventory, recorded, sentence, target_of, with_stress
 from lipmotion.engines.selection.concatenation import concatenated, pieces_of
 from lipmotion.engines.selection.config import MINNIS_2000, SelectionConfig
 from lipmotion.engines.selection.costs import ABUTTING_JOIN
+from lipmotion.engines.selection.inventory import RecordedUnits
 from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.windows import phone_windows
 from lipmotion.types import Timeline, Unit
@@ -33,7 +34,7 @@ EDGES = ("we saw ice cream", "we saw i scream"), ("see that's tough", "see that 
 
 
 def recordings_of(
-    units: DrawnUnits, config: SelectionConfig, wanted: Timeline[Unit], wrong: Timeline[Unit], by: str = "stress"
+    units: RecordedUnits, config: SelectionConfig, wanted: Timeline[Unit], wrong: Timeline[Unit], by: str = "stress"
 ) -> set[int]:
     """Return the recordings of the phones that differ between two sentences by their stress or words, if any do."""
     costs = costs_of(units.without(config.suppressed_phones), config)

@@ -13,7 +13,7 @@ from lipmotion.engines.selection.costs import Costs, Target
 from lipmotion.engines.selection.engine import SelectionEngine
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.search import select
-from lipmotion.engines.selection.targets import target_of
+from lipmotion.engines.selection.selection_training import target_of
 from lipmotion.testing.examples import PHONES as SPOKEN
 from lipmotion.testing.examples import speech, timeline
 

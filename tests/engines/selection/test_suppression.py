@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from engines.selection.drawn_units import DrawnUnits, costs_of, inventory, timeline
+from engines.selection.drawn_units import costs_of, inventory, timeline
 from lipmotion.engines import engine_from_settings
 from lipmotion.engines.selection.concatenation import concatenated, pieces_of
 from lipmotion.engines.selection.config import MINNIS_2000, SelectionConfig
 from lipmotion.engines.selection.costs import Target
 from lipmotion.engines.selection.engine import SelectionEngine
+from lipmotion.engines.selection.inventory import RecordedUnits
 from lipmotion.engines.selection.lip_reading import TABLE_1
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.search import select
@@ -51,7 +52,7 @@ def test_a_word_whose_edge_is_suppressed_keeps_it() -> None:
     assert windows.hidden.tolist() == [False, True, True, True]
 
 
-def joined(units: DrawnUnits, text: str, config: SelectionConfig = PRINTED) -> tuple[Target, np.ndarray]:
+def joined(units: RecordedUnits, text: str, config: SelectionConfig = PRINTED) -> tuple[Target, np.ndarray]:
     """Return the target of a text, and the motion that is selected for it."""
     costs = costs_of(units.without(config.suppressed_phones), config)
     target = costs.target(costs.shown(phone_windows([timeline(text)])), None, None)
@@ -59,7 +60,7 @@ def joined(units: DrawnUnits, text: str, config: SelectionConfig = PRINTED) -> t
     return target, concatenated(costs.inventory, target, pieces, round(timeline(text)[-1].end_s * 100) + 1)[:, 0]
 
 
-def with_spikes(units: DrawnUnits) -> DrawnUnits:
+def with_spikes(units: RecordedUnits) -> RecordedUnits:
     """Return units whose motion is far away inside every invisible phone."""
     drawn = units.values.copy()
     for recording, phone, times_s in zip(
@@ -68,7 +69,7 @@ def with_spikes(units: DrawnUnits) -> DrawnUnits:
         if PHONES[phone] in INVISIBLE:
             start, stop = (units.first[recording] + np.round(times_s * 100)).astype(int)
             drawn[start + 1 : stop] = 9
-    return replace(units, drawn=drawn)
+    return replace(units, motion=drawn)
 
 
 def test_no_recorded_invisible_phone_is_played() -> None:

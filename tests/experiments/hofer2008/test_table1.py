@@ -14,8 +14,7 @@ from lipmotion.engines import engine_from_settings
 from lipmotion.engines.joint.engine import JointEngine
 from lipmotion.errors import CorpusError
 from lipmotion.experiments.hofer2008 import table1
-from lipmotion.experiments.hofer2008.table1 import PAPER_SCORES, Table1Options, hofer2008
-from lipmotion.experiments.hofer2008.table1_text import table, what_held
+from lipmotion.experiments.hofer2008.table1 import PAPER_SCORES, Table1Options, hofer2008, table, what_held
 from lipmotion.experiments.runner import ExperimentSettings
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.evaluation.evaluate import evaluate

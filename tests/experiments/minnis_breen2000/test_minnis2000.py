@@ -13,9 +13,16 @@ import pytest
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_from_settings
 from lipmotion.engines.selection.config import SelectionConfig
-from lipmotion.experiments.minnis_breen2000.joins import join_figures, velocity_change
-from lipmotion.experiments.minnis_breen2000.minnis2000 import ADDITIONS, EVERYTHING, PRINTED, minnis2000, rows
-from lipmotion.experiments.minnis_breen2000.text import table
+from lipmotion.experiments.minnis_breen2000.minnis2000 import (
+    ADDITIONS,
+    EVERYTHING,
+    PRINTED,
+    join_figures,
+    minnis2000,
+    rows,
+    table,
+    velocity_change,
+)
 from lipmotion.experiments.runner import ExperimentSettings
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.pipeline.evaluation.evaluate import evaluate

@@ -1,7 +1,7 @@
 import numpy as np
 
-from lipmotion.export.motion import rounded
-from lipmotion.export.motion.rounded import formatted_rows
+from lipmotion.export.motion import keys as rounded
+from lipmotion.export.motion.keys import formatted_rows
 
 
 def test_rows_are_the_rounded_values(monkeypatch):

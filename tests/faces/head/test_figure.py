@@ -2,10 +2,9 @@ import numpy as np
 import pytest
 
 from lipmotion.faces.head.forms import MOUTH_Y, head
-from lipmotion.faces.head.head_blendshapes import POSES, SIDED_POSES, head_mesh
 from lipmotion.faces.head.pose import CharacterPose
 from lipmotion.faces.head.skin import REST
-from lipmotion.faces.head.stage import camera_for, figure
+from lipmotion.faces.head.stage import POSES, SIDED_POSES, camera_for, figure, head_mesh
 from lipmotion.faces.turning import turned
 from meshes.heads import shaped
 

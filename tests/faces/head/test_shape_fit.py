@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.faces.head.head_blendshapes import POSES, head_mesh
 from lipmotion.faces.head.lips import VISIBLE_RINGS
 from lipmotion.faces.head.pose import CharacterPose
 from lipmotion.faces.head.shape_fit import mouth_weights
 from lipmotion.faces.head.skin import REST
-from lipmotion.faces.head.stage import figure
+from lipmotion.faces.head.stage import POSES, figure, head_mesh
 from lipmotion.meshes.model.mesh import Mesh
 
 SAID = {

@@ -9,8 +9,7 @@ from lipmotion.errors import AlignmentError, InputError
 from lipmotion.hmm.decode import decode_units, unit_loop
 from lipmotion.hmm.log_likelihoods import log_likelihoods_of
 from lipmotion.hmm.model import HmmConfig, UnitHmm
-from lipmotion.hmm.multistream.context_loop import context_loop
-from lipmotion.hmm.multistream.recognise import JointRecogniser
+from lipmotion.hmm.multistream.recognise import JointRecogniser, context_loop
 from lipmotion.hmm.multistream.streams import SPEECH, StreamObservations, StreamWeights
 from lipmotion.hmm.multistream.unit_states import triphone_states
 from lipmotion.hmm.states import StateTable

@@ -10,8 +10,16 @@ import numpy as np
 import pytest
 
 from lipmotion.pipeline.batch import check
-from lipmotion.pipeline.batch.check import FEWEST_LINES, Finding, _findings, expected_s
-from lipmotion.pipeline.batch.checked_line import CheckedLine, LineToCheck, checked_line, letters_of
+from lipmotion.pipeline.batch.check import (
+    FEWEST_LINES,
+    CheckedLine,
+    Finding,
+    LineToCheck,
+    _findings,
+    checked_line,
+    expected_s,
+    letters_of,
+)
 from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.job import Job, Request
 

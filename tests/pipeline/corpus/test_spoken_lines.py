@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.pipeline.corpus.spoken_lines import spoken_lines, transcript_beside
+from lipmotion.pipeline.corpus.long_videos import spoken_lines, transcript_beside
 from lipmotion.types import TimedTranscript, TimedWord, TranscriptLine
 
 SUBTITLES = "1\n00:00:01,000 --> 00:00:02,500\nHello there.\n\n2\n00:00:04,000 --> 00:00:05,000\n- Again!\n"

@@ -19,6 +19,7 @@ from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.job import Request
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion.storage.files import sha256_of
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Outlook, Span, Timeline, Unit
 from lipmotion.units import words_in_time
@@ -103,7 +104,11 @@ def test_what_is_written_is_read_again(tmp_path: Path, suffix: str) -> None:
     spans = (Span(0.0, 0.3, Unit("sil")), Span(0.3, 1 / 3 + 0.1, Unit("p", "sil-p+l", 'pl"ease', confidence=0.25)))
     outlook = Outlook("words", 0.5, None, 30.5, ("a \\ transcript",))
     file = EditFile(
-        Edits().then(*SENTENCES), Request(tmp_path / "in" / "a b.wav", pauses="natural"), Timeline(spans), outlook
+        Edits().then(*SENTENCES),
+        Request(tmp_path / "in" / "a b.wav", pauses="natural"),
+        Timeline(spans),
+        outlook,
+        sha256="ab",
     )
     write_edits(file, path)
     if suffix == ".toml" and sys.version_info < (3, 11):
@@ -112,7 +117,7 @@ def test_what_is_written_is_read_again(tmp_path: Path, suffix: str) -> None:
         return
     found = read_edits(path)
     assert (found.edits, found.units, found.outlook) == (file.edits, file.units, file.outlook)
-    assert found.named == file.named
+    assert (found.named, found.sha256) == (file.named, "ab")
 
 
 @pytest.mark.parametrize(
@@ -155,3 +160,24 @@ def test_a_file_replays_what_was_recognised(toy_speech: Path, toy_model_file: Pa
     replayed = read.session().generated(read.edits)
     assert np.array_equal(replayed.motion.values, plain.motion.values)
     assert (replayed.units, replayed.outlook, replayed.curve_edits) == (plain.units, plain.outlook, plain.curve_edits)
+
+
+def test_edits_of_another_sound_are_refused(toy_speech: Path, toy_model_file: Path, tmp_path: Path) -> None:
+    """Of the same length, and wherever it lies; without a digest, as in earlier files, they are taken."""
+    sound, path = tmp_path / "a.wav", tmp_path / "a.edits.json"
+    sound.write_bytes(toy_speech.read_bytes())
+    file = begun(Request(sound, recogniser="own", model=toy_model_file))
+    write_edits(file, path)
+    assert read_edits(path).sha256 == sha256_of(toy_speech)
+    other = tmp_path / "other.wav"
+    other.write_bytes(sound.read_bytes()[:-2] + b"\0\1")
+    model = load_model(toy_model_file)
+    phones = [span.label.phone for span in file.units or ()]
+    assert [span.label.phone for span in animate(toy_speech, model=model, edits=path).units] == phones
+    with pytest.raises(InputError, match="another recording"):
+        animate(other, model=model, edits=path)
+    other.replace(sound)
+    with pytest.raises(InputError, match="another recording"):
+        read_edits(path).session()
+    unknown = replace(file, sha256="")
+    assert [span.label.phone for span in animate(sound, model=model, edits=unknown).units] == phones

@@ -9,13 +9,13 @@ import pytest
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import MissingDependencyError
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.pipeline.training import transcripts as module
-from lipmotion.pipeline.training.train import train
-from lipmotion.pipeline.training.transcripts import (
+from lipmotion.pipeline.training import labels as module
+from lipmotion.pipeline.training.labels import (
     MOST_NAMED_RECORDINGS,
     warn_of_doubtful_transcripts,
     warn_of_missing_transcripts,
 )
+from lipmotion.pipeline.training.train import train
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, TranscriptFit
 from lipmotion.testing.toy import toy_sentences, toy_utterances
 from lipmotion.types import Timeline, Unit, Utterance

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import platform
+import re
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -12,9 +13,65 @@ from importlib import metadata
 from pathlib import Path
 from typing import Literal
 
-from lipmotion.cli.installation.declared_requirements import Requirement, declared_requirements
+from packaging import requirements
+from packaging.markers import Marker
+from packaging.specifiers import SpecifierSet
+
 from lipmotion.errors import LipMotionError, MissingDependencyError, ModelFormatError
 from lipmotion.extensions import install_command, installed_version
+
+EXTRA = re.compile(r'\s*(?:\band\b)?\s*extra == "([\w-]+)"')
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """A package that lipmotion declares.
+
+    name     : of the package
+    versions : that are required, as ``>=2.1``
+    marker   : the condition of the Python and the system under which it is required; empty: none
+    extra    : the extra that it belongs to; empty: it is always required
+    """
+
+    name: str
+    versions: str
+    marker: str = ""
+    extra: str = ""
+
+    @property
+    def applies(self) -> bool:
+        """Whether this Python and this system have it."""
+        return not self.marker or Marker(self.marker).evaluate()
+
+    @property
+    def installed(self) -> str:
+        """The installed version; empty: it is not installed."""
+        try:
+            return metadata.version(self.name)
+        except metadata.PackageNotFoundError:
+            return ""
+
+    @property
+    def is_met(self) -> bool:
+        """Whether a version is installed that is required."""
+        return bool(self.installed) and SpecifierSet(self.versions).contains(self.installed, prereleases=True)
+
+
+def requirement(text: str) -> Requirement:
+    """Return a requirement from its text in the metadata of a package: ``NAME>=1 ; MARKER``."""
+    found = requirements.Requirement(text)
+    marker = str(found.marker or "")
+    extra = EXTRA.search(marker)
+    return Requirement(found.name, str(found.specifier), EXTRA.sub("", marker).strip(), extra[1] if extra else "")
+
+
+def declared_requirements() -> tuple[Requirement, ...]:
+    """Return all requirements of the installed lipmotion; none where it runs from its sources, without metadata."""
+    try:
+        return tuple(map(requirement, metadata.requires("lipmotion") or ()))
+    except metadata.PackageNotFoundError:
+        return ()
+
 
 State = Literal["works", "absent", "broken"]
 EXTRAS = {
@@ -180,10 +237,12 @@ def _model() -> str:
 
 
 def _compiled_kernels() -> str:
-    try:
-        from lipmotion.kernels.compiled.compiler import cache_folder
-    except ImportError as error:
-        raise _AbsentError(f"no numba here ({error}): everything works, long work takes longer") from error
+    from lipmotion.kernels.choice import numba_works
+
+    if not numba_works():
+        raise _AbsentError("no numba here: everything works, long work takes longer, drawing much longer")
+    from lipmotion.kernels.compiled.compiler import cache_folder
+
     folder = cache_folder()
     if folder is None:
         raise _AbsentError("nowhere to keep machine code: every long command compiles again; set NUMBA_CACHE_DIR")

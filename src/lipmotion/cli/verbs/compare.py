@@ -14,8 +14,6 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     what = "motion file (.json .csv .npz, or another that can be read), or video of a face"
     add_input(parser, "reference", what="recording", help=what)
     add_input(parser, "others", what="recording", nargs="+", metavar="OTHER", help="the same, compared with it")
-    weights = "weights of SyncNet as arrays (docs/compare.md): how well the lips of each video agree with its sound"
-    add_input(parser, "--sync-weights", what="file of weights", metavar="FILE.npz", help=weights)
     add_figures_arguments(parser, lexicon=False)
     parser.set_defaults(run=run)
 
@@ -27,8 +25,6 @@ def run(options: argparse.Namespace) -> None:
 
     report_figures(
         options,
-        lambda _, monitor: compare(
-            options.reference, *options.others, sync_weights=options.sync_weights, monitor=monitor
-        ),
+        lambda _, monitor: compare(options.reference, *options.others, monitor=monitor),
         comparison_table,
     )

@@ -78,7 +78,7 @@ def _render(job: OpenedJob, motion: Path, rate_hz: float | None, monitor: Monito
 
 def _sound_named_by(motion: Path) -> Path | None:
     """Return the sound that a glTF file of motion names, where it is there and begins with the motion."""
-    from lipmotion.meshes.files.gltf_sound import named_sound
+    from lipmotion.meshes.files.gltf_writer import named_sound
     from lipmotion.pipeline.outputs.scenes import GLTF
     from lipmotion.storage.sources import is_file
 

@@ -42,11 +42,10 @@ def run(options: argparse.Namespace) -> None:
     if options.words is not None and is_file(Path(options.words)):
         options.wrong(f"{options.words} is the name of a file; to say what is in it: --text {options.words}")
     from lipmotion.cli.terminal.progress import reporting
-    from lipmotion.cli.verbs.voices import list_voices
 
     with reporting(options) as report:
         if options.voices:
-            list_voices(report)
+            _list_voices(report)
         else:
             _speak(options, report)
 
@@ -77,3 +76,14 @@ def _speak(options: argparse.Namespace, report: Report) -> None:
     )
     job.write(result, sound, model, monitor=report.receive)
     report.finish("\n".join(map(printable, options.output)), files=options.output, seconds=round(sound.duration_s, 3))
+
+
+def _list_voices(report: Report) -> None:
+    """Report the installed voices, one a line, with their languages."""
+    from lipmotion.speech.voices.installed import all_voices
+
+    voices = all_voices()
+    report.finish(
+        "\n".join(f"{voice.full_name:28} {voice.language}" for voice in voices) or "no voice is installed",
+        voices=[{"name": voice.full_name, "language": voice.language} for voice in voices],
+    )

@@ -29,6 +29,7 @@ from lipmotion.corpora.labels.tier import (
     LabelTier,
     TimedLabel,
     check_count,
+    clock_seconds,
     named_tier,
     unit_of_times,
 )
@@ -147,7 +148,6 @@ TEXT_ALONE = {
 KNOWN_SHAPES = "segments, words, results, utterances, monologues, alignment, tiers, fragments, ..."
 BLANK = re.compile(r"\s*")
 DIGITS = re.compile(r"(?:PT)?([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d{1,3})?)\s*(s|ms)?", re.IGNORECASE)
-CLOCK_TEXT = re.compile(r"(?:(\d{1,4}):)?(\d{1,2}):(\d{1,2}(?:[.,]\d{1,9})?)")
 
 
 class DamagedJsonError(InputError):
@@ -266,12 +266,11 @@ def _number(value: Any, where: str, per_s: int = 0) -> tuple[float, int]:
         seconds, nanos = (_number(value.get(name, 0), where)[0] for name in ("seconds", "nanos"))
         return seconds + nanos / 1e9, 1
     if isinstance(value, str):
-        found, clock = DIGITS.fullmatch(value.strip()), CLOCK_TEXT.fullmatch(value.strip())
+        found, clock_s = DIGITS.fullmatch(value.strip()), clock_seconds(value)
         if found:
             value, per_s = found[1].replace(",", "."), {"s": 1, "ms": 1000}.get((found[2] or "").lower(), per_s)
-        elif clock:
-            seconds = float(clock[3].replace(",", "."))
-            return int(clock[1] or 0) * 3600 + int(clock[2]) * 60 + seconds, 1
+        elif not math.isnan(clock_s):
+            return clock_s, 1
         elif value.strip().lower() in ("", "nan", "null", "none", "n/a"):
             value = None
     if value is None:

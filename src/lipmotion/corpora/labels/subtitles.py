@@ -9,12 +9,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 from io import StringIO
 
-from lipmotion.corpora.labels.tier import LINES, LabelTier, TimedLabel, check_count
+from lipmotion.corpora.labels.tier import LINES, LabelTier, TimedLabel, check_count, clock_seconds
 from lipmotion.errors import InputError, shortened
 from lipmotion.units.spoken_text import spoken_text
 
-CLOCK = r"(?:(\d{1,4}):)?(\d{1,2}):(\d{1,2})(?:[.,](\d{1,6}))?"
-"""A time as subtitles write it: hours (which may be missing), minutes, seconds, and their fraction."""
+TIME = r"((?:\d{1,4}:)?\d{1,2}:\d{1,2}(?:[.,]\d{1,6})?)"
 ARROW = r"(?:(?:[-=–—−]\s?){1,3}(?:[>›»]|&gt;)|→)"
 """The arrow between the times, also as people and programs damage it: ``->``, ``- ->``, ``–>``, ``--&gt;``."""
 CUE = re.compile(
@@ -25,10 +24,10 @@ CUE = re.compile(
 FULL_CLOCK = r"(?:\d{1,4}:\d{1,2}:\d{1,2}(?:[.,]\d{1,6})?|\d{1,2}:\d{1,2}[.,]\d{1,6})"
 NO_ARROW = re.compile(rf"^\s{{0,20}}{FULL_CLOCK}[^\w\n]{{1,12}}{FULL_CLOCK}\s{{0,20}}$", re.MULTILINE)
 """A line of two times without an arrow that is known; times of day, as 5:30, do not count."""
-TIMES = re.compile(rf"\s*{CLOCK}\s*{ARROW}\s*{CLOCK}(?:\s.*)?")
-SBV = re.compile(rf"{CLOCK}\s?,\s?{CLOCK}\s*?$", re.MULTILINE)
+TIMES = re.compile(rf"\s*{TIME}\s*{ARROW}\s*{TIME}(?:\s.*)?")
+SBV = re.compile(rf"{TIME}\s?,\s?{TIME}\s*?$", re.MULTILINE)
 """The times of YouTube's own format, ``0:00:01.000,0:00:02.500``."""
-WORD_TIME = re.compile(rf"<{CLOCK}>")
+WORD_TIME = re.compile(rf"<{TIME}>")
 """The time at which the words after it are said, as in the captions that YouTube makes."""
 NO_CUE = re.compile(r"(?:NOTE|STYLE|REGION)(?:\s|$)")
 """The start of a block of WebVTT that is not shown."""
@@ -40,7 +39,7 @@ BRIDGE_S, BRIDGES_SHARE, NEAR_S = 0.1, 0.2, 0.1
 of a file are bridges, lines that the cue before, which ends so near, showed already are left out."""
 SUBSTATION = re.compile(r"\s*\[Script Info\]", re.IGNORECASE)
 """The start of a file of SubStation Alpha."""
-DIALOGUE = re.compile(rf"^Dialogue:[^,\n]{{0,40}},\s*{CLOCK}\s*,\s*{CLOCK}\s*,", re.MULTILINE)
+DIALOGUE = re.compile(rf"^Dialogue:[^,\n]{{0,40}},\s*{TIME}\s*,\s*{TIME}\s*,", re.MULTILINE)
 """The start of a line that is shown: its layer, its start, its end. Editors may save the lines without the header."""
 FORMAT_LINE, DIALOGUE_LINE = "format:", "dialogue:"
 DEFAULT_FIELDS = "layer start end style name marginl marginr marginv effect text".split()
@@ -50,12 +49,6 @@ DRAWING_MODE = re.compile(r"\\p(\d)")
 """Begins a drawing (``{\\p1}``) or ends it (``{\\p0}``): the numbers in between are no words."""
 BREAK = re.compile(r"\\[Nnh]")
 """Line breaks and hard blanks within the text."""
-
-
-def clock_seconds(match: re.Match[str], group: int) -> float:
-    """Return the time in seconds of the four groups of ``CLOCK`` in a match; ``group``: the first of them."""
-    hours, minutes, seconds, fraction = match.group(group, group + 1, group + 2, group + 3)
-    return int(hours or 0) * 3600 + int(minutes) * 60 + float(f"{seconds}.{fraction or 0}")
 
 
 def is_subtitles(text: str) -> bool:
@@ -103,7 +96,7 @@ def _cues(text: str, where: str) -> Iterator[TimedLabel]:
             yield replace(cue, text=_shown(lines))
         count += 1
         check_count(count, where)
-        cue, lines = TimedLabel(clock_seconds(times, 1), clock_seconds(times, 5), "", f"line {number}"), []
+        cue, lines = TimedLabel(clock_seconds(times[1]), clock_seconds(times[2]), "", f"line {number}"), []
     if cue is not None:
         yield replace(cue, text=_shown([*lines, "", ""]))
 
@@ -165,7 +158,7 @@ def _words(cue: TimedLabel) -> tuple[TimedLabel, ...]:
         return ()
     edges = [0, *(mark.end() for mark in marks)]
     ends = [*(mark.start() for mark in marks), len(text)]
-    times_s = [cue.start_s, *(min(max(clock_seconds(mark, 1), cue.start_s), cue.end_s) for mark in marks), cue.end_s]
+    times_s = [cue.start_s, *(min(max(clock_seconds(mark[1]), cue.start_s), cue.end_s) for mark in marks), cue.end_s]
     return tuple(
         TimedLabel(start_s, max(start_s, end_s), text[first:end], cue.position)
         for first, end, start_s, end_s in zip(edges, ends, times_s, times_s[1:], strict=False)
@@ -196,12 +189,12 @@ def _dialogue(line: str, number: int, fields: list[str], where: str) -> TimedLab
     """Return one line of dialogue; the text is the last field, and may hold commas."""
     values = line[len(DIALOGUE_LINE) :].split(",", maxsplit=len(fields) - 1)
     by_name = dict(zip(fields, values, strict=False))
-    start, end = (re.fullmatch(CLOCK, by_name.get(name, "").strip()) for name in ("start", "end"))
+    start, end = (re.fullmatch(TIME, by_name.get(name, "").strip()) for name in ("start", "end"))
     if start is None or end is None or len(values) < len(fields):
         wanted = "Dialogue: 0,0:00:01.00,0:00:02.50,Default,,0,0,0,,Words"
         raise InputError(f"{where}: line {number} is {shortened(line)!r}; required a line as {wanted}")
     shown = BREAK.sub("\n", _without_drawings(by_name.get("text", values[-1])))
-    return TimedLabel(clock_seconds(start, 1), clock_seconds(end, 1), shown, f"line {number}")
+    return TimedLabel(clock_seconds(start[1]), clock_seconds(end[1]), shown, f"line {number}")
 
 
 def _without_drawings(text: str) -> str:

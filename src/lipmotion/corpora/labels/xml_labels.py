@@ -8,12 +8,11 @@ from collections import defaultdict
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from lipmotion.corpora.labels.tier import LINES, OTHER, LabelTier, TimedLabel, check_count, named_tier
+from lipmotion.corpora.labels.tier import LINES, OTHER, LabelTier, TimedLabel, check_count, clock_seconds, named_tier
 from lipmotion.errors import InputError, shortened
 
 ROOT = re.compile(r"\s*(?:<\?xml[^>]{0,200}\?>\s*)?(?:<!--.{0,2000}?-->\s*)*<(?:\w+:)?(\w+)", re.DOTALL)
 READ_ROOTS = ("ANNOTATION_DOCUMENT", "tt", "transcript", "timedtext")
-CLOCK_TIME = re.compile(r"(\d{1,6}):(\d{2}):(\d{2}(?:\.\d+)?)(?::(\d+(?:\.\d+)?))?")
 OFFSET_TIME = re.compile(r"(\d+(?:\.\d+)?)(h|ms|m|s|f|t)?")
 NEAR_S, DEEPEST = 0.01, 20
 
@@ -131,10 +130,9 @@ def _times(element: Element, start_s: float, end_s: float, per_s: dict[str, floa
 
 def _seconds(value: str, per_s: dict[str, float], where: str) -> float:
     """Return a time of TTML: a clock, also with frames, or a number with its unit. Raises InputError: it is none."""
-    clock, offset = CLOCK_TIME.fullmatch(value.strip()), OFFSET_TIME.fullmatch(value.strip())
-    if clock:
-        seconds = int(clock[1]) * 3600 + int(clock[2]) * 60 + float(clock[3])
-        return seconds + float(clock[4] or 0) / per_s["f"]
+    clock_s, offset = clock_seconds(value, per_s.get("f", 0)), OFFSET_TIME.fullmatch(value.strip())
+    if not math.isnan(clock_s):
+        return clock_s
     if offset is None:
         raise InputError(f"{where}: a time is {shortened(value)!r}, required as in 00:00:01.500, 1.5s or 36f")
     return float(offset[1]) / {"h": 1 / 3600, "m": 1 / 60, "ms": 1000, **per_s}.get(offset[2] or "s", 1)

@@ -17,8 +17,7 @@ from lipmotion.engines.coupled.chains.lattice import Lattice
 from lipmotion.engines.coupled.chains.model import Inference
 from lipmotion.engines.coupled.config import PATH, TRAJECTORY, CoupledConfig
 from lipmotion.engines.coupled.conversion.em_conversion import convert, path_means
-from lipmotion.engines.coupled.description import describe
-from lipmotion.engines.coupled.explanation import concatenated, explain_frames, unit_posteriors
+from lipmotion.engines.coupled.explanation import concatenated, describe, explain_frames, unit_posteriors
 from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.engines.coupled.training.alignment import allowed_units
 from lipmotion.engines.coupled.training.coupled_training import fit_coupled

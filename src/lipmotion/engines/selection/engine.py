@@ -6,22 +6,22 @@ import logging
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, ClassVar, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.base import Arrays, Engine, Fit, Inputs, SourcePiece
-from lipmotion.engines.selection.concatenation import pieces_of, shown_units
+from lipmotion.engines.selection.concatenation import Piece, TimeMap, pieces_of, shown_units
 from lipmotion.engines.selection.config import SelectionConfig
-from lipmotion.engines.selection.costs import Costs, Target
-from lipmotion.engines.selection.inventory_text import inventory_text, is_source, source_of, units_by_source
+from lipmotion.engines.selection.costs import JOIN_AFTER, JOIN_BEFORE, Costs, Target
+from lipmotion.engines.selection.inventory import RecordedUnits, inventory_text, is_source, source_of, units_by_source
 from lipmotion.engines.selection.model import SelectionModel, model_arrays, model_from_arrays
 from lipmotion.engines.selection.motion_of_units import Chosen, motion_of_units
 from lipmotion.engines.selection.search import select
-from lipmotion.engines.selection.selection_training import fit_selection
-from lipmotion.engines.selection.source_recordings import source_pieces, typical_duration_s, with_sources
-from lipmotion.engines.selection.targets import target_of
+from lipmotion.engines.selection.selection_training import fit_selection, target_of
+from lipmotion.engines.selection.windows import PHONE_NUMBER, phone_windows
 from lipmotion.errors import InputError
 from lipmotion.motion.predictors import conditions_of
 from lipmotion.printable import printable
@@ -39,6 +39,115 @@ from lipmotion.types import (
 )
 
 Array = NDArray[np.float64]
+SOUND: dict[str, Any] = {
+    "guide": 0.0,
+    "invisible": "",
+    "overlap": "middle",
+    "context": 1.0,
+    "word": 0.3,
+    "stress": 0.3,
+    "duration": 0.5,
+    "join": 0.05,
+    "velocity": 0.0,
+    "hard": 0.5,
+    "protected": 0.0,
+    "cluster": 0.5,
+}
+"""Costs where the sound counts: no phone is invisible, and no sound guides."""
+ROUNDING_S = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class AcousticUnits(RecordedUnits):
+    """Units of which the sound is compared, not the motion.
+
+    acoustic : acoustic features of all recordings, one after the other [shape=(F, D)]
+    """
+
+    acoustic: Array
+
+    @cached_property
+    def values(self) -> Array:
+        """The acoustic features [shape=(F, D)]."""
+        return self.acoustic
+
+
+def source_pieces(
+    model: SelectionModel,
+    config: SelectionConfig,
+    units: Timeline[Unit],
+    recorded_features: Mapping[str, NDArray[np.floating[Any]]],
+) -> tuple[tuple[SourcePiece, ...], Timeline[Unit]]:
+    """Return pieces of recordings and the phones with their sources, as of ``SelectsRecordings``."""
+    inventory = _with_sound(model.inventory, recorded_features)
+    costs = Costs(inventory, replace(config, **SOUND), 1 / np.maximum(inventory.acoustic.std(axis=0), 1e-9))
+    target = costs.target(phone_windows([units]), None, None)
+    chosen = select(costs, target).units
+    pieces = pieces_of(costs, target, chosen)
+    sources = [source_of(inventory, unit) for unit in chosen.tolist()]
+    found = [
+        _source_piece(inventory, target, piece, following)
+        for piece, following in zip(pieces, [*pieces[1:], None], strict=True)
+    ]
+    return tuple(found), with_sources(units, target.windows.times_s[:, 0], sources)
+
+
+def typical_duration_s(inventory: RecordedUnits, phone: str) -> float:
+    """Return the median duration of a phone, or that of all phones if none was recorded."""
+    durations_s = inventory.windows.durations_s
+    own = inventory.usable & (inventory.windows.phones == PHONE_NUMBER[phone])
+    return float(np.median(durations_s[own if own.any() else inventory.usable]))
+
+
+def with_sources(units: Timeline[Unit], starts_s: Array, sources: Sequence[str]) -> Timeline[Unit]:
+    """Return the timeline with the source of the unit of every phone as the name of its unit.
+
+    starts_s : start of every phone of the target
+    """
+    return Timeline(
+        tuple(
+            replace(span, label=replace(span.label, unit=sources[int(np.argmin(np.abs(starts_s - span.start_s)))]))
+            for span in units
+        )
+    )
+
+
+def _with_sound(inventory: RecordedUnits, recorded_features: Mapping[str, NDArray[np.floating[Any]]]) -> AcousticUnits:
+    """Return the units with their sound. Raises InputError: features of other recordings, or of other lengths."""
+    lengths = np.diff(inventory.first).tolist()
+    for name, length in zip(inventory.names, lengths, strict=True):
+        if name not in recorded_features or len(recorded_features[name]) != length:
+            found = f"{len(recorded_features[name])} frames" if name in recorded_features else "nothing"
+            raise InputError(
+                f"recording {name}: {found} of sound, required {length} frames; give the corpus that the model learned"
+            )
+    features = np.concatenate([np.asarray(recorded_features[name], float) for name in inventory.names])
+    return AcousticUnits(
+        inventory.names, inventory.windows, inventory.usable, inventory.first, inventory.kept, inventory.motion, None,
+        features,
+    )  # fmt: skip
+
+
+def _source_piece(inventory: RecordedUnits, target: Target, piece: Piece, following: Piece | None) -> SourcePiece:
+    """Return a piece in the time of its recording, from the middle of one join to the middle of the next."""
+    clock = TimeMap.of(inventory, target, piece, following)
+    recorded, shift = inventory.windows.times_s, piece.unit - piece.first
+    first = piece.first - (piece.join == JOIN_BEFORE)
+    stop = piece.stop + (following is not None and following.join == JOIN_AFTER)
+    begin_s, end_s = recorded[first + shift, 0], recorded[stop - 1 + shift, 1]
+    if piece.first:
+        begin_s = float(clock(np.array([piece.start_s]))[0])
+    if following is not None:
+        end_s = float(clock(np.array([following.start_s]))[0])
+    starts = {
+        number: float(recorded[number + shift, 0])
+        for number in range(first, stop)
+        if begin_s - ROUNDING_S <= recorded[number + shift, 0] < end_s - ROUNDING_S
+    }
+    name = inventory.names[inventory.windows.recording[piece.unit]]
+    return SourcePiece(name, float(begin_s), max(float(end_s), float(begin_s)), starts)
+
+
 LOG = logging.getLogger("lipmotion")
 NAMED_UNITS = 3
 """Units that one warning names."""
@@ -79,35 +188,7 @@ class SelectionEngine(Engine[SelectionModel]):
 
     def generate(self, model: SelectionModel, speech: Speech, constraints: Constraints | None = None) -> Generation:  # noqa: D102
         costs = model.costs(self.config)
-        return self._generated(model, costs, target_of(model, costs, speech), speech, constraints)
-
-    def generate_guided(
-        self, model: SelectionModel, speech: Speech, guide: Array, constraints: Constraints | None = None
-    ) -> Generation:
-        """Return the motion of one recording, as ``generate``, from units that resemble somebody else's motion of it.
-
-        guide       : motion in the model's motion space, as wide as recorded motion [shape=(T, Q)]; it takes the place
-                      of what the model's own guide predicts. How far it counts for a unit still depends on how much
-                      the sounds differ for the own guide (option ``trust``).
-        constraints : values that the motion must take
-        Raises InputError: as ``generate``; a guide of another shape; or a model or speech without a guide of its own.
-        """
-        wanted = len(speech.features.values), model.motion.space.dimensions
-        if guide.shape != wanted:
-            raise InputError(f"a guide of shape {guide.shape}, required {wanted}: frames, dimensions of the motion")
-        costs = model.costs(self.config)
-        target = target_of(model, costs, speech, guide)
-        if target.guided is None:
-            raise InputError(
-                "the model of recorded units does not compare motion; train one with the option guide more than 0, "
-                "and give speech with its spectrum"
-            )
-        return self._generated(model, costs, target, speech, constraints)
-
-    def _generated(
-        self, model: SelectionModel, costs: Costs, target: Target, speech: Speech, constraints: Constraints | None
-    ) -> Generation:
-        """Return the motion of the units that are selected for a target."""
+        target = target_of(model, costs, speech)
         frames = len(speech.features.values)
         given = _given(costs, target, speech.units)
         units = select(costs, target, given=given).units

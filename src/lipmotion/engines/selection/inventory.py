@@ -2,17 +2,63 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+import re
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from textwrap import wrap
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.selection.windows import PHONE_NUMBER, SYMBOLS, PhoneWindows
-from lipmotion.motion.motion_store import MotionStore
 from lipmotion.types import FRAME_RATE_HZ
 from lipmotion.units import PHONES, most_similar_lips
+
+LINE = 110
+"""Width of a line of text, in characters."""
+
+
+def source_of(inventory: RecordedUnits, unit: int) -> str:
+    """Return the recording of a unit, and its time and phone there: ``bbaf2n 0.530-0.610 s b``."""
+    windows = inventory.windows
+    start_s, end_s = windows.times_s[unit].tolist()
+    return f"{inventory.names[windows.recording[unit]]} {start_s:.3f}-{end_s:.3f} s {PHONES[windows.phones[unit]]}"
+
+
+def is_source(text: str) -> bool:
+    """Return whether a text has the form of ``source_of``: a recording, two times, and a phone."""
+    return re.search(r" \d+\.\d+-\d+\.\d+ s \S+$", text) is not None
+
+
+def units_by_source(inventory: RecordedUnits, sources: Iterable[str]) -> dict[str, int]:
+    """Return the units that some texts of ``source_of`` name; other texts are left out."""
+    wanted = set(sources)
+    recordings = {source.split(" ")[0] for source in wanted}
+    numbers = [number for number, name in enumerate(inventory.names) if name.split(" ")[0] in recordings]
+    units = np.flatnonzero(np.isin(inventory.windows.recording, numbers) & inventory.usable).tolist()
+    named = {source_of(inventory, unit): unit for unit in units}
+    return {source: named[source] for source in wanted if source in named}
+
+
+def inventory_text(inventory: RecordedUnits) -> str:
+    """Return how many units each phone has, and what stands in for phones without units."""
+    windows, usable = inventory.windows, inventory.usable
+    counts = {phone: int((usable & (windows.phones == n)).sum()) for n, phone in enumerate(PHONES)}
+    stand_ins = standing_in(windows, usable)
+    lines = [f"{int(usable.sum())} units of {len(inventory.names)} recordings"]
+    lines += _wrapped("units of each phone", [f"{phone} {count}" for phone, count in counts.items() if count])
+    if stand_ins:
+        lines += _wrapped(
+            "phones without units, and what stands in for them", [f"{p} ({q})" for p, q in stand_ins.items()]
+        )
+    return "\n".join(lines)
+
+
+def _wrapped(name: str, items: list[str]) -> list[str]:
+    return [f"{name}:", *(f"  {line}" for line in wrap(", ".join(items), LINE))]
+
 
 Array = NDArray[np.float64]
 UnitNumbers = NDArray[np.intp]
@@ -25,8 +71,9 @@ class RecordedUnits:
     names     : of the recordings
     windows   : the units, recording by recording; times are seconds in their recording
     usable    : whether the motion of each unit was measured throughout [shape=(U,)]
-    first     : the row of ``motion`` at which each recording begins; the last number is that of all rows [shape=(R+1,)]
-    motion    : of all recordings in the motion space, 100 rows a second [shape=(F, Q)]
+    first     : the row of ``values`` at which each recording begins; the last number is that of all rows [shape=(R+1,)]
+    kept      : the first row and the one after the last of each range whose motion is stored, in order [shape=(K, 2)]
+    motion    : there, in the motion space, 100 rows a second; stored in half precision [shape=(N, Q)]
     predicted : what the guide predicts at ``POINTS`` of each unit, reduced [shape=(U, POINTS, D)]; None: no guide
     """
 
@@ -34,17 +81,18 @@ class RecordedUnits:
     windows: PhoneWindows
     usable: NDArray[np.bool_]
     first: NDArray[np.intp]
-    motion: MotionStore
+    kept: NDArray[np.intp]
+    motion: NDArray[np.floating[Any]]
     predicted: NDArray[np.float16] | None
 
     @cached_property
     def values(self) -> Array:
-        """The motion of all recordings, decoded [shape=(F, Q)].
+        """The motion of all recordings [shape=(F, Q)].
 
         Where silence is not stored, it is a line between its edges in the recording.
         """
-        stored = np.concatenate([np.arange(first, stop) for first, stop in self.motion.kept.tolist()])
-        rows, frames = self.motion.rows(stored), np.arange(len(self.motion))
+        stored = np.concatenate([np.arange(first, stop) for first, stop in self.kept.tolist()])
+        rows, frames = self.motion.astype(float), np.arange(self.first[-1])
         if len(rows) == len(frames):
             return rows
         edges = [self.first[:-1], self.first[1:] - 1]

@@ -22,13 +22,11 @@ from lipmotion.hmm.multistream.phone_recogniser import (
 )
 from lipmotion.motion.arrays import LEARNED_MOTION_ARRAYS, learned_motion_arrays, learned_motion_from_arrays
 from lipmotion.motion.generation import LearnedMotion
-from lipmotion.motion.motion_store import motion_store_arrays, motion_store_from_arrays
 from lipmotion.motion.predictors import names_of_predictors, predictor_arrays, predictor_from_arrays
 from lipmotion.storage.schema import (
     POSITIVE,
     Arrays,
     ArraySpec,
-    arrays_under,
     checked_arrays,
     format_errors,
     refuse_undeclared,
@@ -41,8 +39,8 @@ LONGEST_SILENCE_FRAMES = 100
 """At least one of so many frames is stored."""
 LATE_S = 1.0
 """Units end at most so long after the motion of their recording."""
-STORE_PREFIX = "store_"
-"""Beginning of the names of the arrays of the motion store."""
+OLD_PREFIX = "store_"
+"""Beginning of the names of arrays of motion as it once was compressed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,11 +88,12 @@ def model_arrays(model: SelectionModel) -> dict[str, NDArray[Any]]:
         "unit_words": windows.words,
         "unit_stress": windows.stress.astype(np.int32),
         "unit_usable": inventory.usable,
+        "recorded_rows": inventory.kept,
+        "recorded_motion": inventory.motion,
         "selection_scale": model.scale,
         "selection_rest": model.rest,
         "selection_variances": model.variances,
     }
-    arrays |= {f"{STORE_PREFIX}{name}": array for name, array in motion_store_arrays(inventory.motion).items()}
     if model.guide is not None and inventory.predicted is not None:
         arrays |= predictor_arrays(model.guide.predictor)
         arrays |= {
@@ -112,7 +111,9 @@ def model_from_arrays(arrays: Arrays, *, filtered: bool) -> SelectionModel:
     Raises ModelFormatError: an array is missing or undeclared, or has a wrong shape, type or range.
     """
     with format_errors("the model of recorded units"):
-        named = (name for name in arrays if name.startswith((JOINT_PREFIX, STORE_PREFIX)))
+        if any(name.startswith(OLD_PREFIX) for name in arrays):
+            raise ValueError("its recorded motion is compressed, which is no longer read; train the model again")
+        named = (name for name in arrays if name.startswith(JOINT_PREFIX))
         refuse_undeclared(arrays, LEARNED_MOTION_ARRAYS, names_of_predictors(arrays), UNITS, GUIDE, named)
         motion = learned_motion_from_arrays(arrays, filtered=filtered)
         dimensions = motion.space.dimensions
@@ -135,10 +136,11 @@ def model_from_arrays(arrays: Arrays, *, filtered: bool) -> SelectionModel:
             ),
             stored["unit_usable"],
             stored["recording_first"],
-            motion_store_from_arrays(arrays_under(arrays, STORE_PREFIX)),
+            stored["recorded_rows"],
+            stored["recorded_motion"].astype(np.float16),
             predicted,
         )
-        _check(inventory, dimensions)
+        _check(inventory)
         return SelectionModel(
             motion,
             inventory,
@@ -159,6 +161,8 @@ UNITS = {
     "unit_words": ArraySpec(np.bool_, "U 2"),
     "unit_stress": ArraySpec(np.int32, "U", -1, 2),
     "unit_usable": ArraySpec(np.bool_, "U"),
+    "recorded_rows": ArraySpec(np.intp, "K 2", 0, 1e9),
+    "recorded_motion": ArraySpec(np.float32, "N Q", -6e4, 6e4),
     "selection_scale": ArraySpec(np.float64, "Q", POSITIVE, 1e9),
     "selection_rest": ArraySpec(np.float64, "Q", -1e6, 1e6),
     "selection_variances": ArraySpec(np.float64, "3 Q", 1e-30),
@@ -169,22 +173,22 @@ GUIDE = {
 }
 
 
-def _check(inventory: RecordedUnits, dimensions: int) -> None:
+def _check(inventory: RecordedUnits) -> None:
     """Raise ValueError if the parts of an inventory contradict one another."""
-    windows, first, motion = inventory.windows, inventory.first, inventory.motion
+    windows, first, rows = inventory.windows, inventory.first, inventory.kept.ravel()
     if len(first) != len(inventory.names) + 1 or first[0] != 0 or (np.diff(first) < 1).any():
         raise ValueError("recording_first is not rising from 0, with one number for each recording and one more")
-    if len(motion) != first[-1] or len(motion.tolerance) != dimensions:
-        raise ValueError(f"motion of {len(motion)} frames, required {first[-1]} of {dimensions} dimensions")
+    stored = int(np.diff(inventory.kept, axis=1).sum())
+    if (np.diff(rows) < 0).any() or rows[-1] > first[-1] or (np.diff(inventory.kept, axis=1) < 1).any():
+        raise ValueError(f"recorded_rows that are not ranges in ascending order within {first[-1]} rows")
+    if len(inventory.motion) != stored:
+        raise ValueError(f"recorded_motion of {len(inventory.motion)} rows, required {stored}")
     if (np.diff(windows.recording) < 0).any() or windows.recording.max() >= len(inventory.names):
         raise ValueError("units that are not in the order of the recordings")
     if (windows.durations_s < 0).any() or not inventory.usable.any():
         raise ValueError("units of negative duration, or none that is usable")
-    stored = int(np.diff(motion.kept, axis=1).sum())
-    if len(motion) > LONGEST_SILENCE_FRAMES * stored:
-        raise ValueError(
-            f"{stored} of {len(motion)} frames of motion are stored, required 1 of {LONGEST_SILENCE_FRAMES}"
-        )
+    if first[-1] > LONGEST_SILENCE_FRAMES * stored:
+        raise ValueError(f"{stored} of {first[-1]} frames of motion are stored, required 1 of {LONGEST_SILENCE_FRAMES}")
     ends_s = np.diff(first)[windows.recording] / FRAME_RATE_HZ + LATE_S
     if (windows.times_s[:, 1] > ends_s).any():
         raise ValueError("units beyond the end of their recording")

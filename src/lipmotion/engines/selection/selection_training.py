@@ -4,33 +4,64 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.selection.concatenation import concatenated, pieces_of
 from lipmotion.engines.selection.config import SelectionConfig
-from lipmotion.engines.selection.costs import Costs
+from lipmotion.engines.selection.costs import Costs, Target
 from lipmotion.engines.selection.guide import Guide, at_points, fit_guide
 from lipmotion.engines.selection.inventory import RecordedUnits
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.motion_of_units import Chosen, motion_of_units
 from lipmotion.engines.selection.search import select
-from lipmotion.engines.selection.targets import target_of
 from lipmotion.engines.selection.windows import covering, phone_windows
 from lipmotion.errors import CorpusError
 from lipmotion.hmm.multistream.phone_recogniser import fit_phone_recogniser
 from lipmotion.motion.closure import OPENING
 from lipmotion.motion.fit import fit_motion
 from lipmotion.motion.modulation_filter import learned_filter
-from lipmotion.motion.motion_store import LIP_WIDTH_SHARE, MotionStore, compress, lip_tolerance
 from lipmotion.motion.predictors import PredictorTraining, predictor_class, suitable_predictor
+from lipmotion.motion.reliability import phone_reliability
 from lipmotion.motion.rest import away_from_speech, runs, speech_intervals
 from lipmotion.motion.space import MotionSpace
 from lipmotion.stats.delta_windows import dynamics_known, with_dynamics
 from lipmotion.storage.checkpoint import Checkpoint
-from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Progress, sub_monitor
-from lipmotion.units import is_silent
+from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Progress, Span, Speech, Timeline, Unit, sub_monitor
+from lipmotion.units import SILENCE, is_silent
+
+SEGMENT_S = 0.1
+"""Duration of the segments of speech whose phones cannot be relied on."""
+LEAST_RELIABILITY = 0.5
+"""Mean reliability of the phones from which on they choose."""
+
+
+def target_of(model: SelectionModel, costs: Costs, speech: Speech) -> Target:
+    """Return the phones of speech, with the motion that the guide predicts from its sound.
+
+    Where noise makes the recognised phones of a recording unreliable on the whole, the target is segments of equal
+    duration, for which the sound alone chooses.
+    Raises InputError: an unknown phone.
+    """
+    frames = len(speech.features.values)
+    duration_s = (frames - 1) / FRAME_RATE_HZ
+    units, guide = covering(speech.units, duration_s), model.guide
+    if guide is None or not guide.predictor.can_predict(speech) or not costs.config.guide:
+        return costs.target(costs.shown(phone_windows([units])), None, None)
+    motion, distortion = guide.predict(speech)
+    by_sound = bool(phone_reliability(speech, distortion, frames).mean() < LEAST_RELIABILITY)
+    windows = phone_windows([_segments(duration_s)]) if by_sound else costs.shown(phone_windows([units]))
+    predicted = at_points(motion, windows.times_s)
+    return costs.target(windows, guide.expanded(predicted), predicted, by_sound=by_sound)
+
+
+def _segments(duration_s: float) -> Timeline[Unit]:
+    """Return segments of equal duration; their phone is not used."""
+    edges = np.linspace(0, duration_s, max(round(duration_s / SEGMENT_S), 1) + 1).tolist()
+    return Timeline(tuple(Span(a, b, Unit(SILENCE)) for a, b in pairwise(edges)))
+
 
 Array = NDArray[np.float64]
 CHANNEL_WEIGHTS = {"opening": 8.0, "width": 3.0}
@@ -66,7 +97,7 @@ def fit_selection(
         training = PredictorTraining(examples, values, direct, config.epochs, of_guide, checkpoint)
         guide = fit_guide(kind.fit(training).predictor, examples, values)
     monitor(Progress(_STAGE, 1, 3, 0.9))
-    inventory = inventory_of(examples, values, motion.space, guide)
+    inventory = inventory_of(examples, values, guide)
     monitor(Progress(_STAGE, 2, 3, 0.92))
     recorded = np.concatenate([x[example.valid] for x, example in zip(values, examples, strict=True)])
     scale = comparison_scale(recorded, motion.space)
@@ -85,9 +116,7 @@ def fit_selection(
     return model, np.sqrt(model.variances[0])
 
 
-def inventory_of(
-    examples: Sequence[Example], values: Sequence[Array], space: MotionSpace, guide: Guide | None
-) -> RecordedUnits:
+def inventory_of(examples: Sequence[Example], values: Sequence[Array], guide: Guide | None) -> RecordedUnits:
     """Return the inventory of some examples.
 
     values : motion of each in the motion space [each shape=(T, Q)]
@@ -117,7 +146,9 @@ def inventory_of(
             ]
         ).astype(np.float16)
     names = tuple(example.name for example in examples)
-    return RecordedUnits(names, windows, usable, first, _stored(examples, values, first, space), predicted)
+    kept = _kept(examples, first)
+    motion = np.concatenate(values)[np.concatenate([np.arange(start, stop) for start, stop in kept])].astype(np.float16)
+    return RecordedUnits(names, windows, usable, first, np.array(kept, np.intp), motion, predicted)
 
 
 def comparison_scale(recorded: Array, space: MotionSpace) -> Array:
@@ -134,21 +165,14 @@ def comparison_scale(recorded: Array, space: MotionSpace) -> Array:
     return np.sqrt(weights) / deviations
 
 
-def _stored(
-    examples: Sequence[Example], values: Sequence[Array], first: NDArray[np.intp], space: MotionSpace
-) -> MotionStore:
-    """Return the motion, compressed; without the middle of long silences, and without what was not measured."""
-    ranges = []
-    for example, begin, x in zip(examples, first[:-1].tolist(), values, strict=True):
-        time_s = np.arange(len(x)) / FRAME_RATE_HZ
+def _kept(examples: Sequence[Example], first: NDArray[np.intp]) -> list[list[int]]:
+    """Return the ranges of rows that are stored: not the middle of long silences, nor what was not measured."""
+    ranges = list[list[int]]()
+    for example, begin in zip(examples, first[:-1].tolist(), strict=True):
+        time_s = np.arange(len(example.valid)) / FRAME_RATE_HZ
         near = example.valid & ~away_from_speech(time_s, speech_intervals(example.speech.units), KEPT_SILENCE_S)
         ranges += (runs(near) + begin).tolist()
-    everything = np.concatenate(values)
-    measured = np.concatenate([everything[start:stop] for start, stop in ranges])
-    spread = np.ptp(np.percentile(measured, [1, 99], axis=0), axis=0)
-    if "width" in space.direct_names:
-        spread[:] = lip_tolerance(measured, [space.channels[column] for column in space.direct]) / LIP_WIDTH_SHARE
-    return compress(everything, FRAME_RATE_HZ, np.maximum(LIP_WIDTH_SHARE * spread, 1e-6), kept=ranges)
+    return ranges
 
 
 def _rest_pose(examples: Sequence[Example], values: Sequence[Array], space: MotionSpace) -> Array:

@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.engines.trajectory.emission import Emission
-from lipmotion.motion.articulation import ArticulationPrior, dynamics_of
+from lipmotion.motion.articulation import ArticulationPrior, dynamics_of, strangeness
 from lipmotion.motion.generation import Statistics
 from lipmotion.motion.predictors import Predictor
 from lipmotion.motion.reliability import phone_reliability
-from lipmotion.motion.speaker_knowledge import strangeness
 from lipmotion.types import Speech
 
 Array = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""``lipmotion experiment engines``: all engines and the hybrid on the same recordings, and how far they disagree."""
+"""``lipmotion experiment engines``: all engines on the same recordings."""
 
 from __future__ import annotations
 
@@ -7,18 +7,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from lipmotion.corpora.store import Corpus, Selection
-from lipmotion.engines import Animator
-from lipmotion.experiments.comparison import correlation_statistic, opening_curves
-from lipmotion.experiments.engines.disagreement import disagreement_figures, openings_of_clips
-from lipmotion.experiments.engines.hybrid import Hybrid, HybridModel
-from lipmotion.experiments.engines.models import ENGINES_COMPARED, EngineModel, engine_models
+from lipmotion.experiments.comparison import correlation_statistic, opening_curves, significance_mark
+from lipmotion.experiments.engines.models import EngineModel, engine_models
 from lipmotion.experiments.learning_curve import check_training_names
 from lipmotion.experiments.runner import DEFAULT_SETTINGS, ExperimentSettings, channels_with_opening, opening_row
 from lipmotion.kernels.threads import one_thread
-from lipmotion.motion.speaker_maps import SpeakerMaps
+from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.pipeline.evaluation.figures import figures_of
 from lipmotion.pipeline.evaluation.held_out import (
     OPENING,
@@ -28,26 +23,69 @@ from lipmotion.pipeline.evaluation.held_out import (
     held_out_recordings,
     speech_of_condition,
 )
+from lipmotion.pipeline.model import Model
+from lipmotion.printable import printable
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import sub_monitor, with_progress
 
-HYBRID, MEAN = "hybrid", "mean of the three"
+NAME_WIDTH = 19
+HEAD = (
+    f"  {'system':{NAME_WIDTH}}{'ACC (95 %)':23}  nRMSE  variance  jerk  width | score  precision  p b m  false |"
+    "  no pins: score  precision  p b m  false"
+)
+LEGEND = (
+    "variance, jerk: by those of the recordings; width: its ACC; score, precision, p b m: %; false: closings outside "
+    "p b m, a minute of speech; no pins: lips not made to meet"
+)
+CLOSURES = (("score", "6.1f"), ("precision", "11.1f"), ("recall_p_b_m", "7.1f"), ("false_per_minute", "7.0f"))
+
+
+def table(figures: Mapping[str, Any]) -> str:
+    """Return the figures of ``comparison.engines`` as text."""
+    minutes = {row["minutes"] for row in figures["models"].values()}
+    lines = [
+        f"split {figures['split']}: {figures['clips']} clips; models of {' and '.join(map(str, sorted(minutes)))} "
+        f"minutes of train; closed under {figures['closed_under']:.4f}"
+    ]
+    for name, condition in figures["conditions"].items():
+        row = next(iter(condition["systems"].values()))
+        lines += [
+            "",
+            f"{name}: opening, with {row['p_b_m']} p b m and {row['closings']} closings recorded, "
+            f"{figure_text(row['original_per_minute'], '.0f')} a minute outside p b m",
+            HEAD,
+            *(_line(system, each, figures["reference"]) for system, each in condition["systems"].items()),
+        ]
+    lines += [
+        "",
+        f"* differs from {figures['reference']}: the 95 % interval of the difference on the same clips leaves out 0",
+        LEGEND,
+    ]
+    return "\n".join(map(printable, lines))
+
+
+def _line(name: str, row: Mapping[str, Any], reference: str) -> str:
+    acc = "{}{} ({}–{})".format(
+        figure_text(row["acc"], ".3f"),
+        significance_mark(row["acc_gain_95"][reference]),
+        *(figure_text(end, ".3f") for end in row["acc_95"]),
+    )
+    opening = figure_text(row["nrmse"], "7.3f") + figure_text(row["global_variance"], "10.2f")
+    opening += figure_text(row["jerk"], "6.2f")
+    return (
+        f"  {name:{NAME_WIDTH}}{acc:23}{opening}{figure_text(row['width_acc'], '7.3f')} |{_closures(row)} |"
+        f"{'':9}{_closures(row['unpinned'])}"
+    )
+
+
+def _closures(row: Mapping[str, Any]) -> str:
+    return "".join(figure_text(row[name], form) for name, form in CLOSURES)
+
+
 REFERENCE_ENGINE = "trajectory"
 """The engine that every other system is compared with; its phone models give the phones in time."""
 WIDTH = "width"
-
-
-@dataclass(frozen=True, eq=False)
-class ComparedEngine:
-    """A system with its model of motion.
-
-    speakers : maps of the people whom the model knows, or None
-    """
-
-    engine: Animator[Any]
-    learned: Any
-    speakers: SpeakerMaps | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,13 +104,11 @@ def engines(
     models: Path | None = None,
     settings: ExperimentSettings = DEFAULT_SETTINGS,
 ) -> dict[str, Any]:
-    """Return the figures of all engines, of the hybrid, and of the mean of the engines' motions on ``split``.
+    """Return the figures of all engines on ``split``.
 
     split  : the recordings to compare; none of them may be in the training list
     models : folder of the engines' models (``models.engine_models``); None: they are trained and not kept
-    The phones in time are those of the trajectory engine's phone models, for all systems. ``disagreement`` says for
-    every second of every clip how far the three engines are apart, and whether that ranks the seconds by error
-    (``disagreement.disagreement_figures``).
+    The phones in time are those of the trajectory engine's phone models, for all of them.
     Raises CorpusError: no training list, no utterances of this split or some of the training list among them, or
     motion without an opening.
     Raises InputError, ModelFormatError, ExportError: as ``engine_models``.
@@ -90,32 +126,20 @@ def engines(
         lexicon=settings.lexicon,
         monitor=sub_monitor(monitor, 0.6, 0.7),
     )
-    systems = compared_systems(trained)
-    steps = [(condition, name) for condition in recordings.conditions for name in systems]
+    steps = [(condition, name) for condition in recordings.conditions for name in trained]
     made: dict[str, dict[str, _MadeClips]] = {condition: {} for condition in recordings.conditions}
     for condition, name in with_progress(steps, "comparing", sub_monitor(monitor, 0.7, 1)):
-        made[condition][name] = _made(recordings, condition, systems[name])
+        made[condition][name] = _made(recordings, condition, trained[name].model)
         settings.receive(name, condition, recordings, made[condition][name].pinned)
     about = {"split": split or "all", "clips": len(held_out), "seed": settings.seed}
     about |= {"closed_under": recordings.closed_under, "reference": REFERENCE_ENGINE}
     about |= {"models": {name: _about(each) for name, each in trained.items()}}
-    conditions = {name: _condition(recordings, clips, settings.seed) for name, clips in made.items()}
+    conditions = {}
+    for condition, found in made.items():
+        references = {name: each.pinned for name, each in found.items()}
+        rows = {name: _row(recordings, each, references, settings.seed) for name, each in found.items()}
+        conditions[condition] = {"systems": rows}
     return nan_as_null(about | {"conditions": conditions})
-
-
-def compared_systems(trained: Mapping[str, EngineModel]) -> dict[str, ComparedEngine]:
-    """Return the engines and the hybrid, by name.
-
-    trained : from ``engine_models``
-    """
-    models = {name: each.model for name, each in trained.items()}
-    systems = {name: ComparedEngine(model.engine, model.learned, model.speakers) for name, model in models.items()}
-    guiding, selecting = systems["trajectory"], systems["selection"]
-    hybrid: Any = Hybrid
-    systems[HYBRID] = ComparedEngine(
-        hybrid(guiding.engine, selecting.engine), HybridModel(guiding.learned, selecting.learned), selecting.speakers
-    )
-    return systems
 
 
 def _about(trained: EngineModel) -> dict[str, Any]:
@@ -128,8 +152,8 @@ def _about(trained: EngineModel) -> dict[str, Any]:
     }
 
 
-def _made(recordings: HeldOutRecordings, condition: str, system: ComparedEngine) -> _MadeClips:
-    """Return what a system generates under a condition."""
+def _made(recordings: HeldOutRecordings, condition: str, system: Model) -> _MadeClips:
+    """Return what a model generates under a condition."""
     known = replace(recordings, speakers=system.speakers)
     speech = speech_of_condition(known, condition, system.engine, system.learned)
     pinned = compare_with_recorded(known, speech, system.engine, system.learned)
@@ -137,35 +161,6 @@ def _made(recordings: HeldOutRecordings, condition: str, system: ComparedEngine)
     return _MadeClips(
         pinned, compare_with_recorded(known, speech, free, system.learned) if free != system.engine else pinned
     )
-
-
-def mean_of_clips(made: Sequence[Sequence[ComparedClip]]) -> list[ComparedClip]:
-    """Return the same recordings with the mean of what several systems generate.
-
-    made : of each system, the same recordings in the same order
-    """
-    return [
-        replace(clips[0], generated=np.mean([clip.generated for clip in clips], axis=0))
-        for clips in zip(*made, strict=True)
-    ]
-
-
-def _condition(recordings: HeldOutRecordings, made: Mapping[str, _MadeClips], seed: int) -> dict[str, Any]:
-    """Return the figures of all systems in one condition, and their disagreement."""
-    of_engines = [made[name] for name in ENGINES_COMPARED]
-    mean = _MadeClips(
-        mean_of_clips([each.pinned for each in of_engines]), mean_of_clips([each.free for each in of_engines])
-    )
-    everything = {**made, MEAN: mean}
-    pinned = {name: each.pinned for name, each in everything.items()}
-    references = {name: pinned[name] for name in ENGINES_COMPARED}
-    openings, deviation = openings_of_clips(pinned, recordings.channels.index(OPENING))
-    names = [utterance.name for utterance in recordings.utterances]
-    disagreement = disagreement_figures(openings, ENGINES_COMPARED, MEAN, names, seed)
-    return {
-        "systems": {name: _row(recordings, each, references, seed) for name, each in everything.items()},
-        "disagreement": {"deviation": deviation} | disagreement,
-    }
 
 
 def _row(

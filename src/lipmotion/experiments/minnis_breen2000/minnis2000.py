@@ -17,13 +17,16 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import engine_named
+from lipmotion.engines.selection.concatenation import pieces_of
 from lipmotion.engines.selection.config import MINNIS_2000, SelectionConfig
+from lipmotion.engines.selection.costs import ABUTTING_JOIN
 from lipmotion.engines.selection.engine import SelectionEngine
 from lipmotion.engines.selection.model import SelectionModel
-from lipmotion.experiments.comparison import correlation_statistic, opening_curves
+from lipmotion.engines.selection.search import select
+from lipmotion.engines.selection.selection_training import target_of
+from lipmotion.experiments.comparison import correlation_statistic, opening_curves, significance_mark
 from lipmotion.experiments.engines.models import EngineModel, engine_models
 from lipmotion.experiments.learning_curve import check_training_names
-from lipmotion.experiments.minnis_breen2000.joins import join_figures
 from lipmotion.experiments.runner import (
     DEFAULT_SETTINGS,
     ExperimentSettings,
@@ -33,9 +36,12 @@ from lipmotion.experiments.runner import (
     opening_row,
 )
 from lipmotion.kernels.threads import one_thread
+from lipmotion.measures.evaluation_table import figure_text
 from lipmotion.pipeline.evaluation.figures import figures_of
 from lipmotion.pipeline.evaluation.held_out import (
     AUDIO_ONLY,
+    DISTANCES,
+    OPENING,
     ComparedClip,
     HeldOutRecordings,
     compare_with_recorded,
@@ -47,7 +53,92 @@ from lipmotion.pipeline.training.train import Run, train
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.checkpoint import Checkpoint
 from lipmotion.storage.json_text import nan_as_null
-from lipmotion.types import Speech, sub_monitor, with_progress
+from lipmotion.types import FRAME_RATE_HZ, Speech, Utterance, sub_monitor, with_progress
+
+WIDTH = 36
+HEAD = f"  {'':{WIDTH}}{'ACC (95 %)':23}p b m  elsewhere  joins  hard  smooth  variance and jerk: opening, width, outer"
+NOTE = (
+    "* differs from the system as printed: the 95 % interval of the difference on the same clips leaves out 0\n"
+    "p b m: share closed, without pins, %; elsewhere: closings outside p b m a minute; joins: a clip; hard: share that "
+    "abuts, %;\nsmooth: share where the velocity changes by no more than the speaker's own 95th percentile, %; "
+    "variance and jerk: by those of the recordings\nThe paper prints no figures of its own."
+)
+
+
+def table(figures: Mapping[str, Any]) -> str:
+    """Return the figures of ``minnis2000`` as text."""
+    quick = "; quick: few clips, few epochs, only to see that it runs" if figures["quick"] else ""
+    lines = [f"trained on {figures['utterances']} clips, {figures['minutes']} minutes{quick}"]
+    for split, found in figures["lists"].items():
+        for condition, systems in found["conditions"].items():
+            lines += ["", f"{split}, {found['clips']} clips, {condition}", HEAD]
+            lines += [_line(name, row) for name, row in systems.items()]
+    return "\n".join([*lines, "", NOTE])
+
+
+def _line(name: str, row: Mapping[str, Any]) -> str:
+    joins, channels = row["joins"], [row["channels"].get(each) for each in DISTANCES]
+    acc = "{:.3f}{} ({:.3f}–{:.3f})".format(row["acc"], significance_mark(row["acc_gain_95"]), *row["acc_95"])
+    shares = [_percent(joins["hard"]), _percent(joins["smooth"])]
+    ratios = ["/".join(figure_text(each[key], ".2f") for each in channels if each) for key in RATIOS]
+    return (
+        f"  {name:{WIDTH}}{acc:23}{figure_text(row['recall_p_b_m'], '5.1f')}"
+        f"{figure_text(row['false_per_minute'], '11.1f')}{joins['per_clip']:7.1f}{shares[0]:>6}{shares[1]:>8}  "
+        f"{'  '.join(ratios)}"
+    )
+
+
+RATIOS = ("global_variance", "jerk")
+
+
+def _percent(share: float | None) -> str:
+    return figure_text(None if share is None else 100 * share, ".0f")
+
+
+Array = NDArray[np.float64]
+REACH = 4
+"""Frames before and after a frame between which velocities are compared: 40 ms, a picture of a video."""
+PERCENTILES = (50, 75, 95)
+
+
+def join_figures(
+    engine: SelectionEngine, model: SelectionModel, speech: Sequence[Speech], utterances: Sequence[Utterance]
+) -> dict[str, Any]:
+    """Return how many joins some speech takes, and how much the velocity of the opening changes there.
+
+    utterances : the recordings of the speech, whose own changes are the measure
+    ``hard`` is the share of joins in which units abut; ``smooth`` that of joins where the velocity changes by no more
+    than the 95th percentile of the recordings.
+    """
+    costs, kinds, changes, recorded = model.costs(engine.config), [], [], []
+    for utterance, spoken in zip(utterances, speech, strict=True):
+        target = target_of(model, costs, spoken)
+        pieces = pieces_of(costs, target, select(costs, target).units)
+        opening = engine.generate(model, spoken).motion[OPENING]
+        frames = np.array([round(piece.start_s * FRAME_RATE_HZ) for piece in pieces[1:]], np.intp)
+        changes.append(velocity_change(opening)[np.minimum(frames, len(opening) - 1)])
+        kinds += [piece.join for piece in pieces[1:]]
+        motion = utterance.track.motion
+        original = np.interp(np.arange(len(opening)) / FRAME_RATE_HZ, motion.time_s, motion[OPENING])
+        start_s, end_s = target.windows.times_s[0, 1], target.windows.times_s[-1, 0]
+        recorded.append(velocity_change(original)[int(start_s * FRAME_RATE_HZ) : int(end_s * FRAME_RATE_HZ)])
+    made, own = np.concatenate(changes), np.concatenate(recorded)
+    bound = float(np.percentile(own, PERCENTILES[-1])) if len(own) else float("nan")
+    return {
+        "joins": len(kinds),
+        "per_clip": len(kinds) / len(utterances),
+        "hard": kinds.count(ABUTTING_JOIN) / len(kinds) if kinds else float("nan"),
+        "smooth": float(np.mean(made <= bound)) if kinds else float("nan"),
+        "changes": np.percentile(made, PERCENTILES).tolist() if kinds else None,
+        "recorded_changes": np.percentile(own, PERCENTILES).tolist() if len(own) else None,
+    }
+
+
+def velocity_change(curve: NDArray[np.floating[Any]]) -> Array:
+    """Return the size of the second difference over 40 ms on both sides of each frame [shape=(T,)]."""
+    padded = np.pad(np.asarray(curve, float), REACH, mode="edge")
+    return np.abs(padded[2 * REACH :] - 2 * padded[REACH:-REACH] + padded[: -2 * REACH])
+
 
 ENGINE = "selection"
 PRINTED, UNGUIDED, EVERYTHING = "as printed", "all additions but the guide", "all additions: the default"
@@ -84,14 +175,13 @@ def rows() -> dict[str, SelectionConfig]:
     """Return the configuration of every row, by its name; closures are never pinned, so that units alone are judged."""
     printed = SelectionConfig.parsed(MINNIS_2000)
     found = {PRINTED: printed}
-    found |= {name: replace(printed, **{key: _default(key) for key in keys}) for name, keys in ADDITIONS.items()}
+    found |= {
+        name: replace(printed, **{key: getattr(SelectionConfig(), key) for key in keys})
+        for name, keys in ADDITIONS.items()
+    }
     found |= {name: replace(printed, **changes) for name, changes in VARIANTS.items()}
     everything = SelectionConfig(closures=False)
     return found | {UNGUIDED: replace(everything, guide=0.0), EVERYTHING: everything}
-
-
-def _default(option: str) -> Any:
-    return getattr(SelectionConfig(), option)
 
 
 @one_thread()

@@ -14,8 +14,15 @@ from lipmotion.experiments.folds import FOLDS, folds
 from lipmotion.experiments.hofer2008 import table1
 from lipmotion.experiments.learning_curve import learning_curve
 from lipmotion.experiments.minnis_breen2000.minnis2000 import minnis2000
-from lipmotion.experiments.report import hofer_section, minnis_section, other_sections, xie_liu_section
 from lipmotion.experiments.report.section import Section
+from lipmotion.experiments.report.sections import (
+    engines_section,
+    folds_section,
+    hofer_section,
+    learning_section,
+    minnis_section,
+    xie_liu_section,
+)
 from lipmotion.experiments.runner import ExperimentSettings
 from lipmotion.experiments.xie_liu2007 import six_systems
 from lipmotion.experiments.xie_liu2007.systems import COMPARED_SYSTEMS, selected_systems
@@ -102,11 +109,11 @@ def _folds(run: PartRun) -> dict[str, Any]:
 
 
 PARTS: dict[str, ReportPart] = {
-    "hofer2008": ReportPart(("train", "val", TEST), 4, _hofer, hofer_section.section),
-    "xieliu2007": ReportPart(("train", TEST), 8, _xie_liu, xie_liu_section.section, draws=True),
-    "minnis2000": ReportPart(("train", TEST), 2, _minnis, minnis_section.section),
-    "engines": ReportPart(("train", TEST), 4, _engines, other_sections.engines_section),
-    "learning-curve": ReportPart(("train", TEST), 2, _learning_curve, other_sections.learning_section),
-    "folds": ReportPart(("train",), 4, _folds, other_sections.folds_section),
+    "hofer2008": ReportPart(("train", "val", TEST), 4, _hofer, hofer_section),
+    "xieliu2007": ReportPart(("train", TEST), 8, _xie_liu, xie_liu_section, draws=True),
+    "minnis2000": ReportPart(("train", TEST), 2, _minnis, minnis_section),
+    "engines": ReportPart(("train", TEST), 4, _engines, engines_section),
+    "learning-curve": ReportPart(("train", TEST), 2, _learning_curve, learning_section),
+    "folds": ReportPart(("train",), 4, _folds, folds_section),
 }
 """All experiments by name, in the order of the report: the papers' first."""

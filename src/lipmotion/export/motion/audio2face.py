@@ -18,7 +18,7 @@ import numpy as np
 from lipmotion.errors import InputError
 from lipmotion.export.base import MotionFormat
 from lipmotion.export.motion.json_stream import read_members
-from lipmotion.export.motion.rounded import formatted_rows
+from lipmotion.export.motion.keys import formatted_rows
 from lipmotion.meshes.model.shape_names import ARKIT_52
 from lipmotion.storage.json_text import as_json, json_errors
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Timeline, Unit

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from lipmotion.articulation.lip_points import mouth_template
 from lipmotion.errors import ExportError
 from lipmotion.export.base import MotionFormat
-from lipmotion.export.motion.rounded import formatted_rows
+from lipmotion.export.motion.keys import formatted_rows
 from lipmotion.meshes.fitting.point_motion import point_motion
 from lipmotion.types import Generation, Motion
 
@@ -39,7 +39,7 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
     """Write the points; of motion with distances alone, they move as mouths usually do (``fitting.point_motion``)."""
     motion, template = generation.motion, mouth_template()
     moved = point_motion(motion, generation.units).expressed
-    offsets = [_point(place) for place in template.places]
+    offsets = [" ".join(f"{value:.5f}" for value in place * CENTIMETRES) for place in template.places]
     lines = ["HIERARCHY", "ROOT head", "{", "  OFFSET 0 0 0", f"  CHANNELS 6 {ROOT_CHANNELS}"]
     for point, jaw, offset in zip(template.points, template.jaw, offsets, strict=True):
         lines += [f"  JOINT {'JAW' if jaw else 'LIP'}_{point}", "  {", f"    OFFSET {offset}"]
@@ -50,10 +50,6 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
         file.write("\n".join(lines) + "\n")
         for row in formatted_rows(places):
             file.write(f"0 0 0 0 0 0 {row.replace(',', ' ')}\n")
-
-
-def _point(place: Array) -> str:
-    return " ".join(f"{value:.5f}" for value in place * CENTIMETRES)
 
 
 MOTION_FORMAT = MotionFormat(write, check=check, mouth=True)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError, InputError, shortened
 from lipmotion.export.base import MotionFormat
-from lipmotion.export.motion.rounded import formatted_rows
+from lipmotion.export.motion.keys import formatted_rows
 from lipmotion.meshes.files.curve_table import read_curve_motion
 from lipmotion.meshes.files.steady_rate import exact_rate
 from lipmotion.meshes.model.shape_names import arkit_name

@@ -10,7 +10,7 @@ from lipmotion.errors import InputError
 from lipmotion.export.base import MotionFormat
 from lipmotion.export.motion.document import FORMAT, header, parse, parse_units, units_and_origin
 from lipmotion.export.motion.json_stream import read_members
-from lipmotion.export.motion.rounded import formatted_rows
+from lipmotion.export.motion.keys import formatted_rows
 from lipmotion.storage.json_text import as_json, json_errors
 from lipmotion.types import Generation, Motion, Timeline, Unit
 from lipmotion.units import RECOGNISED

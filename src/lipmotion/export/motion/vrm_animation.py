@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 from lipmotion.errors import ExportError
 from lipmotion.export.base import MotionFormat
 from lipmotion.meshes.files.gltf_container import write_container
-from lipmotion.meshes.files.gltf_sound import sound_extras
 from lipmotion.meshes.files.gltf_weights import read_gltf_motion
-from lipmotion.meshes.files.gltf_writer import GltfBuffer
+from lipmotion.meshes.files.gltf_writer import GltfBuffer, sound_extras
 from lipmotion.meshes.model.head_angles import ANGLES, head_quaternions
 from lipmotion.meshes.model.keys import with_jumps
 from lipmotion.meshes.model.shape_names import VRM_EMOTIONS, VRM_VOWELS
@@ -42,7 +41,7 @@ def write(path: Path, generation: Generation, source: Mapping[str, str], _model:
     """Write a binary glTF without a mesh: bones, a node for each expression, and one animation of them."""
     motion, buffer = generation.motion, GltfBuffer()
     curves = _expressions(motion)
-    stepped = [bool({*_sources(name)} & {*generation.stepped}) for name in curves]
+    stepped = [bool({*(BLINKS if name.startswith("blink") else (name,))} & {*generation.stepped}) for name in curves]
     time_s, rows = with_jumps(motion.time_s, np.stack(list(curves.values()), axis=1), stepped)
     nodes = _bones()
     samplers: list[dict[str, Any]] = []
@@ -91,11 +90,6 @@ def _expressions(motion: Motion) -> dict[str, Array]:
         same = np.array_equal(left, right)
         curves |= {"blink": left} if same else {"blinkLeft": left, "blinkRight": right}
     return {name: np.clip(curve, 0, 1) for name, curve in curves.items()}
-
-
-def _sources(name: str) -> tuple[str, ...]:
-    """Return the channels of an expression."""
-    return BLINKS if name.startswith("blink") else (name,)
 
 
 def _bones() -> list[dict[str, Any]]:

@@ -2,29 +2,181 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.faces.head import palette
-from lipmotion.faces.head.body import clothing, collar, ear, earring, neck
+from lipmotion.faces.head.eyelids import LID_SIDE
 from lipmotion.faces.head.eyes import LASHES, brow, brow_shift, catchlights, eyeball, lash_triangles, lashes
 from lipmotion.faces.head.forms import EYE
 from lipmotion.faces.head.hair import hair
 from lipmotion.faces.head.inside import lower_drop, lower_teeth, tongue, tongue_triangles, upper_teeth
-from lipmotion.faces.head.lips import RINGS, VISIBLE_RINGS, closed_share
-from lipmotion.faces.head.part import part
+from lipmotion.faces.head.lips import ACROSS, RINGS, VISIBLE_RINGS, closed_share
+from lipmotion.faces.head.part import Part, grid_triangles, part, tube
 from lipmotion.faces.head.pose import CharacterPose
 from lipmotion.faces.head.skin import AT_CORNER, REST, Skin, jaw_moved
-from lipmotion.faces.head.tint import skin_colours
 from lipmotion.faces.turning import turned
-from lipmotion.meshes.rendering.lighting import Lighting
+from lipmotion.meshes.rendering.lighting import Lighting, linear
 from lipmotion.meshes.rendering.occlusion import reaches
 from lipmotion.meshes.rendering.rasteriser import normals_of
 
 Real = NDArray[np.float64]
+
+_SIDES = 64
+
+
+def ear() -> Part:
+    """Return the left ear."""
+    around = 2 * np.pi * np.arange(48) / 48
+    ring = np.array([0.0, 0.22, 0.42, 0.58, 0.70, 0.79, 0.87, 0.94, 1.0, 1.0, 0.93, 0.75])
+    relief = np.array([-0.028, -0.03, -0.03, -0.022, 0.008, -0.006, 0.012, 0.03, 0.012, -0.02, -0.05, -0.09])
+    outline = np.where(np.sin(around) > 0, 0.215, 0.235)
+    wide = 0.145 * (1 + 0.18 * np.sin(around)) * np.where(np.cos(around) > 0, 1.0, 0.62)
+    u = ring[:, None] * wide * np.cos(around)
+    v = ring[:, None] * outline * np.sin(around)
+    soft = np.where(np.sin(around) < -0.75, 0.4, 1.0)
+    w = relief[:, None] * np.where(ring[:, None] > 0.6, soft, 1.0) * np.ones(48)
+    w = w + 0.02
+    turn = 0.95
+    back, out = np.array([np.sin(turn) * 0.9, 0.10, -np.cos(turn)]), np.array([np.cos(turn), 0, np.sin(turn)])
+    up = np.array([0.14, 1.0, -0.10])
+    places = np.array([0.80, -0.20, -0.80]) + u[..., None] * back + v[..., None] * up + w[..., None] * out
+    colours = np.broadcast_to(np.array(palette.SKIN), places.shape).copy()
+    warm = np.exp(-(((ring - 0.4) / 0.3) ** 2))[:, None, None] * 0.35 + 0.15
+    colours = (1 - warm) * colours + warm * np.array(palette.BLUSH)
+    triangles = grid_triangles(len(ring), 48, closed=True)
+    return part("ear", places.reshape(-1, 3), triangles, colours.reshape(-1, 3), palette.SKIN_FINISH)
+
+
+def earring() -> Part:
+    """Return the left ear's ring, a small ball."""
+    down, around = np.meshgrid(np.linspace(0, np.pi, 12), 2 * np.pi * np.arange(20) / 20, indexing="ij")
+    ball = np.stack([np.sin(down) * np.cos(around), np.cos(down), np.sin(down) * np.sin(around)], axis=-1)
+    places = 0.035 * ball.reshape(-1, 3) + np.array([0.835, -0.455, -0.74])
+    return part("earring", places, grid_triangles(12, 20, closed=True)[:, ::-1], palette.EARRING, palette.METAL_FINISH)
+
+
+def _rings(table: Real) -> Real:
+    """Return rings about the body from rows (height, half width, half depth, middle z, squareness)."""
+    around = 2 * np.pi * np.arange(_SIDES) / _SIDES
+    rows = []
+    for y, wide, deep, z, square in table:
+        power = 2 / square
+        c, s = np.cos(around), np.sin(around)
+        rows.append(
+            np.stack(
+                [
+                    wide * np.sign(c) * np.abs(c) ** power,
+                    np.full(_SIDES, y),
+                    z + deep * np.sign(s) * np.abs(s) ** power,
+                ],
+                axis=1,
+            )
+        )
+    return np.stack(rows)
+
+
+def _between(table: Sequence[tuple[float, ...]], count: int) -> Real:
+    from scipy.interpolate import PchipInterpolator
+
+    knots = np.array(table)
+    at = np.linspace(0, len(table) - 1, count)
+    return np.asarray(PchipInterpolator(np.arange(len(table)), knots)(at))
+
+
+def neck() -> Part:
+    """Return the neck, from under the hair to under the collar."""
+    rings = _rings(
+        _between(
+            [
+                (-0.55, 0.33, 0.30, -0.98, 2),
+                (-1.0, 0.355, 0.34, -0.96, 2),
+                (-1.45, 0.375, 0.36, -0.98, 2),
+                (-1.75, 0.47, 0.40, -1.0, 2),
+                (-1.95, 0.75, 0.45, -1.0, 2),
+            ],
+            26,
+        )
+    )
+    colours = np.broadcast_to(np.array(palette.SKIN), (rings.size // 3, 3)).copy()
+    return part(
+        "neck", rings.reshape(-1, 3), grid_triangles(26, _SIDES, closed=True)[:, ::-1], colours, palette.SKIN_FINISH
+    )
+
+
+def clothing() -> Part:
+    """Return the pullover: shoulders and chest."""
+    table = [
+        (-1.60, 0.47, 0.44, -0.98, 2.0), (-1.66, 0.56, 0.50, -0.99, 2.0), (-1.78, 0.86, 0.56, -1.0, 2.05),
+        (-1.92, 1.28, 0.60, -1.02, 2.1), (-2.08, 1.58, 0.62, -1.03, 2.15), (-2.35, 1.74, 0.66, -1.03, 2.2),
+        (-2.8, 1.80, 0.72, -1.03, 2.2), (-3.4, 1.80, 0.75, -1.03, 2.2),
+    ]  # fmt: skip
+    rings = _rings(_between(table, 28))
+    return part(
+        "clothing",
+        rings.reshape(-1, 3),
+        grid_triangles(28, _SIDES, closed=True)[:, ::-1],
+        palette.CLOTH,
+        palette.CLOTH_FINISH,
+    )
+
+
+def collar() -> Part:
+    """Return the ribbed collar."""
+    around = 2 * np.pi * np.arange(121) / 120
+    path = np.stack([0.475 * np.cos(around), -1.60 - 0.09 * np.sin(around), -0.98 + 0.44 * np.sin(around)], axis=1)
+    upward = np.stack([np.cos(around), np.full(121, 0.35), np.sin(around)], axis=1)
+    rib = 1 + 0.04 * np.cos(30 * around)
+    places, triangles, _ = tube(path, 0.075 * np.ones(121), 0.05 * rib, upward, sides=10)
+    return part("collar", places, triangles, palette.CLOTH_RIB, palette.CLOTH_FINISH)
+
+
+CORNER_FADE_SHARE = 0.4
+"""How far the colour of the lips fades to that of the skin towards the corners."""
+
+
+def skin_colours(skin: Skin) -> Real:
+    """Return the diffuse reflection of all vertices of the skin, linear [shape=(V, 3)]."""
+    x, y, z = np.abs(skin.rest[:, 0]), skin.rest[:, 1], skin.rest[:, 2]
+    colour = np.broadcast_to(np.array(palette.SKIN), skin.rest.shape).copy()
+
+    def tint(strength: float, middle: tuple[float, float], radii: tuple[float, float], wanted: palette.Triple) -> None:
+        spot = np.exp(-(((x - middle[0]) / radii[0]) ** 2) - ((y - middle[1]) / radii[1]) ** 2)
+        share = strength * spot[:, None] * (z > -0.85)[:, None]
+        colour[:] = (1 - share) * colour + share * np.array(wanted)
+
+    tint(0.5, (0, 0.45), (0.5, 0.3), palette.SKIN_LIGHT)
+    tint(0.4, (0.44, -0.36), (0.21, 0.15), palette.BLUSH)
+    tint(0.25, (0, -0.40), (0.12, 0.09), palette.BLUSH)
+    tint(0.12, (0, -1.05), (0.15, 0.1), palette.BLUSH)
+    tint(0.25, (0.33, 0.17), (0.2, 0.06), palette.BLUSH)
+    tint(0.8, (0.055, -0.495), (0.028, 0.018), palette.SKIN_DEEP)
+    _lips(skin, colour)
+    for eye in range(2):
+        lids = skin.lid_rows(eye)
+        colour[lids[0]] = palette.EYE_CORNER
+        colour[lids[1]] = 0.5 * np.array(palette.EYE_CORNER) + 0.5 * np.array(palette.SKIN)
+        for ring, share in ((2, 0.12), (3, 0.30), (4, 0.12)):
+            upper = lids[ring, LID_SIDE > 0]
+            colour[upper] = (1 - share) * np.array(palette.SKIN) + share * np.array(palette.SKIN_DEEP)
+    return linear(colour)
+
+
+def _lips(skin: Skin, colour: Real) -> None:
+    lips = skin.lip_rows()
+    bare = colour[lips[0]]
+    colour[lips[1]] = 0.45 * colour[lips[1]] + 0.55 * np.array(palette.LIP)
+    colour[lips[2 : VISIBLE_RINGS - 1].ravel()] = palette.LIP
+    for ring in range(VISIBLE_RINGS - 2, VISIBLE_RINGS + 1):
+        share = 0.3 * (ring - VISIBLE_RINGS + 3)
+        colour[lips[ring]] = (1 - share) * np.array(palette.LIP) + share * np.array(palette.LIP_DEEP)
+    faded = (CORNER_FADE_SHARE * np.clip((np.abs(ACROSS) - 0.8) / 0.2, 0, 1) ** 2)[:, None]
+    colour[lips[1:VISIBLE_RINGS]] += faded * (bare - colour[lips[1:VISIBLE_RINGS]])
+    colour[lips[VISIBLE_RINGS + 1 :].ravel()] = palette.MOUTH
+
 
 PIVOT = np.array([0.0, -0.75, -0.9])
 """The head turns about this place, the top of the neck."""

@@ -11,9 +11,8 @@ from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.bones import HEAD, LEFT_EYE, NECK, RIGHT_EYE, Bone
 from lipmotion.meshes.model.single_sided import single_sided
 from lipmotion.meshes.model.surface import mesh_surface
-from lipmotion.meshes.rendering.drawn_surface import drawn_surface
+from lipmotion.meshes.rendering.drawn_surface import TexturedCanvas, drawn_surface
 from lipmotion.meshes.rendering.rasteriser import Camera, flat, normals_of
-from lipmotion.meshes.rendering.textured_canvas import TexturedCanvas
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]

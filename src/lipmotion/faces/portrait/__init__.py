@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from lipmotion.faces.base import TRANSPARENT, DrawnMotion, Face, Staging
 from lipmotion.faces.portrait.design import Design
+from lipmotion.kernels.choice import numba_works
 from lipmotion.types import Motion, Prosody, Timeline, Unit
 
 if TYPE_CHECKING:
@@ -77,7 +78,7 @@ class DrawnFace(Face):
         from lipmotion.faces.portrait.planar import PlanarRasteriser
 
         chosen = self.staging
-        if chosen.background == TRANSPARENT:
+        if chosen.background == TRANSPARENT or not numba_works():
             return None
         poses = face_poses(motion, units, fps, chosen, self.prosody)
         background, size = chosen.colour or chosen.background, chosen.size or OWN_SIZE
@@ -90,7 +91,7 @@ class Woman(DrawnFace):
 
     @property
     def design(self) -> Design:  # noqa: D102
-        from lipmotion.faces.portrait.woman import WOMAN
+        from lipmotion.faces.portrait.characters import WOMAN
 
         return WOMAN
 
@@ -105,7 +106,7 @@ class Man(DrawnFace):
 
     @property
     def design(self) -> Design:  # noqa: D102
-        from lipmotion.faces.portrait.man import MAN
+        from lipmotion.faces.portrait.characters import MAN
 
         return MAN
 
@@ -116,6 +117,6 @@ class Cartoon(DrawnFace):
 
     @property
     def design(self) -> Design:  # noqa: D102
-        from lipmotion.faces.portrait.cartoon import CARTOON
+        from lipmotion.faces.portrait.characters import CARTOON
 
         return CARTOON

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.liveliness import CALM, UpperFace
-from lipmotion.faces.portrait.design import Design
+from lipmotion.faces.portrait.design import WHITE, Design
 from lipmotion.faces.portrait.layer import Glow, Layer, Rim
 from lipmotion.faces.portrait.outlines import Points, ellipse, mirrored, open_curve, stroke
-from lipmotion.faces.portrait.palette import WHITE
 from lipmotion.faces.portrait.view import Pixels, Window
 from lipmotion.kernels.pixels.painting import warp
 

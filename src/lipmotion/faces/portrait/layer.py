@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lipmotion.faces.portrait.design import Colour
 from lipmotion.faces.portrait.outlines import Points
-from lipmotion.faces.portrait.palette import Colour
 from lipmotion.faces.portrait.view import Pixels, Window
 
 SUPERSAMPLING = 4

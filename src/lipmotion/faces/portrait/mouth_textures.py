@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.faces.portrait.design import Design
-from lipmotion.faces.portrait.palette import Colour
+from lipmotion.faces.portrait.design import Colour, Design
 
 Texture = NDArray[np.float64]
 

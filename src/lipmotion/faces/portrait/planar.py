@@ -14,15 +14,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.faces.portrait.design import Design
+from lipmotion.faces.portrait.design import Colour, Design
 from lipmotion.faces.portrait.eyes import GAZE_STEPS, LID_POSITIONS, EyePainter, LidPose, lid_pose
 from lipmotion.faces.portrait.mouth_painting import MouthPainter
 from lipmotion.faces.portrait.mouth_textures import MouthTextures, mouth_textures
 from lipmotion.faces.portrait.movement import BrowField, HeadField, SkinField, brow_pose
-from lipmotion.faces.portrait.palette import Colour
 from lipmotion.faces.portrait.portrait_rasteriser import SCENE, FacePose, moving_parts, still_layers
 from lipmotion.faces.portrait.view import View, Window
-from lipmotion.kernels.pixels.planes import (
+from lipmotion.kernels.compiled.planes import (
     Box,
     EyeLayers,
     StillLayers,
@@ -97,14 +96,14 @@ class PlanarRasteriser:
         """
         jaw, mouth = self._parts.jaw, self._parts.mouth
         skin, still = self._jaw_layers
-        lay_skin(skin, *self._skin_field.shifts(pose.mouth, pose.mood), still, jaw.y0, jaw.x0, canvas.planes)
+        lay_skin(skin, *self._skin_field.shifts(pose.mouth, pose.mood), *still, jaw.y0, jaw.x0, canvas.planes)
         to_layer(canvas.planes, mouth.y0, mouth.x0, canvas.mouth)
         self._mouth_painter.paint(canvas.mouth, pose.mouth)
         from_layer(canvas.mouth, mouth.y0, mouth.x0, canvas.planes)
         _pack(canvas, _grown(_box(jaw)))
         self._paint_upper_half(pose, canvas)
         frame = self._frame.copy()
-        warp_planes(canvas.packed, self._head, *self._head_field.shifts(pose.head), planes_of(frame))
+        warp_planes(canvas.packed, *self._head, *self._head_field.shifts(pose.head), *planes_of(frame))
         return frame
 
     def _paint_upper_half(self, pose: FacePose, canvas: PlanarCanvas) -> None:
@@ -118,10 +117,11 @@ class PlanarRasteriser:
         brow, eyes, below = self._parts.brow, self._parts.eyes, self._parts.below_brows
         skin, still = self._brow_layers
         shifts = self._brow_field.shifts(brows)
-        lay_skin(skin, *shifts, still, brow.y0, brow.x0, canvas.planes)
+        lay_skin(skin, *shifts, *still, brow.y0, brow.x0, canvas.planes)
         rows, columns = below.area
         canvas.planes[:, rows, columns] = self._still[:, rows, columns]
-        lay_eyes(self._eyes(lids), -x / GAZE_STEPS, -y / GAZE_STEPS, eyes.y0, eyes.x0, canvas.planes)
+        x_px, y_px = np.float32(-x / GAZE_STEPS), np.float32(-y / GAZE_STEPS)
+        lay_eyes(*self._eyes(lids), x_px, y_px, eyes.y0, eyes.x0, canvas.planes)
         _pack(canvas, _grown(_box(brow)))
         _pack(canvas, _grown(_box(eyes)))
 
@@ -179,13 +179,13 @@ def _packed(values: Singles) -> Packed:
     """Return planes of values 0..255, packed."""
     planes, packed = _bytes(values), np.empty(values.shape, np.uint32)
     for plane, into in zip(planes, packed, strict=True):
-        pack(plane, Box(0, 0, *plane.shape), into)
+        pack(plane, 0, 0, plane.shape[0], plane.shape[1], False, into)
     return packed
 
 
 def _pack(canvas: PlanarCanvas, box: Box) -> None:
     for number in range(3):
-        pack(canvas.planes[number], box, canvas.packed[number], mean=number > 0)
+        pack(canvas.planes[number], *box, number > 0, canvas.packed[number])
 
 
 def _box(window: Window) -> Box:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lipmotion.faces.portrait.design import Design
+from lipmotion.faces.portrait.design import WHITE, Design
 from lipmotion.faces.portrait.layer import Glow, Layer, Rim
 from lipmotion.faces.portrait.outlines import (
     both_sides,
@@ -12,7 +12,6 @@ from lipmotion.faces.portrait.outlines import (
     path_points,
     stroke,
 )
-from lipmotion.faces.portrait.palette import WHITE
 from lipmotion.faces.portrait.view import Pixels, Window
 
 

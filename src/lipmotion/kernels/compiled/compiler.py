@@ -1,14 +1,21 @@
-"""The decorators that compile all kernels."""
+"""The decorators that compile all kernels; without numba these run as they are, slowly."""
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numba
-from numba.core.caching import FunctionCache
+from lipmotion.kernels.choice import numba_works
+
+if numba_works():
+    import numba
+    from numba.core.caching import FunctionCache
+else:
+    FunctionCache = object
+    logging.getLogger("lipmotion").warning("numba is not installed: this is computed by Python alone, slowly")
 
 FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
 
@@ -27,6 +34,8 @@ def compiled_to_rounding(function: FunctionT) -> FunctionT:
 
 
 def _compiled(function: FunctionT, fastmath: set[str] | bool) -> FunctionT:
+    if not numba_works():
+        return function
     kernel = numba.njit(nogil=True, error_model="numpy", fastmath=fastmath)(function)
     with suppress(RuntimeError):  # neither beside this file nor in the user's cache folder can anything be written
         kernel._cache = _Cache(function)  # as its ``enable_caching``

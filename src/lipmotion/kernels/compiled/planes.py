@@ -1,10 +1,19 @@
-"""Warps of planes of bytes, compiled: the same operations in the same order as in ``kernels.pixels.planes``.
+"""Pictures as planes of bytes, as encoders take them: layers that move, laid on them, and the whole, moved.
+
+Planes are uint8 [shape=(3, H, W)]; opaque. A *packed* plane holds, for every pixel, the pixel itself, the one to its
+right, the one below and the one below that, from the lowest byte to the highest one [dtype uint32]: so one number is
+fetched for each pixel that is moved. Shifts are in pixels, at every ``STEP``-th pixel of a window from its first one on
+[shape=(ceil(h / STEP) + 1, ceil(w / STEP) + 1)], and interpolated between; they are rounded down to 1/65536 of a pixel,
+shares of pixels to 1/256. Beyond its edges a window goes on with its last pixels. Without numba faces are painted as
+layers (``kernels.pixels.painting``).
 
 The work of a row is divided into short loops over neighbouring pixels, of 32-bit numbers alone (hence the conversions),
 so that each but the one that fetches pixels from memory becomes vector instructions: five times as fast as one loop.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +27,7 @@ Singles = NDArray[np.float32]
 Packed = NDArray[np.uint32]
 Whole = NDArray[np.int32]
 STEP = 8
-"""As ``kernels.pixels.planes.STEP``; a constant here, so that the loop over a cell is one instruction."""
+"""Pixels between shifts; a constant, so that the loop over a cell is one instruction."""
 SEGMENT = 64
 """Pixels of a row of skin that are laid at once; a multiple of ``STEP``."""
 BOTH = np.uint32(0x00FF00FF)
@@ -26,9 +35,55 @@ EIGHT, SIXTEEN = np.uint32(8), np.uint32(16)
 ONE, LOW, HALF = np.uint32(256), np.uint32(0xFFFF), np.uint32(32768)
 
 
+class Box(NamedTuple):
+    """The pixels y0 <= y < y1, x0 <= x < x1 of planes."""
+
+    y0: int
+    x0: int
+    y1: int
+    x1: int
+
+    @property
+    def area(self) -> tuple[slice, slice]:
+        """The index of these pixels in a plane."""
+        return slice(self.y0, self.y1), slice(self.x0, self.x1)
+
+
+class StillLayers(NamedTuple):
+    """Layers that do not move, around skin that does; colours of 0..255, premultiplied by the cover.
+
+    below : what is behind the skin [shape=(3, h, w)]
+    shade : is added to it where the shadow of the skin falls [shape=(3, h, w)]
+    above : what is in front of the skin, its cover 0..1 last [shape=(4, h, w)]
+    """
+
+    below: Singles
+    shade: Singles
+    above: Singles
+
+
+class EyeLayers(NamedTuple):
+    """The parts of eyes; colours of 0..255, premultiplied by the cover 0..1 that comes last.
+
+    under   : what is behind the irises [shape=(h, w, 4)]
+    opening : between the lids, the share of each pixel in which the irises are seen [shape=(h, w)]
+    over    : what is in front of the irises [shape=(h, w, 4)]
+    iris    : the irises, looking straight ahead [shape=(h, w, 4)]
+    """
+
+    under: Singles
+    opening: Singles
+    over: Singles
+    iris: Singles
+
+
 @compiled
 def pack(plane: Bytes, y0: int, x0: int, y1: int, x1: int, mean: bool, packed: Packed) -> None:
-    """Pack every pixel of a window with its three neighbours, as ``kernels.pixels.planes.pack``."""
+    """Fill in a window of a packed plane.
+
+    plane, packed : [shape=(H, W)]
+    mean : pack the mean of each pixel and its three neighbours, as is needed where every second pixel is taken
+    """
     width, last_x, last_y = x1 - x0, plane.shape[1] - 1, plane.shape[0] - 1
     above, below = np.zeros(width + 1, np.uint32), np.zeros(width + 1, np.uint32)
     inside = min(x1 + 1, last_x if mean else last_x + 1) - x0
@@ -124,7 +179,12 @@ def warp_planes(
     blue: Bytes,
     red: Bytes,
 ) -> None:
-    """Fill a window of three planes with packed ones that are shifted, as ``kernels.pixels.planes.warp_planes``."""
+    """Fill a window of a picture with another one that is shifted, by a different distance everywhere.
+
+    packed    : planes of brightness and of two colours, the latter of means [shape=(3, H, W)]
+    y0 … x1   : the window, of even places and sizes
+    luma      : brightness [shape=(H, W)];  blue, red : colours at half the width and height [shape=(H / 2, W / 2)]
+    """
     height, width = y1 - y0, x1 - x0
     row_x, row_y = np.empty(shift_x.shape[1]), np.empty(shift_x.shape[1])
     index, found = np.empty(width + STEP, np.int32), np.empty(width, np.uint32)
@@ -159,7 +219,12 @@ def lay_skin(
     x0: int,
     target: Bytes,
 ) -> None:
-    """Lay shifted skin between still layers, as ``kernels.pixels.planes.lay_skin``."""
+    """Lay skin that is shifted, by a different distance everywhere, between ``StillLayers`` on a window of planes.
+
+    skin   : packed colours, premultiplied; cover, and strength of the shadow on what is behind, 0..255
+             [shape=(5, h, w)]
+    target : [shape=(3, H, W)], in which the window begins at y0, x0
+    """
     _, height, width = skin.shape
     flat = skin.reshape(5, height * width)
     row_x, row_y = np.empty(shift_x.shape[1]), np.empty(shift_x.shape[1])
@@ -217,7 +282,10 @@ def lay_eyes(
     x0: int,
     target: Bytes,
 ) -> None:
-    """Lay eyes on planes, as ``kernels.pixels.planes.lay_eyes``."""
+    """Lay ``EyeLayers`` on a window of planes that begins at y0, x0.
+
+    x, y : from each pixel to the one of the irises that is seen there
+    """
     height, width = opening.shape
     last_x, last_y, none, whole = np.float32(width - 1), np.float32(height - 1), np.float32(0), np.float32(1)
     eye = np.empty(4, np.float32)
@@ -253,7 +321,7 @@ def lay_eyes(
 
 @compiled
 def to_layer(planes: Bytes, y0: int, x0: int, layer: Singles) -> None:
-    """Copy a window of planes to an opaque layer, as ``kernels.pixels.planes.to_layer``."""
+    """Copy a window of planes to an opaque layer [shape=(h, w, 4)], as ``kernels.pixels.painting`` paints on."""
     for row in range(layer.shape[0]):
         for column in range(layer.shape[1]):
             for channel in range(3):
@@ -263,7 +331,7 @@ def to_layer(planes: Bytes, y0: int, x0: int, layer: Singles) -> None:
 
 @compiled
 def from_layer(layer: Singles, y0: int, x0: int, planes: Bytes) -> None:
-    """Copy an opaque layer to a window of planes, as ``kernels.pixels.planes.from_layer``."""
+    """Copy an opaque layer [shape=(h, w, 4)] to a window of planes, rounded."""
     for row in range(layer.shape[0]):
         for column in range(layer.shape[1]):
             for channel in range(3):

@@ -1,4 +1,4 @@
-"""Light on vertices, compiled: the results are those of ``kernels.pixels.shading`` to the bit."""
+"""Light on vertices, compiled."""
 
 # Functions take their arrays as separate arguments, more than eight in places: numba compiles that to the fastest code.
 
@@ -15,7 +15,7 @@ Real = NDArray[np.float64]
 
 @compiled
 def add_normals(places: Real, triangles: NDArray[np.int32], total: Real) -> None:
-    """Add the normals of triangles to those of their vertices, corner after corner, as ``kernels.shading``."""
+    """Add the normals of triangles to those of their vertices, corner after corner."""
     part = np.empty(total.shape)
     across = np.empty((len(triangles), 3))
     for f in range(len(triangles)):

@@ -1,4 +1,4 @@
-"""Triangles with textures to pixels, compiled: the pictures are those of ``kernels.pixels.textured`` to the bit."""
+"""Triangles with textures to pixels, compiled."""
 
 # Functions take their arrays as separate arguments, more than eight in places: numba compiles that to the fastest code.
 

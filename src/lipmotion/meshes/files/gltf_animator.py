@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lipmotion.meshes.files.gltf_container import GltfDocument, read_gltf_document, write_container
 from lipmotion.meshes.files.gltf_scene import mesh_target_names
-from lipmotion.meshes.files.gltf_sound import sound_extras
+from lipmotion.meshes.files.gltf_writer import sound_extras
 from lipmotion.meshes.model.keys import EVERY_KEY, Thinning, keys_of
 from lipmotion.types import Motion
 

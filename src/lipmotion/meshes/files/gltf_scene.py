@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import warnings
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,17 +13,248 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.meshes.files.gltf_accessors import GltfArrays
-from lipmotion.meshes.files.gltf_colours import WHITE, counted, tinted, vertex_tints
 from lipmotion.meshes.files.gltf_container import GltfDocument, plain_name, read_gltf_document
-from lipmotion.meshes.files.gltf_nodes import placed_nodes
-from lipmotion.meshes.files.gltf_schema import LARGEST_NUMBER
-from lipmotion.meshes.files.gltf_skins import GltfSkin, head_bones, held_bones, read_skin, skin_weights, skinned_frames
-from lipmotion.meshes.files.gltf_textures import GltfMaterials
+from lipmotion.meshes.files.gltf_nodes import PlacedNode, placed_nodes
+from lipmotion.meshes.files.gltf_schema import COMPONENTS, LARGEST_NUMBER, MOST_GROUPS, WIDTHS
 from lipmotion.meshes.files.vrm import expression_shapes, looks_backwards
 from lipmotion.meshes.model.bones import Bone, merged_bones
-from lipmotion.meshes.model.mesh import Blendshape, Material, Mesh, MeshPart, PartNames
+from lipmotion.meshes.model.mesh import OPAQUE, Blendshape, Material, Mesh, MeshPart, PartNames
+from lipmotion.meshes.model.textures import Texture, read_texture
+from lipmotion.meshes.rendering.lighting import linear
+
+Colours = NDArray[np.float64]
+
+UNKNOWN = (0.8, 0.72, 0.66)
+"""The colour (sRGB) of a material whose texture cannot be read: a pale skin, rather than the white that is usually
+multiplied by the texture."""
+
+
+class GltfMaterials:
+    """The materials of a document; every picture is read once."""
+
+    def __init__(self, document: GltfDocument, arrays: GltfArrays) -> None:
+        self._document, self._arrays = document, arrays
+        self._textures: dict[str | int, Texture | None] = {}
+        self._materials: dict[int, Material] = {}
+
+    def material(self, number: int | None) -> Material:
+        """Return a material: its base colour as sRGB, its texture, its gloss from its roughness.
+
+        number : of the document; None: the default material
+        A texture that cannot be read gives a warning and the colour ``UNKNOWN``.
+        """
+        if number is None:
+            return Material()
+        if number not in self._materials:
+            self._materials[number] = self._read(self._document.items("materials")[number])
+        return self._materials[number]
+
+    def moved(self, number: int | None, uv: Colours) -> Colours:
+        """Return places in a material's texture as its extension ``KHR_texture_transform`` moves them.
+
+        uv : v downwards [shape=(N, 2)]
+        """
+        look = {} if number is None else self._document.items("materials")[number].get("pbrMetallicRoughness", {})
+        how = look.get("baseColorTexture", {}).get("extensions", {}).get("KHR_texture_transform")
+        if not how:
+            return uv
+        angle = how.get("rotation", 0.0)
+        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        return (uv * how.get("scale", (1.0, 1.0))) @ turn + how.get("offset", (0.0, 0.0))
+
+    def _read(self, found: dict[str, Any]) -> Material:
+        look = found.get("pbrMetallicRoughness", {})
+        factor = np.clip(look.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0)), 0, 1)
+        linear = factor[:3]
+        coded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+        alpha = found.get("alphaMode", OPAQUE)
+        texture = None
+        if "baseColorTexture" in look:
+            texture = self._texture(self._document.items("textures")[look["baseColorTexture"]["index"]])
+            if texture is None:
+                coded = np.array(UNKNOWN)
+        red, green, blue = np.clip(coded, 0, 1).tolist()
+        return Material(
+            plain_name(found.get("name", "")),
+            (red, green, blue),
+            1 - min(max(look.get("roughnessFactor", 1.0), 0.0), 1.0),
+            1.0 if alpha == OPAQUE else float(factor[3]),
+            texture,
+            alpha,
+            min(max(found.get("alphaCutoff", 0.5), 0.0), 1.0),
+            found.get("doubleSided", False),
+        )
+
+    def _texture(self, texture: dict[str, Any]) -> Texture | None:
+        source = texture.get("extensions", {}).get("EXT_texture_webp", texture).get("source")
+        if source is None:
+            _warn("is in a format (KTX2, AVIF) that is not read; export it as PNG or JPEG")
+            return None
+        image = self._document.items("images")[source]
+        place = image.get("bufferView", image.get("uri", ""))
+        if place not in self._textures:
+            self._textures[place] = self._picture(place)
+        return self._textures[place]
+
+    def _picture(self, place: int | str) -> Texture | None:
+        try:
+            if isinstance(place, str):
+                content: bytes | memoryview = self._document.linked(place, "picture")
+            else:
+                content = self._arrays.bytes_of(place)
+            self._document.budget.spend("bytes of pictures", len(content))
+            texture = read_texture(content, self._document.budget)
+        except InputError as error:
+            _warn(f"cannot be read: {error}")
+            return None
+        if texture is None:
+            _warn("is damaged, too large, or no PNG, JPEG or WebP; export it again")
+        return texture
+
+
+def _warn(what: str) -> None:
+    warnings.warn(f"a texture of the character {what}. Its surface has one colour", UserWarning, stacklevel=2)
+
+
+Array = NDArray[np.float64]
+WHITE = (1.0, 1.0, 1.0)
+"""The colour of a primitive that has colours of vertices and no material."""
+
+
+def vertex_tints(document: GltfDocument, arrays: GltfArrays, number: int, count: int) -> Array:
+    """Return the light and the opacity by which those of a material are multiplied, 0 to 1 [shape=(N, 4)].
+
+    number : of the accessor of ``COLOR_0``: three or four numbers, of floats or of bytes or shorts without a sign;
+             whole numbers count as parts of the largest one, also where the file does not say so
+    count  : of the vertices
+    Raises InputError: another kind of numbers, another number of vertices, or as ``GltfArrays.floats``.
+    """
+    accessor = document.items("accessors")[number]
+    width, kind = WIDTHS[accessor["type"]], np.dtype(COMPONENTS[accessor["componentType"]])
+    if width not in {3, 4} or not (kind.kind == "f" or (kind.kind == "u" and kind.itemsize < 4)):
+        raise InputError(
+            f"colours of vertices are {accessor['type']!r} of {accessor['componentType']!r}, required VEC3 or VEC4 of "
+            "floats, unsigned bytes or unsigned shorts; export it again"
+        )
+    values = arrays.floats(number, width, count)
+    if kind.kind == "u" and not accessor.get("normalized"):
+        values = values / np.iinfo(kind).max
+    tints = np.ones((count, 4))
+    tints[:, :width] = np.clip(values, 0, 1)
+    return tints
+
+
+def counted(tints: Array, material: Material) -> Array:
+    """Return tints [shape=(N, 4)] as a material counts them: where it hides what is behind, their opacity is 1."""
+    if material.alpha != OPAQUE:
+        return tints
+    return np.concatenate([tints[:, :3], np.ones((len(tints), 1))], axis=1)
+
+
+def tinted(colours: Array, tints: Array) -> Array:
+    """Return colours, sRGB, 0 to 1 [shape=(N, 3)], whose light is multiplied by tints [shape=(N, 4)]."""
+    light = linear(colours) * tints[:, :3]
+    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+
 
 Matrix = NDArray[np.float64]
+Numbers = NDArray[np.int64]
+LEAST_WEIGHT = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class GltfSkin:
+    """The joints of a skin.
+
+    joints   : their nodes, in the order of the skin [J]
+    matrices : where each takes what follows it [shape=(J, 3, 4)]
+    """
+
+    joints: tuple[PlacedNode, ...]
+    matrices: Matrix
+
+
+def read_skin(document: GltfDocument, number: int, arrays: GltfArrays, nodes: Mapping[int, PlacedNode]) -> GltfSkin:
+    """Return a skin of a document at rest. Raises InputError: a joint is not in the scene, or matrices are missing."""
+    skin = document.items("skins")[number]
+    listed, inverse = skin["joints"], skin.get("inverseBindMatrices")
+    count = len(listed) if inverse is None else arrays.count(inverse)
+    document.budget.spend("joints", max(count, len(listed)))
+    if not all(joint in nodes for joint in listed):
+        raise InputError("a skin with joints that are not in the scene; export it again")
+    if count < len(listed):
+        raise InputError(f"{count} matrices of {len(listed)} joints; export it again")
+    joints = tuple(nodes[joint] for joint in listed)
+    matrices = np.array([joint.matrix for joint in joints])
+    if inverse is not None:
+        matrices = matrices @ arrays.floats(inverse, 16)[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
+    return GltfSkin(joints, matrices[:, :3])
+
+
+def skin_weights(
+    skin: GltfSkin, arrays: GltfArrays, attributes: Mapping[str, int], count: int
+) -> tuple[Numbers, Matrix]:
+    """Return the joints that every vertex follows, as rows of the skin's list, and how far [shape=(N, W), both].
+
+    count : of the vertices
+    Raises InputError: the numbers do not fit.
+    """
+    joints, weights = [np.zeros((count, 0), np.int64)], [np.zeros((count, 0))]
+    for group in range(MOST_GROUPS):
+        if f"JOINTS_{group}" not in attributes or f"WEIGHTS_{group}" not in attributes:
+            break
+        numbers = arrays.whole(attributes[f"JOINTS_{group}"], 4, count)
+        if count and not 0 <= numbers.min() <= numbers.max() < len(skin.joints):
+            raise InputError(f"vertices follow joint {numbers.max()} of {len(skin.joints)}; export it again")
+        joints.append(numbers)
+        weights.append(arrays.floats(attributes[f"WEIGHTS_{group}"], 4, count))
+    return np.concatenate(joints, axis=1), np.concatenate(weights, axis=1)
+
+
+def skinned_frames(skin: GltfSkin, joints: Numbers, weights: Matrix) -> tuple[Matrix, Matrix]:
+    """Return how a skin at rest maps every vertex: matrices [shape=(N, 3, 3)] and shifts [shape=(N, 3)].
+
+    joints, weights : as of ``skin_weights``
+    """
+    blended = np.zeros((len(weights), 3, 4))
+    for column in range(weights.shape[1]):
+        blended += weights[:, column, None, None] * skin.matrices[joints[:, column]]
+    total = weights.sum(axis=1)
+    held = total > LEAST_WEIGHT
+    blended[held] /= total[held, None, None]
+    blended[~held] = np.eye(4)[:3]
+    if not (np.abs(blended) <= LARGEST_NUMBER).all():
+        raise InputError(f"a skin takes vertices beyond ±{LARGEST_NUMBER:g}; export it again")
+    return blended[:, :, :3], blended[:, :, 3]
+
+
+def head_bones(
+    skin: GltfSkin, joints: Numbers, weights: Matrix, nodes: Mapping[int, PlacedNode], first: int
+) -> Iterator[Bone]:
+    """Yield the bones of the head that vertices follow, or whose parts they follow.
+
+    joints, weights : as of ``skin_weights``;  first : number of the first vertex in the whole mesh
+    """
+    total = np.maximum(weights.sum(axis=1), LEAST_WEIGHT)
+    for kind in sorted({kind for joint in skin.joints for kind in joint.kinds}):
+        member = np.array([kind in joint.kinds for joint in skin.joints])
+        shares = np.clip((weights * member[joints]).sum(axis=1) / total, 0, 1)
+        rows = np.flatnonzero(shares > 0)
+        if len(rows):
+            node = next(joint.kinds[kind] for joint in skin.joints if kind in joint.kinds)
+            yield Bone(kind, nodes[node].matrix[:3, 3], rows + first, shares[rows])
+
+
+def held_bones(node: PlacedNode, nodes: Mapping[int, PlacedNode], first: int, count: int) -> Iterator[Bone]:
+    """Yield the bones that a mesh without skin hangs on; all of its vertices follow.
+
+    first, count : its first vertex in the whole mesh, and how many
+    """
+    for kind, above in sorted(node.kinds.items()):
+        if count:
+            yield Bone(kind, nodes[above].matrix[:3, 3], np.arange(first, first + count), np.ones(count))
+
+
 TRIANGLES = 4
 """The mode of primitives that are lists of triangles; strips, fans, lines and points are not read."""
 LEAST_DISPLACEMENT = 1e-9

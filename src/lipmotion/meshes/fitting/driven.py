@@ -19,18 +19,54 @@ from lipmotion.errors import InputError
 from lipmotion.meshes.files.binding_files import BINDING_SUFFIX, load_binding, read_points, read_weights
 from lipmotion.meshes.files.character_files import read_character
 from lipmotion.meshes.files.rig_tables import RigRow, read_character_table, table_path, with_sources
-from lipmotion.meshes.fitting.lip_placement import LipPlacement, placed_by_points, placed_by_shape, surface_of_named
-from lipmotion.meshes.fitting.mood_weights import expression_weights
+from lipmotion.meshes.fitting.facial_animation import expression_weights
+from lipmotion.meshes.fitting.lip_placement import (
+    LipPlacement,
+    opening_shape,
+    placed_by_points,
+    placed_by_shape,
+    surface_of_named,
+)
 from lipmotion.meshes.fitting.own_curves import OwnCurves, own_curves, plain_row, rows_found
 from lipmotion.meshes.fitting.point_motion import point_motion
 from lipmotion.meshes.fitting.shape_weights import shape_weights
 from lipmotion.meshes.model.binding import ControlBinding, bind, painted
+from lipmotion.meshes.model.bones import JAW
 from lipmotion.meshes.model.face_shapes import FaceShapes, face_shapes, numbers_by_name
-from lipmotion.meshes.model.jaw_bone import with_jaw
-from lipmotion.meshes.model.mesh import Mesh
+from lipmotion.meshes.model.mesh import Blendshape, Mesh
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, VRM_EMOTIONS, arkit_name
 from lipmotion.meshes.model.surface import mesh_surface
 from lipmotion.types import Motion, Timeline, Unit
+
+JAW_OPEN = "jawOpen"
+WIDEST_RAD = np.radians(22.0)
+"""How far a jaw turns at weight 1."""
+
+
+def with_jaw(mesh: Mesh) -> Mesh:
+    """Return a mesh whose mouth opens: one with a jaw bone gets the blendshape ``jawOpen``, where it has none.
+
+    The blendshape is the movement of the jaw's vertices as the bone turns about the axis from ear to ear, on a straight
+    way. A mesh that has a blendshape that opens the mouth, or no jaw bone, is returned as it is.
+    """
+    bone = next((bone for bone in mesh.bones if bone.kind == JAW), None)
+    if bone is None or _opens(mesh):
+        return mesh
+    away = mesh.vertices[bone.rows] - bone.place
+    cosine, sine = np.cos(WIDEST_RAD), np.sin(WIDEST_RAD)
+    turned = away @ np.array([[1, 0, 0], [0, cosine, sine], [0, -sine, cosine]])
+    shape = Blendshape(JAW_OPEN, bone.rows, bone.shares[:, None] * (turned - away))
+    others = tuple(each for each in mesh.shapes if each.name != JAW_OPEN)
+    return replace(mesh, shapes=(*others, shape))
+
+
+def _opens(mesh: Mesh) -> bool:
+    try:
+        opening_shape(mesh)
+    except InputError:
+        return False
+    return True
+
 
 Array = NDArray[np.float64]
 

@@ -9,18 +9,48 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lipmotion.articulation.contact import LEAST_GAP, gap_in
-from lipmotion.articulation.lip_points import FACING, mouth_template
+from lipmotion.articulation.lip_points import FACING, LEFT_CORNER, RIGHT_CORNER, mouth_template
 from lipmotion.articulation.mouth import SpokenMouth
 from lipmotion.meshes.fitting.blendshape_motion import given_weights, with_mouth
 from lipmotion.meshes.fitting.bounded_curves import CurveCosts, bounded_curves
-from lipmotion.meshes.fitting.lip_rounding import rounded_weights
-from lipmotion.meshes.fitting.mood_weights import mood_weights
+from lipmotion.meshes.fitting.facial_animation import mood_weights
 from lipmotion.meshes.fitting.oculus_visemes import NEAREST_VOWEL, viseme_curves
 from lipmotion.meshes.fitting.point_motion import PointMotion, point_motion
 from lipmotion.meshes.model.face_shapes import NOT_FROM_POINTS, FaceShapes
 from lipmotion.types import WEIGHT, Channel, Motion, Timeline, Unit
 
 Array = NDArray[np.float64]
+
+PUCKER, FUNNEL = 0.5, 0.3
+"""Least weights of ``mouthPucker`` and ``mouthFunnel`` in a phone of roundness 1."""
+NARROWING = 0.11
+"""Both together make the mouth narrower by this, in eye distances; there is less, or more, of them for it."""
+SHARES = (0.6, 1.4)
+"""The least and the largest share of them that there is then."""
+SPREADING = tuple(
+    f"{name}{side}" for name in ("mouthSmile", "mouthStretch", "mouthDimple") for side in ("Left", "Right")
+)
+"""Shapes that draw the corners apart: they vanish in round phones."""
+
+
+def rounded_weights(weights: Array, shapes: FaceShapes, protrusion: Array) -> Array:
+    """Return weights of blendshapes with lips at least as round as they are protruded [shape=(T, S)].
+
+    weights : as solved from the points [shape=(T, S)];  protrusion : 0 to 1 [shape=(T,)]
+    """
+    result = weights.copy()
+    template = mouth_template()
+    right, left = template.row(RIGHT_CORNER), template.row(LEFT_CORNER)
+    wanted = [(shapes.row(name), most) for name, most in (("mouthPucker", PUCKER), ("mouthFunnel", FUNNEL))]
+    present = [(row, most) for row, most in wanted if row is not None]
+    narrower = sum(most * float(shapes.moved[row, right, 0] - shapes.moved[row, left, 0]) for row, most in present)
+    share = float(np.clip(NARROWING / narrower, *SHARES)) if narrower > 0 else 1.0
+    for row, most in present:
+        result[:, row] = np.maximum(result[:, row], share * most * protrusion)
+    rows = [row for row in map(shapes.row, SPREADING) if row is not None]
+    result[:, rows] *= (1 - protrusion)[:, None]
+    return result
+
 
 DEPTH_WEIGHT, JAW_WEIGHT, CORNER_WEIGHT, GAP_WEIGHT = 0.4, 0.5, 4.0, 2.0
 """Weights of distances in depth, of the jaw, of the corners across, and of the gap between the lips, beside 1 for

@@ -9,11 +9,31 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lipmotion.errors import InputError, shortened
-from lipmotion.pipeline.batch.fields import as_field, from_field
 from lipmotion.pipeline.batch.lines import LARGEST_LIST_BYTES
 from lipmotion.pipeline.batch.record import Record
-from lipmotion.storage.files import read_text_file, whole_file
+from lipmotion.storage.files import as_text, read_text_file, whole_file
 from lipmotion.storage.text_table import read_table
+
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""What makes a field a formula for spreadsheets, at its beginning."""
+QUOTE = "'"
+
+
+def as_field(text: str) -> str:
+    """Return a text as a field; one that a spreadsheet would compute gets an apostrophe first."""
+    text = as_text(text)
+    return QUOTE + text if _is_formula(text) else text
+
+
+def from_field(field: str) -> str:
+    """Return the text of a field that ``as_field`` made."""
+    return field[1:] if field.startswith(QUOTE) and _is_formula(field) else field
+
+
+def _is_formula(text: str) -> bool:
+    """Return whether a text is a formula, or one behind apostrophes."""
+    return text.lstrip(QUOTE).startswith(FORMULA)
+
 
 APPROVE, REDO, NO_MARK = "approve", "redo", ""
 KINDS = (APPROVE, REDO, NO_MARK)

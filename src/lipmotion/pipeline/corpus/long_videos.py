@@ -18,13 +18,55 @@ from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording
 from lipmotion.corpora.splits import LISTS
 from lipmotion.errors import InputError
 from lipmotion.pipeline.corpus.separate_sound import on_own_time, separate_sound
-from lipmotion.pipeline.corpus.spoken_lines import spoken_lines, transcript_beside
 from lipmotion.pipeline.corpus.utterance_spans import SpokenPart, utterance_spans
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import levels_db, quietest_s, spoken_spans
 from lipmotion.storage.media import open_media, stated_duration_s, video_streams
-from lipmotion.types import Audio, Monitor, Progress
+from lipmotion.types import Audio, Monitor, Progress, TimedTranscript, TranscriptLine
+from lipmotion.units.written_forms import readings
 from lipmotion.vision.video_scan import VideoScan, scan_video
+
+
+def transcript_beside(video: Path) -> TimedTranscript | None:
+    """Return the transcript beside a video, one with times if there is any; None if there is none.
+
+    Raises InputError: a file of labels cannot be read.
+    """
+    transcript = labels_beside(video).transcript
+    if transcript is None or transcript.has_times:
+        return transcript
+    other = labels_beside(video, ignored=frozenset({video.with_suffix(".txt")})).transcript
+    return other if other is not None and other.has_times else transcript
+
+
+def spoken_lines(transcript: TimedTranscript) -> list[SpokenPart]:
+    """Return the lines of a transcript as parts, in order; of a line whose words all have times, the words.
+
+    A line without an end lasts to the next one that has a start; lines without a start are left out. Numbers
+    are read as they usually are.
+    """
+    starts_s = [line.start_s for line in transcript.lines]
+    parts: list[SpokenPart] = []
+    for n, line in enumerate(transcript.lines):
+        words = [
+            SpokenPart(word.start_s, word.end_s, readings(word.word)[0])
+            for word in line.words
+            if word.start_s is not None and word.end_s is not None and word.end_s > word.start_s
+        ]
+        if len(words) == len(line.words):
+            parts += words
+        else:
+            following = next((start_s for start_s in starts_s[n + 1 :] if start_s is not None), None)
+            parts += _whole_line(line, following)
+    return parts
+
+
+def _whole_line(line: TranscriptLine, following_s: float | None) -> list[SpokenPart]:
+    end_s = following_s if line.end_s is None else line.end_s
+    if line.start_s is None or end_s is None or end_s <= line.start_s or not line.words:
+        return []
+    return [SpokenPart(line.start_s, end_s, tuple(said for word in line.words for said in readings(word.word)[0]))]
+
 
 LOG = logging.getLogger("lipmotion")
 

@@ -15,15 +15,11 @@ from lipmotion.errors import InputError
 from lipmotion.export.motion.marker_frame import MILLIMETRES
 from lipmotion.measures import curves, vertices
 from lipmotion.measures.closures import closed_threshold, closure_figures
-from lipmotion.measures.modulation import modulation_distance_db
-from lipmotion.measures.sync_confidence import SyncConfidence
-from lipmotion.measures.sync_network import SyncNetwork, read_sync_network
+from lipmotion.measures.curves import modulation_distance_db
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, arkit_name
-from lipmotion.pipeline.evaluation.lip_sync import lip_sync
 from lipmotion.pipeline.outputs.motion_input import read_generation
 from lipmotion.storage.json_text import nan_as_null
 from lipmotion.types import WEIGHT, Generation, Monitor, Motion, Track, silent_monitor, with_progress
-from lipmotion.vision.footage import track_footage
 from lipmotion.vision.landmarks import LIP_POINTS
 from lipmotion.vision.track import track
 
@@ -40,27 +36,21 @@ UPPER_FACE = tuple(name for name in ARKIT_OTHERS if name.startswith(("brow", "ey
 
 @dataclass(frozen=True, eq=False)
 class _Side:
-    """Motion that is compared: its name, its curves, which frames were measured, how well it agrees with its sound."""
+    """Motion that is compared: its name, its curves, which frames were measured."""
 
     name: str
     motion: Motion
     seen: NDArray[np.bool_]
-    sync: SyncConfidence | None = None
 
 
-def compare(
-    reference: Source, *others: Source, sync_weights: str | Path | None = None, monitor: Monitor = silent_monitor
-) -> dict[str, Any]:
+def compare(reference: Source, *others: Source, monitor: Monitor = silent_monitor) -> dict[str, Any]:
     """Return how far other motion is from that of a reference, by name (docs/compare.md).
 
     reference, others : motion files, videos that show a face (they are tracked), or motion
-    sync_weights      : an ``.npz`` file with the weights of SyncNet; ``sync`` then says how well the lips of each video
-                        agree with its own sound
     monitor           : called with reports of progress
     Motion is compared at the slower of its two rates, where both last; ``notes`` say what was done for it. Figures that
     do not exist are None.
-    Raises InputError: a file that cannot be read, values that are not finite, no common channel, too few frames; other
-    weights than SyncNet's, or weights without a video.
+    Raises InputError: a file that cannot be read, values that are not finite, no common channel, too few frames.
     Raises MissingDependencyError: videos without the extra ``video``.
 
     >>> import lipmotion
@@ -72,43 +62,24 @@ def compare(
     """
     if not others:
         raise InputError("there is nothing to compare the reference with; give another motion file or video")
-    network = read_sync_network(Path(sync_weights)) if sync_weights is not None else None
     items = list(enumerate((reference, *others)))
-    if network is not None and not any(map(_is_video, (reference, *others))):
-        raise InputError(f"{sync_weights}: weights of SyncNet, and no video to use them for; give a video with sound")
-    first, *rest = [_side(item, number, network) for number, item in with_progress(items, "reading", monitor)]
-    pairs = [_figures(first, other) | _sync_figures(other) for other in rest]
-    return nan_as_null({"reference": first.name, **_sync_figures(first), "others": pairs})
+    first, *rest = [_side(item, number) for number, item in with_progress(items, "reading", monitor)]
+    return nan_as_null({"reference": first.name, "others": [_figures(first, other) for other in rest]})
 
 
-def _is_video(source: Source) -> bool:
-    return isinstance(source, str | Path) and Path(source).suffix.lower() in VIDEO_SUFFIXES
-
-
-def _sync_figures(side: _Side) -> dict[str, Any]:
-    return {} if side.sync is None else {"sync": asdict(side.sync)}
-
-
-def _side(source: Source, number: int, network: SyncNetwork | None) -> _Side:
+def _side(source: Source, number: int) -> _Side:
     """Return the motion of a file, or that is given. Raises InputError: as ``compare``."""
     name = str(source) if isinstance(source, str | Path) else f"motion {number}" if number else "the reference"
-    sync = None
     if isinstance(source, str | Path):
         path = Path(source)
-        if not _is_video(path):
-            source = read_generation(path)
-        elif network is None:
-            source = track(path, crops=False)
-        else:
-            footage = track_footage(path)
-            source, sync = footage.track, lip_sync(footage, network)
+        source = track(path, crops=False) if path.suffix.lower() in VIDEO_SUFFIXES else read_generation(path)
     motion = source if isinstance(source, Motion) else source.motion
     if not len(motion.values):
         raise InputError(f"{name}: the motion has no frames")
     if not np.isfinite(motion.values).all():
         raise InputError(f"{name}: there are values that are not finite; interpolate them first")
     seen = np.asarray(source.seen) if isinstance(source, Track) else np.ones(len(motion.values), bool)
-    return _Side(name, _with_arkit_names(motion), seen, sync)
+    return _Side(name, _with_arkit_names(motion), seen)
 
 
 def _with_arkit_names(motion: Motion) -> Motion:

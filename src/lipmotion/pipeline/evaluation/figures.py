@@ -129,14 +129,10 @@ def _silence(clips: Sequence[ComparedClip], values: curves.Clips) -> dict[str, f
     """Return mean and standard deviation of the opening in silence away from speech, and the number of its frames."""
     quiet = np.concatenate(
         [
-            v[away_from_speech(clip.time_s, _speech_s(clip), SILENCE_MARGIN_S)]
+            v[away_from_speech(clip.time_s, [(start_s, end_s) for start_s, end_s, _ in clip.spoken], SILENCE_MARGIN_S)]
             for clip, v in zip(clips, values, strict=True)
         ]
     )
     if not len(quiet):
         return {"mean": float("nan"), "std": float("nan"), "frames": 0}
     return {"mean": float(quiet.mean()), "std": float(quiet.std()), "frames": len(quiet)}
-
-
-def _speech_s(clip: ComparedClip) -> list[tuple[float, float]]:
-    return [(start_s, end_s) for start_s, end_s, _ in clip.spoken]

@@ -17,8 +17,7 @@ from lipmotion.faces.base import Staging
 from lipmotion.meshes.files.rig_tables import RigRow, read_rig_table, rig_motion
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
-from lipmotion.meshes.fitting.facial_animation import fap_motion
-from lipmotion.meshes.fitting.mood_weights import expression_weights
+from lipmotion.meshes.fitting.facial_animation import expression_weights, fap_motion
 from lipmotion.meshes.fitting.oculus_visemes import viseme_motion
 from lipmotion.meshes.fitting.reference_mouth import arkit_mouth, vowel_mouth
 from lipmotion.meshes.fitting.shape_weights import shape_weights

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
+from typing import Final
 
 import numpy as np
 
+from lipmotion.articulation.curve_edits import with_gain
 from lipmotion.articulation.delivery import (
     Delivery,
     closed_on_grid,
@@ -16,15 +19,53 @@ from lipmotion.articulation.delivery import (
     moved_in_time,
 )
 from lipmotion.articulation.expression import is_mood, with_moods
-from lipmotion.articulation.manner import with_detected, with_manners
 from lipmotion.articulation.phone_targets import with_gestures
 from lipmotion.meshes.fitting.blendshape_motion import is_of_blendshapes, with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, arkit_name
 from lipmotion.pipeline.outputs.curve_sets import with_curves
-from lipmotion.types import Generation, Motion
-from lipmotion.types.moods import in_time
+from lipmotion.types import Gain, Generation, Motion, VoiceEvent
+from lipmotion.types.moods import NEUTRAL, PLAIN, MoodKey, in_time
 from lipmotion.types.motion import RADIAN
+from lipmotion.types.voice_event import LAUGHTER, SHOUT, WHISPER
+
+FACTORS: Final = {PLAIN: 1.0, "whisper": 0.85, "shout": 1.5, "mumble": 0.5}
+"""How large the movements of the mouth are in each manner, beside those of plain speech."""
+
+LAUGHING: Final = "happy"
+"""The mood of a face that laughs: cheeks and corners of the lips are raised; ``articulation.pauses`` opens the jaw."""
+
+
+def with_detected(asked: Sequence[MoodKey], events: Sequence[VoiceEvent]) -> tuple[MoodKey, ...]:
+    """Return moods and manners over time: those that are asked for, or else those that are detected.
+
+    asked  : where it has a mood, no other is detected; where it has a manner, no manner
+    events : laughter is a mood; phrases that are whispered or shouted have this manner, as far as they are strong
+    """
+    manner_of = {LAUGHTER: False, WHISPER: True, SHOUT: True}
+    keys = list(asked)
+    for event in events:
+        is_manner = manner_of.get(event.kind)
+        if is_manner is None or any(key.is_manner == is_manner for key in asked):
+            continue
+        named, usual = (event.kind, PLAIN) if is_manner else (LAUGHING, NEUTRAL)
+        strength = event.strength if is_manner else 1.0
+        keys += [MoodKey(event.start_s, named, strength), MoodKey(event.end_s, usual)]
+    return in_time(keys)
+
+
+def with_manners(generation: Generation, keys: Sequence[MoodKey]) -> Generation:
+    """Return generated motion whose mouth moves more, or less, in some manners of speaking; what is closed stays so.
+
+    keys : in the order of their times; moods do not count. Each holds until the next manner
+    """
+    manners = [key for key in keys if key.is_manner]
+    last = MoodKey(len(generation.motion.values) / generation.motion.rate_hz, PLAIN)
+    for key, stop_s in ((key, later.time_s) for key, later in pairwise((*manners, last))):
+        factor = 1 + key.strength * (FACTORS[key.mood] - 1)
+        if factor != 1 and key.time_s < stop_s:
+            generation = with_gain(generation, Gain(key.time_s, stop_s, factor))
+    return generation
 
 
 def delivered(generation: Generation, delivery: Delivery) -> Generation:

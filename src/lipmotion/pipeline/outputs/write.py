@@ -2,18 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
-from lipmotion.articulation.delivery import Delivery
+from lipmotion.articulation.delivery import Delivery, sound_units
+from lipmotion.errors import ExportError
+from lipmotion.export.sound import SOUND_CODECS, write_sound
+from lipmotion.export.timed_labels import LABEL_SUFFIXES, write_labels
 from lipmotion.faces.base import Staging
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.pipeline.film.filmed_video import FILM, FilmOptions
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, checked_outputs, perform
 from lipmotion.pipeline.outputs.shown_faces import AnyFace, ShownFace, shown_face
-from lipmotion.pipeline.outputs.sound_files import SoundOutput
 from lipmotion.types import Audio, Generation, Monitor, silent_monitor
+
+
+class LabelOutput(Output):
+    """``.TextGrid``, ``.vtt``, ``.srt``: phones and words, in the time of the sound."""
+
+    @classmethod
+    def suffixes(cls, settings: OutputSettings) -> tuple[str, ...]:  # noqa: D102, ARG003
+        return LABEL_SUFFIXES
+
+    def prepared(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
+        generation = performance.generation
+        end_s = float(generation.motion.time_s[-1])
+        return partial(write_labels, self.path, sound_units(generation.units, self.settings.delivery, end_s))
+
+
+class SoundOutput(Output):
+    """``.wav``, ``.flac``, ``.ogg``: a sound that is in no file yet."""
+
+    @classmethod
+    def suffixes(cls, settings: OutputSettings) -> tuple[str, ...]:  # noqa: D102
+        return tuple(SOUND_CODECS) if settings.sounded else ()
+
+    def prepared(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
+        if performance.sound is None:
+            raise ExportError(f"{self.path}: there is no sound to write; give one: write(..., speech=Audio(...))")
+        return partial(write_sound, self.path, performance.sound)
 
 
 def write(  # noqa: PLR0913

@@ -31,10 +31,13 @@ from lipmotion.pipeline.training.channels import (
     with_visual_channels,
 )
 from lipmotion.pipeline.training.fingerprint import fingerprint
-from lipmotion.pipeline.training.labels import label_utterances
+from lipmotion.pipeline.training.labels import (
+    label_utterances,
+    warn_of_doubtful_transcripts,
+    warn_of_missing_transcripts,
+)
 from lipmotion.pipeline.training.other_speakers import VoiceExample
 from lipmotion.pipeline.training.sound_inputs import with_sound_inputs
-from lipmotion.pipeline.training.transcripts import warn_of_doubtful_transcripts, warn_of_missing_transcripts
 from lipmotion.pipeline.understand.transcribe import phones_in_time, warn_of_guesses
 from lipmotion.pipeline.workers import worker_pool
 from lipmotion.speech.features.analysed_audio import analysed

@@ -32,6 +32,7 @@ export class Studio {
     this.player = new Player(this.store);
     this.settling = new WhenCalm(this.store, () => this.settle());
     /** @type {Promise<any>} */ this.edits = Promise.resolve();
+    /** @type {string | null} */ this.typed = null; // words that were typed, until they are said
     this.left = false; // whether tabulators go on past the timeline
     this.askedAt = this.editedAt = 0; // when the edit was asked for whose motion is on its way, or is shown next
     this.build();
@@ -67,7 +68,8 @@ export class Studio {
     this.panel = new Panel(panel, this);
     followOwn(own, this);
     store.on(["message"], () => {
-      this.message.textContent = store.message.text;
+      const { text, again } = store.message;
+      this.message.replaceChildren(text, ...(again ? [" ", textButton(TEXT.makeAgain, again, { id: "make-again" })] : []));
       this.message.className = store.message.kind;
     });
     store.on(["saving", "unsaved", "line"], () => {
@@ -93,8 +95,8 @@ export class Studio {
     for (const button of document.querySelectorAll("#places button")) button.setAttribute("aria-pressed", String(button.id === `place-${name}`));
   }
 
-  /** Say something in the status line. */
-  say(text, kind = "") { this.store.set({ message: { text, kind } }); }
+  /** Say something in the status line; `again`: what its button does. */
+  say(text, kind = "", again = null) { this.store.set({ message: { text, kind, again } }); }
 
   /** What was refused is told until something succeeds. */
   succeed() { if (this.store.message.kind) this.say(""); }
@@ -118,12 +120,12 @@ export class Studio {
 
   /** Read the lines of the project, a page after another. */
   async listed() {
-    const lines = [];
-    let page;
+    let lines = [], page = null;
     do {
+      const before = page;
       page = await this.server.read(`project?from=${lines.length}&count=${PAGE_OF_LINES}`);
-      lines.push(...page.lines);
-    } while (page.lines.length && lines.length < page.count);
+      lines = before && before.count !== page.count ? [] : [...lines, ...page.lines]; // some have come or gone: from the first one on
+    } while ((page.lines.length || !lines.length) && lines.length < page.count);
     if (!this.store.project) {
       document.getElementById("phones-known").replaceChildren(...page.forms.phones.map(({ name }) => made("option", { value: name })));
       this.store.set({ face: page.forms.faces.find(({ mesh }) => mesh)?.name ?? page.forms.faces[0]?.name });
@@ -166,7 +168,10 @@ export class Studio {
   /** Show another line. */
   async open(id, again = false) {
     if (id === this.store.lineId && !again) return;
-    if (!again) this.say("");
+    if (!again) {
+      this.typed = null;
+      this.say("");
+    }
     this.player.stop();
     this.weights.forget();
     this.store.set({ lineId: id, line: null, sound: null, motion: null, deviation: null, confidence: null, weights: null, other: null, comparing: false, heads: "one", blind: null, doubts: [], selected: null, span: null, time_s: 0, progress: null });
@@ -239,7 +244,8 @@ export class Studio {
 
   async realign(text) {
     const { span } = this.store;
-    await this.request("transcript", { text, ...(span ?? {}) }, TEXT.aligned);
+    this.typed = text;
+    if (await this.request("transcript", { text, ...(span ?? {}) }, TEXT.aligned)) this.typed = null;
   }
 
   /** After edits of a long line, which moved the mouth around them alone, let the whole motion be made. */
@@ -255,9 +261,15 @@ export class Studio {
 
   request(kind, content, done) {
     this.settling.drop();
-    const id = this.store.lineId, { phones } = this.timeline;
+    const id = this.store.lineId;
+    return this.inTurn(() => this.requested(id, kind, content, done));
+  }
+
+  /** Do something after the changes before it, which leave another revision. */
+  inTurn(act) {
+    const { phones } = this.timeline;
     phones.drop();
-    const reply = this.sending(Promise.all([phones.settled, this.edits]).then(() => this.requested(id, kind, content, done)));
+    const reply = this.sending(Promise.all([phones.settled, this.edits]).then(act));
     this.edits = reply.catch(() => {});
     return reply;
   }
@@ -280,14 +292,15 @@ export class Studio {
       this.succeed();
       if (guessed || done) this.say(guessed ? filled(TEXT.guessed, { words: guessed }) : done);
       this.store.set({ unsaved: false });
-      this.askedAt = asked_ms;
-      if (state.changed) await this.moved(id, state.changed);
+      if (state.changed) {
+        this.askedAt = asked_ms;
+        await this.moved(id, state.changed);
+      }
       return true;
     } catch (error) {
-      if (error instanceof Refused && error.status === 409 && error.state) {
-        this.take(error.state);
-        await this.moved(id, null);
-        this.say(TEXT.elsewhere, "bad");
+      if (error instanceof Refused && error.status === 409) {
+        const what = (content.steps ?? [content.text ?? kind]).join(", ");
+        await this.late(id, error.state, what, () => this.request(kind, { ...content, ...(content.instead ? { instead: 0 } : {}) }, done));
       } else {
         if (error.status === 0) this.store.set({ unsaved: true });
         this.refuse(error);
@@ -296,12 +309,24 @@ export class Studio {
     }
   }
 
+  /** Somebody else was first: show the line as it is now, say what was not made, and offer to make it. */
+  async late(id, state, what, again) {
+    if (id !== this.store.lineId) return;
+    if (state?.status === "ready") {
+      this.take(state);
+      await this.moved(id, null);
+    } else await this.open(id, true);
+    await this.listed();
+    this.say(filled(TEXT.elsewhere, { what }), "bad", again);
+  }
+
   /** Take a new state of the open line. */
   take(line) {
     const { selected, lines, span, line: before } = this.store, list = selected && line[`${selected.kind}s`];
     const was = selected && before?.[`${selected.kind}s`]?.[selected.index], is = list?.[selected.index];
     const follows = was && is && span && span.start_s === was.start_s && span.end_s === was.end_s;
-    const listed = lines.map((each) => (each.id === line.id ? { ...each, edits: line.steps.length, edits_digest: line.edits_digest, exported: each.exported === "yes" ? "changed" : each.exported } : each));
+    const listed = lines.map((each) => (each.id === line.id ? { ...each, edits: line.steps.length, edits_digest: line.edits_digest, revision: line.revision,
+      exported: each.exported === "yes" && each.edits_digest !== line.edits_digest ? "changed" : each.exported } : each));
     this.settleLater(line);
     this.store.set({ line, lines: listed, ...(list && !is ? { selected: null } : {}),
       ...(follows ? { span: { start_s: is.start_s, end_s: is.end_s } } : {}) });
@@ -464,16 +489,21 @@ export class Studio {
     }
   }
 
-  async mark(mark) {
-    const { lineId, lines } = this.store, line = lines.find(({ id }) => id === lineId);
-    if (!line) return;
-    try {
-      const changed = await this.server.told(`lines/${lineId}/mark`, { mark: line.mark === mark ? "none" : mark });
-      this.store.set({ lines: this.store.lines.map((each) => (each.id === lineId ? changed : each)) });
-      this.succeed();
-    } catch (error) {
-      this.refuse(error);
-    }
+  mark(mark) {
+    const { lineId } = this.store;
+    return this.inTurn(async () => {
+      const { lines, line } = this.store, row = lines.find(({ id }) => id === lineId), seen = line?.id === lineId ? line : row;
+      if (!row) return;
+      try {
+        const changed = await this.server.told(`lines/${lineId}/mark`, { mark: row.mark === mark ? "none" : mark, revision: seen.revision });
+        if (seen === this.store.line) seen.revision = changed.revision; // nothing else of it has changed: nothing is drawn anew
+        this.store.set({ lines: this.store.lines.map((each) => (each.id === lineId ? changed : each)) });
+        this.succeed();
+      } catch (error) {
+        if (error instanceof Refused && error.status === 409) await this.late(lineId, null, TEXT.marks[mark], () => this.mark(mark));
+        else this.refuse(error);
+      }
+    });
   }
 
   async keepPronunciation(word, phones) {
@@ -497,6 +527,17 @@ export class Studio {
     }
   }
 
+  /** Ask for something that a line may be open after. */
+  async tryAgain(id, path, content) {
+    try {
+      await this.server.told(path, content);
+      await this.listed();
+      await this.open(id, true);
+    } catch (error) {
+      this.refuse(error);
+    }
+  }
+
   help() { showKeys(); }
 
   /** What covers the face and the timeline while there is nothing to show there. */
@@ -510,15 +551,8 @@ export class Studio {
         textButton(TEXT.open, () => document.getElementById("open").click(), { className: "main" }));
     } else if (status === "failed") {
       cover.replaceChildren(made("h2", { textContent: TEXT.failed }), made("p", { className: "bad", textContent: line?.error ?? listed?.error ?? "" }),
-        textButton(TEXT.tryAgain, async () => {
-          try {
-            await this.server.told("understand", { lines: [lineId] });
-            await this.listed();
-            await this.open(lineId, true);
-          } catch (error) {
-            this.refuse(error);
-          }
-        }));
+        textButton(TEXT.tryAgain, () => this.tryAgain(lineId, "understand", { lines: [lineId] })),
+        ...(line?.restorable ? [textButton(TEXT.restore, () => this.tryAgain(lineId, `lines/${lineId}/restore`, { revision: line.revision }), { id: "restore" })] : []));
     } else {
       const told = progress ?? line?.progress ?? {};
       cover.replaceChildren(made("h2", { textContent: told.stage ? filled(TEXT.working, { what: told.stage }) : TEXT.waiting }),

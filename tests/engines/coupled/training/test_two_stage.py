@@ -16,8 +16,8 @@ from lipmotion.engines.coupled.engine import CoupledEngine
 from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance
 from lipmotion.engines.coupled.training.chain_training import MixtureSchedule, TrainingStep, growing_chains
+from lipmotion.engines.coupled.training.coupled_training import SpeechOnlySchedule, train_on_speech
 from lipmotion.engines.coupled.training.em_steps import e_step, lattice_utterance, variance_floors
-from lipmotion.engines.coupled.training.speech_only import SpeechOnlySchedule, train_on_speech
 from lipmotion.stats.mixture import Mixtures
 from lipmotion.testing.examples import RATE_HZ, examples
 from lipmotion.types import Example, Motion, Span, Timeline, Unit, silent_monitor

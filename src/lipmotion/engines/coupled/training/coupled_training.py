@@ -7,7 +7,7 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeVar
 
@@ -37,9 +37,17 @@ from lipmotion.engines.coupled.conversion.mean_regression import (
 )
 from lipmotion.engines.coupled.model import AWAY_FROM_SPEECH_S, CoupledModel
 from lipmotion.engines.coupled.training.alignment import AlignedUtterance
-from lipmotion.engines.coupled.training.chain_training import MixtureSchedule, TrainingStep, growing_chains
-from lipmotion.engines.coupled.training.em_steps import ChainStatistics
-from lipmotion.engines.coupled.training.speech_only import SpeechOnlySchedule, train_on_speech
+from lipmotion.engines.coupled.training.chain_training import (
+    MixtureSchedule,
+    Report,
+    TrainingStep,
+    component_counts,
+    growing_chains,
+    no_report,
+    train_to_convergence,
+    with_split_components,
+)
+from lipmotion.engines.coupled.training.em_steps import ChainStatistics, lattice_utterance, variance_floors
 from lipmotion.errors import CorpusError
 from lipmotion.kernels.sequences.banded import generate
 from lipmotion.motion.articulation import fit_articulation_prior
@@ -52,6 +60,56 @@ from lipmotion.stats.delta_windows import dynamics_known
 from lipmotion.stats.em import EmResult
 from lipmotion.types import FRAME_RATE_HZ, Example, Monitor, Progress, Timeline, Unit, sub_monitor
 from lipmotion.units import VISEME_OF, is_silent
+
+
+@dataclass(frozen=True)
+class SpeechOnlySchedule:
+    """How many Gaussians the densities of speech get in the second stage, and how many steps of EM.
+
+    mixtures   : Gaussians per density of speech in the end, a power of two; never fewer than before
+    most_steps : greatest number of EM steps between one splitting and the next
+    weight     : of a frame of the other speakers, relative to a frame of the first stage
+    """
+
+    mixtures: int
+    most_steps: int
+    weight: float
+
+
+def train_on_speech(
+    chains: Chains,
+    data: Sequence[AlignedUtterance],
+    speech_only: Sequence[AlignedUtterance],
+    schedule: SpeechOnlySchedule,
+    report: Report = no_report,
+    workers: int = 1,
+) -> Chains:
+    """Return chains whose densities of speech are re-estimated from other speakers as well; all else stays.
+
+    data        : what the chains were trained on; its speech is used here too, without its motion
+    speech_only : utterances of other speakers; the values of their visual streams are ignored
+    report      : is called after every step; while the number of components stays, the weighted log likelihood never
+                  falls
+    Where speech and motion share their components (``hmm``), these stay as many, but their weights are re-estimated.
+    """
+    floors = variance_floors([utterance.observations for utterance in data])
+    utterances = [
+        lattice_utterance(
+            chains, replace(utterance, observations=without_visual_streams(utterance.observations)), weight
+        )
+        for group, weight in ((data, 1.0), (speech_only, schedule.weight))
+        for utterance in group
+    ]
+    present = component_counts(chains)
+    most = present if chains.structure.kind == HMM else (max(schedule.mixtures, present[0]), *present[1:])
+    while True:
+        result = train_to_convergence(
+            chains, utterances, floors, schedule.most_steps, report, workers, speech_only=True
+        )
+        if component_counts(result.model) == most:
+            return result.model
+        chains = with_split_components(result.model, most, result.statistics)
+
 
 Array = NDArray[np.float64]
 ResultT = TypeVar("ResultT")

@@ -1,5 +1,6 @@
 // The other motion: a version that was kept, or that of the other model; and blind comparisons with it.
 
+import { Refused } from "../server.js";
 import { TEXT, filled } from "../strings.js";
 
 /** What the server calls the model that the project's is compared with. */
@@ -17,28 +18,15 @@ export class Comparison {
 
   /** Keep the edits as they are, and compare with them from now on. */
   async keep() {
-    const line = await this.told("versions", {});
-    const version = line?.versions.find(({ digest }) => digest === line.edits_digest);
+    if (!await this.studio.request("versions", {}, "")) return;
+    const { line } = this.store, version = line?.versions?.find(({ digest }) => digest === line.edits_digest);
     if (version) await this.with(version.name);
   }
 
   /** Keep a version no longer. */
   async forget(name) {
     if (this.store.other?.by === name) this.stop();
-    await this.told("versions/forget", { version: name });
-  }
-
-  async told(path, content) {
-    const { store, studio: { server } } = this, { lineId } = store;
-    try {
-      const line = await server.told(`lines/${lineId}/${path}`, content);
-      if (lineId !== store.lineId) return null;
-      store.set({ line });
-      return line;
-    } catch (error) {
-      this.studio.refuse(error);
-      return null;
-    }
+    await this.studio.request("versions/forget", { version: name }, "");
   }
 
   /** What a motion is called, by what the server calls it. */
@@ -122,16 +110,17 @@ export class Comparison {
 
   /** Keep which was better: 0, 1, or null: neither; and tell what was what. */
   async vote(place) {
-    const { blind, blind: { order }, other, lineId } = this.store, names = order.map((isOther) => (isOther ? other.name : TEXT.now));
+    const { blind, blind: { order }, other, line, lineId } = this.store, names = order.map((isOther) => (isOther ? other.name : TEXT.now));
     const shown = order.map((isOther) => ({ by: isOther ? other.by : "" }));
     try {
-      const { better, neither } = await this.studio.server.told(`lines/${lineId}/votes`, { shown, better: place });
+      const { better, neither } = await this.studio.server.told(`lines/${lineId}/votes`, { shown, better: place, revision: line.revision });
       this.studio.player.stop();
       const told = filled(TEXT.blindTold, { a: names[0], b: names[1], now: better[order.indexOf(false)], other: better[order.indexOf(true)], neither, name: other.name });
       this.store.set({ blind: { ...blind, told }, comparing: false });
       this.studio.say(told);
     } catch (error) {
-      this.studio.refuse(error);
+      if (error instanceof Refused && error.status === 409) await this.studio.late(lineId, error.state, TEXT.blind, null);
+      else this.studio.refuse(error);
     }
   }
 }

@@ -137,7 +137,7 @@ function moodPart(studio) {
 
 function transcriptPart(studio) {
   const { line } = studio.store, words = (!line.steps.length && line.transcript) || line.words.map(({ label }) => label).join(" ");
-  const field = made("textarea", { id: "transcript", rows: 3, value: words, "aria-label": TEXT.transcript });
+  const field = made("textarea", { id: "transcript", rows: 3, value: studio.typed ?? words, "aria-label": TEXT.transcript });
   const warnings = (line.warnings ?? []).map((text) => made("p", { className: "hint", textContent: filled(TEXT.wouldHelp, { what: text }) }));
   return section(TEXT.transcript, ...warnings, field, row(textButton(TEXT.align, () => studio.realign(field.value), { id: "align" })));
 }

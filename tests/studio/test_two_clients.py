@@ -1,0 +1,159 @@
+"""Lines are what their sounds are, changes name what they saw, damaged edits are an error: two clients of a studio."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from lipmotion.pipeline.edit_files import read_edits, write_edits
+from lipmotion.pipeline.model import Model
+from lipmotion.storage.files import sha256_of
+from lipmotion.testing.toy import ToySentence
+
+pytest.importorskip("starlette", reason="the extra 'studio' is not installed")
+
+from lipmotion.studio.folder import ProjectFolder
+from studio.open_studio import OpenStudio, open_studio
+from studio.two_clients import walk
+
+
+@pytest.fixture
+def studio(toy_speech: Path, toy_sentence: ToySentence, toy_model: Model, tmp_path: Path) -> Iterator[OpenStudio]:
+    with open_studio(toy_speech, " ".join(toy_sentence.words), toy_model, tmp_path) as opened:
+        opened.ready()
+        yield opened
+
+
+def test_what_is_dropped_under_the_name_of_a_line_that_was_removed_is_a_new_line(studio: OpenStudio) -> None:
+    sound = (studio.folder.path.parent / "line.wav").read_bytes()
+    first = studio.ask("/api/lines?name=take.wav", sound, x_lipmotion_transcript="mama").content
+    studio.ready(first["id"])
+    assert studio.change("edits", first["id"], steps=["phone 2 is p"]).status == 200
+    path = studio.folder.sound(studio.folder.line(first["id"]))
+    assert studio.change("remove", first["id"]).status == 200
+    other = sound[:-2] + b"\0\1"
+    second = studio.ask("/api/lines?name=take.wav", other, x_lipmotion_transcript="bob").content
+    state = studio.ready(second["id"])
+    assert (second["name"], state["transcript"], state["steps"]) == ("take-2", "bob", [])
+    assert path.read_bytes() == sound
+    assert studio.folder.sound(studio.folder.line(second["id"])).read_bytes() == other
+
+
+def test_a_line_that_was_removed_has_its_edits_when_its_sound_is_added_again(studio: OpenStudio) -> None:
+    sound = studio.folder.sound(studio.folder.line(1))
+    assert studio.edit("phone 3 is p").status == 200
+    assert studio.change("remove").status == 200
+    other = sound.with_name("inner") / "line.wav"
+    other.parent.mkdir()
+    other.write_bytes(sound.read_bytes()[:-2] + b"\0\1")
+    assert [studio.folder.line(number).name for number in studio.folder.add(other)] == ["line-2"]
+    assert [studio.folder.line(number).name for number in studio.folder.add(sound)] == ["line"]
+    assert studio.ready(3)["steps"] == ["phone 3 is p"]
+
+
+@pytest.mark.parametrize("change", ["edits", "undo", "transcript", "mark", "versions", "remove", "restore"])
+def test_every_change_names_the_revision_that_it_saw(studio: OpenStudio, change: str) -> None:
+    """Also the first one of a line; and the revision outlives a restart."""
+    content = {"steps": ["phone 2 is p"], "text": "mama", "mark": "redo"}
+    assert studio.ask(f"/api/lines/1/{change}", content).status == 422
+    seen = studio.ready()["revision"]
+    assert studio.edit("phone 3 is p").status == 200
+    late = studio.ask(f"/api/lines/1/{change}", content | {"revision": seen})
+    assert (late.status, "window" in late.content["error"]) == (409, True)
+    state = studio.ready()
+    assert (state["steps"], state["mark"], state["versions"]) == (["phone 3 is p"], "none", [])
+
+
+def test_two_windows_lose_nothing_of_what_was_acknowledged(studio: OpenStudio) -> None:
+    """Six changes at once, all of the line as it was: one is made, and is there."""
+    seen = studio.ready()["revision"]
+    ways: list[tuple[str, Any]] = [("transcript", {"text": "mama"}), ("remove", {}), ("mark", {"mark": "redo"})]
+    ways += [("edits", {"steps": [f"phone {number} is p"]}) for number in (2, 3, 4)]
+    requests = [(f"/api/lines/1/{what}", {"revision": seen, **content}) for what, content in reversed(ways)]
+    replies = studio.ask_together(*requests, *[("/api/project", None)] * 3)
+    assert [reply.status for reply in replies[6:]] == [200] * 3
+    made = [reply.content for reply in replies[:6] if reply.status == 200]
+    assert len(made) == 1, [reply.body for reply in replies[:6]]
+    if "steps" in made[0]:
+        assert studio.ready()["steps"] == made[0]["steps"]
+
+
+def test_damaged_edits_are_an_error_with_a_way_back(studio: OpenStudio) -> None:
+    assert studio.edit("phone 3 is p").status == 200
+    seen, file = studio.row(), studio.folder.edits(studio.folder.line(1))
+    damage = file.read_bytes()[:-40]
+    file.write_bytes(damage)
+    row = studio.row()
+    assert (row["status"], str(file) in row["error"]) == ("failed", True)
+    assert "copies/line.edits.json" in row["error"]
+    late = {"revision": seen["revision"], "steps": ["phone 4 is p"]}
+    assert studio.ask("/api/lines/1/edits", late).status in (422, 503)
+    for what in ("transcript", "mark"):
+        assert studio.change(what, text="mama", mark="redo").status == 422
+    (failed,) = studio.ask("/api/lines/1/export", {"files": [".csv"]}).content["failed"]
+    assert (failed["error"], file.read_bytes()) == (row["error"], damage)
+    state = studio.ready()
+    assert (state["status"], state["restorable"]) == ("failed", True)
+    assert studio.change("restore").status == 200
+    assert studio.ready()["steps"] == ["phone 3 is p"]
+    assert [each.read_bytes() for each in file.parent.glob("*.damaged-*")] == [damage]
+    assert studio.change("restore").status == 422
+
+
+def test_edits_that_others_make_of_an_open_line_are_seen(studio: OpenStudio) -> None:
+    state, line = studio.ready(), studio.folder.line(1)
+    file = read_edits(studio.folder.edits(line))
+    write_edits(file.then("phone 3 is p"), studio.folder.edits(line))
+    content = {"revision": state["revision"], "steps": ["phone 4 is p"]}
+    assert studio.ask("/api/lines/1/edits", content).status in (409, 503)
+    assert studio.ready()["steps"] == ["phone 3 is p"]
+
+
+def test_a_sound_that_was_exchanged_is_neither_opened_nor_played_nor_exported(studio: OpenStudio) -> None:
+    sound = studio.folder.sound(studio.folder.line(1))
+    assert studio.ask("/api/lines/1/sound.wav").status == 200
+    sound.write_bytes(sound.read_bytes()[:-2] + b"\0\1")
+    refused = [studio.ask("/api/lines/1/sound.wav"), studio.ask("/api/lines/1/video", {"start_s": 0, "end_s": 0.2})]
+    assert [(reply.status, "another recording" in reply.content["error"]) for reply in refused] == [(422, True)] * 2
+    (failed,) = studio.ask("/api/lines/1/export", {"files": [".csv"]}).content["failed"]
+    assert "another recording" in failed["error"]
+    assert not (studio.folder.path / "exports" / "line.csv").exists()
+
+
+def test_a_project_of_an_earlier_version_adopts_its_sounds(
+    toy_speech: Path, toy_sentence: ToySentence, toy_model: Model, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """It had no digests: what lies there at the first opening is taken, with a warning; another one is refused then."""
+    words = " ".join(toy_sentence.words)
+    with open_studio(toy_speech, words, toy_model, tmp_path) as studio:
+        studio.ready()
+        assert studio.edit("phone 3 is p").status == 200
+        file, project = studio.folder.edits(studio.folder.line(1)), studio.folder.path / "project.json"
+    for path, name in ((file, "recording_sha256"), (project, "sha256")):
+        document = json.loads(path.read_text(encoding="utf-8"))
+        for each in (document, *document.get("lines", ())):
+            each.pop(name, None)
+        path.write_text(json.dumps(document), encoding="utf-8")
+    shutil.rmtree(studio.folder.path / "copies")
+    with open_studio(toy_speech, words, toy_model, tmp_path) as studio:
+        assert (studio.ready()["steps"], "is taken to be" in caplog.text) == (["phone 3 is p"], True)
+    digest = sha256_of(toy_speech)
+    assert (read_edits(file).sha256, ProjectFolder(project.parent).line(1).sha256) == (digest, digest)
+    assert (project.parent / "copies" / file.name).read_bytes() == file.read_bytes()
+
+
+def test_nothing_that_was_acknowledged_is_lost(toy_model: Model, toy_sentence: ToySentence, tmp_path: Path) -> None:
+    found = walk(toy_model, toy_sentence, tmp_path, 2, 10)
+    assert found.steps > 10
+
+
+@pytest.mark.long
+def test_hundreds_of_steps_lose_nothing(toy_model: Model, toy_sentence: ToySentence, tmp_path: Path) -> None:
+    found = walk(toy_model, toy_sentence, tmp_path, 6, 60)
+    assert found.steps > 300
+    assert min(found.acknowledged, found.late, found.refused) > 10
