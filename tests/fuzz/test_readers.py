@@ -17,11 +17,13 @@ from fuzz.worker import Worker
 FOUND = Path(__file__).parent / "found"
 FOLDERS = sorted(path for path in FOUND.glob("*/*") if path.is_dir())
 ROUNDS = 12
+LONG = ("requests",)
+"""Readers that have much to prepare."""
 INPUTS = {"model": 4, "face": 4, "video": 6, "transcript": 8, "lexicon": 8, "character": 4}
 """Numbers of changed inputs of slower readers."""
 
 
-@pytest.mark.parametrize("name", READERS)
+@pytest.mark.parametrize("name", [pytest.param(each, marks=[pytest.mark.long] * (each in LONG)) for each in READERS])
 def test_good_input_is_read_and_changed_input_read_or_refused(name: str, worker: Worker, good: Good) -> None:
     """The same changes every time; ``python -m fuzz`` goes further."""
     seeds = READERS[name].seeds(good)

@@ -41,7 +41,7 @@ WRONG = [
     ("control,from\nJaw,jawOpen\n", "required control,source"),
     ("control,source\n", "0 rows"),
     ("control,source,gain\nJaw,jawOpen,much\n", "line 2"),
-    ("control,source,gain\nJaw,jawOpen,nan\n", "required at most"),
+    ("control,source,gain\nJaw,jawOpen,nan\n", "line 2: the number is"),
     ("control,source,gain\nJaw,jawOpen,1e9\n", "required at most"),
     ("control,source,low,high\nJaw,jawOpen,2,1\n", "goes from 2 to 1"),
     ("control,source\n,jawOpen\n", "without a control"),

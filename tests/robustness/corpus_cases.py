@@ -200,7 +200,9 @@ _label_file("phones of another recording", ".lab", "0 900000000 p\n", "the sound
 _label_file("more phones than frames", ".lab", "".join(f"{i}0000 {i + 1}0000 p\n" for i in range(2000)),
             "2000 units in time, required at most 1276")  # fmt: skip
 _label_file("a backward label of Audacity", ".txt", "1.5\t0.5\tp\n", "before its start")
-_label_file("an end of 5,000 digits", ".lab", f"0 {'9' * 5000} p\n", "line 1 has the time 999", "required a finite one")
+_label_file(
+    "an end of 5,000 digits", ".lab", f"0 {'9' * 5000} p\n", "line 1 has the time '999", "required a finite one"
+)
 _label_file("many recordings in one", ".lab", '#!MLF!#\n"*/a.lab"\n0 1000000 p\n', "is a master label file")
 _label_file(
     "damaged times", ".srt", "1\n00:00:01,000 --> 7\nhello\n", "a.srt: line 2 is '00:00:01,000 --> 7'; required"

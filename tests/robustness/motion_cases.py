@@ -40,7 +40,7 @@ def _json(name: str, text: str | dict[str, object], code: int, *messages: str) -
 
 _json("units that overlap", {"units": [_unit(0, 0.5), _unit(0.4, 0.6)]}, 3,
       "starts at 0.4 s, before the previous span ends")  # fmt: skip
-_json("a unit at NaN s", {"units": [_unit(float("nan"), 0.4)]}, 3, "lasts from nan to 0.4 s, required: finite")
+_json("a unit at NaN s", {"units": [_unit(float("nan"), 0.4)]}, 3, "start_s is nan, required a finite number")
 _json("a unit that ends in a million years", {"units": [_unit(0, 3e13)]}, 0, "the units go on to",
       "those of another recording?")  # fmt: skip
 _json("an unknown phone", {"units": [_unit(0, 0.4, "qq")]}, 3, "unknown phone 'qq' at 0.0 s; the phones:")
@@ -48,12 +48,12 @@ _json("a time of 400 digits", {"units": [_unit(10**400, 0.4)]}, 3, *DAMAGED)
 _json("two million units", json.dumps(GOOD | {"units": []}).replace("[]", "[" + "0," * 2_000_000 + "0]"), 3, *DAMAGED,
       "a list of more than 1048576 items")  # fmt: skip
 _json("no units", {"units": []}, 3, "the units are an empty list", "or leave them out")
-_json("a unit without a phone", {"units": [{"start_s": 0}]}, 3, "has no 'end_s'; export it again")
+_json("a unit without a phone", {"units": [{"start_s": 0}]}, 3, "end_s is missing")
 _json("a newer version", {"version": 2}, 3, "version 2, this lipmotion reads up to 1: upgrade lipmotion")
 _json("another format", {"format": "other"}, 3, "its 'format' must be 'lipmotion.motion'")
 _json("NaN among the values", {"values": [[0.1], [float("nan")]]}, 3, "the first is 'opening' in frame 1; interpolate")
 _json("rows that are too long", {"values": [[0.1, 0.2]]}, 3, "values have shape (1, 2), required (T, 1)")
-_json("an infinite rate", {"rate_hz": float("inf")}, 3, "motion rate is inf Hz, required more than 0 and finite")
+_json("an infinite rate", {"rate_hz": float("inf")}, 3, "rate_hz is inf, required a finite number")
 _json("a channel that is a spreadsheet's formula", {"channels": [{"name": "=1+1", "unit": "weight"}]}, 3,
       "the channel name '=1+1' begins as a spreadsheet's formula")  # fmt: skip
 _json("100,000 brackets", '{"values": ' + "[" * 100_000, 3, "not JSON", "export it again")

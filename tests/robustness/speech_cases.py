@@ -150,7 +150,7 @@ def _(bench: Bench) -> list[object]:
     return bench.animate(Path("/dev/zero"))
 
 
-@case(GROUP, "a name that is too long", 3, "File name too long")
+@case(GROUP, "a name that is too long", 3, "required a path")
 def _(bench: Bench) -> list[object]:
     return bench.animate("x" * 300 + ".wav")
 

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import tracemalloc
 from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -213,3 +214,15 @@ def test_each_kind_is_computed_once_for_all_that_is_done_with_a_recording(
 def test_animate_computes_each_kind_once(toy_model: Model, sentence: ToySentence, computed: Counter[Any]) -> None:
     animate(sentence.audio, model=toy_model, transcript=" ".join(sentence.words))
     assert set(computed.values()) == {1}
+
+
+def test_features_of_silence_take_no_more_memory_than_they_are() -> None:
+    audio = AnalysedAudio(np.zeros(120 * 16_000, np.float32), 16_000)
+    assert not audio.passages
+    tracemalloc.start()
+    bands = audio.spectrum
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert bands.shape == (audio.frames, 40)
+    assert not bands.any()
+    assert most < 2 * bands.nbytes

@@ -55,7 +55,7 @@ def test_possible_values(kind: str, value: str, wanted: bool) -> None:
     [
         ("rater,", "person,", "no column 'rater'; required rater"),
         (",first,", ",neither,", "line 2: the answer 'neither', required 'first' or 'second'"),
-        (",12.5,2,0,", ",12.5,two,0,", "line 2: invalid literal"),
+        (",12.5,2,0,", ",12.5,two,0,", "line 2: plays"),
         ("ranking", "guess", "line 4: an answer of the kind 'guess', required one of paired, mos, ranking"),
     ],
 )

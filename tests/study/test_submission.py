@@ -58,7 +58,7 @@ def test_anything_else_is_refused(tmp_path: Path, change: dict[str, Any]) -> Non
 @pytest.mark.parametrize("content", [None, [], "text", 7, {}, {"trial": 0}])
 def test_only_the_object_is_taken(tmp_path: Path, content: Any) -> None:
     study = small_study(tmp_path / "study")
-    with pytest.raises(InputError, match="required an object"):
+    with pytest.raises(InputError, match="required a"):
         submitted_sheet(study, trials_of(study, 7), 7, content)
 
 

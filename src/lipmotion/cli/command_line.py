@@ -10,6 +10,7 @@ import sys
 import warnings
 from collections.abc import Sequence
 from difflib import get_close_matches
+from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -44,6 +45,7 @@ from lipmotion.cli.verbs import (
     words,
 )
 from lipmotion.errors import ExportError, LipMotionError
+from lipmotion.types.values import number_of, whole_of
 
 VERBS = (
     *(animate, batch, speak, render, edit, studio, explain, cues, words, corpus, train, adapt, face),
@@ -219,6 +221,11 @@ class WrongCommandLineError(LipMotionError):
 class _Parser(argparse.ArgumentParser):
     """Raises an error for a wrong command line, as one line that says where help is; reports help that cannot be
     printed."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        self.register("type", int, whole_of)
+        self.register("type", float, partial(number_of, finite=False))
 
     def error(self, message: str) -> NoReturn:
         raise WrongCommandLineError(f"{message}{'' if message.endswith('?') else ';'} see: {self.prog} --help")

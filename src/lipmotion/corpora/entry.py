@@ -32,6 +32,7 @@ from lipmotion.types import (
     from_sixteen_bits,
     sixteen_bits,
 )
+from lipmotion.types.values import any_members, items, members, number, one_of, optional, text, truth, whole
 
 ENTRY = "entry.json"
 KEYS = frozenset(
@@ -92,17 +93,27 @@ def write_utterance(folder: Path, utterance: Utterance, settings: dict[str, str]
             shutil.rmtree(folder)
 
 
+_TEXT, _COUNT = text(1 << 24), number(0, LARGEST_NUMBER)
+_CHANNEL = {"name": _TEXT, "unit": _TEXT}
+_ENTRY = members(
+    {
+        **{"name": _TEXT, "speaker": _TEXT, "split": one_of(SPLITS), "words": optional(items(_TEXT))},
+        **{"source": any_members(_TEXT), "notes": items(_TEXT), "settings": any_members(lambda value: value)},
+        **{"checksums": any_members(lambda value: value), "audio_rate_hz": whole(1, 1 << 31), "crops": truth},
+        **{"channels": items(members(_CHANNEL, _CHANNEL, alone=True))},
+        **dict.fromkeys(("duration_s", "rate_hz", "frames", "unseen_frames"), _COUNT),
+    },
+    KEYS,
+)
+"""What of the description is used, and its types."""
+
+
 def read_entry(folder: Path) -> dict[str, Any]:
     """Return the description of an utterance, checked. Raises CorpusError: missing or damaged."""
     try:
-        entry = from_json(read_text_file(folder / ENTRY, "description"))
+        entry: dict[str, Any] = from_json(read_text_file(folder / ENTRY, "description"))
+        _ENTRY(entry)
     except (OSError, ValueError) as error:
-        raise _damaged(folder, error) from error
-    if not isinstance(entry, dict) or not entry.keys() >= KEYS:
-        raise _damaged(folder, KeyError(f"{ENTRY} holds other keys than {', '.join(sorted(KEYS))}"))
-    try:
-        _check_entry(entry)
-    except ValueError as error:
         raise _damaged(folder, error) from error
     return entry
 
@@ -184,43 +195,11 @@ def _check_sums(arrays: Mapping[str, NDArray[Any]], checksums: Mapping[str, int]
             raise ValueError(f"{name} holds other bytes than were written")
 
 
-def _check_entry(entry: dict[str, Any]) -> None:
-    """Raise ValueError for impossible values in a description."""
-    fitting = {
-        "name": isinstance(entry["name"], str),
-        "speaker": isinstance(entry.get("speaker", ""), str),
-        "split": entry["split"] in SPLITS,
-        "words": entry["words"] is None or _is_texts(entry["words"]),
-        "source": isinstance(entry["source"], dict) and _is_texts(list(entry["source"].values())),
-        "notes": _is_texts(entry.get("notes", [])),
-        "settings": isinstance(entry["settings"], dict),
-        "checksums": isinstance(entry.get("checksums", {}), dict),
-        "channels": isinstance(entry["channels"], list) and all(map(_is_channel, entry["channels"])),
-        "audio_rate_hz": isinstance(entry["audio_rate_hz"], int) and entry["audio_rate_hz"] > 0,
-    }
-    fitting |= {key: _is_count(entry[key]) for key in ("duration_s", "rate_hz", "frames", "unseen_frames")}
-    for key, fits in fitting.items():
-        if not fits:
-            raise ValueError(f"{ENTRY} says {str(entry.get(key))[:60]!r} of {key}")
-
-
-def _is_texts(value: Any) -> bool:
-    return isinstance(value, list) and all(isinstance(item, str) for item in value)
-
-
-def _is_channel(value: Any) -> bool:
-    return isinstance(value, dict) and value.keys() == {"name", "unit"} and _is_texts(list(value.values()))
-
-
-def _is_count(value: Any) -> bool:
-    return isinstance(value, int | float) and 0 <= value <= LARGEST_NUMBER
-
-
 def _timeline(rows: Any) -> Timeline[Unit] | None:
     """Return phones in time. Raises ValueError: not rows of start, end and phone, in order."""
     if rows is None:
         return None
-    return Timeline(tuple(Span(float(start_s), float(end_s), Unit(str(phone))) for start_s, end_s, phone in rows))
+    return Timeline(tuple(Span(_COUNT(start_s), _COUNT(end_s), Unit(_TEXT(phone))) for start_s, end_s, phone in rows))
 
 
 def _load(folder: Path, name: str) -> NDArray[Any]:

@@ -100,7 +100,7 @@ def read_aligned_words(path: Path) -> tuple[str, ...]:
         )
     rows = [line.split() for line in path.read_text(encoding="utf-8", errors="replace").splitlines() if line.strip()]
     for number, row in enumerate(rows, 1):
-        if len(row) != 3 or not (row[0].isdecimal() and row[1].isdecimal()):
+        if len(row) != 3 or not re.fullmatch(r"[0-9]+ [0-9]+", " ".join(row[:2])):
             raise InputError(f"{path}: line {number} is {shortened(' '.join(row))!r}; required: start end word")
         if not WORD.fullmatch(row[2]):
             raise InputError(f"{path}: line {number} has {shortened(row[2])!r} where its word should be")

@@ -9,10 +9,11 @@ from typing import Any
 
 from lipmotion.corpora.entry import LARGEST_NUMBER, is_utterance_name, read_entry, read_utterance, write_utterance
 from lipmotion.corpora.splits import SPLITS
-from lipmotion.errors import CorpusError
+from lipmotion.errors import CorpusError, InputError
 from lipmotion.storage.files import TEMPORARY, confined, make_folder, read_text_file, remove_unfinished, whole_file
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types import Utterance
+from lipmotion.types.values import any_members, members, number, one_of, text
 
 FORMAT = "lipmotion.corpus"
 VERSION = 2
@@ -251,17 +252,15 @@ def _read_manifest(path: Path) -> dict[str, dict[str, Any]]:
         )
     try:
         index: dict[str, dict[str, Any]] = content["utterances"]
-        damaged = next(
-            (name for name, entry in index.items() if not is_utterance_name(name) or not _is_listed(entry)), None
-        )
-    except (KeyError, TypeError, AttributeError, ValueError, OverflowError) as error:
-        raise CorpusError(f"{path}: the list of utterances is damaged ({error!r}); prepare the corpus again") from error
+        _INDEX(index)
+        damaged = next((name for name in index if not is_utterance_name(name)), None)
+    except (KeyError, InputError) as error:
+        raise CorpusError(f"{path}: the list of utterances is damaged ({error}); prepare the corpus again") from error
     if damaged is not None:
         raise CorpusError(f"{path}: the utterance {damaged!r} is not listed as one; prepare the corpus again")
     return index
 
 
-def _is_listed(entry: dict[str, Any]) -> bool:
-    numbers = [float(entry[key]) for key in ("duration_s", "frames", "unseen_frames")]
-    possible = all(0 <= number <= LARGEST_NUMBER for number in numbers)
-    return entry["split"] in SPLITS and isinstance(entry.get("speaker", ""), str) and possible
+_COUNTS = ("duration_s", "frames", "unseen_frames")
+_LISTED = {"split": one_of(SPLITS)} | dict.fromkeys(_COUNTS, number(0, LARGEST_NUMBER))
+_INDEX = any_members(members(_LISTED | {"speaker": text(1 << 20)}, _LISTED))

@@ -5,22 +5,24 @@ from __future__ import annotations
 import json
 import logging
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError
 from lipmotion.export.motion.document import parse_units, unit_rows
-from lipmotion.pipeline.edits import FORMS, Edits, MoodStep, Step
+from lipmotion.pipeline.edits import Edits, MoodStep, Step
 from lipmotion.pipeline.job import Request, located
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.outputs.scenes import sound_reference
 from lipmotion.pipeline.session import Session
 from lipmotion.pipeline.understand.read_request import read_request
 from lipmotion.pipeline.understand.request import SpeechRequest
-from lipmotion.storage.files import check_source, read_text_file, sha256_of, whole_file
+from lipmotion.storage.files import LARGEST_TEXT_BYTES, check_source, read_text_file, sha256_of, whole_file
 from lipmotion.storage.json_text import as_json_rows, from_json
 from lipmotion.storage.toml_text import read_toml
 from lipmotion.types import Generation, Outlook, Timeline, Unit
+from lipmotion.types.values import described, items, number, optional, require, text, tupled, value_of
 
 LOG = logging.getLogger("lipmotion")
 FORMAT, VERSION = "lipmotion.edits", 1
@@ -29,6 +31,11 @@ JSON, TOML = SUFFIXES = (".json", ".toml")
 DIGEST = "recording_sha256"
 HELD = ("recording", "model", "lexicon", "language", "recogniser", "speaker", "pauses", "asymmetry")
 """What of a request such a file holds; words and phones that were given are in the phones in time."""
+
+
+_SHARE, _TEXT = number(0, 1), text(1000)
+_OF_OUTLOOK = {"words": _TEXT, "confidence": _SHARE, "range_db": number(), "advice": tupled(items(_TEXT))}
+_OUTLOOK = optional(value_of(partial(Outlook, voice=None), _OF_OUTLOOK | {"voice": _SHARE}, _OF_OUTLOOK))
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,13 +160,13 @@ def read_edits(path: str | Path, *, phones: bool = True) -> EditFile:
     if not isinstance(members, dict) or members.get("format") != FORMAT:
         raise InputError(f'{path}: not a file of edits; it must begin with "format": "{FORMAT}"')
     if members.get("version") != VERSION:
-        found = shortened(repr(members.get("version")))
+        found = described(members.get("version"))
         raise InputError(f"{path}: edits of version {found}, required {VERSION}; update lipmotion")
     if not phones:
         members.pop("units", None)
     try:
         return _content(members, path.parent)
-    except (InputError, TypeError, KeyError, AttributeError, ValueError) as error:
+    except InputError as error:
         raise InputError(f"{path}: {error}") from error
 
 
@@ -175,22 +182,14 @@ def _content(members: dict[str, Any], folder: Path) -> EditFile:
     if unknown := sorted(set(members) - known):
         raise InputError(f"unknown member {unknown[0]!r}; required some of: {', '.join(sorted(known))}")
     steps, undone = (_sentences(members, name) for name in ("steps", "undone"))
-    outlook = members.get("outlook")
     named = located(Request.parsed({name: members[name] for name in HELD if name in members}), folder)
-    units = parse_units(members["units"], members.get("recognised", ())) if "units" in members else None
-    if outlook is not None:
-        outlook = Outlook(**{"voice": None} | outlook | {"advice": tuple(outlook["advice"])})
-    sha256 = members.get(DIGEST, "")
-    if not isinstance(sha256, str):
-        raise InputError(f"{DIGEST} is {shortened(repr(sha256))}, required a text: the digest of the recording's file")
+    units = parse_units(members["units"], members.get("recognised")) if "units" in members else None
+    outlook, sha256 = _OUTLOOK(members.get("outlook")), require(_TEXT, members.get(DIGEST, ""), DIGEST)
     return EditFile(Edits().then(*steps), named, units, outlook, Edits().then(*undone).steps, sha256)
 
 
 def _sentences(members: dict[str, Any], name: str) -> list[str]:
-    found = members.get(name, [])
-    if not isinstance(found, list) or not all(isinstance(step, str) for step in found):
-        raise InputError(f"the {name} are {shortened(repr(found))}, required a list of sentences: {FORMS[0]!r}")
-    return found
+    return list(require(items(text(LARGEST_TEXT_BYTES)), members.get(name, []), name))
 
 
 def write_edits(file: EditFile, path: str | Path) -> None:
@@ -212,9 +211,9 @@ def write_edits(file: EditFile, path: str | Path) -> None:
         members |= unit_rows(file.units)
     if file.outlook is not None:
         members["outlook"] = {name: value for name, value in asdict(file.outlook).items() if value is not None}
-    text = _as_toml(members) if kind == TOML else as_json_rows(members)
+    content = _as_toml(members) if kind == TOML else as_json_rows(members)
     with whole_file(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(content, encoding="utf-8")
 
 
 def _as_toml(members: dict[str, Any]) -> str:

@@ -14,6 +14,7 @@ from lipmotion.types import CurveEdit, DrawnCurve, Gain, Hold, Pin, Span, Timeli
 from lipmotion.types.delivery import Delivery
 from lipmotion.types.moods import MoodKey, in_time, moods_of, text_of
 from lipmotion.types.staging import Staging
+from lipmotion.types.values import described, number_of, whole_of
 from lipmotion.units import PHONES, is_silent, unknown_phone_message
 
 LEAST_PHONE_S = 0.01
@@ -26,14 +27,14 @@ class Text(str):
     __slots__ = ()
 
 
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_NUMBER = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 Numbers = tuple[float, ...]
 _READ: dict[Any, tuple[str, Any]] = {
-    int: (r"\d+", int),
-    float: (_NUMBER, float),
+    int: (r"[0-9]+", whole_of),
+    float: (_NUMBER, number_of),
     str: (r"\S+", str),
     Text: (r"\S.*?", lambda text: Text(" ".join(text.split()))),
-    Numbers: (rf"{_NUMBER}(?:\s+{_NUMBER})*", lambda text: tuple(map(float, text.split()))),
+    Numbers: (rf"{_NUMBER}(?:\s+{_NUMBER})*", lambda text: tuple(map(number_of, text.split()))),
 }
 """How the values of fields are written, and what reads them."""
 
@@ -462,11 +463,13 @@ class SetStep(Step):
             if self.value not in _TRUTH:
                 raise InputError(f"{str(self)!r}: required one of: {', '.join(_TRUTH)}")
             return _TRUTH[self.value]
-        try:
-            value: float | int | str = type(usual)(self.value)
-        except ValueError as error:
-            raise InputError(f"{str(self)!r}: required a number") from error
-        return value
+        if isinstance(usual, str):
+            return self.value
+        return (
+            whole_of(self.value, f"{self.name} is")
+            if isinstance(usual, int)
+            else number_of(self.value, f"{self.name} is")
+        )
 
 
 @dataclass(frozen=True)
@@ -514,7 +517,7 @@ def step_of(sentence: str) -> Step:
     'pin jawOpen 0.2 at 1.0'
     """
     if not isinstance(sentence, str):
-        raise InputError(f"an edit is {shortened(repr(sentence))}, required a sentence: {FORMS[0]!r}")
+        raise InputError(f"an edit is {described(sentence)}, required a sentence: {FORMS[0]!r}")
     for kind in STEPS:
         step = kind.parsed(sentence)
         if step is not None:

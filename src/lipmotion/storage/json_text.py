@@ -6,12 +6,15 @@ import json
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cache
 from typing import Any, NoReturn
 
-from lipmotion.errors import ExportError
+from lipmotion.errors import ExportError, InputError
 
+LONGEST_WHOLE = 300
+"""Most digits of a whole number: one of 309 may be larger than any fraction."""
 SURROGATE = re.compile("[\ud800-\udfff]")
 
 
@@ -88,9 +91,23 @@ def from_json(text: str | bytes) -> Any:
     Raises ValueError: it is none, has a key twice, is nested too deeply, or holds a number that is not finite.
     """
     try:
-        return json.loads(text, object_pairs_hook=_distinct_keys, parse_constant=_refused, parse_float=_finite)
+        numbers: Any = {"parse_constant": _refused, "parse_float": finite, "parse_int": _whole}
+        return json.loads(text, object_pairs_hook=_distinct_keys, **numbers)
     except RecursionError as error:
         raise ValueError("nested too deeply") from error
+
+
+@contextmanager
+def json_errors(what: str) -> Iterator[None]:
+    """Turn the errors of reading JSON that are raised inside into an InputError; ``what`` is read."""
+    try:
+        yield
+    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise InputError(f"not JSON ({error}); export it again") from error
+    except (TypeError, KeyError, ValueError, OverflowError) as error:
+        if type(error) is InputError:
+            raise
+        raise InputError(f"{what} is damaged ({error}); export it again") from error
 
 
 def _distinct_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -105,7 +122,14 @@ def _refused(constant: str) -> NoReturn:
     raise ValueError(f"the number {constant}, required a finite one")
 
 
-def _finite(text: str) -> float:
+def _whole(text: str) -> int:
+    if len(text) > LONGEST_WHOLE:
+        _refused(text[:20])
+    return int(text)
+
+
+def finite(text: str) -> float:
+    """Return the number of a text of JSON or TOML. Raises ValueError: it is not finite."""
     number = float(text)
     if not math.isfinite(number):
         _refused(text[:20])

@@ -94,6 +94,9 @@ def _rows(reader: Iterator[list[str]], above: int) -> Iterator[tuple[int, list[s
 
 def numbers_in(fields: Sequence[str], line: int) -> list[float]:
     """Return fields as numbers; those that are missing are NaN. Raises ValueError: another text, with its line."""
+    written = "".join(fields)
+    if "_" in written or not written.isascii():  # as 1_0, or digits of other scripts, which Python reads
+        raise ValueError(f"line {line}: required numbers in the digits 0 to 9")
     try:
         return list(map(float, fields))
     except ValueError:

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 from typing import Any
 
 from lipmotion.errors import InputError
 from lipmotion.storage.files import read_text_file
+from lipmotion.storage.json_text import finite
+
+DEEP_KEY = re.compile(r"(?:\.[ \t]*[\w\"'-]+[ \t]*){100}")
+"""A name with so many dots; the time to read it grows with the square of their number."""
 
 
 def read_toml(path: Path, kind: str, instead: str) -> dict[str, Any]:
@@ -22,7 +27,20 @@ def read_toml(path: Path, kind: str, instead: str) -> dict[str, Any]:
     import tomllib
 
     text = read_text_file(path, kind)
+    if DEEP_KEY.search(text):
+        raise InputError(f"{path}: a name of more than 100 parts, required one of a table in a table at most")
     try:
-        return tomllib.loads(text)
+        found = tomllib.loads(text, parse_float=finite)
+        _check_wholes(found)
+        return found
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: {error}") from error
+
+
+def _check_wholes(content: Any) -> None:
+    """Raise ValueError for a whole number beyond 64 bits, which TOML has none of."""
+    for name, each in content.items() if isinstance(content, dict) else enumerate(content, 1):
+        if isinstance(each, dict | list):
+            _check_wholes(each)
+        elif type(each) is int and not -(1 << 63) <= each < 1 << 63:
+            raise ValueError(f"{name} is a whole number of {each.bit_length()} bits, required at most 63")

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from starlette.requests import Request
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError
+from lipmotion.types import values
+from lipmotion.types.values import Schema, any_members, items, number_of, require, stated, whole_of
 from lipmotion.web.bodies import json_of
 
 LARGEST_JSON_BYTES = 1 << 20
+LATEST_S = 1e6
 
 
 async def content_of(request: Request) -> dict[str, Any]:
@@ -22,26 +26,19 @@ async def content_of(request: Request) -> dict[str, Any]:
     return content
 
 
+def member(given: Mapping[str, Any], name: str, usual: Any, schema: Schema) -> Any:
+    """Return a member of a request, checked. Raises InputError: there is none, and no usual value; or another one."""
+    return require(schema, given.get(name, usual), name)
+
+
 def whole(given: Mapping[str, Any], name: str, usual: int | None = None, *, least: int = 0, most: int = 1 << 31) -> int:
-    """Return a whole number of a request. Raises InputError: there is none, and no usual value; or out of range."""
-    value = given.get(name, usual)
-    if isinstance(value, str) and value.isascii() and value.isdecimal() and len(value) < 12:
-        value = int(value)
-    if type(value) is not int or not least <= value <= most:
-        raise InputError(f"{name} is {shortened(repr(value))}, required a whole number from {least} to {most}")
-    return value
+    """Return a whole number of a request, also from its text in an address. Raises as ``member``."""
+    return int(member(given, name, usual, stated(partial(whole_of, what=f"{name} is"), values.whole(least, most))))
 
 
 def seconds(given: Mapping[str, Any], name: str, usual: float | None = None) -> float:
-    """Return a time of a request in seconds. Raises InputError: there is none, and no usual value; or no time."""
-    value = given.get(name, usual)
-    try:
-        time_s = math.nan if isinstance(value, bool) or value is None else float(value)
-    except (TypeError, ValueError):
-        time_s = math.nan
-    if not 0 <= time_s <= 1e6:
-        raise InputError(f"{name} is {shortened(repr(value))}, required seconds from 0, as 1.24")
-    return time_s
+    """Return a time of a request in seconds, also from its text in an address. Raises as ``member``."""
+    return float(member(given, name, usual, stated(partial(number_of, what=f"{name} is"), values.number(0, LATEST_S))))
 
 
 def stretch(given: Mapping[str, Any], rate_hz: float, frames: int) -> slice:
@@ -58,26 +55,15 @@ def stretch(given: Mapping[str, Any], rate_hz: float, frames: int) -> slice:
 
 
 def text(given: Mapping[str, Any], name: str, usual: str | None = None, *, longest: int = 200) -> str:
-    """Return a text of a request. Raises InputError: there is none, and no usual value; or it is too long."""
-    value = given.get(name, usual)
-    if not isinstance(value, str) or len(value) > longest:
-        raise InputError(f"{name} is {shortened(repr(value))}, required a text of at most {longest} characters")
-    return value
+    """Return a text of a request. Raises as ``member``."""
+    return str(member(given, name, usual, values.text(longest)))
 
 
 def texts(given: Mapping[str, Any], name: str, *, most: int, longest: int = 2000) -> tuple[str, ...]:
-    """Return a list of texts of a request. Raises InputError: there is none, or it is too long."""
-    value = given.get(name)
-    if not isinstance(value, list) or len(value) > most or not all(isinstance(each, str) for each in value):
-        raise InputError(f"{name} is {shortened(repr(value))}, required a list of at most {most} texts")
-    if any(len(each) > longest for each in value):
-        raise InputError(f"a text of {name} has more than {longest} characters")
-    return tuple(value)
+    """Return a list of texts of a request. Raises as ``member``."""
+    return tuple(member(given, name, None, items(values.text(longest), most=most)))
 
 
 def objects(given: Mapping[str, Any], name: str, *, most: int = 2) -> list[dict[str, Any]]:
-    """Return a list of objects of a request. Raises InputError: there is none, or it is too long."""
-    value = given.get(name)
-    if not isinstance(value, list) or len(value) > most or not all(isinstance(each, dict) for each in value):
-        raise InputError(f"{name} is {shortened(repr(value))}, required a list of at most {most} objects")
-    return value
+    """Return a list of objects of a request. Raises as ``member``."""
+    return list(member(given, name, None, items(any_members(lambda value: value), most=most)))

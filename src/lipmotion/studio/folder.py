@@ -245,10 +245,9 @@ class ProjectFolder:
         """Remove a line's file of edits, and its copy. Raises ExportError: it cannot be removed."""
         with self.lock:
             for path in (self._copy(line), self.edits(line)):  # a copy without its file would be a damage
-                try:
-                    remove(path)
-                except OSError as error:
-                    raise ExportError(f"{path}: cannot be removed: {error.strerror}") from error
+                remove(path)
+                if path.exists():
+                    raise ExportError(f"{path}: cannot be removed")
 
     def is_restorable(self, line: ProjectLine) -> bool:
         """Return whether a line's edits are damaged, or those of another sound, and there is a good copy."""

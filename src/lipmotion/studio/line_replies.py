@@ -25,7 +25,7 @@ from lipmotion.studio.line import OpenLine, transcript_step
 from lipmotion.studio.studio import Studio
 from lipmotion.studio.votes import Vote, tally
 from lipmotion.types import Motion
-from lipmotion.web.replies import FRESH, json_bytes
+from lipmotion.web.replies import FRESH, json_reply
 
 MOST_STEPS = 1000
 LONGEST_TRANSCRIPT = 100_000
@@ -105,12 +105,12 @@ class LineReplies:
         revision, shown = whole(content, "revision"), [text(side, "by", "") for side in objects(content, "shown")]
         better = None if content.get("better") is None else whole(content, "better", most=1)
 
-        def found() -> str:
+        def found() -> dict[str, Any]:
             with self._studio.folder.changing(number, revision) as line:
                 vote = Vote(line.name, tuple(self._studio.side(number, by) for by in shown), better)
-                return as_json(tally(self._studio.folder.add_vote(vote), vote))
+                return tally(self._studio.folder.add_vote(vote), vote)
 
-        return json_bytes((await self._desk.beside(found)).encode())
+        return json_reply(await self._desk.beside(found))
 
     async def keep(self, request: Request) -> Response:
         """The edits as they are, to be kept as a version."""
@@ -220,18 +220,18 @@ class LineReplies:
     async def why(self, request: Request) -> Response:
         """What determined a frame."""
         time_s = seconds(request.query_params, "time")
-        return await self._json(request, lambda line: as_json(line.why(time_s)).encode())
+        return await self._json(request, lambda line: line.why(time_s))
 
     async def doubts(self, request: Request) -> Response:
         """The phones, the least sure first."""
-        return await self._json(request, lambda line: as_json(line.doubts()).encode())
+        return await self._json(request, OpenLine.doubts)
 
     def _number(self, request: Request) -> int:
         """Return the number of a line. Raises HTTPException: there is none of that number."""
         return self._studio.number(str(request.path_params["number"]))
 
-    async def _json(self, request: Request, found: Callable[[OpenLine], bytes]) -> Response:
-        return json_bytes(await self._desk.at(self._number(request), found))
+    async def _json(self, request: Request, found: Callable[[OpenLine], Any]) -> Response:
+        return json_reply(await self._desk.at(self._number(request), found))
 
     async def _stepped(self, request: Request, step: Callable[[OpenLine, int, int], Changed]) -> Response:
         """Return the state of a line after so many of its edits were taken back, or made again."""
@@ -251,9 +251,7 @@ class LineReplies:
             with self._studio.folder.lock:
                 state |= self._studio.line_document(number) | {"revision": line.revision}
             state["transcript"] = state["transcript"] or line.transcript
-            return json_bytes(
-                as_json({**changed, "state": state} if status == 409 else state | changed).encode(), status
-            )
+            return json_reply({**changed, "state": state} if status == 409 else state | changed, status)
 
         return await self._desk.at(number, done)
 
@@ -262,7 +260,7 @@ class LineReplies:
         document = self._studio.line_document(number) | {"media": self._media(number)}
         if document["status"] == READY:  # since it was looked up: its state comes with the next request
             document["status"] = WORKING
-        return json_bytes(as_json(document).encode())
+        return json_reply(document)
 
     def _media(self, number: int) -> dict[str, Any]:
         video = self._studio.video_of(number)

@@ -4,16 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
+from functools import partial
 from hashlib import sha256
 from typing import Any
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.extensions import installed_version
 from lipmotion.pipeline.batch.lines import BatchLine, check_names
+from lipmotion.types.values import (
+    SchemaError,
+    any_members,
+    described,
+    items,
+    members,
+    number,
+    one_of,
+    optional,
+    path,
+    text,
+    tupled,
+    value_of,
+    whole,
+)
 
 FORMAT, VERSION = "lipmotion.project", 1
 NO_MARK, APPROVED, REDO = MARKS = ("none", "approved", "redo")
-MOST_LINES = 100_000
+MOST_LINES, LONGEST_TEXT = 100_000, 1 << 24
 MOST_VERSIONS = 100
 """Versions that are kept of a line."""
 EDITS_SUFFIX = "edits.json"
@@ -93,9 +109,7 @@ class ProjectLine:
 
     def __post_init__(self) -> None:
         if self.mark not in MARKS:
-            raise InputError(f"the mark is {self.mark!r}, required one of: {', '.join(MARKS)}")
-        if type(self.number) is not int or self.number < 1:
-            raise InputError(f"the line {self.name!r} has the number {self.number!r}, required 1 or more")
+            raise InputError(f"the mark is {shortened(repr(self.mark))}, required one of: {', '.join(MARKS)}")
 
     def with_version(self, steps: tuple[str, ...]) -> ProjectLine:
         """Return the line with a version of these edits; as it is, where there is one. Raises InputError: too many."""
@@ -180,39 +194,39 @@ def project_from(content: Any) -> Project:
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise InputError(f'not a project: required "format": "{FORMAT}"')
     if content.get("version") != VERSION:
-        raise InputError(f"a project of version {content.get('version')!r}, required {VERSION}; update lipmotion")
-    given = {name: value for name, value in content.items() if name not in ("format", "version", "made_by", "lines")}
+        version = described(content.get("version"))
+        raise InputError(f"a project of version {version}, required {VERSION}; update lipmotion")
+    given = {name: value for name, value in content.items() if name not in ("format", "version", "made_by")}
     try:
-        lines = [_line(row) for row in content.get("lines", ())]
-        if len({line.number for line in lines}) < len(lines):
-            raise ValueError("two lines of one number")
-        project = Project({line.number: line for line in lines}, **given)
-        paths = (project.model, project.given_model, project.recordings, *project.characters.values())
-        if not all(isinstance(text, str) for text in (project.preset, *paths)):
-            raise ValueError("a path or a name that is no text")
-        project = replace(project, next_number=int(project.next_number)).with_lines(lines)
-    except InputError:
-        raise
-    except (TypeError, ValueError, KeyError, AttributeError) as error:
+        found = _PROJECT(given)
+    except SchemaError as error:
         raise InputError(f"not a project that can be read ({error})") from error
+    lines = found.pop("lines", [])
+    if len({line.number for line in lines}) < len(lines):
+        raise InputError("not a project that can be read (two lines of one number)")
+    project = Project(**found).with_lines(lines)
     check_lines(project)
     return project
 
 
-def _line(row: Any) -> ProjectLine:
-    texts = {name: row[name] for name in ("name", "sound", "sha256", "transcript", "mark", "marked") if name in row}
-    if not all(isinstance(text, str) for text in texts.values()):
-        raise ValueError(f"a text of the line {row.get('number')} is none")
-    numbers = {name: None if row.get(name) is None else float(row[name]) for name in ("duration_s", "doubt")}
-    exports = tuple(ExportRecord(**each) for each in row.get("exports", ()))
-    versions = tuple(KeptVersion(int(each["number"]), _sentences(each["steps"])) for each in row.get("versions", ()))
-    return ProjectLine(**{"sha256": "", **row, **numbers, "exports": exports, "versions": versions})
-
-
-def _sentences(steps: Any) -> tuple[str, ...]:
-    if not isinstance(steps, list) or not all(isinstance(step, str) for step in steps):
-        raise ValueError("edits of a version that are no texts")
-    return tuple(steps)
+_TEXT, _STEPS, _NUMBERED = text(1000), tupled(items(text(LONGEST_TEXT))), whole(1, 1 << 53)
+_EXPORT = {"files": any_members(_TEXT)} | dict.fromkeys(("preset", "edits", "steps", "model", "version"), _TEXT)
+_VERSION = {"number": _NUMBERED, "steps": _STEPS}
+_LINE = {
+    **{"number": _NUMBERED, "name": path, "sound": path, "sha256": text(64), "transcript": text(LONGEST_TEXT)},
+    **{"duration_s": optional(number(0, 1e6)), "doubt": optional(number(-1, 1)), "mark": one_of(MARKS)},
+    **{"marked": text(64), "exports": tupled(items(value_of(ExportRecord, _EXPORT, _EXPORT)))},
+    "versions": tupled(items(value_of(KeptVersion, _VERSION, _VERSION), most=MOST_VERSIONS)),
+}
+_PROJECT = members(
+    {
+        "lines": items(value_of(partial(ProjectLine, sha256=""), _LINE, ("number", "name", "sound"))),
+        **dict.fromkeys(("model", "recordings", "given_model"), path),
+        **dict.fromkeys(("language", "recogniser", "preset"), _TEXT),
+        **{"characters": any_members(path), "next_number": _NUMBERED},
+    },
+    alone=True,
+)
 
 
 def digest_of(sentences: Iterable[str]) -> str:

@@ -6,16 +6,18 @@ from urllib.parse import unquote
 
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import JSONResponse, Response
+from starlette.responses import Response
 
 from lipmotion.errors import InputError
-from lipmotion.studio.asked import content_of, text, texts, whole
+from lipmotion.studio.asked import content_of, member, text, texts, whole
 from lipmotion.studio.presets import preset_of
 from lipmotion.studio.project import APPROVED
 from lipmotion.studio.studio import Studio
+from lipmotion.types import values
+from lipmotion.types.values import items
 from lipmotion.units import PHONES
 from lipmotion.web.bodies import write_body
-from lipmotion.web.replies import FRESH
+from lipmotion.web.replies import FRESH, JSONResponse
 
 LARGEST_UPLOAD_BYTES = 1 << 29
 UPLOAD_S = 600.0
@@ -44,10 +46,9 @@ class ProjectReplies:
 
     async def understand(self, request: Request) -> Response:
         """Lines that are to be understood."""
-        lines = (await content_of(request)).get("lines")
-        if lines != ALL and not (isinstance(lines, list) and all(type(each) is int for each in lines)):
-            raise InputError(f'lines is neither a list of numbers nor "{ALL}"')
-        return JSONResponse({"waiting": self._studio.understand(None if lines == ALL else lines)}, headers=FRESH)
+        content = await content_of(request)
+        lines = None if content.get("lines") == ALL else member(content, "lines", None, items(values.whole(0, 1 << 31)))
+        return JSONResponse({"waiting": self._studio.understand(lines)}, headers=FRESH)
 
     async def dropped(self, request: Request) -> Response:
         """A recording that was dropped on the page, as body."""

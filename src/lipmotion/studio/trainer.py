@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -23,6 +23,7 @@ from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.studio.folder import ProjectFolder, plain_name
 from lipmotion.studio.project import ProjectLine
 from lipmotion.studio.training import FACE, KINDS, VOICE, LearnedLine, TrainingOrder, VoiceOptions, carry_out
+from lipmotion.types.values import any_members, items, members, number, one_of, optional, text, tupled, value_of, whole
 
 LOG = logging.getLogger("lipmotion")
 TRAINING, STATE = "training", "state.json"
@@ -295,13 +296,20 @@ class Trainer:
 
 def _job(found: Mapping[str, Any]) -> TrainingJob:
     """Return what a file says of something that was made. Raises InputError and others: it cannot be understood."""
-    given, told = found["wanted"], found["told"]
-    wanted = Wanted(given["kind"], plain_name(given["name"]), tuple(map(int, given["lines"])), given["options"])
+    job = _JOB(found)
+    wanted, told = replace(job["wanted"], name=plain_name(job["wanted"].name)), job["told"]
     VoiceOptions.stored(wanted.options)
-    if wanted.kind not in KINDS or told["state"] not in (WORKING, DONE, FAILED, STOPPED, INTERRUPTED):
-        raise ValueError("of another kind, or in another state")
     state = INTERRUPTED if told["state"] == WORKING else told["state"]
     return TrainingJob(wanted, {**_nothing_told(), **told, "state": state})
+
+
+_TEXT, _ANY = text(1 << 20), any_members(lambda value: value)
+_WANTED = {"kind": one_of(KINDS), "name": _TEXT, "lines": tupled(items(whole(0, 1 << 31))), "options": _ANY}
+_TOLD = {
+    **{"state": one_of((WORKING, DONE, FAILED, STOPPED, INTERRUPTED)), "stage": _TEXT, "share": number(0, 1)},
+    **{"warnings": items(_TEXT), "skipped": items(_ANY), "error": _TEXT, "report": optional(_ANY)},
+}
+_JOB = members({"wanted": value_of(Wanted, _WANTED, _WANTED), "told": members(_TOLD, ["state"])}, ("wanted", "told"))
 
 
 def _numbered(name: str, number: int) -> str:

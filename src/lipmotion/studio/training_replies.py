@@ -6,16 +6,16 @@ from dataclasses import fields
 from typing import Any
 
 from starlette.requests import Request
-from starlette.responses import JSONResponse, Response
+from starlette.responses import Response
 
-from lipmotion.errors import InputError, shortened
-from lipmotion.studio.asked import content_of, text
+from lipmotion.studio.asked import content_of, member, text
 from lipmotion.studio.project import MOST_LINES
 from lipmotion.studio.studio import Studio
 from lipmotion.studio.trainer import MOST_LISTED
 from lipmotion.studio.training import FACE, VOICE, VoiceOptions, check_options
 from lipmotion.types.configuration import kind_of
-from lipmotion.web.replies import FRESH
+from lipmotion.types.values import items, whole
+from lipmotion.web.replies import FRESH, JSONResponse
 
 
 class TrainingReplies:
@@ -32,7 +32,8 @@ class TrainingReplies:
         """A voice or a face that is to be made."""
         content = await content_of(request)
         kind, name = text(content, "kind"), text(content, "name", "")
-        lines, options = _numbers(content), check_options(content.get("options", {}))
+        lines = list(dict.fromkeys(member(content, "lines", [], items(whole(0, 1 << 31), most=MOST_LINES))))
+        options = check_options(content.get("options", {}))
         await self._desk.beside(lambda: self._trainer.begin(kind, name, lines, options))
         return await self._told(201)
 
@@ -81,11 +82,3 @@ class TrainingReplies:
 def _option(each: Any) -> dict[str, Any]:
     choices = list(each.metadata["rule"].choices)
     return {"name": each.name, "kind": kind_of(each).__name__, "usual": each.default, "choices": choices}
-
-
-def _numbers(content: dict[str, Any]) -> list[int]:
-    """Return the numbers of lines of a request. Raises InputError: something else is there."""
-    found = content.get("lines", [])
-    if not isinstance(found, list) or len(found) > MOST_LINES or not all(type(each) is int for each in found):
-        raise InputError(f"lines is {shortened(repr(found))}, required a list of numbers")
-    return list(dict.fromkeys(found))

@@ -11,6 +11,7 @@ from pathlib import Path
 from lipmotion.errors import InputError, shortened
 from lipmotion.storage.files import read_text_file, whole_file
 from lipmotion.storage.text_table import as_field, from_field
+from lipmotion.types.values import number_of, whole_of
 
 PAIRED, MOS, RANKING = "paired", "mos", "ranking"
 KINDS = (PAIRED, MOS, RANKING)
@@ -102,16 +103,15 @@ def read_answers(path: Path) -> list[Answer]:
 
     Raises InputError: the file cannot be read, lacks a column, or has a value that no answer can have.
     """
-    table = csv.DictReader(io.StringIO(read_text_file(path, "answers")))
-    missing = [name for name in COLUMNS if name not in (table.fieldnames or ())]
-    if missing:
-        raise InputError(f"{path}: no column {missing[0]!r}; required {', '.join(COLUMNS)}")
-    answers = []
-    for row in table:
-        try:
+    table, answers = csv.DictReader(io.StringIO(read_text_file(path, "answers")), restval=""), []
+    try:
+        missing = [name for name in COLUMNS if name not in (table.fieldnames or ())]
+        if missing:
+            raise InputError(f"no column {missing[0]!r}; required {', '.join(COLUMNS)}")
+        for row in table:
             answers.append(_answer(row))
-        except (ValueError, TypeError, AttributeError) as error:  # InputError among them; others: the line is too short
-            raise InputError(f"{path}: line {table.line_num}: {error}") from None
+    except (InputError, csv.Error) as error:
+        raise InputError(f"{path}: line {table.line_num}: {error}") from error
     return answers
 
 
@@ -121,9 +121,9 @@ def _answer(row: dict[str, str]) -> Answer:
             name: from_field(row[name])
             for name in ("rater", "kind", "sentence", "question", "condition", "other", "value")
         },
-        trial=int(row["trial"]),
-        seconds=float(row["seconds"]),
-        plays=int(row["plays"]),
-        practice=bool(int(row["practice"])),
+        trial=whole_of(row["trial"], "trial is"),
+        seconds=number_of(row["seconds"], "seconds is"),
+        plays=whole_of(row["plays"], "plays is"),
+        practice=bool(whole_of(row["practice"], "practice is")),
         expected=row["expected"],
     )

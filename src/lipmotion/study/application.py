@@ -19,7 +19,7 @@ from urllib.parse import urlsplit
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.responses import FileResponse, Response
 from starlette.routing import Route
 
 from lipmotion.errors import InputError
@@ -32,7 +32,7 @@ from lipmotion.study.store import StudyStore, rater_name
 from lipmotion.study.submission import submitted_sheet
 from lipmotion.study.trials import questions_of, trials_of
 from lipmotion.web.bodies import json_of
-from lipmotion.web.replies import ERRORS, FRESH, Guard, SecurityHeaders, foreign_refusal
+from lipmotion.web.replies import ERRORS, FRESH, Guard, JSONResponse, SecurityHeaders, foreign_refusal
 
 PAGE = {
     "": ("study.html", "text/html; charset=utf-8"),

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 from lipmotion.errors import InputError
 from lipmotion.storage.files import read_text_file, sha256_of
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.study.answers import KINDS, MOS, PAIRED, is_possible
 from lipmotion.study.questions import SCALES
+from lipmotion.types.values import any_members, items, number, text, truth, tupled, value_of, whole
 
 FORMAT, VERSION = "lipmotion.study", 1
 MANIFEST, VIDEOS = "study.json", "videos"
@@ -125,13 +125,13 @@ def read_study(folder: Path) -> Study:
     path = folder / MANIFEST
     if not path.is_file():
         raise InputError(f"{folder}: has no {MANIFEST}; make a study: lipmotion study design -o {folder} ...")
-    text = read_text_file(path, "study")
+    found = read_text_file(path, "study")
     try:
-        content = from_json(text)
-        if content.get("format") != FORMAT or content.get("version") != VERSION:
+        content = from_json(found)
+        if not isinstance(content, dict) or (content.pop("format", ""), content.pop("version", 0)) != (FORMAT, VERSION):
             raise ValueError(f"not {FORMAT} of version {VERSION}")
-        return _study(content)
-    except (ValueError, TypeError, KeyError, AttributeError) as error:
+        return _STUDY(content)
+    except ValueError as error:
         raise InputError(f"{path}: not a study that can be read ({error}); design it again") from error
 
 
@@ -149,30 +149,16 @@ def check_videos(study: Study, folder: Path) -> dict[str, Path]:
     return paths
 
 
-def _study(content: Mapping[str, Any]) -> Study:
-    given = {name: value for name, value in content.items() if name not in {"format", "version"}}
-    texts = {name: _text(given[name]) for name in ("kind", "title", "consent", "instructions")}
-    return Study(
-        **{
-            **given,
-            **texts,
-            "scales": tuple(map(_text, given["scales"])),
-            "seed": int(given["seed"]),
-            "videos": tuple(StudyVideo(**video) for video in _list(given["videos"])),
-            "trials": tuple(
-                StudyTrial(**{**trial, "videos": tuple(map(int, trial["videos"]))}) for trial in _list(given["trials"])
-            ),
-        }
-    )
-
-
-def _text(value: Any) -> str:
-    if not isinstance(value, str):
-        raise ValueError(f"{value!r}, required a text")
-    return value
-
-
-def _list(value: Any) -> Sequence[Any]:
-    if not isinstance(value, list):
-        raise ValueError(f"{value!r}, required a list")
-    return value
+_TEXT, _NUMBERS = text(1 << 20), tupled(items(whole(0, 1 << 31)))
+_VIDEO = {"seconds": number(0, 1e6), "made": any_members(_TEXT)} | dict.fromkeys(
+    ("file", "sentence", "condition", "sha256"), _TEXT
+)
+_TRIAL = {"videos": _NUMBERS, "practice": truth, "expected": _TEXT, "note": _TEXT}
+_MEMBERS = {
+    **dict.fromkeys(("kind", "title", "consent", "instructions"), _TEXT),
+    **{"scales": tupled(items(_TEXT)), "seed": whole(-(1 << 63), 1 << 63), "conditions": any_members(_TEXT)},
+    **{"sentences": any_members(any_members(_TEXT)), "made_by": any_members(_TEXT)},
+    "videos": tupled(items(value_of(StudyVideo, _VIDEO, _VIDEO))),
+    "trials": tupled(items(value_of(StudyTrial, _TRIAL, ("videos",)))),
+}
+_STUDY = value_of(Study, _MEMBERS, _MEMBERS)

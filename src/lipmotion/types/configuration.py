@@ -7,7 +7,8 @@ from dataclasses import Field, asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError
+from lipmotion.types.values import described, is_path, number_of, whole_of
 
 ConfigurationT = TypeVar("ConfigurationT", bound="Configuration")
 LARGEST_NUMBER = 1e6
@@ -176,16 +177,21 @@ def check_value(option_field: Field[Any], value: Any) -> None:
     fits = fits or (kind is float and type(value) is int)
     if kind is tuple:
         fits = fits and all(isinstance(each, str) for each in value)
-    if fits and rule.most is not None and not rule.allows(value):
+    if kind is Path:
+        fits = fits and is_path(str(value))
+    in_range = not fits or kind not in (int, float) or -LARGEST_NUMBER <= value <= LARGEST_NUMBER
+    if fits and rule.most is not None and not (in_range and rule.allows(value)):
         what = option_field.metadata.get("what", option_field.name)
-        raise InputError(f"the {what} is {value:g}{rule.unit}, required {rule.words}")
-    if fits and kind in (int, float) and not -LARGEST_NUMBER <= value <= LARGEST_NUMBER:
-        raise InputError(f"{option_field.name} is {value}, required at most {LARGEST_NUMBER:g} in size")
+        found = described(value) if type(value) is int else f"{value:g}"
+        raise InputError(f"the {what} is {found}{rule.unit}, required {rule.words}")
+    if not in_range:
+        raise InputError(f"{option_field.name} is {described(value)}, required at most {LARGEST_NUMBER:g} in size")
     if not fits or not rule.allows(value):
         is_complete = rule.odd or rule.power_of_two or bool(rule.choices) or rule.most is not None
         words = _WORDS.get(kind, "a table of options")
         required = rule.words if is_complete and fits else words + ("" if is_complete else rule.words)
-        raise InputError(f"{option_field.name} is {shortened(repr(value))}, required {required}")
+        found = described(str(value) if kind is Path else value)
+        raise InputError(f"{option_field.name} is {found}, required {required}")
 
 
 def kind_of(option_field: Field[Any]) -> type[Any]:
@@ -206,8 +212,11 @@ def _part(name: str, kind: type[Any], value: Any) -> Any:
 
 def _from_text(option_field: Field[Any], text: str) -> Any:
     """Return the value of an option that a text holds. Raises InputError: a text of another type."""
-    kind = kind_of(option_field)
-    try:
-        return _BOOLEANS[text.lower()] if kind is bool else kind(text)
-    except (ValueError, KeyError) as error:
-        raise InputError(f"{option_field.name} is {text!r}, required {_WORDS[kind]}") from error
+    kind, name = kind_of(option_field), option_field.name
+    if kind is int:
+        return whole_of(text, f"{name} is")
+    if kind is float:
+        return number_of(text, f"{name} is", "a number", finite=False)
+    if kind is bool and text.lower() not in _BOOLEANS:
+        raise InputError(f"{name} is {described(text)}, required {_WORDS[kind]}")
+    return _BOOLEANS[text.lower()] if kind is bool else kind(text)

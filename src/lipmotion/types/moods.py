@@ -16,7 +16,7 @@ PLAIN = "plain"
 MANNERS = ("whisper", "shout", "mumble")
 """The manners of speaking beside the usual one, ``PLAIN``."""
 _NAMES = (NEUTRAL, *MOODS, PLAIN, *MANNERS)
-_NUMBER = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)"
+_NUMBER = r"([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[-+]?[0-9]+)?)"
 _KEY = re.compile(rf"([a-z]+)(?::{_NUMBER})?(?:\s+at\s+{_NUMBER})?", re.IGNORECASE)
 
 

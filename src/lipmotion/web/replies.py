@@ -8,12 +8,14 @@ from collections.abc import Callable, Container, Mapping
 from functools import partial
 from typing import Any
 
+from starlette import responses
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import JSONResponse, Response
+from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from lipmotion.errors import ExportError, LipMotionError
+from lipmotion.storage.json_text import as_json, nan_as_null
 
 LOG = logging.getLogger("lipmotion")
 HEADERS = {
@@ -27,6 +29,16 @@ HEADERS = {
     "permissions-policy": "camera=(), microphone=(), geolocation=()",
 }
 FRESH = {"cache-control": "no-store"}
+
+
+class JSONResponse(responses.JSONResponse):
+    """JSON as a reply: null for what is no number, half a character escaped; whatever the content, browsers read it."""
+
+    def render(self, content: Any) -> bytes:  # noqa: D102
+        try:
+            return as_json(content, ensure_ascii=False).encode()
+        except ExportError:
+            return as_json(nan_as_null(content), ensure_ascii=False).encode()
 
 
 class SecurityHeaders:
@@ -110,6 +122,6 @@ ERRORS: dict[type[Exception], Callable[[Request, Any], Any]] = {
 """What is replied to errors that are raised on purpose, and to a full disk: JSON, ``{"error": text}``."""
 
 
-def json_bytes(content: bytes, status: int = 200) -> Response:
-    """Return JSON that is encoded already as a reply."""
-    return Response(content, status, FRESH, "application/json")
+def json_reply(content: Any, status: int = 200) -> Response:
+    """Return content as a reply of JSON."""
+    return JSONResponse(content, status, FRESH)

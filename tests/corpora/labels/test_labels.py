@@ -197,9 +197,9 @@ def test_real_ones(recordings: Path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (f"0 {'9' * 5000} p\n", "line 1 has the time 9{80}\\.\\.\\., required a finite one"),
-        (f"0 sil\n1000000 p\n{'9' * 5000} aa\n", "line 3 has the time 9"),
-        (f"0.0\t{'9' * 400}.0\tp\n", "line 1 has the time 9"),
+        (f"0 {'9' * 5000} p\n", "line 1 has the time '9{79}\\.\\.\\., required a finite one"),
+        (f"0 sil\n1000000 p\n{'9' * 5000} aa\n", "line 3 has the time '9"),
+        (f"0.0\t{'9' * 400}.0\tp\n", "line 1 has the time '9"),
         ("0 1000000 p\n" * (MOST_LABELS + 1), "more than 250000 labels; give those of one recording"),
         ("a" * (LARGEST_TRANSCRIPT_BYTES + 1), "4194305 characters, required at most 4194304: is it a transcript"),
         (" " * (LARGEST_LABELS + 1), "16777217 bytes, required at most 16777216"),

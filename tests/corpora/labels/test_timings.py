@@ -130,11 +130,11 @@ def test_beside_a_recording_and_other_suffixes(file: Any, tmp_path: Path) -> Non
 ERRORS = {
     "a viseme of Polly": (
         POLLY.replace('"@"', '"Q"'), r"a\.json: line 7: no viseme of Polly is 'Q'; known are: sil p t"),
-    "a viseme of Azure": ([{"audio_offset": 0, "viseme_id": 22}], "the viseme is 22, required 0 to 21"),
+    "a viseme of Azure": ([{"audio_offset": 0, "viseme_id": 22}], "the viseme is 22, required a whole"),
     "a symbol": (CARTESIA.replace('"aɪ"', '"§"'), "phonemes 2 is '§', which is no phone"),
     "lists": (CARTESIA.replace("[0, 0.5]", "[0]"), "line 2, .*: required are the lists words, start"),
     "a mark": ({"timepoints": [{"markName": "m1"}]}, "timepoints 1 is the mark 'm1', which is no word; name every"),
-    "a rate": ({**PIPER, "sample_rate": 0}, "line 1: the sample rate is 0, required"),
+    "a rate": ({**PIPER, "sample_rate": 0}, "line 1: the sample rate in hertz is 0, required"),
     "durations": ({**KOKORO, "pred_dur": [1]}, "1 durations of 7 phonemes, required two more than phonemes"),
     "an event without a time": ([{"Text": "a", "AudioOffset": None}], "no words in time are found"),
     "a time": ({**MFA, "tiers": {"words": {"entries": [["x", 1, "a"]]}}}, "entry 1: a time is 'x', required a number"),

@@ -281,7 +281,7 @@ DAMAGED = {
     "JSON nested too deeply": ('{"segments": ' + "[" * 100_000, "nested too deeply"),
     "a number of 5,000 digits": ('{"segments": [{"text": "a", "start": ' + "9" * 5000 + "}]}", "a number too long"),
     "a text as a time": ('{"words": [{"word": "b", "start": "soon"}]}', "a time is 'soon', required a number"),
-    "a truth as a time": ('{"words": [{"word": "b", "start": true}]}', "a time is True, required a number"),
+    "a truth as a time": ('{"words": [{"word": "b", "start": true}]}', "a time is true, required a finite number"),
     "a time of years": ('{"words": [{"word": "b", "start": 1e8}]}', "a time is 1e.08, required seconds"),
     "a segment that is a number": ('{"segments": [{"text": "a"}, 7]}', "'segments', item 2 is 7, required an object"),
     "a word without text": ('{"words": [{"start": 7}]}', "words 1: no text"),
@@ -292,13 +292,13 @@ DAMAGED = {
     ),
     "CTM of two recordings": ("a 1 0.0 0.5 hi\nb 1 0.5 0.5 you\n", r"line 2: words of two recordings, 'a' and 'b'"),
     "CTM with a broken line": ("a 1 0.0 0.5 hi\na 1 0.5 you\n", r"line 2 is 'a 1 0\.5 you'; required, as in line 1"),
-    "CTM with a time that is none": ("a 1 0.0 0.5 hi\na 1 nan 0.5 you\n", "line 2 has the time nan"),
+    "CTM with a time that is none": ("a 1 0.0 0.5 hi\na 1 nan 0.5 you\n", "line 2 has the time 'nan"),
     "CTM with a negative duration": ("a 1 0.0 0.5 hi\na 1 1.0 -0.5 you\n", r"line 2: a duration of -0\.5 s"),
     "LRS with a broken line": (
         "Text:  HI\n\nWORD START END\nHI 0.1 0.2 9\nYOU 0.2\n",
         r"line 5 is 'YOU.*0\.2'; required",
     ),
-    "LRS with a time that is none": ("Text:  HI\n\nWORD START END\nHI 0.1 nan\n", "line 4 has the time nan"),
+    "LRS with a time that is none": ("Text:  HI\n\nWORD START END\nHI 0.1 nan\n", "line 4 has the time 'nan"),
     "phones alone": ("0 1000000 sil\n1000000 2000000 p\n2000000 3500000 aa\n", "phones in time, but no words"),
 }
 

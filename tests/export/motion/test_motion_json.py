@@ -40,7 +40,7 @@ WRONG: list[tuple[dict[str, object], str]] = [
     ({"version": "1"}, "version '1', required 1"),
     ({"rate_hz": 0}, "rate is 0"),
     ({"rate_hz": "fast"}, "damaged"),
-    ({"channels": [{"name": "opening"}]}, "has no 'unit'"),
+    ({"channels": [{"name": "opening"}]}, "unit is missing"),
     ({"channels": []}, "shape"),
     ({"values": [[1.0], [1.0, 2.0]]}, "damaged"),
     ({"values": [1.0, 2.0]}, "shape"),
@@ -49,7 +49,7 @@ WRONG: list[tuple[dict[str, object], str]] = [
     ({"units": 3}, "damaged"),
     ({"recognised": 3}, "damaged"),
     ({"recognised": [[0.0, 0.3, "sil"]]}, "damaged"),
-    ({"recognised": [[0.0, 0.3, "sil", 1.5]]}, "the confidence 1.5, required 0 to 1"),
+    ({"recognised": [[0.0, 0.3, "sil", 1.5]]}, "1.5, required a number from 0 to 1"),
 ]
 
 
@@ -62,5 +62,5 @@ def test_what_is_wrong_is_said(path, generation):
             read_motion(path)
     for missing in ("rate_hz", "channels", "units"):
         path.write_text(json.dumps({key: document[key] for key in document if key != missing}), encoding="utf-8")
-        with pytest.raises(InputError, match=f"has no '{missing}'"):
+        with pytest.raises(InputError, match=f"{missing} is missing"):
             read_motion(path)

@@ -29,6 +29,7 @@ FORMS: dict[str, tuple[Mutate, ...]] = {
     ".mov": (boxes.change, boxes.change),
     ".m4a": (boxes.change, boxes.change),
     ".csv": (text.change, text.change, text.change),
+    ".toml": (text.change, text.change, text.change),
     ".txt": (text.change, text.change, text.change),
     ".align": (text.change, text.change, text.change),
     ".lab": (text.change, text.change, text.change),

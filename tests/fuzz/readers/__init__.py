@@ -14,12 +14,17 @@ from fuzz.readers import (
     lexicon,
     lines,
     model,
+    requests,
+    settings,
     transcript,
     units,
     video,
 )
 
-_MODULES = (audio, video, transcript, lexicon, units, labels, model, face, drawing, corpus, curves, character, lines)
+_MODULES = (
+    *(audio, video, transcript, lexicon, units, labels, model, face),
+    *(drawing, corpus, curves, character, lines, settings, requests),
+)
 READERS: dict[str, Reader] = {
     module.__name__.rpartition(".")[2]: Reader(module.__name__.rpartition(".")[2], module.seeds, module.read)
     for module in _MODULES

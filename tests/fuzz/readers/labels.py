@@ -101,7 +101,8 @@ def _read_labels(path: Path) -> None:
         parts: list[TranscriptLine | TimedWord] = [line, *line.words]
         for part in parts:
             times_s = [time for time in (part.start_s, part.end_s) if time is not None]
-            require(all(map(math.isfinite, times_s)) and times_s == sorted(times_s), "times that are none")
+            require(all(0 <= time_s < math.inf for time_s in times_s), "times that are none")
+            require(times_s == sorted(times_s), "times that are not in order")
     phones = supplied_phones(SourceRecording("a", path, labels.words, phones=labels.phones), LENGTH_S)
     for span in phones or ():
         require(0 <= span.start_s <= span.end_s <= LENGTH_S, "a phone outside of the sound")

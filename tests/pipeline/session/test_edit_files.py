@@ -127,7 +127,7 @@ def test_what_is_written_is_read_again(tmp_path: Path, suffix: str) -> None:
         ("{", "not a file of edits"),
         ('{"format": "lipmotion.edits", "version": 9}', "edits of version 9, required 1"),
         ('{"format": "lipmotion.edits", "version": 1, "stops": []}', "unknown member 'stops'"),
-        ('{"format": "lipmotion.edits", "version": 1, "steps": "lock"}', "required a list of sentences"),
+        ('{"format": "lipmotion.edits", "version": 1, "steps": "lock"}', "required a list"),
         ('{"format": "lipmotion.edits", "version": 1, "steps": ["jump"]}', "'jump' is no edit"),
         ('{"format": "lipmotion.edits", "version": 1, "units": [{"phone": "p"}]}', "start_s"),
     ],

@@ -10,6 +10,7 @@ from lipmotion.cli.arguments.paths import add_input, add_output
 from lipmotion.cli.terminal.printing import print_line, print_lines
 from lipmotion.errors import InputError, shortened
 from lipmotion.pipeline.job import Outputs
+from lipmotion.types.values import number_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -124,11 +125,8 @@ def _stated(options: argparse.Namespace) -> dict[str, dict[str, float]]:
     for pose in CALIBRATION:
         for part in filter(None, getattr(options, pose).split(",")):
             name, _, text = part.rpartition("=")
-            try:
-                value = float(text)
-            except ValueError:
-                value = float("nan")
-            if not name.strip() or not abs(value) < float("inf"):
-                raise InputError(f"--{pose}: {shortened(part)!r} states no value, required NAME=X, as A=0.8")
+            value = number_of(text, f"--{pose}: the value in {shortened(part)!r} is", "NAME=X, as A=0.8")
+            if not name.strip():
+                raise InputError(f"--{pose}: {shortened(part)!r} names no control, required NAME=X, as A=0.8")
             stated.setdefault(pose, {})[name.strip()] = value
     return stated

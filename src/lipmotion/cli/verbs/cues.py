@@ -18,6 +18,7 @@ from lipmotion.errors import shortened
 from lipmotion.pipeline.job import Request
 from lipmotion.storage.sources import is_file
 from lipmotion.types.delivery import Delivery
+from lipmotion.types.values import whole_of
 
 RECOGNISERS = {"pocketsphinx": "auto", "phonetic": "fast"}
 """The recogniser that takes the place of each of Rhubarb's."""
@@ -74,9 +75,9 @@ def _recogniser(name: str) -> str:
 
 def _threads(text: str) -> int:
     """Return a number of threads. Raises ArgumentTypeError: it is none, or under 1."""
-    if not text.isdecimal() or not int(text):
+    if (count := whole_of(text)) < 1:
         raise argparse.ArgumentTypeError(f"{text!r}, required: 1 or more")
-    return int(text)
+    return count
 
 
 def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 
 from lipmotion.corpora.labels.phone_symbols import ipa_labels, with_pauses
 from lipmotion.corpora.labels.tier import (
+    EARLIEST_S,
     LINES,
     PHONE_LABELS,
     TICKS_PER_S,
@@ -33,17 +34,18 @@ from lipmotion.corpora.labels.tier import (
     unit_of_times,
 )
 from lipmotion.errors import InputError, shortened
+from lipmotion.types import values
+from lipmotion.types.values import number_of, require
 from lipmotion.units import SILENCE
 from lipmotion.units.spoken_text import check_word_count, spoken_text
 from lipmotion.units.text_normalisation import words_in
 
 LOG = logging.getLogger("lipmotion")
+_TEXT = values.text(1 << 20)
 Objects = list[tuple[str, dict[str, Any]]]
 """Objects of a file, each with its place, for messages."""
 LATEST_S = 1e6
 """Times beyond eleven days are an error, or in another unit."""
-EARLIEST_S = -1.0
-"""A time before this is none; recognisers write others a little before 0."""
 SINGLE_SHARE, LONGEST_JUDGED, DEEPEST = 0.9, 1000, 12
 """A list is one of words where so many of its texts are single ones; letters of a text that are judged; how deep lists
 are searched in lists."""
@@ -225,7 +227,10 @@ def _documents(text: str, where: str) -> Iterator[tuple[int, Any]]:
     Names of members are in lower case, without underscores and JavaScript's ``priv``; those of tiers stay.
     Raises DamagedJsonError: with the line.
     """
-    decoder = json.JSONDecoder(object_pairs_hook=lambda pairs: {_plain_name(name): value for name, value in pairs})
+    decoder = json.JSONDecoder(
+        object_pairs_hook=lambda pairs: {_plain_name(name): value for name, value in pairs},
+        parse_constant=lambda _: None,  # NaN: missing
+    )
     at, line, counted = _next(text, 0), 1, 0
     while at < len(text):
         line, counted = line + text.count("\n", counted, at), at
@@ -270,11 +275,9 @@ def _number(value: Any, where: str, per_s: int = 0) -> tuple[float, int]:
             value = None
     if value is None:
         return math.nan, per_s
-    try:
-        time = float(str(value) if isinstance(value, bool) else value)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"{where}: a time is {shortened(repr(value)[:200])}, required a number of seconds") from error
-    return (time if math.isfinite(time) else math.nan), per_s
+    if isinstance(value, str):
+        return number_of(value, f"{where}: a time is", "a number of seconds"), per_s
+    return require(values.number(), value, f"{where}: a time"), per_s
 
 
 def _row(item: dict[str, Any], place: str, where: str, name: str) -> Row | None:
@@ -335,8 +338,7 @@ def _rows(value: Any, place: str, where: str, name: str = "", depth: int = 0) ->
         if isinstance(item, dict):
             rows += _rows(item, f"{place}, {name or 'item'} {number}".strip(", "), where, name, depth + 1)
         elif name in ("segments", "words"):
-            found = shortened(repr(item)[:200])
-            raise InputError(f"{where}: {name!r}, item {number} is {found}, required an object with text and times")
+            require(values.members({}), item, f"{where}: {name!r}, item {number}")
         check_count(len(rows), where)
     return rows
 
@@ -374,7 +376,7 @@ def _phones_in(item: dict[str, Any], word: Row, where: str) -> list[Row]:
     for number, each in enumerate(item["phones"] if isinstance(item.get("phones"), list) else [], 1):
         place, fields = f"{word.place}, phone {number}", each if isinstance(each, dict) else {}
         end = start + _seconds(fields.get("duration"), f"{where}: {place}")
-        name = _required_text(fields.get("phone"), f"{where}: {place}").partition("_")[0]
+        name = require(_TEXT, fields.get("phone"), f"{where}: {place}").partition("_")[0]
         phones.append(replace(word, start=start, end=end, text=name, place=place, role=PHONE_LABELS))
         start = end
     return phones
@@ -452,12 +454,6 @@ def _seconds(value: Any, where: str, per_s: float = 1) -> float:
     return time / (own or per_s)
 
 
-def _required_text(value: Any, where: str) -> str:
-    if not isinstance(value, str):
-        raise InputError(f"{where} is {shortened(repr(value)[:200])}, required a text")
-    return value
-
-
 def _word_and_phone_tiers(words: Sequence[TimedLabel], phones: Sequence[TimedLabel], where: str) -> list[LabelTier]:
     check_count(max(len(words), len(phones)), where)
     tiers = (LabelTier(WORDS, tuple(words), WORDS), LabelTier(PHONE_LABELS, tuple(phones), PHONE_LABELS))
@@ -471,10 +467,7 @@ def _viseme(value: Any, where: str) -> str:
             known = " ".join(POLLY_VISEMES)
             raise InputError(f"{where}: no viseme of Polly is {shortened(value)!r}; known are: {known}")
         return POLLY_VISEMES[value]
-    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < len(AZURE_VISEMES):
-        found = shortened(repr(value)[:200])
-        raise InputError(f"{where}: the viseme is {found}, required 0 to {len(AZURE_VISEMES) - 1}")
-    return AZURE_VISEMES[value]
+    return AZURE_VISEMES[require(values.whole(0, len(AZURE_VISEMES) - 1), value, f"{where}: the viseme")]
 
 
 def _column_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
@@ -505,7 +498,7 @@ def _columns(owner: dict[str, Any], names: tuple[str, ...], per_s: int, where: s
     for number, (text, start, end) in enumerate(zip(*lists, strict=True), 1):
         start_s, end_s = (_seconds(time, f"{where} {number}", per_s) for time in (start, end))
         end_s += start_s if "duration" in names[2] else 0.0
-        labels.append(TimedLabel(start_s, end_s, _required_text(text, f"{where} {number}"), f"{names[0]} {number}"))
+        labels.append(TimedLabel(start_s, end_s, require(_TEXT, text, f"{where} {number}"), f"{names[0]} {number}"))
     return labels
 
 
@@ -529,15 +522,12 @@ def _duration_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
         return None
     rows: list[tuple[str, Any, Any, float]] = []
     for place, item in piper:
-        rate = item.get("samplerate")
-        if isinstance(rate, bool) or not isinstance(rate, int | float) or not 1000 <= rate <= 1_000_000:
-            found = shortened(repr(rate)[:200])
-            raise InputError(f"{where}: {place}: the sample rate is {found}, required that of the sound in hertz")
+        rate = require(values.number(1000, 1e6), item.get("samplerate"), f"{where}: {place}: the sample rate in hertz")
         for number, each in enumerate(item["phonemealignments"], 1):
             fields = each if isinstance(each, dict) else {}
             rows.append((f"{place}, phoneme {number}", fields.get("phoneme"), fields.get("numsamples"), rate))
     for item in kokoro:
-        letters = f"^{_required_text(item['phonemes'], f'{where}: phonemes')}$"
+        letters = f"^{require(_TEXT, item['phonemes'], f'{where}: phonemes')}$"
         if len(item["preddur"]) != len(letters):
             raise InputError(
                 f"{where}: {len(item['preddur'])} durations of {len(letters) - 2} phonemes, required two more than "
@@ -549,7 +539,7 @@ def _duration_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
     lengths_s = [_seconds(length, f"{where}: {place}", per_s) for place, _, length, per_s in rows]
     edges_s = [0.0, *accumulate(lengths_s)]
     phones = [
-        TimedLabel(start_s, end_s, _required_text(text, f"{where}: {place}"), place)
+        TimedLabel(start_s, end_s, require(_TEXT, text, f"{where}: {place}"), place)
         for (place, text, *_), start_s, end_s in zip(rows, edges_s, edges_s[1:], strict=False)
     ]
     words = [row for item in kokoro for row in _rows({"tokens": item.get("tokens")}, "", where)]
@@ -575,7 +565,7 @@ def _named_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
             if not isinstance(entry, list) or len(entry) not in (2, 3):
                 raise InputError(f"{where}: {place} is no list of start, end and label")
             *times_s, text = (*(_seconds(time, f"{where}: {place}") for time in entry[:-1]), entry[-1])
-            labels.append(TimedLabel(times_s[0], times_s[-1], _required_text(text, f"{where}: {place}"), place))
+            labels.append(TimedLabel(times_s[0], times_s[-1], require(_TEXT, text, f"{where}: {place}"), place))
         if len(tier["entries"][0] if tier["entries"] else ()) == 3:
             tiers.append(named_tier(name, sorted(labels, key=lambda label: label.start_s)))
     return tiers

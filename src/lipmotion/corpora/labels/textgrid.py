@@ -100,7 +100,7 @@ def _pass_range(tokens: Iterator[tuple[str, str]]) -> None:
 
 def _count(tokens: Iterator[tuple[str, str]]) -> int:
     value = _take(tokens, "number")
-    if not value.isdecimal() or len(value) > LONGEST_COUNT:
+    if not (value.isascii() and value.isdecimal()) or len(value) > LONGEST_COUNT:
         raise _DamagedError(f"there stands number {value[:40]}, required a count")
     return int(value)
 

@@ -10,9 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from statistics import median
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError
 from lipmotion.printable import is_line
 from lipmotion.types import Span, TimedTranscript, TimedWord, Timeline, TranscriptLine, Unit, in_order
+from lipmotion.types.values import number_of
 from lipmotion.units import (
     PHONES,
     RECOGNISED,
@@ -36,6 +37,8 @@ from lipmotion.units.spoken_text import (
 )
 
 LOG = logging.getLogger("lipmotion")
+EARLIEST_S = -1.0
+"""A time before this is none; recognisers write others a little before 0, where the sound begins."""
 WORDS, LINES, PHONE_LABELS, RECOGNISED_PHONES, OTHER = "words", "lines", "phones", "recognised", "other"
 """What a tier holds. ``OTHER`` is neither said nor seen: pronunciations, syllables, translations, notes."""
 ROLES = (
@@ -126,11 +129,8 @@ def clock_seconds(text: str, frames_per_s: float = 0) -> float:
 
 
 def required_time(text: str, place: str, where: str) -> float:
-    """Return a time from its text, also with a decimal comma. Raises InputError: it is not finite."""
-    time = float(text.replace(",", "."))
-    if not math.isfinite(time):
-        raise InputError(f"{where}: {place} has the time {shortened(text)}, required a finite one")
-    return time
+    """Return a time from its text, also with a decimal comma. Raises InputError: it is none, or not finite."""
+    return number_of(text.replace(",", "."), f"{where}: {place} has the time", "a finite one")
 
 
 def unit_of_times(spans: Sequence[tuple[float, float, str]], role: str, where: str, usual: int = 1) -> int:
@@ -258,11 +258,14 @@ def tier_transcript(tiers: Sequence[LabelTier], where: str) -> TimedTranscript:
 
 
 def _times(label: TimedLabel, where: str) -> tuple[float | None, float | None]:
-    """Return the times of a label, None where they are not known. Raises InputError: it ends before it starts."""
+    """Return the times of a label, None where they are not known: nothing is said before the sound begins.
+
+    Raises InputError: it ends before it starts.
+    """
     if label.end_s < label.start_s:
         raise _reversed(label, where)
-    start_s, end_s = (time_s if math.isfinite(time_s) else None for time_s in (label.start_s, label.end_s))
-    return start_s, end_s
+    start_s, end_s = (time_s if EARLIEST_S <= time_s < math.inf else None for time_s in (label.start_s, label.end_s))
+    return start_s and max(start_s, 0.0), end_s and max(end_s, 0.0)
 
 
 def _reversed(label: TimedLabel, where: str) -> InputError:

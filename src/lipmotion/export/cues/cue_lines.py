@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
@@ -10,6 +9,7 @@ from lipmotion.errors import InputError, shortened
 from lipmotion.export.cues.cue_shapes import PHONE_SHAPES
 from lipmotion.export.cues.sheet import CueSheet
 from lipmotion.types import Span, Timeline
+from lipmotion.types.values import number_of
 from lipmotion.units.mouth_chart import BLAIR, LETTERS, REST, SHAPES
 
 _FLEMING_DOBBS = "mbp:A nltdr:B fv:G th:B gk:B sh:F o:E ehsz:C aa:D iy:B rest:X"
@@ -42,12 +42,9 @@ def chart_of(names: Iterable[str]) -> dict[str, str]:
 
 def cue_time(text: str, place: str) -> float:
     """Return a time in seconds, or a number of frames. Raises InputError: it is none, with its place."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
+    value = number_of(text, f"{place}: the time is", "a number from 0 on")
     if not 0 <= value <= LONGEST_S * 1000:
-        raise InputError(f"{place}: the time is {shortened(text)!r}, required a number from 0 on")
+        raise InputError(f"{place}: the time is {value:g}, required a number from 0 to {LONGEST_S * 1000:g}")
     return value
 
 

@@ -142,7 +142,7 @@ def parse(text: str) -> CueSheet:
             found.append(((last + 1) / fps, "", ""))
     chart = chart_of(name for _, name, _ in found if name)
     rows = [(start_s, shape_of(name, chart, place) if name else REST) for start_s, name, place in found]
-    kept = [row for row, after in zip(rows, [*rows[1:], (math.inf, "")], strict=True) if row[0] < after[0]]
+    kept = [row for row, after in zip(rows, [*rows[1:], (math.inf, "")], strict=False) if row[0] < after[0]]
     return sheet_of(kept, frames / fps, float(fps), Timeline(tuple(words)))
 
 

@@ -8,7 +8,6 @@ Source: NVIDIA, "Audio2Face, Export" and "Blendshape conversion"; files of versi
 
 from __future__ import annotations
 
-import json
 import logging
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,13 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from lipmotion.errors import InputError, shortened
+from lipmotion.errors import InputError
 from lipmotion.export.base import MotionFormat
 from lipmotion.export.motion.json_stream import read_members
 from lipmotion.export.motion.keys import formatted_rows
 from lipmotion.meshes.model.shape_names import ARKIT_52
-from lipmotion.storage.json_text import as_json
+from lipmotion.storage.json_text import as_json, json_errors
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Timeline, Unit
+from lipmotion.types.values import items, members, number, text
 
 LOG = logging.getLogger("lipmotion")
 NAMES, WEIGHTS, RATE, SOUND, POSES, FRAMES = (
@@ -54,24 +54,20 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
 
     Raises InputError: not such a file, no rate, or rows that do not fit the names.
     """
-    try:
+    with json_errors("the file of Audio2Face"):
         document = read_members(path.read_text(encoding="utf-8-sig"), WEIGHTS)
-        names, rows, rate_hz = document[NAMES], document[WEIGHTS], float(document[RATE])
-    except KeyError as error:
-        raise InputError(f"not a file of Audio2Face: it has no {error}; export it again as JSON") from error
-    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise InputError(f"not JSON ({error}); export it again") from error
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"the file of Audio2Face is damaged ({error}); export it again") from error
+        found = _MEMBERS(document)
+        names, rows, rate_hz = found[NAMES], document[WEIGHTS], found[RATE]
     stated = document.get(FRAMES)
     if isinstance(stated, int) and stated != len(rows):
         LOG.warning("%s: %d frames are stated, %d are there", path, stated, len(rows))
     return Motion(_checked_rows(names, rows), rate_hz, tuple(Channel(name, WEIGHT) for name in names)), Timeline(())
 
 
-def _checked_rows(names: Any, rows: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
-    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise InputError(f"the member {NAMES!r} is {shortened(repr(names)[:200])}, required a list of names")
+_MEMBERS = members({NAMES: items(text(1000)), RATE: number()}, (NAMES, RATE))
+
+
+def _checked_rows(names: list[str], rows: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
     if not isinstance(rows, np.ndarray) or rows.ndim != 2 or rows.shape[1] != len(names):
         shape = rows.shape if isinstance(rows, np.ndarray) else "no"
         raise InputError(

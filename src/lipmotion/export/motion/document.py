@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.printable import is_line
+from lipmotion.storage.json_text import json_errors
 from lipmotion.types import Channel, Generation, Motion, Span, Timeline, Unit
+from lipmotion.types.values import items, members, number, text
 from lipmotion.units import RECOGNISED, RecognisedPhone, recognised_phones, with_confidences
 
 FORMAT = "lipmotion.motion"
@@ -49,33 +51,22 @@ def parse(document: Any, values: Any) -> tuple[Motion, Timeline[Unit]]:
     Raises InputError: not a motion document, a newer version, or members that are missing or do not fit.
     """
     _check(document)
-    try:
-        channels = tuple(Channel(str(channel["name"]), str(channel["unit"])) for channel in document["channels"])
-        motion = Motion(_array(values, len(channels)), float(document["rate_hz"]), channels)
-        return motion, parse_units(document["units"], document.get(RECOGNISED, ()))
-    except InputError:
-        raise
-    except KeyError as error:
-        raise InputError(f"the motion document has no {error}; export it again") from error
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"the motion document is damaged ({error}); export it again") from error
+    with json_errors("the motion document"):
+        found = _DOCUMENT(document)
+        channels = tuple(Channel(**channel) for channel in found["channels"])
+        motion = Motion(_array(values, len(channels)), found["rate_hz"], channels)
+    return motion, parse_units(document.get("units"), document.get(RECOGNISED))
 
 
-def parse_units(rows: Any, recognised: Any = ()) -> Timeline[Unit]:
+def parse_units(rows: Any, recognised: Any = None) -> Timeline[Unit]:
     """Return the units of the member ``units``: objects with ``start_s``, ``end_s`` and ``phone`` or ``unit``.
 
     recognised : the member ``recognised``, where there is one: units that are in it, too, are not known
     Raises InputError: rows of another kind, without a time or a name, or with times that no recording has.
     """
-    try:
-        units = Timeline(tuple(_span(row) for row in rows))
-        return with_confidences(units, [_recognised(*row) for row in recognised])
-    except InputError:
-        raise
-    except KeyError as error:
-        raise InputError(f"a unit has no {error}; export it again, or give start_s, end_s and phone") from error
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"the motion document is damaged ({error}); export it again") from error
+    with json_errors("the motion document"):
+        confidences = [_recognised(*row) for row in _ROWS(recognised or [])]
+        return with_confidences(Timeline(tuple(map(_span, _UNITS(rows)))), confidences)
 
 
 def _check(document: Any) -> None:
@@ -104,8 +95,7 @@ def _row(span: Span[Unit]) -> dict[str, Any]:
 
 
 def _span(row: Any) -> Span[Unit]:
-    start_s, end_s = float(row["start_s"]), float(row["end_s"])
-    span = Span(start_s, end_s, Unit(str(row["phone"]), str(row.get("unit", "")), str(row.get("word", ""))))
+    span = Span(row["start_s"], row["end_s"], Unit(row["phone"], row.get("unit", ""), row.get("word", "")))
     if not is_line(span.label.phone + span.label.unit + span.label.word):
         label = shortened(repr(span.label))
         raise InputError(f"{label} has a line end, a control character or half a character in it; correct it")
@@ -117,8 +107,20 @@ def _span(row: Any) -> Span[Unit]:
 
 
 def _recognised(start_s: Any, end_s: Any, name: Any, confidence: Any) -> RecognisedPhone:
-    """Return a row of the member ``recognised``. Raises ValueError, TypeError: it is none."""
-    phone = RecognisedPhone(float(start_s), float(end_s), str(name), float(confidence))
-    if not 0 <= phone.confidence <= 1:
-        raise ValueError(f"the confidence {phone.confidence}, required 0 to 1")
-    return phone
+    """Return a row of the member ``recognised``. Raises SchemaError: it is none."""
+    return RecognisedPhone(_TIME(start_s), _TIME(end_s), _TEXT(name), number(0, 1)(confidence))
+
+
+_TEXT, _TIME = text(10_000), number()
+_UNITS = items(
+    members(
+        {"start_s": _TIME, "end_s": _TIME, "phone": _TEXT, "unit": _TEXT, "word": _TEXT}, ("start_s", "end_s", "phone")
+    )
+)
+_ROWS = items(items(lambda value: value, 4, 4))
+_CHANNEL = {"name": _TEXT, "unit": _TEXT}
+_DOCUMENT = members(
+    {"channels": items(members(_CHANNEL, _CHANNEL)), "rate_hz": number(), "units": lambda value: value},
+    ("channels", "rate_hz", "units"),
+)
+"""What is used of a document, and its types."""

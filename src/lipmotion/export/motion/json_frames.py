@@ -18,6 +18,7 @@ import numpy as np
 from lipmotion.errors import InputError, shortened
 from lipmotion.meshes.files.curve_table import TIME_COLUMN, column_key, in_seconds, motion_at_times, tabulated
 from lipmotion.meshes.model.shape_names import ARKIT_52, is_known
+from lipmotion.storage.json_text import json_errors
 from lipmotion.types import Motion, Timeline, Unit
 
 LOG = logging.getLogger("lipmotion")
@@ -36,17 +37,11 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
 
     Raises InputError: not JSON, none of these forms, frames without a time, or pieces that contradict one another.
     """
-    try:
+    with json_errors("the file of frames of weights"):
         documents = list(_documents(path.read_text(encoding="utf-8-sig")))
         objects = [_keyed(each) for each in _objects(documents, DEEPEST)]
         pieces = [each for each in objects if "frameindex" in each and each.get("blendshapes")]
         return (_of_azure(pieces) if pieces else _of_frames(objects)), Timeline(())
-    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise InputError(f"not JSON ({error}); export it again") from error
-    except InputError:
-        raise
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"the frames of weights are damaged ({error}); export it again") from error
 
 
 def _documents(text: str) -> Iterator[Any]:

@@ -11,7 +11,7 @@ from lipmotion.export.base import MotionFormat
 from lipmotion.export.motion.document import FORMAT, header, parse, parse_units, units_and_origin
 from lipmotion.export.motion.json_stream import read_members
 from lipmotion.export.motion.keys import formatted_rows
-from lipmotion.storage.json_text import as_json
+from lipmotion.storage.json_text import as_json, json_errors
 from lipmotion.types import Generation, Motion, Timeline, Unit
 from lipmotion.units import RECOGNISED
 
@@ -32,17 +32,11 @@ def write(path: Path, generation: Generation, source: Mapping[str, str], model: 
 
 def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
     """Return motion and units of a file. Raises InputError: not JSON, or not a motion document."""
-    try:
+    with json_errors("the motion document"):
         text = path.read_text(encoding="utf-8-sig")
         if text.lstrip().startswith("["):
             raise InputError(f"not a motion document: its 'format' must be {FORMAT!r}")
         document = read_members(text, "values", "confidence")
-    except InputError:
-        raise
-    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise InputError(f"not JSON ({error}); export it again") from error
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"the motion document is damaged ({error}); export it again") from error
     return parse(document, document.get("values"))
 
 
@@ -58,7 +52,7 @@ def read_units(path: Path) -> Timeline[Unit] | None:
         return None
     if document is None or "units" not in document or "channels" in document:
         return None
-    return parse_units(document["units"], document.get(RECOGNISED, ()))
+    return parse_units(document["units"], document.get(RECOGNISED))
 
 
 MOTION_FORMAT = MotionFormat(write, read, units=read_units)

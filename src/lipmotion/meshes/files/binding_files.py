@@ -18,6 +18,7 @@ from lipmotion.storage.archive import UNREADABLE, read_archive, read_archive_hea
 from lipmotion.storage.files import check_source, read_text_file, whole_file
 from lipmotion.storage.schema import ArraySpec, checked_arrays, format_errors
 from lipmotion.storage.text_table import read_table
+from lipmotion.types.values import whole_of
 
 BINDING_FORMAT, BINDING_VERSION = "lipmotion.binding", 1
 BINDING_SUFFIX = ".binding"
@@ -145,10 +146,7 @@ def read_points(path: Path) -> dict[int, int]:
 
 
 def _whole(path: Path, line: int, text: str) -> int:
-    try:
-        return int(text)
-    except ValueError as error:
-        raise InputError(f"{path}: line {line}: {shortened(text)!r} is no whole number") from error
+    return whole_of(text, f"{path}: line {line}: the number of a point is")
 
 
 def _rows(path: Path, columns: tuple[str, ...], kind: str) -> Iterator[tuple[int, list[str]]]:

@@ -15,8 +15,8 @@ from lipmotion.errors import InputError, shortened
 from lipmotion.meshes.files.gltf_schema import ASSET, gltf_schema
 from lipmotion.meshes.model.file_limits import Budget
 from lipmotion.storage.files import whole_file
-from lipmotion.storage.json_schema import SchemaError
 from lipmotion.storage.json_text import as_json, from_json
+from lipmotion.types.values import SchemaError
 
 MAGIC, VERSION = b"glTF", 2
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from lipmotion.meshes.model.file_limits import ALLOWANCE
-from lipmotion.storage.json_schema import (
+from lipmotion.types.values import (
     Schema,
     SchemaError,
     any_members,

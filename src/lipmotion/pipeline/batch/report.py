@@ -16,7 +16,7 @@ from urllib.parse import quote
 from lipmotion.export.web_page import coloured
 from lipmotion.pipeline.batch.ledger import Ledger
 from lipmotion.pipeline.batch.lines import BatchLine
-from lipmotion.pipeline.batch.marks import APPROVE, Mark, as_field, is_due
+from lipmotion.pipeline.batch.marks import APPROVE, Mark, is_due
 from lipmotion.pipeline.batch.record import FAILED, Record
 from lipmotion.printable import printable
 from lipmotion.speech.recognition.recognised_speech import NOISY_DB

@@ -61,12 +61,14 @@ def generate_passages(
     made = [_generate_passage(generate, part, speech.times_given, pins, finish) for part in parts]
     dtype = np.dtype(np.float32) if frames > DOUBLE_FRAMES else rest.motion.values.dtype
     values = _join_rows(parts, [each.motion.values for each in made], rest.motion.values, np.empty((frames, 0), dtype))
+    values = np.require(values, None, "W")
     spread = _join_spread(parts, made, rest, np.empty((frames, 0), dtype))
     motion = replace(rest.motion, values=values)
     held = [(pinned_frame(pin, motion, is_weight=False), motion.column(pin.channel), pin.value) for pin in pins]
     bend_through_pins(values, held, REACH_FRAMES)  # those in silence; the others hold but for the way to rest
     clip_at_zero(motion)
-    if not isinstance(spread, ReducedVariance):
+    if held and not isinstance(spread, ReducedVariance):
+        spread = np.require(spread, None, "W")
         for frame, column, _ in held:
             spread[frame, column] = 0
     units, trace = _join_units(speech, parts, made, rest.units[0].label), _join_traces(parts, made, rest, frames)
@@ -119,9 +121,13 @@ def _join_rows(
     rows : of each passage [shape=(T', P)]
     rest : those of silence [shape=(REST_FRAMES, P)]
     like : as long as the result, of its type [shape=(T, 0)]
+    Without passages all rows are one in memory, which may not be changed: silence may last for hours.
     """
     still = rest.mean(axis=0)
-    whole = np.tile(still, (len(like), 1)).astype(like.dtype)
+    if not parts:
+        return np.broadcast_to(still.astype(like.dtype), (len(like), len(still)))
+    whole = np.empty((len(like), len(still)), like.dtype)
+    whole[:] = still
     ramp = (1 - np.cos(np.pi * np.arange(1, RAMP_FRAMES + 1) / (RAMP_FRAMES + 1))) / 2
     for part, inside in zip(parts, rows, strict=True):
         share = np.ones(part.frames)

@@ -86,7 +86,8 @@ class AnalysedAudio(Audio):
         """
         parts = [of_passage(passage.audio) for passage in self.passages]
         if not parts:
-            return np.zeros_like(of_passage(_PassageAudio(self.samples, self.rate_hz)))
+            some = of_passage(_PassageAudio(self.samples[: self.rate_hz], self.rate_hz))  # not of hours of silence
+            return np.zeros((self.frames, *some.shape[1:]), some.dtype)
         whole = np.empty((self.frames, *parts[0].shape[1:]), parts[0].dtype)
         for (first, own, _), part in zip(self.passages, parts, strict=True):
             whole[own] = part[-1] if silence is None else silence

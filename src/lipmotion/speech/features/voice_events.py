@@ -83,6 +83,8 @@ def voice_events(audio: Audio, units: Timeline[Unit]) -> tuple[VoiceEvent, ...]:
     Raises InputError: as ``speech.features.mfcc`` says.
     """
     audio = analysed(audio)
+    if not audio.passages:
+        return ()
     level_db, voiced, pitch = smoothed_level_db(audio), *_voice(audio)
     laughs = tuple(_laughs(audio, level_db, voiced, units))
     phrases = [phrase for phrase in _phrases(units) if not any(_overlap_s(phrase, laugh) > 0 for laugh in laughs)]
@@ -229,12 +231,13 @@ def _silences(units: Timeline[Unit]) -> list[tuple[float, float]]:
 
 def _noises(bands: NDArray[np.float32], voiced: Voiced) -> Iterator[tuple[int, int, float]]:
     """Yield first frame, the one after the last, and rise in decibels of noise that is as a breath's."""
-    powers, centres = np.exp(bands.astype(np.float64)), band_centres()
-    low, middle, high = (
-        powers[:, (centres >= least) & (centres < most)].mean(axis=1)
-        for least, most in ((0, 1000), (1000, 3500), (3500, 7600))
+    centres, starts = band_centres(), range(0, len(bands), BLOCK_FRAMES)
+    low, middle, high, bright = (
+        np.concatenate([np.exp(bands[n : n + BLOCK_FRAMES, inside].astype(np.float64)).mean(axis=1) for n in starts])
+        for least, most in ((0, 1000), (1000, 3500), (3500, 7600), (1000, np.inf))
+        for inside in [(centres >= least) & (centres < most)]
     )
-    level = _smoothed(DB * np.log(powers[:, centres >= 1000].mean(axis=1)))
+    level = _smoothed(DB * np.log(bright))
     quiet = _quiet(level)
     edges = np.flatnonzero(np.diff(np.r_[False, (level > quiet + BREATH_RISE_DB[0]) & ~voiced, False]))
     for first, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
@@ -256,7 +259,7 @@ def _quiet(level: Curve) -> Curve:
     windows = sliding_window_view(np.pad(level, reach, "edge"), 2 * reach + 1)
     rank = int(QUIET_SHARE * windows.shape[1])
     blocks = (windows[first : first + BLOCK_FRAMES] for first in range(0, len(windows), BLOCK_FRAMES))
-    return np.concatenate([np.partition(block, rank, axis=1)[:, rank] for block in blocks])
+    return np.concatenate([np.partition(block, rank, axis=1)[:, rank].copy() for block in blocks])
 
 
 def _bands(audio: AnalysedAudio, frames: slice) -> NDArray[np.float32]:

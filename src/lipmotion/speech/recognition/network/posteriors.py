@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property, partial
 from itertools import groupby
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,11 +102,11 @@ class FoundToken(NamedTuple):
 class PhonePosteriors:
     """Posteriors of tokens in a stretch of a recording.
 
-    values : natural logarithms, every ``POSTERIOR_STEP`` frames [shape=(N, K)]
+    values : natural logarithms, every ``POSTERIOR_STEP`` frames [shape=(N, K)]; of a whole recording in half precision
     tokens : K of them
     """
 
-    values: NDArray[np.float32]
+    values: NDArray[np.floating[Any]]
     tokens: tuple[str, ...]
 
     @property
@@ -124,7 +124,7 @@ class PhonePosteriors:
     @cached_property
     def of_phones(self) -> NDArray[np.float32]:
         """Logarithms of the posteriors of ``PHONES``, and last of none of them [shape=(N, 48)]."""
-        summed = np.exp(self.values) @ _phones_of(self.tokens)
+        summed = np.exp(self.values, dtype=np.float32) @ _phones_of(self.tokens)
         return np.log(np.maximum(summed, np.finfo(np.float32).tiny))
 
     @cached_property
@@ -215,7 +215,7 @@ def recording_posteriors(name: str, audio: AnalysedAudio, each: ParallelMap = ma
     def joined() -> PhonePosteriors:
         tokens = phone_recogniser(name).tokens
         rows = -(-len(audio.log_energy) // POSTERIOR_STEP)
-        values = np.full((rows, len(tokens)), LEAST_LOG_POSTERIOR, np.float32)
+        values = np.full((rows, len(tokens)), LEAST_LOG_POSTERIOR, np.float16)  # as stretches are computed
         values[:, tokens.index(BLANK)] = 0
         for stretch, posteriors in posterior_stretches(name, audio, each):
             first = stretch.first // POSTERIOR_STEP
@@ -233,7 +233,7 @@ def token_posteriors(name: str, audio: Audio, each: ParallelMap = map) -> TokenP
     name, each : as of ``posterior_stretches``, whose errors it raises
     """
     audio = analysed(audio)
-    values = recording_posteriors(name, audio, each).values.astype(np.float16)
+    values = recording_posteriors(name, audio, each).values
     mean = mean_posterior(posterior_stretches(name, audio, each))
     return TokenPosteriors(values, phone_recogniser(name).source, mean)
 

@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import pytest
 
-from lipmotion.storage.json_schema import (
+from lipmotion.errors import InputError
+from lipmotion.types.values import (
     SchemaError,
     any_members,
     if_fits,
     items,
     members,
     number,
+    number_of,
     one_of,
+    optional,
+    path,
     text,
     truth,
+    value_of,
     whole,
+    whole_of,
 )
 
 POINT = members({"at": items(number(-1, 1), 2, 2), "count": whole(0, 9), "kind": one_of(["a", 1])}, ["at"])
@@ -54,3 +60,35 @@ def test_what_does_not_fit_is_named_with_its_place() -> None:
         assert len(str(refused.value)) < 300
     with pytest.raises(SchemaError, match=r"^a\.b\[1\]\.at\[0\] is 5"):
         members({"a": any_members(items(POINT))})({"a": {"b": [{"at": [0, 0]}, {"at": [5, 0]}]}})
+
+
+def test_numbers_in_texts_are_of_plain_digits() -> None:
+    assert number_of(" -1.5e3 ") == pytest.approx(-1500)
+    assert whole_of("+12") == 12
+    for given in ("1_0", "٣", "nan", "1e999", "9" * 400, "0x1", "", "1,5"):
+        with pytest.raises(InputError, match="required a number"):
+            number_of(given)
+    for given in ("1_0", "٣", "9" * 5000, "1.0", ""):
+        with pytest.raises(InputError, match="required a whole number"):
+            whole_of(given)
+
+
+def test_texts_and_paths_that_no_file_holds() -> None:
+    assert path("a/\udce9.wav") == "a/\udce9.wav"  # a name that is no UTF-8
+    for wrong in ("a\0b", "\ud800", "x" * 5000, "a/" + "é" * 200, 7, None):
+        with pytest.raises(SchemaError):
+            path(wrong)
+    for wrong in ("\ud800", "x" * 5000, 10**400, float("nan")):
+        with pytest.raises(SchemaError):
+            text(1000)(wrong)
+    for wrong in (10**400, float("inf"), "1", True, None):
+        with pytest.raises(SchemaError):
+            number()(wrong)
+
+
+def test_a_value_is_made_of_its_fields_alone() -> None:
+    pair = value_of(complex, {"real": number(), "imag": optional(number())}, ["real"])
+    assert pair({"real": 1, "imag": 2}) == complex(1, 2)
+    for wrong in ({}, {"real": 1, "other": 2}, [1, 2]):
+        with pytest.raises(SchemaError):
+            pair(wrong)

@@ -1,0 +1,249 @@
+"""Values from outside: the one check of numbers, texts and documents, whichever file, option or request brings them.
+
+A schema is a function that returns a value as the code may use it, or raises ``SchemaError``. Tables of schemas say
+what is used of a document of JSON or TOML: its types and ranges.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Callable, Collection, Mapping
+from typing import Any
+
+from lipmotion.errors import InputError, shortened
+
+Schema = Callable[[Any], Any]
+NAME_BYTES, PATH_BYTES = 255, 4096
+"""Most bytes of a name in a path, and of a path, that file systems take."""
+_LEFT_OUT = object()
+_HALVES = re.compile("[\ud800-\udc7f\udd00-\udfff]")
+"""Halves of characters; \\udc80 to \\udcff are bytes of names of files that are not UTF-8."""
+_NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|(?i:nan|[-+]?inf)")
+_WHOLE = re.compile("[-+]?[0-9]{1,18}")
+
+
+class SchemaError(InputError):
+    """A value has another type or range; says where it stands, and what is required there."""
+
+    def __init__(self, found: str, required: str, place: str = "") -> None:
+        super().__init__(f"{shortened(place.removeprefix('.')) or 'the document'} is {found}, required {required}")
+        self.found, self.required, self.place = found, required, place
+
+    def within(self, step: str) -> SchemaError:
+        """Return the error with one step more before its place: ``.name`` of a member, ``[3]`` of an item."""
+        return SchemaError(self.found, self.required, step + self.place)
+
+
+def require(schema: Schema, value: Any, what: str) -> Any:
+    """Return a value as its schema does; ``what`` says what it is. Raises InputError: it does not fit."""
+    try:
+        return schema(value)
+    except SchemaError as error:
+        raise InputError(f"{what}{error.place} is {error.found}, required {error.required}") from error
+
+
+def number_of(
+    text: str, what: str = "the number is", required: str = "a number, as 1.24", *, finite: bool = True
+) -> float:
+    """Return the number that a text states in the digits 0 to 9, with a point.
+
+    finite : whether ``nan`` and ``inf`` are refused here; else the range that is required says it
+    Raises InputError: another text, as ``1_0`` or digits of other scripts.
+
+    >>> number_of(" -1.5e3")
+    -1500.0
+    """
+    found = float(text) if _NUMBER.fullmatch(text.strip()) else None
+    if found is None or (finite and not math.isfinite(found)):
+        raise InputError(f"{what} {described(text)}, required {required}")
+    return found
+
+
+def whole_of(text: str, what: str = "the number is", required: str = "a whole number") -> int:
+    """Return the whole number that a text states in the digits 0 to 9, 18 at most. Raises InputError: another text."""
+    if not _WHOLE.fullmatch(text.strip()):
+        raise InputError(f"{what} {described(text)}, required {required}")
+    return int(text)
+
+
+def is_path(text: str) -> bool:
+    """Return whether a text can be the path of a file: without NUL and halves, it and its names not too long."""
+    names = [] if "\0" in text or _HALVES.search(text) else re.split(r"[/\\]", text)
+    sizes = [len(name if os.name == "nt" else os.fsencode(name)) for name in names]
+    return bool(sizes) and max(sizes) <= NAME_BYTES and sum(sizes) + len(sizes) <= PATH_BYTES
+
+
+def whole(least: int, most: int) -> Schema:
+    """Return the schema of a whole number in a range, limits included."""
+    required = f"a whole number from {least} to {most}"
+
+    def checked(value: Any) -> int:
+        if type(value) is not int or not least <= value <= most:
+            raise SchemaError(described(value), required)
+        return value
+
+    return checked
+
+
+def number(least: float = -math.inf, most: float = math.inf) -> Schema:
+    """Return the schema of a finite number in a range, limits included; whole numbers become fractions."""
+    required = f"a number from {least:g} to {most:g}" if least > -math.inf else "a finite number"
+
+    def checked(value: Any) -> float:
+        try:
+            found = float(value) if type(value) in (int, float) else math.nan
+        except OverflowError:
+            found = math.inf
+        if not (math.isfinite(found) and least <= value <= most):
+            raise SchemaError(described(value), required)
+        return found
+
+    return checked
+
+
+def truth(value: Any) -> bool:
+    """Return a truth value. Raises SchemaError: another one."""
+    if type(value) is not bool:
+        raise SchemaError(described(value), "true or false")
+    return value
+
+
+def text(most: int) -> Schema:
+    """Return the schema of a text of at most so many letters, none of them half a character."""
+
+    def checked(value: Any) -> str:
+        if type(value) is not str or len(value) > most or _HALVES.search(value):
+            raise SchemaError(described(value), f"a text of at most {most} letters")
+        return value
+
+    return checked
+
+
+def path(value: Any) -> str:
+    """Return the text of a path; an empty one is none. Raises SchemaError: no file can have it."""
+    if type(value) is not str or not is_path(value):
+        raise SchemaError(described(value), f"a path, of names of at most {NAME_BYTES} bytes")
+    return value
+
+
+def optional(schema: Schema) -> Schema:
+    """Return the schema of a value that may be None."""
+    return lambda value: None if value is None else schema(value)
+
+
+def one_of(values: Collection[int | str]) -> Schema:
+    """Return the schema of a choice among numbers or texts."""
+    known = {(type(value), value) for value in values}
+
+    def checked(value: Any) -> int | str:
+        if type(value) not in (int, str) or (type(value), value) not in known:
+            raise SchemaError(described(value), f"one of {', '.join(map(str, values))}")
+        return value
+
+    return checked
+
+
+def items(schema: Schema, least: int = 0, most: int | None = None) -> Schema:
+    """Return the schema of a list, all of whose items have one schema, of ``least`` to ``most`` items (None: any)."""
+    required = f"a list of {least} items" if least == most else f"a list of {least} to {most} items"
+
+    def checked(value: Any) -> list[Any]:
+        if type(value) is not list:
+            raise SchemaError(described(value), "a list")
+        if len(value) < least or (most is not None and len(value) > most):
+            raise SchemaError(f"a list of {len(value)}", required if most is not None else f"at least {least} items")
+        kept = []
+        for place, item in enumerate(value):
+            try:
+                one = schema(item)
+            except SchemaError as error:
+                raise error.within(f"[{place}]") from None
+            if one is not _LEFT_OUT:
+                kept.append(one)
+        return kept
+
+    return checked
+
+
+def members(table: Mapping[str, Schema], needed: Collection[str] = (), *, alone: bool = False) -> Schema:
+    """Return the schema of an object: a table of its members, and which of them must be there.
+
+    alone : whether others are refused; else they are dropped
+    """
+
+    def checked(value: Any) -> dict[str, Any]:
+        if type(value) is not dict:
+            raise SchemaError(described(value), "an object")
+        for name in needed:
+            if name not in value:
+                raise SchemaError("missing", "a value", f".{name}")
+        if alone and (others := value.keys() - table.keys()):
+            raise SchemaError("a member that is not known", ", ".join(table), f".{shortened(min(others))}")
+        names = value.keys() & table.keys() if len(value) > len(table) else [name for name in value if name in table]
+        return _checked({name: value[name] for name in names}, table.__getitem__)
+
+    return checked
+
+
+def value_of(kind: Callable[..., Any], table: Mapping[str, Schema], needed: Collection[str] = ()) -> Schema:
+    """Return the schema of an object of which a class makes its value: the members are its fields, and no others."""
+    schema = members(table, needed, alone=True)
+    return lambda value: kind(**schema(value))
+
+
+def stated(read: Callable[[str], Any], schema: Schema) -> Schema:
+    """Return the schema of a number that may also be stated as a text, of which a function returns it."""
+    return lambda value: schema(read(value) if isinstance(value, str) else value)
+
+
+def tupled(schema: Schema) -> Schema:
+    """Return the schema of a list that becomes a tuple."""
+    return lambda value: tuple(schema(value))
+
+
+def any_members(schema: Schema) -> Schema:
+    """Return the schema of an object with members of any names, all of one schema."""
+
+    def checked(value: Any) -> dict[str, Any]:
+        if type(value) is not dict:
+            raise SchemaError(described(value), "an object")
+        return _checked(value, lambda _: schema)
+
+    return checked
+
+
+def if_fits(schema: Schema) -> Schema:
+    """Return the schema of an item or a member that is left out where it does not fit, as others read it as well."""
+
+    def checked(value: Any) -> Any:
+        try:
+            return schema(value)
+        except SchemaError:
+            return _LEFT_OUT
+
+    return checked
+
+
+def _checked(content: Mapping[str, Any], schema_of: Callable[[str], Schema]) -> dict[str, Any]:
+    kept = {}
+    for name, member in content.items():
+        try:
+            one = schema_of(name)(member)
+        except SchemaError as error:
+            raise error.within(f".{shortened(name)}") from None
+        if one is not _LEFT_OUT:
+            kept[name] = one
+    return kept
+
+
+def described(value: Any) -> str:
+    """Return a value in a few words, for a message: whatever it is, however deep or long."""
+    if isinstance(value, Mapping | list | tuple):
+        return "an object" if isinstance(value, Mapping) else "a list"
+    if value is None or type(value) is bool:
+        return {None: "null", True: "true", False: "false"}[value]
+    if type(value) is int and value.bit_length() > 10_000:  # which Python does not spell
+        return "a whole number of thousands of digits"
+    return shortened(repr(value[:100] if type(value) is str else value))
