@@ -35,9 +35,6 @@ from lipmotion.articulation.symmetry import symmetrical
 from lipmotion.errors import AlignmentError, InputError, shortened
 from lipmotion.kernels.choice import expect_more
 from lipmotion.kernels.threads import one_thread
-from lipmotion.meshes.fitting.facial_animation import PARAMETERS
-from lipmotion.meshes.fitting.oculus_visemes import VISEME_CHANNELS
-from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS
 from lipmotion.motion.speaker_maps import SpeakerMap
 from lipmotion.pipeline.edits import (
     CurveStep,
@@ -55,12 +52,10 @@ from lipmotion.pipeline.edits import (
     with_span,
 )
 from lipmotion.pipeline.excerpts import Excerpt, excerpt_of_change, speech_within, with_excerpt
-from lipmotion.pipeline.generate.generation_for import generate_for
+from lipmotion.pipeline.generate.generation_for import generate_for, person_of
 from lipmotion.pipeline.generate.outlook import outlook_of
 from lipmotion.pipeline.generate.prior import with_prior
-from lipmotion.pipeline.generate.transfer import person_of
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.outputs.delivered import delivered, with_motion
 from lipmotion.pipeline.understand.language import in_language
 from lipmotion.pipeline.understand.request import SpeechInput, SpeechRequest, request_of
 from lipmotion.pipeline.understand.understood_speech import (
@@ -102,9 +97,6 @@ UNDERSTANDING = 0.9
 """The share of the work that is recognition, in reports; the rest is the generation of motion."""
 MODELLED = ("opening", "width", "outer")
 """Channels, beside weights, that models generate as they are, so that motion runs smoothly through their pins."""
-WEIGHTS = (*ARKIT_MOUTH, *ARKIT_OTHERS, *VISEME_CHANNELS)
-KNOWN_CURVES = (*WEIGHTS, *(row[1] for row in PARAMETERS))
-"""Curves that outputs may have, whatever the motion has: ARKit's blendshapes, visemes, MPEG-4's parameters."""
 LIP_POINT = re.compile(r"[xyz]_\d+")
 LATE_S = 0.1
 """Seconds by which times of edits may lie after the end; editing programs round times."""
@@ -241,6 +233,8 @@ class Session:
 
     def delivered(self, edits: Edits = NO_EDITS) -> Generation:
         """Return the motion as files hold it: with its intensity, anticipation and offset (docs/controls.md)."""
+        from lipmotion.pipeline.outputs.delivered import delivered  # curves, which ``animate`` needs not
+
         with self._one_at_a_time, one_thread():
             key = (edits.steps, self.is_sketching)
             return self._delivered.once(key, lambda: delivered(self.generated(edits), edits.delivery()))
@@ -358,7 +352,7 @@ class Session:
         def stretch() -> MotionStretch:
             generation = self._after(before)
             motion = with_gestures(generation.motion, generation.units, names)
-            return locked_stretch(with_motion(generation, motion), lock.start_s, lock.end_s)
+            return locked_stretch(generation.with_motion(motion), lock.start_s, lock.end_s)
 
         return self._locks.once((before, lock, names, self.is_sketching), stretch)
 
@@ -380,7 +374,7 @@ class Session:
             curves = [*modelled, *curves]  # a gain or a held pose has moved their values
         asked = [edit.channel for edit in curves if edit.channel in GESTURES]
         if asked:
-            generation = with_motion(generation, with_gestures(generation.motion, generation.units, asked))
+            generation = generation.with_motion(with_gestures(generation.motion, generation.units, asked))
         motion = with_edited_curves(generation.motion, generation.units, curves)
         others = tuple(edit for edit in curves if edit.channel not in motion.names)
         for edit in edits:
@@ -389,6 +383,8 @@ class Session:
 
     def _check_edit(self, edit: CurveEdit | Hold, motion: Motion) -> None:
         """Raise InputError if an edit is of no curve that is known, or of no time of the recording."""
+        from lipmotion.pipeline.outputs.curve_sets import KNOWN_CURVES, WEIGHTS  # they load characters
+
         known = (*motion.names, *GESTURES, *KNOWN_CURVES, *self._curves)
         if edit.channel and edit.channel not in known:
             what, lower = (

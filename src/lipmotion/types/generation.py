@@ -427,6 +427,12 @@ class Generation:
             return replace(self, motion=motion, spread=replace(self.spread, mixing=self.spread.mixing[:, columns]))
         return replace(self, motion=motion, spread=self.spread[:, columns])
 
+    def with_motion(self, motion: Motion) -> Generation:
+        """Return the generation with other motion; channels after its own have the variance 0."""
+        added = len(motion.channels) - len(self.motion.channels)
+        spread = np.pad(self.variance, ((0, 0), (0, added))) if added else self.spread
+        return replace(self, motion=motion, spread=spread)
+
     def resampled(self, rate_hz: float) -> Generation:
         """Return the generation at another frame rate: interpolated values, and the state of the nearest frame.
 

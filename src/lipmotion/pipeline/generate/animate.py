@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from lipmotion.errors import InputError
-from lipmotion.pipeline.edit_files import EditFile, edit_file
 from lipmotion.pipeline.edits import Edits
 from lipmotion.pipeline.model import Model, load_model
+from lipmotion.pipeline.session import Session
 from lipmotion.pipeline.understand.request import SpeechInput, request_of
 from lipmotion.types import Constraints, Generation, Monitor, TimedTranscript, silent_monitor
+
+if TYPE_CHECKING:
+    from lipmotion.pipeline.edit_files import EditFile
 
 
 def animate(  # noqa: PLR0913
@@ -54,8 +58,14 @@ def animate(  # noqa: PLR0913
     if not isinstance(constraints, Constraints | None):
         raise InputError(f"the constraints are a {type(constraints).__name__}, required Constraints((Pin(...),))")
     request = request_of(speech, transcript, language)
-    file = edit_file(edits)
     model = model if isinstance(model, Model) else load_model(model)
-    session = file.session(request, model=model, workers=workers, monitor=monitor, meanwhile=meanwhile)
+    if edits is None or isinstance(edits, Edits):
+        session = Session(request, model=model, workers=workers, monitor=monitor, meanwhile=meanwhile)
+    else:
+        from lipmotion.pipeline.edit_files import edit_file
+
+        file = edit_file(edits)
+        session = file.session(request, model=model, workers=workers, monitor=monitor, meanwhile=meanwhile)
+        edits = file.edits
     pins = Edits.of_pins(constraints.pins if constraints else ())
-    return session.generated(file.edits.then(*pins.steps))
+    return session.generated((edits or Edits()).then(*pins.steps))

@@ -17,6 +17,8 @@ from lipmotion.motion.closure import clip_at_zero, is_never_negative
 from lipmotion.motion.generation import BLOCK_FRAMES
 from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps, restfulness, viseme_weights
 from lipmotion.pipeline.generate.passages import generate_passages
+from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.types import (
     FRAME_RATE_HZ,
     ChannelValue,
@@ -49,6 +51,26 @@ def speaker_map(maps: SpeakerMaps | None, speaker: str) -> SpeakerMap | None:
             "several people"
         )
     return maps.of(speaker)
+
+
+def person_of(model: Model, request: SpeechRequest) -> SpeakerMap | None:
+    """Return the map of the motion that a model generates to that of the person of a request; None: it is not mapped.
+
+    Raises as ``speaker_map`` and ``map_onto``.
+    """
+    person = speaker_map(model.speakers, request.speaker)
+    if request.onto is None:
+        if request.onto_speaker:
+            raise InputError(
+                f"onto the speaker {request.onto_speaker!r}, but of what? give a corpus or a model (--onto), or leave "
+                "the name out"
+            )
+        return person
+    from lipmotion.motion.transfer_map import composed
+    from lipmotion.pipeline.generate.transfer import map_onto  # it tracks faces
+
+    onto = map_onto(model, request.onto, speaker=request.speaker, onto_speaker=request.onto_speaker, speech=request)
+    return composed(person, onto)
 
 
 def generate_for(

@@ -17,7 +17,7 @@ from lipmotion.faces.filmed.face import SUFFIX, FilmedFace, load_face
 from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.resample import model_motion
 from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps
-from lipmotion.motion.transfer_map import composed, measured_speech_s, transfer_map, with_channels
+from lipmotion.motion.transfer_map import measured_speech_s, transfer_map, with_channels
 from lipmotion.pipeline.generate.generation_for import generate_for, speaker_map
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.understand.request import Onto, SpeechRequest
@@ -108,23 +108,6 @@ def with_person(model: Model, name: str, person: SpeakerMap) -> Model:
     names = (*known, name)
     speakers = SpeakerMaps(person.channels, names, **rows, lips=lips)
     return replace(model, speakers=speakers, about={**model.about, "speakers": list(names)})
-
-
-def person_of(model: Model, request: SpeechRequest) -> SpeakerMap | None:
-    """Return the map of the motion that a model generates to that of the person of a request; None: it is not mapped.
-
-    Raises as ``speaker_map`` and ``map_onto``.
-    """
-    person = speaker_map(model.speakers, request.speaker)
-    if request.onto is None:
-        if request.onto_speaker:
-            raise InputError(
-                f"onto the speaker {request.onto_speaker!r}, but of what? give a corpus or a model (--onto), or leave "
-                "the name out"
-            )
-        return person
-    onto = map_onto(model, request.onto, speaker=request.speaker, onto_speaker=request.onto_speaker, speech=request)
-    return composed(person, onto)
 
 
 def measured_pair(

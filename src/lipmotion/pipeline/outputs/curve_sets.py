@@ -17,13 +17,13 @@ from lipmotion.faces.base import Staging
 from lipmotion.meshes.files.rig_tables import RigRow, read_rig_table, rig_motion
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
-from lipmotion.meshes.fitting.facial_animation import expression_weights, fap_motion
-from lipmotion.meshes.fitting.oculus_visemes import viseme_motion
+from lipmotion.meshes.fitting.facial_animation import PARAMETERS, expression_weights, fap_motion
+from lipmotion.meshes.fitting.oculus_visemes import VISEME_CHANNELS, viseme_motion
 from lipmotion.meshes.fitting.reference_mouth import arkit_mouth, vowel_mouth
 from lipmotion.meshes.fitting.shape_weights import shape_weights
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.meshes.model.other_shapes import CLOSED
-from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, arkit_name
+from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS, arkit_name
 from lipmotion.pipeline.outputs.living_curves import living_curves
 from lipmotion.storage.files import whole_file
 from lipmotion.types import WEIGHT, Channel, CurveEdit, Generation, Motion, Prosody, Timeline, Unit
@@ -31,6 +31,9 @@ from lipmotion.types import WEIGHT, Channel, CurveEdit, Generation, Motion, Pros
 ARKIT, WHOLE_FACE, VOWELS = "arkit", "face", "vowels"
 LIVING_SETS = (WHOLE_FACE, VOWELS)
 """Sets of curves with eyes, brows and head, which move on their own."""
+WEIGHTS = (*ARKIT_MOUTH, *ARKIT_OTHERS, *VISEME_CHANNELS)
+KNOWN_CURVES = (*WEIGHTS, *(row[1] for row in PARAMETERS))
+"""Curves that outputs may have, whatever the motion has: ARKit's blendshapes, visemes, MPEG-4's parameters."""
 SHAPE_SETS = (ARKIT, WHOLE_FACE, "visemes", VOWELS, "fap")
 """Sets of curves that need no mesh: ARKit's blendshapes of the mouth, the same with eyes, brows and head (which move on
 their own), the 15 visemes of Oculus and OpenXR, the five vowels of VRM with pressed lips, moods, eyes, brows and head,

@@ -24,7 +24,7 @@ from lipmotion.meshes.fitting.blendshape_motion import is_of_blendshapes, with_m
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, arkit_name
 from lipmotion.pipeline.outputs.curve_sets import with_curves
-from lipmotion.types import Gain, Generation, Motion, VoiceEvent
+from lipmotion.types import Gain, Generation, VoiceEvent
 from lipmotion.types.moods import NEUTRAL, PLAIN, MoodKey, in_time
 from lipmotion.types.motion import RADIAN
 from lipmotion.types.voice_event import LAUGHTER, SHOUT, WHISPER
@@ -80,7 +80,7 @@ def delivered(generation: Generation, delivery: Delivery) -> Generation:
     larger = _larger(with_manners(generation, keys), delivery.intensity)
     if not all(key.is_manner for key in keys):
         moods = with_moods(larger.motion, keys)
-        larger = with_motion(larger.selected(tuple(n for n in larger.motion.names if not is_mood(n))), moods)
+        larger = larger.selected(tuple(n for n in larger.motion.names if not is_mood(n))).with_motion(moods)
     return moved_in_time(larger, delivery)
 
 
@@ -100,7 +100,7 @@ def shown(
     frames = delivery.hold_frames(fps)
     if not frames:
         return moved
-    moved = with_motion(moved, with_gestures(moved.motion, moved.units))
+    moved = moved.with_motion(with_gestures(moved.motion, moved.units))
     closed_s, moved = closed_times(moved), closed_on_grid(moved, fps)
     if character is not None and character.shapes is not None:
         moved = with_curves(moved, character)[0]
@@ -111,7 +111,7 @@ def with_drawn_channels(generation: Generation) -> Generation:
     """Return a generation with the channels that faces draw: those of a mouth, where it has blendshapes."""
     if not is_of_blendshapes(generation.motion):
         return generation
-    return with_motion(generation, with_mouth(generation.motion))
+    return generation.with_motion(with_mouth(generation.motion))
 
 
 def held_mouth(generation: Generation, frames: int, closed_s: Sequence[float]) -> Generation:
@@ -134,13 +134,6 @@ def held_mouth(generation: Generation, frames: int, closed_s: Sequence[float]) -
     values, variance = motion.values.astype(np.float64), np.array(generation.variance)
     values[:, columns], variance[:, columns] = mouth.motion.values, mouth.variance
     return replace(mouth, motion=replace(motion, values=values), spread=variance)
-
-
-def with_motion(generation: Generation, motion: Motion) -> Generation:
-    """Return a generation with more channels after its own, of variance 0."""
-    added = len(motion.channels) - len(generation.motion.channels)
-    variance = np.pad(generation.variance, ((0, 0), (0, added))) if added else generation.spread
-    return replace(generation, motion=motion, spread=variance)
 
 
 def _larger(generation: Generation, intensity: float) -> Generation:

@@ -26,7 +26,7 @@ from lipmotion.meshes.fitting.facial_animation import FAP
 from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.shape_names import arkit_name
 from lipmotion.pipeline.outputs.curve_sets import ARKIT, LIVING_SETS, WHOLE_FACE, beside, curves_of, with_curves
-from lipmotion.pipeline.outputs.delivered import delivered, held_mouth, with_motion
+from lipmotion.pipeline.outputs.delivered import delivered, held_mouth
 from lipmotion.pipeline.outputs.living_curves import living_curves
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
 from lipmotion.pipeline.outputs.prosody import recorded_prosody
@@ -141,7 +141,7 @@ def with_articulation(generation: Generation, channels: Sequence[str] = GESTURES
 
     channels : the articulatory ones among these are added (docs/articulation.md); their variance is 0
     """
-    return with_motion(generation, with_gestures(generation.motion, generation.units, channels))
+    return generation.with_motion(with_gestures(generation.motion, generation.units, channels))
 
 
 def _text(value: object) -> str:

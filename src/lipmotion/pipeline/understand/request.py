@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
 
 from lipmotion.articulation.pauses import REST
-from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError, shortened
-from lipmotion.faces.filmed.face import FilmedFace
-from lipmotion.motion.speaker_maps import SpeakerMap
 from lipmotion.pipeline.job import DETECTED, Request
-from lipmotion.pipeline.model import Model
 from lipmotion.types import Audio, TimedTranscript, Timeline, Unit
 from lipmotion.types.configuration import check_value
 from lipmotion.types.languages import ENGLISH
 from lipmotion.units import Lexicon
 
-Onto = str | Path | Corpus | Model | FilmedFace | SpeakerMap
+if TYPE_CHECKING:
+    from lipmotion.corpora.store import Corpus
+    from lipmotion.faces.filmed.face import FilmedFace
+    from lipmotion.motion.speaker_maps import SpeakerMap
+    from lipmotion.pipeline.model import Model
+
+Onto: TypeAlias = "str | Path | Corpus | Model | FilmedFace | SpeakerMap"
 """Another person: a video, the folder of a corpus, a model file or a face file, or the value of one of them, or a
 finished map."""
 
