@@ -8,6 +8,7 @@ from lipmotion.corpora.labels.label_files import (
     labels_beside,
     read_labels,
     read_phones,
+    read_plain_text,
     read_transcript,
     speakers_in,
 )
@@ -20,6 +21,7 @@ __all__ = [
     "labels_beside",
     "read_labels",
     "read_phones",
+    "read_plain_text",
     "read_transcript",
     "speakers_in",
 ]

@@ -337,6 +337,16 @@ def _words_of(phones: LabelTier, tiers: list[LabelTier]) -> tuple[TimedLabel, ..
     return words if all(len(label.text.split()) < 2 for label in words) else ()
 
 
+def read_plain_text(path: Path) -> str:
+    """Return the text of a file of words alone.
+
+    Raises InputError: no such file, larger than ``LARGEST_TRANSCRIPT_BYTES``, not UTF-8 text, or labels in time.
+    """
+    text = read_text_file(path, "transcript", LARGEST_TRANSCRIPT_BYTES)
+    check_plain_text(text, str(path))
+    return text
+
+
 def check_plain_text(text: str, where: str) -> None:
     """Raise InputError unless a text is words alone: times and marks of labels and subtitles would be read as words.
 

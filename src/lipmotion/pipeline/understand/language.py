@@ -6,7 +6,6 @@ import logging
 from dataclasses import replace
 from pathlib import Path
 
-from lipmotion.corpora.labels import read_transcript
 from lipmotion.errors import InputError
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.spoken_language import english_spoken
@@ -31,8 +30,11 @@ def in_language(request: SpeechRequest) -> SpeechRequest:
     if request.language == ENGLISH:
         return request
     given = request.transcript
-    text = read_transcript(given) if isinstance(given, Path) else given
-    transcript = _plain_transcript(text) if isinstance(text, str) else text
+    if isinstance(given, Path):
+        from lipmotion.corpora.labels import read_transcript  # forty formats
+
+        given = read_transcript(given)
+    transcript = _plain_transcript(given) if isinstance(given, str) else given
     language = request.language if request.language != AUTO else _told(request, transcript)
     if language in (ENGLISH, AUTO):
         return replace(request, language=language)

@@ -5,12 +5,11 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from lipmotion.corpora.labels import labels_beside, speakers_in
+from lipmotion.corpora.labels import labels_beside, read_transcript, speakers_in
 from lipmotion.errors import InputError
 from lipmotion.pipeline.job import Request
 from lipmotion.pipeline.understand.given_units import read_units
 from lipmotion.pipeline.understand.request import SpeechRequest
-from lipmotion.pipeline.understand.transcribe import read_transcript
 from lipmotion.storage.sources import check_kind
 from lipmotion.types import TimedTranscript
 from lipmotion.units import Lexicon

@@ -7,13 +7,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from difflib import SequenceMatcher
 from itertools import groupby, pairwise
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.corpora.labels import check_plain_text, read_transcript
 from lipmotion.errors import AlignmentError, shortened
 from lipmotion.hmm.loudness import frames_above
 from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
@@ -35,18 +33,14 @@ from lipmotion.speech.recognition.transcript_evidence import (
     transcript_evidence,
 )
 from lipmotion.speech.voices.pronunciations import LanguageLexicon
-from lipmotion.storage.files import read_text_file
 from lipmotion.types import FRAME_RATE_HZ, Audio, Features, Span, TimedTranscript, Timeline, Unit
 from lipmotion.units import Lexicon, Pronunciation, check_words, is_silent
-from lipmotion.units.length_limits import LARGEST_TRANSCRIPT_BYTES
 from lipmotion.units.phones import phone_edits
 
 __all__ = [
     "Transcription",
     "guesses",
     "phones_in_time",
-    "read_plain_text",
-    "read_transcript",
     "transcribe",
     "warn_of_guesses",
 ]
@@ -285,16 +279,6 @@ def phones_in_time(
         anchors, words = anchors_of(words) if words.has_times else None, words.words
     check_words(words, audio.duration_s)
     return phones.align(audio, features, words, lexicon, anchors)
-
-
-def read_plain_text(path: Path) -> str:
-    """Return the text of a file of words alone.
-
-    Raises InputError: no such file, larger than ``LARGEST_TRANSCRIPT_BYTES``, not UTF-8 text, or labels in time.
-    """
-    text = read_text_file(path, "transcript", LARGEST_TRANSCRIPT_BYTES)
-    check_plain_text(text, str(path))
-    return text
 
 
 def warn_of_misfit(fit: TranscriptFit, corrected: bool = False) -> None:

@@ -24,7 +24,6 @@ from lipmotion.pipeline.understand.spoken_language import warn_of_another_langua
 from lipmotion.pipeline.understand.transcribe import (
     heard_phones,
     named_places,
-    read_transcript,
     transcribe,
     warn_of_guesses,
     warn_of_label_misfit,
@@ -450,7 +449,11 @@ def _words(
     transcript: str | Path | TimedTranscript | None, duration_s: float
 ) -> tuple[str, ...] | TimedTranscript | None:
     """Return the words of a transcript. Raises AlignmentError: a text that is too long for the recording."""
-    text = read_transcript(transcript) if isinstance(transcript, Path) else transcript
+    text = transcript
+    if isinstance(text, Path):
+        from lipmotion.corpora.labels import read_transcript  # forty formats
+
+        text = read_transcript(text)
     if text is None or isinstance(text, TimedTranscript):
         return text
     if text is transcript and "." in text and not any(map(str.isspace, text)) and is_file(Path(text)):
