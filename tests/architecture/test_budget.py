@@ -1,4 +1,4 @@
-"""Budgets of the house: lines and files, and what ``animate`` loads. They may only go down (docs/architecture.md)."""
+"""Budgets of the house: lines and files, and what ``animate`` loads. They may only go down."""
 
 from __future__ import annotations
 
