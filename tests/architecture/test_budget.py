@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
+
+from children import run_child
 
 ROOT = Path(__file__).parents[2]
 SOURCE_LINES, SOURCE_FILES = 97_100, 701
@@ -37,8 +38,8 @@ def test_lines_and_files() -> None:
 @pytest.mark.long
 def test_what_animate_loads() -> None:
     """The main path stands alone: for sound alone, no face, tracking, studio or reader of labels is loaded."""
-    ran = subprocess.run([sys.executable, "-c", LOADED], cwd=ROOT, capture_output=True, text=True, check=True)
-    loaded = [Path(line) for line in ran.stdout.split()]
+    ran = run_child([sys.executable, "-c", LOADED], folder=ROOT, check=True)
+    loaded = [Path(line) for line in ran.stdout.splitlines()]
     assert len(loaded) <= LOADED_FILES
     assert lines_of(loaded) <= LOADED_LINES
     rooms = {path.parts[path.parts.index("lipmotion") + 1] for path in loaded if "lipmotion" in path.parts}

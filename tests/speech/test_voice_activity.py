@@ -9,7 +9,10 @@ from numpy.typing import NDArray
 
 from lipmotion.hmm.loudness import DECIBEL, LEAST_FRAMES, power_level, spoken_frames
 from lipmotion.pipeline.generate.animate import animate
+from lipmotion.pipeline.model import Model
+from lipmotion.speech.features.analysed_audio import AnalysedAudio, analysed
 from lipmotion.speech.features.mfcc import DYNAMIC_RANGE, HOP, WINDOW, log_energy
+from lipmotion.speech.features.speaker_similarity import speaker_similarity
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.voice_activity import (
     LONGEST_FRAMES,
@@ -292,3 +295,28 @@ def test_another_line_changes_no_motion_of_a_real_voice(recordings: Path, voice:
         before, after = louder(other, -max(decibels, 0)), louder(line, min(decibels, 0))
         samples = np.concatenate([before, noise(gap_s, 0), after])
         assert_same_motion(line, samples, len(other) // HOP + round(100 * gap_s))
+
+
+def test_a_tone_that_covers_a_word_is_found_and_no_voice_is_one() -> None:
+    sentence = toy_sentences(3)[0]
+    samples, tone = sentence.audio.samples.copy(), slice(16_000, 22_400)
+    assert analysed(sentence.audio).tones == []
+    samples[tone] += np.float32(0.3) * np.sin(2 * np.pi * 1000 * np.arange(6400) / 16_000).astype(np.float32)
+    audio = AnalysedAudio(samples, 16_000)
+    ((first, end),) = audio.tones
+    assert abs(first - 100) <= 8
+    assert abs(end - 140) <= 8
+    level = audio.log_energy
+    assert level[110:130].max() < level[:100].max() - 5  # as silent as a room, in what recognisers get
+
+
+def test_a_voice_behind_a_noise_gate_is_as_similar_as_without(toy_model: Model) -> None:
+    """Digital silence within a passage says nothing of its voice."""
+    sentence = toy_sentences(3)[0]
+    samples = sentence.audio.samples.copy()
+    samples[16_000:20_000] = 0
+    whole, gated = (
+        speaker_similarity(toy_model.phones, AnalysedAudio(each, 16_000)).score
+        for each in (sentence.audio.samples, samples)
+    )
+    assert abs(whole - gated) < 3

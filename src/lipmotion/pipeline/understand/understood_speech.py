@@ -164,6 +164,9 @@ def understood_speech(
         understood = _detected(understood, audio)
     if understood.is_without_speech and not understood.events:
         LOG.warning("no speech found in the recording: the mouth rests; give a recording in which something is said")
+    elif audio.tones:
+        places = [(first / FRAME_RATE_HZ, end / FRAME_RATE_HZ) for first, end in audio.tones]
+        LOG.warning("a steady tone covers what is said at %s: the mouth rests there", named_places(places))
     speech, found = understood.speech, understood.recognition
     if found is not None and request.language == ENGLISH:
         warn_of_another_language(found)

@@ -15,7 +15,7 @@ from lipmotion.hmm.loudness import smooth_level, spoken_frames
 from lipmotion.speech.features.mfcc import HOP, checked_samples, frame_count, log_energy, mfcc_of_warps
 from lipmotion.speech.features.spectrum import spectrum
 from lipmotion.speech.recognition.general.front_end import CEPSTRA, general_features
-from lipmotion.speech.sound.voice_activity import find_passages, level_passage
+from lipmotion.speech.sound.voice_activity import Stretch, fill_gaps, find_passages, find_tones, level_passage
 from lipmotion.types import Audio, Features
 
 MadeT = TypeVar("MadeT")
@@ -51,17 +51,32 @@ class AnalysedAudio(Audio):
     @cached_property
     def passages(self) -> tuple[Passage, ...]:
         """The passages of the recording, in order; none where nothing can be said in it."""
-        energy = log_energy(checked_samples(self))
+        recorded, energy = self.samples, self._recorded_energy
+        if self.tones:
+            recorded = recorded.copy()
+            for first, end in self.tones:
+                recorded[max(first - 1, 0) * HOP : end * HOP] = 0
+            energy = log_energy(recorded)
         found = find_passages(energy)
         bounds = [0, *((before.end + after.first) // 2 for before, after in pairwise(found)), self.frames]
         passages = []
         for number, (first, end) in enumerate(found):
-            samples = level_passage(self.samples[first * HOP : end * HOP], energy[first:end])
-            sound = spoken_frames(energy[first:end])
+            level, samples = energy[first:end], recorded[first * HOP : end * HOP]
+            samples = level_passage(fill_gaps(samples, level), level)
+            sound = spoken_frames(level)
             lead, tail = (max(SILENT_FRAMES - int(side.argmax()), 0) // 4 * 4 for side in (sound, sound[::-1]))
             padded = _PassageAudio(np.pad(samples, (lead * HOP, tail * HOP)), self.rate_hz, lead=lead, tail=tail)
             passages.append(Passage(first - lead, slice(bounds[number], bounds[number + 1]), padded))
         return tuple(passages)
+
+    @cached_property
+    def tones(self) -> list[Stretch]:
+        """Where a steady tone covers what is said; its frames count as silence."""
+        return find_tones(self.samples, self._recorded_energy)
+
+    @cached_property
+    def _recorded_energy(self) -> NDArray[np.float32]:
+        return log_energy(checked_samples(self))
 
     @property
     def is_passage(self) -> bool:
