@@ -103,12 +103,9 @@ def _power_lines(part: Figures, power: float) -> list[str]:
 def _scope_lines(rows: Sequence[Figures]) -> list[str]:
     """Return what the intervals are over, where it is not raters and sentences."""
     scopes = sorted({row["over"] for row in rows} - {BOTH})
-    return [f"  intervals over {' / '.join(scopes)} only: {_named(rows, scopes)}"] if scopes else []
-
-
-def _named(rows: Sequence[Figures], scopes: Sequence[str]) -> str:
     found = [row for row in rows if row["over"] in scopes]
-    return ", ".join(f"{row['condition']}–{row['other']}" if "other" in row else row["condition"] for row in found)
+    named = [f"{row['condition']}–{row['other']}" if "other" in row else row["condition"] for row in found]
+    return [f"  intervals over {' / '.join(scopes)} only: {', '.join(named)}"] if scopes else []
 
 
 def _without_last(rows: list[list[str]], is_kept: bool) -> list[list[str]]:
