@@ -48,7 +48,7 @@ def test_a_table_is_written_calibrated_and_found(run: RunCommand, glb: Path, her
     assert run("character", "rig.csv", "--open", "Jaw=-20").out[-1] == "rig.csv"
     assert "Jaw,jawOpen,-" in (here / "rig.csv").read_text(encoding="utf-8-sig")
     for arguments, message in (
-        (("character", glb, "--open", "0.3"), "--open: '0.3' states no value"),
+        (("character", glb, "--open", "0.3"), "--open: '0.3' names no control, required NAME=X"),
         (("character", "rig.csv"), "state values of its controls"),
     ):
         done = run(*arguments)

@@ -37,9 +37,7 @@ def test_units_alone_without_names_of_units(tmp_path: Path) -> None:
     (tmp_path / "a.json").write_text(json.dumps({"units": rows}), encoding="utf-8")
     assert read_units(tmp_path / "a.json") == timeline(*ROWS)
     (tmp_path / "b.json").write_text('{"units": [{"start_s": 0, "phone": "m"}]}', encoding="utf-8")
-    with pytest.raises(
-        InputError, match=r"b\.json: a unit has no 'end_s'; export it again, or give start_s, end_s and phone"
-    ):
+    with pytest.raises(InputError, match=r"b\.json: .*end_s is missing.*; export it again"):
         read_units(tmp_path / "b.json")
     (tmp_path / "c.json").write_text('{"phones": []}', encoding="utf-8")
     with pytest.raises(InputError, match=r"c\.json: not a motion document"):

@@ -73,7 +73,7 @@ def test_paths_begin_at_the_folder_of_the_file(tmp_path: Path) -> None:
         ("[outputs]\nchannels = [1]", "required a list of texts"),
         ("[outputs]\njaw = 'sound'", "jaw is 'sound', required one of: motion, energy, none"),
         ("[request]\nmodel = 1", "model is 1, required a path"),
-        ("[request]\nasymmetry = nan", "the asymmetry is nan, required 0 to 1"),
+        ("[request]\nasymmetry = nan", "the number nan, required a finite one"),
         ("[staging]\nsize = 63", "the size is 63 pixels"),
         ("[request", "Expected"),
         ("a = " + "[" * 100_000, "scene.toml"),

@@ -190,7 +190,7 @@ def check_value(option_field: Field[Any], value: Any) -> None:
         is_complete = rule.odd or rule.power_of_two or bool(rule.choices) or rule.most is not None
         words = _WORDS.get(kind, "a table of options")
         required = rule.words if is_complete and fits else words + ("" if is_complete else rule.words)
-        found = described(str(value) if kind is Path else value)
+        found = described(str(value) if isinstance(value, Path) else value)
         raise InputError(f"{option_field.name} is {found}, required {required}")
 
 

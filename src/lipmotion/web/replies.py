@@ -106,20 +106,19 @@ async def _refused(_: Request, error: Exception) -> Response:
 
 async def failed(status: int, _: Request, error: Exception) -> Response:
     """Return the reply to an error that was raised on purpose."""
-    if isinstance(error, ExportError | OSError | sqlite3.Error):
+    if status == UNAVAILABLE:
         LOG.warning("%s", error)
         return JSONResponse({"error": "cannot be stored now; try again"}, status, FRESH)
     return JSONResponse({"error": str(error)}, status, FRESH)
 
 
+UNAVAILABLE = 503
 ERRORS: dict[type[Exception], Callable[[Request, Any], Any]] = {
     HTTPException: _refused,
     LipMotionError: partial(failed, 422),
-    ExportError: partial(failed, 503),
-    OSError: partial(failed, 503),
-    sqlite3.Error: partial(failed, 503),
+    **dict.fromkeys((ExportError, OSError, MemoryError, sqlite3.Error), partial(failed, UNAVAILABLE)),
 }
-"""What is replied to errors that are raised on purpose, and to a full disk: JSON, ``{"error": text}``."""
+"""What is replied to errors that are raised on purpose, and to a full disk or memory: JSON, ``{"error": text}``."""
 
 
 def json_reply(content: Any, status: int = 200) -> Response:

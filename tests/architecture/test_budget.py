@@ -1,0 +1,56 @@
+"""Budgets of the house: lines and files, and what ``animate`` loads. They may only go down."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+SOURCE_LINES, SOURCE_FILES = 97_100, 701
+LOADED_FILES, LOADED_LINES = 205, 28_500
+TEST_LINES, BENCHMARK_LINES, DOC_WORDS = 71_300, 14_000, 90_500
+LOADED = """
+import sys, lipmotion
+lipmotion.animate("examples/welcome.flac")
+files = [module.__file__ for name, module in sys.modules.items() if name.partition(".")[0] == "lipmotion"]
+print("\\n".join(filter(None, files)))
+"""
+
+
+def lines_of(paths: Iterable[Path]) -> int:
+    return sum(path.read_bytes().count(b"\n") for path in paths)
+
+
+def test_lines_and_files() -> None:
+    source = list((ROOT / "src").rglob("*.py"))
+    assert lines_of(source) <= SOURCE_LINES
+    assert len(source) <= SOURCE_FILES
+    assert lines_of((ROOT / "tests").rglob("*.py")) <= TEST_LINES
+    assert lines_of((ROOT / "benchmarks").rglob("*.py")) <= BENCHMARK_LINES
+    assert sum(len(page.read_text("utf-8").split()) for page in (ROOT / "docs").rglob("*.md")) <= DOC_WORDS
+
+
+@pytest.mark.long
+def test_what_animate_loads() -> None:
+    """The main path stands alone: for sound alone, no face, tracking, studio or reader of labels is loaded."""
+    ran = subprocess.run([sys.executable, "-c", LOADED], cwd=ROOT, capture_output=True, text=True, check=True)
+    loaded = [Path(line) for line in ran.stdout.split()]
+    assert len(loaded) <= LOADED_FILES
+    assert lines_of(loaded) <= LOADED_LINES
+    rooms = {path.parts[path.parts.index("lipmotion") + 1] for path in loaded if "lipmotion" in path.parts}
+    assert not rooms & {
+        "cli",
+        "corpora",
+        "experiments",
+        "export",
+        "faces",
+        "meshes",
+        "studio",
+        "study",
+        "vision",
+        "web",
+    }
