@@ -190,7 +190,6 @@ class _Plan:
         return worst + REPEATS_COST * float(again.sum()) / len(order)
 
     def _joins_from(self, at: int, way: int) -> _Joins:
-        """Return the joins that are possible after a frame."""
         room = self._room(at, way)
         least = min(self._least, max(room, 1))
         lengths = np.arange(least, room + 1) if room >= least else np.array([room])

@@ -135,7 +135,13 @@ class Refiner:
         the detail; found exactly by dynamic programming.
         Cost: O(T·N·K) for distances, O(T·neighbours²) for the search.
         """
-        numbers, costs = self._nearest(self._by_colour(coefficients))
+        wanted = len(self.eigenlips.channels)
+        if coefficients.ndim != 2 or coefficients.shape[1] != wanted or not np.isfinite(coefficients).all():
+            raise InputError(
+                f"coefficients of shape {coefficients.shape}, required finite ones of shape (T, {wanted}), "
+                "as Eigenlips.project gives them"
+            )
+        numbers, costs = self._nearest(np.stack(np.split(coefficients.astype(np.float32), len(COLOURS), axis=1)))
         if self.options.steadiness:
             changes = self.candidates.detail_distances
             if self.options.together:
@@ -160,16 +166,6 @@ class Refiner:
                 levels[..., colour] += self.candidates.details[chosen[:, colour], :, :, colour]
         np.rint(levels, out=levels)
         return np.clip(levels, 0, 255, out=levels).astype(np.uint8)
-
-    def _by_colour(self, coefficients: Values) -> Costs:
-        """Return coefficients of each colour [shape=(3, T, K)]. Raises InputError: as ``choose``."""
-        wanted = len(self.eigenlips.channels)
-        if coefficients.ndim != 2 or coefficients.shape[1] != wanted or not np.isfinite(coefficients).all():
-            raise InputError(
-                f"coefficients of shape {coefficients.shape}, required finite ones of shape (T, {wanted}), "
-                "as Eigenlips.project gives them"
-            )
-        return np.stack(np.split(coefficients.astype(np.float32), len(COLOURS), axis=1))
 
     def _nearest(self, wanted: Costs) -> tuple[Index, Costs]:
         """Return the nearest candidates of each frame, nearest first, and their costs [each shape=(C, T, n)].

@@ -17,7 +17,6 @@ from lipmotion.types import Audio, Monitor, silent_monitor, with_progress
 LONGEST_S = 30
 """Seconds that are read of each talker."""
 BABBLE = "babble"
-RATIOS_DB = (20.0, 10.0, 5.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -30,7 +29,7 @@ class NoiseConditions:
     """
 
     kinds: tuple[str, ...] = ()
-    ratios_db: tuple[float, ...] = RATIOS_DB
+    ratios_db: tuple[float, ...] = (20.0, 10.0, 5.0, 0.0)
     talkers: tuple[Audio, ...] = ()
 
     def __post_init__(self) -> None:

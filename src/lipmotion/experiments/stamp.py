@@ -81,10 +81,15 @@ def _processor_seconds() -> float:
 
 
 def _machine() -> dict[str, Any]:
+    try:
+        lines = CPU_INFO.read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     return {
         "machine": {
             "cores": os.cpu_count(),
-            "processor": _processor(),
+            "processor": named[0] if named else platform.processor() or platform.machine(),
             "system": platform.platform(),
             "linear algebra": ", ".join(map(str, blas_kernels())),
         },
@@ -104,15 +109,6 @@ def commit(root: Path) -> str | None:
 
     found = said("rev-parse", "HEAD")
     return f"{found}, changed since" if found and said("status", "--porcelain", "--", "src") else found
-
-
-def _processor() -> str:
-    try:
-        lines = CPU_INFO.read_text(encoding="utf-8").splitlines()
-    except OSError:
-        lines = []
-    named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return named[0] if named else platform.processor() or platform.machine()
 
 
 def _version(package: str) -> str | None:

@@ -202,30 +202,25 @@ def read_motion(path: str | Path) -> tuple[Motion, Timeline[Unit]]:
             frame, column = np.argwhere(~finite)[0].tolist()
             first = f"the first is {motion.names[column]!r} in frame {frame}"
             raise InputError(f"{(~finite).sum()} values that are not finite, {first}; interpolate them first")
-        _check_weights(path, motion)
+        beyond = []
+        for channel, curve in zip(motion.channels, motion.values.T, strict=True):
+            if channel.unit in {WEIGHT, EYE_DISTANCE} and is_known(channel.name):
+                low, high = float(curve.min(initial=0.0)), float(curve.max(initial=0.0))
+                if high > LARGEST_WEIGHT:
+                    raise InputError(
+                        f"the weight {channel.name} goes up to {high:g}, required 0 to 1; divide percent by 100"
+                    )
+                if not -TOLERATED_WEIGHT <= low <= high <= 1 + TOLERATED_WEIGHT:
+                    beyond.append(f"{channel.name} from {low:.2f} to {high:.2f}")
+        if beyond:
+            what = f"{len(beyond)} weights go beyond 0 to 1, where faces are drawn as at 0 or 1"
+            LOG.warning("%s: %s: %s", path, what, ", ".join(beyond[:8]))
         return motion, units
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
     except InputError as error:
         text = str(error)
         raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from error
-
-
-def _check_weights(path: Path, motion: Motion) -> None:
-    """Raise InputError if blendshapes count from 0 to 100; warn where they go beyond 0 to 1."""
-    beyond = []
-    for channel, curve in zip(motion.channels, motion.values.T, strict=True):
-        if channel.unit in {WEIGHT, EYE_DISTANCE} and is_known(channel.name):
-            low, high = float(curve.min(initial=0.0)), float(curve.max(initial=0.0))
-            if high > LARGEST_WEIGHT:
-                raise InputError(
-                    f"the weight {channel.name} goes up to {high:g}, required 0 to 1; divide percent by 100"
-                )
-            if not -TOLERATED_WEIGHT <= low <= high <= 1 + TOLERATED_WEIGHT:
-                beyond.append(f"{channel.name} from {low:.2f} to {high:.2f}")
-    if beyond:
-        what = f"{len(beyond)} weights go beyond 0 to 1, where faces are drawn as at 0 or 1"
-        LOG.warning("%s: %s: %s", path, what, ", ".join(beyond[:8]))
 
 
 def read_units(path: Path) -> Timeline[Unit]:

@@ -31,23 +31,19 @@ def write_sound(path: Path, audio: Audio) -> None:
     if not len(audio.samples):
         raise ExportError(f"{path}: the sound has no samples")
     with whole_file(path) as temporary:
-        _encode(temporary, path, audio)
+        import av
 
-
-def _encode(temporary: Path, path: Path, audio: Audio) -> None:
-    import av
-
-    container_name, codec, rate_hz = SOUND_CODECS[path.suffix.lower()]
-    try:
-        with av.open(str(temporary), "w", format=container_name) as container:
-            stream = container.add_stream(codec, rate=rate_hz or audio.rate_hz, layout="mono")
-            for start in range(0, len(audio.samples), BLOCK):
-                values = sixteen_bits(audio.samples[None, start : start + BLOCK])
-                part = av.AudioFrame.from_ndarray(values, format="s16", layout="mono")
-                part.rate, part.pts, part.time_base = audio.rate_hz, start, Fraction(1, audio.rate_hz)
-                container.mux(stream.encode(part))
-            container.mux(stream.encode(None))
-    except av.FFmpegError as error:
-        if isinstance(error, OSError):  # a full disk
-            raise
-        raise ExportError(f"{path}: cannot be encoded: {error}") from error
+        container_name, codec, rate_hz = SOUND_CODECS[path.suffix.lower()]
+        try:
+            with av.open(str(temporary), "w", format=container_name) as container:
+                stream = container.add_stream(codec, rate=rate_hz or audio.rate_hz, layout="mono")
+                for start in range(0, len(audio.samples), BLOCK):
+                    values = sixteen_bits(audio.samples[None, start : start + BLOCK])
+                    part = av.AudioFrame.from_ndarray(values, format="s16", layout="mono")
+                    part.rate, part.pts, part.time_base = audio.rate_hz, start, Fraction(1, audio.rate_hz)
+                    container.mux(stream.encode(part))
+                container.mux(stream.encode(None))
+        except av.FFmpegError as error:
+            if isinstance(error, OSError):  # a full disk
+                raise
+            raise ExportError(f"{path}: cannot be encoded: {error}") from error

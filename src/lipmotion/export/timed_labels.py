@@ -33,9 +33,6 @@ def clock(seconds: float, mark: str) -> str:
     return f"{minutes // 60:02d}:{minutes % 60:02d}:{rest // 1000:02d}{mark}{rest % 1000:03d}"
 
 
-SRT_SUFFIX = ".srt"
-
-
 def write_subrip(path: Path, units: Timeline[Unit]) -> None:
     """Write the words in time, or the phones where the name ends with ``.phones.srt``, one a cue; silence has none.
 
@@ -48,7 +45,6 @@ def write_subrip(path: Path, units: Timeline[Unit]) -> None:
         temporary.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8", newline="\n")
 
 
-VTT_SUFFIX = ".vtt"
 _ESCAPES = {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
 
 
@@ -93,7 +89,13 @@ def write_textgrid(path: Path, units: Timeline[Unit]) -> None:
     lines = ['File type = "ooTextFile"', 'Object class = "TextGrid"', "", "xmin = 0", f"xmax = {end_s}"]
     lines += ["tiers? <exists>", f"size = {len(tiers)}", "item []:"]
     for number, (name, intervals) in enumerate(tiers, 1):
-        lines += _tier(number, name, _without_gaps(intervals, end_s), end_s)
+        whole = _without_gaps(intervals, end_s)
+        lines += [f"    item [{number}]:", '        class = "IntervalTier"', f'        name = "{name}"']
+        lines += ["        xmin = 0", f"        xmax = {end_s}", f"        intervals: size = {len(whole)}"]
+        for place, (start_s, stop_s, text) in enumerate(whole, 1):
+            quoted = text.replace('"', '""')
+            lines += [f"        intervals [{place}]:", f"            xmin = {start_s}", f"            xmax = {stop_s}"]
+            lines.append(f'            text = "{quoted}"')
     with whole_file(path) as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
@@ -110,25 +112,10 @@ def _without_gaps(intervals: list[Interval], duration_s: float) -> list[Interval
     return [*whole, (end_s, duration_s, "")] if end_s < duration_s else whole
 
 
-def _tier(number: int, name: str, intervals: list[Interval], end_s: float) -> list[str]:
-    """Return the lines of one tier."""
-    lines = [f"    item [{number}]:", '        class = "IntervalTier"', f'        name = "{name}"']
-    lines += ["        xmin = 0", f"        xmax = {end_s}", f"        intervals: size = {len(intervals)}"]
-    for place, (start_s, stop_s, text) in enumerate(intervals, 1):
-        quoted = text.replace('"', '""')
-        lines += [
-            f"        intervals [{place}]:",
-            f"            xmin = {start_s}",
-            f"            xmax = {stop_s}",
-        ]
-        lines.append(f'            text = "{quoted}"')
-    return lines
-
-
 _WRITERS: dict[str, Callable[[Path, Timeline[Unit]], None]] = {
     TEXTGRID_SUFFIX: write_textgrid,
-    VTT_SUFFIX: write_webvtt,
-    SRT_SUFFIX: write_subrip,
+    ".vtt": write_webvtt,
+    ".srt": write_subrip,
 }
 LABEL_SUFFIXES = tuple(_WRITERS)
 """Suffixes of label files, as programs write them; capitals do not matter."""

@@ -67,12 +67,7 @@ TAGS = frozenset(
 )
 """Tags that an mp4 file can hold; FFmpeg would leave out all others without a word."""
 _BT601, _BT709, _LIMITED_RANGE = 6, 1, 1
-_ENCODER = {
-    "preset": "superfast",
-    "crf": "18",
-    "threads": "4",
-    "x264-params": "mbtree=1:rc-lookahead=10:bframes=0",
-}
+_ENCODER = {"preset": "superfast", "crf": "18", "threads": "4", "x264-params": "mbtree=1:rc-lookahead=10:bframes=0"}
 """Chosen by measuring (docs/results/video.md): half of the time of ``veryfast`` at the same PSNR and SSIM. Frames that
 are predicted from both sides (bframes) smooth what changes from frame to frame. The number of threads is fixed because
 the bytes depend on it: so they do not depend on the number of processors."""

@@ -23,15 +23,12 @@ FACES: Registry[type[Face]] = Registry(
 )
 
 
-DRAWING_SUFFIX = ".svg"
-
-
 def face_named(name: str = "portrait") -> Face:
     """Return a face; a name that ends in ``.svg`` is the path of a drawing in layers (docs/faces.md).
 
     Raises InputError: none of that name, a drawing that cannot be used, or what an installed package adds is no face.
     """
-    if name.lower().endswith(DRAWING_SUFFIX):
+    if name.lower().endswith(".svg"):
         from lipmotion.faces.portrait.layered import LayeredFace
 
         return LayeredFace(Path(name))

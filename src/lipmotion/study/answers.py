@@ -109,21 +109,19 @@ def read_answers(path: Path) -> list[Answer]:
         if missing:
             raise InputError(f"no column {missing[0]!r}; required {', '.join(COLUMNS)}")
         for row in table:
-            answers.append(_answer(row))
+            answers.append(
+                Answer(
+                    **{
+                        name: from_field(row[name])
+                        for name in ("rater", "kind", "sentence", "question", "condition", "other", "value")
+                    },
+                    trial=whole_of(row["trial"], "trial is"),
+                    seconds=number_of(row["seconds"], "seconds is"),
+                    plays=whole_of(row["plays"], "plays is"),
+                    practice=bool(whole_of(row["practice"], "practice is")),
+                    expected=row["expected"],
+                )
+            )
     except (InputError, csv.Error) as error:
         raise InputError(f"{path}: line {table.line_num}: {error}") from error
     return answers
-
-
-def _answer(row: dict[str, str]) -> Answer:
-    return Answer(
-        **{
-            name: from_field(row[name])
-            for name in ("rater", "kind", "sentence", "question", "condition", "other", "value")
-        },
-        trial=whole_of(row["trial"], "trial is"),
-        seconds=number_of(row["seconds"], "seconds is"),
-        plays=whole_of(row["plays"], "plays is"),
-        practice=bool(whole_of(row["practice"], "practice is")),
-        expected=row["expected"],
-    )

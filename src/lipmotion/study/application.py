@@ -73,7 +73,8 @@ def study_application(
         return foreign_refusal(path, headers, is_own, names)
 
     desk = _Desk(study, store)
-    page = {name: _packaged(*each) for name, each in PAGE.items()}
+    folder = files("lipmotion.study") / "page"
+    page = {name: (coloured((folder / file).read_text("utf-8")).encode(), kind) for name, (file, kind) in PAGE.items()}
 
     async def packaged(request: Request) -> Response:
         content, kind = page[request.url.path.removeprefix("/")]
@@ -93,10 +94,7 @@ def study_application(
         Route("/api/state", desk.state),
         Route("/api/answers", desk.answered, methods=["POST"]),
     ]
-    application = Starlette(
-        routes=routes,
-        exception_handlers=ERRORS,
-    )
+    application = Starlette(routes=routes, exception_handlers=ERRORS)
     application.add_middleware(Guard, refusal=refusal)
     application.add_middleware(SecurityHeaders)
     return application
@@ -162,9 +160,7 @@ class _Desk:
         if number >= len(trials):
             return place
         ahead = self._addresses(trials[number + 1]) if number + 1 < len(trials) else []
-        return place | self._page(trials[number]) | {"ahead": ahead}
-
-    def _page(self, trial: StudyTrial) -> dict[str, Any]:
+        trial = trials[number]
         study = self._study
         asked: dict[str, Any] = {"practice": trial.practice, "note": trial.note, "videos": self._addresses(trial)}
         if study.kind == MOS:
@@ -173,11 +169,7 @@ class _Desk:
             asked["points"] = POINTS[:HIGHEST_MOS]
         elif study.kind != PAIRED:
             asked["highest"] = HIGHEST_RANK
-        return asked
+        return place | asked | {"ahead": ahead}
 
     def _addresses(self, trial: StudyTrial) -> list[str]:
         return [f"/{VIDEOS}/{video.file}" for video in self._study.shown(trial)]
-
-
-def _packaged(name: str, kind: str) -> tuple[bytes, str]:
-    return coloured((files("lipmotion.study") / "page" / name).read_text("utf-8")).encode(), kind

@@ -14,15 +14,7 @@ from lipmotion.study.encoding import encode_shown
 from lipmotion.study.manifest import VIDEOS, Study, StudyTrial, StudyVideo, write_manifest
 from lipmotion.study.questions import CONSENT, INSTRUCTIONS
 from lipmotion.study.settings import StudySettings
-from lipmotion.study.sources import (
-    Condition,
-    MadeVideo,
-    StudySentence,
-    condition_of,
-    drawn_job,
-    named_conditions,
-    sentences_of,
-)
+from lipmotion.study.sources import MadeVideo, StudySentence, condition_of, drawn_job, named_conditions, sentences_of
 from lipmotion.study.trials import VideoNumbers, anchor_trials, attention_trials, main_trials, practice_trials, shuffled
 from lipmotion.types import Monitor, silent_monitor
 from lipmotion.types.progress import with_progress
@@ -67,7 +59,7 @@ def design_study(
         videos: list[StudyVideo] = []
         wanted = [(sentence, name) for sentence in said for name in makers]
         for sentence, name in with_progress(wanted, "making videos", monitor):
-            given = _made(makers[name], sentence, folder)
+            given = makers[name](sentence, folder / _UNFINISHED)
             videos.append(_shown(given, sentence, name, folder, settings))
             if name == base and sentence.name in late:
                 videos.append(_shown(given, sentence, ANCHOR, folder, settings))
@@ -99,10 +91,6 @@ def _late_sentences(kind: str, sentences: Sequence[StudySentence], settings: Stu
     if kind == RANKING:
         return names if settings.anchors else []
     return shuffled(names, "anchor", settings.seed)[: settings.anchors]
-
-
-def _made(condition: Condition, sentence: StudySentence, folder: Path) -> MadeVideo:
-    return condition(sentence, folder / _UNFINISHED)
 
 
 def _shown(given: MadeVideo, sentence: StudySentence, name: str, folder: Path, settings: StudySettings) -> StudyVideo:

@@ -98,16 +98,13 @@ class Study:
             if not VIDEO_NAME.fullmatch(video.file):
                 raise ValueError(f"a video called {video.file!r}, required 32 hexadecimal digits and .mp4")
         for trial in self.trials:
-            self._check(trial)
-
-    def _check(self, trial: StudyTrial) -> None:
-        required = {PAIRED: range(2, 3), MOS: range(1, 2)}.get(self.kind, range(2, 100))
-        if len(trial.videos) not in required:
-            raise ValueError(f"a trial of {len(trial.videos)} videos in a study of the kind {self.kind}")
-        if not all(0 <= video < len(self.videos) for video in trial.videos):
-            raise ValueError("a trial shows a video that is not there")
-        if trial.expected and not is_possible(self.kind, trial.expected):
-            raise ValueError(f"a trial expects {trial.expected!r}, which nobody can answer")
+            required = {PAIRED: range(2, 3), MOS: range(1, 2)}.get(self.kind, range(2, 100))
+            if len(trial.videos) not in required:
+                raise ValueError(f"a trial of {len(trial.videos)} videos in a study of the kind {self.kind}")
+            if not all(0 <= video < len(self.videos) for video in trial.videos):
+                raise ValueError("a trial shows a video that is not there")
+            if trial.expected and not is_possible(self.kind, trial.expected):
+                raise ValueError(f"a trial expects {trial.expected!r}, which nobody can answer")
 
     def shown(self, trial: StudyTrial) -> list[StudyVideo]:
         """Return the videos of a trial, in the order in which they are shown."""

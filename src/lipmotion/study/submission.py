@@ -38,14 +38,11 @@ def submitted_sheet(study: Study, trials: list[StudyTrial], rater: int, content:
     lasts_s = sum(video.seconds for video in study.shown(trial))
     if seconds < SHARE_PLAYED * lasts_s:
         raise InputError(f"{seconds:.1f} s for videos of {lasts_s:.1f} s; play all of them to their ends")
-    values = _values(study, trial, found["values"])
-    return AnswerSheet(rater, found["trial"], values, seconds, sum(found["plays"]))
-
-
-def _values(study: Study, trial: StudyTrial, given: list[str]) -> tuple[str, ...]:
+    given = found["values"]
     count = len(questions_of(study, trial))
     if len(given) != count:
         raise InputError(f"required {count} answers")
     if not all(is_possible(study.kind, value) for value in given):
         raise InputError(f"an answer that is not possible, required {POSSIBLE[study.kind]}")
-    return tuple(given if study.kind == PAIRED else (str(int(value)) for value in given))
+    values = tuple(given if study.kind == PAIRED else (str(int(value)) for value in given))
+    return AnswerSheet(rater, found["trial"], values, seconds, sum(found["plays"]))

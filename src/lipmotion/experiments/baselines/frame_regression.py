@@ -15,16 +15,7 @@ from lipmotion.motion.space import MotionSpace, fit_reduced_motion
 from lipmotion.speech.features.mfcc import LOG_ENERGY
 from lipmotion.stats.tree_regression import ridge, zero_statistics
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
-from lipmotion.types import (
-    FRAME_RATE_HZ,
-    Constraints,
-    Example,
-    Generation,
-    Monitor,
-    Motion,
-    Speech,
-    StateTrace,
-)
+from lipmotion.types import FRAME_RATE_HZ, Constraints, Example, Generation, Monitor, Motion, Speech, StateTrace
 
 Array = NDArray[np.float64]
 Float32Array = NDArray[np.float32]

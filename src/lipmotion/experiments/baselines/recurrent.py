@@ -107,10 +107,7 @@ def _network(torch: Any, inputs: int, outputs: int) -> Any:
 
 
 def _step(
-    torch: Any,
-    network: Any,
-    optimiser: Any,
-    batch: Sequence[tuple[Float32Array, Float32Array, NDArray[np.bool_]]],
+    torch: Any, network: Any, optimiser: Any, batch: Sequence[tuple[Float32Array, Float32Array, NDArray[np.bool_]]]
 ) -> None:
     """Take one optimiser step on a batch of recordings; the shorter ones are padded, and padding does not count."""
     columns = zip(*batch, strict=True)

@@ -9,7 +9,7 @@ from typing import Any
 
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.experiments.comparison import correlation_statistic, opening_curves, significance_mark
-from lipmotion.experiments.engines.models import EngineModel, engine_models
+from lipmotion.experiments.engines.models import engine_models
 from lipmotion.experiments.learning_curve import check_training_names
 from lipmotion.experiments.runner import DEFAULT_SETTINGS, ExperimentSettings, channels_with_opening, opening_row
 from lipmotion.kernels.threads import one_thread
@@ -23,7 +23,6 @@ from lipmotion.pipeline.evaluation.held_out import (
     held_out_recordings,
     speech_of_condition,
 )
-from lipmotion.pipeline.model import Model
 from lipmotion.printable import printable
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.json_text import nan_as_null
@@ -129,38 +128,32 @@ def engines(
     steps = [(condition, name) for condition in recordings.conditions for name in trained]
     made: dict[str, dict[str, _MadeClips]] = {condition: {} for condition in recordings.conditions}
     for condition, name in with_progress(steps, "comparing", sub_monitor(monitor, 0.7, 1)):
-        made[condition][name] = _made(recordings, condition, trained[name].model)
+        system = trained[name].model
+        known = replace(recordings, speakers=system.speakers)
+        speech = speech_of_condition(known, condition, system.engine, system.learned)
+        pinned = compare_with_recorded(known, speech, system.engine, system.learned)
+        free = system.engine.without_closures()
+        made[condition][name] = _MadeClips(
+            pinned, compare_with_recorded(known, speech, free, system.learned) if free != system.engine else pinned
+        )
         settings.receive(name, condition, recordings, made[condition][name].pinned)
     about = {"split": split or "all", "clips": len(held_out), "seed": settings.seed}
     about |= {"closed_under": recordings.closed_under, "reference": REFERENCE_ENGINE}
-    about |= {"models": {name: _about(each) for name, each in trained.items()}}
+    about["models"] = {
+        name: {
+            "configuration": each.model.engine.config.as_mapping(),
+            "utterances": each.model.about["utterances"],
+            "minutes": each.model.about["minutes"],
+            "seconds": each.seconds,
+        }
+        for name, each in trained.items()
+    }
     conditions = {}
     for condition, found in made.items():
         references = {name: each.pinned for name, each in found.items()}
         rows = {name: _row(recordings, each, references, settings.seed) for name, each in found.items()}
         conditions[condition] = {"systems": rows}
     return nan_as_null(about | {"conditions": conditions})
-
-
-def _about(trained: EngineModel) -> dict[str, Any]:
-    model = trained.model
-    return {
-        "configuration": model.engine.config.as_mapping(),
-        "utterances": model.about["utterances"],
-        "minutes": model.about["minutes"],
-        "seconds": trained.seconds,
-    }
-
-
-def _made(recordings: HeldOutRecordings, condition: str, system: Model) -> _MadeClips:
-    """Return what a model generates under a condition."""
-    known = replace(recordings, speakers=system.speakers)
-    speech = speech_of_condition(known, condition, system.engine, system.learned)
-    pinned = compare_with_recorded(known, speech, system.engine, system.learned)
-    free = system.engine.without_closures()
-    return _MadeClips(
-        pinned, compare_with_recorded(known, speech, free, system.learned) if free != system.engine else pinned
-    )
 
 
 def _row(

@@ -204,7 +204,8 @@ def _chosen(
     for model in engine.growing_models(examples, monitor):
         gaussians = model.hmm.models[SPEECH].tied.mixtures.size[1]
         if gaussians in counts:
-            acc[gaussians] = _acc(choosing, engine, model)
+            made = compared_clips(choosing, AUDIO_ONLY, engine, model)
+            acc[gaussians] = correlation_statistic(*opening_curves(choosing, made)).value
             if _best(acc) == gaussians:
                 arrays = engine.to_arrays(model)
     if not acc:
@@ -215,11 +216,6 @@ def _chosen(
 def _best(acc: Mapping[int, float]) -> int:
     """Return the number of Gaussians with the highest correlation; among equals the smallest."""
     return max(acc, key=lambda count: (acc[count], -count))
-
-
-def _acc(choosing: HeldOutRecordings, engine: JointEngine, model: JointModel) -> float:
-    made = compared_clips(choosing, AUDIO_ONLY, engine, model)
-    return correlation_statistic(*opening_curves(choosing, made)).value
 
 
 @dataclass(frozen=True, eq=False)

@@ -42,8 +42,6 @@ from lipmotion.pipeline.evaluation.held_out import (
     AUDIO_ONLY,
     DISTANCES,
     OPENING,
-    ComparedClip,
-    HeldOutRecordings,
     compare_with_recorded,
     held_out_recordings,
     speech_of_condition,
@@ -80,15 +78,14 @@ def _line(name: str, row: Mapping[str, Any]) -> str:
     joins, channels = row["joins"], [row["channels"].get(each) for each in DISTANCES]
     acc = "{:.3f}{} ({:.3f}–{:.3f})".format(row["acc"], significance_mark(row["acc_gain_95"]), *row["acc_95"])
     shares = [_percent(joins["hard"]), _percent(joins["smooth"])]
-    ratios = ["/".join(figure_text(each[key], ".2f") for each in channels if each) for key in RATIOS]
+    ratios = [
+        "/".join(figure_text(each[key], ".2f") for each in channels if each) for key in ("global_variance", "jerk")
+    ]
     return (
         f"  {name:{WIDTH}}{acc:23}{figure_text(row['recall_p_b_m'], '5.1f')}"
         f"{figure_text(row['false_per_minute'], '11.1f')}{joins['per_clip']:7.1f}{shares[0]:>6}{shares[1]:>8}  "
         f"{'  '.join(ratios)}"
     )
-
-
-RATIOS = ("global_variance", "jerk")
 
 
 def _percent(share: float | None) -> str:
@@ -165,7 +162,6 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
     "window N = 7": {"window": 7},
 }
 """Other readings of the print, and what it leaves open."""
-QUICK_EPOCHS = 20
 _ROW, _SUMS = "row", "correlation"
 """Names of the arrays of a kept row: its figures, and the sums over clips of its correlation."""
 WHAT_IS_SHOWN = ("acc", "nrmse", "global_variance", "jerk")
@@ -222,21 +218,19 @@ def minnis2000(
         found[split] = _on_list(corpus, names, trained.model, kept, part)
     about: dict[str, Any] = {"seed": settings.seed, "quick": quick, "seconds": trained.seconds}
     about |= {key: trained.model.about[key] for key in ("utterances", "minutes")}
-    about |= {"rows": {name: _changes(config) for name, config in rows().items()}}
+    printed = vars(SelectionConfig.parsed(MINNIS_2000))
+    options = {name: vars(config).items() for name, config in rows().items()}
+    about |= {
+        "rows": {name: {key: value for key, value in of if value != printed[key]} for name, of in options.items()}
+    }
     return nan_as_null(about | {"lists": found})
-
-
-def _changes(config: SelectionConfig) -> dict[str, Any]:
-    """Return the options that differ from the system as printed."""
-    printed = SelectionConfig.parsed(MINNIS_2000)
-    return {name: value for name, value in vars(config).items() if value != getattr(printed, name)}
 
 
 def _quick_model(corpus: Corpus, settings: ExperimentSettings) -> EngineModel:
     start_s = perf_counter()
     model, _ = train(
         corpus,
-        engine=engine_named(ENGINE, {"epochs": QUICK_EPOCHS}),
+        engine=engine_named(ENGINE, {"epochs": 20}),
         recogniser=settings.recogniser,
         lexicon=settings.lexicon,
         run=Run(settings.monitor, None, settings.workers),
@@ -268,11 +262,20 @@ def _on_list(
             if arrays is None:
                 key = condition, config.joint_recogniser and condition == AUDIO_ONLY
                 if key not in spoken:
-                    spoken[key] = _speech(recordings, condition, model, SelectionConfig(joint_recogniser=key[1]))
+                    listening = SelectionConfig(joint_recogniser=key[1])
+                    spoken[key] = speech_of_condition(
+                        recordings, condition, SelectionEngine(listening), _of_the_row(model.learned, listening)
+                    )
                 engine = SelectionEngine(config)
                 clips = compare_with_recorded(recordings, spoken[key], engine, learned)
                 settings.receive(name, condition, recordings, clips)
-                row = _row(recordings, clips, settings.seed)
+                figures = figures_of(clips, recordings, settings.seed)
+                lips = figures["closures_p_b_m"]
+                row = opening_row(figures) | {key: lips[key] for key in ("false_per_minute", "original_per_minute")}
+                row["channels"] = {
+                    channel: {figure: values[figure] for figure in WHAT_IS_SHOWN}
+                    for channel, values in figures["channels"].items()
+                }
                 row["joins"] = join_figures(engine, learned, spoken[key], recordings.utterances)
                 statistic = correlation_statistic(*opening_curves(recordings, clips))
                 printed = replace(statistic, sums=list(reference.get(condition, statistic.sums)))
@@ -284,24 +287,8 @@ def _on_list(
     return {"clips": len(names), "closed_under": recordings.closed_under, "conditions": conditions}
 
 
-def _speech(recordings: HeldOutRecordings, condition: str, model: Model, listening: SelectionConfig) -> list[Speech]:
-    """Return the speech of all recordings, with all that any row needs."""
-    return speech_of_condition(recordings, condition, SelectionEngine(listening), _of_the_row(model.learned, listening))
-
-
 def _of_the_row(learned: SelectionModel, config: SelectionConfig) -> SelectionModel:
     """Return what training with a configuration makes of the same recordings."""
     if not config.articulation:
         learned = replace(learned, motion=replace(learned.motion, prior=None))
     return learned if config.joint_recogniser else replace(learned, phone_recogniser=None)
-
-
-def _row(recordings: HeldOutRecordings, clips: Sequence[ComparedClip], seed: int) -> dict[str, Any]:
-    """Return the figures of one row, but for its joins."""
-    figures = figures_of(clips, recordings, seed)
-    lips = figures["closures_p_b_m"]
-    row = opening_row(figures) | {key: lips[key] for key in ("false_per_minute", "original_per_minute")}
-    row["channels"] = {
-        channel: {figure: values[figure] for figure in WHAT_IS_SHOWN} for channel, values in figures["channels"].items()
-    }
-    return row

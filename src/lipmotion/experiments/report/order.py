@@ -66,11 +66,7 @@ class PaperOrder:
 
     def sentences(self) -> list[str]:
         """Return what held and what did not, sentence by sentence."""
-        found = [
-            f"In print: {self._listed(self.paper)}.",
-            f"Here: {self._listed(self.here)}.",
-            *self._of_the_best(),
-        ]
+        found = [f"In print: {self._listed(self.paper)}.", f"Here: {self._listed(self.here)}.", *self._of_the_best()]
         for sign, what in (
             (1, "Held: the interval of the difference is on the paper's side of 0"),
             (-1, "Reversed: it is on the other side"),

@@ -16,7 +16,6 @@ from lipmotion.engines import engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError, LipMotionError
 from lipmotion.experiments.report.page import FinishedPart, ReportPage
 from lipmotion.experiments.report.parts import PARTS, TEST, PartRun, can_draw
-from lipmotion.experiments.report.section import Section
 from lipmotion.experiments.report.shown_clip import ClipKeeper, write_videos
 from lipmotion.experiments.runner import DEFAULT_SETTINGS, ExperimentSettings, channels_with_opening, quick_part
 from lipmotion.experiments.stamp import Stamp
@@ -79,14 +78,22 @@ def experiment_report(
     Raises CorpusError: no utterances to train on or for an experiment of ``only``, or motion without an opening.
     Raises ExportError: the folder holds something else or cannot be written to, or another call is at work on it.
     """
-    wanted = _wanted(only)
+    unknown = [name for name in only or () if name not in PARTS]
+    if unknown:
+        raise InputError(f"no experiment {unknown[0]!r}; there are: {', '.join(PARTS)}")
+    wanted = [name for name in PARTS if only is None or name in only]
     corpus = quick_part(corpus, settings.seed) if quick else corpus
     possible, lacking = _possible(corpus, wanted, named=only is not None)
     check_apart((), [Source(corpus.path, "corpus")], folders=[folder])
     _check_folder(folder)
     with locked(folder):
         remove_unfinished(folder)
-        writer = _Writer(corpus, folder, quick, settings, lacking, _digest(corpus, quick, settings))
+        config, lexicon = settings.recogniser or HmmConfig(), settings.lexicon or Lexicon()
+        of_input = fingerprint(corpus, corpus.names(), engine_named("trajectory"), config, lexicon, GEOMETRY, None)
+        lists = [[split, *corpus.names(split)] for split in SPLITS]
+        writer = _Writer(
+            corpus, folder, quick, settings, lacking, f"{of_input} {lists} {quick} {settings.seed} {can_draw()}"
+        )
         writer.write_page(wanted)
         missing = [name for name in possible if writer.record(name) is None]
         whole = sum(PARTS[name].share for name in missing)
@@ -101,13 +108,6 @@ def experiment_report(
     verdicts = {part.name: part.section.verdict for part in finished}
     made = [name for name in missing if name not in writer.failed]
     return WrittenReport(folder / PAGE, verdicts, lacking, writer.failed, made)
-
-
-def _wanted(only: Sequence[str] | None) -> list[str]:
-    unknown = [name for name in only or () if name not in PARTS]
-    if unknown:
-        raise InputError(f"no experiment {unknown[0]!r}; there are: {', '.join(PARTS)}")
-    return [name for name in PARTS if only is None or name in only]
 
 
 def _possible(corpus: Corpus, wanted: Sequence[str], *, named: bool) -> tuple[list[str], dict[str, str]]:
@@ -243,12 +243,16 @@ class _Writer:
                 record: dict[str, Any] = {"experiment": name, "key": self.key(name), "stamp": made_with}
                 record["figures"] = figures
                 record |= {"videos": videos, "pictures": _moved_pictures(plots, made)}
-                _write_tables(section, made / "tables")
+                folder = made / "tables"
+                folder.mkdir()
+                for table in section.tables:
+                    with whole_file(folder / f"{table.name}.csv") as unfinished:
+                        unfinished.write_text(table.as_csv(), encoding="utf-8", newline="")
+                    _write_json(folder / f"{table.name}.json", table.as_content())
                 _write_json(made / MOTION, motion)
                 _write_json(made / FIGURES, record)
 
     def _command(self, wanted: Sequence[str]) -> list[str]:
-        """Return the words of a command for some experiments."""
         words = ["lipmotion", "experiment", "all", self.name, "-o", self.folder.resolve().name]
         words += ["--only", ",".join(wanted)] if len(wanted) < len(PARTS) else []
         words += ["--lexicon", "FILE"] if self.settings.lexicon else []
@@ -260,14 +264,6 @@ def told(error: Exception) -> str:
     return str(error) if isinstance(error, LipMotionError) else f"{type(error).__name__}: {error}"
 
 
-def _digest(corpus: Corpus, quick: bool, settings: ExperimentSettings) -> str:
-    """Return a digest of corpus, lists, configurations, versions and processor."""
-    config, lexicon = settings.recogniser or HmmConfig(), settings.lexicon or Lexicon()
-    of_input = fingerprint(corpus, corpus.names(), engine_named("trajectory"), config, lexicon, GEOMETRY, None)
-    lists = [[split, *corpus.names(split)] for split in SPLITS]
-    return f"{of_input} {lists} {quick} {settings.seed} {can_draw()}"
-
-
 def _moved_pictures(plots: Path | None, target: Path) -> list[dict[str, str]]:
     """Move the pictures of an experiment into its folder; return their files and captions."""
     if plots is None:
@@ -275,14 +271,6 @@ def _moved_pictures(plots: Path | None, target: Path) -> list[dict[str, str]]:
     for file in PLOT_CAPTIONS:
         shutil.move(plots / file, target / file)
     return [{"file": file, "caption": caption} for file, caption in PLOT_CAPTIONS.items()]
-
-
-def _write_tables(section: Section, folder: Path) -> None:
-    folder.mkdir()
-    for table in section.tables:
-        with whole_file(folder / f"{table.name}.csv") as unfinished:
-            unfinished.write_text(table.as_csv(), encoding="utf-8", newline="")
-        _write_json(folder / f"{table.name}.json", table.as_content())
 
 
 def _write_json(path: Path, content: Any) -> None:

@@ -18,13 +18,7 @@ from lipmotion.export.video import SOUND_HZ, write_mp4
 from lipmotion.export.web_page import Html
 from lipmotion.faces import Staging, staged_face
 from lipmotion.pipeline.evaluation.figures import BILABIAL
-from lipmotion.pipeline.evaluation.held_out import (
-    AUDIO_ONLY,
-    DISTANCES,
-    OPENING,
-    ComparedClip,
-    HeldOutRecordings,
-)
+from lipmotion.pipeline.evaluation.held_out import AUDIO_ONLY, DISTANCES, OPENING, ComparedClip, HeldOutRecordings
 from lipmotion.storage.files import whole_file
 from lipmotion.storage.json_text import as_json, from_json
 from lipmotion.types import Audio, Channel, Monitor, Motion, Span, Timeline, Unit, with_progress
@@ -105,44 +99,32 @@ def write_videos(
     The mouth as it was filmed is shown where the corpus has its pictures; else, and for every system, a drawn face.
     Raises ExportError: a video cannot be written.
     """
+    from scipy.signal import resample_poly
+
     utterance = corpus.utterance(content["name"])
-    sound, found = _sound(utterance.audio), []
+    samples = resample_poly(np.asarray(utterance.audio.samples, np.float32), SOUND_HZ, utterance.audio.rate_hz)
+    sound, found = Audio(samples.astype(np.float32), SOUND_HZ), []
     crops = utterance.track.crops
     if crops is not None and len(crops):
         write_mp4(folder / "mouth.mp4", map(_enlarged, crops), fps=utterance.track.motion.rate_hz, audio=sound)
         found.append({"file": "mouth.mp4", "caption": "the recording itself: the mouth as filmed"})
     shown = {RECORDED: content[RECORDED]}
     shown |= {name: content["systems"][name] for name in systems if name in content["systems"]}
-    silence = _silence(content["spoken"], utterance.audio.duration_s)
+    # No shape of a phone is drawn, the motion alone is shown: the face is given the silence around the phones.
+    spoken_s = (time_s for start_s, end_s, _ in content["spoken"] for time_s in (start_s, end_s))
+    edges = [0.0, *spoken_s, utterance.audio.duration_s]
+    gaps = [(start, end) for start, end in zip(edges[::2], edges[1::2], strict=True) if end - start > 1 / FPS]
+    silence = Timeline(tuple(Span(start, end, Unit("sil")) for start, end in gaps))
     for number, name in enumerate(with_progress(list(shown), "videos", monitor)):
-        motion = _motion(content, np.array(shown[name]), utterance.audio.duration_s)
+        values = np.array(shown[name])
+        time_s = np.arange(int(utterance.audio.duration_s * FPS) + 1) / FPS
+        columns = [np.interp(time_s, content["time_s"], column) for column in values.T]
+        motion = Motion(np.stack(columns, axis=1), FPS, tuple(map(Channel, content["channels"])))
         file = f"{number}.mp4"
         frames = (picture[LOWER_FACE] for picture in staged_face("woman", STAGING).render(motion, silence, fps=FPS))
         write_mp4(folder / file, frames, fps=FPS, audio=sound)
         found.append({"file": file, "caption": "a drawn face, recorded motion" if name == RECORDED else name})
     return found
-
-
-def _motion(content: Mapping[str, Any], values: NDArray[np.float64], duration_s: float) -> Motion:
-    """Return the motion of a clip at the rate of the video, from 0 s to the end of the sound."""
-    time_s = np.arange(int(duration_s * FPS) + 1) / FPS
-    columns = [np.interp(time_s, content["time_s"], column) for column in values.T]
-    return Motion(np.stack(columns, axis=1), FPS, tuple(map(Channel, content["channels"])))
-
-
-def _silence(spoken: Sequence[tuple[float, float, str]], duration_s: float) -> Timeline[Unit]:
-    """Return the silence around some phones: no shape of a phone is drawn, the motion alone is shown."""
-    edges = [0.0, *(time for start_s, end_s, _ in spoken for time in (start_s, end_s)), duration_s]
-    gaps = [(start, end) for start, end in zip(edges[::2], edges[1::2], strict=True) if end - start > 1 / FPS]
-    return Timeline(tuple(Span(start, end, Unit("sil")) for start, end in gaps))
-
-
-def _sound(audio: Audio) -> Audio:
-    """Return a sound at the rate of videos."""
-    from scipy.signal import resample_poly
-
-    samples = resample_poly(np.asarray(audio.samples, np.float32), SOUND_HZ, audio.rate_hz)
-    return Audio(samples.astype(np.float32), SOUND_HZ)
 
 
 def _enlarged(crop: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -19,7 +19,6 @@ from lipmotion.types import GREY
 
 CONVERGENCE_RECORDINGS, PREDICTED_RECORDINGS = 8, 6
 """Recordings that are shown in one picture."""
-DOTS_PER_INCH = 110
 PLOT_FILES = {"start": "conversion.png", "steps": "convergence.png", "clips": "predicted.png"}
 """File names of the pictures like Figs. 7, 10 and 11."""
 PLOT_CAPTIONS = dict(
@@ -73,7 +72,16 @@ def draw_plots(chains: TrainedSystem, recordings: HeldOutRecordings, folder: Pat
     make_folder(folder)
     _save(_conversion(figure, some, by_em[0], by_path[0]), folder / PLOT_FILES["start"])
     _save(_convergence(figure, some, chains), folder / PLOT_FILES["steps"])
-    _save(_predicted(figure, some, by_em[:PREDICTED_RECORDINGS]), folder / PLOT_FILES["clips"])
+    made = by_em[:PREDICTED_RECORDINGS]
+    picture = figure(figsize=(10, 2.2 * len(made)), layout="constrained")
+    all_axes = picture.subplots(len(made), 1, squeeze=False)[:, 0]
+    for axes, clip, utterance in zip(all_axes, made, some.utterances, strict=False):
+        axes.plot(clip.time_s, clip.original[:, 0], "k:", label="recorded")
+        axes.plot(clip.time_s, clip.generated[:, 0], color="tab:blue", label="predicted")
+        _label_axes(axes, some, f"{utterance.name}: {' '.join(utterance.words or ())}")
+    all_axes[0].legend(loc="upper right", ncols=2)
+    all_axes[-1].set_xlabel("time (s)")
+    _save(picture, folder / PLOT_FILES["clips"])
 
 
 def _conversion(figure: Any, recordings: HeldOutRecordings, by_em: ComparedClip, by_path: ComparedClip) -> Any:
@@ -104,18 +112,6 @@ def _convergence(figure: Any, recordings: HeldOutRecordings, chains: TrainedSyst
     return picture
 
 
-def _predicted(figure: Any, recordings: HeldOutRecordings, made: list[ComparedClip]) -> Any:
-    picture = figure(figsize=(10, 2.2 * len(made)), layout="constrained")
-    all_axes = picture.subplots(len(made), 1, squeeze=False)[:, 0]
-    for axes, clip, utterance in zip(all_axes, made, recordings.utterances, strict=False):
-        axes.plot(clip.time_s, clip.original[:, 0], "k:", label="recorded")
-        axes.plot(clip.time_s, clip.generated[:, 0], color="tab:blue", label="predicted")
-        _label_axes(axes, recordings, f"{utterance.name}: {' '.join(utterance.words or ())}")
-    all_axes[0].legend(loc="upper right", ncols=2)
-    all_axes[-1].set_xlabel("time (s)")
-    return picture
-
-
 def _label_axes(axes: Any, recordings: HeldOutRecordings, title: str) -> None:
     name = recordings.channels[0]
     unit = next(c.unit for c in recordings.utterances[0].track.motion.channels if c.name == name).replace("_", " ")
@@ -126,4 +122,4 @@ def _label_axes(axes: Any, recordings: HeldOutRecordings, title: str) -> None:
 
 def _save(picture: Any, path: Path) -> None:
     with whole_file(path) as unfinished:
-        picture.savefig(unfinished, format="png", dpi=DOTS_PER_INCH)
+        picture.savefig(unfinished, format="png", dpi=110)

@@ -127,11 +127,7 @@ def selected_systems(names: Sequence[str] | None) -> list[str]:
 
 
 def tuned_options(
-    name: str,
-    examples: Sequence[Example],
-    validation: HeldOutRecordings,
-    tuning: TuningOptions,
-    monitor: Monitor,
+    name: str, examples: Sequence[Example], validation: HeldOutRecordings, tuning: TuningOptions, monitor: Monitor
 ) -> list[Trial]:
     """Return all settings that were tried for a system of the paper.
 

@@ -91,9 +91,7 @@ def alternatives(options: Options, tuning: TuningOptions) -> list[list[dict[str,
 
 
 def tuned(
-    options: Options,
-    kinds: Sequence[Sequence[Options]],
-    attempt: Callable[[Options], Sequence[Trial]],
+    options: Options, kinds: Sequence[Sequence[Options]], attempt: Callable[[Options], Sequence[Trial]]
 ) -> list[Trial]:
     """Return all trials of a search that takes one kind of setting after another; the best is ``best_trial`` of them.
 

@@ -43,7 +43,16 @@ def frame_costs(generation: Generation, frames: int, fps: float, intensity: floa
     Where the motion has no channel ``opening`` or ``width``, the phones alone decide.
     """
     edges_s = np.arange(frames + 1) / fps
-    phone_values = _phone_values_of_frames(generation.units, edges_s)
+    silence = _phone_values(shapes_of_phone(SILENCE)[0], silent=True)
+    bounds_s, sums = [-LEAD_S], [np.zeros_like(silence)]
+    for span in generation.units:
+        start_s = span.start_s - LEAD_S
+        for part in shapes_of_phone(span.label.phone):
+            duration_s = part.share * span.duration_s
+            bounds_s += [start_s, start_s + duration_s]
+            sums += [sums[-1], sums[-1] + duration_s * (_phone_values(part, is_silent(span.label.phone)) - silence)]
+            start_s += duration_s
+    phone_values = silence + _integrals(np.array(bounds_s), np.array(sums), edges_s)
     cost, voiced, nominal = phone_values[:, : len(_NAMES)].copy(), phone_values[:, -3], phone_values[:, -2:]
     if "opening" in generation.motion.names:
         opening = _relative_opening(_means(generation.motion, "opening", edges_s), nominal[:, 0], voiced)
@@ -58,20 +67,6 @@ def frame_costs(generation: Generation, frames: int, fps: float, intensity: floa
         cost[frame] += penalty
         cost[frame, _NAMES.index(shape)] -= penalty
     return cost
-
-
-def _phone_values_of_frames(units: Timeline[Unit], edges_s: Array) -> Array:
-    """Return the mean of ``_phone_values`` over each frame [shape=(frames, 12)]; time without phones is silence."""
-    silence = _phone_values(shapes_of_phone(SILENCE)[0], silent=True)
-    bounds_s, sums = [-LEAD_S], [np.zeros_like(silence)]
-    for span in units:
-        start_s = span.start_s - LEAD_S
-        for part in shapes_of_phone(span.label.phone):
-            duration_s = part.share * span.duration_s
-            bounds_s += [start_s, start_s + duration_s]
-            sums += [sums[-1], sums[-1] + duration_s * (_phone_values(part, is_silent(span.label.phone)) - silence)]
-            start_s += duration_s
-    return silence + _integrals(np.array(bounds_s), np.array(sums), edges_s)
 
 
 def _phone_values(part: PhoneShapes, silent: bool) -> Array:

@@ -38,12 +38,7 @@ def text(sheet: CueSheet, sound_file: str) -> str:
     shown = shown_shapes(sheet)
     phrases = [words_of_run(sheet, first, last) for first, last in _runs(shown)]
     said = [" ".join(word for *_, word in phrase) for phrase in phrases]
-    lines = [
-        MARK,
-        _one_line(" ".join(sound_file.split())) or "sound.wav",
-        f"{sheet.fps:.0f}",
-        f"{len(shown)}",
-    ]
+    lines = [MARK, _one_line(" ".join(sound_file.split())) or "sound.wav", f"{sheet.fps:.0f}", f"{len(shown)}"]
     lines += ["1", "\tVoice 1", f"\t{'|'.join(said)}", f"\t{len(phrases)}"]
     for phrase, words in zip(phrases, said, strict=True):
         lines += [f"\t\t{words}", f"\t\t{phrase[0][0]}", f"\t\t{phrase[-1][1]}", f"\t\t{len(phrase)}"]

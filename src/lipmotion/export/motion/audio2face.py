@@ -11,7 +11,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -61,19 +60,15 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
     stated = document.get(FRAMES)
     if isinstance(stated, int) and stated != len(rows):
         LOG.warning("%s: %d frames are stated, %d are there", path, stated, len(rows))
-    return Motion(_checked_rows(names, rows), rate_hz, tuple(Channel(name, WEIGHT) for name in names)), Timeline(())
-
-
-_MEMBERS = members({NAMES: items(text(1000)), RATE: number()}, (NAMES, RATE))
-
-
-def _checked_rows(names: list[str], rows: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
     if not isinstance(rows, np.ndarray) or rows.ndim != 2 or rows.shape[1] != len(names):
         shape = rows.shape if isinstance(rows, np.ndarray) else "no"
         raise InputError(
             f"the member {WEIGHTS!r} has {shape} rows and columns, required a column for each of {NAMES!r}"
         )
-    return rows
+    return Motion(rows, rate_hz, tuple(Channel(name, WEIGHT) for name in names)), Timeline(())
+
+
+_MEMBERS = members({NAMES: items(text(1000)), RATE: number()}, (NAMES, RATE))
 
 
 MOTION_FORMAT = MotionFormat(write, read, curves="face", rate_hz=RATE_HZ, names_sound=True)

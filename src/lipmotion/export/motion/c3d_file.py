@@ -179,7 +179,6 @@ def _number(found: dict[str, Values], name: str, otherwise: float) -> float:
 
 
 def _parameters(content: bytes, at: int, numbers: _Numbers) -> dict[str, Values]:
-    """Return the parameters by ``GROUP.NAME``."""
     groups: dict[int, str] = {}
     found: list[tuple[int, str, Values]] = []
     while at + 2 <= len(content) and content[at]:
@@ -277,7 +276,6 @@ def _section(groups: dict[str, dict[str, int | float | Values]]) -> bytes:
 
 
 def _stored_parameter(value: int | float | Values) -> bytes:
-    """Return type, sizes and values of a parameter as bytes."""
     if isinstance(value, list):
         width = max((len(text.encode("ascii", "replace")) for text in value), default=0)
         texts = b"".join(text.encode("ascii", "replace").ljust(width) for text in value)

@@ -7,7 +7,6 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.printable import is_line
@@ -50,11 +49,22 @@ def parse(document: Any, values: Any) -> tuple[Motion, Timeline[Unit]]:
 
     Raises InputError: not a motion document, a newer version, or members that are missing or do not fit.
     """
-    _check(document)
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
+        raise InputError(f"not a motion document: its 'format' must be {FORMAT!r}")
+    version = document.get("version")
+    if not isinstance(version, int) or version < 1:
+        raise InputError(f"the motion document has version {version!r}, required {VERSION}; export it again")
+    if version > VERSION:
+        raise InputError(
+            f"the motion document has version {version}, this lipmotion reads up to {VERSION}: upgrade lipmotion"
+        )
     with json_errors("the motion document"):
         found = _DOCUMENT(document)
         channels = tuple(Channel(**channel) for channel in found["channels"])
-        motion = Motion(_array(values, len(channels)), found["rate_hz"], channels)
+        if isinstance(values, np.ndarray) and values.dtype.kind not in "fiu":
+            raise InputError(f"the motion document has values of {values.dtype}, required numbers; export it again")
+        array = np.asarray(values, dtype=np.float64)
+        motion = Motion(array.reshape(0, len(channels)) if array.size == 0 else array, found["rate_hz"], channels)
     return motion, parse_units(document.get("units"), document.get(RECOGNISED))
 
 
@@ -67,25 +77,6 @@ def parse_units(rows: Any, recognised: Any = None) -> Timeline[Unit]:
     with json_errors("the motion document"):
         confidences = [_recognised(*row) for row in _ROWS(recognised or [])]
         return with_confidences(Timeline(tuple(map(_span, _UNITS(rows)))), confidences)
-
-
-def _check(document: Any) -> None:
-    if not isinstance(document, dict) or document.get("format") != FORMAT:
-        raise InputError(f"not a motion document: its 'format' must be {FORMAT!r}")
-    version = document.get("version")
-    if not isinstance(version, int) or version < 1:
-        raise InputError(f"the motion document has version {version!r}, required {VERSION}; export it again")
-    if version > VERSION:
-        raise InputError(
-            f"the motion document has version {version}, this lipmotion reads up to {VERSION}: upgrade lipmotion"
-        )
-
-
-def _array(values: Any, channels: int) -> NDArray[np.float64]:
-    if isinstance(values, np.ndarray) and values.dtype.kind not in "fiu":
-        raise InputError(f"the motion document has values of {values.dtype}, required numbers; export it again")
-    array = np.asarray(values, dtype=np.float64)
-    return array.reshape(0, channels) if array.size == 0 else array
 
 
 def _row(span: Span[Unit]) -> dict[str, Any]:

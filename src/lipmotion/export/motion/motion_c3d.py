@@ -81,7 +81,16 @@ def read(path: Path) -> tuple[Motion, Timeline[Unit]]:
     """
     content = read_c3d(path)
     if content.software == SOFTWARE:
-        return _as_written(content), Timeline(())
+        eyes = {name for name, _ in EYES}
+        numbers = {column: MARKER.match(label) for column, label in enumerate(content.labels) if label not in eyes}
+        points = {column: found[1] for column, found in numbers.items() if found}
+        curves = zip(content.analog_labels, content.analog_units, strict=True)
+        channels = [Channel(name, unit or EYE_DISTANCE) for name, unit in curves]
+        channels += [Channel(f"{axis}_{point}") for point in points.values() for axis in "xyz"]
+        places = content.points[:, list(points)].reshape(len(content.points), -1) / MILLIMETRES
+        analog = content.analog[:, : len(content.analog_labels)]
+        values = np.concatenate([analog, places], axis=1) if len(analog) else places
+        return Motion(values, content.rate_hz, tuple(channels)), Timeline(())
     named = {label.split(":")[-1].strip(): column for column, label in enumerate(content.labels)}
     markers = {
         name: bridged
@@ -117,20 +126,6 @@ def _bridged(places: Array) -> Array | None:
         return None
     frames = np.arange(len(places))
     return np.stack([np.interp(frames, frames[seen], axis[seen]) for axis in places.T], axis=1)
-
-
-def _as_written(content: C3dFile) -> Motion:
-    """Return the motion of a file that ``write`` wrote: the curves first, then the points."""
-    eyes = {name for name, _ in EYES}
-    numbers = {column: MARKER.match(label) for column, label in enumerate(content.labels) if label not in eyes}
-    points = {column: found[1] for column, found in numbers.items() if found}
-    curves = zip(content.analog_labels, content.analog_units, strict=True)
-    channels = [Channel(name, unit or EYE_DISTANCE) for name, unit in curves]
-    channels += [Channel(f"{axis}_{point}") for point in points.values() for axis in "xyz"]
-    places = content.points[:, list(points)].reshape(len(content.points), -1) / MILLIMETRES
-    analog = content.analog[:, : len(content.analog_labels)]
-    values = np.concatenate([analog, places], axis=1) if len(analog) else places
-    return Motion(values, content.rate_hz, tuple(channels))
 
 
 MOTION_FORMAT = MotionFormat(write, read, check)

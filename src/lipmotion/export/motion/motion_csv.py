@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lipmotion.errors import ExportError, InputError, shortened
 from lipmotion.export.base import MotionFormat
@@ -73,11 +72,7 @@ def _read(table: TextTable) -> Motion:
         numbers.extend(numbers_in(fields, line))
     values = np.frombuffer(numbers, np.float64).reshape(-1, columns) if numbers else np.empty((0, columns))
     channels = (Channel(name, WEIGHT if arkit_name(name) else EYE_DISTANCE) for name in table.names[1:])
-    return Motion(values[:, 1:], _rate(values[:, 0]), tuple(channels))
-
-
-def _rate(time_s: NDArray[np.float64]) -> float:
-    """Return the frame rate in hertz. Raises InputError: too few rows, or times that are not even from 0."""
+    time_s = values[:, 0]
     if len(time_s) < 2:
         raise InputError("the table has fewer than two rows, so its frame rate is unknown; use .json or .npz")
     if not np.abs(time_s).max() < LONGEST_S:
@@ -85,7 +80,7 @@ def _rate(time_s: NDArray[np.float64]) -> float:
     step_s = (time_s[-1] - time_s[0]) / (len(time_s) - 1)
     if time_s[0] != 0 or not step_s > 0 or np.abs(np.diff(time_s) - step_s).max() > 1e-6:
         raise InputError("the column time_s must begin at 0 and rise in even steps")
-    return exact_rate(round(float(1 / step_s), 6))
+    return Motion(values[:, 1:], exact_rate(round(float(1 / step_s), 6)), tuple(channels))
 
 
 MOTION_FORMAT = MotionFormat(write, read, check)

@@ -84,15 +84,6 @@ def write(path: Path, generation: Generation, _source: Mapping[str, str], _model
                 kept = sorted({*kept, *(frame - 1 for frame in kept if frame)})
             morphs[morph] = [(frames[frame], float(values[frame])) for frame in kept]
     bones = {}
-    for bone, angles in _angles(motion).items():
-        turned = head_quaternions(angles) * MIRRORED
-        turns: Turns = [(frame, (x, y, z, w)) for frame, (x, y, z, w) in zip(frames, turned.tolist(), strict=True)]
-        bones[bone] = turns
-    _write_keys(path, morphs, bones)
-
-
-def _angles(motion: Motion) -> dict[str, np.ndarray]:
-    """Return the angles of the bones that a motion turns, as of ``head_quaternions`` [each shape=(T, 3)]."""
     curves = {name: motion[name].astype(np.float64) for name in (*ANGLES, *MOVED_BY["gaze"]) if name in motion.names}
     found = {}
     if {*ANGLES} <= {*curves}:
@@ -100,7 +91,11 @@ def _angles(motion: Motion) -> dict[str, np.ndarray]:
     if {*MOVED_BY["gaze"]} & {*curves}:
         still = dict.fromkeys(MOVED_BY["gaze"], np.zeros(len(motion.values)))
         found[EYES] = np.pad(given_gaze(still | curves), ((0, 0), (0, 1)))
-    return found
+    for bone, angles in found.items():
+        turned = head_quaternions(angles) * MIRRORED
+        turns: Turns = [(frame, (x, y, z, w)) for frame, (x, y, z, w) in zip(frames, turned.tolist(), strict=True)]
+        bones[bone] = turns
+    _write_keys(path, morphs, bones)
 
 
 def read(path: Path) -> tuple[Motion, Timeline[Unit]]:

@@ -46,7 +46,11 @@ def write(path: Path, generation: Generation, source: Mapping[str, str], _model:
     """Write one clip, named as the recording, with a curve for each weight of the motion."""
     motion, name = generation.motion, Path(source.get("path", "")).stem or "speech"
     end_s = float(motion.time_s[-1])
-    curves = [line for name in _weights(motion) for line in _curve(generation, name)]
+    curves = [
+        line
+        for name in [channel.name for channel in motion.channels if channel.unit == WEIGHT]
+        for line in _curve(generation, name)
+    ]
     lines = [
         *("%YAML 1.1", "%TAG !u! tag:unity3d.com,2011:", "--- !u!74 &7400000", "AnimationClip:"),
         *("  m_ObjectHideFlags: 0", "  m_CorrespondingSourceObject: {fileID: 0}", "  m_PrefabInstance: {fileID: 0}"),
@@ -78,12 +82,7 @@ def _quoted(name: str) -> str:
     return name if _PLAIN.fullmatch(name) else json.dumps(name, ensure_ascii=False)
 
 
-def _weights(motion: Motion) -> list[str]:
-    return [channel.name for channel in motion.channels if channel.unit == WEIGHT]
-
-
 def _curve(generation: Generation, name: str) -> Iterator[str]:
-    """Yield the lines of the curve of one blendshape."""
     motion = generation.motion
     values = np.round(FULL * motion[name].astype(np.float64), DECIMALS) + 0.0
     steps = name in generation.stepped

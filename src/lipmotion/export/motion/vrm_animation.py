@@ -40,10 +40,18 @@ def check(motion: Motion) -> None:
 def write(path: Path, generation: Generation, source: Mapping[str, str], _model: Mapping[str, str]) -> None:
     """Write a binary glTF without a mesh: bones, a node for each expression, and one animation of them."""
     motion, buffer = generation.motion, GltfBuffer()
-    curves = _expressions(motion)
+    curves = {name: motion[name].astype(np.float64) for name in (*VRM_VOWELS, *VRM_EMOTIONS) if name in motion.names}
+    if all(name in motion.names for name in BLINKS):
+        left, right = (motion[name].astype(np.float64) for name in BLINKS)
+        same = np.array_equal(left, right)
+        curves |= {"blink": left} if same else {"blinkLeft": left, "blinkRight": right}
+    curves = {name: np.clip(curve, 0, 1) for name, curve in curves.items()}
     stepped = [bool({*(BLINKS if name.startswith("blink") else (name,))} & {*generation.stepped}) for name in curves]
     time_s, rows = with_jumps(motion.time_s, np.stack(list(curves.values()), axis=1), stepped)
-    nodes = _bones()
+    nodes = [
+        {"name": name, "translation": [0.0, up, 0.0], "children": [n + 1]} for n, (name, up) in enumerate(BONES.items())
+    ]
+    del nodes[-1]["children"]
     samplers: list[dict[str, Any]] = []
     channels: list[dict[str, Any]] = []
 
@@ -80,25 +88,6 @@ def write(path: Path, generation: Generation, source: Mapping[str, str], _model:
         "accessors": buffer.accessors,
     }
     write_container(path, document, b"".join(buffer.chunks))
-
-
-def _expressions(motion: Motion) -> dict[str, Array]:
-    """Return the curves of the expressions, 0 to 1: one blink of both eyes where they do the same."""
-    curves = {name: motion[name].astype(np.float64) for name in (*VRM_VOWELS, *VRM_EMOTIONS) if name in motion.names}
-    if all(name in motion.names for name in BLINKS):
-        left, right = (motion[name].astype(np.float64) for name in BLINKS)
-        same = np.array_equal(left, right)
-        curves |= {"blink": left} if same else {"blinkLeft": left, "blinkRight": right}
-    return {name: np.clip(curve, 0, 1) for name, curve in curves.items()}
-
-
-def _bones() -> list[dict[str, Any]]:
-    """Return the nodes of the bones, from the hips up."""
-    nodes = [
-        {"name": name, "translation": [0.0, up, 0.0], "children": [n + 1]} for n, (name, up) in enumerate(BONES.items())
-    ]
-    del nodes[-1]["children"]
-    return nodes
 
 
 MOTION_FORMAT = MotionFormat(write, read_gltf_motion, check, curves="vowels", names_sound=True)

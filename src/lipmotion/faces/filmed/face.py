@@ -93,7 +93,10 @@ class FilmedFace:
         height, width = video.size
         seconds = len(video) / video.rate_hz
         explained = [f"{100 * float(space.explained.mean()):.1f} %" for space in (appearance.mouth, appearance.jaw)]
-        described = {key: _text(value) for key, value in self.about.items()}
+        described = {
+            key: "; ".join(map(str, value)) if isinstance(value, list) else str(value)
+            for key, value in self.about.items()
+        }
         return described | {
             "mouth": f"{appearance.mouth.summary}; {len(appearance.mouths)} candidates",
             "jaw": f"{len(appearance.jaw.channels)} components, {explained[1]} of the variance; "
@@ -223,7 +226,3 @@ def _take(arrays: Arrays, channels: tuple[Channel, ...]) -> SpokenTake:
     sound = Audio(stored["sound"].astype(np.float32) / np.float32(FULL_SCALE), int(stored["sound_rate_hz"]))
     motion = Motion(stored["motion"].astype(np.float64), float(stored["rate_hz"]), channels)
     return SpokenTake(sound, motion, stored["seen"])
-
-
-def _text(value: object) -> str:
-    return "; ".join(map(str, value)) if isinstance(value, list) else str(value)

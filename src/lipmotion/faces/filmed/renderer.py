@@ -160,7 +160,10 @@ class Stitcher:
         """Return the lower face of the footage, aligned [shape=(T, H, W, 3)]."""
         size = HEIGHT * self.appearance.scale, WIDTH * self.appearance.scale
         return np.stack(
-            [_grey_levels(cut(each.frame, to, size)) for each, to in zip(batch, self._maps(batch), strict=True)]
+            [
+                np.clip(np.rint(cut(each.frame, to, size)), 0, 255).astype(np.uint8)
+                for each, to in zip(batch, self._maps(batch), strict=True)
+            ]
         )
 
     def _maps(self, batch: Sequence[Background]) -> Array:
@@ -208,7 +211,3 @@ class Stitcher:
         scale = self.appearance.scale
         mask = moved_part(scale) if self.options.jaw else mouth_ellipse(scale)
         return feather(mask, FEATHER_PX * scale)
-
-
-def _grey_levels(picture: Floats) -> Picture:
-    return np.clip(np.rint(picture), 0, 255).astype(np.uint8)

@@ -30,11 +30,7 @@ FULL_NARROWING, FULL_WIDENING = 0.16, 0.12
 
 
 def head_poses(
-    motion: Motion,
-    units: Timeline[Unit],
-    fps: float,
-    staging: Staging | None = None,
-    prosody: Prosody | None = None,
+    motion: Motion, units: Timeline[Unit], fps: float, staging: Staging | None = None, prosody: Prosody | None = None
 ) -> list[CharacterPose]:
     """Return the pose of every video frame, frame n at ``n / fps`` seconds, to the end of the motion.
 

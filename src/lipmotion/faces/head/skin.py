@@ -167,14 +167,6 @@ class Skin:
         places = self.places(pose)
         change = normals_of(places, self.triangles) - self._meshed_rest
         normals = self.normals + self._calm * change
-        self._join_lips(normals, pose)
-        return places, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
-
-    def _join_lips(self, normals: Real, pose: CharacterPose) -> None:
-        """Turn normals beside the seam of closed lips, and at the corners, to those of the other lip.
-
-        What meets there has no edge of light between its two sides then.
-        """
         rows, closed = self.lip_rows(), closed_share(pose)
         normals[rows[VISIBLE_RINGS - 1]] += closed * (
             normals[rows[VISIBLE_RINGS - 2]] - normals[rows[VISIBLE_RINGS - 1]]
@@ -186,6 +178,7 @@ class Skin:
             normals[rows[ring]] += 0.5 * share * (own[_OPPOSITE] - own)
         outer = rows[1:VISIBLE_RINGS]
         normals[outer] += CORNER_SKIN_SHARE * (1 - pose.roundness) * _NEAR_CORNER * (self._before_lips - normals[outer])
+        return places, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
 
     def _bound(self, fill: Real) -> Binding:
         """Return how every vertex of the face is bound to the columns of the lips, and to the jaw.

@@ -83,10 +83,6 @@ def head_mesh(figure: Figure, *, moods: bool = False) -> Mesh:
             shapes.append(
                 Blendshape.between(f"eyeLook{name}{side}", rest, rest + share * moved, least=LEAST_DISPLACEMENT)
             )
-    return Mesh(rest, figure.triangles, _parts(figure), tuple(shapes), colours=_encoded(figure.colours))
-
-
-def _parts(figure: Figure) -> tuple[MeshPart, ...]:
     pieces = [(name, count, figure.parts[0]) for name, count in figure.skin.pieces.items()]
     pieces += [(each.name, len(each.triangles), each) for each in figure.parts[1:]]
     parts, first = [], 0
@@ -96,7 +92,7 @@ def _parts(figure: Figure) -> tuple[MeshPart, ...]:
         material = Material(name, (red, green, blue), min(2 * each.finish.gloss, 1.0))
         parts.append(MeshPart(name, first, first + count, material))
         first += count
-    return tuple(parts)
+    return Mesh(rest, figure.triangles, tuple(parts), tuple(shapes), colours=_encoded(figure.colours))
 
 
 def _encoded(light: Real) -> Real:
@@ -105,7 +101,6 @@ def _encoded(light: Real) -> Real:
     return np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1 / 2.4) - 0.055)
 
 
-CENTRE = (0.0, -0.03)
 PICTURE_HEIGHT = 3.35
 """Height of the picture, in eye distances."""
 
@@ -124,7 +119,7 @@ def mesh_of_figure(*, moods: bool = False) -> Mesh:
 
 def camera_for(width: int, height: int) -> Camera:
     """Return the camera for a size of pictures. Raises InputError: a size that is odd or under 64."""
-    return Camera(width, height, CENTRE, PICTURE_HEIGHT)
+    return Camera(width, height, (0.0, -0.03), PICTURE_HEIGHT)
 
 
 class Stage:

@@ -63,7 +63,20 @@ class EyePainter:
 
     def __init__(self, design: Design, window: Window) -> None:
         self._design, self._window = design, window
-        self.iris = _iris(window, design).pixels
+        layer, colours, eyes = Layer(window), design.palette, design.eyes
+        y, r = eyes.y, eyes.iris
+        for x in (eyes.x, -eyes.x):
+            if design.flat:
+                layer.fill(ellipse(x, y, r, r), colours.iris)
+                layer.fill(ellipse(x, y, 0.6 * r, 0.6 * r), colours.pupil)
+                layer.fill(ellipse(x - 0.3 * r, y - 0.35 * r, 0.28 * r, 0.28 * r), WHITE)
+                continue
+            light = Glow(x, y + 0.5 * r, 0.6 * r, 0.4 * r, colours.iris_light, 0.9)
+            layer.fill(ellipse(x, y, r, r), colours.iris, Rim(0.16 * r, colours.iris_dark, 1.0), light)
+            layer.fill(ellipse(x, y, 0.46 * r, 0.46 * r), colours.pupil)
+            layer.fill(ellipse(x - 0.3 * r, y - 0.32 * r, 0.22 * r, 0.22 * r), WHITE, opacity=0.95)
+            layer.fill(ellipse(x + 0.32 * r, y + 0.34 * r, 0.11 * r, 0.11 * r), WHITE, opacity=0.6)
+        self.iris = layer.pixels
         self.lids = lru_cache(maxsize=2 * LID_POSITIONS)(self._painted_lids)
         self._cached = lru_cache(maxsize=128)(self._painted)
 
@@ -173,21 +186,3 @@ def _lashes(layer: Layer, design: Design, lid: Knots, lower: Knots, side: int) -
         root_y = y + 0.35 * (lid[-2][1] - y)
         wing = open_curve([(x - 0.03, root_y), (x + 0.015, y - 0.012), (x + 0.046, y - 0.04)])
         layer.fill(_on(side, stroke(wing, [0.03, 0.02, 0])), colour)
-
-
-def _iris(window: Window, design: Design) -> Layer:
-    """Return a layer with both irises, looking straight ahead; the lights on them move with them only a little."""
-    layer, colours, eyes = Layer(window), design.palette, design.eyes
-    y, r = eyes.y, eyes.iris
-    for x in (eyes.x, -eyes.x):
-        if design.flat:
-            layer.fill(ellipse(x, y, r, r), colours.iris)
-            layer.fill(ellipse(x, y, 0.6 * r, 0.6 * r), colours.pupil)
-            layer.fill(ellipse(x - 0.3 * r, y - 0.35 * r, 0.28 * r, 0.28 * r), WHITE)
-            continue
-        light = Glow(x, y + 0.5 * r, 0.6 * r, 0.4 * r, colours.iris_light, 0.9)
-        layer.fill(ellipse(x, y, r, r), colours.iris, Rim(0.16 * r, colours.iris_dark, 1.0), light)
-        layer.fill(ellipse(x, y, 0.46 * r, 0.46 * r), colours.pupil)
-        layer.fill(ellipse(x - 0.3 * r, y - 0.32 * r, 0.22 * r, 0.22 * r), WHITE, opacity=0.95)
-        layer.fill(ellipse(x + 0.32 * r, y + 0.34 * r, 0.11 * r, 0.11 * r), WHITE, opacity=0.6)
-    return layer

@@ -230,8 +230,6 @@ def chosen_mouths(poses: Sequence[MouthPose], mouths: Sequence[str], fps: float)
 
 
 class _LayeredPicture:
-    """Draws frames of one drawing at one size."""
-
     def __init__(self, drawing: Drawing, staging: Staging) -> None:
         self._drawing, self._size = drawing, staging.size or OWN_SIZE
         self._opaque, self._scene = staging.background != TRANSPARENT, staging.background == SCENE
@@ -241,7 +239,15 @@ class _LayeredPicture:
         self._to_pixels = np.array([[scale, 0, -x * scale], [0, scale, -y * scale]])
         names = {name for layers, _ in drawing.shapes for name in layers}
         self._head = "head" if "head" in names else ""
-        self._behind, self._front = self._parts_around_head()
+        behind: list[tuple[Shape, tuple[float, float]]] = []
+        front: list[tuple[Shape, tuple[float, float]]] = []
+        passed = False
+        for layers, shape in self._drawing.shapes:
+            if self._in_head(layers):
+                passed = True
+            elif self._scene or "background" not in layers:
+                (front if passed else behind).append((shape, (0.0, 0.0)))
+        self._behind, self._front = self._paint(behind), self._paint(front)
         colour = staging.colour or ((255, 255, 255) if self._scene else None)
         if colour is not None:
             wall = np.ones_like(self._behind) * np.array([*colour, 1], np.float32)
@@ -265,18 +271,6 @@ class _LayeredPicture:
         alpha = whole[..., 3:]
         straight = np.where(alpha > 0, whole[..., :3] / np.maximum(alpha, 1e-6), 0)
         return np.asarray(np.clip(np.dstack([straight, alpha * 255]) + 0.5, 0, 255), np.uint8)
-
-    def _parts_around_head(self) -> tuple[Pixels, Pixels]:
-        """Return what is behind the layer ``head``, and what is in front of it; all behind if there is no head."""
-        behind: list[tuple[Shape, tuple[float, float]]] = []
-        front: list[tuple[Shape, tuple[float, float]]] = []
-        passed = False
-        for layers, shape in self._drawing.shapes:
-            if self._in_head(layers):
-                passed = True
-            elif self._scene or "background" not in layers:
-                (front if passed else behind).append((shape, (0.0, 0.0)))
-        return self._paint(behind), self._paint(front)
 
     def _in_head(self, layers: tuple[str, ...]) -> bool:
         return not self._head or self._head in layers

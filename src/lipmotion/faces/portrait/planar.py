@@ -72,7 +72,11 @@ class PlanarRasteriser:
         self._parts = parts = moving_parts(view, design)
         layers = still_layers(view.window(-9, -9, 9, 9), design, background)
         self._still = _bytes(_planes(layers.still)[:3])
-        self._skin = _packed(np.concatenate([_planes(layers.skin) * _COVER_AS_BYTE, layers.skin[None, ..., 4] * 255]))
+        values = np.concatenate([_planes(layers.skin) * _COVER_AS_BYTE, layers.skin[None, ..., 4] * 255])
+        planes, packed = _bytes(values), np.empty(values.shape, np.uint32)
+        for plane, into in zip(planes, packed, strict=True):
+            pack(plane, 0, 0, plane.shape[0], plane.shape[1], False, into)
+        self._skin = packed
         self._around = StillLayers(_planes(layers.below)[:3], _planes(layers.shade)[:3], _planes(layers.front))
         self._jaw_layers, self._brow_layers = self._cut(parts.jaw), self._cut(parts.brow)
         self._head = Box(*(edge // 2 * 2 for edge in _box(parts.head)))
@@ -81,7 +85,18 @@ class PlanarRasteriser:
         self._iris = _yuv(self._eye_painter.iris)
         self._skin_field, self._brow_field = SkinField(parts.jaw, design.lips), BrowField(parts.brow)
         self._head_field = HeadField(Window(view, self._head.x0, self._head.y0, self._head.x1, self._head.y1))
-        self._mouth_painter = MouthPainter(design, parts.mouth, _yuv_textures(mouth_textures(design)))
+        textures = mouth_textures(design)
+        found = {one.name: getattr(textures, one.name) for one in fields(textures)}
+        self._mouth_painter = MouthPainter(
+            design,
+            parts.mouth,
+            MouthTextures(
+                **{
+                    name: np.concatenate([texture[..., :3] @ FROM_RGB.T + OFFSETS, texture[..., 3:]], axis=-1)
+                    for name, texture in found.items()
+                }
+            ),
+        )
         chroma = self._still[1:].reshape(2, size // 2, 2, size // 2, 2).mean(axis=(2, 4))
         self._frame = np.concatenate([self._still[0].ravel(), _bytes(chroma).ravel()]).reshape(-1, size)
 
@@ -160,27 +175,8 @@ def _planes(pixels: NDArray[np.floating[Any]]) -> Singles:
     return np.ascontiguousarray(_yuv(pixels).transpose(2, 0, 1))
 
 
-def _yuv_textures(textures: MouthTextures) -> MouthTextures:
-    """Return textures, whose colours are not premultiplied, as brightness, two colours and opacity."""
-    found = {one.name: getattr(textures, one.name) for one in fields(textures)}
-    return MouthTextures(
-        **{
-            name: np.concatenate([texture[..., :3] @ FROM_RGB.T + OFFSETS, texture[..., 3:]], axis=-1)
-            for name, texture in found.items()
-        }
-    )
-
-
 def _bytes(values: NDArray[np.floating[Any]]) -> Bytes:
     return np.clip(values + 0.5, 0, 255).astype(np.uint8)
-
-
-def _packed(values: Singles) -> Packed:
-    """Return planes of values 0..255, packed."""
-    planes, packed = _bytes(values), np.empty(values.shape, np.uint32)
-    for plane, into in zip(planes, packed, strict=True):
-        pack(plane, 0, 0, plane.shape[0], plane.shape[1], False, into)
-    return packed
 
 
 def _pack(canvas: PlanarCanvas, box: Box) -> None:

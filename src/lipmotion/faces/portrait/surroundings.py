@@ -4,14 +4,7 @@ from __future__ import annotations
 
 from lipmotion.faces.portrait.design import WHITE, Design
 from lipmotion.faces.portrait.layer import Glow, Layer, Rim
-from lipmotion.faces.portrait.outlines import (
-    both_sides,
-    closed_curve,
-    lowered,
-    open_curve,
-    path_points,
-    stroke,
-)
+from lipmotion.faces.portrait.outlines import both_sides, closed_curve, lowered, open_curve, path_points, stroke
 from lipmotion.faces.portrait.view import Pixels, Window
 
 

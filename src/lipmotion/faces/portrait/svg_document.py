@@ -249,7 +249,15 @@ def _number(text: str, name: str) -> float:
 def _group(attributes: Mapping[str, str], around: _Group) -> _Group:
     """Return what an element hands down, or for a shape what it has itself."""
     _check_references(attributes)
-    style = _style(attributes)
+    names = (*_INHERITED, "opacity")
+    style = {name: attributes[name] for name in names if name in attributes}
+    for part in attributes.get("style", "").split(";"):
+        name, _, value = part.partition(":")
+        if name.strip() in names:
+            style[name.strip()] = value.strip()
+    for name, value in style.items():
+        if len(value) > LONGEST_VALUE_CHARACTERS:
+            raise InputError(f"{name} is {shortened(value)!r}, required a number or a plain colour")
     opacity = around.opacity * float(np.clip(_number(style.pop("opacity", "1"), "opacity"), 0, 1))
     matrix = around.matrix
     if "transform" in attributes:
@@ -267,19 +275,6 @@ def _check_references(attributes: Mapping[str, str]) -> None:
             )
         if _local(name).lower().startswith("on"):
             raise InputError(f"a script, {shortened(_local(name))!r}, is not allowed")
-
-
-def _style(attributes: Mapping[str, str]) -> dict[str, str]:
-    names = (*_INHERITED, "opacity")
-    style = {name: attributes[name] for name in names if name in attributes}
-    for part in attributes.get("style", "").split(";"):
-        name, _, value = part.partition(":")
-        if name.strip() in names:
-            style[name.strip()] = value.strip()
-    for name, value in style.items():
-        if len(value) > LONGEST_VALUE_CHARACTERS:
-            raise InputError(f"{name} is {shortened(value)!r}, required a number or a plain colour")
-    return style
 
 
 def _shape(group: _Group, lines: list[tuple[Points, bool]], *, filled: bool) -> Shape:

@@ -23,7 +23,7 @@ from lipmotion.errors import InputError, shortened
 from lipmotion.meshes.files.steady_rate import steady_rows
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, arkit_name, is_known
 from lipmotion.motion.rest import runs
-from lipmotion.storage.text_table import TextTable, numbers_in, open_table
+from lipmotion.storage.text_table import numbers_in, open_table
 from lipmotion.types import EYE_DISTANCE, WEIGHT, Channel, Motion, Timeline, Unit
 from lipmotion.types.motion import RADIAN
 
@@ -109,7 +109,22 @@ def read_curve_table(path: Path) -> tuple[Motion, NDArray[np.bool_]]:
     """
     try:
         with open_table(path) as table:
-            return _read(table)
+            names = table.plain_names
+            keys = list(map(column_key, names))
+            timed = next((column for column, key in enumerate(keys) if TIME_COLUMN.fullmatch(key)), None)
+            used = [n for n, key in enumerate(keys) if n != timed and not NO_CURVES.fullmatch(key)]
+            if timed is None or not 0 < len(used) <= MOST_CURVES:
+                raise ValueError(
+                    f"the first line is {shortened(','.join(names))!r}, required 'time_s,opening,...', or curves "
+                    "beside a column of times: Timecode,BlendshapeCount,JawOpen,... or timestamp_ms,jawOpen,..."
+                )
+            times, names, values = _rows(table.rows, names, timed, used, keys.index(COUNT) if COUNT in keys else None)
+            coded = bool(re.search("[:;]", times[0][1]))
+            if coded:
+                time_s = _seconds([_timecode(text, line) for line, text in times])
+            else:
+                time_s = in_seconds(np.array([numbers_in([text], line)[0] for line, text in times]), keys[timed])
+            return motion_at_times(names, time_s, values, WEIGHT if coded else EYE_DISTANCE)
     except (ValueError, OverflowError) as error:
         if isinstance(error, InputError):
             raise
@@ -119,25 +134,6 @@ def read_curve_table(path: Path) -> tuple[Motion, NDArray[np.bool_]]:
 def column_key(name: str) -> str:
     """Return the name of a column as it is compared: ``Time (ms)`` is ``timems``."""
     return re.sub(r"[\s_()\[\].-]+", "", name).lower()
-
-
-def _read(table: TextTable) -> tuple[Motion, NDArray[np.bool_]]:
-    names = table.plain_names
-    keys = list(map(column_key, names))
-    timed = next((column for column, key in enumerate(keys) if TIME_COLUMN.fullmatch(key)), None)
-    used = [n for n, key in enumerate(keys) if n != timed and not NO_CURVES.fullmatch(key)]
-    if timed is None or not 0 < len(used) <= MOST_CURVES:
-        raise ValueError(
-            f"the first line is {shortened(','.join(names))!r}, required 'time_s,opening,...', or curves beside "
-            "a column of times: Timecode,BlendshapeCount,JawOpen,... or timestamp_ms,jawOpen,..."
-        )
-    times, names, values = _rows(table.rows, names, timed, used, keys.index(COUNT) if COUNT in keys else None)
-    coded = bool(re.search("[:;]", times[0][1]))
-    if coded:
-        time_s = _seconds([_timecode(text, line) for line, text in times])
-    else:
-        time_s = in_seconds(np.array([numbers_in([text], line)[0] for line, text in times]), keys[timed])
-    return motion_at_times(names, time_s, values, WEIGHT if coded else EYE_DISTANCE)
 
 
 def _rows(
@@ -317,11 +313,23 @@ def _seconds(codes: list[Timecode]) -> Array:
     frames = np.array([code.frames for code in codes])
     day_s, mark = DAY_S, codes[0].mark
     if not mark:
-        return _counted_s(whole)
+        starts = np.flatnonzero(np.diff(whole)) + 1
+        if len(starts) < 2:
+            raise ValueError(
+                "the timecodes have no frames (HH:MM:SS), required HH:MM:SS:FF: a spreadsheet has shortened them"
+            )
+        rate = (starts[-1] - starts[0]) / ((whole[starts[-1]] - whole[starts[0]]) % DAY_S)
+        LOG.warning("the timecodes have no frames: %d rows are taken as even, %.2f a second", len(whole), rate)
+        return np.asarray(np.arange(len(whole)) / rate)
     if mark == ".":
         time_s = whole + frames
     else:
-        rate = _timecode_rate(whole, frames)
+        passed = np.flatnonzero(np.diff(whole) == 1)
+        most = int(frames.max() if len(passed) > 1 else frames[passed].max() if len(passed) else frames.max())
+        if most >= TIMECODE_RATES[-1]:
+            raise InputError(f"a timecode has frame {most}, required less than {TIMECODE_RATES[-1]}")
+        shown = next(rate for rate in TIMECODE_RATES if rate > most)
+        rate = shown if len(passed) else max(shown, APP_RATE)
         time_s = whole + frames / rate
         if mark == ";" or _drops_frames(whole, frames, rate):
             time_s, day_s = _dropped_s(whole, frames, rate), float(_dropped_s(np.array(DAY_S), np.array(0.0), rate))
@@ -341,28 +349,6 @@ def _drops_frames(whole: Array, frames: Array, rate: int) -> bool:
     first = np.flatnonzero((np.diff(whole) == 1) & (whole[1:] % 60 == 0) & (whole[1:] % 600 != 0)) + 1
     jumps = (frames[first - 1] >= rate - 1) & (np.floor(frames[first]) == rate // 15)
     return rate in {30, 60} and bool(len(first)) and bool(jumps.all())
-
-
-def _counted_s(whole: Array) -> Array:
-    """Return times of rows whose timecodes have no frames: as many even rows a second as there are in whole seconds."""
-    starts = np.flatnonzero(np.diff(whole)) + 1
-    if len(starts) < 2:
-        raise ValueError(
-            "the timecodes have no frames (HH:MM:SS), required HH:MM:SS:FF: a spreadsheet has shortened them"
-        )
-    rate = (starts[-1] - starts[0]) / ((whole[starts[-1]] - whole[starts[0]]) % DAY_S)
-    LOG.warning("the timecodes have no frames: %d rows are taken as even, %.2f a second", len(whole), rate)
-    return np.asarray(np.arange(len(whole)) / rate)
-
-
-def _timecode_rate(whole: Array, frames: Array) -> int:
-    """Return how many frames of the timecode make a second."""
-    passed = np.flatnonzero(np.diff(whole) == 1)
-    most = int(frames.max() if len(passed) > 1 else frames[passed].max() if len(passed) else frames.max())
-    if most >= TIMECODE_RATES[-1]:
-        raise InputError(f"a timecode has frame {most}, required less than {TIMECODE_RATES[-1]}")
-    shown = next(rate for rate in TIMECODE_RATES if rate > most)
-    return shown if len(passed) else max(shown, APP_RATE)
 
 
 def _in_order(time_s: Array) -> NDArray[np.bool_]:

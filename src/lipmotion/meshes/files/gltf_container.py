@@ -60,7 +60,13 @@ class GltfDocument:
         Raises InputError: no such file, a file elsewhere, too large, or damaged.
         """
         if uri.startswith("data:"):
-            return _data(uri, kind)
+            head, _, body = uri.partition(",")
+            if not head.endswith(";base64"):
+                raise InputError(f"its {kind} is {shortened(head)!r}, required base64; export as .glb")
+            try:
+                return base64.b64decode(body, validate=True)
+            except (binascii.Error, ValueError) as error:
+                raise InputError(f"its {kind} is no base64 ({error}); export as .glb") from error
         name = unquote(uri) if len(uri) <= LONGEST_NAME_CHARACTERS else uri
         if not name or len(name) > LONGEST_NAME_CHARACTERS or Path(name).name != name or "\\" in name or "\0" in name:
             raise InputError(f"its {kind} is {shortened(repr(name))}, required a file in the same folder")
@@ -88,8 +94,16 @@ def read_gltf_document(path: Path) -> GltfDocument:
         document = GltfDocument(json, gltf_schema(json)(json), path.parent, budget)
     except SchemaError as error:
         raise InputError(f"{error}; export it again") from error
-    _check_extensions(document.parts.get("extensionsRequired", []))
-    _add_buffers(document, binary)
+    for name in document.parts.get("extensionsRequired", []):
+        if name == "KHR_draco_mesh_compression":
+            raise InputError("it is compressed by Draco, which is not read; export it without, or with meshopt")
+        if name not in READABLE and not name.startswith("KHR_materials_"):
+            raise InputError(f"it requires the extension {shortened(name)!r}, which is not read; export without it")
+    for number, buffer in enumerate(document.items("buffers")):
+        if "uri" in buffer:
+            document.buffers[number] = memoryview(document.linked(buffer["uri"], "buffer"))
+        elif number == 0 and binary is not None:
+            document.buffers[number] = binary
     return document
 
 
@@ -140,29 +154,3 @@ def _json(text: bytes, budget: Budget) -> Any:
         return from_json(text)
     except ValueError as error:
         raise InputError(f"no glTF document ({shortened(str(error))}); give a .glb, .gltf or .vrm file") from error
-
-
-def _check_extensions(required: list[str]) -> None:
-    for name in required:
-        if name == "KHR_draco_mesh_compression":
-            raise InputError("it is compressed by Draco, which is not read; export it without, or with meshopt")
-        if name not in READABLE and not name.startswith("KHR_materials_"):
-            raise InputError(f"it requires the extension {shortened(name)!r}, which is not read; export without it")
-
-
-def _add_buffers(document: GltfDocument, binary: memoryview | None) -> None:
-    for number, buffer in enumerate(document.items("buffers")):
-        if "uri" in buffer:
-            document.buffers[number] = memoryview(document.linked(buffer["uri"], "buffer"))
-        elif number == 0 and binary is not None:
-            document.buffers[number] = binary
-
-
-def _data(uri: str, kind: str) -> bytes:
-    head, _, body = uri.partition(",")
-    if not head.endswith(";base64"):
-        raise InputError(f"its {kind} is {shortened(head)!r}, required base64; export as .glb")
-    try:
-        return base64.b64decode(body, validate=True)
-    except (binascii.Error, ValueError) as error:
-        raise InputError(f"its {kind} is no base64 ({error}); export as .glb") from error

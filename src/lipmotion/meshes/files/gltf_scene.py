@@ -311,7 +311,19 @@ class _SceneSurface:
         for number in sorted(self._nodes):
             node = self._document.items("nodes")[number]
             if "mesh" in node:
-                self._add_node(number, node, self._document.items("meshes")[node["mesh"]])
+                mesh = self._document.items("meshes")[node["mesh"]]
+                name = plain_name(node.get("name") or mesh.get("name", "")) or f"mesh {node['mesh']}"
+                self._budget.spend("parts", len(mesh["primitives"]))
+                for primitive in mesh["primitives"]:
+                    if primitive.get("mode", TRIANGLES) == TRIANGLES and "POSITION" in primitive["attributes"]:
+                        attributes = primitive["attributes"]
+                        moved = tuple(target.get("POSITION") for target in primitive.get("targets", []))
+                        shared = (number, attributes["POSITION"], attributes.get("COLOR_0"), moved)
+                        if shared not in self._blocks:
+                            self._blocks[shared] = self._block(
+                                number, primitive, target_names(self._document, mesh, primitive)
+                            )
+                        self._add_primitive(primitive, name, self._blocks[shared])
         if not self._triangles:
             raise InputError("there are no triangles in it; export the surface")
         turn = np.array([-1.0, 1.0, -1.0]) if looks_backwards(self._document) else np.ones(3)
@@ -338,21 +350,13 @@ class _SceneSurface:
         rows, moved = zip(*self._moved.pop(name), strict=True)
         return Blendshape(name, np.concatenate(rows), np.concatenate(moved) * turn)
 
-    def _add_node(self, number: int, node: dict[str, Any], mesh: dict[str, Any]) -> None:
-        name = plain_name(node.get("name") or mesh.get("name", "")) or f"mesh {node['mesh']}"
-        self._budget.spend("parts", len(mesh["primitives"]))
-        for primitive in mesh["primitives"]:
-            if primitive.get("mode", TRIANGLES) == TRIANGLES and "POSITION" in primitive["attributes"]:
-                attributes = primitive["attributes"]
-                moved = tuple(target.get("POSITION") for target in primitive.get("targets", []))
-                shared = (number, attributes["POSITION"], attributes.get("COLOR_0"), moved)
-                if shared not in self._blocks:
-                    self._blocks[shared] = self._block(number, primitive, target_names(self._document, mesh, primitive))
-                self._add_primitive(primitive, name, self._blocks[shared])
-
     def _add_primitive(self, primitive: dict[str, Any], name: str, block: _SharedVertices) -> None:
         attributes, count = primitive["attributes"], len(block.vertices)
-        corners = self._corners(primitive, count)
+        size = self._arrays.count(primitive["indices"]) if "indices" in primitive else count
+        self._budget.spend("triangles", -(-size // 3))
+        corners = self._arrays.whole(primitive["indices"], 1)[:, 0] if "indices" in primitive else np.arange(count)
+        if size % 3 or (size and not 0 <= corners.min() <= corners.max() < count):
+            raise InputError(f"triangles of vertices up to {corners.max(initial=0)} of {count}; export it again")
         if not corners.size:
             return
         material = self._materials.material(primitive.get("material"))
@@ -376,15 +380,6 @@ class _SceneSurface:
         self._triangles.append(corners.reshape(-1, 3) + block.first)
         self._parts.append((self._names.unused(name, material.name), material))
         self._uv.append(mapped)
-
-    def _corners(self, primitive: dict[str, Any], count: int) -> NDArray[np.int64]:
-        """Return the vertices of the corners of triangles, counted in their block [shape=(3 · F,)]."""
-        size = self._arrays.count(primitive["indices"]) if "indices" in primitive else count
-        self._budget.spend("triangles", -(-size // 3))
-        corners = self._arrays.whole(primitive["indices"], 1)[:, 0] if "indices" in primitive else np.arange(count)
-        if size % 3 or (size and not 0 <= corners.min() <= corners.max() < count):
-            raise InputError(f"triangles of vertices up to {corners.max(initial=0)} of {count}; export it again")
-        return corners
 
     def _block(self, number: int, primitive: dict[str, Any], names: list[str]) -> _SharedVertices:
         """Return the vertices of a primitive at their places in the scene; keep its bones and morph targets."""

@@ -118,7 +118,6 @@ def read_gltf_motion(path: Path) -> tuple[Motion, Timeline[Unit]]:
 
 
 def _moves_mouth(track: _Track) -> bool:
-    """Return whether a shape of the mouth changes."""
     keys = track.keys[:, 1] if track.kind == CUBIC else track.keys
     mouth = [spoken_name(name) is not None or arkit_name(name) in ARKIT_MOUTH for name in track.names]
     return bool((np.ptp(keys, axis=0) > STILL)[mouth].any())
@@ -211,7 +210,13 @@ def _targets(document: GltfDocument, animation: dict[str, Any]) -> Iterator[tupl
 
 def _tracks(document: GltfDocument, arrays: GltfArrays, animation: dict[str, Any]) -> Iterator[_Track]:
     """Yield what moves a face in an animation. Raises InputError: its keys are damaged."""
-    expressions = _expressions(document)
+    given = document.parts.get("extensions", {}).get("VRMC_vrm_animation", {}).get("expressions", {})
+    expressions = {
+        each["node"]: plain_name(name)
+        for kind in ("preset", "custom")
+        for name, each in given.get(kind, {}).items()
+        if "node" in each
+    }
     for node, path, sampler in _targets(document, animation):
         if path.startswith("weights"):
             owner, one = document.items("nodes")[node].get("mesh", -1), path.partition("/")[2]
@@ -233,14 +238,3 @@ def _track(arrays: GltfArrays, sampler: dict[str, Any], names: tuple[str, ...], 
     values = arrays.floats(sampler["output"], width, rows * len(times))[:, : width if turns else 1]
     shape = (len(times), 3, len(names)) if kind == CUBIC else (len(times), len(names))
     return _Track(names, times, values.reshape(shape), kind)
-
-
-def _expressions(document: GltfDocument) -> dict[int, str]:
-    """Return the names of the expressions of a VRM animation by the numbers of their nodes."""
-    given = document.parts.get("extensions", {}).get("VRMC_vrm_animation", {}).get("expressions", {})
-    return {
-        each["node"]: plain_name(name)
-        for kind in ("preset", "custom")
-        for name, each in given.get(kind, {}).items()
-        if "node" in each
-    }

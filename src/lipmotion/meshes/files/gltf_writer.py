@@ -182,7 +182,17 @@ def _primitive(
     if mesh.colours is not None:
         attributes["COLOR_0"] = buffer.add(_linear(mesh.colours[rows]), "VEC3", target=VERTICES)
     if scene.turn is not None:
-        attributes |= _joint_attributes(buffer, scene.turn.share[rows])
+        share = scene.turn.share[rows]
+        joints = np.zeros((len(share), 4), np.uint8)
+        joints[:, 1] = share > 0
+        weights = np.zeros((len(share), 4))
+        weights[:, 1] = share.astype("<f4")
+        weights[:, 0] = 1 - weights[:, 1]
+        joints[weights == 0] = 0
+        attributes |= {
+            "JOINTS_0": buffer.add_bytes(joints, "VEC4", target=VERTICES),
+            "WEIGHTS_0": buffer.add(weights, "VEC4", target=VERTICES),
+        }
     moved = np.zeros((len(mesh.vertices), 3))
     targets = []
     for shape, (turned, change) in zip(shapes, normals.turned, strict=False):
@@ -204,20 +214,6 @@ def _primitive(
         "material": len(materials) - 1,
     }
     return primitive | ({"targets": targets} if targets else {})
-
-
-def _joint_attributes(buffer: GltfBuffer, share: NDArray[np.float64]) -> dict[str, int]:
-    """Add how far vertices follow the body (joint 0) and the head (joint 1); return the numbers of the accessors."""
-    joints = np.zeros((len(share), 4), np.uint8)
-    joints[:, 1] = share > 0
-    weights = np.zeros((len(share), 4))
-    weights[:, 1] = share.astype("<f4")
-    weights[:, 0] = 1 - weights[:, 1]
-    joints[weights == 0] = 0
-    return {
-        "JOINTS_0": buffer.add_bytes(joints, "VEC4", target=VERTICES),
-        "WEIGHTS_0": buffer.add(weights, "VEC4", target=VERTICES),
-    }
 
 
 def _add_joints(document: dict[str, Any], buffer: GltfBuffer, turn: HeadTurn) -> None:

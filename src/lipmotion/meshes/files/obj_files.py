@@ -60,7 +60,20 @@ class _Surface:
     def add(self, kind: bytes, words: list[bytes]) -> None:
         """Add a line. Raises ValueError: it is damaged, or there are too many."""
         if kind == b"f":
-            self._add_polygon(words)
+            if not 3 <= len(words) <= MOST_CORNERS:
+                raise InputError(f"a polygon of {len(words)} corners, required 3 to {MOST_CORNERS}")
+            self.budget.spend("triangles", len(words) - 2)
+            if self.here not in self.names:
+                self.budget.spend("parts", 1)
+                self.names[self.here] = len(self.names)
+            vertices, textures = len(self.vertices) // 3, len(self.textures) // 2
+            split = [word.split(b"/", 2) for word in words]
+            corners = [_index(each[0], vertices) for each in split]
+            mapped = [_index(each[1], textures) if len(each) > 1 and each[1] else -1 for each in split]
+            for n in range(1, len(words) - 1):
+                self.corners.extend((corners[0], corners[n], corners[n + 1]))
+                self.mapped.extend((mapped[0], mapped[n], mapped[n + 1]))
+                self.parts.append(self.names[self.here])
         elif kind == b"v":
             self.budget.spend("vertices", 1)
             _add_vertex(self.vertices, words)
@@ -74,22 +87,6 @@ class _Surface:
             self.here = (self.here[0], _text(words))
         elif kind == b"mtllib":
             self.library = _text(words)
-
-    def _add_polygon(self, words: list[bytes]) -> None:
-        if not 3 <= len(words) <= MOST_CORNERS:
-            raise InputError(f"a polygon of {len(words)} corners, required 3 to {MOST_CORNERS}")
-        self.budget.spend("triangles", len(words) - 2)
-        if self.here not in self.names:
-            self.budget.spend("parts", 1)
-            self.names[self.here] = len(self.names)
-        vertices, textures = len(self.vertices) // 3, len(self.textures) // 2
-        split = [word.split(b"/", 2) for word in words]
-        corners = [_index(each[0], vertices) for each in split]
-        mapped = [_index(each[1], textures) if len(each) > 1 and each[1] else -1 for each in split]
-        for n in range(1, len(words) - 1):
-            self.corners.extend((corners[0], corners[n], corners[n + 1]))
-            self.mapped.extend((mapped[0], mapped[n], mapped[n + 1]))
-            self.parts.append(self.names[self.here])
 
 
 def read_obj(path: Path) -> Mesh:
@@ -114,7 +111,19 @@ def read_obj(path: Path) -> Mesh:
     if not surface.corners:
         raise InputError(f"{path}: there are no polygons in it, required a mesh; export the surface, not points alone")
     used = {material for _, material in surface.names}
-    return _mesh(surface, vertices, uv, painted, _materials(path.parent, surface.library, used, budget))
+    materials = _materials(path.parent, surface.library, used, budget)
+    part = np.array(surface.parts)
+    order = np.argsort(part, kind="stable")
+    stops = np.cumsum([0, *np.bincount(part, minlength=len(surface.names))])
+    parts = tuple(
+        MeshPart(group or material, int(first), int(stop), materials.get(material, Material(material)))
+        for (group, material), first, stop in zip(surface.names, stops, stops[1:], strict=False)
+    )
+    textures = np.array(surface.mapped).reshape(-1, 3)[order]
+    mapped = np.where(textures[..., None] >= 0, uv[textures], 0.0) if len(uv) else None
+    triangles = np.array(surface.corners, np.int32).reshape(-1, 3)[order]
+    colours = _colours(painted, triangles, parts)
+    return Mesh(vertices, triangles, parts, uv=mapped, colours=colours)
 
 
 def read_obj_folder(folder: Path, wanted: Callable[[str], bool] = lambda _: True) -> Mesh:
@@ -146,27 +155,6 @@ def read_obj_folder(folder: Path, wanted: Callable[[str], bool] = lambda _: True
         shapes.append(Blendshape.between(path.stem, mesh.vertices, vertices, least=least))
         budget.spend("displacements", len(shapes[-1].rows))
     return replace(mesh, shapes=tuple(shapes))
-
-
-def _mesh(
-    surface: _Surface,
-    vertices: NDArray[np.float64],
-    uv: NDArray[np.float64],
-    painted: NDArray[np.float64],
-    materials: dict[str, Material],
-) -> Mesh:
-    part = np.array(surface.parts)
-    order = np.argsort(part, kind="stable")
-    stops = np.cumsum([0, *np.bincount(part, minlength=len(surface.names))])
-    parts = tuple(
-        MeshPart(group or material, int(first), int(stop), materials.get(material, Material(material)))
-        for (group, material), first, stop in zip(surface.names, stops, stops[1:], strict=False)
-    )
-    textures = np.array(surface.mapped).reshape(-1, 3)[order]
-    mapped = np.where(textures[..., None] >= 0, uv[textures], 0.0) if len(uv) else None
-    triangles = np.array(surface.corners, np.int32).reshape(-1, 3)[order]
-    colours = _colours(painted, triangles, parts)
-    return Mesh(vertices, triangles, parts, uv=mapped, colours=colours)
 
 
 def _colours(

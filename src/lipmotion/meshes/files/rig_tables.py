@@ -30,7 +30,6 @@ CONTROL = "control"
 """The unit of controls of a user's rig."""
 LARGEST_TABLE_BYTES, MOST_CONTROLS = 1 << 20, 2000
 LARGEST_NUMBER = 1e6
-TABLE_SUFFIX = ".character.csv"
 SOURCES = (*ARKIT_52, *(f"viseme_{name}" for name in VISEMES_15), *VRM_VOWELS, CLOSED, *VRM_EMOTIONS)
 """The curves that blendshapes of a character may follow; besides, each what its own shape fits best: its own name."""
 CLOSED_VISEME = "viseme_PP"
@@ -76,7 +75,17 @@ def read_rig_table(path: Path) -> tuple[RigRow, ...]:
         if texts["control"].startswith("#"):
             continue
         try:
-            rows.append(_row(texts))
+            if not texts["control"]:
+                raise ValueError("a row without a control")
+            numbers = {
+                name: _number(texts[name], default)
+                for name, default in (("gain", 1.0), ("offset", 0.0), ("low", -np.inf), ("high", np.inf))
+            }
+            if numbers["low"] > numbers["high"]:
+                raise ValueError(
+                    f"the control {texts['control']!r} goes from {numbers['low']:g} to {numbers['high']:g}"
+                )
+            rows.append(RigRow(texts["control"], texts["source"], **numbers))
         except ValueError as error:
             raise InputError(f"{path}: line {line}: {shortened(str(error))}") from error
     if not rows or len(rows) > MOST_CONTROLS:
@@ -125,18 +134,6 @@ def rig_motion(rows: tuple[RigRow, ...], sources: Mapping[str, NDArray[np.float6
     return Motion(np.stack(columns, axis=1), rate_hz, tuple(Channel(name, CONTROL) for name in curves))
 
 
-def _row(texts: Mapping[str, str]) -> RigRow:
-    if not texts["control"]:
-        raise ValueError("a row without a control")
-    numbers = {
-        name: _number(texts[name], default)
-        for name, default in (("gain", 1.0), ("offset", 0.0), ("low", -np.inf), ("high", np.inf))
-    }
-    if numbers["low"] > numbers["high"]:
-        raise ValueError(f"the control {texts['control']!r} goes from {numbers['low']:g} to {numbers['high']:g}")
-    return RigRow(texts["control"], texts["source"], **numbers)
-
-
 def _number(text: str, default: float) -> float:
     if not text:
         return default
@@ -149,7 +146,7 @@ def _number(text: str, default: float) -> float:
 def table_path(character: Path) -> Path:
     """Return where the table of a character is: ``head.glb`` has ``head.glb.character.csv`` in the same folder."""
     named = character.resolve() if character.name in {"", ".."} else character
-    return named.parent / f"{named.name}{TABLE_SUFFIX}"
+    return named.parent / f"{named.name}.character.csv"
 
 
 def read_character_table(character: Path, mesh: Mesh) -> dict[str, RigRow]:

@@ -73,7 +73,10 @@ def steady_rows(time_s: Array, rows: Array) -> tuple[Array, float]:
     if min(off, known_off[0]) <= EVEN_SHARE:
         fits = (hertz for hertz, each in zip(known_hz, known_off, strict=True) if each <= 2 * off + ROUNDING_SHARE)
         return rows, next(fits, round(mean_hz, 6))
-    hertz = _usual(1 / float(np.median(steps)))
+    hertz = 1 / float(np.median(steps))
+    nearest = min(USUAL_RATES_HZ, key=lambda usual: abs(usual - hertz))
+    if abs(nearest - hertz) <= NEAR_RATE * nearest:
+        hertz = nearest
     frames = round(float(passed_s[-1]) * hertz) + 1
     if frames > LONGEST_GAP * len(time_s) + SPARE_FRAMES:
         raise InputError(
@@ -87,9 +90,3 @@ def steady_rows(time_s: Array, rows: Array) -> tuple[Array, float]:
 def _unevenness(passed_s: Array, hertz: float) -> float:
     """Return how far times are from an even grid at most, as a share of a step."""
     return float(np.abs(passed_s * hertz - np.arange(len(passed_s))).max())
-
-
-def _usual(hertz: float) -> float:
-    """Return the usual rate next to a measured one, or the measured one."""
-    nearest = min(USUAL_RATES_HZ, key=lambda usual: abs(usual - hertz))
-    return nearest if abs(nearest - hertz) <= NEAR_RATE * nearest else hertz

@@ -191,7 +191,6 @@ def _material(place: str, part: MeshPart, *, painted: bool) -> Iterator[str]:
 
 
 def _codes_hz(scene: Scene) -> float:
-    """Return the number of time codes a second."""
     return scene.weights.rate_hz if scene.weights and scene.weights.rate_hz <= FASTEST_HZ else USUAL_HZ
 
 

@@ -114,11 +114,7 @@ class DrivenCharacter:
         return self._own_curves.weights(motion, units, self.shapes)
 
     def poses(
-        self,
-        motion: Motion,
-        units: Timeline[Unit],
-        time_s: Array,
-        others: Mapping[str, Array] | None = None,
+        self, motion: Motion, units: Timeline[Unit], time_s: Array, others: Mapping[str, Array] | None = None
     ) -> list[DrivenPose]:
         """Return the pose at some times in seconds, evenly spaced, for ``posed``.
 
@@ -128,8 +124,10 @@ class DrivenCharacter:
         Raises InputError: as ``point_motion``.
         """
         points = point_motion(motion, units)
-        beside, contact = self._beside(others or {}, len(time_s)), points.mouth.contact
-        moved = points.expressed
+        count = len(time_s)
+        columns = [*self.beside(others or {}, count).values(), *(np.zeros(count) for _ in self._expressions)]
+        beside = np.stack(columns, axis=1) if columns else np.zeros((count, 0))
+        moved, contact = points.expressed, points.mouth.contact
         if self.shapes is not None:
             moved = self.weights(motion, units).values.astype(np.float64)
         rows = in_pictures(moved, contact, motion.rate_hz, time_s)
@@ -173,7 +171,11 @@ class DrivenCharacter:
     def posed(self, pose: DrivenPose) -> Array:
         """Return the vertices in a pose [shape=(V, 3)]."""
         if self.shapes is not None:
-            return self._shaped(pose.mouth @ self._displacements, pose.others)
+            vertices = self.mesh.vertices.copy()
+            vertices[self.moving] += (pose.mouth @ self._displacements).reshape(-1, 3)
+            if pose.others.any():
+                vertices[self.moving] += (pose.others @ self._others).reshape(-1, 3)
+            return vertices
         vertices = self._binding.moved(self.mesh, pose.mouth)
         vertices[self.moving] += (pose.others @ self._others).reshape(-1, 3)
         return vertices
@@ -229,7 +231,6 @@ class DrivenCharacter:
 
     @cached_property
     def _mouth_names(self) -> tuple[str, ...]:
-        """The mesh's names of the blendshapes of the mouth."""
         if self._own_curves is not None:
             return tuple(dict.fromkeys(row.control for row in self._own_curves.rows))
         return self.shapes.names if self.shapes else ()
@@ -257,18 +258,6 @@ class DrivenCharacter:
 
     def _moved(self, names: Sequence[str]) -> Array:
         return self.mesh.displacements(self.moving, names).reshape(len(names), 3 * len(self.moving))
-
-    def _beside(self, others: Mapping[str, Array], count: int) -> Array:
-        """Return the weights of the blendshapes of eyes and brows over time [shape=(T, S)]."""
-        columns = [*self.beside(others, count).values(), *(np.zeros(count) for _ in self._expressions)]
-        return np.stack(columns, axis=1) if columns else np.zeros((count, 0))
-
-    def _shaped(self, moved: Array, other: Array) -> Array:
-        vertices = self.mesh.vertices.copy()
-        vertices[self.moving] += moved.reshape(-1, 3)
-        if other.any():
-            vertices[self.moving] += (other @ self._others).reshape(-1, 3)
-        return vertices
 
 
 def driven_character(

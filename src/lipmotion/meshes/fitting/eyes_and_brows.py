@@ -142,7 +142,10 @@ def gaze_weights(gaze: Array) -> dict[str, Array]:
 def eye_and_brow_weights(moved: Liveliness) -> dict[str, Array]:
     """Return the weights of ARKit's blendshapes of eyes and brows, 0 to 1 [each shape=(F,)]; given ones as they are."""
     gaze, raised = gaze_weights(moved.gaze), np.clip(moved.brows / FULL_BROW_RISE, 0, 1)
-    moods = _of_moods(moved) if moved.units else {}
+    moods: dict[str, Array] = {}  # of both sides alike
+    if moved.units:
+        moods = {name: moved.unit(number) for number, name in GIVEN_UNITS.items() if name != "mouthFrown"}
+        moods["eyeSquint"] = np.maximum(moods["eyeSquint"], CHEEK_SQUINT * moved.unit(6))
     weights: dict[str, Array] = {}
     for side in SIDES:
         weights[f"eyeBlink{side}"] = np.clip(moved.lids, 0, 1)
@@ -151,14 +154,3 @@ def eye_and_brow_weights(moved: Liveliness) -> dict[str, Array]:
         weights |= {f"{name}{side}": curve for name, curve in moods.items()}
     weights["browInnerUp"] = np.clip(raised + moved.unit(1), 0, 1)
     return weights | {**moved.given}
-
-
-def _of_moods(moved: Liveliness) -> dict[str, Array]:
-    """Return the weights of shapes, one each for both sides, that a mood alone moves [each shape=(F,)]."""
-    return {
-        "browDown": moved.unit(4),
-        "eyeWide": moved.unit(5),
-        "cheekSquint": moved.unit(6),
-        "eyeSquint": np.maximum(moved.unit(7), CHEEK_SQUINT * moved.unit(6)),
-        "noseSneer": moved.unit(9),
-    }

@@ -88,7 +88,10 @@ def placed_by_shape(mesh: Mesh, surface: MeshSurface) -> LipPlacement:
     shape = opening_shape(mesh)
     drop = np.zeros(len(mesh.vertices))
     drop[shape.rows] = -shape.displacements[:, 1]
-    skin = _skin(surface, drop)
+    still, moved = drop < 0.1 * drop.max(initial=0.0), drop > 0.5 * drop.max(initial=0.0)
+    count = int(surface.pieces.max(initial=-1)) + 1
+    counts = [np.bincount(surface.pieces[chosen], minlength=count) for chosen in (still, moved)]
+    skin = surface.pieces == int(np.minimum(*counts).argmax())
     drop = np.where(skin, drop, 0.0) / max(float(drop[skin].max(initial=0.0)), 1e-12)
     middle = _slit(mesh.vertices, surface, drop, skin)
     if len(middle) < 3:
@@ -101,7 +104,10 @@ def placed_by_shape(mesh: Mesh, surface: MeshSurface) -> LipPlacement:
     scale = float(left[0] - right[0]) / template.inner_width
     order = np.argsort(middle[:, 0], kind="stable")
     targets = _targets(template, scale, (right + left) / 2, middle[order])
-    upper = drop < _share_at_slit(mesh.vertices, drop, skin, middle)
+    rows = np.flatnonzero(skin)
+    near = _tree(mesh.vertices[rows]).query(middle, k=min(12, len(rows)))[1].reshape(len(middle), -1)
+    share = (drop[rows][near].max(axis=1) + drop[rows][near].min(axis=1)) / 2
+    upper = drop < share[_tree(middle).query(mesh.vertices)[1]]
     vertices = _nearest(mesh, surface, template, targets, skin, upper)
     return LipPlacement(template.points, vertices, scale, np.eye(3))
 
@@ -183,14 +189,6 @@ def opening_shape(mesh: Mesh) -> Blendshape:
     )
 
 
-def _skin(surface: MeshSurface, drop: Places) -> NDArray[np.bool_]:
-    """Return the vertices of the face: the piece of the surface with both moved and still vertices, most of them."""
-    still, moved = drop < 0.1 * drop.max(initial=0.0), drop > 0.5 * drop.max(initial=0.0)
-    count = int(surface.pieces.max(initial=-1)) + 1
-    counts = [np.bincount(surface.pieces[chosen], minlength=count) for chosen in (still, moved)]
-    return surface.pieces == int(np.minimum(*counts).argmax())
-
-
 def _slit(vertices: Places, surface: MeshSurface, drop: Places, skin: NDArray[np.bool_]) -> Places:
     """Return points along the line where the lips meet: middles of pairs that go apart [shape=(N, 3)]."""
     moved = vertices[skin & (drop > 0.5)]
@@ -207,7 +205,16 @@ def _slit(vertices: Places, surface: MeshSurface, drop: Places, skin: NDArray[np
     near = np.fromiter(chain.from_iterable(found), np.int64)
     pairs = np.stack([np.repeat(low, [len(each) for each in found]), high[near]], axis=1)
     pairs = pairs[drop[pairs[:, 0]] - drop[pairs[:, 1]] > SLIT_STEP]
-    pairs = pairs[_apart(vertices, surface, pairs, reach)]
+    far = np.zeros(len(pairs), bool)
+    straight = np.linalg.norm(vertices[pairs[:, 0]] - vertices[pairs[:, 1]], axis=1)
+    longest = np.maximum(DETOUR_RATIO * straight, reach / 2)
+    sources, number = np.unique(pairs[:, 0], return_inverse=True)
+    at_once = max(1, DISTANCES_AT_ONCE // len(vertices))
+    for first in range(0, len(sources), at_once):
+        along = surface.distances(sources[first : first + at_once], float(longest.max(initial=0.0)) + reach)
+        here = (number >= first) & (number < first + at_once)
+        far[here] = along[number[here] - first, pairs[here, 1]] > longest[here]
+    pairs = pairs[far]
     middle = (vertices[pairs[:, 0]] + vertices[pairs[:, 1]]) / 2
     return middle[middle[:, 2] > _foremost(middle, reach / 4) - FRONT_SHARE * reach / SLIT_REACH]
 
@@ -226,28 +233,6 @@ def _foremost(places: Places, reach: float) -> Places:
     largest = np.empty(len(places))
     largest[order] = np.maximum(table[level, first], table[level, stop - 2**level])
     return largest
-
-
-def _apart(vertices: Places, surface: MeshSurface, pairs: Rows, reach: float) -> NDArray[np.bool_]:
-    """Return which pairs are far from one another along the surface [shape=(N,)]."""
-    far = np.zeros(len(pairs), bool)
-    straight = np.linalg.norm(vertices[pairs[:, 0]] - vertices[pairs[:, 1]], axis=1)
-    longest = np.maximum(DETOUR_RATIO * straight, reach / 2)
-    sources, number = np.unique(pairs[:, 0], return_inverse=True)
-    at_once = max(1, DISTANCES_AT_ONCE // len(vertices))
-    for first in range(0, len(sources), at_once):
-        along = surface.distances(sources[first : first + at_once], float(longest.max(initial=0.0)) + reach)
-        here = (number >= first) & (number < first + at_once)
-        far[here] = along[number[here] - first, pairs[here, 1]] > longest[here]
-    return far
-
-
-def _share_at_slit(vertices: Places, drop: Places, skin: NDArray[np.bool_], middle: Places) -> Places:
-    """Return the share of the jaw's way that divides the lips, at every vertex: less near the corners [shape=(V,)]."""
-    rows = np.flatnonzero(skin)
-    near = _tree(vertices[rows]).query(middle, k=min(12, len(rows)))[1].reshape(len(middle), -1)
-    share = (drop[rows][near].max(axis=1) + drop[rows][near].min(axis=1)) / 2
-    return share[_tree(middle).query(vertices)[1]]
 
 
 def _targets(template: MouthTemplate, scale: float, centre: Places, middle: Places) -> Places:

@@ -39,14 +39,24 @@ class OwnCurves:
         blendshapes by the mesh's names are such weights already, and stay.
         Raises InputError: as ``shape_weights``.
         """
-        parting = self._parting(shapes)
+        parting = np.zeros(len(shapes.names))
+        for row, parted in zip(self.rows, self.parted.tolist(), strict=True):
+            parting[shapes.names.index(row.source)] += row.gain * parted
         given = self._given(motion)
         if given is not None:
             solved = shape_weights(given, units, replace(shapes, gap=parting))
         else:
             solved = shape_weights(motion, units, shapes)
             if any(row.gain != 1 for row in self.rows):
-                solved = replace(solved, values=self._with_gains(solved.values.astype(np.float64), shapes, parting))
+                weights = solved.values.astype(np.float64)
+                gains = [row.gain for row in self.rows]
+                before, after = weights @ shapes.gap, weights @ parting
+                share = np.clip(after / np.maximum(before, 1e-9), min(gains), max(gains))
+                # Closed after the gains where they closed the lips before.
+                wanted = np.maximum(share * before, np.minimum(before, LEAST_GAP))
+                solved = replace(
+                    solved, values=with_gap(weights, replace(shapes, gap=parting), np.where(before > 0, wanted, before))
+                )
         curves = dict(zip(shapes.names, solved.values.astype(np.float64).T, strict=True))
         moved = rig_motion(self.rows, curves, solved.rate_hz)
         return replace(moved, channels=tuple(Channel(name, WEIGHT) for name in moved.names))
@@ -63,21 +73,6 @@ class OwnCurves:
         values = [motion[name] for name in kept] + list(found.values())
         channels = [motion.channels[motion.column(name)] for name in kept] + [Channel(name, WEIGHT) for name in found]
         return Motion(np.stack(values, axis=1), motion.rate_hz, tuple(channels))
-
-    def _parting(self, shapes: FaceShapes) -> Array:
-        """Return how far the solved shapes part the lips with these gains [shape=(S,)]."""
-        parting = np.zeros(len(shapes.names))
-        for row, parted in zip(self.rows, self.parted.tolist(), strict=True):
-            parting[shapes.names.index(row.source)] += row.gain * parted
-        return parting
-
-    def _with_gains(self, weights: Array, shapes: FaceShapes, parting: Array) -> Array:
-        """Return solved weights that close the lips after the gains where they closed them before [shape=(T, S)]."""
-        gains = [row.gain for row in self.rows]
-        before, after = weights @ shapes.gap, weights @ parting
-        share = np.clip(after / np.maximum(before, 1e-9), min(gains), max(gains))
-        wanted = np.maximum(share * before, np.minimum(before, LEAST_GAP))
-        return with_gap(weights, replace(shapes, gap=parting), np.where(before > 0, wanted, before))
 
 
 def own_curves(

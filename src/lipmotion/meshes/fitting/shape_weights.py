@@ -63,7 +63,6 @@ PRESS_DEPTH = 0.01
 """In p, b and m the lips are closed this much further than to touch, in eye distances: no light between them."""
 LEAST_PARTING = 0.004
 """Shapes that part the lips by less than this, in eye distances, are not used to part or to close them."""
-BISECTIONS = 60
 PRESS_WEIGHT, UPPER_ROLL_WEIGHT, LOWER_ROLL_WEIGHT, TONGUE_WEIGHT = 0.2, 0.1, 0.55, 0.3
 """Weights of ARKit's blendshapes for what lip points do not show: lips that are pressed together (``mouthPressLeft``,
 ``mouthPressRight``, ``mouthRollUpper``), a lower lip on the teeth, a tongue between the teeth."""
@@ -101,20 +100,27 @@ def shape_weights(
         weights = _closed_as_spoken(given.values.astype(np.float64), with_mouth(motion), points.mouth, shapes, mood)
     else:
         if shapes.style == "visemes":
-            weights = _spoken_weights(points, units, shapes, options)
+            time_s = np.arange(len(points.mouth.gap)) / points.mouth.rate_hz
+            said = np.zeros((len(time_s), len(shapes.names)))
+            for viseme, curve in viseme_curves(units, time_s).items():
+                vowel = NEAREST_VOWEL.get(viseme)
+                row = shapes.row(f"viseme_{viseme}")
+                if row is None and vowel is not None:
+                    row = shapes.row(f"vowel_{vowel}")
+                if row is not None:
+                    said[:, row] += curve
+            matrix = np.concatenate([_rows(shapes), VISEME_WEIGHT * np.eye(len(shapes.names))], axis=1)
+            targets = np.concatenate([_targets(points), VISEME_WEIGHT * said], axis=1)
+            weights = bounded_curves(matrix, targets, options.costs)
         else:
-            weights = _with_mood(_free_weights(_without_mood(points, mood, shapes), shapes, options), mood)
+            free = points
+            if mood is not None:  # what the shapes of a mood do to the width of the mouth is theirs
+                displacements = points.displacements.copy()
+                displacements[..., 0] -= mood @ shapes.moved[..., 0]
+                free = replace(points, displacements=displacements)
+            weights = _with_mood(_free_weights(free, shapes, options), mood)
         weights = with_gap(weights, shapes, points.mouth.gap - PRESS_DEPTH * points.mouth.closing)
     return Motion(weights, motion.rate_hz, tuple(Channel(name, WEIGHT) for name in shapes.names))
-
-
-def _without_mood(points: PointMotion, mood: Array | None, shapes: FaceShapes) -> PointMotion:
-    """Return points without what the shapes of a mood do to the width of the mouth."""
-    if mood is None:
-        return points
-    displacements = points.displacements.copy()
-    displacements[..., 0] -= mood @ shapes.moved[..., 0]
-    return replace(points, displacements=displacements)
 
 
 def _with_mood(weights: Array, mood: Array | None) -> Array:
@@ -164,7 +170,7 @@ def with_gap(weights: Array, shapes: FaceShapes, gap: Array, kept: Collection[st
     still = (np.abs(apart) < LEAST_PARTING) | np.isin(shapes.known, list(kept))
     way = np.where(still, 0.0, apart)
     low, high = np.full(len(weights), -1 / LEAST_PARTING), np.full(len(weights), 1 / LEAST_PARTING)
-    for _ in range(BISECTIONS):
+    for _ in range(60):
         middle = (low + high) / 2
         wide = np.clip(weights - middle[:, None] * way, 0.0, 1.0) @ apart > gap
         low, high = np.where(wide, middle, low), np.where(wide, high, middle)
@@ -179,7 +185,12 @@ def _free_weights(points: PointMotion, shapes: FaceShapes, options: SolverOption
     mouth = points.mouth
     fixed = np.zeros((len(mouth.gap), len(shapes.names)))
     if options.gestures:
-        for name, curve in _beside_points(mouth).items():
+        for name, curve in {
+            **dict.fromkeys(("mouthPressLeft", "mouthPressRight"), PRESS_WEIGHT * mouth.closing),
+            "mouthRollUpper": UPPER_ROLL_WEIGHT * mouth.closing,
+            "mouthRollLower": LOWER_ROLL_WEIGHT * mouth.tuck,
+            "tongueOut": TONGUE_WEIGHT * mouth.between_teeth,
+        }.items():
             if name in shapes.known:
                 fixed[:, shapes.known.index(name)] = curve
     free = np.array([name not in NOT_FROM_POINTS for name in shapes.known])
@@ -196,37 +207,6 @@ def _free_weights(points: PointMotion, shapes: FaceShapes, options: SolverOption
     if options.gestures:
         weights = rounded_weights(weights, shapes, mouth.protrusion)
     return np.clip(weights, 0.0, 1.0)
-
-
-def _beside_points(mouth: SpokenMouth) -> dict[str, Array]:
-    """Return the weights of ARKit's blendshapes of what lip points do not show [each shape=(T,)]."""
-    return {
-        **dict.fromkeys(("mouthPressLeft", "mouthPressRight"), PRESS_WEIGHT * mouth.closing),
-        "mouthRollUpper": UPPER_ROLL_WEIGHT * mouth.closing,
-        "mouthRollLower": LOWER_ROLL_WEIGHT * mouth.tuck,
-        "tongueOut": TONGUE_WEIGHT * mouth.between_teeth,
-    }
-
-
-def _spoken_weights(points: PointMotion, units: Timeline[Unit], shapes: FaceShapes, options: SolverOptions) -> Array:
-    """Return the weights of visemes: the phones say which, the points how much [shape=(T, S)]."""
-    said = _said(units, np.arange(len(points.mouth.gap)) / points.mouth.rate_hz, shapes)
-    matrix = np.concatenate([_rows(shapes), VISEME_WEIGHT * np.eye(len(shapes.names))], axis=1)
-    targets = np.concatenate([_targets(points), VISEME_WEIGHT * said], axis=1)
-    return bounded_curves(matrix, targets, options.costs)
-
-
-def _said(units: Timeline[Unit], time_s: Array, shapes: FaceShapes) -> Array:
-    """Return the visemes or vowels that the phones say [shape=(T, S)]."""
-    said = np.zeros((len(time_s), len(shapes.names)))
-    for viseme, curve in viseme_curves(units, time_s).items():
-        vowel = NEAREST_VOWEL.get(viseme)
-        row = shapes.row(f"viseme_{viseme}")
-        if row is None and vowel is not None:
-            row = shapes.row(f"vowel_{vowel}")
-        if row is not None:
-            said[:, row] += curve
-    return said
 
 
 def _rows(shapes: FaceShapes) -> Array:

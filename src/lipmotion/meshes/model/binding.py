@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -152,7 +152,9 @@ def painted(binding: ControlBinding, mesh: Mesh, paint: Mapping[int, Mapping[int
         weights[vertex] = 0.0
         for point, value in given.items():
             if point not in binding.placement.points:
-                raise InputError(f"{point} is no control point, required one of {_listed(binding.placement.points)}")
+                raise InputError(
+                    f"{point} is no control point, required one of {', '.join(map(str, binding.placement.points))}"
+                )
             if not 0 <= value <= 1:
                 raise InputError(f"the weight of point {point} on vertex {vertex} is {value:g}, required 0 to 1")
             weights[vertex, binding.placement.row(point)] = value
@@ -196,7 +198,3 @@ def _inside(mesh: Mesh, surface: MeshSurface, placement: LipPlacement) -> NDArra
     chosen = covered & (heights < centre[1])
     chosen[surface.pieces[placement.vertices]] = False
     return np.asarray(chosen[surface.pieces])
-
-
-def _listed(points: Sequence[int]) -> str:
-    return ", ".join(map(str, points))

@@ -86,7 +86,8 @@ def face_shapes(mesh: Mesh, placement: LipPlacement) -> FaceShapes:
     strong = np.abs(moved).max(axis=(1, 2), initial=0.0) > LEAST_DISPLACEMENT
     found, style = _mouth(mesh, strong)
     if not found:
-        raise InputError(f"no blendshape moves the mouth; the mesh has {_listed(mesh)}. Drive it by control points")
+        there = shortened(", ".join(mesh.shape_names)) or "none"
+        raise InputError(f"no blendshape moves the mouth; the mesh has {there}. Drive it by control points")
     if len(found) > MOST_SHAPES:
         raise InputError(
             f"{len(found)} blendshapes move the mouth, required at most {MOST_SHAPES}; leave some empty in its table "
@@ -151,7 +152,3 @@ def _mouth(mesh: Mesh, strong: NDArray[np.bool_]) -> tuple[list[tuple[str, list[
     others = [number for number in np.flatnonzero(strong).tolist() if mesh.shapes[number].called]
     own += [("", [number]) for number in others if number not in named]
     return sorted(own, key=lambda each: each[1]), "own"
-
-
-def _listed(mesh: Mesh) -> str:
-    return shortened(", ".join(mesh.shape_names)) or "none"

@@ -143,7 +143,9 @@ class Mesh:
             raise InputError(f"tints have shape {self.tints.shape}, required {(len(self.vertices), 4)}")
         if not self.parts:
             object.__setattr__(self, "parts", (MeshPart("", 0, len(self.triangles)),))
-        self._check_parts()
+        edges = [0, *(part.stop for part in self.parts)]
+        if [part.first for part in self.parts] != edges[:-1] or edges[-1] != len(self.triangles):
+            raise InputError(f"the parts of the mesh end at {edges[1:]}, required ranges of {len(self.triangles)}")
         for shape in self.shapes:
             _check_places(f"the blendshape {shortened(shape.name)!r}", shape.displacements)
             _check_rows(f"the blendshape {shortened(shape.name)!r}", shape.rows, len(self.vertices))
@@ -176,11 +178,6 @@ class Mesh:
             chosen[:] = dense[rows]
             dense[shape.rows] = 0.0
         return moved
-
-    def _check_parts(self) -> None:
-        edges = [0, *(part.stop for part in self.parts)]
-        if [part.first for part in self.parts] != edges[:-1] or edges[-1] != len(self.triangles):
-            raise InputError(f"the parts of the mesh end at {edges[1:]}, required ranges of {len(self.triangles)}")
 
 
 def _check_places(what: str, values: NDArray[np.float64]) -> None:

@@ -17,7 +17,7 @@ from lipmotion.kernels.pixels.textured import (
     draw_textured,
 )
 from lipmotion.meshes.model.mesh import BLEND, MASK, Material, Mesh
-from lipmotion.meshes.model.textures import Extremes, Texture, TextureTable, texture_table
+from lipmotion.meshes.model.textures import Texture, TextureTable, texture_table
 from lipmotion.meshes.rendering.lighting import LEVELS, Finish, Lighting, linear, tone_table
 from lipmotion.meshes.rendering.rasteriser import Camera, Canvas, Colours, flat
 
@@ -120,7 +120,10 @@ def drawn_surface(mesh: Mesh, shown: NDArray[np.bool_], pixels_per_unit: float) 
     corners[behind] = corners[behind][:, ::-1]
     uv = np.zeros((len(numbers), 3, 2)) if mesh.uv is None else np.clip(mesh.uv[numbers], -FARTHEST_UV, FARTHEST_UV)
     uv[behind] = uv[behind][:, ::-1]
-    textures = _textures(materials)
+    textures: dict[Texture, int] = {}
+    for material in materials:
+        if material.texture is not None:
+            textures.setdefault(material.texture, len(textures))
     looks = _looks(mesh, numbers, part_of[numbers], uv, texture_table(list(textures)), textures, pixels_per_unit)
     kept = looks.looks[:, 1] != EMPTY
     looks = looks._replace(uv=looks.uv[kept], looks=looks.looks[kept], alphas=looks.alphas[kept])
@@ -137,14 +140,6 @@ def drawn_surface(mesh: Mesh, shown: NDArray[np.bool_], pixels_per_unit: float) 
         _colours(mesh, materials, rows, kinds),
         looks._replace(triangles=inverse.reshape(corners.shape).astype(np.int32)),
     )
-
-
-def _textures(materials: list[Material]) -> dict[Texture, int]:
-    textures: dict[Texture, int] = {}
-    for material in materials:
-        if material.texture is not None:
-            textures.setdefault(material.texture, len(textures))
-    return textures
 
 
 def _looks(
@@ -175,36 +170,23 @@ def _looks(
             alphas[mine] = material.cutoff, 1.0 if kind == SOLID else material.opacity
             if kind != SOLID:
                 halvings = looks[mine, 0] - table.first[textures[material.texture]]
-                least, most = _opacities(material, material.texture, downwards[mine], halvings)
+                ends_uv, texels = downwards[mine], 2 * 2 ** halvings.astype(np.int64)
+                least, most = material.texture.range_of_opacity(ends_uv.min(axis=1), ends_uv.max(axis=1), texels)
+                least, most = least * material.opacity, most * material.opacity
                 hides, seen = (material.cutoff, material.cutoff) if kind == CUT else (HIDING_OPACITY, SEEN_OPACITY)
                 looks[mine, 1] = np.where(least >= hides, SOLID, np.where(most < seen, EMPTY, kind))
         if mesh.tints is not None and material.alpha in (MASK, BLEND):
-            _thin(material, mesh.tints[mesh.triangles[numbers[mine]], 3].mean(axis=1), mine, looks, alphas)
+            opacity = mesh.tints[mesh.triangles[numbers[mine]], 3].mean(axis=1)
+            is_cut = material.alpha == MASK
+            kind, hides, seen = (
+                (CUT, material.cutoff, material.cutoff) if is_cut else (CLEAR, HIDING_OPACITY, SEEN_OPACITY)
+            )
+            whole = material.opacity * opacity
+            kinds, bare = looks[mine, 1], looks[mine, 0] < 0
+            lowered = np.where(whole < seen, EMPTY, np.where((whole < hides) | ~bare & (opacity < 1), kind, kinds))
+            looks[mine, 1] = np.where(kinds == EMPTY, EMPTY, lowered)
+            alphas[mine] = np.stack([np.full(len(whole), material.cutoff), whole], axis=1)
     return TexturedTriangles(np.zeros((0, 3), np.int32), downwards, looks, alphas, table.texels, table.levels)
-
-
-def _thin(material: Material, opacity: Array, mine: Rows, looks: NDArray[np.int32], alphas: Array) -> None:
-    """Multiply the opacity of a part's triangles by that of their vertices, the mean of each triangle's, in place.
-
-    opacity : of the triangles of the part;  mine : which ones these are [shape=(N,), both]
-    """
-    kind, hides, seen = (
-        (CUT, material.cutoff, material.cutoff) if material.alpha == MASK else (CLEAR, HIDING_OPACITY, SEEN_OPACITY)
-    )
-    whole = material.opacity * opacity
-    kinds, bare = looks[mine, 1], looks[mine, 0] < 0
-    lowered = np.where(whole < seen, EMPTY, np.where((whole < hides) | ~bare & (opacity < 1), kind, kinds))
-    looks[mine, 1] = np.where(kinds == EMPTY, EMPTY, lowered)
-    alphas[mine] = np.stack([np.full(len(whole), material.cutoff), whole], axis=1)
-
-
-def _opacities(material: Material, texture: Texture, uv: Array, halvings: NDArray[np.int32]) -> Extremes:
-    """Return the least and the largest opacity on triangles [shape=(F,), both].
-
-    uv : their corners, v downwards [shape=(F, 3, 2)];  halvings : how often their texture is reduced [shape=(F,)]
-    """
-    least, most = texture.range_of_opacity(uv.min(axis=1), uv.max(axis=1), 2 * 2 ** halvings.astype(np.int64))
-    return least * material.opacity, most * material.opacity
 
 
 def _colours(mesh: Mesh, materials: list[Material], rows: Rows, kinds: Rows) -> Array:

@@ -119,7 +119,18 @@ def analyse_study(
     """
     given = read_answers(Path(answers)) if isinstance(answers, str | Path) else list(answers)
     counted = counts(given)
-    _check(counted, len(given), baseline, power, sentences)
+    if not counted:
+        raise InputError(
+            f"{len(given)} answers, none of which counts: required some that are neither practice nor checks"
+        )
+    conditions = sorted({each.condition for each in counted if each.kind != PAIRED})
+    if baseline is not None and baseline not in conditions:
+        known = ", ".join(conditions) or "no condition, as nothing was rated"
+        raise InputError(f"the baseline {shortened(baseline)!r}, required one of: {known}")
+    if not 0.05 < power < 1:
+        raise InputError(f"a power of {power:g}, required between 0.05 and 1, such as {USUAL_POWER}")
+    if sentences is not None and sentences < 2:
+        raise InputError(f"{sentences} sentences of planned studies, required at least 2")
     screening = screen(given)
     kept = screening.kept(counted)
     plan = (baseline, power, sentences)
@@ -133,20 +144,6 @@ def analyse_study(
         "screened": screened or None,
         "all": everybody,
     }
-
-
-def _check(counted: Sequence[Answer], given: int, baseline: str | None, power: float, sentences: int | None) -> None:
-    """Raise InputError for what cannot be analysed."""
-    if not counted:
-        raise InputError(f"{given} answers, none of which counts: required some that are neither practice nor checks")
-    conditions = sorted({each.condition for each in counted if each.kind != PAIRED})
-    if baseline is not None and baseline not in conditions:
-        known = ", ".join(conditions) or "no condition, as nothing was rated"
-        raise InputError(f"the baseline {shortened(baseline)!r}, required one of: {known}")
-    if not 0.05 < power < 1:
-        raise InputError(f"a power of {power:g}, required between 0.05 and 1, such as {USUAL_POWER}")
-    if sentences is not None and sentences < 2:
-        raise InputError(f"{sentences} sentences of planned studies, required at least 2")
 
 
 def _parts(answers: Sequence[Answer], baseline: str | None, power: float, sentences: int | None) -> list[Figures]:

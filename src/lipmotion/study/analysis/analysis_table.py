@@ -16,7 +16,10 @@ NO_FIGURE = "–"
 def analysis_table(figures: Figures) -> str:
     """Return the figures of ``analyse_study`` as text."""
     lines = [f"{figures['answers']} answers count; {figures['left_aside']} of practice and attention do not"]
-    lines += _screening_lines(figures["screening"])
+    screening = figures["screening"]
+    lines += [f"screening: {screening['kept']} of {screening['raters']} raters kept; required of each:"]
+    lines += [f"  {name}: {rule}" for name, rule in screening["rules"].items()]
+    lines += [f"  left out: {row['rater']} ({row['rule']}: {row['found']})" for row in screening["left_out"]]
     parts = figures["screened"]
     if parts is None:
         lines += ["", "no rater is left after screening: figures of all raters"]
@@ -30,12 +33,6 @@ def analysis_table(figures: Figures) -> str:
         lines += (_paired_lines if part["kind"] == PAIRED else _rating_lines)(part, unscreened)
         lines += _power_lines(part, figures["power"])
     return "\n".join(map(printable, lines))
-
-
-def _screening_lines(screening: Figures) -> list[str]:
-    lines = [f"screening: {screening['kept']} of {screening['raters']} raters kept; required of each:"]
-    lines += [f"  {name}: {rule}" for name, rule in screening["rules"].items()]
-    return lines + [f"  left out: {row['rater']} ({row['rule']}: {row['found']})" for row in screening["left_out"]]
 
 
 def _rating_lines(part: Figures, everybody: Figures | None) -> list[str]:
@@ -60,7 +57,7 @@ def _paired_lines(part: Figures, everybody: Figures | None) -> list[str]:
     """Return how often each condition was preferred, the pairs, the strengths, and the effect of the order."""
     if "missing" in part:
         return [f"  {part['missing']}"]
-    before = _shares(everybody)
+    before = {(row["condition"], row["other"]): row["share"] for row in everybody.get("pairs", ())} if everybody else {}
     scores = [["condition", "preferred", "share", "95 %"]]
     scores += [
         [row["condition"], f"{row['wins']} of {row['answers']}", _number(row["share"], ".1%"), _limits(row, ".1%")]
@@ -106,16 +103,9 @@ def _power_lines(part: Figures, power: float) -> list[str]:
 def _scope_lines(rows: Sequence[Figures]) -> list[str]:
     """Return what the intervals are over, where it is not raters and sentences."""
     scopes = sorted({row["over"] for row in rows} - {BOTH})
-    return [f"  intervals over {' / '.join(scopes)} only: {_named(rows, scopes)}"] if scopes else []
-
-
-def _named(rows: Sequence[Figures], scopes: Sequence[str]) -> str:
     found = [row for row in rows if row["over"] in scopes]
-    return ", ".join(f"{row['condition']}–{row['other']}" if "other" in row else row["condition"] for row in found)
-
-
-def _shares(part: Figures | None) -> dict[tuple[str, str], float]:
-    return {(row["condition"], row["other"]): row["share"] for row in part.get("pairs", ())} if part else {}
+    named = [f"{row['condition']}–{row['other']}" if "other" in row else row["condition"] for row in found]
+    return [f"  intervals over {' / '.join(scopes)} only: {', '.join(named)}"] if scopes else []
 
 
 def _without_last(rows: list[list[str]], is_kept: bool) -> list[list[str]]:

@@ -234,9 +234,17 @@ def paired_figures(table: PairTable) -> Figures:
     """Return the figures of paired comparisons."""
     everything = np.full(len(table.is_first), True)
     first = share_figures(table.cells(table.is_first.astype(float), everything))
+    rows = []
+    for i, j, cells in _pair_cells(table):
+        chosen = table.between(i, j)
+        wins, count = int((table.is_preferred(i) & chosen).sum()), int(chosen.sum())
+        names: Figures = {"condition": table.conditions[i], "other": table.conditions[j]}
+        counts = {"wins": wins, "answers": count, "p_binomial": binomial_p(wins, count)}
+        rows.append(names | counts | share_figures(cells))
+    corrected = holm([row["p"] for row in rows])
     return {
         "conditions": [_score_figures(table, place) for place in range(len(table.conditions))],
-        "pairs": _preferences(table),
+        "pairs": [row | {"p_holm": p} for row, p in zip(rows, corrected, strict=True)],
         "first_preferred": {"answers": len(table.is_first)} | first,
         "consistency": consistency(table),
         "bradley_terry": strength_figures(table),
@@ -353,19 +361,6 @@ def _pair_cells(table: PairTable) -> list[tuple[int, int, Array]]:
         if chosen.any():
             found.append((i, j, table.cells(table.is_preferred(i).astype(float), chosen)))
     return found
-
-
-def _preferences(table: PairTable) -> list[Figures]:
-    """Return the preference in each pair, with two tests: of the answers, and over raters and sentences."""
-    rows = []
-    for i, j, cells in _pair_cells(table):
-        chosen = table.between(i, j)
-        wins, count = int((table.is_preferred(i) & chosen).sum()), int(chosen.sum())
-        names: Figures = {"condition": table.conditions[i], "other": table.conditions[j]}
-        counts = {"wins": wins, "answers": count, "p_binomial": binomial_p(wins, count)}
-        rows.append(names | counts | share_figures(cells))
-    corrected = holm([row["p"] for row in rows])
-    return [row | {"p_holm": p} for row, p in zip(rows, corrected, strict=True)]
 
 
 def _score_figures(table: PairTable, place: int) -> Figures:
