@@ -305,9 +305,9 @@ def test_a_tone_that_covers_a_word_is_found_and_no_voice_is_one() -> None:
     audio = AnalysedAudio(samples, 16_000)
     ((first, end),) = audio.tones
     assert abs(first - 100) <= 8
-    assert abs(end - 140) <= 8
+    assert 120 < end <= 142
     level = audio.log_energy
-    assert level[110:130].max() < level[:100].max() - 5  # as silent as a room, in what recognisers get
+    assert level[110:120].max() < level[:100].max() - 5  # as silent as a room, in what recognisers get
 
 
 def test_a_voice_behind_a_noise_gate_is_as_similar_as_without(toy_model: Model) -> None:
