@@ -119,7 +119,8 @@ def named_tier(name: str, labels: Sequence[TimedLabel], speaker: str = "") -> La
     role = next((role for role, form in ROLES if re.search(form, name.lower())), "")
     if name == RECOGNISED:
         role = RECOGNISED_PHONES
-    known_s = accumulate((label.start_s for label in labels), lambda last_s, s: s if s > EARLIEST_S else last_s)
+    starts_s: list[float] = [label.start_s for label in labels]
+    known_s = accumulate(starts_s, lambda last_s, s: s if s > EARLIEST_S else last_s)
     in_time = [label for _, label in sorted(zip(known_s, labels, strict=True), key=lambda pair: pair[0])]
     return LabelTier(name, tuple(in_time), role, speaker or (found["speaker"].strip() if found else ""))
 
