@@ -8,7 +8,6 @@ import re
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import accumulate
 from statistics import median
 
 from lipmotion.errors import InputError
@@ -119,8 +118,8 @@ def named_tier(name: str, labels: Sequence[TimedLabel], speaker: str = "") -> La
     role = next((role for role, form in ROLES if re.search(form, name.lower())), "")
     if name == RECOGNISED:
         role = RECOGNISED_PHONES
-    starts_s: list[float] = [label.start_s for label in labels]
-    known_s = accumulate(starts_s, lambda last_s, s: s if s > EARLIEST_S else last_s)
+    last_s = -math.inf
+    known_s = [last_s := label.start_s if label.start_s > EARLIEST_S else last_s for label in labels]
     in_time = [label for _, label in sorted(zip(known_s, labels, strict=True), key=lambda pair: pair[0])]
     return LabelTier(name, tuple(in_time), role, speaker or (found["speaker"].strip() if found else ""))
 
