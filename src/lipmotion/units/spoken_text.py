@@ -28,7 +28,11 @@ CUE = re.compile(r"(?:\A|(?<=\n\n))[ \t]*([A-Z][A-Z0-9.'’ -]{1,30}(?:\([^()\n]
 DIRECTION = re.compile(r"^[ \t]*(?:\([^()\n]{1,80}\)|(?:INT|EXT)\b[./][^\n]*)[ \t]*$", re.MULTILINE)
 """A line of a screenplay that is not said."""
 NO_NAMES = frozenset("note notes warning question answer step tip remember ps p.s example".split())
-SYMBOLS = re.compile(r"&=\S+|%hesitation\b|\b(?:xxx|yyy)\b|&[-+~](?=\w)|(?<!\w)%(?=[^\W\d])", re.IGNORECASE)
+MARKED = r"[~%!]+(?:sp|(?:sil|pau|lau|noise|breath|inhal|exhal|cough|throat|lip|smack|sniff|sigh|click|music)\w*)"
+"""Sounds with a mark before them: ``~SIL``, ``%noise``, ``!SIL``."""
+SYMBOLS = re.compile(
+    rf"&=\S+|%hesitation\b|(?<!\S){MARKED}(?!\S)|\b(?:xxx|yyy)\b|&[-+~](?=\w)|(?<!\w)%(?=[^\W\d])", re.IGNORECASE
+)
 """CHAT's sounds (``&=laughs``) and words that nobody understood; of hesitations (``%uh``) the mark alone."""
 SPEAKER_NAME_LINES = 3
 """A name that begins so many lines is that of a speaker."""
@@ -48,9 +52,11 @@ class SpokenAs(Enum):
 
 SILENCES = frozenset(["", *"sil sp pau ssil nsn h# #h # ## _ - silence = vocnoise iver".split()])
 """Labels of silence, pauses and noise that is not speech; so is anything in brackets that is not of speech."""
+LAUGHTER = "LAU"
+"""In capitals, as in lexicons of telephone speech; ``Lau`` is a name."""
 UNKNOWN_WORDS = frozenset("spn unk oov xxx yyy usb".split())
 """Labels of speech of which nobody knows the words, also in brackets: of aligners, of CHAT, of WebMAUS (``<usb>``)."""
-IN_BRACKETS = re.compile(r"<[^<>]*>|\[[^\[\]]*\]|\([^()]*\)|\{[^{}]*\}|\+\+?\w+\+\+?|&=\S+|♪+|\*+")
+IN_BRACKETS = re.compile(r"<[^<>]*>|\[[^\[\]]*\]|\([^()]*\)|\{[^{}]*\}|\+\+?\w+\+\+?|&=\S+|♪+|\*+|" + MARKED)
 UNKNOWN_SPEECH = re.compile(r"unknown|unintelligible|inaudible|indistinct|garbage|spoken.?noise", re.IGNORECASE)
 
 
@@ -60,7 +66,7 @@ def spoken_as(label: str) -> SpokenAs:
     >>> spoken_as("[laughs]"), spoken_as("<unk>"), spoken_as("hello")
     (<SpokenAs.SILENCE: 'silence'>, <SpokenAs.UNKNOWN: 'unknown'>, <SpokenAs.SPEECH: 'speech'>)
     """
-    name = label.strip().lower()
+    name = "sil" if label.strip() == LAUGHTER else label.strip().lower()
     bracketed = IN_BRACKETS.fullmatch(name) is not None
     inner = name.strip("<>[](){}+&=* ") if bracketed else name
     if inner in UNKNOWN_WORDS or (bracketed and UNKNOWN_SPEECH.search(inner)):

@@ -420,3 +420,53 @@ XSAMPA = {"4": "d", "{": "ae", "3`": "er", "@U": "ow", "t_h": "t", '"i:': "iy", 
 def test_xsampa_is_read_where_it_makes_sense(write: Any) -> None:
     rows = [(i / 10, (i + 1) / 10, label.replace('"', '""')) for i, label in enumerate(XSAMPA)]
     assert phones(write(grid(phones=rows), "a.TextGrid")) == list(XSAMPA.values())
+
+
+MS = [(w, 1000 * a, 1000 * b) for w, a, b in W]
+OTHERS: dict[str, Any] = {
+    "Speechify": [
+        {"type": "word", "start": 6 * i, "end": 6 * i + 5, "start_time": a, "end_time": b, "value": w}
+        for i, (w, a, b) in enumerate(MS)
+    ],
+    "Soniox": {
+        "tokens": [
+            {"text": text, "start_ms": a, "end_ms": b}
+            for text, a, b in (("hel", 400, 600), ("lo", 600, 800), (" big", 850, 1100), (" moon", 1200, 1600))
+        ]
+    },
+    "Hume": [{"text": w, "time": {"begin": a, "end": b}} for w, a, b in MS],
+    "PlayHT": [{"type": "word", "word": w, "time": {"start": a, "end": b}} for w, a, b in W],
+    "MiniMax": [{"timestamped_words": [{"word": w, "time_begin": a, "time_end": b} for w, a, b in MS]}],
+    "Inworld": {
+        "timestampInfo": {
+            "wordAlignment": {
+                "words": [w for w, *_ in W],
+                "wordStartTimeSeconds": [a for _, a, _ in W],
+                "wordEndTimeSeconds": [b for *_, b in W],
+            }
+        }
+    },
+    "milliseconds with decimals": [{"word": w, "start": a + 0.01, "end": b + 0.01} for w, a, b in MS],
+    "milliseconds as lines": "".join(f"{a:.1f}\t{b:.1f}\t{w}\n" for w, a, b in MS),
+    "hundredths": [{"word": w, "start": round(a / 10), "end": round(b / 10)} for w, a, b in MS],
+}
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_word_times_of_voices_and_other_units(write: Any, name: str) -> None:
+    path = write(OTHERS[name])
+    assert words(path) == "hello big moon"
+    assert [t for pair in times(path) for t in pair] == pytest.approx([t for _, *pair in W for t in pair], abs=1e-3)
+
+
+@pytest.mark.parametrize(("start", "end"), [("start_offset", "end_offset"), ("start", "end")])
+def test_frames_are_refused(write: Any, start: str, end: str) -> None:
+    with pytest.raises(InputError, match="frames"):
+        read_transcript(write([{"word": w, start: round(25 * a), end: round(25 * b)} for w, a, b in W]))
+
+
+def test_minus_one_is_no_time_and_marked_sounds_are_not_said(write: Any) -> None:
+    rows = [{"word": w, "start": a, "end": b} for w, a, b in (*W, ("mama", -1, -1), ("~SIL", 2, 3), ("%noise", 3, 4))]
+    path = write(rows)
+    assert words(path) == "hello big moon mama"
+    assert times(path)[-1] == (None, None)

@@ -382,7 +382,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @settings(max_examples=25)
 def test_what_is_written_is_read(folder: Path, rows: list[tuple[float, float, list[str]]], form: str) -> None:
     shortest_s = 0.2  # shorter cues that repeat the one before are the bridges of captions that scroll
-    spans = sorted((min(a, b), max(a, b, min(a, b) + shortest_s), said) for a, b, said in rows)
+    longest_s = 10  # words that last longer are in another unit
+    spans = sorted((min(a, b), min(a, b) + min(max(abs(a - b), shortest_s), longest_s), said) for a, b, said in rows)
     if form == "json":
         text = json.dumps({"segments": [{"start": a, "end": b, "text": " ".join(said)} for a, b, said in spans]})
     elif form == "tsv":

@@ -174,28 +174,28 @@ def read_phones(path: Path, tier: str = "", speaker: str = "") -> Timeline[Unit]
 
 
 def speakers_in(path: Path) -> tuple[str, ...]:
-    """Return the speakers whom a file of labels names, none of another file. Raises InputError: it is damaged."""
+    """Return the speakers whom a file of labels names, none of another or a damaged file."""
     if not path.is_file() or path.stat().st_size > LARGEST_LABELS:
         return ()
-    tiers = _timed_tiers(_text(path), str(path)) or []
+    try:
+        tiers = _timed_tiers(_text(path), "") or []
+    except InputError:  # said by the reader
+        return ()
     return tuple(dict.fromkeys(tier.speaker for tier in tiers_of_speakers(tiers) if tier.speaker))
 
 
 def holds_timings(path: Path) -> bool:
-    """Return whether a file has the timings of a voice or an aligner; False: it is another file, or no file at all.
-
-    Raises InputError: it has, and a symbol or a time in it is none.
-    """
+    """Return whether a file has the timings of a voice or an aligner; False: it is another file, or no file at all."""
     if not path.is_file() or not 0 < path.stat().st_size <= LARGEST_LABELS:
         return False
     with path.open("rb") as file:
         if MOTION.search(file.read(MOTION_HEAD)):
             return False
-    text, where = _text(path), str(path)
+    text = _text(path)
     try:
-        return bool(service_tiers(text, where)) if is_json(text) else line_tiers(text, where) is not None
-    except DamagedJsonError:  # said by the reader of motion
-        return False
+        return bool(service_tiers(text, "")) if is_json(text) else line_tiers(text, "") is not None
+    except InputError as error:  # said by the reader, if it is damaged by that of motion
+        return not isinstance(error, DamagedJsonError)
 
 
 def _read(path: Path, *, unknown_json: bool) -> RecordingLabels | None:
@@ -203,9 +203,11 @@ def _read(path: Path, *, unknown_json: bool) -> RecordingLabels | None:
     if unknown_json and path.stat().st_size > LARGEST_LABELS:
         return None
     text, where = _text(path), str(path)
-    if unknown_json and (not is_json(text) or service_tiers(text, where) is None):
+    if unknown_json and not is_json(text):
         return None
     tiers = _timed_tiers(text, where)
+    if unknown_json and tiers is None:
+        return None
     if tiers is not None:
         return _labels(tiers, where)
     _check_plain(text, path)

@@ -30,6 +30,7 @@ from lipmotion.corpora.labels.tier import (
     TimedLabel,
     check_count,
     clock_seconds,
+    in_seconds,
     named_tier,
     unit_of_times,
 )
@@ -56,7 +57,8 @@ ROUNDING_S = 1.0
 class Times(NamedTuple):
     """The names of the times of an item; ``per_s``: how many are a second, 0: how long words last decides.
 
-    usual : how many usually are, where nothing can be told
+    usual  : how many usually are, where nothing can be told; 0: their own form must say it, else they are frames
+    pieces : tokens are pieces of words, and one without a blank before it goes on with the word ahead of it
     """
 
     start: str
@@ -64,23 +66,25 @@ class Times(NamedTuple):
     duration: str = ""
     per_s: int = 0
     usual: int = 1
+    pieces: bool = False
 
 
 TIMES = (
-    Times("start", "end", "duration"),  # Whisper, Vosk, Deepgram, AssemblyAI (ms), Gladia, ElevenLabs, Gentle
+    Times("startms", "endms", "durationms", 1000, pieces=True),  # Soniox
+    Times("starttimems", "endtimems", "durationms", 1000),
     Times("starttime", "endtime", "duration"),  # AWS, Google, Yandex, Speechmatics, Qwen3-ASR, servers of Kokoro
+    Times("start", "end", "duration"),  # Whisper, Vosk, Deepgram, AssemblyAI (ms), Gladia, ElevenLabs, Gentle
     Times("startts", "endts", per_s=1),  # Kokoro
     Times("ts", "endts", "duration", 1),  # Rev.ai
     Times("begin", "end", "dur"),  # aeneas
-    Times("startms", "endms", "durationms", 1000),
-    Times("starttimems", "endtimems", "durationms", 1000),
     Times("tstartms", "", "ddurationms", 1000),  # YouTube, json3
     Times("offsetinticks", "", "durationinticks", TICKS_PER_S),  # Azure, batch transcription
     Times("offsetmilliseconds", "", "durationmilliseconds", 1000),  # Azure, fast transcription
     Times("audiooffset", "", "duration", usual=TICKS_PER_S),  # Azure, speech synthesis
     Times("offset", "", "duration", usual=TICKS_PER_S),  # Azure, speech recognition
-    Times("startoffset", "endoffset"),  # Google, version 2
-    Times("timestart", "timeend"),
+    Times("startoffset", "endoffset", usual=0),  # Google, version 2 ("0.1s"); NeMo's are frames
+    Times("timestart", "timeend"),  # PlayHT
+    Times("timebegin", "timeend", per_s=1000),  # MiniMax, Hume
     Times("from", "to"),
     Times("timeseconds", per_s=1),  # Google, text to speech
     Times("", "resultendtime", per_s=1),  # Google, a result without words
@@ -92,7 +96,7 @@ TEXTS = (
 ).split()
 """The names of what is said, in order; of alternatives it is the first one."""
 ALTERNATIVES = ("alternatives", "nbest")
-WORD_LISTS = ("words", "items", "elements", "tokens", "timestamps", "timepoints")
+WORD_LISTS = ("words", "items", "elements", "tokens", "timestamps", "timepoints", "timestampedwords")
 """Members that hold words in time, within a line or alone."""
 LINE_LISTS = (
     "segments transcription utterances monologues events chunks fragments channels recognizedphrases sentences phrases "
@@ -125,25 +129,16 @@ COLUMNS = (
     ("characters", ("characters", "characterstarttimesseconds", "characterendtimesseconds"), 1),  # ElevenLabs
     ("characters", ("chars", "charstarttimesms", "chardurationsms"), 1000),  # ElevenLabs' web socket
     ("characters", ("chars", "charstarttimesms", "charsdurationsms"), 1000),
+    ("characters", ("tokens", "timestamps"), 1),  # sherpa-onnx, pieces of words that last to the next one
+    (WORDS, ("words", "wordstarttimeseconds", "wordendtimeseconds"), 1),  # Inworld
     (WORDS, ("words", "start", "end"), 1),  # Cartesia, word_timestamps
     (PHONE_LABELS, ("phonemes", "start", "end"), 1),  # Cartesia, phoneme_timestamps
 )
 """Parallel lists of texts, starts and ends (durations where they are named so), and how many units are a second."""
-COLUMN_OWNERS = ("normalizedalignment", "alignment", "wordtimestamps", "phonemetimestamps")
+COLUMN_OWNERS = ("normalizedalignment", "alignment", "wordtimestamps", "phonemetimestamps", "wordalignment")
 SPOKEN_WORD = re.compile(r"\[[^\[\]]*\]|[^\s\[]+")
 """A word of characters, or a direction in brackets (``[whispers]``), which is not said."""
-TEXT_ALONE = {
-    "text",
-    "partial",
-    "result",
-    "language",
-    "duration",
-    "task",
-    "usage",
-    "logprobs",
-    "alternatives",
-    "confidence",
-}
+TEXT_ALONE = {*"text partial result language duration task usage logprobs alternatives confidence".split()}
 """Members of what a recogniser says without times."""
 KNOWN_SHAPES = "segments, words, results, utterances, monologues, alignment, tiers, fragments, ..."
 BLANK = re.compile(r"\s*")
@@ -197,7 +192,7 @@ def service_tiers(text: str, where: str) -> list[LabelTier] | None:
         timed = any(row.parts or not math.isnan(row.start) or row.times.end for row in rows)
         lists_of_words = [item["words"] for _, item in objects if isinstance(item.get("words"), list)]
         missed = sum(isinstance(word, dict) and word.get("case") == MISSED for each in lists_of_words for word in each)
-        if missed:
+        if missed and where:
             LOG.warning("%s: %d words were not found in the sound and are left out", where, missed)
         lists = [item[name] for _, item in objects for name in (*LINE_LISTS, *WORD_LISTS) if name in item]
         is_empty = bool(lists) and not any(lists)
@@ -273,7 +268,7 @@ def _number(value: Any, where: str, per_s: int = 0) -> tuple[float, int]:
             return clock_s, 1
         elif value.strip().lower() in ("", "nan", "null", "none", "n/a"):
             value = None
-    if value is None:
+    if value in (None, -1, "-1", "-1.0"):  # some services write -1 where they have none
         return math.nan, per_s
     if isinstance(value, str):
         return number_of(value, f"{where}: a time is", "a number of seconds"), per_s
@@ -286,6 +281,8 @@ def _row(item: dict[str, Any], place: str, where: str, name: str) -> Row | None:
     if text is None and any(item.get(name) for name in ("text", "word")):
         found = shortened(repr(item.get("text") or item.get("word"))[:200])
         raise InputError(f"{where}: {place}: its text is {found}, required a text")
+    if isinstance(item.get("time"), dict):  # Hume, PlayHT
+        item = {**item, **{f"time{edge}": time for edge, time in item["time"].items()}, "time": None}
     speaker, stamp, offsets = _speaker(item), item.get("timestamp"), item.get("offsets")
     role = WORDS if "word" in item or name in WORD_LISTS else ""
     if "visemeid" in item or item.get("type") == "viseme":
@@ -301,8 +298,11 @@ def _row(item: dict[str, Any], place: str, where: str, name: str) -> Row | None:
         item, times = dict(zip(("start", "end"), stamp, strict=True)), Times("start", "end", per_s=1)
     else:
         times = next((row for row in TIMES if (row.start or row.end) in item), UNTIMED)
-        if "time" in item and item.get("type") in POLLY_KINDS:  # its start and end are places in the text
+        is_mark = item.get("type") in POLLY_KINDS  # its start and end are places in the text
+        if is_mark and item.get("time") is not None:
             times = Times("time", usual=1000)
+        elif is_mark and {"start", "starttime"} <= item.keys():  # Speechify
+            times = times._replace(per_s=1000)
     start, per_s = _number(item.get(times.start), f"{where}: {place}", times.per_s)
     end, per_s = _number(item.get(times.end), f"{where}: {place}", per_s)
     if math.isnan(end) and times.duration in item:
@@ -328,7 +328,7 @@ def _rows(value: Any, place: str, where: str, name: str = "", depth: int = 0) ->
     if depth > DEEPEST:
         return []
     if isinstance(value, dict):
-        said = not any(NOT_SAID.search(str(value.get(kind, "")).lower()) for kind in KINDS)
+        said = "chunks" in value or not any(NOT_SAID.search(str(value.get(kind, "")).lower()) for kind in KINDS)
         return _rows_of_object(value, place, where, name, depth) if said else []
     rows: list[Row] = []
     items = value if isinstance(value, list) else []
@@ -340,7 +340,19 @@ def _rows(value: Any, place: str, where: str, name: str = "", depth: int = 0) ->
         elif name in ("segments", "words"):
             require(values.members({}), item, f"{where}: {name!r}, item {number}")
         check_count(len(rows), where)
-    return rows
+    return _joined(rows) if name == "tokens" else rows
+
+
+def _joined(rows: list[Row]) -> list[Row]:
+    """Return the words of tokens that are pieces of words."""
+    words: list[Row] = []
+    for row in rows:
+        if words and row.times.pieces and not row.text[:1].isspace() and row.speaker == words[-1].speaker:
+            end = words[-1].end if math.isnan(row.end) or not any(map(str.isalnum, row.text)) else row.end
+            words[-1] = replace(words[-1], end=end, text=words[-1].text + row.text)
+        else:
+            words.append(row)
+    return words
 
 
 def _rows_of_object(item: dict[str, Any], place: str, where: str, name: str, depth: int) -> list[Row]:
@@ -391,7 +403,8 @@ def _tiers(rows: list[Row], where: str) -> list[LabelTier]:
     phones = [row for row in rows if row.role == PHONE_LABELS]
     rows = [row for row in rows if row.role != PHONE_LABELS]
     half = len(rows) // 2
-    if half and [(row.text, row.start) for row in rows[:half]] == [(row.text, row.start) for row in rows[half:]]:
+    first, again = ([(row.text, row.start) for row in part] for part in (rows[:half], rows[half:]))
+    if half and first == again and rows[0].speaker != rows[-1].speaker:
         rows = rows[half:]  # Google's last result has the words of all again, with their speakers
     if any(len({part.speaker for part in row.parts}) > 1 for row in rows):
         rows = [part for row in rows for part in row.parts or (row,)]
@@ -431,7 +444,7 @@ def _label(row: Row, per_s: int, where: str) -> TimedLabel:
     for time, time_s in ((row.start, start_s), (row.end, end_s)):
         if LATEST_S < abs(time_s) < math.inf:
             raise InputError(f"{where}: {row.place}: a time is {time:g}, required seconds, up to {LATEST_S:g}")
-    start_s = math.nan if start_s < EARLIEST_S else start_s
+    start_s = math.nan if start_s <= EARLIEST_S else start_s
     if end_s < start_s - ROUNDING_S:
         raise InputError(f"{where}: {row.place} ends at {end_s:g} s, before its start at {start_s:g} s; correct it")
     return TimedLabel(start_s, max(end_s, start_s) if end_s < start_s else end_s, row.text, row.place)
@@ -440,6 +453,10 @@ def _label(row: Row, per_s: int, where: str) -> TimedLabel:
 def _per_s(rows: Sequence[Row], role: str, where: str) -> int:
     """Return how many units are a second in rows whose names do not say it."""
     judged = [row for row in rows if not row.times.per_s and not math.isnan(row.start)]
+    if any(row.times.usual == 0 for row in judged):
+        raise InputError(
+            f"{where}: its times are offsets in frames, whose length is not known; required start and end in seconds"
+        )
     spans = [(row.start, row.end, row.text) for row in judged]
     return unit_of_times(spans, role, where, judged[0].times.usual) if judged else 1
 
@@ -475,17 +492,20 @@ def _column_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
     found: dict[str, list[TimedLabel]] = defaultdict(list)
     pieces = 0
     for place, item in objects:
+        for name in ("result", "timestampinfo"):
+            item = item[name] if isinstance(item.get(name), dict) else item  # noqa: PLW2901
         owners = {name: item[name] for name in COLUMN_OWNERS if isinstance(item.get(name), dict)}
         owners.pop("alignment" if "normalizedalignment" in owners else "", None)
         for name, owner in (owners or {"lists": item}).items():
             for role, names, per_s in COLUMNS:
                 if isinstance(owner.get(names[0]), list) and owner.keys() >= {*names}:
                     found[role] += _columns(owner, names, per_s, f"{where}: {place}, {name}")
-                    pieces += per_s != 1
+                    pieces += per_s != 1 or "wordstarttimeseconds" in names
     if pieces > 1:
         raise InputError(f"{where}: holds {pieces} pieces whose times each begin at 0; save the sound of each apart")
     words = found[WORDS] + _words_of_characters(found["characters"])
-    return _word_and_phone_tiers(words, ipa_labels(found[PHONE_LABELS], where), where) if any(found.values()) else None
+    tiers = _word_and_phone_tiers(words, ipa_labels(found[PHONE_LABELS], where), where)
+    return in_seconds(tiers, where) if any(found.values()) else None
 
 
 def _columns(owner: dict[str, Any], names: tuple[str, ...], per_s: int, where: str) -> list[TimedLabel]:
@@ -495,9 +515,12 @@ def _columns(owner: dict[str, Any], names: tuple[str, ...], per_s: int, where: s
         raise InputError(f"{where}: required are the lists {', '.join(names)}, all of one length")
     check_count(len(lists[0]), where)
     labels = []
+    lists += [[*lists[1][1:], math.inf][: len(lists[1])]] if len(lists) == 2 else []
     for number, (text, start, end) in enumerate(zip(*lists, strict=True), 1):
-        start_s, end_s = (_seconds(time, f"{where} {number}", per_s) for time in (start, end))
-        end_s += start_s if "duration" in names[2] else 0.0
+        start_s, end_s = (
+            time if time is math.inf else _seconds(time, f"{where} {number}", per_s) for time in (start, end)
+        )
+        end_s += start_s if "duration" in names[-1] else 0.0
         labels.append(TimedLabel(start_s, end_s, require(_TEXT, text, f"{where} {number}"), f"{names[0]} {number}"))
     return labels
 
@@ -506,7 +529,7 @@ def _words_of_characters(characters: list[TimedLabel]) -> list[TimedLabel]:
     """Return the words that characters in time make, without directions in brackets."""
     owner = [number for number, label in enumerate(characters) for _ in label.text]
     words = []
-    for match in SPOKEN_WORD.finditer("".join(label.text for label in characters)):
+    for match in SPOKEN_WORD.finditer("".join(label.text for label in characters).replace("▁", " ")):
         first, last = characters[owner[match.start()]], characters[owner[match.end() - 1]]
         words.append(replace(first, end_s=last.end_s, text=match[0]))
     return words
@@ -567,5 +590,5 @@ def _named_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
             *times_s, text = (*(_seconds(time, f"{where}: {place}") for time in entry[:-1]), entry[-1])
             labels.append(TimedLabel(times_s[0], times_s[-1], require(_TEXT, text, f"{where}: {place}"), place))
         if len(tier["entries"][0] if tier["entries"] else ()) == 3:
-            tiers.append(named_tier(name, sorted(labels, key=lambda label: label.start_s)))
+            tiers.append(named_tier(name, labels))
     return tiers

@@ -38,7 +38,7 @@ from lipmotion.units.spoken_text import (
 
 LOG = logging.getLogger("lipmotion")
 EARLIEST_S = -1.0
-"""A time before this is none; recognisers write others a little before 0, where the sound begins."""
+"""A time up to this is none; recognisers write others a little before 0, where the sound begins."""
 WORDS, LINES, PHONE_LABELS, RECOGNISED_PHONES, OTHER = "words", "lines", "phones", "recognised", "other"
 """What a tier holds. ``OTHER`` is neither said nor seen: pronunciations, syllables, translations, notes."""
 ROLES = (
@@ -75,8 +75,16 @@ TYPICAL_WORD_S = 0.3
 """How long a phone, and a word, alone or of a line, last."""
 UNIT_LIMITS = ((150, 1), (6000, 1000), (300_000, 0), (3_200_000, 1_000_000))
 """If they last up to so many times as long as is typical, so many units are a second; 0: these are samples."""
+WHOLE_LIMITS = ((15, 1), (70, 0), (220, 100), *UNIT_LIMITS[1:])
+"""The same for whole numbers of words and phones, which may be frames (0), too; lines in seconds last that long."""
 TICKS_PER_S = 10_000_000
-UNITS = {1: "seconds", 1000: "milliseconds", 1_000_000: "microseconds", TICKS_PER_S: "ticks of 100 ns"}
+UNITS = {
+    1: "seconds",
+    100: "hundredths of a second",
+    1000: "milliseconds",
+    1_000_000: "microseconds",
+    TICKS_PER_S: "ticks of 100 ns",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,12 +113,15 @@ class LabelTier:
 
 
 def named_tier(name: str, labels: Sequence[TimedLabel], speaker: str = "") -> LabelTier:
-    """Return a tier whose name says what it holds and perhaps who speaks."""
+    """Return a tier in order of time whose name says what it holds and perhaps who speaks."""
     found = next(filter(None, (re.fullmatch(form, name, re.IGNORECASE) for form in SPEAKERS)), None)
     role = next((role for role, form in ROLES if re.search(form, name.lower())), "")
     if name == RECOGNISED:
         role = RECOGNISED_PHONES
-    return LabelTier(name, tuple(labels), role, speaker or (found["speaker"].strip() if found else ""))
+    last_s = -math.inf
+    known_s = [last_s := label.start_s if label.start_s > EARLIEST_S else last_s for label in labels]
+    in_time = [label for _, label in sorted(zip(known_s, labels, strict=True), key=lambda pair: pair[0])]
+    return LabelTier(name, tuple(in_time), role, speaker or (found["speaker"].strip() if found else ""))
 
 
 def check_count(count: int, where: str) -> None:
@@ -136,38 +147,42 @@ def required_time(text: str, place: str, where: str) -> float:
 def unit_of_times(spans: Sequence[tuple[float, float, str]], role: str, where: str, usual: int = 1) -> int:
     """Return how many units of time are a second, by how long words, of a line each of them, or phones last.
 
-    spans : start, end and text, in the unit; where one is no whole number these are seconds
+    spans : start, end and text, in the unit
+    where : the file's name; empty: nothing is logged
     usual : how many it usually is, where one span says nothing; a warning names what is neither this nor seconds
-    Raises InputError: the times are samples, whose rate is not known.
+    Raises InputError: the times are samples or frames, whose rate is not known.
     """
     lengths = [
         (end - start) / (1 if role == PHONE_LABELS else max(len(text.split()), 1))
         for start, end, text in spans
         if math.inf > end > start and spoken_as(text) is SpokenAs.SPEECH
     ]
-    if any(math.isfinite(time) and time != int(time) for span in spans for time in span[:2]):
-        return 1
+    whole = all(time == int(time) for span in spans for time in span[:2] if math.isfinite(time))
     if len(lengths) < 1 + (usual == 1):
-        return usual
+        return usual if whole else 1
     times = median(lengths) / TYPICAL_S.get(role, TYPICAL_WORD_S)
-    per_s = next((per_s for limit, per_s in UNIT_LIMITS if times < limit), TICKS_PER_S)
-    if per_s == 0:
-        raise InputError(
-            f"{where}: its times seem to be samples of the sound (one lasts {median(lengths):g}), required seconds"
-        )
-    if per_s not in (1, usual):
+    limits = WHOLE_LIMITS if whole and role in (WORDS, PHONE_LABELS) else UNIT_LIMITS
+    per_s = next((per_s for limit, per_s in limits if times < limit), TICKS_PER_S)
+    if not whole and per_s != 1000:
+        return 1
+    starts = [start for start, *_ in spans if not math.isnan(start)]
+    if per_s == 0 or (per_s > 1 and len(lengths) > 2 and max(starts) - min(starts) < median(lengths)):
+        what = "frames" if times < WHOLE_LIMITS[1][0] else "samples of the sound" if per_s == 0 else "in two units"
+        raise InputError(f"{where}: its times seem to be {what} (one lasts {median(lengths):g}), required seconds")
+    if where and per_s not in (1, usual):
         LOG.warning("%s: its times are taken for %s; write seconds if they are not", where, UNITS[per_s])
     return per_s
 
 
 def in_seconds(tiers: list[LabelTier], where: str) -> list[LabelTier]:
-    """Return tiers in seconds; whole numbers of which a word would last a minute are in the unit that they seem to be.
+    """Return tiers in seconds; times of which a word would last a minute are in the unit that they seem to be.
 
     Raises InputError: as ``unit_of_times``.
     """
-    judged = next((tier for tier in tiers if tier.role == WORDS or holds_phones(tier)), None)
+    said = [tier for tier in tiers if tier.role != OTHER]
+    judged = next((tier for tier in said if tier.role == WORDS or holds_phones(tier)), next(iter(said), None))
     spans = [(label.start_s, label.end_s, label.text) for label in judged.labels] if judged else []
-    role = PHONE_LABELS if judged and holds_phones(judged) else WORDS
+    role = PHONE_LABELS if judged and holds_phones(judged) else judged.role if judged else ""
     per_s = unit_of_times(spans, role, where)
     return [scaled_tier(tier, per_s) for tier in tiers]
 
@@ -264,7 +279,7 @@ def _times(label: TimedLabel, where: str) -> tuple[float | None, float | None]:
     """
     if label.end_s < label.start_s:
         raise _reversed(label, where)
-    start_s, end_s = (time_s if EARLIEST_S <= time_s < math.inf else None for time_s in (label.start_s, label.end_s))
+    start_s, end_s = (time_s if EARLIEST_S < time_s < math.inf else None for time_s in (label.start_s, label.end_s))
     return start_s and max(start_s, 0.0), end_s and max(end_s, 0.0)
 
 
@@ -303,7 +318,7 @@ def _check_order(labels: Sequence[TimedLabel], where: str, *, with_gaps: bool) -
     """Raise InputError for labels without times, that overlap or end before they start, or that leave a gap."""
     end_s = 0.0
     for number, label in enumerate(labels):
-        if math.isnan(label.start_s + label.end_s):
+        if not min(label.start_s, label.end_s) > EARLIEST_S:
             raise InputError(f"{where}: {label.position} has no time, required the start and the end of a phone")
         if label.end_s < label.start_s:
             raise _reversed(label, where)

@@ -126,7 +126,7 @@ def _spans(text: str, form: re.Pattern[str], where: str) -> LabelTier:
         labels.append(TimedLabel(start_s, end_s, words[0].strip() if words else "", place))
     tier = LabelTier("labels", tuple(labels))
     if form is SECONDS:
-        return tier
+        return in_seconds([tier], where)[0]
     lengths = [label.end_s - label.start_s for label in labels if label.end_s > label.start_s]
     is_timit = Path(where).suffix.lower() in TIMIT_SUFFIXES or any(label.text == TIMIT_SILENCE for label in labels)
     short = bool(lengths) and median(lengths) < LONGEST_SAMPLES and labels[-1].end_s < LAST_SAMPLE
@@ -215,8 +215,5 @@ def _table(text: str, columns: dict[str, int], where: str) -> list[LabelTier]:
         end_s += 0.0 if row.get("end") else start_s
         key = (row.get("kind", named), row.get("speaker", ""))
         kinds[key].append(TimedLabel(start_s, end_s, row["text"], place))
-    tiers = [
-        named_tier(kind, sorted(labels, key=lambda label: label.start_s), speaker)
-        for (kind, speaker), labels in kinds.items()
-    ]
+    tiers = [named_tier(kind, labels, speaker) for (kind, speaker), labels in kinds.items()]
     return in_seconds(tiers, where)
