@@ -18,10 +18,11 @@ Rhubarb = Callable[..., Done]
 
 @pytest.fixture
 def rhubarb(run: RunCommand, here: Path, toy_speech: Path, toy_model_file: Path) -> Rhubarb:
-    """Runs ``cues`` as Rhubarb; ``take.wav`` is in the folder, with a dialogue, and one that is empty."""
+    """Runs ``cues`` as Rhubarb; ``take.wav`` is in the folder, with a dialogue, and two without words."""
     (here / "take.wav").write_bytes(toy_speech.read_bytes())
     (here / "dialog.txt").write_text("see bob papa mama")
     (here / "empty.txt").write_text("")
+    (here / "sounds.txt").write_text("\ufeff[music] ...\n", encoding="utf-8")
     return lambda *words: run("cues", "--model", toy_model_file, *words)
 
 
@@ -29,7 +30,7 @@ def shapes_of(document: str) -> list[str]:
     return [cue["value"] for cue in json.loads(document)["mouthCues"]]
 
 
-@pytest.mark.parametrize("dialogue", ["dialog.txt", "empty.txt"])
+@pytest.mark.parametrize("dialogue", ["dialog.txt", "empty.txt", "sounds.txt"])
 def test_after_effects(rhubarb: Rhubarb, here: Path, dialogue: str) -> None:
     """It always names a dialogue, and reads the log file: what is in it is an error."""
     line: tuple[str, ...] = ("--dialogFile", dialogue, "--recognizer", "phonetic", "--extendedShapes", "GX")

@@ -55,6 +55,15 @@ def test_the_rate_of_the_timecode_is_found_and_midnight_passed(tmp_path, curves,
     np.testing.assert_allclose(motion.values, curves.values, atol=6e-11)
 
 
+@pytest.mark.parametrize("form", ["00:{0:02d}:{1:02d}.0", "00:{0:02d}:{1:02d}", "00:00:{0:02d}.0", "00:00:{0:02d}"])
+@pytest.mark.parametrize("rate", [24, 60])
+def test_frames_that_a_spreadsheet_made_seconds_of_are_frames(tmp_path, caplog, form, rate):
+    rows = [row(form.format(n // rate, n % rate), n / 1000) for n in range(4 * rate)]
+    motion = read(tmp_path, "\n".join([HEAD, *rows]))
+    assert (motion.rate_hz, len(motion.values)) == (pytest.approx(rate), 4 * rate)
+    assert "frames" in caplog.text
+
+
 def test_uneven_times_and_lost_frames_are_evened_out(tmp_path, curves):
     rng = np.random.default_rng(3)
     times_s = curves.time_s + rng.uniform(-0.3, 0.3, len(curves.values)) / RATE_HZ

@@ -36,6 +36,9 @@ def test_units_alone_without_names_of_units(tmp_path: Path) -> None:
     rows = [{"start_s": a, "end_s": b, "phone": phone} for a, b, phone in ROWS]
     (tmp_path / "a.json").write_text(json.dumps({"units": rows}), encoding="utf-8")
     assert read_units(tmp_path / "a.json") == timeline(*ROWS)
+    again = {"units": [{**row, "word": "oh", "again": n == 1} for n, row in enumerate(rows)]}
+    (tmp_path / "d.json").write_text(json.dumps(again), encoding="utf-8")
+    assert [span.label.again for span in read_units(tmp_path / "d.json")] == [n == 1 for n in range(len(rows))]
     (tmp_path / "b.json").write_text('{"units": [{"start_s": 0, "phone": "m"}]}', encoding="utf-8")
     with pytest.raises(InputError, match=r"b\.json: .*end_s is missing.*; export it again"):
         read_units(tmp_path / "b.json")

@@ -48,6 +48,15 @@ def test_sound_and_motion_are_of_the_same_length(spoken: SpokenText) -> None:
     assert generation.outlook.words == "given units"
 
 
+@pytest.mark.parametrize(
+    "text", ["[00:00.5]Papa, see Bob.\n[00:02]Mama!", "1\n00:00:00,500 --> 00:00:02,000\nPAPA: {0}\n"]
+)
+@pytest.mark.usefixtures("stand_in")
+def test_times_of_subtitles_are_not_spoken(toy_model: Model, text: str, caplog: pytest.LogCaptureFixture) -> None:
+    assert phones(speak(text.format(TEXT), model=toy_model)) == phones(speak(TEXT, model=toy_model))
+    assert "subtitles" in caplog.text
+
+
 def test_tags_in_the_text_are_moods_and_not_spoken(stand_in: None, toy_model: Model) -> None:  # noqa: ARG001
     sound, generation = speak("<smile> Papa, see Bob. [sad] Mama!", model=toy_model)
     assert sound.duration_s == speak(TEXT, model=toy_model).sound.duration_s

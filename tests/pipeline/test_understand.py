@@ -132,7 +132,8 @@ def test_subtitles_are_aligned_within_their_times(toy_model: Model, toy_sentence
     )
     plain = SpeechRequest(toy_sentence.audio, transcript=" ".join(toy_sentence.words), recogniser="own")
     wanted = understand(toy_model, plain)
-    for transcript in (tmp_path / "said.srt", words_in_time(toy_sentence), words_in_time(toy_sentence, 0.4)):
+    text = (tmp_path / "said.srt").read_text(encoding="utf-8")
+    for transcript in (tmp_path / "said.srt", text, words_in_time(toy_sentence), words_in_time(toy_sentence, 0.4)):
         found = understand(toy_model, replace(plain, transcript=transcript))
         assert found.units == wanted.units
         assert found.units_known

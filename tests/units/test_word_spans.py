@@ -24,7 +24,11 @@ def test_a_word_that_is_said_again_is_another_one() -> None:
         ("tutu", "t uw t uw t uw t uw", [0, 4]),
         ("mama", "m aa m ax", [0]),
         ("bigbig", "b ih g b ih g", [0]),
-        ("big", "b ih b ih", [0]),
+        ("big", "b ih b ih", [0, 2]),
+        ("zero", "z iy r ow z iy r ow", [0, 4]),
+        ("blorp", "b l ao r p b l ao r p b l ao r p", [0, 5, 10]),
+        ("hahaha", "hh aa hh aa hh aa hh aa hh aa hh aa", [0, 6]),
+        ("brrk", "r r r", [0]),
         ("", "b ih g b ih g", [0]),
     ):
         ends = [*starts[1:], len(phones.split())]

@@ -13,6 +13,16 @@ from lipmotion.units.text_normalisation import tokens_in
 from lipmotion.units.written_forms import MOST_READINGS, readings
 
 USUAL = (
+    (
+        "1 000 000 of 12 345 678",
+        "one million of twelve million three hundred forty five thousand six hundred seventy eight",
+    ),
+    ("$1'000'000, 10\u202f000 km", "one million dollars ten thousand kilometers"),
+    ("call 600 123 456", "call six hundred one hundred twenty three four hundred fifty six"),
+    ("C++ or C#", "c plus plus or c sharp"),
+    ("w/o you? w/o.", "without you without"),
+    ("№ 5, №5", "number five number five"),
+    ("10^3 or 10^2", "ten to the third or ten squared"),
     ("in 1995", "in nineteen ninety five"),
     ("1956", "nineteen fifty six"),
     ("1900", "nineteen hundred"),

@@ -41,6 +41,7 @@ class Unit:
     word  : the word that contains the phone; empty where it is not known
     confidence : of a recognised phone, 0 to 1: how well words confirm it; None: the phone is known (given, labelled, or
                  aligned to known words)
+    again : whether the phone begins its word anew, right after the same word
 
     >>> Unit("p", "sil-p+l", "please")
     Unit(phone='p', unit='sil-p+l', word='please')
@@ -50,6 +51,7 @@ class Unit:
     unit: str = ""
     word: str = ""
     confidence: float | None = field(default=None, repr=False)
+    again: bool = field(default=False, repr=False, compare=False)
 
 
 @dataclass(frozen=True)

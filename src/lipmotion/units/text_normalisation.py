@@ -20,6 +20,10 @@ RANGE = re.compile(
     r"(?:(?<=\d[ap]m)|(?<=\d [ap]m)|(?<=:\d\d))\s?[-–]\s?(?=\d)|(?<=\d)-(?=\d{1,2}\s?[ap]m\b)", re.IGNORECASE
 )
 """The dash of ``9am-5pm`` and ``5:00-6:30``."""
+GROUPED = re.compile(
+    r"(?<![\w.,])(?<!\d )[1-9](?:\d{0,2}(?:(?:'\d{3})+|(?: \d{3})* 000)|\d?(?: \d{3}){2,})(?![\d']| \d)"
+)
+"""Numbers whose thousands are parted by blanks or apostrophes: ``1 000 000``, ``1'000'000``."""
 SMILEY = re.compile(r"(?<!\w)(?:[:;=8][-o']?[)(\]DPpO3|/\\]+|<3+|[xX]D+|\^_+\^|[tT]_[tT])(?!\w)")
 REFERENCE = re.compile(r"&(?:[a-zA-Z]{2,8}|#\d{1,6}|#x[\da-fA-F]{1,5});")
 
@@ -51,7 +55,8 @@ def tokens_in(text: str) -> tuple[str, ...]:
     ('Dr.', 'brown', 'met', 'Henry VIII', 'at', '5:00', 'in', 'may', '1995')
     """
     text = SMILEY.sub(" ", REFERENCE.sub(lambda found: html.unescape(found[0]), text))
-    plain = re.sub(r"\bUS(?=\$)", "", RANGE.sub("–", plain_text(text)))
+    plain = re.sub(r"\bUS(?=\$)", "", RANGE.sub("–", plain_text(re.sub("№ ?", "No. ", text))))
+    plain = GROUPED.sub(lambda found: re.sub(r"\D", ",", found[0]), plain)
     shouted = not any(letter.islower() for letter in plain)
     tokens = []
     for token in (found[0] for found in _scanner().finditer(plain)):
@@ -68,7 +73,7 @@ def _scanner() -> re.Pattern[str]:
     word = rf"{WORD}(?=[,;!?]|\s+(?-i:[a-z])|\s*\Z)"  # most are words and no more; the rest takes a tenfold time
     forms = [rf"(?:{form})(?![^\W_])" for form, _ in FORMS[:-1]]  # initials are words
     numeric, worded = ("|".join(part) for part in (forms[: len(NUMERIC)], forms[len(NUMERIC) :]))
-    signs = r"(?<!\w)w/o?(?=\s)|[&@×÷]|[+=](?![+=])(?<![+=]{2})|#(?=\w)|~(?=\d)"
+    signs = r"(?<!\w)w/o?(?=[\s.,;!?]|\Z)|[&@×÷]|[+=](?![+=])(?<![+=]{2})|#(?=\w)|~(?=\d)"
     dashes = r"(?<![^\s(])-(?=[.$£€]?\d)|−(?=\d)|(?<=[m\d])–(?=\d)"
     begun = rf"(?<![^\W_])(?:{word}|(?=[^\W\d_])(?:{worded})|(?![\s,;!?])(?:{numeric}))"
     grouped = "|".join([begun, signs, dashes, WORD, r"\d+(?:\.\d+)*"])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
 from itertools import groupby
 
 from lipmotion.errors import MissingDependencyError
@@ -13,8 +13,8 @@ from lipmotion.units.lexicon import Lexicon, Pronunciation
 def words_in_time(units: Timeline[Unit]) -> Timeline[str]:
     """Return the words of phones in time; phones without a word, silence among them, are spans of the empty text.
 
-    Neighbours of the same word are one word, unless their phones are those of the word said several times: ``b ih g b
-    ih g`` is ``big big``, while ``t uw t uw`` is one ``tutu``. Only words of the dictionary are told apart so.
+    Neighbours of the same word are one word, unless one is known to begin it ``again``, or their phones are those of
+    the word said several times: ``b ih g b ih g`` is ``big big``, while ``t uw t uw`` is one ``tutu``.
 
     >>> big = [Span(n / 10, (n + 1) / 10, Unit(phone, word="big")) for n, phone in enumerate("b ih g b ih g".split())]
     >>> [word.label for word in words_in_time(Timeline(tuple(big)))]
@@ -23,7 +23,9 @@ def words_in_time(units: Timeline[Unit]) -> Timeline[str]:
     found = []
     for word, run in groupby(units, key=lambda span: span.label.word):
         spans = list(run)
-        starts = _starts(word, tuple(span.label.phone for span in spans))
+        starts = [0, *(place for place, span in enumerate(spans) if span.label.again and place)]
+        if len(starts) == 1:
+            starts = _starts(word, tuple(span.label.phone for span in spans))
         for first, end in zip(starts, [*starts[1:], len(spans)], strict=True):
             found.append(Span(spans[first].start_s, spans[end - 1].end_s, word))
     return Timeline(tuple(found))
@@ -37,23 +39,15 @@ def _starts(word: str, phones: Pronunciation) -> list[int]:
         lexicon = Lexicon()
         variants = lexicon.pronunciations(word.lower()) if lexicon.known(word.lower()) else ()
     except MissingDependencyError:
-        return [0]
-    return _fewest_parts(phones, variants) or [0]
+        variants = ()
+    said = _spaced(phones)
+    once = "|".join(sorted(map(_spaced, variants), key=len, reverse=True))  # as few times as can be
+    if not once or not re.fullmatch(f"(?:{once})+", said):
+        part = re.fullmatch(r"((?:\S+ ){2,}?)\1+", said)
+        written = re.fullmatch(r"(.{2,}?)\1+", word.lower())  # a word that repeats its own part, as ``blahblah``
+        once = part[1] * (len(word) // len(written[1]) if written else 1) if part else said
+    return [said.count(" ", 0, found.start()) for found in re.finditer(once, said)] or [0]
 
 
-def _fewest_parts(phones: Pronunciation, variants: Sequence[Pronunciation]) -> list[int]:
-    """Return where the parts begin if phones are put together of as few variants as possible; empty: they are not."""
-    parts: list[tuple[int, int] | None] = [(0, 0), *[None] * len(phones)]  # up to here: how many, start of the last one
-    for end in range(1, len(phones) + 1):
-        for variant in variants:
-            start = end - len(variant)
-            before = parts[start] if start >= 0 and phones[start:end] == variant else None
-            best = parts[end]
-            if before is not None and (best is None or before[0] + 1 < best[0]):
-                parts[end] = before[0] + 1, start
-    starts: list[int] = []
-    end = len(phones)
-    while end and (last := parts[end]) is not None:
-        end = last[1]
-        starts.append(end)
-    return starts[::-1]
+def _spaced(phones: Pronunciation) -> str:
+    return "".join(f"{phone} " for phone in phones)

@@ -367,6 +367,8 @@ NUMERIC: Forms = (
     (rf"({A})\s?[x×]\s?({A})", "{1} by {2}|{1} times {2}|{1} x {2}"),
     (rf"({A})x", "{1} times|{1} x"),
     (r"#(\d+)", "number {1}|hashtag {1}"),
+    (rf"({NUMBER})\^2", "{1} squared|{1} to the second"),
+    (rf"({NUMBER})\^(\d+)", "{1} to the {2:o}"),
     (rf"{NUMBER}?\.\d+", _decimal),
     (NUMBER, _number),
 )
@@ -386,6 +388,8 @@ FORMS: Forms = (
     (r"(?-i:([A-Z][a-z]+) ([VX]))", "{1:w} {2:w}|{1:w} the {2:R}|{1:w} {2:r}"),
     (rf"(?-i:([A-Z][a-z]+) (?=[IVX]{{2}}){NUMERAL})", "{1:w} the {2:R}|{1:w} {2:r}"),
     (r"(?:[a-z]\.){2,}[a-z]?", lambda text: iter([text.lower().replace(".", " ")])),
+    (r"(?-i:([A-Z])\+\+)", "{1:w} plus plus"),
+    (r"(?-i:([A-Z])#)", "{1:w} sharp"),
     (r"(?-i:[A-Z]{1,3}&[A-Z]{1,3})", lambda text: iter([" ".join(text).lower().replace("&", "and")])),
     (rf"(?!d-day)(?P<bit>[b-df-hj-np-tv-z]{{1,3}})-(?:(?P=bit)-)*(?=(?P=bit)){WORD}", _stutter),
     (r"(?-i:[A-Z]{2,5}s?)", _initials),

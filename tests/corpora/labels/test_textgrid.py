@@ -5,9 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.corpora.labels import read_labels
+from lipmotion.corpora.labels import read_labels, read_phones
 from lipmotion.corpora.labels.textgrid import parse_interval_tiers
 from lipmotion.errors import InputError
+from lipmotion.units import words_in_time
 
 Interval = tuple[float, float, str]
 
@@ -159,6 +160,17 @@ def test_quotes_in_a_text_are_written_twice() -> None:
     rows: list[Interval] = [(0, 1, '""'), (1, 2, '""a""""'), (2, 3, ""), (3, 4, '""' * 5000)]
     (tier,) = parse_interval_tiers(short_form({"words": rows}), "a.TextGrid")
     assert [label.text for label in tier.labels] == ['"', '"a""', "", '"' * 5000]
+
+
+def test_a_word_that_is_said_again_stays_another_word(tmp_path):
+    words: list[Interval] = [(0, 0.3, "city"), (0.3, 0.6, "city"), (0.6, 0.8, ""), (0.8, 0.9, "city")]
+    phones: list[Interval] = [
+        (n / 10, (n + 1) / 10, phone) for n, phone in enumerate("S DX IY S T IH SIL SIL IY".split())
+    ]
+    (tmp_path / "a.TextGrid").write_text(short_form({"words": words, "phones": phones}))
+    units = read_phones(tmp_path / "a.TextGrid")
+    assert [span.label for span in words_in_time(units)] == ["city", "city", "", "city"]
+    assert [span.label.again for span in units] == [n == 3 for n in range(9)]
 
 
 def test_vowels_are_reduced_word_by_word(tmp_path):

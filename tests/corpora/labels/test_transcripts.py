@@ -97,6 +97,8 @@ OF_LINES = {
     "NOTE one more\n\n00:00:02.750 --> 00:00:04.000\n(door opens) How are&nbsp;you\n\nNOTE the end\n",
     "WebVTT with names of cues": "WEBVTT\n\nfirst part\n00:01.000 --> 00:02.500\nHello there\n\nsecond part\n"
     "00:02.750 --> 00:04.000\nHow are you\n",
+    "lyrics": "[ar:Anna]\n[offset:+50]\n[00:02.80] How are\nyou\n[00:01.05] Hello there\n[00:02.55]\n[00:04.05]\n",
+    "lines that begin with times": "[0:01] Hello there\n[00:00:02.50]\n[0:00:02.75]How are you\n[0:04]",
     "Whisper's table": "start\tend\ttext\n1000\t2500\tHello there!\n2750\t4000\tHow are you?\n",
     "Whisper": json.dumps(
         {

@@ -46,6 +46,19 @@ def test_what_is_written_is_read(form: str, sheet: CueSheet, tmp_path: Path) -> 
     assert motion.time_s[-1] == pytest.approx(2.5, abs=1 / 24)
 
 
+@pytest.mark.parametrize(
+    ("times", "scale"), [("0 1000 2000", 1000.0), ("0 80 160", 1000.0), ("0 2 4", 1.0), ("0 99.5 199", 1.0)]
+)
+def test_milliseconds_are_read_as_such(
+    times: str, scale: float, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    starts = times.split()
+    (tmp_path / "a.tsv").write_text("".join(map("{}\t{}\n".format, starts, "XDX")))
+    found = read_cues(tmp_path / "a.tsv").cues
+    assert [cue.end_s for cue in found] == pytest.approx([float(time) / scale for time in starts[1:]])
+    assert ("milliseconds" in caplog.text) == (scale > 1)
+
+
 def test_lips_close_in_a_and_are_as_open_as_the_drawings(sheet: CueSheet) -> None:
     mouth = spoken_mouth(*cue_motion(sheet))
     middle = {name: round(100 * (end_s - 0.0625)) for name, end_s in SHOWN}

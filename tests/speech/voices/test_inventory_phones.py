@@ -54,6 +54,17 @@ def test_unstressed_vowels_are_reduced_and_words_known() -> None:
     ]
 
 
+def test_a_word_that_is_said_again_is_known_as_such() -> None:
+    said = with_words("ih t ih z ix t".split(), ["it", "is", "it"], LEXICON)
+    assert not any(unit.again for unit in said)
+    assert [unit.again for unit in with_words("ih t ax t".split(), ["it", "it"], LEXICON)] == [
+        False,
+        False,
+        True,
+        False,
+    ]
+
+
 def test_pauses_are_named_by_place_and_length() -> None:
     said = timeline(
         ("pau", 0.0, 0.1), ("ih", 0.1, 0.2), ("pau", 0.2, 0.35), ("t", 0.35, 0.4), ("pau", 0.4, 0.65), ("ih", 0.65, 1.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,8 @@ RECOGNISERS = {"pocketsphinx": "auto", "phonetic": "fast"}
 VERSION = "; takes the options of Rhubarb Lip Sync version 1.14.0"
 """What programs look for that ask whether Rhubarb is there, and which."""
 BLANK = b" \t\r\n\0\xef\xbb\xbf\xfe\xff"
+NO_WORDS = re.compile(rb"\[[^\[\]]*\]|[^\w\x80-\xff]")
+"""Sounds in brackets, and what is no letter."""
 
 
 def add_rhubarb_options(parser: argparse.ArgumentParser) -> None:
@@ -65,7 +68,7 @@ def _dialogue(path: str) -> str | None:
     if not is_file(Path(path)):
         raise argparse.ArgumentTypeError(f"no such file: {shortened(path)!r}; the words themselves: --transcript TEXT")
     with Path(path).open("rb") as file:
-        return path if file.read(1 << 16).strip(BLANK) else None
+        return path if NO_WORDS.sub(b"", file.read(1 << 16).strip(BLANK)) else None
 
 
 def _recogniser(name: str) -> str:

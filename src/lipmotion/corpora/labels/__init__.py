@@ -12,11 +12,13 @@ from lipmotion.corpora.labels.label_files import (
     read_transcript,
     speakers_in,
 )
+from lipmotion.corpora.labels.subtitles import is_subtitles, subtitle_words
 
 __all__ = [
     "RecordingLabels",
     "check_plain_text",
     "holds_timings",
+    "is_subtitles",
     "label_files_beside",
     "labels_beside",
     "read_labels",
@@ -24,4 +26,5 @@ __all__ = [
     "read_plain_text",
     "read_transcript",
     "speakers_in",
+    "subtitle_words",
 ]

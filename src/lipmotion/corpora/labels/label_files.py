@@ -43,7 +43,7 @@ from lipmotion.units.text_normalisation import checked_tokens
 from lipmotion.units.written_forms import readings
 
 LOG = logging.getLogger("lipmotion")
-RECOGNISED = (".srt", ".vtt", ".ass", ".ssa", ".sbv", ".ttml", ".dfxp", ".json", ".jsonl", ".ctm", ".stm", ".tsv")
+RECOGNISED = tuple(".srt .vtt .ass .ssa .sbv .lrc .ttml .dfxp .json .jsonl .ctm .stm .tsv".split())
 """Suffixes of subtitles and of what recognisers write."""
 FOR_WORDS = (".txt", ".TextGrid", ".textgrid", ".eaf", ".lab", ".wrd", *RECOGNISED)
 """Suffixes in whose files words are searched, in order: plain text first, as labels in time may not be words, and what
@@ -126,13 +126,16 @@ def read_labels(path: Path) -> RecordingLabels:
     return _read(path, unknown_json=False) or RecordingLabels()
 
 
-def read_transcript(path: Path, tier: str = "", speaker: str = "") -> str | TimedTranscript:
+def read_transcript(path: Path | str, tier: str = "", speaker: str = "") -> str | TimedTranscript:
     """Return the text of a file of plain text, or the words in time of one of another kind that ``read_labels`` reads.
 
+    path : or a text itself, of which subtitles alone are read
     tier, speaker : which tier and whose words; empty: all that hold words are read, and a warning names the speakers
     Raises InputError: as ``read_labels``, no such file, phones without words, or no such tier or speaker.
     """
-    text = _text(path, "transcript")
+    if isinstance(path, str) and not is_subtitles(path):
+        return path
+    text, path = (path, Path("the transcript")) if isinstance(path, str) else (_text(path, "transcript"), path)
     tiers = _timed_tiers(text, str(path))
     if tiers is None:
         _check_plain(text, path)

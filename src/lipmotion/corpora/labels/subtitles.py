@@ -1,9 +1,10 @@
-"""Subtitles: SubRip (``.srt``), WebVTT (``.vtt``), SubStation Alpha (``.ass``, ``.ssa``), YouTube's ``.sbv``, and
-Whisper's table of lines (``.tsv``).
+"""Subtitles: SubRip (``.srt``), WebVTT (``.vtt``), SubStation Alpha (``.ass``, ``.ssa``), YouTube's ``.sbv``,
+Whisper's table of lines (``.tsv``), and lyrics (``.lrc``).
 """
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import replace
@@ -11,7 +12,7 @@ from io import StringIO
 
 from lipmotion.corpora.labels.tier import LINES, LabelTier, TimedLabel, check_count, clock_seconds
 from lipmotion.errors import InputError, shortened
-from lipmotion.units.spoken_text import spoken_text
+from lipmotion.units.spoken_text import speaker_names, spoken_text
 
 TIME = r"((?:\d{1,4}:)?\d{1,2}:\d{1,2}(?:[.,]\d{1,6})?)"
 ARROW = r"(?:(?:[-=–—−]\s?){1,3}(?:[>›»]|&gt;)|→)"
@@ -49,15 +50,21 @@ DRAWING_MODE = re.compile(r"\\p(\d)")
 """Begins a drawing (``{\\p1}``) or ends it (``{\\p0}``): the numbers in between are no words."""
 BREAK = re.compile(r"\\[Nnh]")
 """Line breaks and hard blanks within the text."""
+LYRICS_TAG = r"\[(?:[a-zA-Z]{2,10}|#):[^\]\n]{0,500}\]"
+"""What lyrics say of themselves: ``[ar:Anna]``, ``[offset:+250]``."""
+LYRICS = re.compile(rf"(?:\s{{0,20}}{LYRICS_TAG}){{0,40}}\s{{0,20}}\[{TIME}\]")
+"""The start of lyrics, or of a text whose lines begin with their times: ``[00:12.50]Hello``."""
+LYRICS_LINE = re.compile(rf"((?:\[{TIME}\]\s{{0,4}}){{1,100}}).*")
 
 
 def is_subtitles(text: str) -> bool:
-    """Return whether a text is a file of subtitles, or Whisper's table of lines."""
+    """Return whether a text is a file of subtitles or lyrics, or Whisper's table of lines."""
     return (
         text.startswith(("WEBVTT", HEADER))
         or _is_substation(text)
         or CUE.search(text) is not None
         or SBV.match(text) is not None
+        or LYRICS.match(text) is not None
     )
 
 
@@ -75,10 +82,40 @@ def subtitle_tier(text: str, where: str) -> LabelTier:
     """
     if text.startswith(HEADER):
         cues = _rows(text, where)
+    elif LYRICS.match(text):
+        cues = _lyrics(text, where)
     else:
         cues = _substation_cues(text, where) if _is_substation(text) else _cues(text, where)
     labels = (replace(cue, parts=_words(cue)) for cue in _without_repetitions(list(cues)))
     return LabelTier("subtitles", tuple(labels), LINES)
+
+
+def subtitle_words(text: str) -> str:
+    """Return what is said of subtitles as a text. Raises InputError: as ``subtitle_tier``."""
+    lines = [label.text for label in subtitle_tier(text, "the text").labels]
+    names = speaker_names(lines)
+    return "\n".join(spoken_text(WORD_TIME.sub("", line), names) for line in lines)
+
+
+def _lyrics(text: str, where: str) -> Iterator[TimedLabel]:
+    """Yield the lines of lyrics in order, each to the next; several times before a line repeat it."""
+    cues: list[TimedLabel] = []
+    found = re.search(r"\[offset:\s?([+-]?\d{1,7})\s?\]", text)
+    early_s = int(found[1]) / 1000 if found else 0.0
+    for number, row in enumerate(StringIO(text), 1):
+        line = row.strip()
+        timed = LYRICS_LINE.fullmatch(line)
+        if timed is None:
+            if cues and not re.fullmatch(LYRICS_TAG, line):
+                cues[-1] = replace(cues[-1], text=f"{cues[-1].text}\n{line}")
+            continue
+        for time in re.finditer(TIME, timed[1]):
+            check_count(len(cues), where)
+            start_s = max(clock_seconds(time[1]) - early_s, 0.0)
+            cues.append(TimedLabel(start_s, math.inf, line[timed.end(1) :], f"line {number}"))
+    cues.sort(key=lambda cue: cue.start_s)
+    for cue, end_s in zip(cues, [*(cue.start_s for cue in cues[1:]), math.inf], strict=True):
+        yield replace(cue, end_s=end_s)
 
 
 def _cues(text: str, where: str) -> Iterator[TimedLabel]:

@@ -234,8 +234,9 @@ def with_words(units: Timeline[Unit], labels: Sequence[TimedLabel]) -> Timeline[
     timed = [label for label in labels if not math.isnan(label.start_s + label.end_s)]
     starts_s = [label.start_s for label in timed]
     spans: list[Span[Unit]] = []
+    place = -1
     for span in units:
-        middle_s = (span.start_s + span.end_s) / 2
+        middle_s, before = (span.start_s + span.end_s) / 2, place
         place = bisect_right(starts_s, middle_s) - 1
         inside = place >= 0 and middle_s < timed[place].end_s and not is_silent(span.label.phone)
         if inside and span.label.unit == UNKNOWN_PHONES:
@@ -243,7 +244,8 @@ def with_words(units: Timeline[Unit], labels: Sequence[TimedLabel]) -> Timeline[
             inside = max(map(abs, edges)) <= WHOLE_WORD_S
         word = timed[place].text if inside else ""
         said = word if is_line(word) and spoken_as(word) is SpokenAs.SPEECH else ""
-        spans.append(replace(span, label=replace(span.label, word=said)))
+        again = place > before and bool(spans) and said == spans[-1].label.word != ""
+        spans.append(replace(span, label=replace(span.label, word=said, again=again)))
     return Timeline(tuple(spans))
 
 

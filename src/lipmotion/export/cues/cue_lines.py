@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
+from statistics import median
 
 from lipmotion.errors import InputError, shortened
 from lipmotion.export.cues.cue_shapes import PHONE_SHAPES
@@ -12,6 +14,7 @@ from lipmotion.types import Span, Timeline
 from lipmotion.types.values import number_of
 from lipmotion.units.mouth_chart import BLAIR, LETTERS, REST, SHAPES
 
+LOG = logging.getLogger("lipmotion")
 _FLEMING_DOBBS = "mbp:A nltdr:B fv:G th:B gk:B sh:F o:E ehsz:C aa:D iy:B rest:X"
 FLEMING_DOBBS = dict(pair.split(":") for pair in _FLEMING_DOBBS.split())
 PHONES = {"rest": REST, "hh": "C"} | {
@@ -20,6 +23,8 @@ PHONES = {"rest": REST, "hh": "C"} | {
 """Shapes by the names of other sets, for which Moho and Papagayo have switches."""
 LONGEST_S = 86_400.0
 MOST_CUES = 250_000
+MILLISECONDS = 20.0
+"""Shapes other than rest of which half seem to last so many whole seconds are in milliseconds."""
 
 
 def shape_of(name: str, names: dict[str, str], place: str) -> str:
@@ -54,10 +59,15 @@ def sheet_of(
     """Return a sheet of shapes that each last to the next one, with rest before the first.
 
     rows  : starts in seconds, in order, and shapes;  end_s : of the last one
+    Times that are milliseconds are read as these, with a warning.
     Raises InputError: there are none, or too many, or they are not in order.
     """
     if not rows:
         raise InputError("there is no mouth shape in it; export the cues again")
+    lengths = [after[0] - row[0] for row, after in pairwise(rows) if row[1] != REST]
+    if lengths and median(lengths) >= MILLISECONDS and all(float(start_s).is_integer() for start_s, _ in rows):
+        LOG.warning("a mouth shape seems to last %g s: the times are taken for milliseconds", median(lengths))
+        rows, end_s = [(start_s / 1000, shape) for start_s, shape in rows], end_s / 1000
     if len(rows) > MOST_CUES or end_s > LONGEST_S:
         raise InputError(f"{len(rows)} mouth shapes in {end_s:g} s, required at most {MOST_CUES} in {LONGEST_S:g} s")
     late = next((place for place, (row, after) in enumerate(pairwise(rows), 1) if after[0] < row[0]), None)

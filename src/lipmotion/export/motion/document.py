@@ -12,7 +12,7 @@ from lipmotion.errors import InputError, shortened
 from lipmotion.printable import is_line
 from lipmotion.storage.json_text import json_errors
 from lipmotion.types import Channel, Generation, Motion, Span, Timeline, Unit
-from lipmotion.types.values import items, members, number, text
+from lipmotion.types.values import items, members, number, text, truth
 from lipmotion.units import RECOGNISED, RecognisedPhone, recognised_phones, with_confidences
 
 FORMAT = "lipmotion.motion"
@@ -82,11 +82,12 @@ def parse_units(rows: Any, recognised: Any = None) -> Timeline[Unit]:
 def _row(span: Span[Unit]) -> dict[str, Any]:
     """Return the member of ``units`` for a phone, with its word if that is known."""
     row = {"start_s": span.start_s, "end_s": span.end_s, "phone": span.label.phone, "unit": span.label.unit}
-    return row | {"word": span.label.word} if span.label.word else row
+    return row | ({"word": span.label.word} if span.label.word else {}) | ({"again": True} if span.label.again else {})
 
 
 def _span(row: Any) -> Span[Unit]:
-    span = Span(row["start_s"], row["end_s"], Unit(row["phone"], row.get("unit", ""), row.get("word", "")))
+    unit = Unit(row["phone"], row.get("unit", ""), row.get("word", ""), again=row.get("again", False))
+    span = Span(row["start_s"], row["end_s"], unit)
     if not is_line(span.label.phone + span.label.unit + span.label.word):
         label = shortened(repr(span.label))
         raise InputError(f"{label} has a line end, a control character or half a character in it; correct it")
@@ -105,7 +106,8 @@ def _recognised(start_s: Any, end_s: Any, name: Any, confidence: Any) -> Recogni
 _TEXT, _TIME = text(10_000), number()
 _UNITS = items(
     members(
-        {"start_s": _TIME, "end_s": _TIME, "phone": _TEXT, "unit": _TEXT, "word": _TEXT}, ("start_s", "end_s", "phone")
+        {"start_s": _TIME, "end_s": _TIME, "phone": _TEXT, "unit": _TEXT, "word": _TEXT, "again": truth},
+        ("start_s", "end_s", "phone"),
     )
 )
 _ROWS = items(items(lambda value: value, 4, 4))

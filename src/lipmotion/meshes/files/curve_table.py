@@ -56,6 +56,8 @@ LEFT_OUT_SHARE, LEFT_OUT = 0.1, 3
 """So many rows may be left out: a share of all, or a few."""
 LONGEST_STEP_S = 2.0
 """Rows that are further apart are not seconds apart: the column of times has another unit."""
+MISREAD_ROWS = 10
+"""More rows a second apart are frames, of which a spreadsheet made seconds."""
 MOST_CURVES = 2000
 _TIMECODE = re.compile(r"(\d{1,2})[:;](\d{1,2})[:;](\d{1,2})(?:([:;.,])(\d{1,9}(?:[.,]\d{1,9})?))?", re.ASCII)
 
@@ -312,6 +314,11 @@ def _seconds(codes: list[Timecode]) -> Array:
     whole = np.array([code.seconds for code in codes], float)
     frames = np.array([code.frames for code in codes])
     day_s, mark = DAY_S, codes[0].mark
+    if mark == "." and len(codes) > MISREAD_ROWS and (frames == frames[0]).all():
+        mark = ""
+    if not mark and len(codes) > MISREAD_ROWS and np.median(np.diff(whole)) == 1:
+        LOG.warning("rows are a second apart: the last field of the timecodes is taken for frames (MM:SS:FF)")
+        whole, frames, mark = whole // 60, whole % 60, ":"
     if not mark:
         starts = np.flatnonzero(np.diff(whole)) + 1
         if len(starts) < 2:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import replace
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from lipmotion.articulation.pauses import REST
 from lipmotion.corpora.entry import quantise
+from lipmotion.corpora.labels import is_subtitles, subtitle_words
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
 from lipmotion.kernels.threads import one_thread
@@ -33,6 +35,7 @@ from lipmotion.units.mood_tags import moods_in_time, tagged_text
 from lipmotion.units.phones import SHORT_PAUSE_S
 from lipmotion.units.sentences import MOST_CHARACTERS, sentences_of
 
+LOG = logging.getLogger("lipmotion")
 CORPUS_VOICE = "corpus"
 """The name of the voice that is a corpus."""
 REST_S = 0.25
@@ -87,6 +90,9 @@ def speak(  # noqa: PLR0913
     >>> sound, result = lipmotion.speak("Please speak.")  # doctest: +SKIP
     >>> lipmotion.write(result, ["hello.mp4", "hello.wav"], speech=sound)  # doctest: +SKIP
     """
+    if is_subtitles(text):
+        LOG.warning("the text is that of subtitles: times, and sounds in brackets, are left out")
+        text = subtitle_words(text)
     text, tags = tagged_text(text)
     if voice == CORPUS_VOICE or corpus is not None:
         if voice != CORPUS_VOICE or corpus is None:

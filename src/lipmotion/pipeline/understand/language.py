@@ -30,7 +30,7 @@ def in_language(request: SpeechRequest) -> SpeechRequest:
     if request.language == ENGLISH:
         return request
     given = request.transcript
-    if isinstance(given, Path):
+    if isinstance(given, Path) or (isinstance(given, str) and ":" in given):
         from lipmotion.corpora.labels import read_transcript  # forty formats
 
         given = read_transcript(given)

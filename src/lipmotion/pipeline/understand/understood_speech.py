@@ -453,7 +453,7 @@ def _words(
 ) -> tuple[str, ...] | TimedTranscript | None:
     """Return the words of a transcript. Raises AlignmentError: a text that is too long for the recording."""
     text = transcript
-    if isinstance(text, Path):
+    if isinstance(text, Path) or (isinstance(text, str) and ":" in text):  # a file, or perhaps subtitles
         from lipmotion.corpora.labels import read_transcript  # forty formats
 
         text = read_transcript(text)

@@ -6,6 +6,7 @@ import re
 import unicodedata
 from bisect import bisect_right
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import groupby
 
 from lipmotion.errors import InputError
@@ -64,11 +65,14 @@ def with_words(phones: Sequence[str], words: Sequence[str], lexicon: Lexicon) ->
     Both follow from the cheapest match with the words' first pronunciations; a phone that matches none belongs to the
     word before it.
     """
-    expected = [(phone, word) for word in words for phone in _pronunciation(word, lexicon)]
-    units, word = [], expected[0][1] if expected else words[0]
+    expected = [(phone, number) for number, word in enumerate(words) for phone in _pronunciation(word, lexicon)]
+    units, number = [], expected[0][1] if expected else 0
     for phone, match in zip(phones, matches(phones, [phone for phone, _ in expected]), strict=True):
-        in_lexicon, word = expected[match] if match >= 0 else ("", word)
-        units.append(Unit(in_lexicon if REDUCED_VOWELS.get(phone) == in_lexicon else phone, word=word))
+        before = number
+        in_lexicon, number = expected[match] if match >= 0 else ("", number)
+        name = in_lexicon if REDUCED_VOWELS.get(phone) == in_lexicon else phone
+        again = number > before and words[number] == words[before]
+        units.append(Unit(name, word=words[number], again=again))
     return units
 
 
@@ -94,9 +98,11 @@ def _with_written_words(phones: Phones, written: Timeline[str], lexicon: Lexicon
         text = written[number].label
         words = words_in(text)
         if lexicon is not None and words:
-            units += with_words(names, words, lexicon)
+            named = with_words(names, words, lexicon)
         else:
-            units += [Unit(name, word=WRITTEN_EDGES.sub("", normalised_text(text))) for name in names]
+            named = [Unit(name, word=WRITTEN_EDGES.sub("", normalised_text(text))) for name in names]
+        again = bool(units) and named[0].word == units[-1].word
+        units += [replace(named[0], again=again), *named[1:]]
     return units
 
 
