@@ -12,7 +12,7 @@ from lipmotion.errors import InputError, shortened
 from lipmotion.printable import is_line
 from lipmotion.storage.json_text import json_errors
 from lipmotion.types import Channel, Generation, Motion, Span, Timeline, Unit
-from lipmotion.types.values import items, members, number, text, truth
+from lipmotion.types.values import items, members, number, require, text, truth
 from lipmotion.units import RECOGNISED, RecognisedPhone, recognised_phones, with_confidences
 
 FORMAT = "lipmotion.motion"
@@ -20,13 +20,17 @@ VERSION = 1
 
 
 def header(generation: Generation) -> dict[str, Any]:
-    """Return the members ``format``, ``version``, ``rate_hz`` and ``channels``."""
+    """Return the members ``format``, ``version``, ``rate_hz`` and ``channels``.
+
+    Raises InputError: a channel has a name that would not be read.
+    """
     motion = generation.motion
+    channels = [{"name": channel.name, "unit": channel.unit} for channel in motion.channels]
     return {
         "format": FORMAT,
         "version": VERSION,
         "rate_hz": float(motion.rate_hz),
-        "channels": [{"name": channel.name, "unit": channel.unit} for channel in motion.channels],
+        "channels": require(items(members(_CHANNEL)), channels, "channels"),
     }
 
 
