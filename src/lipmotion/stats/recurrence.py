@@ -100,7 +100,8 @@ class RecurrentNetwork(SequenceNetwork):
         states, passes, counts = inputs, [], _both_directions(inside[:, :, None].astype(np.float32))
         for layer in self.layers:
             passed = _layer_pass(layer, _both_directions(states), counts)
-            states = _side_by_side(passed.outputs)
+            forth, back = passed.outputs[0], passed.outputs[1, ::-1]
+            states = np.ascontiguousarray(np.concatenate([forth, back], axis=2).transpose(1, 0, 2))
             if dropout is not None:
                 dropped = dropout.mask(states.shape) * dropout.gain
                 states = states * dropped
@@ -140,11 +141,6 @@ def _both_directions(values: Array) -> Array:
     """Return the values of a batch [shape=(B, T, C)] forward and backward in time [shape=(2, T, B, C)]."""
     forward = values.transpose(1, 0, 2)
     return np.stack([forward, forward[::-1]])
-
-
-def _side_by_side(values: Array) -> Array:
-    """Return values of both directions [shape=(2, T, B, C)] at each time step of a batch [shape=(B, T, 2·C)]."""
-    return np.ascontiguousarray(np.concatenate([values[0], values[1, ::-1]], axis=2).transpose(1, 0, 2))
 
 
 def _layer_pass(layer: RecurrentLayer, inputs: Array, inside: Array) -> _CellPass:

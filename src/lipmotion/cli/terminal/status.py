@@ -28,14 +28,10 @@ def outcome(error: BaseException) -> tuple[int, str] | None:
     if isinstance(error, MemoryError):
         return InputError.exit_code, f"not enough memory ({error}); give a shorter recording or a smaller file"
     if isinstance(error, OSError):  # what the operating system refuses: no permission, a name too long
-        return InputError.exit_code, one_line(GONE if _is_nameless(error) else error)
+        nameless = (error.errno, error.strerror, error.filename) == (errno.ENOENT, os.strerror(errno.ENOENT), None)
+        return InputError.exit_code, one_line(GONE if nameless else error)  # the current folder
     failed = failed_extension(error)
     return None if failed is None else (InputError.exit_code, one_line(failed))
-
-
-def _is_nameless(error: OSError) -> bool:
-    """Return whether something without a name is missing: the current folder."""
-    return (error.errno, error.strerror, error.filename) == (errno.ENOENT, os.strerror(errno.ENOENT), None)
 
 
 def one_line(message: object) -> str:

@@ -154,7 +154,10 @@ def held_out_recordings(  # noqa: PLR0913
     threshold = None
     if OPENING in compared:
         training = [corpus.utterance(name) for name in corpus.names("train", selection.speakers)]
-        threshold = closed_threshold([_openings(utterance) for utterance in training or utterances])
+        tracks = [utterance.track for utterance in training or utterances]
+        threshold = closed_threshold(
+            [np.asarray(each.motion[OPENING], float)[np.asarray(each.seen)] for each in tracks]
+        )
     recognised = with_progress(utterances, "phones: recognition", sub_monitor(monitor, 0.4, 0.9))
     found = [phones.recognition(utterance.audio, utterance.features) for utterance in recognised]
     conditions = {AUDIO_ONLY: [each.units for each in found]}
@@ -185,11 +188,6 @@ def compared_channels(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...],
         raise CorpusError(f"none of {len(names)} motion channels moves in these {len(utterances)} utterances")
     moving = tuple(name for name, moved in zip(names, moves, strict=True) if moved)
     return moving, tuple(name for name in names if name not in moving)
-
-
-def _openings(utterance: Utterance) -> NDArray[np.float64]:
-    """Return the opening in all frames in which the face was measured [shape=(N,)]."""
-    return np.asarray(utterance.track.motion[OPENING], float)[np.asarray(utterance.track.seen)]
 
 
 def _check_channels(motion: Motion, compared: Sequence[str]) -> None:

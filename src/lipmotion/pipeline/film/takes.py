@@ -67,7 +67,8 @@ def takes_of(source: Path, recordings: Path | None = None, speaker: str = "") ->
         found = _of_corpus(Corpus.open(source), recordings, speaker)
     else:
         folder = [item for item in discover(source).recordings if item.motion_file is None]
-        found = [_take(item, source) for item in _training(_of_person(folder, speaker, str(source)))]
+        items = _of_person(folder, speaker, str(source))
+        found = [_take(item, source) for item in [item for item in items if item.split == "train"] or items]
     if not found:
         raise InputError(f"{source}: no videos in it; give a video of the person, or a folder of videos")
     return _evenly_used(found)
@@ -112,11 +113,6 @@ def _of_person(items: Sequence[SourceRecording], speaker: str, where: str) -> li
         known = ", ".join(name or "one without a name" for name in people)
         raise InputError(f"{where}: {found}, a face is that of one person; name it (--speaker): {known}")
     return [item for item in items if not speaker or item.speaker == speaker]
-
-
-def _training(items: list[SourceRecording]) -> list[SourceRecording]:
-    """Return the recordings of the training list; all if it is empty."""
-    return [item for item in items if item.split == "train"] or items
 
 
 def _of_corpus(corpus: Corpus, recordings: Path | None, speaker: str) -> list[Take]:

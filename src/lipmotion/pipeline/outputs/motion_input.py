@@ -53,17 +53,14 @@ def read_generation(path: str | Path, units: str | Path | None = None, rate_hz: 
         raise InputError(f"{path}: the motion lasts {lasts_s:.0f} s, required at most {LONGEST_S:.0f}; cut it")
     phones = found if units is None else read_units(units)
     channels = tuple(
-        Channel(each.name, WEIGHT) if each.unit == EYE_DISTANCE and _is_weight(each.name) else each
+        Channel(each.name, WEIGHT)
+        if each.unit == EYE_DISTANCE and (is_known(each.name) or is_mood(each.name))
+        else each
         for each in motion.channels
     )
     states = np.zeros(len(motion.values), np.intp)
     nothing = np.broadcast_to(0.0, motion.values.shape)
     return Generation(replace(motion, channels=channels), nothing, phones, StateTrace((STATE,), states))
-
-
-def _is_weight(name: str) -> bool:
-    """Return whether a channel of that name is a weight: a blendshape, a viseme, a vowel, or a mood."""
-    return is_known(name) or is_mood(name)
 
 
 def in_step(motion: Motion, duration_s: float, advice: str = "") -> Motion:

@@ -104,7 +104,8 @@ def label_utterances(
     blocks = [utterances[start : start + UTTERANCES_PER_CHECKPOINT] for start in starts]
     stored = [checkpoint.load(_stage(number)) for number in range(len(blocks))]
     unlabelled = (block for block, arrays in zip(blocks, stored, strict=True) if arrays is None)
-    missing = [list(map(_without_pictures, block)) for block in unlabelled]
+    # without mouth pictures, which take time to send to another process
+    missing = [[replace(each, track=replace(each.track, crops=None)) for each in block] for block in unlabelled]
     labelled = iter(each(partial(_label_block, labeller=labeller), missing))
     done = 0
     for number, (block, arrays) in enumerate(zip(blocks, stored, strict=True)):
@@ -122,11 +123,6 @@ def label_utterances(
 def _stage(number: int) -> str:
     """Return the name of a block in the checkpoint."""
     return f"labels-{number}"
-
-
-def _without_pictures(utterance: Utterance) -> Utterance:
-    """Return an utterance without mouth pictures, which takes less time to send to another process."""
-    return replace(utterance, track=replace(utterance.track, crops=None))
 
 
 def _label_block(utterances: Sequence[Utterance], labeller: Labeller) -> list[PhonesOrReason]:

@@ -27,7 +27,7 @@ from lipmotion.stats.constrained_mllr import (
 )
 from lipmotion.stats.em import run_em
 from lipmotion.stats.mixture import Mixtures
-from lipmotion.types import FRAME_RATE_HZ, Audio, Features
+from lipmotion.types import FRAME_RATE_HZ, Audio
 from lipmotion.units import is_silent
 
 PASSES, ITERATIONS = 2, 4
@@ -98,16 +98,10 @@ def _checked_speech_s(names: Sequence[str], densities: NDArray[np.intp]) -> floa
 def _common_similarity(own: UnitHmm, audios: Sequence[AnalysedAudio]) -> SpeakerSimilarity:
     """Return the speaker similarity of all recordings together, at one warp for all of them."""
     scores = {
-        warp: own.fit(np.concatenate([_features_once(audio, warp).values for audio in audios])) - own.typical_fit
-        for warp in WARPS
+        warp: own.fit(np.concatenate([audio.mfcc(warp).values for audio in audios])) - own.typical_fit for warp in WARPS
     }
     warp = best_warp(scores)
     return SpeakerSimilarity(warp, scores[warp])
-
-
-def _features_once(audio: AnalysedAudio, warp: float) -> Features:
-    """Return the features at a warp; only those without one are needed again, others would fill the memory."""
-    return audio.mfcc() if warp == 1 else analysed(audio).mfcc(warp)
 
 
 def _own_prior(own: UnitHmm, *, short: bool) -> tuple[AffineStatistics, NDArray[np.bool_]]:

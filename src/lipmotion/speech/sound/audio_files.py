@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.speech.sound.audio_decoding import DecodedAudio, check_sound_format, decode_audio
@@ -111,14 +110,9 @@ def _check_damage(path: Path, sound: DecodedAudio, level: int) -> None:
 def _checked(path: Path, audio: Audio) -> Audio:
     if audio.duration_s < SHORTEST_S:
         raise InputError(f"{path}: holds {audio.duration_s * 1000:.0f} ms of sound, required at least 100 ms")
-    if not _is_finite(audio.samples):
+    if not np.isfinite([audio.samples.min(), audio.samples.max()]).all():  # which needs no further array
         raise InputError(f"{path}: holds samples that are not finite (NaN or infinite); export the recording again")
     return audio
-
-
-def _is_finite(samples: NDArray[np.float32]) -> bool:
-    """Return whether all samples are finite; their extremes tell, and need no further array."""
-    return bool(np.isfinite(samples.min()) and np.isfinite(samples.max()))
 
 
 def _reason(error: Exception) -> str:
