@@ -121,7 +121,7 @@ def test_models_of_something_else_are_refused(
     with pytest.raises(ExportError, match="the corpus"):
         engines(toy_corpus, models=toy_corpus.path, settings=SMALL)
     (tmp_path / "file").write_text("")
-    with pytest.raises(ExportError, match="cannot be a folder for models"):
+    with pytest.raises(ExportError, match="is a file; give the name"):
         engines(toy_corpus, models=tmp_path / "file", settings=SMALL)
 
 

@@ -182,7 +182,7 @@ def test_each_edit_by_pointer_and_keys(page: Page) -> None:
     window.press(TAB)
     assert page.of("studio.store.selected.index") == 11
     page.edit(lambda: window.press_together(SHIFT, RIGHT), r"phone 12 ends 1\.\d+")
-    page.edit(lambda: type_over("n"), "phone 12 is n")
+    page.edit(lambda: type_over("t"), "phone 12 is t")
     page.edit(lambda: window.press("s"), r"split phone 12 at 1\.\d+")
     page.edit(lambda: window.press("m"), "remove phone 14")
     page.edit(lambda: window.press(DELETE), "remove phone 13")
