@@ -42,7 +42,7 @@ LOCAL_FRAMES, LOCAL_DROP, SOFTEST_DROP = 301, 30 * DECIBEL, 42 * DECIBEL
 """Sound lies less than the second below the loudest within the first, and less than the third below all of it."""
 STEADY, STEADY_FRAMES = 10 * DECIBEL, 201
 """The level of a voice falls by more than the first from the loudest of so many frames around."""
-TONE_FRAMES, TONE_RANGE, TONE_SHARE, TONE_DROP = 15, 0.3, 0.9, 20 * DECIBEL
+TONE_FRAMES, TONE_RANGE, TONE_SHARE, TONE_DROP = 15, 0.2, 0.985, 20 * DECIBEL
 """A tone has a log energy within the second for so many frames, this share of its power at one frequency, and is no
 softer than the last beneath the loudest frame. No voice in 13 minutes of speech, or of a synthesiser, is a tone."""
 GATED_DROP, FILLED_DROP = 70 * DECIBEL, 33 * DECIBEL
