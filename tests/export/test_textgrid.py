@@ -28,7 +28,7 @@ def test_gaps_become_intervals_without_text(tmp_path: Path) -> None:
 
 
 def test_times_words_and_confidences_are_exact(tmp_path: Path) -> None:
-    edges_s = [0.0, 1 / 3, 0.1 * 5 + 1e-12, 1e3 / 7]
+    edges_s = [0.0, 1 / 3, 0.1 * 5 + 1e-12, 10 / 7]
     labels = [Unit("sil"), Unit("b", word="big", confidence=0.1 + 0.2), Unit("ih", word="big", confidence=1e-7)]
     units = Timeline(tuple(Span(a, b, label) for a, b, label in zip(edges_s, edges_s[1:], labels, strict=False)))
     write_textgrid(tmp_path / "a.TextGrid", units)
