@@ -297,7 +297,7 @@ def measured_person(examples: Sequence[Example], column: int | None) -> PersonSt
             ranges = closable_ranges(example.speech.units, len(values))
             smallest += [values[frames, column][valid[frames]].min() for frames in ranges if valid[frames].any()]
     resting, speech = np.concatenate(silent), np.concatenate(spoken)
-    quiet = _first_long([resting, np.concatenate(silence)])
+    quiet = next((each for each in (resting, np.concatenate(silence)) if len(each) >= LEAST_FRAMES), None)
     if not len(speech):
         speech = np.concatenate(measured)
     if not len(speech):
@@ -312,11 +312,6 @@ def measured_person(examples: Sequence[Example], column: int | None) -> PersonSt
     rest = np.median(quiet, axis=0) if quiet is not None else np.full(speech.shape[1], np.nan)
     seconds = [len(frames) / FRAME_RATE_HZ for frames in (resting, speech)]
     return PersonStatistics(rest, seconds[0], np.median(speech, axis=0), high - low, follow, closed, seconds[1])
-
-
-def _first_long(candidates: Sequence[Array]) -> Array | None:
-    """Return the first of some frames that are enough for a rest pose, or None."""
-    return next((frames for frames in candidates if len(frames) >= LEAST_FRAMES), None)
 
 
 def rest_poses(people: Sequence[PersonStatistics]) -> Array:

@@ -93,12 +93,10 @@ def _within(speech: Speech, frames: slice) -> Speech:
     steps, halves = (slice(frames.start // each, -(-frames.stop // each)) for each in (STEP, 2))
     posteriors, prior, confidence, parts = speech.posteriors, speech.prior, speech.confidence, None
     if speech.parts is not None:
-        begin = [max(part.own.start, part.first) for part in speech.parts]
-        end = [min(part.own.stop, part.first + part.frames) for part in speech.parts]
         parts = tuple(
             _part_within(part, frames)
-            for part, first, stop in zip(speech.parts, begin, end, strict=True)
-            if max(first, frames.start) < min(stop, frames.stop)
+            for part in speech.parts
+            if max(part.inside.start, frames.start) < min(part.inside.stop, frames.stop)
         )
     return Speech(
         some,

@@ -106,11 +106,16 @@ class SpeechPart(NamedTuple):
         """The number of its frames."""
         return len(self.speech.features.values)
 
+    @property
+    def inside(self) -> slice:
+        """Its own frames of the recording, as far as its sound goes."""
+        return slice(max(self.own.start, self.first), min(self.own.stop, self.first + self.frames))
+
     def between(self, units: Timeline[Unit]) -> Timeline[Unit]:
         """Return the recording's phones in time in its own frames, with times from its first frame."""
-        start, stop = max(self.own.start, self.first), min(self.own.stop, self.first + self.frames)
-        within = units.between(start / FRAME_RATE_HZ, stop / FRAME_RATE_HZ)
-        return within.shifted((start - self.first) / FRAME_RATE_HZ)
+        inside = self.inside
+        within = units.between(inside.start / FRAME_RATE_HZ, inside.stop / FRAME_RATE_HZ)
+        return within.shifted((inside.start - self.first) / FRAME_RATE_HZ)
 
 
 @dataclass(frozen=True, eq=False)

@@ -155,12 +155,13 @@ def test_it_goes_on_from_what_is_finished(
 @LONG
 def test_intervals_hold_their_figures_and_nothing_differs_from_itself(figures: dict[str, Any]) -> None:
     rows = figures["rows"][-1]["conditions"]["audio only"]
-    for row in rows.values():
+    for name, row in rows.items():
         for key in ("amse", "acc"):
             low, high = row[f"{key}_95"]
             assert low - 1e-9 <= row[key] <= high + 1e-9
+        # tuned, the same system may be the same
+        assert row["acc_gain_95"] != (0, 0) or name.startswith(REFERENCE_SYSTEM)
     assert rows[REFERENCE_SYSTEM]["acc_gain_95"] == (0, 0)
-    assert any(row["acc_gain_95"] != (0, 0) for row in rows.values())
 
 
 @LONG

@@ -68,14 +68,11 @@ def fingerprint_of(job: Job) -> str:
     lipmotion, and the recogniser of phones."""
     request = replace(job.request, model=job.request.model or shipped_path())
     parts = [{name: _told(value) for name, value in part.as_mapping().items()} for part in (request, job.outputs)]
-    parts += [job.delivery.as_mapping(), job.staging.as_mapping(), *_drawings(job.outputs.face)]
+    parts += [job.delivery.as_mapping(), job.staging.as_mapping()]
+    if is_drawings(job.outputs.face):
+        parts.append({path.name: sha256_of(path) for path in picture_files(Path(job.outputs.face))})
     parts += _table(job.outputs.character)
     return _digest(as_json([*parts, installed_version(), installed_phone_recogniser()]))
-
-
-def _drawings(face: str) -> list[dict[str, str]]:
-    """Return the digests of the drawings in the folder that a face is; none of another face."""
-    return [{path.name: sha256_of(path) for path in picture_files(Path(face))}] if is_drawings(face) else []
 
 
 def _table(character: Path | None) -> list[dict[str, str]]:

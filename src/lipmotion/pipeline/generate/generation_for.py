@@ -16,7 +16,7 @@ from lipmotion.errors import InputError
 from lipmotion.motion.closure import clip_at_zero, is_never_negative
 from lipmotion.motion.generation import BLOCK_FRAMES
 from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps, restfulness, viseme_weights
-from lipmotion.pipeline.generate.passages import generate_passages
+from lipmotion.pipeline.generate.passages import REACH_FRAMES, generate_passages
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.types import (
@@ -32,8 +32,6 @@ from lipmotion.types import (
 )
 
 ModelT = TypeVar("ModelT")
-REACH_FRAMES = 10
-"""Frames on both sides of a pin over which a value is reached that the mean person's mouth cannot take."""
 
 
 def speaker_map(maps: SpeakerMaps | None, speaker: str) -> SpeakerMap | None:

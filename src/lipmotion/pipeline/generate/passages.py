@@ -97,8 +97,7 @@ def _generate_passage(
 ) -> Generation:
     """Return the motion of a passage, with the pins that lie in it."""
     start_s = part.first / FRAME_RATE_HZ
-    first, stop = max(part.own.start, part.first), min(part.own.stop, part.first + part.frames)
-    inside = [pin for pin in pins if first <= round(pin.time_s * FRAME_RATE_HZ) < stop]
+    inside = [pin for pin in pins if part.inside.start <= round(pin.time_s * FRAME_RATE_HZ) < part.inside.stop]
     shifted = Constraints(tuple(replace(pin, time_s=pin.time_s - start_s) for pin in inside))
     try:
         generation = generate(replace(part.speech, times_given=times_given), shifted)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from difflib import SequenceMatcher
@@ -30,6 +31,7 @@ from lipmotion.speech.recognition.transcript_evidence import (
     LEAST_GAP_S,
     OtherSpeech,
     TranscriptEvidence,
+    WordEvidence,
     transcript_evidence,
 )
 from lipmotion.speech.voices.pronunciations import LanguageLexicon
@@ -159,6 +161,29 @@ def _compared(evidence: TranscriptEvidence, recognised: Timeline[Unit]) -> Trans
     transcript is known to leave out something, recognised phones between those of its words are more of it.
     """
     spans = [span for span in recognised if not is_silent(span.label.phone)]
+    words, taken = _found_words(evidence, spans)
+    beside = [span for place, span in enumerate(spans) if place not in taken]
+    middles_s = [(span.start_s + span.end_s) / 2 for span in beside]
+    known = {(other.first, other.stop) for other in evidence.others}
+    said = [-1, *(number for number, word in enumerate(words) if word.is_said), len(words)]
+    others = []
+    for before, after in pairwise(said):
+        before_s = words[before].end_s if before >= 0 else 0.0
+        after_s = words[after].start_s if after < len(words) else np.inf
+        between = beside[bisect_left(middles_s, before_s) : bisect_left(middles_s, after_s)]
+        lasts = between and between[-1].end_s - between[0].start_s >= LEAST_GAP_S
+        is_more = (before + 1, after) in known or (evidence.gaps and len(between) >= LEAST_INSERTED)
+        if after > before + 1 or (lasts and is_more):
+            start_s, end_s = (between[0].start_s, between[-1].end_s) if between else (before_s, before_s)
+            others.append(OtherSpeech(start_s, end_s, before + 1, after))
+    return TranscriptEvidence(tuple(words), tuple(others))
+
+
+def _found_words(evidence: TranscriptEvidence, spans: Sequence[Span[Unit]]) -> tuple[list[WordEvidence], set[int]]:
+    """Return the words of ``_compared``, those that are found with the times that they have there, and their phones.
+
+    spans : recognised phones; those of the words that are found are returned by their numbers
+    """
     words, phones = list(evidence.words), [span.label.phone for span in spans]
     wanted = [(number, phone) for number, word in enumerate(words) for phone in word.phones]
     matcher = SequenceMatcher(None, [phone for _, phone in wanted], phones, autojunk=False)
@@ -184,19 +209,7 @@ def _compared(evidence: TranscriptEvidence, recognised: Timeline[Unit]) -> Trans
             _, first, end = min(edits)
             words[number] = word._replace(start_s=spans[first].start_s, end_s=spans[end - 1].end_s, is_said=True)
             taken.update(range(first, end))
-    others = []
-    said = [-1, *(number for number, word in enumerate(words) if word.is_said), len(words)]
-    for before, after in pairwise(said):
-        before_s = words[before].end_s if before >= 0 else 0.0
-        after_s = words[after].start_s if after < len(words) else np.inf
-        beside = (span for place, span in enumerate(spans) if place not in taken)
-        between = [span for span in beside if before_s <= (span.start_s + span.end_s) / 2 < after_s]
-        known = any(other.first == before + 1 and other.stop == after for other in evidence.others)
-        lasts = between and between[-1].end_s - between[0].start_s >= LEAST_GAP_S
-        if after > before + 1 or (lasts and (known or (evidence.gaps and len(between) >= LEAST_INSERTED))):
-            start_s, end_s = (between[0].start_s, between[-1].end_s) if between else (before_s, before_s)
-            others.append(OtherSpeech(start_s, end_s, before + 1, after))
-    return TranscriptEvidence(tuple(words), tuple(others))
+    return words, taken
 
 
 def _recognised_within(
