@@ -25,7 +25,7 @@ from lipmotion.speech.recognition.recogniser import RECOGNISER_KINDS, Recogniser
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio
 from lipmotion.units import Lexicon, words_of
-from lipmotion.vision.track import track
+from lipmotion_faces.tracking.track import track
 
 VOICES = {
     "LibriVox reader, the 4 others": tuple(name for name in SPOKEN if name.startswith("sense_and")),

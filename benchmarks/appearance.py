@@ -19,19 +19,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.appearance import person
-from lipmotion.appearance.lower_face import HEIGHT, WIDTH, cheek_light, face_shape, mouth_part, region_map, relit
-from lipmotion.appearance.person import Appearance, FootagePictures, learn_appearance
-from lipmotion.appearance.placing import cut
 from lipmotion.errors import InputError
-from lipmotion.pipeline.film.background import chin_px
-from lipmotion.pipeline.film.build import JAW_ENDS, UNUSED_AXIS
 from lipmotion.types import Channel, Motion
-from lipmotion.vision.footage import Footage, footage_frames, track_footage
-from lipmotion.vision.frames import WHOLE
-from lipmotion.vision.landmarks import EYE_CORNERS, TRACKED_POINTS
-from lipmotion.vision.mouth_pictures import eyes_to_image
-from lipmotion.vision.tracked_frames import tracked_frames
+from lipmotion_faces.appearance import person
+from lipmotion_faces.appearance.lower_face import HEIGHT, WIDTH, cheek_light, face_shape, mouth_part, region_map, relit
+from lipmotion_faces.appearance.person import Appearance, FootagePictures, learn_appearance
+from lipmotion_faces.appearance.placing import cut
+from lipmotion_faces.film.background import chin_px
+from lipmotion_faces.film.build import JAW_ENDS, UNUSED_AXIS
+from lipmotion_faces.tracking.footage import Footage, footage_frames, track_footage
+from lipmotion_faces.tracking.frames import WHOLE
+from lipmotion_faces.tracking.landmarks import EYE_CORNERS, TRACKED_POINTS
+from lipmotion_faces.tracking.mouth_pictures import eyes_to_image
+from lipmotion_faces.tracking.tracked_frames import tracked_frames
 
 Pictures = NDArray[np.uint8]
 EYES = [TRACKED_POINTS.index(point) for point in EYE_CORNERS]

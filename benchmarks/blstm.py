@@ -24,12 +24,12 @@ from numpy.typing import NDArray
 
 from lipmotion import Corpus
 from lipmotion.corpora.splits import read_names
-from lipmotion.experiments.baselines import recurrent
 from lipmotion.measures.curves import pooled_correlation
 from lipmotion.motion.posterior_network import COMPONENTS, LEAST_LOG_POSTERIOR
 from lipmotion.motion.resample import model_motion
 from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser, token_posteriors
 from lipmotion.types import Example, Speech, Timeline, silent_monitor
+from lipmotion_lab.baselines import recurrent
 
 CHANNELS = ("opening", "width", "outer")
 TRIED = {"DROPOUT": (0.3, 0.5), "LEARNING_RATE": (2e-3, 4e-3), "EPOCHS": (40, 80)}

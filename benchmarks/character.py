@@ -4,7 +4,7 @@
 
 Ten sentences are spoken by a synthetic voice (the extra ``text``), so their phones are known.
 
-*Re-tracked*: the faces are drawn at 25 frames a second, written as .mp4 and tracked by ``lipmotion.vision.track`` (the
+*Re-tracked*: the faces are drawn at 25 frames a second, written as .mp4 and tracked (the
 extra ``video``); ACC of opening, width and outer, pooled over all sentences, against the motion given. ``distances
 alone``: the same motion, but only silence is known of the phones, so that nothing but the channels is drawn. *Told*:
 the gap and the width of the poses, that is the motion with what the phones add. *By colour*: a second judge, which
@@ -32,13 +32,13 @@ from numpy.typing import NDArray
 
 import lipmotion
 from lipmotion.articulation.mouth import spoken_mouth
-from lipmotion.export.video import write_mp4
-from lipmotion.faces import face_named
-from lipmotion.faces.portrait.pose import mouth_poses
 from lipmotion.types import Audio, Motion, Timeline, Unit
+from lipmotion_faces import face_named
+from lipmotion_faces.portrait.pose import mouth_poses
+from lipmotion_faces.video.mp4 import write_mp4
 
 try:
-    from lipmotion.faces import Staging, staged_face
+    from lipmotion_faces import Staging, staged_face
 except ImportError:  # the first version of the portrait
     Staging = None
 
@@ -70,7 +70,7 @@ def drawn(face: str, motion: Motion, units: Timeline[Unit], fps: float, still: b
 
 
 def retracked(face: str, spoken: Sequence[Spoken], still: bool) -> dict[str, Any]:
-    from lipmotion.vision.track import track
+    from lipmotion_faces.tracking.track import track
 
     given, measured, told, coloured = [], [], [], []
     tones = tones_of(face)
@@ -164,12 +164,12 @@ def mouth_measures(frame: NDArray[np.uint8], tones: NDArray[np.float64]) -> NDAr
 
 def tones_of(face: str) -> NDArray[np.float64]:
     try:
-        from lipmotion.faces import face_named as named
+        from lipmotion_faces import face_named as named
 
         colours = named(face).design.palette
         get = lambda name: getattr(colours, name)  # noqa: E731
     except AttributeError:
-        from lipmotion.faces.portrait import design as palette
+        from lipmotion_faces.portrait import design as palette
 
         get = lambda name: getattr(palette, name.upper())  # noqa: E731
     names = ("skin", "skin_shade", "lower_lip_light", "upper_lip_dark", "cavity", "tooth", "tongue")

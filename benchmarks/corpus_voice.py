@@ -36,7 +36,6 @@ from lipmotion import Corpus, Model, load_model
 from lipmotion.corpora.labels import labels_beside
 from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES
 from lipmotion.engines.base import SelectsRecordings
-from lipmotion.experiments.minnis_breen2000.minnis2000 import velocity_change
 from lipmotion.measures.bootstrap import bootstrap_interval
 from lipmotion.pipeline.generate.corpus_voice import speak_from_corpus
 from lipmotion.speech.features.analysed_audio import analysed
@@ -46,6 +45,7 @@ from lipmotion.speech.voices.installed import speak_sentences, voice_named
 from lipmotion.types import FRAME_RATE_HZ, Audio, Generation, SpokenText, Utterance
 from lipmotion.units import Lexicon, words_of
 from lipmotion.units.ipa_phones import token_phones
+from lipmotion_lab.minnis_breen2000.minnis2000 import velocity_change
 
 OPEN = Path(__file__).with_name("open_sentences.txt")
 VOICES = ("espeak-ng:en-us+m3", "flite:rms")

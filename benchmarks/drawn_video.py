@@ -32,14 +32,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 import lipmotion
-from lipmotion.export.video import write_mp4
-from lipmotion.faces.base import DrawsPlanes, Face, Staging
-from lipmotion.faces.registry import staged_face
-from lipmotion.pipeline.outputs.drawn_video import load_drawing
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.speech.features.prosody import prosody_of
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Generation
+from lipmotion_faces.base import DrawsPlanes, Face, Staging
+from lipmotion_faces.outputs.drawn_video import load_drawing
+from lipmotion_faces.registry import staged_face
+from lipmotion_faces.video.mp4 import write_mp4
 
 HERE = Path(__file__).parents[1]
 FACES = ("woman", "man", "cartoon")

@@ -37,8 +37,6 @@ from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines.base import Animator, Fit, Inputs
 from lipmotion.engines.joint.config import JointEngineConfig
 from lipmotion.engines.joint.engine import JointEngine, JointModel
-from lipmotion.experiments.comparison import closing_score_statistic, correlation_statistic, opening_curves
-from lipmotion.experiments.runner import opening_row
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.hmm.multistream.align import align
 from lipmotion.hmm.multistream.generate import densities_of_path, single_gaussians
@@ -49,15 +47,6 @@ from lipmotion.hmm.multistream.unit_frames import units_in_time
 from lipmotion.hmm.multistream.unit_states import Inventory
 from lipmotion.kernels.threads import one_thread
 from lipmotion.motion.space import fit_reduced_motion
-from lipmotion.pipeline.evaluation.figures import figures_of
-from lipmotion.pipeline.evaluation.held_out import (
-    AUDIO_ONLY,
-    DISTANCES,
-    ComparedClip,
-    HeldOutRecordings,
-    compared_clips,
-    held_out_recordings,
-)
 from lipmotion.pipeline.training.train import phones_and_examples
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
@@ -73,6 +62,17 @@ from lipmotion.types import (
     silent_monitor,
 )
 from lipmotion.units import UNIT_SETS, Lexicon, is_silent
+from lipmotion_lab.comparison import closing_score_statistic, correlation_statistic, opening_curves
+from lipmotion_lab.evaluation.figures import figures_of
+from lipmotion_lab.evaluation.held_out import (
+    AUDIO_ONLY,
+    DISTANCES,
+    ComparedClip,
+    HeldOutRecordings,
+    compared_clips,
+    held_out_recordings,
+)
+from lipmotion_lab.runner import opening_row
 
 Array = NDArray[np.float64]
 SILENCE = "sil"

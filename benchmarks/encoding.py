@@ -25,9 +25,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.export import video
 from lipmotion.types import Audio
-from lipmotion.vision.frames import open_video
+from lipmotion_faces.tracking.frames import open_video
+from lipmotion_faces.video import mp4 as video
 
 Picture = NDArray[np.uint8]
 CABAC = "cabac=1:deblock=0,0:8x8dct=1"

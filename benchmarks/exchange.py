@@ -17,12 +17,12 @@ from lipmotion import Delivery
 from lipmotion.articulation.delivery import closed_times
 from lipmotion.articulation.liveliness import UPPER_FACE_UNITS
 from lipmotion.articulation.mouth import spoken_mouth
-from lipmotion.faces.base import Staging, alive
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.eyes_and_brows import given_movements, moves_by_itself
 from lipmotion.pipeline.outputs.delivered import delivered
 from lipmotion.pipeline.outputs.motion_input import read_generation
 from lipmotion.types import Motion, Timeline, Unit
+from lipmotion_faces.base import Staging, alive
 
 Array = NDArray[np.float64]
 MOODS = "happy, angry at 2, surprised at 4"

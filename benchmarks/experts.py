@@ -25,7 +25,7 @@ from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.understood_speech import understand
 from lipmotion.types import Audio, Motion, Track
-from lipmotion.vision.track import track
+from lipmotion_faces.tracking.track import track
 
 SHARES = (0.0, 0.2, 0.35, 0.5, 0.75, 1.0)
 CONDITIONS = ("quiet", "babble 10 dB", "white 10 dB", "room")

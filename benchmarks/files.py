@@ -23,16 +23,16 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import lipmotion
 from lipmotion.addons.blender.curves import at_frames
 from lipmotion.export.addon import write_addon
-from lipmotion.faces.head.lips import COLUMNS, VISIBLE_RINGS
-from lipmotion.faces.head.performance import head_poses
-from lipmotion.faces.head.shape_fit import mouth_weights
-from lipmotion.faces.head.stage import figure, head_mesh
 from lipmotion.meshes.fitting.driven import driven_character
 from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.curve_sets import with_curves
 from lipmotion.pipeline.outputs.prosody import prosody_of_speech
-from lipmotion.pipeline.outputs.scenes import character_scene, head_scene, write_scene
 from lipmotion.types import Generation
+from lipmotion_faces.head.lips import COLUMNS, VISIBLE_RINGS
+from lipmotion_faces.head.performance import head_poses
+from lipmotion_faces.head.shape_fit import mouth_weights
+from lipmotion_faces.head.stage import figure, head_mesh
+from lipmotion_faces.outputs.scenes import character_scene, head_scene, write_scene
 from programs import gltf_report, gltf_validator, python_with, run_with
 
 EXAMPLES = Path(__file__).parents[1] / "examples"

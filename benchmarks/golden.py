@@ -34,7 +34,7 @@ TINY = """
 import sys
 from pathlib import Path
 try:
-    from lipmotion.testing import write_toy_recordings
+    from lipmotion_faces.testing import write_toy_recordings
 except ImportError:
     from lipmotion.testing.toy import write_toy_recordings
 write_toy_recordings(Path(sys.argv[1]))

@@ -32,15 +32,15 @@ from numpy.typing import NDArray
 
 import lipmotion
 from lipmotion.export.sound import write_sound
-from lipmotion.export.video import write_mp4
-from lipmotion.faces import face_named
-from lipmotion.faces.head.performance import head_poses
-from lipmotion.faces.head.pose import CharacterPose
-from lipmotion.faces.head.stage import Stage, camera_for
-from lipmotion.meshes.rendering.rasteriser import Camera
 from lipmotion.types import Audio, Channel, Motion, Span, SpokenText, Timeline, Unit
 from lipmotion.units import LIP_CLOSING
-from lipmotion.vision.track import track
+from lipmotion_faces import face_named
+from lipmotion_faces.head.performance import head_poses
+from lipmotion_faces.head.pose import CharacterPose
+from lipmotion_faces.head.stage import Stage, camera_for
+from lipmotion_faces.rendering.rasteriser import Camera
+from lipmotion_faces.tracking.track import track
+from lipmotion_faces.video.mp4 import write_mp4
 
 SENTENCES = (
     "Please bring my mother the blue ball before the party.",

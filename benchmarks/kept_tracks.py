@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from lipmotion.types import Channel, Motion, Track
-from lipmotion.vision.track import track
+from lipmotion_faces.tracking.track import track
 
 
 def kept_track(path: Path, folder: Path | None) -> Track:

@@ -22,11 +22,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.appearance.looping import LoopOrder, fade_frames
-from lipmotion.faces.filmed.face import load_face
-from lipmotion.pipeline.film.background import BackgroundSequence, chin_px, placed_maps, stored_sequence
-from lipmotion.vision.footage import footage_groups, track_footage
-from lipmotion.vision.frames import VideoSpan
+from lipmotion_faces.appearance.looping import LoopOrder, fade_frames
+from lipmotion_faces.film.background import BackgroundSequence, chin_px, placed_maps, stored_sequence
+from lipmotion_faces.filmed.face import load_face
+from lipmotion_faces.tracking.footage import footage_groups, track_footage
+from lipmotion_faces.tracking.frames import VideoSpan
 
 LONGEST = VideoSpan(0, 20)
 WINDOW_S = 10

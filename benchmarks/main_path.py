@@ -101,7 +101,7 @@ def warm_seconds(speech: Path, repeats: int) -> float:
 def frames_per_second(grid: Path, clips: int = 10) -> float:
     """Return the tracking speed over some clips, decoding and mouth crops included."""
     try:
-        from lipmotion.vision.track import track
+        from lipmotion_faces.tracking.track import track
     except ImportError:
         return float("nan")
     videos = sorted((grid / "clips").iterdir())[: clips + 1]

@@ -23,11 +23,11 @@ from PIL import Image, ImageDraw
 
 import lipmotion
 from lipmotion.articulation.mouth import spoken_mouth
-from lipmotion.faces.base import DrawsSingly, Staging
-from lipmotion.faces.registry import staged_face
 from lipmotion.pipeline.outputs.delivered import shown
 from lipmotion.types.moods import MOODS, NEUTRAL
 from lipmotion.units import closing_phones
+from lipmotion_faces.base import DrawsSingly, Staging
+from lipmotion_faces.registry import staged_face
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 FACES = ("woman", "man", "cartoon", "head")

@@ -41,9 +41,6 @@ from lipmotion.articulation.lip_points import CHIN, LOWER_MIDDLE, UPPER_MIDDLE
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.articulation.pauses import PAUSE_STYLES, with_pauses
 from lipmotion.articulation.symmetry import symmetrical
-from lipmotion.faces.head.performance import head_poses
-from lipmotion.faces.head.pose import CharacterPose
-from lipmotion.faces.head.stage import figure, head_mesh
 from lipmotion.meshes.files.gltf_writer import write_gltf_scene
 from lipmotion.meshes.fitting.driven import driven_character
 from lipmotion.meshes.fitting.lip_placement import LipPlacement, placed_by_shape
@@ -55,13 +52,16 @@ from lipmotion.motion.reliability import phone_reliability
 from lipmotion.pipeline.generate.generation_for import generate_for
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.curve_sets import curves_of
-from lipmotion.pipeline.outputs.scenes import METRES
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.understood_speech import understood_speech
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Generation, Motion, Speech, Timeline, Track, Unit
 from lipmotion.units import is_silent
 from lipmotion.units.classes import CLASSES
+from lipmotion_faces.head.performance import head_poses
+from lipmotion_faces.head.pose import CharacterPose
+from lipmotion_faces.head.stage import figure, head_mesh
+from lipmotion_faces.outputs.scenes import METRES
 
 Array = NDArray[np.float64]
 Inside = NDArray[np.bool_]

@@ -3,7 +3,7 @@
     python benchmarks/mutants.py MUTANTS.json [--tree .] [--only NAME ...] [--tests PATH ...] [--rest] [--every]
                                  [--list] [-o RESULTS.json] [-- PYTEST OPTIONS]
 
-MUTANTS.json is a list of objects: ``name``, ``path`` (below ``src/lipmotion``), ``old`` (text that the file holds
+MUTANTS.json is a list of objects: ``name``, ``path`` (below ``src/lipmotion`` or ``src``), ``old`` (text that it holds
 exactly once), ``new`` (what takes its place), and ``tests`` (files or folders of the tree: where a test should fail).
 
 Each mutant gets a fresh copy of the tree, so the tree itself is never changed, and one run of pytest that stops at the
@@ -29,7 +29,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
-PACKAGE = Path("src") / "lipmotion"
+PACKAGES = Path("src"), Path("src") / "lipmotion"
 PARTS = (".ci", "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "Makefile", "README.md", "SECURITY.md",
          "benchmarks", "docs", "examples", "pyproject.toml", "requirements", "scripts", "src", "tests")  # fmt: skip
 """What tests may look at, as far as the tree has it."""
@@ -48,7 +48,7 @@ FAILURE = re.compile(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", re.MULTILINE)
 class Mutant:
     """A small bug.
 
-    path  : of the file, below ``src/lipmotion``
+    path  : of the file, below ``src/lipmotion`` or ``src``
     old   : text that it holds exactly once
     new   : what takes its place
     tests : where a test should fail
@@ -59,6 +59,10 @@ class Mutant:
     old: str
     new: str
     tests: tuple[str, ...] = ALL
+
+    def file_in(self, tree: Path) -> Path:
+        """Return the file in a copy of the repository."""
+        return next(path for folder in PACKAGES if (path := tree / folder / self.path).is_file())
 
     def planted(self, text: str) -> str:
         """Return a file's text with the bug in it. Raises SystemExit: the old text is not there exactly once."""
@@ -122,7 +126,7 @@ class Tests:
             if (self.tree.parent / SHARED).exists():
                 (Path(folder) / SHARED).symlink_to((self.tree.parent / SHARED).resolve())
             for mutant in mutants:
-                file = copy / PACKAGE / mutant.path
+                file = mutant.file_in(copy)
                 file.write_text(mutant.planted(file.read_text(encoding="utf-8")), encoding="utf-8")
             yield copy
 
@@ -218,7 +222,7 @@ def chosen(options: argparse.Namespace, tree: Path) -> list[Mutant]:
         raise SystemExit(f"no mutant {', '.join(sorted(unknown))}")
     mutants = [mutant for mutant in mutants if not options.only or mutant.name in options.only]
     for mutant in mutants:
-        mutant.planted((tree / PACKAGE / mutant.path).read_text(encoding="utf-8"))
+        mutant.planted(mutant.file_in(tree).read_text(encoding="utf-8"))
     return [replace(mutant, tests=tuple(options.tests)) for mutant in mutants] if options.tests else mutants
 
 

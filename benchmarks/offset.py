@@ -16,9 +16,9 @@ import numpy as np
 
 import lipmotion
 from lipmotion.measures.offset import Offset, best_offset, pooled_offset
-from lipmotion.pipeline.corpus.sync import clip_scores
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.types import FRAME_RATE_HZ, Audio, Utterance
+from lipmotion_faces.corpus.sync import clip_scores
 
 
 def main() -> None:

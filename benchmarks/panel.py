@@ -40,20 +40,20 @@ from video_face import phones
 
 import lipmotion
 from lipmotion.corpora.store import Corpus
-from lipmotion.export.video import SOUND_HZ, write_mp4
-from lipmotion.pipeline.evaluation.figures import BILABIAL
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.study.analysis.analyse import analyse_study
-from lipmotion.study.analysis.paired import binomial_p, exact_interval
-from lipmotion.study.answers import FIRST, PAIRED, RECORDING, SECOND, Answer, write_answers
-from lipmotion.study.collected import answers_of
-from lipmotion.study.design import design_study
-from lipmotion.study.manifest import Study, check_videos, read_study
-from lipmotion.study.region import Region
-from lipmotion.study.settings import StudySettings
-from lipmotion.study.store import AnswerSheet
-from lipmotion.study.trials import trials_of
-from lipmotion.vision.footage import untracked_frames
+from lipmotion_faces.tracking.footage import untracked_frames
+from lipmotion_faces.video.mp4 import SOUND_HZ, write_mp4
+from lipmotion_lab.evaluation.figures import BILABIAL
+from lipmotion_studio.study.analysis.analyse import analyse_study
+from lipmotion_studio.study.analysis.paired import binomial_p, exact_interval
+from lipmotion_studio.study.answers import FIRST, PAIRED, RECORDING, SECOND, Answer, write_answers
+from lipmotion_studio.study.collected import answers_of
+from lipmotion_studio.study.design import design_study
+from lipmotion_studio.study.manifest import Study, check_videos, read_study
+from lipmotion_studio.study.region import Region
+from lipmotion_studio.study.settings import StudySettings
+from lipmotion_studio.study.store import AnswerSheet
+from lipmotion_studio.study.trials import trials_of
 
 Pictures = NDArray[np.uint8]
 Spoken = tuple[float, float, str]

@@ -26,10 +26,10 @@ from numpy.typing import NDArray
 from lipmotion import Corpus, animate, load_model, save_model
 from lipmotion.corpora.store import Selection
 from lipmotion.engines import engine_from_settings
-from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.training.train import train
 from lipmotion.pipeline.understand.request import SpeechRequest
+from lipmotion_lab.evaluation.evaluate import evaluate
 
 MAIN = "s1"
 KINDS = ["alone", "pooled", "maps", "nearest"]

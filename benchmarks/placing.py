@@ -22,13 +22,13 @@ from numpy.typing import NDArray
 from poisson import DirectSolver, error
 from scipy.ndimage import binary_erosion, distance_transform_edt
 
-from lipmotion.appearance.mouth_region import HEIGHT, WIDTH
-from lipmotion.appearance.placing import Kind, feather, inverse_map, place
-from lipmotion.appearance.poisson import cloning_system
 from lipmotion.kernels.pixels.affine import resample
-from lipmotion.vision.face_follower import FaceFollower
-from lipmotion.vision.frames import open_video
-from lipmotion.vision.mouth_pictures import face_to_image, region_to_image
+from lipmotion.motion.mouth_region import HEIGHT, WIDTH
+from lipmotion_faces.appearance.placing import Kind, feather, inverse_map, place
+from lipmotion_faces.appearance.poisson import cloning_system
+from lipmotion_faces.tracking.face_follower import FaceFollower
+from lipmotion_faces.tracking.frames import open_video
+from lipmotion_faces.tracking.mouth_pictures import face_to_image, region_to_image
 
 Picture = NDArray[np.uint8]
 FEATHER_PX = 6.0

@@ -25,7 +25,7 @@ from scipy.ndimage import gaussian_filter
 from scipy.sparse import eye_array
 from scipy.sparse.linalg import splu
 
-from lipmotion.appearance.poisson import CloningSystem, cloning_system
+from lipmotion_faces.appearance.poisson import CloningSystem, cloning_system
 
 Pictures = NDArray[np.uint8]
 SIZES = ((72, 56), (144, 112), (288, 224))

@@ -29,12 +29,12 @@ from numpy.typing import NDArray
 
 import lipmotion
 from lipmotion.articulation.mouth import spoken_mouth
-from lipmotion.export.video import write_mp4
-from lipmotion.faces import face_named
-from lipmotion.faces.portrait.geometry import lip_outlines
-from lipmotion.faces.portrait.portrait_rasteriser import FacePose, Rasteriser
-from lipmotion.faces.portrait.pose import MouthPose, mouth_poses
 from lipmotion.types import Audio, Motion, Timeline, Unit, Utterance
+from lipmotion_faces import face_named
+from lipmotion_faces.portrait.geometry import lip_outlines
+from lipmotion_faces.portrait.portrait_rasteriser import FacePose, Rasteriser
+from lipmotion_faces.portrait.pose import MouthPose, mouth_poses
+from lipmotion_faces.video.mp4 import write_mp4
 
 SOUNDS = {
     "silence": "sil", "p b m": "p b m", "f": "f", "v": "v", "th": "th dh", "oo (two, blue)": "uw",
@@ -86,7 +86,7 @@ def middle_pose(poses: list[MouthPose]) -> MouthPose:
 
 def tracked(face: str, poses: dict[str, MouthPose]) -> dict[str, Row]:
     """Return the four measures of drawings as the project's tracker sees them."""
-    from lipmotion.vision.track import track
+    from lipmotion_faces.tracking.track import track
 
     drawing = Rasteriser(face_named(face).design, SIZE)  # type: ignore[attr-defined]
     frames = [

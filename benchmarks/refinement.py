@@ -22,13 +22,13 @@ import numpy as np
 from numpy.typing import NDArray
 from picture_measures import picture_figures, sharpness
 
-from lipmotion.appearance.camera_noise import NoiseSource, estimate_noise
-from lipmotion.appearance.candidates import CANDIDATES, choose_candidates, make_candidates, squared_distances
-from lipmotion.appearance.eigenlips import Eigenlips, fit_eigenlips
-from lipmotion.appearance.refinement import PAPER, RefinementOptions, Refiner, moving_average
 from lipmotion.corpora.store import Corpus
+from lipmotion.motion.eigenlips import Eigenlips, fit_eigenlips
 from lipmotion.pipeline.training.channels import PICTURES
 from lipmotion.stats.pca import evenly_spaced
+from lipmotion_faces.appearance.camera_noise import NoiseSource, estimate_noise
+from lipmotion_faces.appearance.candidates import CANDIDATES, choose_candidates, make_candidates, squared_distances
+from lipmotion_faces.appearance.refinement import PAPER, RefinementOptions, Refiner, moving_average
 
 Pictures = NDArray[np.uint8]
 Array = NDArray[Any]

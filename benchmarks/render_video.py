@@ -35,14 +35,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.appearance.lower_face import FaceShape, best_scale, region_map, replaced_part
-from lipmotion.appearance.placing import cut, feather, place
-from lipmotion.appearance.poisson import CloningSystem, cloning_system
 from lipmotion.export.sound import write_sound
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio
-from lipmotion.vision.footage import footage_frames, track_footage
-from lipmotion.vision.frames import open_video
+from lipmotion_faces.appearance.lower_face import FaceShape, best_scale, region_map, replaced_part
+from lipmotion_faces.appearance.placing import cut, feather, place
+from lipmotion_faces.appearance.poisson import CloningSystem, cloning_system
+from lipmotion_faces.tracking.footage import footage_frames, track_footage
+from lipmotion_faces.tracking.frames import open_video
 
 COMMAND = [sys.executable, "-m", "lipmotion.cli.main"]
 Pictures = NDArray[np.uint8]

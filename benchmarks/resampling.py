@@ -22,8 +22,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.appearance.placing import cut, feather, inverse_map, place
 from lipmotion.kernels.pixels import affine
+from lipmotion_faces.appearance.placing import cut, feather, inverse_map, place
 
 SIZES = (((288, 360), (112, 128)), ((720, 1280), (280, 320)), ((720, 1280), (336, 384)), ((2160, 3840), (336, 384)))
 """Frame and patch, height and width; in the last, a pixel of the patch is 2.7 pixels of the frame."""

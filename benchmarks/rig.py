@@ -25,12 +25,12 @@ from scipy.sparse import csr_array
 
 import lipmotion
 from lipmotion.articulation.lip_points import LEFT_CORNER, LOWER_MIDDLE, RIGHT_CORNER, UPPER_MIDDLE
-from lipmotion.faces.mesh import MeshFace
 from lipmotion.meshes.files.character_files import read_character
 from lipmotion.meshes.fitting.driven import DrivenCharacter, driven_character
 from lipmotion.meshes.fitting.point_motion import point_motion
 from lipmotion.meshes.model.binding import skinned
 from lipmotion.units import LIP_CLOSING, is_silent
+from lipmotion_faces.mesh import MeshFace
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
@@ -133,7 +133,7 @@ def on_the_mesh(character: DrivenCharacter, spoken: lipmotion.Generation) -> dic
 
 def retracked(character: DrivenCharacter, spoken: lipmotion.Generation) -> dict[str, object]:
     """The same correlations, by the project's tracker in the rendered video."""
-    from lipmotion.vision.track import track
+    from lipmotion_faces.tracking.track import track
 
     with tempfile.TemporaryDirectory() as folder:
         video = Path(folder) / "character.mp4"

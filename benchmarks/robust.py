@@ -40,7 +40,7 @@ from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio
 from lipmotion.units import Lexicon, is_silent, words_of
 from lipmotion.units.phones import phone_edits
-from lipmotion.vision.track import track
+from lipmotion_faces.tracking.track import track
 
 RATE_HZ = 16_000
 SAME = {"ao": "aa", "zh": "sh"}

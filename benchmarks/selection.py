@@ -36,12 +36,12 @@ from lipmotion.engines.selection.lip_reading import INVISIBLE, NORMAL, PROTECTED
 from lipmotion.engines.selection.model import SelectionModel
 from lipmotion.engines.selection.search import select
 from lipmotion.engines.selection.selection_training import target_of
-from lipmotion.experiments.minnis_breen2000.minnis2000 import join_figures
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.understood_speech import understand
 from lipmotion.types import Features, Speech, Timeline, Utterance
 from lipmotion.units import PHONES
+from lipmotion_lab.minnis_breen2000.minnis2000 import join_figures
 
 Array = NDArray[np.float64]
 OPTIONS: dict[str, dict[str, Any]] = {

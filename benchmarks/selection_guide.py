@@ -16,8 +16,8 @@ from lipmotion import Corpus
 from lipmotion.corpora.splits import read_names
 from lipmotion.corpora.store import Selection
 from lipmotion.engines import engine_named
-from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.training.train import train
+from lipmotion_lab.evaluation.evaluate import evaluate
 
 CHANNELS = ("opening", "width", "outer")
 GUIDES = ("prior", "posteriors")

@@ -28,7 +28,7 @@ from pathlib import Path
 import numpy as np
 
 import lipmotion
-from lipmotion.pipeline.corpus.prompts import prompts
+from lipmotion.pipeline.training.prompts import prompts
 from lipmotion.speech.voices import espeak
 from lipmotion.speech.voices.installed import default_voice, speak_sentence
 from lipmotion.speech.voices.phone_maps import ESPEAK_PHONES

@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from lipmotion.vision import steadying
-from lipmotion.vision.footage import Footage, footage_frames, track_footage
-from lipmotion.vision.frames import VideoSpan
-from lipmotion.vision.steadying import REGION, REGISTERED_NOISE_PX, registered_maps, steady_maps
+from lipmotion_faces.tracking import steadying
+from lipmotion_faces.tracking.footage import Footage, footage_frames, track_footage
+from lipmotion_faces.tracking.frames import VideoSpan
+from lipmotion_faces.tracking.steadying import REGION, REGISTERED_NOISE_PX, registered_maps, steady_maps
 
 Array = NDArray[np.float64]
 LONGEST = VideoSpan(0, 5)

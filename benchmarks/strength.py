@@ -32,9 +32,9 @@ from lipmotion.articulation.lip_points import (
     UPPER_EDGE,
     UPPER_MIDDLE,
 )
-from lipmotion.faces.mesh import MeshStage
 from lipmotion.meshes.fitting.driven import DrivenCharacter, driven_character
 from lipmotion.units import LIP_CLOSING
+from lipmotion_faces.mesh import MeshStage
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 OPEN, ROUND, SPREAD = ("aa", "ae", "ah", "ay"), ("uw", "w", "ow"), ("iy", "ih")

@@ -39,22 +39,22 @@ ROOT = Path(__file__).parents[1]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "src")]
 
 from lipmotion.export.sound import write_sound  # noqa: E402
-from lipmotion.faces.mesh import MeshFace  # noqa: E402
-from lipmotion.faces.registry import face_named  # noqa: E402
 from lipmotion.kernels.choice import expect_more  # noqa: E402
 from lipmotion.meshes.fitting.driven import driven_character  # noqa: E402
 from lipmotion.pipeline.edit_files import EditFile  # noqa: E402
 from lipmotion.pipeline.edits import step_of  # noqa: E402
 from lipmotion.pipeline.job import Request  # noqa: E402
 from lipmotion.pipeline.model import load_model  # noqa: E402
-from lipmotion.pipeline.outputs.shown_faces import ShownFace, shown_face  # noqa: E402
 from lipmotion.speech.sound.audio_files import read_audio  # noqa: E402
 from lipmotion.storage.json_text import as_json  # noqa: E402
-from lipmotion.studio.folder import opened_folder  # noqa: E402
-from lipmotion.studio.line import OpenLine  # noqa: E402
-from lipmotion.studio.understanding import open_line, understand_line  # noqa: E402
 from lipmotion.testing.toy import toy_sentences  # noqa: E402
 from lipmotion.types import Audio, Timeline  # noqa: E402
+from lipmotion_faces.mesh import MeshFace  # noqa: E402
+from lipmotion_faces.outputs.shown_faces import ShownFace, shown_face  # noqa: E402
+from lipmotion_faces.registry import face_named  # noqa: E402
+from lipmotion_studio.folder import opened_folder  # noqa: E402
+from lipmotion_studio.line import OpenLine  # noqa: E402
+from lipmotion_studio.understanding import open_line, understand_line  # noqa: E402
 from meshes.heads import head, write_glb  # noqa: E402
 from studio.attack import attacked  # noqa: E402
 from studio.served import Served, lost_edits, random_edit, served, undone_edits  # noqa: E402

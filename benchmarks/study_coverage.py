@@ -24,10 +24,10 @@ from scipy.special import ndtr, ndtri, stdtrit
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from lipmotion.study.analysis.analyse import power_of, raters_needed
-from lipmotion.study.analysis.crossed import Components, Interval, crossed_mean
-from lipmotion.study.analysis.paired import fit_strengths, paired_figures
-from lipmotion.study.analysis.ratings import RANKS, RatingTable, rating_figures
+from lipmotion_studio.study.analysis.analyse import power_of, raters_needed
+from lipmotion_studio.study.analysis.crossed import Components, Interval, crossed_mean
+from lipmotion_studio.study.analysis.paired import fit_strengths, paired_figures
+from lipmotion_studio.study.analysis.ratings import RANKS, RatingTable, rating_figures
 from study.analysis.simulated import Effects, comparisons, expected_preference, expected_rating, ratings
 
 Array = NDArray[np.float64]

@@ -21,7 +21,7 @@ from statistics import median
 ROOT = Path(__file__).parents[1]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "src")]
 
-from lipmotion.study.store import ANSWERS  # noqa: E402
+from lipmotion_studio.study.store import ANSWERS  # noqa: E402
 from study.served import ScriptedRater, served  # noqa: E402
 from study.small_study import small_study  # noqa: E402
 
@@ -101,7 +101,7 @@ def finished(raters: list[ScriptedRater], *, started: bool = False) -> int:
 
 def faults(folder: Path, raters: list[ScriptedRater]) -> tuple[int, int]:
     """Return how many acknowledged answers are not in the database as they were given, and how many are there twice."""
-    from lipmotion.study.store import StudyStore
+    from lipmotion_studio.study.store import StudyStore
 
     with closing(sqlite3.connect(folder / ANSWERS)) as database:
         rows = database.execute("SELECT rater, trial, value FROM answers").fetchall()
@@ -126,11 +126,11 @@ def page(folder: Path) -> dict[str, float]:
     """Return the time until the page of a study of 36 videos can be used: to consent, and to play the first trial."""
     import numpy as np
 
-    from lipmotion.export.video import write_mp4
-    from lipmotion.study.answers import MOS
-    from lipmotion.study.design import design_study
-    from lipmotion.study.settings import StudySettings
     from lipmotion.types import Audio
+    from lipmotion_faces.video.mp4 import write_mp4
+    from lipmotion_studio.study.answers import MOS
+    from lipmotion_studio.study.design import design_study
+    from lipmotion_studio.study.settings import StudySettings
     from study.browser import browser
     from study.test_page import wait_for
 

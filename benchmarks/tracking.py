@@ -26,9 +26,9 @@ from numpy.typing import NDArray
 
 from lipmotion.errors import InputError
 from lipmotion.types import Track
-from lipmotion.vision.face_mesh import FaceMesh
-from lipmotion.vision.landmarks import EYE_CORNERS, JAW_POINTS, LIP_POINTS, TRACKED_POINTS
-from lipmotion.vision.track import track
+from lipmotion_faces.tracking.face_mesh import FaceMesh
+from lipmotion_faces.tracking.landmarks import EYE_CORNERS, JAW_POINTS, LIP_POINTS, TRACKED_POINTS
+from lipmotion_faces.tracking.track import track
 
 Image = NDArray[np.uint8]
 Array = NDArray[np.float64]

@@ -43,7 +43,7 @@ from robust import SPOKEN
 import lipmotion
 from lipmotion.corpora.layouts import words_of_name
 from lipmotion.errors import AlignmentError
-from lipmotion.pipeline.corpus.prompts import prompts
+from lipmotion.pipeline.training.prompts import prompts
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.transcribe import read_transcript, transcribe
 from lipmotion.pipeline.understand.understood_speech import understood_speech

@@ -30,10 +30,10 @@ from lipmotion.motion.closure import OPENING, closable_ranges
 from lipmotion.motion.rest import away_from_speech, speech_intervals
 from lipmotion.motion.speaker_maps import FAR_FROM_SPEECH_S, RANGE_PERCENTILES, SpeakerMap, restfulness
 from lipmotion.motion.transfer_map import transfer_map
-from lipmotion.pipeline.generate.transfer import measured_pair
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.sound.pauses import levels_db, spoken_spans
 from lipmotion.types import FRAME_RATE_HZ, Audio, Example, Track
+from lipmotion_faces.transfer import measured_pair
 
 CHANNELS = (OPENING, "width", "outer")
 PIECE_S, DRAWS, TOUCH, LEAST_SILENCE = 5.0, 10, 0.01, 8

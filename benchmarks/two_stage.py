@@ -35,8 +35,6 @@ from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines import engine_named
 from lipmotion.engines.coupled.model import CoupledModel
 from lipmotion.motion.resample import model_motion
-from lipmotion.pipeline.corpus.prompts import prompts
-from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.training.other_speakers import (
     VoiceExample,
@@ -45,6 +43,7 @@ from lipmotion.pipeline.training.other_speakers import (
     synthetic_sentences,
     voice_examples,
 )
+from lipmotion.pipeline.training.prompts import prompts
 from lipmotion.pipeline.training.train import examples_without_motion
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.understood_speech import understand
@@ -54,6 +53,7 @@ from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.speech.voices.installed import installed_voices
 from lipmotion.types import Audio, Example, Speech, Timeline, Unit, Utterance, silent_monitor
 from lipmotion.units import VISEME_OF, Lexicon, is_silent
+from lipmotion_lab.evaluation.evaluate import evaluate
 
 SENTENCES, HELD_OUT_SENTENCES = 60, 15
 """Number of sentences; the last of them are held out from training, to test with."""

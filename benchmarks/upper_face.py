@@ -22,9 +22,9 @@ from scipy.ndimage import gaussian_filter1d
 from lipmotion.articulation.liveliness import liveliness
 from lipmotion.pipeline.outputs.prosody import prosody_of_speech
 from lipmotion.types import FRAME_RATE_HZ, Channel, Motion, Prosody, Timeline
-from lipmotion.vision.head_pose import head_pose
-from lipmotion.vision.landmarks import RIGID_POINTS
-from lipmotion.vision.packages import import_face_mesh
+from lipmotion_faces.tracking.head_pose import head_pose
+from lipmotion_faces.tracking.landmarks import RIGID_POINTS
+from lipmotion_faces.tracking.packages import import_face_mesh
 
 Curve = NDArray[np.float64]
 BROWS = (70, 63, 105, 66, 107, 300, 293, 334, 296, 336)

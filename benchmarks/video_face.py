@@ -59,14 +59,10 @@ from video_ways import (
 )
 
 from lipmotion import Corpus, animate, load_model
-from lipmotion.appearance.placing import cut
 from lipmotion.errors import InputError
-from lipmotion.export.video import write_mp4
-from lipmotion.faces.filmed.face import load_face
 from lipmotion.measures.bootstrap import bootstrap_interval
 from lipmotion.measures.closures import closed_threshold, phone_closures
 from lipmotion.measures.curves import pooled_correlation
-from lipmotion.pipeline.evaluation.figures import BILABIAL
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.training.train import phones_of
 from lipmotion.pipeline.understand.request import SpeechRequest
@@ -74,8 +70,12 @@ from lipmotion.pipeline.workers import worker_pool
 from lipmotion.speech.recognition.recogniser import cached_recogniser
 from lipmotion.types import Audio, Motion, Track
 from lipmotion.units import Lexicon, is_silent
-from lipmotion.vision.frames import open_video
-from lipmotion.vision.track import track
+from lipmotion_faces.appearance.placing import cut
+from lipmotion_faces.filmed.face import load_face
+from lipmotion_faces.tracking.frames import open_video
+from lipmotion_faces.tracking.track import track
+from lipmotion_faces.video.mp4 import write_mp4
+from lipmotion_lab.evaluation.figures import BILABIAL
 
 Array = NDArray[np.float64]
 Span = tuple[float, float]

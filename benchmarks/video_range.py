@@ -38,15 +38,15 @@ from video_sheets import Sheets
 from video_ways import AROUND_PX, MOUTH, Pictures, RecordedClip, on_frames, recorded_clip, video_of
 
 from lipmotion import Corpus, animate, load_model
-from lipmotion.appearance import lower_face as region
-from lipmotion.appearance.mouth_region import EYE_DISTANCE_PX
-from lipmotion.faces.filmed.face import FilmedFace, load_face
 from lipmotion.kernels.threads import one_thread
 from lipmotion.measures.closures import closed_threshold
-from lipmotion.pipeline.evaluation.figures import BILABIAL
-from lipmotion.pipeline.film.filmed_video import FilmOptions, film_of
+from lipmotion.motion.mouth_region import EYE_DISTANCE_PX
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.types import Motion, Timeline, Unit
+from lipmotion_faces.appearance import lower_face as region
+from lipmotion_faces.film.filmed_video import FilmOptions, film_of
+from lipmotion_faces.filmed.face import FilmedFace, load_face
+from lipmotion_lab.evaluation.figures import BILABIAL
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

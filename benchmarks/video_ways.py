@@ -10,26 +10,26 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.appearance import lower_face
-from lipmotion.appearance.candidates import squared_distances
-from lipmotion.appearance.eigenlips import Eigenlips, fit_eigenlips
-from lipmotion.appearance.mouth_region import HEIGHT, WIDTH
-from lipmotion.appearance.placing import inverse_map, place
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
-from lipmotion.faces.filmed.face import FilmedFace
-from lipmotion.faces.filmed.renderer import AS_PRINTED, STITCHING
-from lipmotion.faces.registry import face_named
-from lipmotion.pipeline.film import filmed_video
-from lipmotion.pipeline.film.background import open_background, placed_maps
-from lipmotion.pipeline.film.filmed_video import FILM, FilmOptions, film_of
+from lipmotion.motion.eigenlips import Eigenlips, fit_eigenlips
+from lipmotion.motion.mouth_region import HEIGHT, WIDTH
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.training.channels import PICTURES
 from lipmotion.stats.pca import evenly_spaced
 from lipmotion.types import Motion, Timeline, Utterance
-from lipmotion.vision.footage import footage_frames, track_footage
-from lipmotion.vision.landmarks import LIP_POINTS
-from lipmotion.vision.mouth_pictures import region_to_image
+from lipmotion_faces.appearance import lower_face
+from lipmotion_faces.appearance.candidates import squared_distances
+from lipmotion_faces.appearance.placing import inverse_map, place
+from lipmotion_faces.film import filmed_video
+from lipmotion_faces.film.background import open_background, placed_maps
+from lipmotion_faces.film.filmed_video import FILM, FilmOptions, film_of
+from lipmotion_faces.filmed.face import FilmedFace
+from lipmotion_faces.filmed.renderer import AS_PRINTED, STITCHING
+from lipmotion_faces.registry import face_named
+from lipmotion_faces.tracking.footage import footage_frames, track_footage
+from lipmotion_faces.tracking.landmarks import LIP_POINTS
+from lipmotion_faces.tracking.mouth_pictures import region_to_image
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -19,13 +19,13 @@ import numpy as np
 
 import lipmotion
 from lipmotion.errors import AlignmentError
-from lipmotion.pipeline.corpus.prompts import prompts
 from lipmotion.pipeline.training.other_speakers import (
     SpokenSentence,
     is_held_out_speaker,
     synthetic_sentences,
     voice_examples,
 )
+from lipmotion.pipeline.training.prompts import prompts
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.recogniser import Recogniser
 from lipmotion.speech.voices.installed import installed_voices

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from PIL import Image
 
 import lipmotion
-from lipmotion.appearance.mouth_region import EYE_DISTANCE_PX
-from lipmotion.faces import Staging
-from lipmotion.vision.footage import Footage, footage_frames, track_footage
+from lipmotion.motion.mouth_region import EYE_DISTANCE_PX
+from lipmotion_faces import Staging
+from lipmotion_faces.tracking.footage import Footage, footage_frames, track_footage
 
 STRIP = Path(__file__).parent.parent / "docs" / "images" / "strip.webp"
 WIDTH_PX, HEIGHT_PX = 300, 340

@@ -13,8 +13,8 @@ from matplotlib import pyplot as plt
 from numpy.typing import NDArray
 
 import lipmotion
-from lipmotion.faces import Staging, staged_face
 from lipmotion.pipeline.outputs.curve_sets import curves_of
+from lipmotion_faces import Staging, staged_face
 
 IMAGES = Path(__file__).parent.parent / "docs" / "images"
 SENTENCE = "Five big boats follow you far up the little river. My father will call."

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib import pyplot as plt
 
 import lipmotion
-from lipmotion.faces import Staging, staged_face
+from lipmotion_faces import Staging, staged_face
 
 ROOT = Path(__file__).parent.parent
 FPS = 25.0

@@ -22,13 +22,13 @@ from numpy.typing import NDArray
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_named
-from lipmotion.faces.filmed.face import FilmedFace, save_face
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion import posterior_network
 from lipmotion.pipeline.model import Model, save_model
 from lipmotion.pipeline.training.train import train
 from lipmotion.speech.recognition.network.hama import Hama
 from lipmotion.testing.toy import ToySentence, toy_sentences, toy_utterances
+from lipmotion_faces.filmed.face import FilmedFace, save_face
 from testing.toy_face import toy_face
 
 SENTENCES = 12

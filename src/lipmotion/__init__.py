@@ -12,32 +12,26 @@ from __future__ import annotations
 
 TYPE_CHECKING = False  # as in typing, whose import would delay the answer to Ctrl-C
 if TYPE_CHECKING:
+    from typing import Any
+
     from lipmotion.corpora.store import Corpus, Selection
     from lipmotion.engines import engine_named
     from lipmotion.export.base import read_motion
     from lipmotion.export.cues.sheet import CueSheet
-    from lipmotion.faces.filmed.face import FilmedFace, load_face, save_face
-    from lipmotion.pipeline.corpus.prepare import prepare
     from lipmotion.pipeline.edits import Edits
-    from lipmotion.pipeline.evaluation.compare import compare
-    from lipmotion.pipeline.evaluation.evaluate import evaluate
-    from lipmotion.pipeline.film.build import build_face
-    from lipmotion.pipeline.film.filmed_video import FilmOptions
     from lipmotion.pipeline.generate.animate import animate
     from lipmotion.pipeline.generate.explain import explain
     from lipmotion.pipeline.generate.speak import speak
     from lipmotion.pipeline.generate.state_runs import state_runs
-    from lipmotion.pipeline.generate.transfer import map_onto, with_person
     from lipmotion.pipeline.job import Job, Outputs, Request
-    from lipmotion.pipeline.model import Model, load_model, save_model
+    from lipmotion.pipeline.model import Model, load_model, save_model, with_person
     from lipmotion.pipeline.outputs.cues import cues, write_cues
-    from lipmotion.pipeline.outputs.session_pictures import SessionPictures
+    from lipmotion.pipeline.outputs.output import FilmOptions
     from lipmotion.pipeline.outputs.write import write
     from lipmotion.pipeline.session import Session
     from lipmotion.pipeline.training.adapt import adapt
     from lipmotion.pipeline.training.train import Run, train
     from lipmotion.pipeline.understand.request import SpeechRequest
-    from lipmotion.study.analysis.analyse import analyse_study
     from lipmotion.types import (
         Audio,
         Constraints,
@@ -64,7 +58,6 @@ __all__ = [
     "Edits",
     "Explanation",
     "FilmOptions",
-    "FilmedFace",
     "Gain",
     "Generation",
     "Job",
@@ -77,7 +70,6 @@ __all__ = [
     "Run",
     "Selection",
     "Session",
-    "SessionPictures",
     "Span",
     "SpeechRequest",
     "SpokenText",
@@ -85,20 +77,12 @@ __all__ = [
     "Timeline",
     "Unit",
     "adapt",
-    "analyse_study",
     "animate",
-    "build_face",
-    "compare",
     "cues",
     "engine_named",
-    "evaluate",
     "explain",
-    "load_face",
     "load_model",
-    "map_onto",
-    "prepare",
     "read_motion",
-    "save_face",
     "save_model",
     "speak",
     "state_runs",
@@ -112,7 +96,6 @@ _HOMES = {
     "Edits": "lipmotion.pipeline.edits",
     "Run": "lipmotion.pipeline.training.train",
     "Session": "lipmotion.pipeline.session",
-    "SessionPictures": "lipmotion.pipeline.outputs.session_pictures",
     "SpeechRequest": "lipmotion.pipeline.understand.request",
     "Selection": "lipmotion.corpora.store",
     "Corpus": "lipmotion.corpora.store",
@@ -123,42 +106,45 @@ _HOMES = {
     "Lexicon": "lipmotion.units",
     "Model": "lipmotion.pipeline.model",
     "adapt": "lipmotion.pipeline.training.adapt",
-    "analyse_study": "lipmotion.study.analysis.analyse",
-    "FilmOptions": "lipmotion.pipeline.film.filmed_video",
-    "FilmedFace": "lipmotion.faces.filmed.face",
+    "FilmOptions": "lipmotion.pipeline.outputs.output",
     "animate": "lipmotion.pipeline.generate.animate",
-    "build_face": "lipmotion.pipeline.film.build",
-    "compare": "lipmotion.pipeline.evaluation.compare",
     "cues": "lipmotion.pipeline.outputs.cues",
     "engine_named": "lipmotion.engines",
-    "evaluate": "lipmotion.pipeline.evaluation.evaluate",
     "explain": "lipmotion.pipeline.generate.explain",
-    "load_face": "lipmotion.faces.filmed.face",
     "load_model": "lipmotion.pipeline.model",
-    "map_onto": "lipmotion.pipeline.generate.transfer",
-    "prepare": "lipmotion.pipeline.corpus.prepare",
     "read_motion": "lipmotion.export.base",
-    "save_face": "lipmotion.faces.filmed.face",
     "save_model": "lipmotion.pipeline.model",
     "SpokenText": "lipmotion.types",
     "speak": "lipmotion.pipeline.generate.speak",
     "state_runs": "lipmotion.pipeline.generate.state_runs",
     "train": "lipmotion.pipeline.training.train",
-    "with_person": "lipmotion.pipeline.generate.transfer",
+    "with_person": "lipmotion.pipeline.model",
     "write": "lipmotion.pipeline.outputs.write",
     "write_cues": "lipmotion.pipeline.outputs.cues",
 }
 
 
-def __getattr__(name: str) -> object:
-    if name not in __all__:
+_ADDED = (
+    *("FilmedFace", "SessionPictures", "analyse_study", "build_face", "compare", "evaluate", "load_face"),
+    *("map_onto", "prepare", "save_face"),
+)
+"""Names that the packages of faces, studio and lab provide (entry points of the group ``lipmotion.names``)."""
+
+
+def __getattr__(name: str) -> Any:
+    if name not in __all__ and name not in _ADDED:
         raise AttributeError(f"module 'lipmotion' has no attribute {name!r}")
     from importlib import import_module
 
-    value = getattr(import_module(_HOMES.get(name, "lipmotion.types")), name)
+    if name in _ADDED:
+        from lipmotion.extensions import provided
+
+        value = provided(name)
+    else:
+        value = getattr(import_module(_HOMES.get(name, "lipmotion.types")), name)
     globals()[name] = value
     return value
 
 
 def __dir__() -> list[str]:
-    return __all__
+    return [*__all__, *_ADDED]

@@ -15,7 +15,7 @@ from functools import cached_property
 from importlib import import_module, metadata
 from pathlib import Path
 from traceback import walk_tb
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from lipmotion.errors import InputError
 
@@ -23,10 +23,11 @@ ExtensionT = TypeVar("ExtensionT")
 GROUPS = (
     *("lipmotion.engines", "lipmotion.faces", "lipmotion.exporters", "lipmotion.corpus_readers"),
     *("lipmotion.outputs", "lipmotion.predictors", "lipmotion.trackers", "lipmotion.phone_recognisers"),
-    "lipmotion.motion_readers",
+    *("lipmotion.motion_readers", "lipmotion.verbs", "lipmotion.names"),
 )
 """Every group of entry points that is read."""
-OWN = {"lipmotion", "argparse"}
+PACKAGE = "lipmotion"
+OWN = {PACKAGE, "lipmotion_faces", "lipmotion_studio", "lipmotion_lab", "argparse"}
 SOURCE = "source"
 """What stands for the version where lipmotion is not installed."""
 
@@ -34,7 +35,7 @@ SOURCE = "source"
 def installed_version() -> str:
     """Return the version of lipmotion; ``source`` where it is not installed."""
     try:
-        return metadata.version("lipmotion")
+        return metadata.version(PACKAGE)
     except metadata.PackageNotFoundError:
         return SOURCE
 
@@ -55,7 +56,7 @@ def _installed_from() -> str:
     from urllib.request import url2pathname
 
     try:
-        record = metadata.distribution("lipmotion").read_text("direct_url.json") or "{}"
+        record = metadata.distribution(PACKAGE).read_text("direct_url.json") or "{}"
         url = urlsplit(json.loads(record).get("url", ""))
         origin = url2pathname(url.path) if url.scheme == "file" else ""
     except metadata.PackageNotFoundError:
@@ -70,7 +71,8 @@ class Registry(Generic[ExtensionT]):
 
     kind     : the word for such an extension in messages: ``engine``, for instance
     group    : the group of the entry points: ``lipmotion.engines``, for instance
-    built_in : ``module:attribute`` of each built-in extension, by name; a package cannot replace it
+    built_in : ``module:attribute`` of each built-in extension, by name; a package cannot replace it, nor what this
+               distribution itself declares as entry points (faces, studio, lab)
     """
 
     kind: str
@@ -79,8 +81,9 @@ class Registry(Generic[ExtensionT]):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All names: first the built-in ones, then those of installed packages in alphabetical order."""
-        return (*self.built_in, *sorted(set(self._installed) - set(self.built_in)))
+        """All names: first those of this distribution, then those of installed packages in alphabetical order."""
+        own = dict.fromkeys((*self.built_in, *self._own))
+        return (*own, *sorted(set(self._installed) - set(own)))
 
     def load(self, name: str) -> ExtensionT:
         """Import an extension and return it; what it prints meanwhile goes to standard error.
@@ -90,6 +93,8 @@ class Registry(Generic[ExtensionT]):
         if name in self.built_in:
             module, _, attribute = self.built_in[name].partition(":")
             return getattr(import_module(module), attribute)
+        if name in self._own:
+            return self._own[name].load()
         if name not in self._installed:
             raise InputError(f"no {self.kind} {name!r}; there are: {', '.join(self.names)}")
         entry = self._installed[name]
@@ -106,8 +111,29 @@ class Registry(Generic[ExtensionT]):
         return added
 
     @cached_property
+    def _own(self) -> Mapping[str, metadata.EntryPoint]:
+        """Those of the packages beside the core, in this distribution; they are found without a look at others."""
+        try:
+            entries = metadata.distribution(PACKAGE).entry_points
+        except metadata.PackageNotFoundError:
+            return {}
+        return {entry.name: entry for entry in entries if entry.group == self.group}
+
+    @cached_property
     def _installed(self) -> Mapping[str, metadata.EntryPoint]:
         return {entry.name: entry for entry in _entries(self.group)}
+
+
+def provided(name: str) -> Any:
+    """Return what a package beside the core (faces, studio, lab) provides by a name, as ``shown_face``.
+
+    They declare such names as entry points of the group ``lipmotion.names``; the core imports none of them itself.
+    Raises InputError: no package that is installed provides it.
+    """
+    return NAMES.load(name)
+
+
+NAMES: Registry[Any] = Registry("name", "lipmotion.names", {})
 
 
 def failed_extension(error: BaseException) -> str | None:

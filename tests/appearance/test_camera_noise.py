@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from appearance.test_eigenlips import pictures
-from lipmotion.appearance.camera_noise import (
+from lipmotion.errors import InputError, ModelFormatError
+from lipmotion.storage.archive import read_archive, write_archive
+from lipmotion_faces.appearance.camera_noise import (
     CameraNoise,
     NoiseSource,
     camera_noise_arrays,
     camera_noise_from_arrays,
     estimate_noise,
 )
-from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.storage.archive import read_archive, write_archive
 
 SIZE = (40, 50)
 COVARIANCE = np.array([[9.0, 3.0, 2.0], [3.0, 4.0, 1.0], [2.0, 1.0, 6.0]])

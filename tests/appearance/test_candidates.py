@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from appearance.test_eigenlips import pictures
-from lipmotion.appearance.candidates import (
+from lipmotion.errors import InputError
+from lipmotion.motion.eigenlips import Eigenlips, fit_eigenlips
+from lipmotion_faces.appearance.candidates import (
     MIXTURE_SHARE,
     choose_candidates,
     drawn_to_recorded,
@@ -12,8 +14,6 @@ from lipmotion.appearance.candidates import (
     recorded_details,
     squared_distances,
 )
-from lipmotion.appearance.eigenlips import Eigenlips, fit_eigenlips
-from lipmotion.errors import InputError
 
 HELD_OUT = pictures(count=160)[120:]
 
@@ -61,7 +61,7 @@ def test_all_are_chosen_where_there_are_few_and_equal_ones_once() -> None:
 
 def test_more_candidates_than_a_block_of_mouths(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = choose_candidates(mouths(), 40)
-    monkeypatch.setattr("lipmotion.appearance.candidates.BLOCK", 17)
+    monkeypatch.setattr("lipmotion_faces.appearance.candidates.BLOCK", 17)
     assert np.array_equal(choose_candidates(mouths(), 40), whole)
 
 

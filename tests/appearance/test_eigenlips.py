@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lipmotion.appearance.eigenlips import Eigenlips, eigenlips_arrays, eigenlips_from_arrays, fit_eigenlips
 from lipmotion.errors import InputError, ModelFormatError
+from lipmotion.motion.eigenlips import Eigenlips, eigenlips_arrays, eigenlips_from_arrays, fit_eigenlips
 from oracles.components import components, share
 
 

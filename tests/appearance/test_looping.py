@@ -5,9 +5,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from lipmotion.appearance.frame_descriptors import FrameDescriptors
-from lipmotion.appearance.looping import BUSY_S, JUMP_LIMIT, LoopOrder, fade_frames, loop_order
 from lipmotion.errors import InputError
+from lipmotion_faces.appearance.frame_descriptors import FrameDescriptors
+from lipmotion_faces.appearance.looping import BUSY_S, JUMP_LIMIT, LoopOrder, fade_frames, loop_order
 
 RATE_HZ = 25.0
 FADE_FRAMES = fade_frames(RATE_HZ)

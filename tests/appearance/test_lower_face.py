@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.appearance import mouth_region
-from lipmotion.appearance.lower_face import (
+from lipmotion.errors import InputError
+from lipmotion.motion import mouth_region
+from lipmotion_faces.appearance.lower_face import (
     CHEEK_PX,
     CORNER,
     HEIGHT,
@@ -27,8 +28,7 @@ from lipmotion.appearance.lower_face import (
     relit,
     replaced_part,
 )
-from lipmotion.appearance.placing import cut
-from lipmotion.errors import InputError
+from lipmotion_faces.appearance.placing import cut
 
 SHAPE = FaceShape(44.0, 120.0)
 PLACE = np.array([[1.5, -0.2, 210.0], [0.2, 1.5, 140.0]])

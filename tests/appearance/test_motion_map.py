@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.appearance.motion_map import (
+from lipmotion.errors import InputError, ModelFormatError
+from lipmotion.types import Channel, Motion
+from lipmotion_faces.appearance.motion_map import (
     COMPONENTS,
     FRAMES_PER_CENTRE,
     MOTION_MAP,
@@ -16,8 +18,6 @@ from lipmotion.appearance.motion_map import (
     motion_map_arrays,
     motion_map_from_arrays,
 )
-from lipmotion.errors import InputError, ModelFormatError
-from lipmotion.types import Channel, Motion
 from pipeline.damage import DAMAGES, UNREADABLE, damaged
 
 CHANNELS = (Channel("opening"), Channel("width"), Channel("still"), Channel("weight", "weight"))

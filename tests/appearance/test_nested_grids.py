@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.appearance.poisson import CLEARANCE, GridFiller, nested_grids
+from lipmotion_faces.appearance.poisson import CLEARANCE, GridFiller, nested_grids
 
 
 def disc(height: int, width: int) -> np.ndarray:

@@ -7,22 +7,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lipmotion.appearance import person
-from lipmotion.appearance.candidates import CANDIDATES
-from lipmotion.appearance.lower_face import cheek_light, mouth_ellipse, mouth_part, relit, replaced_part
-from lipmotion.appearance.person import (
+from lipmotion.errors import InputError
+from lipmotion.stats.pca import evenly_spaced
+from lipmotion.testing.toy import toy_motion, toy_sentences
+from lipmotion.types import Motion
+from lipmotion_faces.appearance import person
+from lipmotion_faces.appearance.candidates import CANDIDATES
+from lipmotion_faces.appearance.lower_face import cheek_light, mouth_ellipse, mouth_part, relit, replaced_part
+from lipmotion_faces.appearance.person import (
     EDGE_PX,
     JAW_CANDIDATES,
     Appearance,
     FootagePictures,
     learn_appearance,
 )
-from lipmotion.appearance.refinement import STEADY
-from lipmotion.errors import InputError
-from lipmotion.faces.filmed.face import FilmedFace
-from lipmotion.stats.pca import evenly_spaced
-from lipmotion.testing.toy import toy_motion, toy_sentences
-from lipmotion.types import Motion
+from lipmotion_faces.appearance.refinement import STEADY
+from lipmotion_faces.filmed.face import FilmedFace
 from testing.toy_face import NOISE, SHAPE, toy_chin_px, toy_footage_pictures, toy_lower_faces
 
 MOUTH = (slice(None), *mouth_part(1))

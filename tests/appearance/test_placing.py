@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.appearance.placing import Kind, cut, feather, inverse_map, place
 from lipmotion.errors import InputError
 from lipmotion.kernels.pixels.affine import resample
+from lipmotion_faces.appearance.placing import Kind, cut, feather, inverse_map, place
 
 TURNED = np.array([[0.7, -0.1, 12.3], [0.12, 0.68, 8.6]])
 

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.appearance import poisson
-from lipmotion.appearance.mouth_region import HEIGHT, WIDTH
-from lipmotion.appearance.poisson import cloning_system
 from lipmotion.errors import InputError
+from lipmotion.motion.mouth_region import HEIGHT, WIDTH
+from lipmotion_faces.appearance import poisson
+from lipmotion_faces.appearance.poisson import cloning_system
 from oracles.membranes import cloned
 
 

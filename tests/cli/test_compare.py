@@ -5,7 +5,7 @@ from pathlib import Path
 
 from cli.conftest import RunCommand, is_one_error
 from lipmotion.measures.comparison_table import comparison_table
-from lipmotion.pipeline.evaluation.compare import compare
+from lipmotion_lab.compare import compare
 
 
 def table(factor: float) -> str:

@@ -11,11 +11,11 @@ from cli.conftest import RunCommand, is_one_error
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import MissingDependencyError
 from lipmotion.export.sound import write_sound
-from lipmotion.export.video import write_mp4
-from lipmotion.pipeline.corpus import prepare
-from lipmotion.pipeline.corpus import sync as offset
-from lipmotion.pipeline.corpus.prepare import PrepareReport
 from lipmotion.types import Audio, Item, Progress
+from lipmotion_faces.corpus import prepare
+from lipmotion_faces.corpus import sync as offset
+from lipmotion_faces.corpus.prepare import PrepareReport
+from lipmotion_faces.video.mp4 import write_mp4
 from speech.recorded_twice import RATE_HZ, clap, recorded_twice, speech_like
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from cli.conftest import RunCommand, is_one_error
 from lipmotion.corpora.store import Corpus
-from lipmotion.pipeline.corpus.coverage import coverage
+from lipmotion_faces.corpus.coverage import coverage
 
 
 def test_coverage_of_a_corpus(run: RunCommand, toy_corpus: Corpus) -> None:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from cli.conftest import RunCommand, is_one_error
 from lipmotion.corpora.store import Corpus
-from lipmotion.pipeline.corpus.prompts import prompts
+from lipmotion.pipeline.training.prompts import prompts
 
 
 def test_sentences_with_what_they_cover(run: RunCommand) -> None:

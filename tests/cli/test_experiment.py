@@ -10,16 +10,16 @@ import pytest
 
 from cli.conftest import RunCommand, is_one_error
 from lipmotion.corpora.store import Corpus
-from lipmotion.experiments import comparison, folds, learning_curve, runner
-from lipmotion.experiments.engines import engine_comparison as text
-from lipmotion.experiments.hofer2008 import table1
-from lipmotion.experiments.minnis_breen2000 import minnis2000 as minnis_2000
-from lipmotion.experiments.report.parts import PARTS
-from lipmotion.experiments.xie_liu2007 import six_systems
-from lipmotion.experiments.xie_liu2007 import text as xieliu2007_text
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.bootstrap import bootstrap_interval
-from lipmotion.pipeline.evaluation import figures as evaluation_figures
+from lipmotion_lab import comparison, folds, learning_curve, runner
+from lipmotion_lab.engines import engine_comparison as text
+from lipmotion_lab.evaluation import figures as evaluation_figures
+from lipmotion_lab.hofer2008 import table1
+from lipmotion_lab.minnis_breen2000 import minnis2000 as minnis_2000
+from lipmotion_lab.report.parts import PARTS
+from lipmotion_lab.xie_liu2007 import six_systems
+from lipmotion_lab.xie_liu2007 import text as xieliu2007_text
 
 
 @pytest.fixture(autouse=True)

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from cli.conftest import RunCommand, is_one_error
-from lipmotion.faces.filmed.face import FilmedFace, load_face, save_face
-from lipmotion.pipeline.film import build
 from lipmotion.testing.toy import toy_sentences
+from lipmotion_faces.film import build
+from lipmotion_faces.filmed.face import FilmedFace, load_face, save_face
 from pipeline.film.toy_footage import ToyVideo, install, write_video
 from speech import stand_in_voice
 

@@ -48,7 +48,7 @@ def test_a_face(filmed_face_file: Path, here: Path) -> None:
     code = (
         "import resource, sys\n"
         "from lipmotion.errors import ExportError\n"
-        "from lipmotion.faces.filmed.face import load_face, save_face\n"
+        "from lipmotion_faces.filmed.face import load_face, save_face\n"
         "face = load_face(sys.argv[1])\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))\n"
         "try:\n"

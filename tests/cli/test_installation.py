@@ -14,7 +14,7 @@ from lipmotion.cli.installation.doctor import InstalledPart, Requirement, doctor
 from lipmotion.errors import LipMotionError
 from lipmotion.extensions import install_command
 from lipmotion.speech.voices.synthesiser import SyntheticVoice
-from lipmotion.vision.packages import missing
+from lipmotion_faces.tracking.packages import missing
 
 MAIN = "from lipmotion.cli.main import main; sys.exit(main())"
 
@@ -96,8 +96,8 @@ def test_whatever_a_part_raises(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize(("version", "told"), [("4.10.0", "4.10.0, MediaPipe"), ("5.1.0", "another OpenCV lies over")])
 def test_face_tracking(monkeypatch: pytest.MonkeyPatch, version: str, told: str) -> None:
-    monkeypatch.setattr("lipmotion.vision.packages.import_opencv", lambda: SimpleNamespace(__version__=version))
-    monkeypatch.setattr("lipmotion.vision.packages.import_face_mesh", lambda: None)
+    monkeypatch.setattr("lipmotion_faces.tracking.packages.import_opencv", lambda: SimpleNamespace(__version__=version))
+    monkeypatch.setattr("lipmotion_faces.tracking.packages.import_face_mesh", lambda: None)
     monkeypatch.setattr("importlib.metadata.version", lambda _: "4.10.0.84")
     found = doctor_module._looked("", doctor_module._PARTS["face tracking"])
     assert found.state == "works"
@@ -108,7 +108,7 @@ def test_no_face_tracking(monkeypatch: pytest.MonkeyPatch) -> None:
     def fails() -> None:
         raise missing("OpenCV", ImportError("libGL.so.1"))
 
-    monkeypatch.setattr("lipmotion.vision.packages.import_opencv", fails)
+    monkeypatch.setattr("lipmotion_faces.tracking.packages.import_opencv", fails)
     found = doctor_module._looked("", doctor_module._PARTS["face tracking"])
     assert found.state == "absent"
     assert "libGL.so.1" in found.told

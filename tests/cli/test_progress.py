@@ -20,10 +20,10 @@ from lipmotion.cli.main import main
 from lipmotion.cli.terminal.events import Events, JsonLines
 from lipmotion.cli.terminal.progress import reporting
 from lipmotion.cli.terminal.stop import Stopper
-from lipmotion.cli.verbs import evaluate
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError
 from lipmotion.types import Item, Progress
+from lipmotion_lab.verbs import evaluate
 
 EVENTS = (
     Progress("first", 0, 2, 0.0),

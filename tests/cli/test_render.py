@@ -15,8 +15,8 @@ from lipmotion.errors import InputError
 from lipmotion.export.base import read_motion
 from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.motion_input import read_generation
-from lipmotion.pipeline.outputs.scenes import write_scene
 from lipmotion.types import WEIGHT, Channel, Motion
+from lipmotion_faces.outputs.scenes import write_scene
 from meshes.heads import head
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from cli.conftest import RunCommand, is_one_error
-from lipmotion.study.answers import read_answers
-from lipmotion.study.store import AnswerSheet, StudyStore
+from lipmotion_studio.study.answers import read_answers
+from lipmotion_studio.study.store import AnswerSheet, StudyStore
 from study.small_study import small_study
 from study.test_design import write_video
 

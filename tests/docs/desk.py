@@ -15,9 +15,9 @@ import lipmotion
 from docs.site_pages import ROOT
 from lipmotion.corpora.store import Corpus
 from lipmotion.export.sound import write_sound
-from lipmotion.study.answers import write_answers
 from lipmotion.testing.toy import ToySentence, toy_sentences, toy_utterances
 from lipmotion.types import Audio
+from lipmotion_studio.study.answers import write_answers
 from meshes.heads import head, lip_points, write_glb
 from meshes.obj_writing import write_obj
 from study.analysis.simulated import Effects, rated_answers, ratings

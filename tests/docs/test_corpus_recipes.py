@@ -20,12 +20,12 @@ from lipmotion.cli.main import main
 from lipmotion.corpora.store import Corpus
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.bootstrap import bootstrap_interval
-from lipmotion.pipeline.corpus import prepare as prepare_module
-from lipmotion.pipeline.evaluation import figures as evaluation_figures
 from lipmotion.pipeline.model import load_model
 from lipmotion.pipeline.training import train as train_module
 from lipmotion.testing import toy_utterances
 from lipmotion.types import Track, Utterance
+from lipmotion_faces.corpus import prepare as prepare_module
+from lipmotion_lab.evaluation import figures as evaluation_figures
 
 FOLDER = Path(__file__).parents[2] / "recipes"
 INDEX = FOLDER / "README.md"

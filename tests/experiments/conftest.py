@@ -5,9 +5,9 @@ from functools import partial
 
 import pytest
 
-from lipmotion.experiments import comparison
 from lipmotion.measures.bootstrap import bootstrap_interval
-from lipmotion.pipeline.evaluation import figures as evaluation_figures
+from lipmotion_lab import comparison
+from lipmotion_lab.evaluation import figures as evaluation_figures
 
 
 @pytest.fixture(scope="package", autouse=True)

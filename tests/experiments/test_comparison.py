@@ -3,15 +3,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.experiments.comparison import (
+from lipmotion.measures import curves
+from lipmotion.measures.closures import closure_figures
+from lipmotion_lab.comparison import (
     ClipStatistic,
     closing_score_statistic,
     correlation_statistic,
     distance_statistic,
     significance_mark,
 )
-from lipmotion.measures import curves
-from lipmotion.measures.closures import closure_figures
 
 Clips = list[np.ndarray]
 

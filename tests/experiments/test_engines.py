@@ -13,14 +13,14 @@ import pytest
 from experiments.copies import copied
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.errors import CorpusError, ExportError, InputError
-from lipmotion.experiments.engines.engine_comparison import engines, table
-from lipmotion.experiments.engines.models import ENGINES_COMPARED
-from lipmotion.experiments.runner import ExperimentSettings
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.model import load_model
 from lipmotion.testing.examples import speech, timeline
 from lipmotion.types import Progress
+from lipmotion_lab.engines.engine_comparison import engines, table
+from lipmotion_lab.engines.models import ENGINES_COMPARED
+from lipmotion_lab.evaluation.evaluate import evaluate
+from lipmotion_lab.runner import ExperimentSettings
 
 LONG = pytest.mark.long
 SMALL = ExperimentSettings(recogniser=HmmConfig(mixtures=1, iterations=2))

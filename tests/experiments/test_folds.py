@@ -13,15 +13,15 @@ import pytest
 from experiments.copies import copied, renamed
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.experiments import folds as module
-from lipmotion.experiments.folds import folds, table
-from lipmotion.experiments.runner import ExperimentSettings
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.measures.closures import closings
-from lipmotion.pipeline.evaluation.figures import BILABIAL
-from lipmotion.pipeline.evaluation.held_out import ComparedClip, compared_clips, held_out_recordings
 from lipmotion.pipeline.training.train import train
 from lipmotion.speech.recognition.recogniser import cached_recogniser
+from lipmotion_lab import folds as module
+from lipmotion_lab.evaluation.figures import BILABIAL
+from lipmotion_lab.evaluation.held_out import ComparedClip, compared_clips, held_out_recordings
+from lipmotion_lab.folds import folds, table
+from lipmotion_lab.runner import ExperimentSettings
 
 PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
 SMALL = ExperimentSettings(recogniser=PHONE_MODELS)

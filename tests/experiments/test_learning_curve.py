@@ -12,12 +12,12 @@ import pytest
 from experiments.copies import renamed
 from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.experiments import learning_curve as module
-from lipmotion.experiments.learning_curve import SIZES, learning_curve, table
-from lipmotion.experiments.runner import ExperimentSettings
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.training.train import train
+from lipmotion_lab import learning_curve as module
+from lipmotion_lab.evaluation.evaluate import evaluate
+from lipmotion_lab.learning_curve import SIZES, learning_curve, table
+from lipmotion_lab.runner import ExperimentSettings
 
 PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
 SMALL = ExperimentSettings(recogniser=PHONE_MODELS)

@@ -22,7 +22,6 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import read_motion, write_motion
 from lipmotion.export.cues.base import write_cue_file
 from lipmotion.export.cues.sheet import CueSheet
-from lipmotion.export.synthetic_mark import mark_metadata
 from lipmotion.export.timed_labels import write_labels
 from lipmotion.meshes.files.gltf_container import read_gltf_document
 from lipmotion.meshes.files.gltf_writer import write_gltf_scene
@@ -34,6 +33,7 @@ from lipmotion.pipeline.batch.report import _field, _for_page
 from lipmotion.printable import is_line, printable
 from lipmotion.storage.files import as_text
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
+from lipmotion_faces.video.synthetic_mark import mark_metadata
 
 PARTS = (
     *('"', '""', "'", "'''", "\\", "\\\\", '\\"', "\n", "\r\n", "\r", "\t", "\0", "\x1b[2J", "\x7f", "\x85", "\u2028"),

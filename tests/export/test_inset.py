@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.export.synthetic_mark import mark_frames
-from lipmotion.pipeline.film.filmed_video import HEIGHT_SHARE, MARGIN_SHARE, WHITE, WIDTH_SHARE, inset_box, with_inset
+from lipmotion_faces.film.filmed_video import HEIGHT_SHARE, MARGIN_SHARE, WHITE, WIDTH_SHARE, inset_box, with_inset
+from lipmotion_faces.video.synthetic_mark import mark_frames
 
 
 def frames(count: int = 3, height: int = 120, width: int = 160) -> list[np.ndarray]:

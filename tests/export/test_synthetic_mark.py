@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.export import write_mp4
-from lipmotion.export.synthetic_mark import SOURCE_TYPE, STATEMENT, mark_frames, mark_metadata
 from lipmotion.types import Audio
+from lipmotion_faces.video.mp4 import write_mp4
+from lipmotion_faces.video.synthetic_mark import SOURCE_TYPE, STATEMENT, mark_frames, mark_metadata
 
 NAMES = {
     "rdf": "http://www.w3.org/1999/02/22-rdf-syntax-ns#",

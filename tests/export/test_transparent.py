@@ -6,8 +6,8 @@ import pytest
 from PIL import Image
 
 from lipmotion.errors import ExportError
-from lipmotion.export.transparent import write_pictures, write_with_alpha
 from lipmotion.types import Audio
+from lipmotion_faces.video.transparent import write_pictures, write_with_alpha
 
 HZ = 16_000
 

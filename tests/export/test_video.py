@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import ExportError
-from lipmotion.export import write_mp4
-from lipmotion.export.video import LARGEST_PACKET_BYTES, TAGS, frame_rate
 from lipmotion.types import Audio
+from lipmotion_faces.video.mp4 import LARGEST_PACKET_BYTES, TAGS, frame_rate, write_mp4
 
 RATES = [24, 29.97, 60]
 

@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import ExportError
-from lipmotion.export import write_mp4
-from lipmotion.export.video import LARGEST_PACKET_BYTES, XMP_UUID, append_xmp
 from lipmotion.types import Audio
+from lipmotion_faces.video.mp4 import LARGEST_PACKET_BYTES, XMP_UUID, append_xmp, write_mp4
 
 
 @pytest.fixture

@@ -9,9 +9,9 @@ import pytest
 from PIL import Image
 
 from lipmotion.errors import InputError
-from lipmotion.faces.base import Staging
-from lipmotion.faces.cut_out import read_cut_out
 from lipmotion.units.mouth_chart import BLAIR
+from lipmotion_faces.base import Staging
+from lipmotion_faces.cut_out import read_cut_out
 
 LETTERS = "ABCDEFGHX"
 

@@ -5,9 +5,9 @@ from hypothesis import strategies as st
 
 from lipmotion.articulation.contact import LARGEST_GAP
 from lipmotion.articulation.mouth import TUCKED_GAP, jaw_drop
-from lipmotion.faces.portrait.characters import CARTOON, MAN, WOMAN
-from lipmotion.faces.portrait.geometry import TEETH_EDGE, lip_outlines, mouth_interior
-from lipmotion.faces.portrait.pose import MouthPose
+from lipmotion_faces.portrait.characters import CARTOON, MAN, WOMAN
+from lipmotion_faces.portrait.geometry import TEETH_EDGE, lip_outlines, mouth_interior
+from lipmotion_faces.portrait.pose import MouthPose
 
 X = np.linspace(-0.5, 0.5, 1001)
 MIDDLE = 500

@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lipmotion.errors import InputError
-from lipmotion.faces import Staging, face_named, staged_face
-from lipmotion.faces.portrait.layered import MOUTHS, chosen_mouths, painted
-from lipmotion.faces.portrait.pose import MouthPose
-from lipmotion.faces.portrait.svg_document import drawing_of
-from lipmotion.testing import check_face
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
+from lipmotion_faces import Staging, face_named, staged_face
+from lipmotion_faces.portrait.layered import MOUTHS, chosen_mouths, painted
+from lipmotion_faces.portrait.pose import MouthPose
+from lipmotion_faces.portrait.svg_document import drawing_of
+from lipmotion_faces.testing import check_face
 
 ROBOT = Path(__file__).parents[2] / "examples" / "robot.svg"
 WHOLE = np.array([[1.0, 0, 0], [0, 1, 0]])
@@ -151,7 +151,7 @@ def test_a_drawing_has_limits_as_a_whole(monkeypatch):
             drawing_of(svg(inside))
     with pytest.raises(InputError, match="not an SVG"):
         drawing_of(b"<!DOCTYPE svg " * 300_000)
-    monkeypatch.setattr("lipmotion.faces.portrait.svg_document.MOST_POINTS", 120)
+    monkeypatch.setattr("lipmotion_faces.portrait.svg_document.MOST_POINTS", 120)
     arcs = '<path d="M0 0a1 1 0 011 1"/>'
     assert len(drawing_of(svg(arcs * 2)).shapes) == 2
     for inside in (arcs * 3, arcs + '<path d="M0 0' + "z" * 80 + '"/>', arcs * 2 + '<circle r="1"/>'):

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from lipmotion.faces.portrait.outlines import (
+from lipmotion_faces.portrait.outlines import (
     STEPS,
     closed_curve,
     open_curve,

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from lipmotion.articulation.liveliness import UpperFace
-from lipmotion.faces import base
-from lipmotion.faces.base import DrawsPlanes, Face, Staging
-from lipmotion.faces.portrait.characters import CARTOON, MAN, WOMAN
-from lipmotion.faces.portrait.movement import HeadPlacement
-from lipmotion.faces.portrait.planar import FROM_RGB, OFFSETS, PlanarRasteriser, planes_of
-from lipmotion.faces.portrait.portrait_rasteriser import FacePose, Rasteriser
-from lipmotion.faces.portrait.pose import MouthPose
-from lipmotion.faces.registry import staged_face
 from lipmotion.types import Channel, Motion, Timeline
+from lipmotion_faces import base
+from lipmotion_faces.base import DrawsPlanes, Face, Staging
+from lipmotion_faces.portrait.characters import CARTOON, MAN, WOMAN
+from lipmotion_faces.portrait.movement import HeadPlacement
+from lipmotion_faces.portrait.planar import FROM_RGB, OFFSETS, PlanarRasteriser, planes_of
+from lipmotion_faces.portrait.portrait_rasteriser import FacePose, Rasteriser
+from lipmotion_faces.portrait.pose import MouthPose
+from lipmotion_faces.registry import staged_face
 
 MOTION = Motion(np.linspace(0, 0.2, 30)[:, None], 25.0, (Channel("opening"),))
 POSES = (

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.faces import FACES, Staging, staged_face
-from lipmotion.faces.portrait.characters import WOMAN
-from lipmotion.faces.portrait.movement import NECK_END, NECK_TOP, PIVOT_Y, HeadField, HeadPlacement, grid
-from lipmotion.faces.portrait.portrait_rasteriser import FacePose, Rasteriser
-from lipmotion.faces.portrait.pose import MouthPose
-from lipmotion.faces.portrait.view import View
-from lipmotion.testing import check_face
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
+from lipmotion_faces import FACES, Staging, staged_face
+from lipmotion_faces.portrait.characters import WOMAN
+from lipmotion_faces.portrait.movement import NECK_END, NECK_TOP, PIVOT_Y, HeadField, HeadPlacement, grid
+from lipmotion_faces.portrait.portrait_rasteriser import FacePose, Rasteriser
+from lipmotion_faces.portrait.pose import MouthPose
+from lipmotion_faces.portrait.view import View
+from lipmotion_faces.testing import check_face
 
 NOTHING_SAID: Timeline[Unit] = Timeline(())
 DRAWN = ("woman", "man", "cartoon")

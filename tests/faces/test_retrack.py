@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from lipmotion.faces import Staging, staged_face
 from lipmotion.types import Channel, Motion, Span, Timeline, Unit
+from lipmotion_faces import Staging, staged_face
 
 pytestmark = pytest.mark.video
 mediapipe = pytest.importorskip("mediapipe")

@@ -3,8 +3,10 @@ import pytest
 
 from lipmotion.errors import InputError
 from lipmotion.meshes.model.mesh import Material, Mesh, MeshPart
-from lipmotion.meshes.rendering.lighting import Finish, Lighting, linear
-from lipmotion.meshes.rendering.rasteriser import Camera, Canvas, flat, gradient, normals_of
+from lipmotion.meshes.model.surface import normals_of
+from lipmotion.meshes.model.textures import linear
+from lipmotion_faces.rendering.lighting import Finish, Lighting
+from lipmotion_faces.rendering.rasteriser import Camera, Canvas, flat, gradient
 
 CAMERA = Camera(120, 100, (0.5, -0.25), across=2.0, distance=8.0)
 

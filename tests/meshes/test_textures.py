@@ -9,8 +9,8 @@ from lipmotion.meshes.files.gltf_scene import read_gltf
 from lipmotion.meshes.files.obj_files import read_obj
 from lipmotion.meshes.model.mesh import BLEND, MASK, OPAQUE, Material, Mesh, MeshPart
 from lipmotion.meshes.model.textures import Texture, read_texture, texture_table
-from lipmotion.meshes.rendering.drawn_surface import TexturedCanvas, drawn_surface
-from lipmotion.meshes.rendering.rasteriser import Camera, flat
+from lipmotion_faces.rendering.drawn_surface import TexturedCanvas, drawn_surface
+from lipmotion_faces.rendering.rasteriser import Camera, flat
 from meshes.gltf import UV, glb, textured_document
 
 QUARTERS = np.array([[[255, 0, 0, 255], [0, 255, 0, 255]], [[0, 0, 255, 255], [255, 255, 255, 0]]], np.uint8)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.faces.head.stage import figure, head_mesh
 from lipmotion.meshes.files.gltf_scene import read_gltf
 from lipmotion.meshes.files.obj_files import read_obj, read_obj_folder
 from lipmotion.meshes.model.mesh import BLEND, MASK, OPAQUE
-from lipmotion.meshes.rendering.lighting import linear
+from lipmotion.meshes.model.textures import linear
+from lipmotion_faces.head.stage import figure, head_mesh
 from meshes.gltf import document, glb, textured_document, with_colours
 from meshes.heads import write_glb
 from meshes.test_textures import encoded, picture_of

@@ -16,11 +16,6 @@ from lipmotion.articulation.expression import is_mood
 from lipmotion.articulation.lip_points import FACING
 from lipmotion.articulation.mouth import frame_times, spoken_mouth
 from lipmotion.export.base import read_motion, write_motion
-from lipmotion.faces.base import Staging
-from lipmotion.faces.head.performance import head_poses
-from lipmotion.faces.head.shape_fit import lip_gap
-from lipmotion.faces.head.stage import figure, head_mesh
-from lipmotion.faces.portrait.drawn_frames import face_poses
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter, driven_character
 from lipmotion.meshes.fitting.facial_animation import FAP
@@ -29,10 +24,15 @@ from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.pipeline.outputs.curve_sets import ARKIT, VOWELS, WHOLE_FACE, curves_of
 from lipmotion.pipeline.outputs.delivered import delivered
 from lipmotion.pipeline.outputs.motion_files import in_format, resampled_curves
-from lipmotion.pipeline.outputs.scenes import character_scene, head_scene
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 from lipmotion.types.moods import MOODS
 from lipmotion.units import closing_phones
+from lipmotion_faces.base import Staging
+from lipmotion_faces.head.performance import head_poses
+from lipmotion_faces.head.shape_fit import lip_gap
+from lipmotion_faces.head.stage import figure, head_mesh
+from lipmotion_faces.outputs.scenes import character_scene, head_scene
+from lipmotion_faces.portrait.drawn_frames import face_poses
 from meshes.heads import head, lip_points, write_glb
 from meshes.obj_writing import write_obj
 from meshes.speech import motion, units

@@ -13,8 +13,8 @@ import lipmotion
 from faces.test_cut_out import draw
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.cues.sheet import shown_shapes
-from lipmotion.faces import Staging
 from lipmotion.types import Audio, Generation, StateTrace, Timeline
+from lipmotion_faces import Staging
 from meshes.speech import motion, units
 
 LETTERS = "A B C D E F G H X"

@@ -8,9 +8,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from lipmotion.appearance.eigenlips import eigenlips_arrays
 from lipmotion.errors import ModelFormatError
 from lipmotion.hmm.model import hmm_arrays
+from lipmotion.motion.eigenlips import eigenlips_arrays
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.pipeline.understand.understood_speech import understand

@@ -13,18 +13,18 @@ from lipmotion.articulation.contact import closures
 from lipmotion.articulation.delivery import Delivery
 from lipmotion.errors import InputError
 from lipmotion.export.base import read_motion
-from lipmotion.faces import Face, Staging
-from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.meshes.fitting.driven import driven_character
 from lipmotion.pipeline.outputs.curve_sets import curves_of, with_curves
 from lipmotion.pipeline.outputs.delivered import delivered, held_mouth, shown
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance
 from lipmotion.pipeline.outputs.prosody import moved_prosody
-from lipmotion.pipeline.outputs.scenes import delivered_scene
-from lipmotion.pipeline.outputs.shown_faces import ShownPerson, shown_face
 from lipmotion.pipeline.outputs.write import write
 from lipmotion.types import Generation, Prosody, StateTrace
 from lipmotion.types.moods import MoodKey
+from lipmotion_faces import Face, Staging
+from lipmotion_faces.filmed.face import FilmedFace
+from lipmotion_faces.outputs.scenes import delivered_scene
+from lipmotion_faces.outputs.shown_faces import ShownPerson, shown_face
 from meshes.heads import head, write_glb
 from meshes.speech import motion, units
 
@@ -74,8 +74,8 @@ def test_brows_and_head_of_pictures_come_later_with_the_mouth(
             levels.append(prosody.level_db)
         return face
 
-    monkeypatch.setattr("lipmotion.pipeline.outputs.drawn_video.staged_face", staged)
-    monkeypatch.setattr("lipmotion.export.transparent.write_pictures", lambda *_: None)
+    monkeypatch.setattr("lipmotion_faces.outputs.drawn_video.staged_face", staged)
+    monkeypatch.setattr("lipmotion_faces.video.transparent.write_pictures", lambda *_: None)
     for offset_ms in (0, 500):
         path = tmp_path / "a%d.png"
         write(generation, path, speech=toy_speech, fps=1, face="woman", delivery=Delivery(offset_ms=offset_ms))

@@ -13,18 +13,18 @@ from lipmotion.articulation.delivery import Delivery, closed_times
 from lipmotion.articulation.expression import with_moods
 from lipmotion.articulation.liveliness import Liveliness
 from lipmotion.articulation.mouth import spoken_mouth
-from lipmotion.faces import Staging
 from lipmotion.meshes.fitting.eyes_and_brows import FULL_LOOK_RAD, eye_and_brow_weights
+from lipmotion.meshes.fitting.living_curves import living_curves
 from lipmotion.meshes.model.head_angles import ANGLES as HEAD
 from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH
 from lipmotion.pipeline.outputs.curve_sets import curves_of
-from lipmotion.pipeline.outputs.living_curves import living_curves
 from lipmotion.pipeline.outputs.motion_files import in_format, thinned
 from lipmotion.pipeline.outputs.motion_input import read_generation
 from lipmotion.pipeline.outputs.write import write
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, StateTrace, Timeline
 from lipmotion.types.moods import moods_of
+from lipmotion_faces import Staging
 from meshes.speech import motion, units
 
 TAKE = Path("a.livelink.csv")

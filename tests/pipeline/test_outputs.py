@@ -14,13 +14,13 @@ from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs import output
 from lipmotion.pipeline.outputs.cues import CueOutput, cues, write_cues
-from lipmotion.pipeline.outputs.drawn_video import PicturesOutput, VideoOutput
 from lipmotion.pipeline.outputs.motion_files import MotionOutput
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, checked_outputs, plan
-from lipmotion.pipeline.outputs.scenes import SceneOutput
-from lipmotion.pipeline.outputs.shown_faces import shown_face
 from lipmotion.pipeline.outputs.write import LabelOutput, SoundOutput, write
 from lipmotion.types import Generation
+from lipmotion_faces.outputs.drawn_video import PicturesOutput, VideoOutput
+from lipmotion_faces.outputs.scenes import SceneOutput
+from lipmotion_faces.outputs.shown_faces import shown_face
 
 
 class WordOutput(Output):

@@ -12,26 +12,26 @@ import pytest
 from lipmotion.articulation.delivery import Delivery, closed_times
 from lipmotion.articulation.expression import mood_table, with_moods
 from lipmotion.errors import InputError
-from lipmotion.faces import Staging
-from lipmotion.faces.head.lips import VISIBLE_RINGS
-from lipmotion.faces.head.stage import figure, head_mesh
 from lipmotion.meshes.files.gltf_accessors import GltfArrays
 from lipmotion.meshes.files.gltf_container import read_gltf_document
 from lipmotion.meshes.fitting.driven import driven_character
 from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.scene import Scene
 from lipmotion.pipeline.outputs.output import OutputSettings, Performance
-from lipmotion.pipeline.outputs.scenes import (
+from lipmotion.storage.files import sound_reference
+from lipmotion.types import Channel, Generation, Motion, Pin, StateTrace, Timeline
+from lipmotion.types.moods import moods_of
+from lipmotion_faces import Staging
+from lipmotion_faces.head.lips import VISIBLE_RINGS
+from lipmotion_faces.head.stage import figure, head_mesh
+from lipmotion_faces.outputs.scenes import (
     SceneOutput,
     character_scene,
     delivered_scene,
     head_scene,
-    sound_reference,
     write_scene,
 )
-from lipmotion.pipeline.outputs.shown_faces import shown_face
-from lipmotion.types import Channel, Generation, Motion, Pin, StateTrace, Timeline
-from lipmotion.types.moods import moods_of
+from lipmotion_faces.outputs.shown_faces import shown_face
 from meshes.heads import head, write_glb
 from meshes.speech import motion, units
 from programs import convert_to_fbx, gltf_report, gltf_validator, python_with, run_with

@@ -16,7 +16,6 @@ from lipmotion.errors import CorpusError, InputError
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion.closure import closable_ranges
 from lipmotion.motion.speaker_maps import speaker_arrays
-from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.generate.explain import explain
 from lipmotion.pipeline.generate.posteriors import animate_with_posteriors
@@ -25,6 +24,7 @@ from lipmotion.pipeline.training.train import train
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.testing.toy import ToySentence, toy_utterances
 from lipmotion.types import Channel, Constraints, Motion, Pin, ReducedVariance, Utterance
+from lipmotion_lab.evaluation.evaluate import evaluate
 
 SMALL = HmmConfig(mixtures=1, iterations=2)
 GAIN, OFFSET = np.array([0.5, 1.2, 0.6]), np.array([0.04, -0.05, 0.1])

@@ -17,14 +17,14 @@ from lipmotion.hmm.model import HmmConfig
 from lipmotion.motion.closure import closable_ranges
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.generate.explain import explain
-from lipmotion.pipeline.generate.transfer import map_onto, with_person
-from lipmotion.pipeline.model import Model, load_model, save_model
+from lipmotion.pipeline.model import Model, load_model, save_model, with_person
 from lipmotion.pipeline.training.train import train
 from lipmotion.pipeline.understand.request import Onto, SpeechRequest
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence, toy_motion, toy_utterances
 from lipmotion.types import Audio, Channel, Constraints, Motion, Pin, Track, Utterance
-from lipmotion.vision.frames import VideoSpan
+from lipmotion_faces.tracking.frames import VideoSpan
+from lipmotion_faces.transfer import map_onto
 
 GAIN, OFFSET = np.array([0.5, 1.2, 0.6]), np.array([0.04, -0.05, 0.1])
 """How ben's opening, width and outer differ from those of the toy."""
@@ -152,7 +152,7 @@ def test_onto_the_person_of_a_video(
         tracked.append((path, crops, span.end_s))
         return of_ben(toy_utterances(3)[0]).track
 
-    monkeypatch.setattr("lipmotion.pipeline.generate.transfer.track", track)
+    monkeypatch.setattr("lipmotion_faces.transfer.track", track)
     own, mapped = (animate(request(toy_sentence, onto), model=toy_model).motion for onto in (None, toy_speech))
     assert tracked == [(toy_speech, False, 60.0)]
     ratio = np.ptp(mapped["opening"]) / np.ptp(own["opening"])
@@ -230,7 +230,7 @@ def test_what_is_no_person(toy_model: Model, toy_sentence: ToySentence, tmp_path
 def test_onto_a_real_person(recordings: Path) -> None:
     """A face that rests with parted lips: the third of a second of it counts for nearly half of the way."""
     pytest.importorskip("mediapipe")
-    from lipmotion.vision.track import track
+    from lipmotion_faces.tracking.track import track
 
     video = recordings / "grid-others" / "brbk7n.mpg"
     rest = np.median(track(video, crops=False).motion["opening"][:8])

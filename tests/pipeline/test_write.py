@@ -16,12 +16,12 @@ from lipmotion.articulation.delivery import closed_on_grid
 from lipmotion.articulation.phone_targets import GESTURES
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import read_motion
-from lipmotion.faces import Staging
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.outputs.motion_files import with_articulation
 from lipmotion.pipeline.outputs.write import write
 from lipmotion.types import Audio, Generation
+from lipmotion_faces import Staging
 
 
 @pytest.fixture(scope="module")
@@ -65,8 +65,8 @@ def test_the_sound_of_a_video_is_read_without_a_second_warning(
         warns.append(warn)
         return Audio(np.zeros(16_000, np.float32), 16_000)
 
-    monkeypatch.setattr("lipmotion.pipeline.outputs.drawn_video.read_audio", read)
-    monkeypatch.setattr("lipmotion.export.video.write_mp4", lambda *_, **__: None)
+    monkeypatch.setattr("lipmotion_faces.outputs.drawn_video.read_audio", read)
+    monkeypatch.setattr("lipmotion_faces.video.mp4.write_mp4", lambda *_, **__: None)
     write(result, [tmp_path / "a.mp4"], speech=toy_speech)
     assert warns == [False]
 
@@ -170,7 +170,7 @@ def test_scenes_name_no_sound_that_will_be_gone(
     result: Generation, toy_speech: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, temporary: bool
 ) -> None:
     named = []
-    monkeypatch.setattr("lipmotion.pipeline.outputs.scenes.delivered_scene", lambda _: True)
-    monkeypatch.setattr("lipmotion.pipeline.outputs.scenes.write_scene", lambda *_, sound: named.append(sound))
+    monkeypatch.setattr("lipmotion_faces.outputs.scenes.delivered_scene", lambda _: True)
+    monkeypatch.setattr("lipmotion_faces.outputs.scenes.write_scene", lambda *_, sound: named.append(sound))
     write(result, [tmp_path / "a.glb"], speech=toy_speech, temporary=temporary)
     assert named == [None if temporary else toy_speech]

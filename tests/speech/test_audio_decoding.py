@@ -349,7 +349,7 @@ def test_a_rate_that_changes_on_the_way_is_checked_as_the_first(tmp_path: Path) 
 
 
 def test_a_video_without_sound_and_a_sound_without_video(tmp_path: Path) -> None:
-    from lipmotion.vision.frames import open_video
+    from lipmotion_faces.tracking.frames import open_video
 
     with pytest.raises(InputError, match="has no sound track; give a recording with sound"):
         read_audio(write_pictures(tmp_path / "mute.mp4"))

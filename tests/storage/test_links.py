@@ -14,7 +14,6 @@ import pytest
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import ExportError, LipMotionError
 from lipmotion.pipeline.batch.ledger import Place, opened_ledger
-from lipmotion.pipeline.corpus.sync import sync
 from lipmotion.storage.checkpoint import Checkpoint
 from lipmotion.storage.files import (
     LOCK,
@@ -30,12 +29,13 @@ from lipmotion.storage.files import (
     whole_file,
     whole_folder,
 )
-from lipmotion.studio.folder import opened_folder
-from lipmotion.studio.training import VOICE, LearnedLine, TrainingOrder, VoiceOptions, carry_out
-from lipmotion.studio.votes import Side, Vote
-from lipmotion.study.manifest import MANIFEST
-from lipmotion.study.store import ANSWERS, StudyStore
 from lipmotion.testing import toy_utterances
+from lipmotion_faces.corpus.sync import sync
+from lipmotion_studio.folder import opened_folder
+from lipmotion_studio.study.manifest import MANIFEST
+from lipmotion_studio.study.store import ANSWERS, StudyStore
+from lipmotion_studio.training import VOICE, LearnedLine, TrainingOrder, VoiceOptions, carry_out
+from lipmotion_studio.votes import Side, Vote
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="links as POSIX has them")
 Verb = Callable[[Path], object]

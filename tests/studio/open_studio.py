@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from lipmotion.pipeline.model import Model
-from lipmotion.studio.access import TOKEN_HEADER, Access
-from lipmotion.studio.application import studio_application
-from lipmotion.studio.folder import ProjectFolder, opened_folder
-from lipmotion.studio.known_model import KnownModel
-from lipmotion.studio.studio import Studio
+from lipmotion_studio.access import TOKEN_HEADER, Access
+from lipmotion_studio.application import studio_application
+from lipmotion_studio.folder import ProjectFolder, opened_folder
+from lipmotion_studio.known_model import KnownModel
+from lipmotion_studio.studio import Studio
 from study.asgi import Application, Reply, answered, ask
 
 TOY_DIGEST = "0" * 64

@@ -16,7 +16,6 @@ import av
 import numpy as np
 import pytest
 
-from lipmotion.export.video import write_mp4
 from lipmotion.meshes.files.gltf_weights import read_gltf_motion
 from lipmotion.pipeline.edit_files import read_edits
 from lipmotion.pipeline.edits import FORMS
@@ -24,18 +23,19 @@ from lipmotion.pipeline.model import Model, save_model
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.testing.toy import ToySentence
 from lipmotion.units import Lexicon
+from lipmotion_faces.video.mp4 import write_mp4
 
 pytest.importorskip("starlette", reason="the extra 'studio' is not installed")
 
 from lipmotion.storage.files import LOCK
-from lipmotion.studio import line as line_module
-from lipmotion.studio.access import TOKEN_HEADER, Access
-from lipmotion.studio.application import studio_application
-from lipmotion.studio.folder import ProjectFolder, opened_folder
-from lipmotion.studio.known_model import known_model
-from lipmotion.studio.project import project_from
-from lipmotion.studio.studio import Studio
-from lipmotion.studio.votes import read_votes
+from lipmotion_studio import line as line_module
+from lipmotion_studio.access import TOKEN_HEADER, Access
+from lipmotion_studio.application import studio_application
+from lipmotion_studio.folder import ProjectFolder, opened_folder
+from lipmotion_studio.known_model import known_model
+from lipmotion_studio.project import project_from
+from lipmotion_studio.studio import Studio
+from lipmotion_studio.votes import read_votes
 from studio.open_studio import HOST, TOKEN, TOY_DIGEST, OpenStudio, open_studio, toy
 from study.asgi import Reply
 
@@ -341,7 +341,7 @@ def test_a_project_outlives_its_model(
         asked.append(path)
         return toy_model
 
-    monkeypatch.setattr("lipmotion.studio.known_model.load_model", loaded)
+    monkeypatch.setattr("lipmotion_studio.known_model.load_model", loaded)
     with opened_folder(None, tmp_path / "project") as folder:
         folder.change(lambda project: replace(project, model="../gone.lipmotion"))
         with closing(Studio(folder)):
@@ -365,7 +365,7 @@ def test_what_the_list_says_of_a_line_outlives_a_kill(
 def test_lines_that_are_not_used_are_closed_and_open_again_as_they_were(
     studio: OpenStudio, toy_speech: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("lipmotion.studio.desk.MOST_OPEN", 1)
+    monkeypatch.setattr("lipmotion_studio.desk.MOST_OPEN", 1)
     edited = studio.edit("phone 3 is p").content
     reply = studio.ask("/api/lines?name=other.wav", toy_speech.read_bytes())
     other = reply.content["id"]

@@ -12,9 +12,9 @@ import pytest
 from lipmotion.errors import ExportError, InputError
 from lipmotion.export.sound import write_sound
 from lipmotion.storage.files import portable_name
-from lipmotion.studio.folder import PROJECT, ProjectFolder, folder_for, opened_folder
-from lipmotion.studio.project import ExportRecord, Project, ProjectLine, project_document, project_from
 from lipmotion.testing.toy import ToySentence
+from lipmotion_studio.folder import PROJECT, ProjectFolder, folder_for, opened_folder
+from lipmotion_studio.project import ExportRecord, Project, ProjectLine, project_document, project_from
 
 LINE = {"number": 1, "name": "a", "sound": "a.wav", "sha256": "0"}
 RECORD = ExportRecord("arkit", {"exports/a.livelink.csv": "1"}, "exports/a.edits.json", "2", "3", "0.1.0")

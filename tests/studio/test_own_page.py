@@ -13,7 +13,7 @@ from study.browser import BROWSER, DRIVER, MISSING, browser, check_screen
 
 pytest.importorskip("uvicorn", reason="the extra 'studio' is not installed")
 
-from lipmotion.studio.folder import opened_folder
+from lipmotion_studio.folder import opened_folder
 from studio.test_page import LIMIT_S, SCREENS, WEBGL, WELCOME, Page, served
 from studio.toy_recordings import SENTENCES, write_recordings
 

@@ -14,17 +14,17 @@ import numpy as np
 import pytest
 
 from children import LIPMOTION, child, wait_until
-from lipmotion.export.video import write_mp4
 from lipmotion.meshes.files.gltf_weights import read_gltf_motion
 from lipmotion.pipeline.model import load_model, save_model, shipped_path
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.files import sha256_of
+from lipmotion_faces.video.mp4 import write_mp4
 from studio.late_sound import shifted
 from study.browser import CONTROL, DELETE, ENTER, ESCAPE, RIGHT, SHIFT, SPACE, TAB, UP, WINDOW_S, Browser, check_screen
 from study.firefox import BOTH, Opens
 
 pytest.importorskip("uvicorn", reason="the extra 'studio' is not installed")
-from lipmotion.studio.votes import read_votes
+from lipmotion_studio.votes import read_votes
 
 pytestmark = pytest.mark.long
 WELCOME = Path(__file__).parents[2] / "examples" / "welcome.flac"

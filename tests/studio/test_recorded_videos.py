@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from lipmotion.export.sound import write_sound
-from lipmotion.export.video import write_mp4
 from lipmotion.speech.sound.audio_files import read_audio
-from lipmotion.studio.recorded_videos import MP4, played_as, sound_begins_s, video_of, write_playable
 from lipmotion.testing.toy import ToySentence
+from lipmotion_faces.video.mp4 import write_mp4
+from lipmotion_studio.recorded_videos import MP4, played_as, sound_begins_s, video_of, write_playable
 from studio.late_sound import shifted
 
 LATE_S = 0.3

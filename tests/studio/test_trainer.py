@@ -20,9 +20,9 @@ from lipmotion.testing.toy import ToySentence
 
 pytest.importorskip("starlette", reason="the extra 'studio' is not installed")
 
-from lipmotion.studio.folder import ProjectFolder
-from lipmotion.studio.trainer import TRAINING, Trainer
-from lipmotion.studio.training import TrainingOrder, VoiceOptions, carry_out, divided_names
+from lipmotion_studio.folder import ProjectFolder
+from lipmotion_studio.trainer import TRAINING, Trainer
+from lipmotion_studio.training import TrainingOrder, VoiceOptions, carry_out, divided_names
 from studio.open_studio import OpenStudio, open_studio
 from studio.toy_recordings import SENTENCES, write_recordings
 
@@ -151,7 +151,7 @@ def test_what_cannot_be_made_is_refused(studio: OpenStudio) -> None:
 
 def test_videos_of_the_project_are_gathered_with_their_words(tmp_path: Path) -> None:
     """What the readers refuse is told as a sentence, and nothing is left of what was gathered."""
-    from lipmotion.studio.training import LearnedLine, _gathered
+    from lipmotion_studio.training import LearnedLine, _gathered
 
     for name in ("take.mp4", "take.srt", "other.mp4"):
         (tmp_path / name).write_text(name, encoding="utf-8")
@@ -191,7 +191,7 @@ def test_the_time_left_counts_down_and_reports_are_kept(tmp_path: Path, monkeypa
     folder, now_s, (pipe, tells) = ProjectFolder(tmp_path), [0.0], Pipe(duplex=False)
     folder.change(lambda project: replace(project, recordings="."))
     process = SimpleNamespace(join=lambda: None, kill=tells.close)
-    monkeypatch.setattr("lipmotion.studio.trainer.begun_apart", lambda *_: (process, pipe))
+    monkeypatch.setattr("lipmotion_studio.trainer.begun_apart", lambda *_: (process, pipe))
     trainer = Trainer(folder, lambda: now_s[0])
     trainer.begin("voice", "me", [], VoiceOptions())
 

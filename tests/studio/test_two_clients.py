@@ -17,7 +17,7 @@ from lipmotion.testing.toy import ToySentence
 
 pytest.importorskip("starlette", reason="the extra 'studio' is not installed")
 
-from lipmotion.studio.folder import ProjectFolder
+from lipmotion_studio.folder import ProjectFolder
 from studio.open_studio import OpenStudio, open_studio
 from studio.two_clients import walk
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.studio.votes import Side, Vote, read_votes, tally, votes_text
+from lipmotion_studio.votes import Side, Vote, read_votes, tally, votes_text
 
 A, B, C = (Side(name, digest * 64, "e" * 64) for name, digest in (("voice", "a"), ("voice", "b"), ("other", "c")))
 KEPT = Side("voice", "a" * 64, "f" * 64)

@@ -28,12 +28,12 @@ from lipmotion.export.sound import write_sound
 from lipmotion.pipeline.edit_files import read_edits
 from lipmotion.pipeline.model import Model
 from lipmotion.storage.files import sha256_of
-from lipmotion.studio.access import Access
-from lipmotion.studio.application import studio_application
-from lipmotion.studio.folder import opened_folder
-from lipmotion.studio.project import digest_of
-from lipmotion.studio.studio import Studio
 from lipmotion.testing.toy import ToySentence
+from lipmotion_studio.access import Access
+from lipmotion_studio.application import studio_application
+from lipmotion_studio.folder import opened_folder
+from lipmotion_studio.project import digest_of
+from lipmotion_studio.studio import Studio
 from studio.open_studio import HOST, TOKEN, OpenStudio, toy
 from study.asgi import Reply
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from children import LIPMOTION, Child, child
-from lipmotion.study.manifest import Study
+from lipmotion_studio.study.manifest import Study
 from study.hostile import Hostile
 from study.small_study import scripted_answer
 

@@ -6,10 +6,10 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from lipmotion.study.answers import ANCHOR, MOS, PAIRED, RANKING
-from lipmotion.study.manifest import VIDEOS, Study, StudyVideo, write_manifest
-from lipmotion.study.questions import SCALES
-from lipmotion.study.trials import anchor_trials, attention_trials, main_trials, practice_trials, questions_of
+from lipmotion_studio.study.answers import ANCHOR, MOS, PAIRED, RANKING
+from lipmotion_studio.study.manifest import VIDEOS, Study, StudyVideo, write_manifest
+from lipmotion_studio.study.questions import SCALES
+from lipmotion_studio.study.trials import anchor_trials, attention_trials, main_trials, practice_trials, questions_of
 
 CONDITIONS = ("recording", "visemes", "phones")
 SENTENCES = ("one", "two", "three", "four", "five", "six")

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.study.answers import COLUMNS, Answer, is_possible, read_answers, write_answers
+from lipmotion_studio.study.answers import COLUMNS, Answer, is_possible, read_answers, write_answers
 
 ANSWERS = [
     Answer("r1", "paired", 0, 'say "b", now', "preference", "recording", "trajectory", "first", 12.5, 2, False, ""),

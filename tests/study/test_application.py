@@ -9,17 +9,17 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from lipmotion.study.answers import KINDS, PAIRED, read_answers
-from lipmotion.study.collected import export_answers, forget_rater
-from lipmotion.study.manifest import Study, check_videos
-from lipmotion.study.store import StudyStore
+from lipmotion_studio.study.answers import KINDS, PAIRED, read_answers
+from lipmotion_studio.study.collected import export_answers, forget_rater
+from lipmotion_studio.study.manifest import Study, check_videos
+from lipmotion_studio.study.store import StudyStore
 from study.asgi import Application, ask
 from study.small_study import scripted_answer, small_study
 
 starlette = pytest.importorskip("starlette", reason="the extra 'study' is not installed")
 
-from lipmotion.study.application import ANSWER_BURST, JOIN_BURST, PAGE, study_application  # noqa: E402
-from lipmotion.web.replies import HEADERS  # noqa: E402
+from lipmotion_studio.study.application import ANSWER_BURST, JOIN_BURST, PAGE, study_application  # noqa: E402
+from lipmotion_studio.web.replies import HEADERS  # noqa: E402
 
 
 class Open(NamedTuple):
@@ -129,7 +129,7 @@ def test_too_many_requests_of_one_rater_do_not_stop_another(place: Open) -> None
 
 
 def test_too_many_raters_at_once_have_to_wait(place: Open, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("lipmotion.study.application.JOIN_BURST", 3)
+    monkeypatch.setattr("lipmotion_studio.study.application.JOIN_BURST", 3)
     assert JOIN_BURST >= 20
     application = study_application(place.study, {}, place.store)
     found = [ask(application, "/api/raters", {"agrees": True}).status for _ in range(8)]

@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.export.synthetic_mark import SOURCE_TYPE, STATEMENT, mark_metadata
-from lipmotion.export.video import write_mp4
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.storage.files import sha256_of
-from lipmotion.study.answers import ANCHOR, MOS, PAIRED, RANKING
-from lipmotion.study.design import design_study
-from lipmotion.study.encoding import encode_shown
-from lipmotion.study.manifest import VIDEO_NAME, VIDEOS, check_videos, read_study
-from lipmotion.study.region import Region
-from lipmotion.study.settings import StudySettings
-from lipmotion.study.sources import condition_of, drawn_job, named_conditions, sentences_of
 from lipmotion.types import Audio
+from lipmotion_faces.video.mp4 import write_mp4
+from lipmotion_faces.video.synthetic_mark import SOURCE_TYPE, STATEMENT, mark_metadata
+from lipmotion_studio.study.answers import ANCHOR, MOS, PAIRED, RANKING
+from lipmotion_studio.study.design import design_study
+from lipmotion_studio.study.encoding import encode_shown
+from lipmotion_studio.study.manifest import VIDEO_NAME, VIDEOS, check_videos, read_study
+from lipmotion_studio.study.region import Region
+from lipmotion_studio.study.settings import StudySettings
+from lipmotion_studio.study.sources import condition_of, drawn_job, named_conditions, sentences_of
 
 PLAIN = StudySettings(practice=1, anchors=1, anchor_ms=100, checks=1)
 

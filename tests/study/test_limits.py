@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lipmotion.study.limits import RateLimit
+from lipmotion_studio.study.limits import RateLimit
 
 
 def test_a_burst_and_then_a_rate() -> None:

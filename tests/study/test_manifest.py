@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.study.answers import KINDS
-from lipmotion.study.manifest import MANIFEST, check_videos, read_study
+from lipmotion_studio.study.answers import KINDS
+from lipmotion_studio.study.manifest import MANIFEST, check_videos, read_study
 from study.small_study import small_study
 
 

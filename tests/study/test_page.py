@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from children import wait_until
-from lipmotion.export.video import write_mp4
-from lipmotion.study.answers import MOS, PAIRED, RANKING, Answer
-from lipmotion.study.collected import collected_answers
-from lipmotion.study.manifest import VIDEOS, Study, StudyVideo
 from lipmotion.types import Audio
+from lipmotion_faces.video.mp4 import write_mp4
+from lipmotion_studio.study.answers import MOS, PAIRED, RANKING, Answer
+from lipmotion_studio.study.collected import collected_answers
+from lipmotion_studio.study.manifest import VIDEOS, Study, StudyVideo
 from study.browser import ENTER, LEFT, RIGHT, SPACE, Browser, check_screen
 from study.firefox import BOTH, Opens
 from study.served import Server, served

@@ -11,10 +11,10 @@ import pytest
 
 from children import LIPMOTION, environment, run_child, wait_until
 from lipmotion.errors import InputError
-from lipmotion.study.collected import collected_answers
-from lipmotion.study.manifest import VIDEOS
-from lipmotion.study.serve import serve_study
-from lipmotion.study.store import ANSWERS
+from lipmotion_studio.study.collected import collected_answers
+from lipmotion_studio.study.manifest import VIDEOS
+from lipmotion_studio.study.serve import serve_study
+from lipmotion_studio.study.store import ANSWERS
 from study.hostile import FOREIGN, hostile_requests
 from study.served import Connection, ScriptedRater, raw_reply, send_junk, served
 from study.small_study import small_study

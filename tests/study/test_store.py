@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.study.manifest import MANIFEST
-from lipmotion.study.store import ANSWERS, AnswerSheet, StudyStore, rater_name, rater_number
+from lipmotion_studio.study.manifest import MANIFEST
+from lipmotion_studio.study.store import ANSWERS, AnswerSheet, StudyStore, rater_name, rater_number
 from study.small_study import small_study
 
 

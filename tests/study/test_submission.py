@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.study.answers import MOS, RANKING
-from lipmotion.study.store import AnswerSheet
-from lipmotion.study.submission import submitted_sheet
-from lipmotion.study.trials import trials_of
+from lipmotion_studio.study.answers import MOS, RANKING
+from lipmotion_studio.study.store import AnswerSheet
+from lipmotion_studio.study.submission import submitted_sheet
+from lipmotion_studio.study.trials import trials_of
 from study.small_study import small_study
 
 SENT = {"trial": 4, "values": ["second"], "plays": [1, 2], "seconds": 1.25}

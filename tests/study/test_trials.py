@@ -8,8 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.study.answers import ANCHOR, MOS, PAIRED, RANKING
-from lipmotion.study.trials import anchor_trials, attention_trials, main_trials, questions_of, shuffled, trials_of
+from lipmotion_studio.study.answers import ANCHOR, MOS, PAIRED, RANKING
+from lipmotion_studio.study.trials import (
+    anchor_trials,
+    attention_trials,
+    main_trials,
+    questions_of,
+    shuffled,
+    trials_of,
+)
 from study.small_study import CONDITIONS, SENTENCES, small_study
 
 VIDEOS = {(sentence, name): n for n, (sentence, name) in enumerate((s, c) for s in SENTENCES for c in CONDITIONS)}

@@ -12,8 +12,9 @@ import pytest
 
 from lipmotion.errors import InputError
 from lipmotion.export.base import MOTION_FORMATS, MotionFormat
-from lipmotion.faces import Face, face_named
-from lipmotion.testing import ContractError, check_exporter, check_face
+from lipmotion.testing import ContractError, check_exporter
+from lipmotion_faces import Face, face_named
+from lipmotion_faces.testing import check_face
 
 
 class Bars(Face):

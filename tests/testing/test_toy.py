@@ -19,11 +19,11 @@ from lipmotion.testing.toy import (
     toy_motion,
     toy_sentences,
     toy_utterances,
-    write_toy_recordings,
 )
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units.lexicon import Lexicon
 from lipmotion.units.phones import SILENCE
+from lipmotion_faces.testing import write_toy_recordings
 
 FPS = 25.0
 

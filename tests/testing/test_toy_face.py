@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.appearance.lower_face import CORNER, region_map
-from lipmotion.appearance.placing import cut
 from lipmotion.errors import InputError
 from lipmotion.testing.toy import toy_motion, toy_sentences
 from lipmotion.types import Motion
+from lipmotion_faces.appearance.lower_face import CORNER, region_map
+from lipmotion_faces.appearance.placing import cut
 from testing.toy_face import (
     toy_chin_px,
     toy_face,

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lipmotion.vision import face_follower as follow
-from lipmotion.vision.landmarks import TRACKED_POINTS
-from lipmotion.vision.trackers import FaceBox, LandmarkTracker
+from lipmotion_faces.tracking import face_follower as follow
+from lipmotion_faces.tracking.landmarks import TRACKED_POINTS
+from lipmotion_faces.tracking.trackers import FaceBox, LandmarkTracker
 
 COLUMN = {index: n for n, index in enumerate(TRACKED_POINTS)}
 

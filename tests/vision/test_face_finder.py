@@ -8,8 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from lipmotion.errors import MissingDependencyError
-from lipmotion.vision import mediapipe as face_finder
-from lipmotion.vision.mediapipe import FaceFinder, parts
+from lipmotion_faces.tracking import mediapipe as face_finder
+from lipmotion_faces.tracking.mediapipe import FaceFinder, parts
 
 Box = tuple[float, float, float, float]  # left, top, side, score, px of a picture of 1280 × 720
 

@@ -8,9 +8,9 @@ import pytest
 from children import run_child
 from lipmotion.errors import MissingDependencyError
 from lipmotion.extensions import install_command
-from lipmotion.vision.face_mesh import FaceMesh, quiet_stderr
-from lipmotion.vision.packages import import_face_mesh, import_opencv
-from lipmotion.vision.trackers import tracker_named
+from lipmotion_faces.tracking.face_mesh import FaceMesh, quiet_stderr
+from lipmotion_faces.tracking.packages import import_face_mesh, import_opencv
+from lipmotion_faces.tracking.trackers import tracker_named
 
 
 def test_missing_packages_are_named_with_the_way_to_install_them(monkeypatch):
@@ -46,6 +46,6 @@ def test_native_messages_are_dropped_only_inside(capfd):
 def test_importing_needs_no_video_packages():
     code = (
         "import sys; sys.modules['cv2'] = sys.modules['mediapipe'] = None; "
-        "import lipmotion.vision.track, lipmotion.corpora.store, lipmotion.pipeline.corpus.prepare"
+        "import lipmotion_faces.tracking.track, lipmotion.corpora.store, lipmotion_faces.corpus.prepare"
     )
     run_child([sys.executable, "-c", code], check=True)

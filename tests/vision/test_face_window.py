@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lipmotion.vision.face_follower import REACH, SIZE_PX, FaceWindow, WindowedMesh
-from lipmotion.vision.trackers import FaceBox, LandmarkTracker
+from lipmotion_faces.tracking.face_follower import REACH, SIZE_PX, FaceWindow, WindowedMesh
+from lipmotion_faces.tracking.trackers import FaceBox, LandmarkTracker
 
 pytest.importorskip("cv2")
 pytestmark = pytest.mark.video

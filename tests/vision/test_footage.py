@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.vision.footage import footage_frames, footage_groups, track_footage, untracked_frames
-from lipmotion.vision.frames import VideoSpan
-from lipmotion.vision.track import track
+from lipmotion_faces.tracking.footage import footage_frames, footage_groups, track_footage, untracked_frames
+from lipmotion_faces.tracking.frames import VideoSpan
+from lipmotion_faces.tracking.track import track
 from vision.scripted import face, script
 
 OPENINGS = 0.1 + 0.05 * np.sin(np.arange(20) / 3)

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.vision import frames
-from lipmotion.vision.frames import VideoFrame, VideoSpan, open_video
+from lipmotion_faces.tracking import frames
+from lipmotion_faces.tracking.frames import VideoFrame, VideoSpan, open_video
 from vision.variants import write_frames
 
 

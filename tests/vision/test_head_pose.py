@@ -5,8 +5,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from lipmotion.vision.head_pose import similarity_transforms, without_head_motion
-from lipmotion.vision.landmarks import EYE_CORNERS, JAW_POINTS, LIP_POINTS, NASION, RIGID_POINTS, TRACKED_POINTS
+from lipmotion_faces.tracking.head_pose import similarity_transforms, without_head_motion
+from lipmotion_faces.tracking.landmarks import EYE_CORNERS, JAW_POINTS, LIP_POINTS, NASION, RIGID_POINTS, TRACKED_POINTS
 
 COLUMN = {index: n for n, index in enumerate(TRACKED_POINTS)}
 FRAMES = 40

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.vision.image_similarity import (
+from lipmotion_faces.tracking.image_similarity import (
     face_thumbnail,
     image_correlation,
     mouth_thumbnail,

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from lipmotion.vision.landmarks import FOREHEAD_SLOPE_DEG, LIP_POINTS, TRACKED_POINTS
-from lipmotion.vision.mouth_pictures import eyes_to_image, face_to_image, mouth_crop, region_to_image
+from lipmotion_faces.tracking.landmarks import FOREHEAD_SLOPE_DEG, LIP_POINTS, TRACKED_POINTS
+from lipmotion_faces.tracking.mouth_pictures import eyes_to_image, face_to_image, mouth_crop, region_to_image
 
 pytestmark = pytest.mark.video
 cv2 = pytest.importorskip("cv2")

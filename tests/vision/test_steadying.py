@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from lipmotion.types import Motion, Track
-from lipmotion.vision import steadying
-from lipmotion.vision.footage import Footage
-from lipmotion.vision.frames import WHOLE
-from lipmotion.vision.steadying import REGISTERED_NOISE_PX, registered_maps, steady_maps
+from lipmotion_faces.tracking import steadying
+from lipmotion_faces.tracking.footage import Footage
+from lipmotion_faces.tracking.frames import WHOLE
+from lipmotion_faces.tracking.steadying import REGISTERED_NOISE_PX, registered_maps, steady_maps
 
 STILL = np.array([[0.8, 0, 100], [0, 0.8, 60]])
 MOUTH = np.array([0.0, 76.0, 1.0])

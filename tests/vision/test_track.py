@@ -9,9 +9,9 @@ import pytest
 
 from children import run_child
 from lipmotion.errors import InputError
-from lipmotion.vision.frames import VideoSpan
-from lipmotion.vision.landmarks import JAW_POINTS, LIP_POINTS
-from lipmotion.vision.track import CHANNELS, motion_values, track
+from lipmotion_faces.tracking.frames import VideoSpan
+from lipmotion_faces.tracking.landmarks import JAW_POINTS, LIP_POINTS
+from lipmotion_faces.tracking.track import CHANNELS, motion_values, track
 from vision.scripted import COLUMN, face, script
 
 
@@ -150,6 +150,6 @@ class TestRealRecordings:
 
     def test_nothing_is_printed(self, recordings: Path):
         path = recordings / "grid-s1" / "clips" / "brwa3s.mkv"
-        code = f"from pathlib import Path; from lipmotion.vision.track import track; track(Path({str(path)!r}))"
+        code = f"from pathlib import Path; from lipmotion_faces.tracking.track import track; track(Path({str(path)!r}))"
         done = run_child([sys.executable, "-c", code], check=True)
         assert (done.stdout, done.stderr) == ("", "")

@@ -11,11 +11,11 @@ import pytest
 
 from lipmotion.errors import InputError
 from lipmotion.extensions import GROUPS
-from lipmotion.pipeline.corpus.prepare import prepare
-from lipmotion.vision.landmarks import EYE_CORNERS, TRACKED_POINTS
-from lipmotion.vision.mediapipe import FaceFinder, MediaPipe
-from lipmotion.vision.track import track
-from lipmotion.vision.trackers import TRACKERS, LandmarkTracker, tracker_named
+from lipmotion_faces.corpus.prepare import prepare
+from lipmotion_faces.tracking.landmarks import EYE_CORNERS, TRACKED_POINTS
+from lipmotion_faces.tracking.mediapipe import FaceFinder, MediaPipe
+from lipmotion_faces.tracking.track import track
+from lipmotion_faces.tracking.trackers import TRACKERS, LandmarkTracker, tracker_named
 from vision.scripted import NoFinder
 
 

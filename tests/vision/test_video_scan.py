@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.vision import video_scan
-from lipmotion.vision.video_scan import scan_video
+from lipmotion_faces.tracking import video_scan
+from lipmotion_faces.tracking.video_scan import scan_video
 from vision.variants import write_frames
 
 

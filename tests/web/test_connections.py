@@ -17,8 +17,8 @@ from starlette.requests import Request  # noqa: E402
 from starlette.responses import Response  # noqa: E402
 from starlette.routing import Route  # noqa: E402
 
-from lipmotion.web import connections  # noqa: E402
-from lipmotion.web.listening import listening  # noqa: E402
+from lipmotion_studio.web import connections  # noqa: E402
+from lipmotion_studio.web.listening import listening  # noqa: E402
 
 LARGE, SMALL = 1 << 26, b"small"
 PATIENCE_S = 60.0

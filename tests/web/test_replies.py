@@ -8,7 +8,7 @@ import sqlite3
 import pytest
 
 from lipmotion.errors import ExportError, InputError
-from lipmotion.web.replies import ERRORS
+from lipmotion_studio.web.replies import ERRORS
 
 
 @pytest.mark.parametrize("kind", [ExportError, OSError, MemoryError, sqlite3.OperationalError, InputError])

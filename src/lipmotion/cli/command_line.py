@@ -8,7 +8,7 @@ import logging
 import re
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
@@ -19,39 +19,15 @@ from lipmotion.cli.arguments.paths import check_paths
 from lipmotion.cli.terminal.events import Events
 from lipmotion.cli.terminal.printing import flush_output, print_usage, with_program_name
 from lipmotion.cli.terminal.stop import Stopper
-from lipmotion.cli.verbs import (
-    adapt,
-    addon,
-    animate,
-    batch,
-    character,
-    cite,
-    compare,
-    completion,
-    corpus,
-    cues,
-    doctor,
-    edit,
-    evaluate,
-    experiment,
-    explain,
-    face,
-    info,
-    render,
-    speak,
-    studio,
-    study,
-    train,
-    words,
-)
 from lipmotion.errors import ExportError, LipMotionError
+from lipmotion.extensions import Registry
 from lipmotion.types.values import number_of, whole_of
 
-VERBS = (
-    *(animate, batch, speak, render, edit, studio, explain, cues, words, corpus, train, adapt, face),
-    *(character, addon, evaluate, compare, experiment, study, info, cite),
-    *(doctor, completion),
+_VERBS = "animate batch speak render edit explain cues words train adapt character addon info cite doctor"
+VERBS: Registry[Callable[[Any], None]] = Registry(
+    "verb", "lipmotion.verbs", {name: f"lipmotion.cli.verbs.{name}:add" for name in [*_VERBS.split(), "completion"]}
 )
+"""What adds each verb to the parser; those of faces, studio and lab are entry points."""
 OF_OTHER_TOOLS = {
     **dict.fromkeys(("convert", "export", "import", "draw", "video", "play"), "render IN -o OUT"),
     **dict.fromkeys(("generate", "lipsync", "sync", "process", "run", "infer", "predict"), "animate SPEECH -o OUT"),
@@ -118,8 +94,8 @@ def parser() -> argparse.ArgumentParser:
     )
     whole.add_argument("--version", action=Version, nargs=0, help="print the version")
     verbs = whole.add_subparsers(title="verbs", dest="verb", required=True, metavar="VERB")
-    for verb in VERBS:
-        verb.add(verbs)
+    for name in VERBS.names:
+        VERBS.load(name)(verbs)
     return whole
 
 

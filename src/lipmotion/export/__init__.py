@@ -8,7 +8,6 @@ from lipmotion.export.base import (
     readable_suffixes,
     write_motion,
 )
-from lipmotion.export.video import write_mp4
 
 __all__ = [
     "MotionFormat",
@@ -17,5 +16,4 @@ __all__ = [
     "read_motion",
     "readable_suffixes",
     "write_motion",
-    "write_mp4",
 ]

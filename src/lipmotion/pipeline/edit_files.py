@@ -14,11 +14,17 @@ from lipmotion.export.motion.document import parse_units, unit_rows
 from lipmotion.pipeline.edits import Edits, MoodStep, Step
 from lipmotion.pipeline.job import Request, located
 from lipmotion.pipeline.model import Model, load_model
-from lipmotion.pipeline.outputs.scenes import sound_reference
 from lipmotion.pipeline.session import Session
 from lipmotion.pipeline.understand.read_request import read_request
 from lipmotion.pipeline.understand.request import SpeechRequest
-from lipmotion.storage.files import LARGEST_TEXT_BYTES, check_source, read_text_file, sha256_of, whole_file
+from lipmotion.storage.files import (
+    LARGEST_TEXT_BYTES,
+    check_source,
+    read_text_file,
+    sha256_of,
+    sound_reference,
+    whole_file,
+)
 from lipmotion.storage.json_text import as_json_rows, from_json
 from lipmotion.storage.toml_text import read_toml
 from lipmotion.types import Generation, Outlook, Timeline, Unit

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args
 
 from lipmotion.errors import InputError
+from lipmotion.extensions import provided
 from lipmotion.storage.sources import is_file
 from lipmotion.storage.toml_text import read_toml
 from lipmotion.types.configuration import Configuration, Rule, option
@@ -299,12 +300,6 @@ DETAILS = {
 """Levels of detail, and the options that each sets; what each loses: docs/controls.md."""
 
 
-def _is_drawings(face: str, folder: Path) -> bool:
-    from lipmotion.faces.registry import is_drawings
-
-    return is_drawings(face, folder)
-
-
 def located(part: PartT, folder: Path) -> PartT:
     """Return a part with paths that begin at a folder; a text that is no file there, or folder of drawings, stays."""
     found: dict[str, Any] = {}
@@ -313,6 +308,6 @@ def located(part: PartT, folder: Path) -> PartT:
         if isinstance(value, Path) and str(value) != "-":
             found[each.name] = folder / value
         elif isinstance(value, str) and ("reads" in each.metadata or each.name == "curves"):
-            is_read = is_file(folder / value) or (each.name == "face" and _is_drawings(value, folder))
+            is_read = is_file(folder / value) or (each.name == "face" and provided("is_drawings")(value, folder))
             found |= {each.name: str(folder / value)} if is_read else {}
     return replace(part, **found)

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.appearance.eigenlips import Eigenlips, eigenlips_arrays, eigenlips_from_arrays
 from lipmotion.engines import ENGINES, Engine, engine_named
 from lipmotion.errors import InputError, ModelFormatError
 from lipmotion.hmm.model import HmmConfig, UnitHmm, hmm_arrays, hmm_from_arrays
-from lipmotion.motion.speaker_maps import SpeakerMaps, speaker_arrays, speakers_from_arrays
+from lipmotion.motion.eigenlips import Eigenlips, eigenlips_arrays, eigenlips_from_arrays
+from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps, speaker_arrays, speakers_from_arrays
 from lipmotion.pipeline.training.channels import EIGENLIPS, GEOMETRY
 from lipmotion.speech.features.mfcc import FEATURES
 from lipmotion.speech.recognition.adaptation import Adaptation, adaptation_arrays, adaptation_from_arrays
@@ -217,3 +218,31 @@ _FOLDERS = ("phones", "engine", "adaptation", "eigenlips", "prior", "speakers")
 """Prefixes of the names of all arrays."""
 _OWN_KEYS = ("format", "version", "engine", "configuration", "recogniser", "prior")
 """Keys of the header that are not part of ``Model.about``."""
+
+
+def with_person(model: Model, name: str, person: SpeakerMap) -> Model:
+    """Return a model that also knows another person, so that a map is fitted once: ``SpeechRequest(speaker=name)``.
+
+    name   : of the person; the model must not know another one of this name
+    person : from ``map_onto``, without a speaker: the map from the motion of the model's mean or only person
+    Raises InputError: an empty name, or one that the model knows; a map without all channels of the model's people.
+
+    >>> import lipmotion
+    >>> model = lipmotion.load_model()
+    >>> known = lipmotion.with_person(model, "anna", lipmotion.map_onto(model, "anna.mp4"))  # doctest: +SKIP
+    >>> lipmotion.save_model(known, "with-anna.lipmotion")  # doctest: +SKIP
+    """
+    maps = model.speakers
+    known = maps.names if maps is not None else ()
+    if not name or name in known:
+        raise InputError(f"a person named {name!r}, required another name than: {', '.join(('', *known))}")
+    if maps is not None:
+        person = person.ordered(maps.channels)
+    rows = {
+        part: np.concatenate([*([getattr(maps, part)] if maps is not None else []), getattr(person, part)[None]])
+        for part in ("gain", "offset", "rest", "habits")
+    }
+    lips = maps.lips if maps is not None else person.lips
+    names = (*known, name)
+    speakers = SpeakerMaps(person.channels, names, **rows, lips=lips)
+    return replace(model, speakers=speakers, about={**model.about, "speakers": list(names)})

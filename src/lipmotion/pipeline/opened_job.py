@@ -7,19 +7,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from lipmotion.errors import InputError
-from lipmotion.faces.filmed.renderer import AS_PRINTED, STITCHING
-from lipmotion.faces.mesh import MeshFace
+from lipmotion.extensions import provided
 from lipmotion.meshes.fitting import driven
 from lipmotion.pipeline.edit_files import EditFile, edit_file
-from lipmotion.pipeline.film.filmed_video import FilmOptions
 from lipmotion.pipeline.generate.posteriors import animate_with_posteriors, check_picture, write_posteriors
 from lipmotion.pipeline.job import Job, Outputs
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.outputs.curve_sets import check_curve_set, curve_names
-from lipmotion.pipeline.outputs.drawn_video import VideoOutput
 from lipmotion.pipeline.outputs.motion_files import with_articulation
-from lipmotion.pipeline.outputs.output import Output, OutputSettings, checked_outputs
-from lipmotion.pipeline.outputs.shown_faces import ShownFace, shown_face
+from lipmotion.pipeline.outputs.output import FilmOptions, Output, OutputSettings, ShownFace, checked_outputs
 from lipmotion.pipeline.outputs.write import write_planned
 from lipmotion.pipeline.understand.read_request import read_request
 from lipmotion.types import Audio, Generation, Monitor, silent_monitor, sub_monitor
@@ -61,11 +57,7 @@ class OpenedJob:
             outputs.motion_hz,
             outputs.fps,
             FilmOptions(
-                Path(footage) if footage else None,
-                outputs.jaw,
-                outputs.overlay,
-                outputs.mark,
-                AS_PRINTED if outputs.refinement == "paper" else STITCHING,
+                Path(footage) if footage else None, outputs.jaw, outputs.overlay, outputs.mark, outputs.refinement
             ),
             staging,
             self.job.delivery,
@@ -124,7 +116,7 @@ class OpenedJob:
         Raises InputError, ExportError and more: as ``animate`` and ``write``.
         """
         named, picture = self.job.request, self.job.outputs.posteriors
-        draws = any(isinstance(output, VideoOutput) for output in self.checked(named.recording))
+        draws = any(output.draws for output in self.checked(named.recording))
         if picture:
             check_picture(picture, named.recording)
         request, model = read_request(named, words_beside=words_beside), load() if load else load_model(named.model)
@@ -160,10 +152,10 @@ def opened(job: Job) -> OpenedJob:
     if outputs.character is None:
         if outputs.lip_points or outputs.binding or outputs.control_points:
             raise InputError("lip points and bindings belong to a character; name it: --character FILE")
-        return OpenedJob(job, shown_face(outputs.face), outputs.curves or None, edits)
+        return OpenedJob(job, provided("shown_face")(outputs.face), outputs.curves or None, edits)
     character = character_of(outputs)
     weighed = character if character.shapes is not None else None
-    return OpenedJob(job, shown_face(MeshFace(character)), outputs.curves or weighed, edits)
+    return OpenedJob(job, provided("shown_face")(character), outputs.curves or weighed, edits)
 
 
 def character_of(outputs: Outputs) -> driven.DrivenCharacter:

@@ -609,3 +609,12 @@ def remove_unfinished(folder: Path) -> None:
     for path in folder.glob(f"{TEMPORARY}*"):
         if path.name != LOCK:
             remove(path)
+
+
+def sound_reference(sound: Path, path: Path) -> str:
+    """Return the path of a sound from the folder of another file, with slashes; on another drive its name alone."""
+    try:
+        relative = os.path.relpath(sound, path.parent)
+    except ValueError:
+        relative = sound.name
+    return as_text(relative.replace(os.sep, "/"))

@@ -1,8 +1,8 @@
 """Tools for tests and extensions of lipmotion: checks of the contracts, synthetic examples, the toy corpus."""
 
 from lipmotion.testing.check_engine import ENGINE_CHECKS, TrainedEngine, check_engine
-from lipmotion.testing.contract import ContractError, check_exporter, check_face
-from lipmotion.testing.toy import toy_motion, toy_sentences, toy_utterances, write_toy_recordings
+from lipmotion.testing.contract import ContractError, check_exporter
+from lipmotion.testing.toy import toy_motion, toy_sentences, toy_utterances
 
 __all__ = [
     "ENGINE_CHECKS",
@@ -10,9 +10,7 @@ __all__ = [
     "TrainedEngine",
     "check_engine",
     "check_exporter",
-    "check_face",
     "toy_motion",
     "toy_sentences",
     "toy_utterances",
-    "write_toy_recordings",
 ]

@@ -9,21 +9,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.appearance.mouth_region import EYE_DISTANCE_PX, HEIGHT, WIDTH
 from lipmotion.errors import InputError
-from lipmotion.export.video import write_mp4
-from lipmotion.faces import Staging
-from lipmotion.faces.portrait import Woman
+from lipmotion.motion.mouth_region import EYE_DISTANCE_PX, HEIGHT, WIDTH
 from lipmotion.speech.features.analysed_audio import analysed
-from lipmotion.storage.files import make_folder, whole_file
 from lipmotion.testing.formant_synthesiser import synthesise
 from lipmotion.types import Audio, Channel, Motion, Timeline, Track, Unit, Utterance
-from lipmotion.units import is_silent
 
 SKIN, LIPS, INSIDE = (206.0, 160.0, 141.0), (172.0, 84.0, 88.0), (58.0, 24.0, 30.0)
 """Colours, RGB."""
@@ -120,9 +114,8 @@ SPEECH_S = 1.27
 SILENCE_S, PITCH_HZ = (0.4, 0.6), (105.0, 135.0)  # ranges
 
 CAMERA_HZ = 25.0
-FACE_HEIGHT = 256
 _GRID_HZ = 1000
-_MOTION_HZ = 100.0
+MOTION_HZ = 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,27 +184,6 @@ def toy_utterances(count: int, seed: int = 0) -> list[Utterance]:
     return [_utterance(sentence) for sentence in toy_sentences(count, seed)]
 
 
-def write_toy_recordings(directory: Path, *, sentences: int = 12, seed: int = 0, fps: float = CAMERA_HZ) -> list[Path]:
-    """Write the toy corpus as recordings: ``toy00.mp4``, ``toy00.txt``, ..., and the three lists; return the videos.
-
-    directory : made if it does not exist; files of the same names are replaced
-    Each video takes about half a second.
-    Raises InputError: fewer than three sentences, or fps not positive; ExportError: a file cannot be written.
-    """
-    spoken = toy_sentences(sentences, seed)
-    make_folder(directory)
-    videos = [directory / f"{sentence.name}.mp4" for sentence in spoken]
-    face = Woman(Staging(size=FACE_HEIGHT, blinks=False, gaze=False, brows=False, head=False))
-    for sentence, video in zip(spoken, videos, strict=True):
-        motion = toy_motion(sentence.units, _MOTION_HZ)
-        silence = Timeline(tuple(span for span in sentence.units if is_silent(span.label.phone)))  # no shapes of phones
-        write_mp4(video, face.render(motion, silence, fps=fps), fps=fps, audio=sentence.audio)
-        _write_lines(video.with_suffix(".txt"), [" ".join(sentence.words)])
-    for split in ("train", "val", "test"):
-        _write_lines(directory / f"{split}.txt", [sentence.name for sentence in spoken if sentence.split == split])
-    return videos
-
-
 def _shuffled_words(rng: np.random.Generator) -> Iterator[str]:
     """Yield the words endlessly, shuffled again each time that all have been used."""
     while True:
@@ -273,8 +245,3 @@ def _lip_separation(units: Timeline[Unit], grid_s: NDArray[np.float64]) -> NDArr
             away_s = np.maximum(0, np.maximum(span.start_s - grid_s, grid_s - span.end_s))
             separation = np.minimum(separation, 0.5 - 0.5 * np.cos(np.pi * np.minimum(1, away_s / CLOSING_S)))
     return separation
-
-
-def _write_lines(path: Path, lines: list[str]) -> None:
-    with whole_file(path) as temporary:
-        temporary.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import CorpusError
-from lipmotion.experiments.baselines.frame_regression import REACH, ContextRidge, LoudnessRegression, MeanPose
 from lipmotion.speech.features.mfcc import LOG_ENERGY
 from lipmotion.testing.examples import CHANNELS
 from lipmotion.testing.examples import examples as sentences
 from lipmotion.types import Example, silent_monitor
+from lipmotion_lab.baselines.frame_regression import REACH, ContextRidge, LoudnessRegression, MeanPose
 
 BASELINES: list[type] = [MeanPose, LoudnessRegression, ContextRidge]
 

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lipmotion.experiments.baselines import recurrent as network
-from lipmotion.experiments.baselines.frame_regression import FrameRegressionModel
-from lipmotion.experiments.baselines.recurrent import BlstmBaseline
 from lipmotion.testing.examples import CHANNELS
 from lipmotion.testing.examples import examples as sentences
 from lipmotion.types import Example, Progress
+from lipmotion_lab.baselines import recurrent as network
+from lipmotion_lab.baselines.frame_regression import FrameRegressionModel
+from lipmotion_lab.baselines.recurrent import BlstmBaseline
 
 pytest.importorskip("torch", reason="the extra 'network' is not installed")
 

@@ -13,12 +13,12 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_from_settings
 from lipmotion.engines.joint.engine import JointEngine
 from lipmotion.errors import CorpusError
-from lipmotion.experiments.hofer2008 import table1
-from lipmotion.experiments.hofer2008.table1 import PAPER_SCORES, Table1Options, hofer2008, table, what_held
-from lipmotion.experiments.runner import ExperimentSettings
 from lipmotion.hmm.model import HmmConfig
-from lipmotion.pipeline.evaluation.evaluate import evaluate
 from lipmotion.pipeline.training.train import train
+from lipmotion_lab.evaluation.evaluate import evaluate
+from lipmotion_lab.hofer2008 import table1
+from lipmotion_lab.hofer2008.table1 import PAPER_SCORES, Table1Options, hofer2008, table, what_held
+from lipmotion_lab.runner import ExperimentSettings
 
 PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
 SMALL = ExperimentSettings(recogniser=PHONE_MODELS)

@@ -13,7 +13,11 @@ import pytest
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_from_settings
 from lipmotion.engines.selection.config import SelectionConfig
-from lipmotion.experiments.minnis_breen2000.minnis2000 import (
+from lipmotion.hmm.model import HmmConfig
+from lipmotion.pipeline.training.train import train
+from lipmotion_lab.evaluation.evaluate import evaluate
+from lipmotion_lab.evaluation.held_out import ComparedClip, HeldOutRecordings
+from lipmotion_lab.minnis_breen2000.minnis2000 import (
     ADDITIONS,
     EVERYTHING,
     PRINTED,
@@ -23,11 +27,7 @@ from lipmotion.experiments.minnis_breen2000.minnis2000 import (
     table,
     velocity_change,
 )
-from lipmotion.experiments.runner import ExperimentSettings
-from lipmotion.hmm.model import HmmConfig
-from lipmotion.pipeline.evaluation.evaluate import evaluate
-from lipmotion.pipeline.evaluation.held_out import ComparedClip, HeldOutRecordings
-from lipmotion.pipeline.training.train import train
+from lipmotion_lab.runner import ExperimentSettings
 
 LONG = pytest.mark.long
 PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)
@@ -89,7 +89,7 @@ def test_a_run_that_was_stopped_goes_on(
     def run() -> dict[str, Any]:
         return minnis2000(toy_corpus, work=tmp_path, settings=ExperimentSettings(recogniser=PHONE_MODELS))
 
-    module = "lipmotion.experiments.minnis_breen2000.minnis2000.join_figures"
+    module = "lipmotion_lab.minnis_breen2000.minnis2000.join_figures"
     made: list[None] = []
 
     def stopping(*given: Any) -> dict[str, Any]:

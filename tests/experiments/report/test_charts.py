@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from lipmotion.experiments.report.charts import Dot, curve, dots, rising
+from lipmotion_lab.report.charts import Dot, curve, dots, rising
 
 
 def test_figures_intervals_and_the_papers_stand_on_one_axis() -> None:

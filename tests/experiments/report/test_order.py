@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from lipmotion.experiments.report.order import PaperOrder, PaperPair
+from lipmotion_lab.report.order import PaperOrder, PaperPair
 
 PAPER = {"a": 3.0, "b": 2.0, "c": 1.0}
 

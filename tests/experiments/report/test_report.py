@@ -16,14 +16,14 @@ from experiments.copies import copied, renamed
 from experiments.report.test_sections import figures_of
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError, ExportError, InputError
-from lipmotion.experiments.hofer2008 import table1
-from lipmotion.experiments.hofer2008.table1 import PAPER_SCORES, Table1Options
-from lipmotion.experiments.report import parts, report
-from lipmotion.experiments.report.parts import PARTS, PartRun, ReportPart
-from lipmotion.experiments.report.report import PAGE, WrittenReport, experiment_report
-from lipmotion.experiments.runner import ExperimentSettings
 from lipmotion.hmm.model import HmmConfig
 from lipmotion.units import Lexicon
+from lipmotion_lab.hofer2008 import table1
+from lipmotion_lab.hofer2008.table1 import PAPER_SCORES, Table1Options
+from lipmotion_lab.report import parts, report
+from lipmotion_lab.report.parts import PARTS, PartRun, ReportPart
+from lipmotion_lab.report.report import PAGE, WrittenReport, experiment_report
+from lipmotion_lab.runner import ExperimentSettings
 from study.browser import BROWSER, DRIVER, MISSING, axe_script, browser
 
 SMALL = ExperimentSettings(recogniser=HmmConfig(mixtures=1, iterations=2))

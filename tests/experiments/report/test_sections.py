@@ -9,10 +9,10 @@ from xml.etree import ElementTree
 
 import pytest
 
-from lipmotion.experiments.hofer2008.table1 import PAPER_SCORES
-from lipmotion.experiments.report.parts import PARTS
-from lipmotion.experiments.report.section import FEW_CLIPS, Section, warning_of
-from lipmotion.experiments.xie_liu2007.systems import PAPER_FIGURES
+from lipmotion_lab.hofer2008.table1 import PAPER_SCORES
+from lipmotion_lab.report.parts import PARTS
+from lipmotion_lab.report.section import FEW_CLIPS, Section, warning_of
+from lipmotion_lab.xie_liu2007.systems import PAPER_FIGURES
 
 RESULTS = Path(__file__).parents[3] / "docs" / "results"
 FILES = {

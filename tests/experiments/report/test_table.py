@@ -3,7 +3,7 @@ from __future__ import annotations
 import csv
 import io
 
-from lipmotion.experiments.report.table import Column, Table
+from lipmotion_lab.report.table import Column, Table
 
 ROWS = {
     "a, <b>": {"acc": 0.5, "acc_95": (0.4, 0.6), "acc_gain_95": (0.1, 0.2), "kind": "x"},

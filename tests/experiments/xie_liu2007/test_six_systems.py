@@ -13,12 +13,19 @@ from experiments.copies import copied
 from lipmotion.corpora.store import Corpus
 from lipmotion.engines import engine_from_settings, engine_named
 from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError
-from lipmotion.experiments.noise import NoiseConditions
-from lipmotion.experiments.runner import ExperimentSettings
-from lipmotion.experiments.xie_liu2007 import six_systems, systems
-from lipmotion.experiments.xie_liu2007.plots import PLOT_FILES
-from lipmotion.experiments.xie_liu2007.six_systems import ComparisonOptions, xieliu2007
-from lipmotion.experiments.xie_liu2007.systems import (
+from lipmotion.hmm.model import HmmConfig
+from lipmotion.measures import curves
+from lipmotion.pipeline.training.train import train
+from lipmotion.speech.recognition.recogniser import cached_recogniser
+from lipmotion.storage.archive import read_archive
+from lipmotion_lab.evaluation.evaluate import evaluate
+from lipmotion_lab.evaluation.held_out import compared_clips, held_out_recordings
+from lipmotion_lab.noise import NoiseConditions
+from lipmotion_lab.runner import ExperimentSettings
+from lipmotion_lab.xie_liu2007 import six_systems, systems
+from lipmotion_lab.xie_liu2007.plots import PLOT_FILES
+from lipmotion_lab.xie_liu2007.six_systems import ComparisonOptions, xieliu2007
+from lipmotion_lab.xie_liu2007.systems import (
     BEST_PATH,
     BLSTM,
     COMPARED_SYSTEMS,
@@ -29,15 +36,8 @@ from lipmotion.experiments.xie_liu2007.systems import (
     selected_systems,
     system_from_arrays,
 )
-from lipmotion.experiments.xie_liu2007.text import table
-from lipmotion.experiments.xie_liu2007.tuning import TuningOptions
-from lipmotion.hmm.model import HmmConfig
-from lipmotion.measures import curves
-from lipmotion.pipeline.evaluation.evaluate import evaluate
-from lipmotion.pipeline.evaluation.held_out import compared_clips, held_out_recordings
-from lipmotion.pipeline.training.train import train
-from lipmotion.speech.recognition.recogniser import cached_recogniser
-from lipmotion.storage.archive import read_archive
+from lipmotion_lab.xie_liu2007.text import table
+from lipmotion_lab.xie_liu2007.tuning import TuningOptions
 
 LONG = pytest.mark.long
 PHONE_MODELS = HmmConfig(mixtures=1, iterations=2)

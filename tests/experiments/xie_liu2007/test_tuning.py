@@ -10,7 +10,13 @@ from lipmotion.corpora.store import Corpus, Selection
 from lipmotion.engines.coupled.chains.structures import SYSTEMS
 from lipmotion.engines.coupled.config import CoupledConfig
 from lipmotion.engines.coupled.engine import CoupledEngine
-from lipmotion.experiments.xie_liu2007.tuning import (
+from lipmotion.measures import curves
+from lipmotion.pipeline.model import Model
+from lipmotion.speech.recognition.recogniser import Recogniser
+from lipmotion.testing.examples import examples
+from lipmotion.types import silent_monitor
+from lipmotion_lab.evaluation.held_out import HeldOutRecordings, compared_clips, held_out_recordings
+from lipmotion_lab.xie_liu2007.tuning import (
     CONVERSIONS,
     Trial,
     TuningOptions,
@@ -22,12 +28,6 @@ from lipmotion.experiments.xie_liu2007.tuning import (
     trained_on_the_way,
     tuned,
 )
-from lipmotion.measures import curves
-from lipmotion.pipeline.evaluation.held_out import HeldOutRecordings, compared_clips, held_out_recordings
-from lipmotion.pipeline.model import Model
-from lipmotion.speech.recognition.recogniser import Recogniser
-from lipmotion.testing.examples import examples
-from lipmotion.types import silent_monitor
 
 SMALL = SYSTEMS["ph-MSHMM"] | {"chains": "viseme", "states": 2}
 

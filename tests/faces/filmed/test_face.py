@@ -13,9 +13,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lipmotion.appearance.person_arrays import APPEARANCE, PARTS
 from lipmotion.errors import ExportError, InputError, ModelFormatError
-from lipmotion.faces.filmed.face import (
+from lipmotion.storage.archive import read_archive, read_archive_header, write_archive
+from lipmotion.storage.coded_video import STORED_VIDEO
+from lipmotion_faces.appearance.person_arrays import APPEARANCE, PARTS
+from lipmotion_faces.filmed.face import (
     BACKGROUND,
     MOST_TAKES,
     TAKE,
@@ -25,8 +27,6 @@ from lipmotion.faces.filmed.face import (
     read_face_header,
     save_face,
 )
-from lipmotion.storage.archive import read_archive, read_archive_header, write_archive
-from lipmotion.storage.coded_video import STORED_VIDEO
 from pipeline.damage import DAMAGES, UNREADABLE, damaged
 
 CODED = ("appearance/mouths", "appearance/jaws", "background/data")

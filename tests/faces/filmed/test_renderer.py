@@ -8,17 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lipmotion.appearance.chin import moved_part
-from lipmotion.appearance.lower_face import mouth_ellipse, mouth_part, region_map, relit
-from lipmotion.appearance.person import Appearance, FaceCodes
-from lipmotion.appearance.placing import cut
-from lipmotion.appearance.refinement import STEADY
 from lipmotion.errors import InputError
-from lipmotion.faces.filmed import renderer
-from lipmotion.faces.filmed.face import FilmedFace
-from lipmotion.faces.filmed.renderer import BATCH, Background, Stitcher, StitchingOptions
 from lipmotion.testing.toy import toy_motion, toy_sentences
 from lipmotion.types import Motion
+from lipmotion_faces.appearance.chin import moved_part
+from lipmotion_faces.appearance.lower_face import mouth_ellipse, mouth_part, region_map, relit
+from lipmotion_faces.appearance.person import Appearance, FaceCodes
+from lipmotion_faces.appearance.placing import cut
+from lipmotion_faces.appearance.refinement import STEADY
+from lipmotion_faces.filmed import renderer
+from lipmotion_faces.filmed.face import FilmedFace
+from lipmotion_faces.filmed.renderer import BATCH, Background, Stitcher, StitchingOptions
 from testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH, toy_chin_px, toy_frames, toy_places
 
 FRAMES = 24

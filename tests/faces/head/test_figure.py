@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from lipmotion.faces.head.forms import MOUTH_Y, head
-from lipmotion.faces.head.pose import CharacterPose
-from lipmotion.faces.head.skin import REST
-from lipmotion.faces.head.stage import POSES, SIDED_POSES, camera_for, figure, head_mesh
-from lipmotion.faces.turning import turned
+from lipmotion_faces.head.forms import MOUTH_Y, head
+from lipmotion_faces.head.pose import CharacterPose
+from lipmotion_faces.head.skin import REST
+from lipmotion_faces.head.stage import POSES, SIDED_POSES, camera_for, figure, head_mesh
+from lipmotion_faces.turning import turned
 from meshes.heads import shaped
 
 VIEWER = camera_for(640, 360).place

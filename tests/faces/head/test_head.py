@@ -7,13 +7,13 @@ import pytest
 
 from faces.head.motions import NOTHING_SAID, opening
 from lipmotion.errors import InputError
-from lipmotion.faces import face_named
-from lipmotion.faces.base import Staging
-from lipmotion.faces.head import Head, render
-from lipmotion.faces.head.pose import CharacterPose
-from lipmotion.faces.head.stage import Stage, camera_for
-from lipmotion.meshes.rendering.rasteriser import Camera
-from lipmotion.testing import check_face
+from lipmotion_faces import face_named
+from lipmotion_faces.base import Staging
+from lipmotion_faces.head import Head, render
+from lipmotion_faces.head.pose import CharacterPose
+from lipmotion_faces.head.stage import Stage, camera_for
+from lipmotion_faces.rendering.rasteriser import Camera
+from lipmotion_faces.testing import check_face
 
 SMALL: dict[str, Any] = {"width": 160, "height": 120}
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from faces.test_retrack import syllables, tracked
-from lipmotion.faces.head import render
+from lipmotion_faces.head import render
 
 pytestmark = [pytest.mark.video, pytest.mark.long]
 mediapipe = pytest.importorskip("mediapipe")

@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lipmotion.faces.head.inside import LOWER_EDGE, lower_drop, lower_teeth, upper_teeth
-from lipmotion.faces.head.lips import (
+from lipmotion_faces.head.inside import LOWER_EDGE, lower_drop, lower_teeth, upper_teeth
+from lipmotion_faces.head.lips import (
     ARCH,
     COLUMNS,
     SIDE,
@@ -14,9 +14,9 @@ from lipmotion.faces.head.lips import (
     lip_surface,
     section_points,
 )
-from lipmotion.faces.head.pose import CharacterPose
-from lipmotion.faces.head.skin import jaw_moved
-from lipmotion.faces.head.stage import figure
+from lipmotion_faces.head.pose import CharacterPose
+from lipmotion_faces.head.skin import jaw_moved
+from lipmotion_faces.head.stage import figure
 
 MEET, FRONT = 4, 15
 """The point of the cross-section where the lips meet, and the rings before the wall of the mouth."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lipmotion.faces.head.lips import VISIBLE_RINGS
-from lipmotion.faces.head.pose import CharacterPose
-from lipmotion.faces.head.shape_fit import mouth_weights
-from lipmotion.faces.head.skin import REST
-from lipmotion.faces.head.stage import POSES, figure, head_mesh
 from lipmotion.meshes.model.mesh import Mesh
+from lipmotion_faces.head.lips import VISIBLE_RINGS
+from lipmotion_faces.head.pose import CharacterPose
+from lipmotion_faces.head.shape_fit import mouth_weights
+from lipmotion_faces.head.skin import REST
+from lipmotion_faces.head.stage import POSES, figure, head_mesh
 
 SAID = {
     "rest": REST,

@@ -7,11 +7,11 @@ import pytest
 
 from faces.head.motions import said
 from lipmotion.articulation.mouth import ROUND_GAP
-from lipmotion.faces.head.performance import head_poses
-from lipmotion.faces.head.pose import CharacterPose
-from lipmotion.faces.head.stage import Stage, camera_for
-from lipmotion.meshes.rendering.rasteriser import Camera
 from lipmotion.types import Channel, Motion
+from lipmotion_faces.head.performance import head_poses
+from lipmotion_faces.head.pose import CharacterPose
+from lipmotion_faces.head.stage import Stage, camera_for
+from lipmotion_faces.rendering.rasteriser import Camera
 
 STAGE_SIZE = (360, 300)
 UNIT = STAGE_SIZE[1] / 0.8

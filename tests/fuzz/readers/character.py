@@ -14,12 +14,12 @@ from PIL import Image
 
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import require
-from lipmotion.faces.mesh import MeshStage
 from lipmotion.meshes.files.binding_files import save_binding, write_weights
 from lipmotion.meshes.files.character_files import read_character
 from lipmotion.meshes.fitting.driven import driven_character
-from lipmotion.meshes.rendering.drawn_surface import drawn_surface
 from lipmotion.pipeline.outputs.curve_sets import curves_of
+from lipmotion_faces.mesh import MeshStage
+from lipmotion_faces.rendering.drawn_surface import drawn_surface
 from meshes.gltf import data_uri, document, glb, packed_attributes, textured_document, with_colours
 from meshes.heads import head, lip_points, write_glb
 from meshes.obj_writing import write_obj

@@ -21,9 +21,9 @@ from lipmotion.export.cues.base import CUE_FORMATS
 from lipmotion.export.cues.cue_motion import PARSERS
 from lipmotion.export.cues.sheet import CueSheet
 from lipmotion.export.motion.c3d_file import C3dFile, write_c3d
-from lipmotion.pipeline.corpus.supplied_motion import supplied_track
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Span, StateTrace, Timeline
 from lipmotion.units.mouth_chart import SHAPES
+from lipmotion_faces.corpus.supplied_motion import supplied_track
 from meshes import gltf
 from meshes.flame import head
 from meshes.live_link_app import write_take

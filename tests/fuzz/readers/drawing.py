@@ -10,9 +10,9 @@ import numpy as np
 from faces.test_cut_out import draw
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import require
-from lipmotion.faces import Staging, staged_face
-from lipmotion.faces.cut_out import read_cut_out
 from lipmotion.types import Channel, Motion, Timeline
+from lipmotion_faces import Staging, staged_face
+from lipmotion_faces.cut_out import read_cut_out
 
 ROBOT = Path(__file__).parents[3] / "examples" / "robot.svg"
 SMALL = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 40 40"><g id="head" transform="rotate(5) scale(1.1 1)">

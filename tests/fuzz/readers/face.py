@@ -12,9 +12,9 @@ import numpy as np
 
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import require
-from lipmotion.faces.filmed.face import load_face, save_face
-from lipmotion.pipeline.film.filmed_video import film_of
 from lipmotion.types import Motion
+from lipmotion_faces.film.filmed_video import film_of
+from lipmotion_faces.filmed.face import load_face, save_face
 from testing.toy_face import toy_face
 
 FRAMES = 3

@@ -13,8 +13,8 @@ from lipmotion.corpora.labels import read_labels
 from lipmotion.corpora.layouts import read_aligned_words
 from lipmotion.corpora.source_recordings import RecordingFolder, SourceRecording
 from lipmotion.corpora.splits import LISTS, assign_splits
-from lipmotion.pipeline.corpus.supplied_motion import supplied_phones
 from lipmotion.types import TimedWord, TranscriptLine
+from lipmotion_faces.corpus.supplied_motion import supplied_phones
 
 LONG = """File type = "ooTextFile"
 Object class = "TextGrid"

@@ -12,10 +12,10 @@ from typing import Any
 from fuzz.inputs import Files, Good
 from fuzz.readers.plausible import good_model, require, short_speech
 from lipmotion.export.sound import write_sound
-from lipmotion.studio.access import TOKEN_HEADER
-from lipmotion.study.application import study_application
-from lipmotion.study.manifest import check_videos
-from lipmotion.study.store import StudyStore
+from lipmotion_studio.access import TOKEN_HEADER
+from lipmotion_studio.study.application import study_application
+from lipmotion_studio.study.manifest import check_videos
+from lipmotion_studio.study.store import StudyStore
 from studio.open_studio import HOST, TOKEN, open_studio
 from study.asgi import Application, ask
 from study.small_study import small_study

@@ -16,13 +16,13 @@ from lipmotion.pipeline.edits import Edits
 from lipmotion.pipeline.job import Job, Request
 from lipmotion.pipeline.opened_job import opened
 from lipmotion.storage.json_text import from_json
-from lipmotion.studio.folder import PROJECT, VOTES, ProjectFolder
-from lipmotion.studio.project import ExportRecord, KeptVersion, Project, ProjectLine, project_document, project_from
-from lipmotion.studio.trainer import Trainer
-from lipmotion.studio.votes import read_votes
-from lipmotion.study.answers import COLUMNS, read_answers
-from lipmotion.study.manifest import MANIFEST, read_study
 from lipmotion.types import Outlook, Span, Timeline, Unit
+from lipmotion_studio.folder import PROJECT, VOTES, ProjectFolder
+from lipmotion_studio.project import ExportRecord, KeptVersion, Project, ProjectLine, project_document, project_from
+from lipmotion_studio.study.answers import COLUMNS, read_answers
+from lipmotion_studio.study.manifest import MANIFEST, read_study
+from lipmotion_studio.trainer import Trainer
+from lipmotion_studio.votes import read_votes
 from pipeline.session.test_edit_files import SENTENCES
 from study.small_study import small_study
 

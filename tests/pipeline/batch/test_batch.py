@@ -21,7 +21,6 @@ from children import LIPMOTION, NOWHERE, Child, child, run_child, wait_until
 from lipmotion.articulation.delivery import Delivery
 from lipmotion.errors import CorpusError, ExportError, InputError
 from lipmotion.export.base import motion_suffixes
-from lipmotion.faces.filmed.face import FilmedFace
 from lipmotion.pipeline.batch import BatchLine, batch, one_line, read_lines
 from lipmotion.pipeline.batch import run as run_module
 from lipmotion.pipeline.batch.ledger import Place
@@ -31,8 +30,9 @@ from lipmotion.pipeline.edit_files import EditFile
 from lipmotion.pipeline.job import Job, Outputs, Request
 from lipmotion.pipeline.model import Model
 from lipmotion.pipeline.opened_job import OpenedJob
-from lipmotion.pipeline.outputs.shown_faces import shown_face
 from lipmotion.types import Item
+from lipmotion_faces.filmed.face import FilmedFace
+from lipmotion_faces.outputs.shown_faces import shown_face
 
 pytest.importorskip("joblib")
 

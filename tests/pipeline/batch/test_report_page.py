@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from children import wait_until
-from lipmotion.export.video import write_mp4
 from lipmotion.pipeline.batch.ledger import Place, opened_ledger
 from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.batch.marks import Mark, read_marks
 from lipmotion.pipeline.batch.report import write_reports
 from lipmotion.types import Audio
+from lipmotion_faces.video.mp4 import write_mp4
 from study.browser import BROWSER, DRIVER, MISSING, SPACE, Browser, axe_script, browser
 
 pytestmark = [

@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 from lipmotion.corpora.store import Corpus
-from lipmotion.pipeline.corpus.coverage import coverage, coverage_document, coverage_lines, phone_distances
 from lipmotion.testing.toy import toy_utterances
 from lipmotion.types import Span, Timeline, Unit
 from lipmotion.units import PHONES, Lexicon, most_similar_lips
+from lipmotion_faces.corpus.coverage import coverage, coverage_document, coverage_lines, phone_distances
 
 WORDS = Lexicon({"pab": (("p", "aa", "b"),), "tib": (("t", "iy", "b"),), "zog": (("zh", "oy", "g"),)})
 

@@ -13,14 +13,14 @@ import pytest
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError
-from lipmotion.pipeline.corpus import long_videos
-from lipmotion.pipeline.corpus import prepare as module
-from lipmotion.pipeline.corpus.prepare import prepare
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Channel, Motion, Progress, Track
-from lipmotion.vision.frames import WHOLE, VideoSpan
-from lipmotion.vision.track import track
-from lipmotion.vision.video_scan import VideoScan
+from lipmotion_faces.corpus import long_videos
+from lipmotion_faces.corpus import prepare as module
+from lipmotion_faces.corpus.prepare import prepare
+from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
+from lipmotion_faces.tracking.track import track
+from lipmotion_faces.tracking.video_scan import VideoScan
 
 RATE = 16_000
 SENTENCES = [(1.0 + 4.5 * n, 4.0 + 4.5 * n) for n in range(10)]

@@ -15,10 +15,10 @@ from children import NOWHERE, child
 from lipmotion.corpora.entry import read_entry
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError, ExportError, InputError, MissingDependencyError
-from lipmotion.pipeline.corpus import prepare as module
-from lipmotion.pipeline.corpus.prepare import prepare
 from lipmotion.storage.files import locked
 from lipmotion.types import Channel, Item, Motion, Progress, Track
+from lipmotion_faces.corpus import prepare as module
+from lipmotion_faces.corpus.prepare import prepare
 
 
 def speak(path: Path, seed: int) -> None:
@@ -264,7 +264,7 @@ SCRIPT = """
 import sys
 import time
 from pathlib import Path
-from lipmotion.pipeline.corpus.prepare import prepare
+from lipmotion_faces.corpus.prepare import prepare
 from lipmotion.types import Item
 
 items = []

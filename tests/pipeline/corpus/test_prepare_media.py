@@ -13,8 +13,8 @@ import pytest
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError
-from lipmotion.pipeline.corpus.prepare import prepare
 from lipmotion.types import Item
+from lipmotion_faces.corpus.prepare import prepare
 
 CLIP = "brwa3s"
 COUNT = 75
@@ -69,7 +69,7 @@ def test_variable_frame_rate_with_subtitles_and_a_cover(recordings: Path, tmp_pa
 
 def test_each_of_many_unusable_files_is_reported_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        "lipmotion.pipeline.corpus.prepare.tracker_named",
+        "lipmotion_faces.corpus.prepare.tracker_named",
         lambda _: SimpleNamespace(versions=lambda: {"mediapipe": "1"}),
     )
     names = [f"clip{number:03d}" for number in range(30)]

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import InputError
-from lipmotion.pipeline.corpus.prompts import greedy_cover, prompts, units_of
+from lipmotion.pipeline.training.prompts import greedy_cover, prompts, units_of
 from lipmotion.units import Lexicon
 
 SETS = st.lists(st.sets(st.integers(0, 11), min_size=1), min_size=1, max_size=8)

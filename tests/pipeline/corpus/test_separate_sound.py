@@ -13,11 +13,11 @@ from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError
 from lipmotion.export.base import write_motion
 from lipmotion.export.sound import write_sound
-from lipmotion.pipeline.corpus import long_videos as module
-from lipmotion.pipeline.corpus.prepare import prepare
-from lipmotion.pipeline.corpus.separate_sound import SeparateSound, in_step, on_own_time
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Generation, Motion, StateTrace, Timeline, Track
+from lipmotion_faces.corpus import long_videos as module
+from lipmotion_faces.corpus.prepare import prepare
+from lipmotion_faces.corpus.separate_sound import SeparateSound, in_step, on_own_time
 from speech.recorded_twice import RATE_HZ, clap, recorded_twice, speech_like
 
 RATE = 60.0

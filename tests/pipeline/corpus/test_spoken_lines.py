@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from lipmotion.pipeline.corpus.long_videos import spoken_lines, transcript_beside
 from lipmotion.types import TimedTranscript, TimedWord, TranscriptLine
+from lipmotion_faces.corpus.long_videos import spoken_lines, transcript_beside
 
 SUBTITLES = "1\n00:00:01,000 --> 00:00:02,500\nHello there.\n\n2\n00:00:04,000 --> 00:00:05,000\n- Again!\n"
 WHISPER = {

@@ -17,11 +17,11 @@ from lipmotion.export.base import write_motion
 from lipmotion.export.motion.c3d_file import C3dFile, write_c3d
 from lipmotion.meshes.files.curve_table import SPEECH_CURVES
 from lipmotion.motion import acoustic_network, posterior_network
-from lipmotion.pipeline.corpus import prepare as module
-from lipmotion.pipeline.corpus.prepare import prepare
-from lipmotion.pipeline.corpus.supplied_motion import source_digests, supplied_phones, supplied_track
 from lipmotion.types import Channel, Generation, Motion, Span, StateTrace, Timeline, Unit
 from lipmotion.units import is_silent
+from lipmotion_faces.corpus import prepare as module
+from lipmotion_faces.corpus.prepare import prepare
+from lipmotion_faces.corpus.supplied_motion import source_digests, supplied_phones, supplied_track
 from meshes.live_link_app import write_take
 
 CHANNELS = (Channel("jaw", "weight"), Channel("brow", "weight"))
@@ -170,10 +170,10 @@ def test_facegood_from_recordings_to_figures(recordings: Path, tmp_path: Path, m
     """Two recordings to train on, the third to test: Mandarin, 30 Hz, 116 blendshapes, no transcript."""
     monkeypatch.setattr(acoustic_network, "LEAST_STEPS", 100)
     monkeypatch.setattr(posterior_network, "STEPS", 6.0)
-    from lipmotion.pipeline.evaluation.evaluate import evaluate
     from lipmotion.pipeline.generate.animate import animate
     from lipmotion.pipeline.model import load_model, save_model
     from lipmotion.pipeline.training.train import train
+    from lipmotion_lab.evaluation.evaluate import evaluate
 
     folder = recordings / "facegood"
     if not folder.is_dir():

@@ -11,12 +11,12 @@ import pytest
 from lipmotion.corpora.entry import read_entry
 from lipmotion.corpora.store import Corpus
 from lipmotion.measures.offset import best_offset
-from lipmotion.pipeline.corpus import sync as module
-from lipmotion.pipeline.corpus.sync import clip_scores, offsets, sync
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Audio, Channel, Motion, Span, Timeline, Track, Unit, Utterance
-from lipmotion.vision.track import track
+from lipmotion_faces.corpus import sync as module
+from lipmotion_faces.corpus.sync import clip_scores, offsets, sync
+from lipmotion_faces.tracking.track import track
 
 RATE_HZ = 16_000
 COUNT = 4

@@ -9,8 +9,8 @@ import pytest
 import lipmotion
 from lipmotion.errors import InputError
 from lipmotion.measures import curves, vertices
-from lipmotion.pipeline.evaluation.compare import compare
 from lipmotion.types import WEIGHT, Channel, Motion, Track
+from lipmotion_lab.compare import compare
 from meshes.speech import motion
 
 SPEECH = motion()

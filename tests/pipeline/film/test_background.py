@@ -8,10 +8,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from lipmotion.faces.filmed.face import FilmedFace
-from lipmotion.faces.filmed.renderer import Background
-from lipmotion.pipeline.film import background
-from lipmotion.pipeline.film.background import (
+from lipmotion.testing.toy import toy_sentences
+from lipmotion_faces.film import background
+from lipmotion_faces.film.background import (
     HEAD_PX,
     BackgroundSequence,
     best_background,
@@ -19,7 +18,8 @@ from lipmotion.pipeline.film.background import (
     open_background,
     stored_sequence,
 )
-from lipmotion.testing.toy import toy_sentences
+from lipmotion_faces.filmed.face import FilmedFace
+from lipmotion_faces.filmed.renderer import Background
 from pipeline.film.toy_footage import ToyVideo, footage_of, install, write_video
 from testing.toy_face import SCALE, toy_chin_px, toy_frames, toy_places
 

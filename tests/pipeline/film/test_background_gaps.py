@@ -9,12 +9,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from lipmotion.faces.filmed.face import FilmedFace
-from lipmotion.pipeline.film import background
-from lipmotion.pipeline.film.background import BackgroundSequence, stored_sequence
 from lipmotion.types import Motion, Track
-from lipmotion.vision.footage import Footage
-from lipmotion.vision.frames import WHOLE
+from lipmotion_faces.film import background
+from lipmotion_faces.film.background import BackgroundSequence, stored_sequence
+from lipmotion_faces.filmed.face import FilmedFace
+from lipmotion_faces.tracking.footage import Footage
+from lipmotion_faces.tracking.frames import WHOLE
 
 
 @pytest.fixture(scope="module")

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.faces.filmed.face import FilmedFace, load_face, save_face
-from lipmotion.pipeline.film import build
-from lipmotion.pipeline.film.build import build_face
-from lipmotion.pipeline.film.takes import Take
 from lipmotion.speech.sound.pauses import QUIETEST_DB
 from lipmotion.testing.toy import toy_sentences
 from lipmotion.types import Audio, Channel, Item, Motion, Progress, Track
-from lipmotion.vision.footage import Footage
-from lipmotion.vision.frames import WHOLE, VideoSpan
+from lipmotion_faces.film import build
+from lipmotion_faces.film.build import build_face
+from lipmotion_faces.film.takes import Take
+from lipmotion_faces.filmed.face import FilmedFace, load_face, save_face
+from lipmotion_faces.tracking.footage import Footage
+from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
 from pipeline.film.toy_footage import ToyVideo, footage_of, install, write_video
 from testing.toy_face import toy_chin_px
 

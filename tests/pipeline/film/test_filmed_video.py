@@ -10,22 +10,22 @@ import av
 import numpy as np
 import pytest
 
-from lipmotion.appearance.person import Appearance
 from lipmotion.errors import ExportError, InputError, ModelFormatError
-from lipmotion.export.synthetic_mark import SOURCE_TYPE
-from lipmotion.faces.filmed.face import FilmedFace
-from lipmotion.faces.filmed.renderer import AS_PRINTED, Stitcher, StitchingOptions
-from lipmotion.pipeline.film import filmed_video as module
-from lipmotion.pipeline.film.background import stored_sequence
-from lipmotion.pipeline.film.filmed_video import FilmOptions, face_codes, film_of, write_film
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.outputs.output import OutputSettings
-from lipmotion.pipeline.outputs.shown_faces import shown_face
+from lipmotion.pipeline.outputs.output import FilmOptions, OutputSettings
 from lipmotion.pipeline.outputs.write import write
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.testing.toy import ToySentence, toy_motion
 from lipmotion.types import Audio, Channel, Item, Motion, Progress, Span, Timeline, Unit
+from lipmotion_faces.appearance.person import Appearance
+from lipmotion_faces.film import filmed_video as module
+from lipmotion_faces.film.background import stored_sequence
+from lipmotion_faces.film.filmed_video import face_codes, film_of, write_film
+from lipmotion_faces.filmed.face import FilmedFace
+from lipmotion_faces.filmed.renderer import AS_PRINTED, Stitcher, StitchingOptions
+from lipmotion_faces.outputs.shown_faces import shown_face
+from lipmotion_faces.video.synthetic_mark import SOURCE_TYPE
 from speech.sounds import tone, write_sound
 from testing.toy_face import FRAME_HEIGHT, FRAME_WIDTH
 
@@ -194,7 +194,7 @@ def test_options_of_filmed_faces_alone(tmp_path: Path, toy_speech: Path) -> None
         (FilmOptions(background=video), "a background"),
         (FilmOptions(overlay="inset"), "an overlay"),
         (FilmOptions(jaw="energy"), "another jaw"),
-        (FilmOptions(stitching=AS_PRINTED), "another refinement"),
+        (FilmOptions(refinement="paper"), "another refinement"),
         (FilmOptions(mark="visible"), "a visible mark"),
     ):
         with pytest.raises(InputError, match=rf"{words} is for filmed faces; give one: --face FILE\.face"):

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from cli.conftest import RunCommand, here, run
-from lipmotion.faces.filmed.face import load_face
-from lipmotion.pipeline.film.filmed_video import film_of, write_film
 from lipmotion.pipeline.generate.animate import animate
 from lipmotion.pipeline.understand.request import SpeechRequest
 from lipmotion.speech.sound.audio_files import read_audio
 from lipmotion.types import Motion
-from lipmotion.vision.track import track
+from lipmotion_faces.film.filmed_video import film_of, write_film
+from lipmotion_faces.filmed.face import load_face
+from lipmotion_faces.tracking.track import track
 
 __all__ = ["here", "run"]
 pytestmark = [pytest.mark.recordings, pytest.mark.video, pytest.mark.long]
@@ -42,8 +42,8 @@ def some_clips(clips: list[Path], tmp_path_factory: pytest.TempPathFactory) -> P
 
 @pytest.fixture(scope="module")
 def built(some_clips: Path) -> Path:
-    from lipmotion.faces.filmed.face import save_face
-    from lipmotion.pipeline.film.build import build_face
+    from lipmotion_faces.film.build import build_face
+    from lipmotion_faces.filmed.face import save_face
 
     path = some_clips.parent / "someone.face"
     save_face(build_face(some_clips, workers=1), path)

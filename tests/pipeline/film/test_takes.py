@@ -10,10 +10,10 @@ import pytest
 
 from lipmotion.corpora.store import Corpus
 from lipmotion.errors import CorpusError, InputError
-from lipmotion.pipeline.film import takes
-from lipmotion.pipeline.film.takes import MOST_FOOTAGE_S, takes_of
 from lipmotion.storage.files import sha256_of
 from lipmotion.testing.toy import toy_utterances
+from lipmotion_faces.film import takes
+from lipmotion_faces.film.takes import MOST_FOOTAGE_S, takes_of
 from speech.sounds import tone, write_sound
 
 MakeVideos = Callable[..., Path]

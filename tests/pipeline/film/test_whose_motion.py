@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from lipmotion.errors import InputError
-from lipmotion.faces.filmed.face import FilmedFace
-from lipmotion.pipeline.film.filmed_video import is_person_of, person_shown
-from lipmotion.pipeline.outputs.shown_faces import shown_face
+from lipmotion_faces.film.filmed_video import is_person_of, person_shown
+from lipmotion_faces.filmed.face import FilmedFace
+from lipmotion_faces.outputs.shown_faces import shown_face
 
 
 def model_of(*speakers: str, corpus: str = "filmed/many") -> Any:

@@ -12,7 +12,6 @@ import pytest
 from lipmotion.articulation.delivery import Delivery
 from lipmotion.errors import InputError
 from lipmotion.export.sound import write_sound
-from lipmotion.faces.base import Staging
 from lipmotion.pipeline.edit_files import EditFile, begun, read_edits, write_edits
 from lipmotion.pipeline.edits import STEPS, Edits, MoodStep, step_of
 from lipmotion.pipeline.generate.animate import animate
@@ -23,6 +22,7 @@ from lipmotion.storage.files import sha256_of
 from lipmotion.testing.toy import ToySentence
 from lipmotion.types import Outlook, Span, Timeline, Unit
 from lipmotion.units import words_in_time
+from lipmotion_faces.base import Staging
 
 SENTENCES = (
     "word 3 is blue",

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.study.analysis.paired import PairTable
-from lipmotion.study.analysis.ratings import RANKS, SCALES, RatingTable
-from lipmotion.study.answers import FIRST, MOS, PAIRED, RANKING, SECOND, Answer
+from lipmotion_studio.study.analysis.paired import PairTable
+from lipmotion_studio.study.analysis.ratings import RANKS, SCALES, RatingTable
+from lipmotion_studio.study.answers import FIRST, MOS, PAIRED, RANKING, SECOND, Answer
 
 Array = NDArray[np.float64]
 NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(61)

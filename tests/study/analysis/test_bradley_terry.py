@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from lipmotion.study.analysis.paired import deviations, fit_strengths, linked
+from lipmotion_studio.study.analysis.paired import deviations, fit_strengths, linked
 
 TEAMS = ("Milwaukee", "Detroit", "Toronto", "New York", "Boston", "Cleveland", "Baltimore")
 HOME_WINS = [

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from lipmotion.study.analysis.crossed import BOTH, NOTHING, RATERS, SENTENCES, crossed_mean, holm
+from lipmotion_studio.study.analysis.crossed import BOTH, NOTHING, RATERS, SENTENCES, crossed_mean, holm
 
 TABLE = np.random.default_rng(4).normal(3, 1, (7, 5)) + np.random.default_rng(5).normal(size=(7, 1))
 

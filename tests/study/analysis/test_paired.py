@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from lipmotion.errors import InputError
-from lipmotion.study.analysis.paired import (
+from lipmotion_studio.study.analysis.paired import (
     ALL_EQUAL,
     binomial_p,
     consistency,

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from lipmotion.study.analysis.analyse import power_of, raters_needed, rating_power, share_power
-from lipmotion.study.analysis.crossed import Components, crossed_mean
+from lipmotion_studio.study.analysis.analyse import power_of, raters_needed, rating_power, share_power
+from lipmotion_studio.study.analysis.crossed import Components, crossed_mean
 
 USUAL = Components(0.16, 0.04, 1.0)
 

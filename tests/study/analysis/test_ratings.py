@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from lipmotion.study.analysis.ratings import (
+from lipmotion_studio.study.analysis.ratings import (
     RANKS,
     SCALES,
     RatingTable,
@@ -15,7 +15,7 @@ from lipmotion.study.analysis.ratings import (
     rating_table,
     relative_improvement,
 )
-from lipmotion.study.answers import MOS
+from lipmotion_studio.study.answers import MOS
 from study.analysis.simulated import Effects, expected_rating, rated_answers, rating, ratings
 
 MEANS = np.array([3.1, 3.9, 4.7])

@@ -18,7 +18,7 @@ from packaging.markers import Marker
 from packaging.specifiers import SpecifierSet
 
 from lipmotion.errors import LipMotionError, MissingDependencyError, ModelFormatError
-from lipmotion.extensions import install_command, installed_version
+from lipmotion.extensions import install_command, installed_version, provided
 
 EXTRA = re.compile(r'\s*(?:\band\b)?\s*extra == "([\w-]+)"')
 
@@ -210,11 +210,8 @@ def _phone_recogniser() -> str:
 
 def _face_tracking() -> str:
     """Return which OpenCV and MediaPipe are imported, and whether another OpenCV lies over that of the extra."""
-    from lipmotion.vision.packages import import_face_mesh, import_opencv
-
     try:
-        opencv = import_opencv().__version__
-        import_face_mesh()
+        opencv = provided("tracking_versions")()
     except MissingDependencyError as error:
         raise _AbsentError(str(error)) from error
     found = f"OpenCV {opencv}, MediaPipe {metadata.version('mediapipe')}"

@@ -51,9 +51,10 @@ def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Print what was found; write what was asked for."""
+    from lipmotion.extensions import provided
     from lipmotion.meshes.files.binding_files import save_binding, write_points, write_weights
     from lipmotion.pipeline.opened_job import character_of
-    from lipmotion.pipeline.outputs.curve_sets import described, write_picture
+    from lipmotion.pipeline.outputs.curve_sets import described
 
     if options.character.suffix.lower() == ".csv":
         _calibrate_rig(options)
@@ -76,7 +77,7 @@ def run(options: argparse.Namespace) -> None:
     if options.write_binding and character.binding is not None:
         save_binding(options.write_binding, character.binding, character.mesh)
     if options.picture:
-        write_picture(options.picture, character)
+        provided("write_picture")(options.picture, character)
     for path in (options.write_points, options.write_weights, options.write_binding, options.picture):
         if path:
             print_line(path)

@@ -57,7 +57,6 @@ def _render(job: OpenedJob, motion: Path, rate_hz: float | None, monitor: Monito
     import numpy as np
 
     from lipmotion.pipeline.edit_files import is_edit_file
-    from lipmotion.pipeline.outputs.drawn_video import VideoOutput
     from lipmotion.pipeline.outputs.motion_input import as_long_as, read_generation
     from lipmotion.speech.sound.audio_files import read_audio
     from lipmotion.types import Audio
@@ -70,7 +69,7 @@ def _render(job: OpenedJob, motion: Path, rate_hz: float | None, monitor: Monito
     generation = read_generation(motion, job.job.request.units, rate_hz)
     if isinstance(sound, Path):
         generation = as_long_as(generation, read_audio(sound).duration_s, keeps_rate=rate_hz is not None)
-    elif any(isinstance(output, VideoOutput) for output in planned):
+    elif any(output.draws for output in planned):
         samples = round(float(generation.motion.time_s[-1]) * SILENT_HZ)
         sound = Audio(np.zeros(samples, np.float32), SILENT_HZ)
     job.write(generation, sound, monitor=monitor)
@@ -79,10 +78,9 @@ def _render(job: OpenedJob, motion: Path, rate_hz: float | None, monitor: Monito
 def _sound_named_by(motion: Path) -> Path | None:
     """Return the sound that a glTF file of motion names, where it is there and begins with the motion."""
     from lipmotion.meshes.files.gltf_writer import named_sound
-    from lipmotion.pipeline.outputs.scenes import GLTF
     from lipmotion.storage.sources import is_file
 
-    named = named_sound(motion) if motion.suffix.lower() == GLTF and is_file(motion) else None
+    named = named_sound(motion) if motion.suffix.lower() == ".glb" and is_file(motion) else None
     if named is None:
         return None
     sound, start_s = named

@@ -19,8 +19,7 @@ from lipmotion.meshes.files.gltf_schema import COMPONENTS, LARGEST_NUMBER, MOST_
 from lipmotion.meshes.files.vrm import expression_shapes, looks_backwards
 from lipmotion.meshes.model.bones import Bone, merged_bones
 from lipmotion.meshes.model.mesh import OPAQUE, Blendshape, Material, Mesh, MeshPart, PartNames
-from lipmotion.meshes.model.textures import Texture, read_texture
-from lipmotion.meshes.rendering.lighting import linear
+from lipmotion.meshes.model.textures import Texture, linear, read_texture
 
 Colours = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from lipmotion.meshes.files.usd_text import asset, matrix, numbers, prim, prim_names, rows_of, tokens, triple, whole
 from lipmotion.meshes.model.mesh import Mesh, MeshPart
 from lipmotion.meshes.model.scene import HeadTurn, Scene, ShadingNormals, shading_normals
-from lipmotion.meshes.rendering.lighting import linear
+from lipmotion.meshes.model.textures import linear
 from lipmotion.storage.files import whole_file
 
 ROOT = "Character"

@@ -12,8 +12,7 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.meshes.model.keys import EVERY_KEY, Thinning, keys_of
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.meshes.model.single_sided import single_sided
-from lipmotion.meshes.model.surface import mesh_surface
-from lipmotion.meshes.rendering.rasteriser import normals_of
+from lipmotion.meshes.model.surface import mesh_surface, normals_of
 from lipmotion.types import Motion
 
 Array = NDArray[np.float64]

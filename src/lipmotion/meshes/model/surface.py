@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from lipmotion.kernels.pixels.shading import normal_sums
 from lipmotion.meshes.model.mesh import Mesh
 
 if TYPE_CHECKING:
@@ -97,6 +98,16 @@ def vertex_normals(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) 
     )
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     return normals / np.where(lengths > 0, lengths, 1.0)
+
+
+def normals_of(places: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.float64]:
+    """Return the normal of every vertex, the mean of its triangles weighted by their area [shape=(V, 3)], of length 1.
+
+    A vertex without triangles gets (0, 0, 1).
+    """
+    total = normal_sums(places, triangles)
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    return np.where(length > 0, total / np.where(length > 0, length, 1), [0.0, 0.0, 1.0])
 
 
 def _places(mesh: Mesh, normals: NDArray[np.float64]) -> Rows:

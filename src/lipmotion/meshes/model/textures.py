@@ -204,3 +204,9 @@ def _halved(image: NDArray[np.float32]) -> NDArray[np.float32]:
     alpha = total[..., 3:] / parts
     colour = np.where(alpha > 0, total[..., :3] / np.maximum(total[..., 3:], 1e-6), plain / parts)
     return np.concatenate([np.minimum(colour, 1), alpha], axis=2)
+
+
+def linear(colour: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return sRGB colours, 0 to 1, as diffuse reflection; the shape stays."""
+    values = np.asarray(colour, float)
+    return np.asarray(np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4))

@@ -12,13 +12,13 @@ from contextvars import ContextVar
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from lipmotion.errors import ExportError, LipMotionError
 from lipmotion.export.base import motion_suffix
-from lipmotion.extensions import failed_extension
-from lipmotion.faces.filmed.face import FilmedFace
+from lipmotion.extensions import failed_extension, provided
 from lipmotion.measures.closures import CLOSED_SHARE
 from lipmotion.meshes.files.rig_tables import table_path
 from lipmotion.motion.closure import OPENING, closable_ranges
@@ -35,7 +35,6 @@ from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.batch.record import DONE, FAILED, Record
 from lipmotion.pipeline.batch.settings import CUES, input_files, line_fingerprint
 from lipmotion.pipeline.generate.animate import animate
-from lipmotion.pipeline.generate.transfer import map_onto
 from lipmotion.pipeline.job import Job, Request
 from lipmotion.pipeline.model import Model, load_model
 from lipmotion.pipeline.opened_job import OpenedJob, opened
@@ -286,9 +285,9 @@ def _opened_of(job: Job, _: tuple[int, ...]) -> OpenedJob:
 
 
 @lru_cache(maxsize=8)
-def _map_onto(model: Model, face: FilmedFace, speaker: str) -> SpeakerMap:
+def _map_onto(model: Model, face: Any, speaker: str) -> SpeakerMap:
     """Return the map of the motion of a speaker onto a face: the same for all lines, and slow to make."""
-    return map_onto(model, face, speaker=speaker)
+    return provided("map_onto")(model, face, speaker=speaker)
 
 
 def check_line_job(job: Job) -> None:

@@ -14,16 +14,12 @@ from lipmotion.errors import ExportError, InputError
 from lipmotion.export.base import motion_suffixes
 from lipmotion.export.cues import CUE_FORMATS
 from lipmotion.export.timed_labels import LABEL_SUFFIXES
-from lipmotion.extensions import installed_version
-from lipmotion.faces.cut_out import picture_files
-from lipmotion.faces.registry import is_drawings
+from lipmotion.extensions import installed_version, provided
 from lipmotion.meshes.files.rig_tables import table_path
 from lipmotion.pipeline.batch.lines import BatchLine
 from lipmotion.pipeline.job import Job
 from lipmotion.pipeline.model import shipped_path
 from lipmotion.pipeline.outputs.cues import SHEET
-from lipmotion.pipeline.outputs.drawn_video import VIDEO_SUFFIXES
-from lipmotion.pipeline.outputs.scenes import SCENE_SUFFIXES
 from lipmotion.speech.recognition.network.posteriors import installed_phone_recogniser
 from lipmotion.storage.files import check_source, sha256_of
 from lipmotion.storage.json_text import as_json
@@ -48,7 +44,7 @@ def check_job(job: Job) -> None:
 
 def possible_kinds() -> tuple[str, ...]:
     """Return the kinds of outputs that a batch can write, without the first dot."""
-    plain = (*motion_suffixes(), *LABEL_SUFFIXES, *VIDEO_SUFFIXES, *SCENE_SUFFIXES)
+    plain = (*motion_suffixes(), *LABEL_SUFFIXES, *provided("video_suffixes"), *provided("scene_suffixes"))
     return (*(suffix.removeprefix(".") for suffix in plain), *(f"{CUES}{name}" for name in CUE_FORMATS))
 
 
@@ -69,8 +65,8 @@ def fingerprint_of(job: Job) -> str:
     request = replace(job.request, model=job.request.model or shipped_path())
     parts = [{name: _told(value) for name, value in part.as_mapping().items()} for part in (request, job.outputs)]
     parts += [job.delivery.as_mapping(), job.staging.as_mapping()]
-    if is_drawings(job.outputs.face):
-        parts.append({path.name: sha256_of(path) for path in picture_files(Path(job.outputs.face))})
+    if provided("is_drawings")(job.outputs.face):
+        parts.append({path.name: sha256_of(path) for path in provided("picture_files")(Path(job.outputs.face))})
     parts += _table(job.outputs.character)
     return _digest(as_json([*parts, installed_version(), installed_phone_recogniser()]))
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from lipmotion.articulation.curve_edits import bend_through_pins
 from lipmotion.engines import Animator
 from lipmotion.errors import InputError
+from lipmotion.extensions import provided
 from lipmotion.motion.closure import clip_at_zero, is_never_negative
 from lipmotion.motion.generation import BLOCK_FRAMES
 from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps, restfulness, viseme_weights
@@ -65,9 +66,10 @@ def person_of(model: Model, request: SpeechRequest) -> SpeakerMap | None:
             )
         return person
     from lipmotion.motion.transfer_map import composed
-    from lipmotion.pipeline.generate.transfer import map_onto  # it tracks faces
 
-    onto = map_onto(model, request.onto, speaker=request.speaker, onto_speaker=request.onto_speaker, speech=request)
+    onto = provided("map_onto")(
+        model, request.onto, speaker=request.speaker, onto_speaker=request.onto_speaker, speech=request
+    )
     return composed(person, onto)
 
 

@@ -13,20 +13,19 @@ from lipmotion.articulation.curve_edits import with_edited_curves
 from lipmotion.articulation.expression import moods_shown
 from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.errors import InputError
-from lipmotion.faces.base import Staging
 from lipmotion.meshes.files.rig_tables import RigRow, read_rig_table, rig_motion
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.facial_animation import PARAMETERS, expression_weights, fap_motion
+from lipmotion.meshes.fitting.living_curves import living_curves
 from lipmotion.meshes.fitting.oculus_visemes import VISEME_CHANNELS, viseme_motion
 from lipmotion.meshes.fitting.reference_mouth import arkit_mouth, vowel_mouth
 from lipmotion.meshes.fitting.shape_weights import shape_weights
 from lipmotion.meshes.model.mesh import Mesh
 from lipmotion.meshes.model.other_shapes import CLOSED
 from lipmotion.meshes.model.shape_names import ARKIT_MOUTH, ARKIT_OTHERS, arkit_name
-from lipmotion.pipeline.outputs.living_curves import living_curves
-from lipmotion.storage.files import whole_file
 from lipmotion.types import WEIGHT, Channel, CurveEdit, Generation, Motion, Prosody, Timeline, Unit
+from lipmotion.types.staging import Staging
 
 ARKIT, WHOLE_FACE, VOWELS = "arkit", "face", "vowels"
 LIVING_SETS = (WHOLE_FACE, VOWELS)
@@ -188,17 +187,6 @@ def with_curves(
     both = beside(motion, added)
     variance = np.pad(generation.variance, ((0, 0), (0, len(added.channels))))
     return replace(generation, motion=both, spread=variance), added.names
-
-
-def write_picture(path: Path, character: DrivenCharacter) -> None:
-    """Write a picture of a character at rest as PNG. Raises ExportError: it cannot be written."""
-    from PIL import Image
-
-    from lipmotion.faces.mesh import HEIGHT, WIDTH, MeshStage
-
-    picture = MeshStage(character, WIDTH, HEIGHT).picture(character.mesh.vertices)
-    with whole_file(path) as unfinished:
-        Image.fromarray(picture).save(unfinished, format="PNG")
 
 
 def described(character: DrivenCharacter) -> Iterator[str]:

@@ -18,22 +18,21 @@ from lipmotion.articulation.mouth import spoken_mouth
 from lipmotion.articulation.phone_targets import GESTURES, with_gestures
 from lipmotion.errors import ExportError
 from lipmotion.export.base import check_motion, motion_format, motion_suffix, motion_suffixes, write_motion
-from lipmotion.faces.base import Staging
 from lipmotion.meshes.files.rig_tables import CONTROL
 from lipmotion.meshes.fitting.blendshape_motion import with_mouth
 from lipmotion.meshes.fitting.driven import DrivenCharacter
 from lipmotion.meshes.fitting.facial_animation import FAP
+from lipmotion.meshes.fitting.living_curves import living_curves
 from lipmotion.meshes.model.keys import Thinning
 from lipmotion.meshes.model.shape_names import arkit_name
 from lipmotion.pipeline.outputs.curve_sets import ARKIT, LIVING_SETS, WHOLE_FACE, beside, curves_of, with_curves
 from lipmotion.pipeline.outputs.delivered import delivered, held_mouth
-from lipmotion.pipeline.outputs.living_curves import living_curves
 from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
 from lipmotion.pipeline.outputs.prosody import recorded_prosody
-from lipmotion.pipeline.outputs.scenes import sound_reference
-from lipmotion.storage.files import as_text
+from lipmotion.storage.files import as_text, sound_reference
 from lipmotion.types import WEIGHT, Channel, Generation, Motion, Prosody
 from lipmotion.types.motion import RADIAN
+from lipmotion.types.staging import Staging
 
 LOG = logging.getLogger("lipmotion")
 CURVES = (WEIGHT, CONTROL, RADIAN)

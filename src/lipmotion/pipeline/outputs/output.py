@@ -15,18 +15,92 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from lipmotion.articulation.delivery import Delivery
 from lipmotion.errors import ExportError, InputError
 from lipmotion.extensions import Registry
-from lipmotion.faces.base import Staging
 from lipmotion.meshes.fitting.driven import DrivenCharacter
-from lipmotion.pipeline.film.filmed_video import FILM, FilmOptions
-from lipmotion.pipeline.job import RATE
+from lipmotion.pipeline.job import RATE, Jaw, Mark, Overlay, Refinement
 from lipmotion.storage.files import check_distinct, check_target
-from lipmotion.types import Audio, Generation, Monitor, silent_monitor
+from lipmotion.types import Audio, Generation, Monitor, Prosody, silent_monitor
+from lipmotion.types.staging import Staging
 
 if TYPE_CHECKING:
+    from lipmotion.meshes.model.scene import Scene
     from lipmotion.pipeline.model import Model
-    from lipmotion.pipeline.outputs.shown_faces import ShownFace
 
 Made = TypeVar("Made")
+
+
+@dataclass(frozen=True)
+class FilmOptions:
+    """How a filmed face is shown.
+
+    background : footage of the same person into which mouth and jaw are stitched; None: the one in the face's file
+    jaw        : what the jaw follows: the motion, the energy of the sound (Xie & Liu 2007, §6.2), or the background's
+                 own motion (``none``)
+    overlay    : the aid to lip-reading: on the speech's own video, a large mouth in a corner (``inset``) or over the
+                 speaker's own (``mouth``); None: no such video is needed
+    mark       : how the video says that it is synthetic: in its metadata, there and in a corner of the picture
+                 (``visible``), or not at all (docs/consent.md)
+    refinement : detail of the mouth: ``steady``, or of the nearest picture, as in the paper (``paper``)
+
+    >>> import lipmotion
+    >>> lipmotion.FilmOptions(jaw="none").mark
+    'metadata'
+    """
+
+    background: Path | None = None
+    jaw: Jaw = "motion"
+    overlay: Overlay | None = None
+    mark: Mark = "metadata"
+    refinement: Refinement = "steady"
+
+
+FILM = FilmOptions()
+
+
+class ShownFace(ABC):
+    """A face with all that outputs ask of it."""
+
+    files: tuple[Path, ...] = ()
+    """Pictures that it is read from."""
+    has_own_background = False
+    """Whether the background is footage, and not a colour."""
+    character: DrivenCharacter | None = None
+    """The character that is drawn, of which curves may be edited."""
+
+    @abstractmethod
+    def check(self, settings: OutputSettings) -> None:
+        """Raise InputError if the face cannot be shown as the settings say; called before long work begins."""
+
+    @abstractmethod
+    def check_video(self, path: Path, settings: OutputSettings) -> None:
+        """Raise ExportError or InputError if a video or pictures of that name cannot show the face so."""
+
+    @abstractmethod
+    def check_drawable(self, path: Path, generation: Generation) -> None:
+        """Raise ExportError if a generation has nothing from which the face can be drawn."""
+
+    @abstractmethod
+    def write_video(self, path: Path, performance: Performance) -> None:
+        """Write a video, or pictures. Raises InputError: the motion lacks channels. Raises ExportError: as writers."""
+
+    @abstractmethod
+    def scene(
+        self, generation: Generation, settings: OutputSettings, prosody: Prosody | None, frames: slice | None = None
+    ) -> Scene:
+        """Return the character of files for 3D programs, with its animation.
+
+        frames : of the motion: the only ones that are wanted; None: all
+        """
+
+    def other_person(self, model: Model, speaker: str = "") -> Any:  # noqa: ARG002
+        """Return the person (as of ``Request.onto``) onto whom the motion of a model must be mapped; None: nobody.
+
+        speaker : of the people of the model whose motion is generated
+        """
+        return None
+
+    def load(self) -> None:
+        """Load what draws the face, so that drawing begins sooner."""
+        return
 
 
 @dataclass(frozen=True)
@@ -90,6 +164,9 @@ class Performance:
 class Output(ABC):
     """A file that is written of a performance."""
 
+    draws = False
+    """Whether it shows a face in pictures, which takes longer than motion."""
+
     def __init__(self, path: Path, settings: OutputSettings) -> None:
         self.path, self.settings = path, settings
 
@@ -128,15 +205,12 @@ OUTPUTS: Registry[type[Output]] = Registry(
     "lipmotion.outputs",
     {
         "motion": f"{_HERE}.motion_files:MotionOutput",
-        "video": f"{_HERE}.drawn_video:VideoOutput",
-        "scene": f"{_HERE}.scenes:SceneOutput",
         "labels": f"{_HERE}.write:LabelOutput",
         "sound": f"{_HERE}.write:SoundOutput",
-        "pictures": f"{_HERE}.drawn_video:PicturesOutput",
         "cues": f"{_HERE}.cues:CueOutput",
     },
 )
-"""Kinds of outputs."""
+"""Kinds of outputs; those that show a face are entry points of the package of faces."""
 
 
 def plan(path: str | Path, settings: OutputSettings) -> Output:

@@ -5,18 +5,26 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from lipmotion.articulation.delivery import Delivery, sound_units
 from lipmotion.errors import ExportError
 from lipmotion.export.sound import SOUND_CODECS, write_sound
 from lipmotion.export.timed_labels import LABEL_SUFFIXES, write_labels
-from lipmotion.faces.base import Staging
+from lipmotion.extensions import provided
 from lipmotion.meshes.fitting.driven import DrivenCharacter
-from lipmotion.pipeline.film.filmed_video import FILM, FilmOptions
 from lipmotion.pipeline.model import Model
-from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance, checked_outputs, perform
-from lipmotion.pipeline.outputs.shown_faces import AnyFace, ShownFace, shown_face
+from lipmotion.pipeline.outputs.output import (
+    FILM,
+    FilmOptions,
+    Output,
+    OutputSettings,
+    Performance,
+    checked_outputs,
+    perform,
+)
 from lipmotion.types import Audio, Generation, Monitor, silent_monitor
+from lipmotion.types.staging import Staging
 
 
 class LabelOutput(Output):
@@ -54,7 +62,7 @@ def write(  # noqa: PLR0913
     channels: Sequence[str] | None = None,
     rate_hz: float | None = None,
     fps: float | None = None,
-    face: AnyFace | ShownFace = "portrait",
+    face: Any = "portrait",
     film: FilmOptions = FILM,
     staging: Staging | None = None,
     delivery: Delivery | None = None,
@@ -102,7 +110,7 @@ def write(  # noqa: PLR0913
     """
     sound = speech if isinstance(speech, Audio) else None
     settings = OutputSettings(
-        shown_face(face),
+        provided("shown_face")(face),
         None if speech is None or sound is not None else Path(str(speech)),
         sound is not None,
         None if channels is None else tuple(channels),

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lipmotion.appearance.eigenlips import COMPONENTS, Eigenlips, fit_eigenlips
 from lipmotion.errors import CorpusError, InputError, shortened
+from lipmotion.motion.eigenlips import COMPONENTS, Eigenlips, fit_eigenlips
 from lipmotion.printable import printable
 from lipmotion.stats.pca import evenly_spaced
 from lipmotion.types import Channel, Motion, Track, Utterance

@@ -18,8 +18,8 @@ import numpy as np
 from lipmotion.corpora.labels import labels_beside
 from lipmotion.corpora.source_recordings import AUDIO_SUFFIXES
 from lipmotion.errors import AlignmentError, CorpusError, InputError, MissingDependencyError, shortened
-from lipmotion.pipeline.corpus.prompts import prompts
 from lipmotion.pipeline.model import load_model
+from lipmotion.pipeline.training.prompts import prompts
 from lipmotion.pipeline.understand.transcribe import phones_in_time
 from lipmotion.speech.features.analysed_audio import analysed
 from lipmotion.speech.recognition.agreement import DOUBTFUL_SCORE, agreement_score

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from lipmotion.articulation.pauses import REST
 from lipmotion.errors import InputError, shortened
@@ -16,13 +16,12 @@ from lipmotion.units import Lexicon
 
 if TYPE_CHECKING:
     from lipmotion.corpora.store import Corpus
-    from lipmotion.faces.filmed.face import FilmedFace
     from lipmotion.motion.speaker_maps import SpeakerMap
     from lipmotion.pipeline.model import Model
 
-Onto: TypeAlias = "str | Path | Corpus | Model | FilmedFace | SpeakerMap"
-"""Another person: a video, the folder of a corpus, a model file or a face file, or the value of one of them, or a
-finished map."""
+Onto: TypeAlias = "str | Path | Corpus | Model | SpeakerMap | Any"
+"""Another person: a video, the folder of a corpus, a model file or a face file, or the value of one of them (a
+``FilmedFace`` too), or a finished map."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,1 +1,0 @@
-"""Recordings to a corpus: preparation, supplied motion, synchronisation, prompts."""

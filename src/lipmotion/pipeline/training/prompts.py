@@ -1,0 +1,134 @@
+"""Sentences to record for training, in an order that covers most units early."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import chain, pairwise
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.corpora.store import Corpus
+from lipmotion.errors import InputError
+from lipmotion.pipeline.training.phone_sequences import pronounced_sentences, recorded_phones
+from lipmotion.units import SILENCE, VISEME_OF, Lexicon
+
+PHONE, DIPHONE, CONTEXT = "phone", "diphone", "beside"
+WEIGHTS = {PHONE: 8.0, DIPHONE: 2.0, CONTEXT: 1.0}
+"""Weight of the first occurrence of each kind of unit: a phone; a phone after a phone; a phone beside a viseme class.
+The engines back off from the last kind to the first, so the more general kinds must be covered."""
+
+UnitName = tuple[str, ...]
+"""The kind of a unit, and its phones or classes."""
+
+
+@dataclass(frozen=True)
+class Prompt:
+    """A sentence, and the number of phones and diphones that are covered after it has been recorded."""
+
+    text: str
+    phones: int
+    diphones: int
+
+
+@dataclass(frozen=True)
+class Prompts:
+    """The sentences to record, and statistics of all sentences.
+
+    chosen           : the sentences to record, in this order
+    phones, diphones : number of different phones and diphones in all sentences and in the existing corpus
+    sentences        : number of sentences among which was chosen
+    left_out         : sentences that cannot be used, with the word that is neither in the dictionary nor in the lexicon
+    """
+
+    chosen: tuple[Prompt, ...]
+    phones: int
+    diphones: int
+    sentences: int
+    left_out: dict[str, str]
+
+
+def prompts(
+    text: str | Path | None = None, *, count: int = 50, have: Corpus | None = None, lexicon: Lexicon | None = None
+) -> Prompts:
+    """Return the sentences that cover most units for the time it takes to speak them.
+
+    text    : a file with a sentence a line; None: the list in the package
+    count   : largest number of sentences; fewer are returned if further ones would cover nothing new
+    have    : a corpus whose units count as covered; its utterances without words or phones are ignored
+    lexicon : pronunciations of words, ahead of those of the dictionary
+    Raises InputError: no such file, no sentence that can be used, or a count under 1.
+    Source: greedy weighted set cover (Chvátal 1979), gains recomputed only where they may matter (Minoux 1978).
+    """
+    if count < 1:
+        raise InputError(f"{count} prompts asked for, required at least 1")
+    lexicon = lexicon or Lexicon()
+    usable, left_out = pronounced_sentences(text, lexicon)
+    index: dict[UnitName, int] = {}
+    units = [_numbered(units_of(phones), index) for phones in usable.values()]
+    recorded = (
+        _numbered(
+            {unit for run in chain.from_iterable(recorded_phones(have, lexicon)) for unit in units_of(run)}, index
+        )
+        if have
+        else None
+    )
+    weights = np.array([WEIGHTS[name[0]] for name in index])
+    if recorded is not None:
+        weights[recorded] = 0
+    costs = [len(phones) for phones in usable.values()]
+    order = greedy_cover(units, costs, weights.copy(), count)
+    covered = weights == 0
+    is_phone, is_diphone = (np.array([name[0] == kind for name in index]) for kind in (PHONE, DIPHONE))
+    chosen, sentences = [], list(usable)
+    for number in order:
+        covered[units[number]] = True
+        chosen.append(Prompt(sentences[number], int((covered & is_phone).sum()), int((covered & is_diphone).sum())))
+    return Prompts(tuple(chosen), int(is_phone.sum()), int(is_diphone.sum()), len(usable), left_out)
+
+
+def units_of(phones: Sequence[str]) -> set[UnitName]:
+    """Return the units in a sequence of phones between two silences; silence counts as a neighbour only."""
+    sequence = [SILENCE, *phones, SILENCE]
+    units: set[UnitName] = {(DIPHONE, left, right) for left, right in pairwise(sequence)}
+    for left, phone, right in zip(sequence, phones, sequence[2:], strict=False):
+        contexts = (f"[{VISEME_OF[left]}]-{phone}", f"{phone}+[{VISEME_OF[right]}]")
+        units |= {(PHONE, phone), *((CONTEXT, context) for context in contexts)}
+    return units
+
+
+def greedy_cover(
+    sets: Sequence[NDArray[np.intp]], costs: Sequence[float], weights: NDArray[np.float64], count: int
+) -> list[int]:
+    """Return the numbers of the sets to take, in order: each time the set that adds most weight for its cost.
+
+    sets    : elements of each set, as indices into ``weights``
+    costs   : of each set
+    weights : of each element [shape=(E,)]; set to 0 for the elements that are covered
+    count   : largest number of sets
+    The gain of a set never increases, so a set that is still first after its gain was recomputed is the best of all.
+    """
+    queue = [
+        (-float(weights[elements].sum()) / cost, i) for i, (elements, cost) in enumerate(zip(sets, costs, strict=True))
+    ]
+    heapq.heapify(queue)
+    taken: list[int] = []
+    while queue and len(taken) < count:
+        _, i = heapq.heappop(queue)
+        recomputed = (-float(weights[sets[i]].sum()) / costs[i], i)
+        if queue and recomputed > queue[0]:
+            heapq.heappush(queue, recomputed)
+        elif recomputed[0] == 0:
+            break
+        else:
+            taken.append(i)
+            weights[sets[i]] = 0
+    return taken
+
+
+def _numbered(units: set[UnitName], index: dict[UnitName, int]) -> NDArray[np.intp]:
+    """Return the numbers of some units, adding new ones to the index."""
+    return np.array([index.setdefault(unit, len(index)) for unit in sorted(units)], np.intp)

@@ -1,0 +1,308 @@
+"""The order in which frames of a background are shown, for speech of any length, without a visible jump."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion_faces.appearance.frame_descriptors import FrameDescriptors, row_distances
+
+Array = NDArray[np.float64]
+Numbers = NDArray[np.intp]
+Kind = Literal["turn", "jump"]
+
+JUMP_LIMIT = 2.5
+"""No jump is made between frames that differ by more than this many times the difference of ordinary neighbours, what
+a cross-fade spreads over its frames being counted a frame."""
+LEAST_RUN_S = 0.8
+"""Frames are shown one after the other for at least so long between two joins, where the background is long enough."""
+USUAL_RUN_S = 4.0
+"""A run of this length costs as much as a join at which everything moves as usual; longer ones cost less."""
+CHOICE_COST_RANGE = 1.0
+"""Joins whose cost exceeds the least one by less than this are chosen by chance, so that no rhythm is seen."""
+FADE_S = 0.56
+"""Time over which a jump is cross-faded; the head moves from one place to the other in it."""
+REPEAT_COST, REPEAT_S = 4.0, 10.0
+"""What going to frames that were just shown costs, and in which time it falls to 1/e of this."""
+REPEATS_COST = 3.0
+"""What an order costs all of whose frames are shown again within ``REPEAT_S``."""
+BUSY_CHANGE_RATIO, BUSY_S = 2.5, 0.12
+"""Eyes that change by more than this many times the median change blink or look elsewhere: no join so near, s."""
+BUSY_COST = 10.0
+"""What a join there costs: more than any other."""
+MOST_COMPARED_FRAMES = 1500
+"""In longer backgrounds no jumps are searched, as every pair of frames would be compared."""
+TRIES = 32
+"""Orders that are drawn; the one with the least cost of its worst join, its last frame and its repeats is returned."""
+_DYNAMICS = ((-2, 0.125), (-1, 0.375), (0, 0.375), (1, 0.125))
+"""Neighbours whose differences are averaged, so that motion goes on in its direction (Schödl et al. 2000, 3.1)."""
+
+
+@dataclass(frozen=True)
+class Join:
+    """A place where frames that were not neighbours in the background follow one another, or its direction changes.
+
+    at    : the frame of the order before which it is
+    kind  : ``turn``, the background is then shown the other way round, or ``jump``
+    cost  : of a turn, the speed of the background relative to its median; of a jump, the difference of the frames and
+            of their neighbours relative to the ordinary difference of neighbours
+    """
+
+    at: int
+    kind: Kind
+    cost: float
+
+
+@dataclass(frozen=True, eq=False)
+class LoopOrder:
+    """Which frames of a background are shown, N of them.
+
+    first, second : numbers of frames of the background [shape=(N,)]
+    weight        : share of ``second`` in what is shown, 0 but where a jump is cross-faded [shape=(N,)]
+    joins         : every join, in order
+    """
+
+    first: Numbers
+    second: Numbers
+    weight: Array
+    joins: tuple[Join, ...]
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+    def __iter__(self) -> Iterator[tuple[int, int, float]]:
+        return zip(self.first.tolist(), self.second.tolist(), self.weight.tolist(), strict=True)
+
+
+def loop_order(
+    descriptors: FrameDescriptors,
+    count: int,
+    rate_hz: float,
+    *,
+    usable: NDArray[np.bool_] | None = None,
+    cuts: Sequence[int] = (),
+    seed: int = 0,
+) -> LoopOrder:
+    """Return an order of a background's frames for speech of any length.
+
+    descriptors : of every frame of the background
+    count       : frames that are wanted
+    rate_hz     : frame rate of the background
+    usable      : the frames that may be shown, all where it is not given [shape=(T,)]
+    cuts        : frames before which the camera changes
+    seed        : for the choice among joins that are equally good; the same seed gives the same order
+    A background that is long enough is shown as it is, from where it begins and ends most calmly. Another one is shown
+    in runs, forwards and backwards, with joins between them: turns, at frames where little moves, and jumps between
+    frames in which the face looks and moves alike, cross-faded. What was shown long ago comes first. No join is made in
+    a blink while there is another one.
+    Raises InputError: no frames are wanted, or none may be shown.
+    Source: Schödl et al. 2000, "Video textures" (cost of jumps); turns and runs are ours.
+    Cost: O(T²) for T frames up to ``MOST_COMPARED_FRAMES``, else O(T).
+    """
+    allowed = np.ones(len(descriptors), bool) if usable is None else np.asarray(usable, bool)
+    if count < 1 or allowed.shape != (len(descriptors),) or not allowed.any():
+        raise InputError(
+            f"{count} frames of a background of which {int(allowed.sum())} of {len(descriptors)} may be shown; "
+            "required at least one of each"
+        )
+    plan = _Plan(descriptors, rate_hz, allowed, cuts)
+    longest = max(plan.scenes, key=lambda scene: scene[1] - scene[0])
+    if count <= longest[1] - longest[0]:
+        starts = np.arange(longest[0], longest[1] - count + 1)
+        start = int(starts[np.argmin(plan.restless[starts] + plan.restless[starts + count - 1])])
+        return _as_order([(start, 1, count)], (), count, 0)
+    draws = np.random.default_rng(seed)
+    orders = [plan.order(count, longest, draws) for _ in range(TRIES)]
+    return min(orders, key=plan.blemish)
+
+
+@dataclass(frozen=True, eq=False)
+class _Joins:
+    """Joins that are possible: the last frame before each, its cost, and the frame after it, -1 for a turn."""
+
+    ends: Numbers
+    costs: Array
+    nexts: Numbers
+
+
+class _Plan:
+    """A background, and what joins in it would cost.
+
+    scenes   : first frame of each part without a cut, and the one after its last
+    restless : cost of turning at each frame, or of beginning or ending there [shape=(T,)]
+    """
+
+    def __init__(
+        self, descriptors: FrameDescriptors, rate_hz: float, allowed: NDArray[np.bool_], cuts: Sequence[int]
+    ) -> None:
+        self.scenes = scenes_of(allowed, cuts)
+        self._scene_of = np.full(len(allowed), -1)
+        for index, (start, stop) in enumerate(self.scenes):
+            self._scene_of[start:stop] = index
+        self.busy = _busy(descriptors.eyes, rate_hz, self.scenes)
+        self.restless = _restlessness(descriptors.standardised(self.scenes), self.scenes) + BUSY_COST * self.busy
+        self._least = max(1, round(LEAST_RUN_S * rate_hz))
+        self._usual = USUAL_RUN_S * rate_hz
+        self._repeat = REPEAT_S * rate_hz
+        self._fade = fade_frames(rate_hz)
+        self._jumps = self._best_jumps(descriptors)
+
+    def order(self, count: int, longest: tuple[int, int], draws: np.random.Generator) -> LoopOrder:
+        """Return one order of frames, drawn by chance."""
+        early = np.arange(longest[0], longest[0] + max(1, (longest[1] - longest[0]) // 4))
+        at, way, shown = int(early[np.argmin(self.restless[early])]), 1, 0
+        last_shown = np.full(len(self.restless), -np.inf)
+        runs: list[tuple[int, int, int]] = []
+        joins: list[Join] = []
+        while shown < count:
+            options = self._joins_from(at, way)
+            lengths = np.abs(options.ends - at) + 1
+            seen = self._last_seen(options, way, last_shown)
+            ages = np.where(options.nexts < 0, 0, shown + lengths - seen)
+            costs = options.costs + self._usual / lengths + REPEAT_COST * np.exp(-ages / self._repeat)
+            chosen = int(draws.choice(np.flatnonzero(costs <= costs.min() + CHOICE_COST_RANGE)))
+            end, after = int(options.ends[chosen]), int(options.nexts[chosen])
+            runs.append((at, way, abs(end - at) + 1))
+            shown += runs[-1][2]
+            last_shown[at : end + way if end + way >= 0 else None : way] = shown
+            if shown >= count:
+                break
+            is_turn = after < 0
+            joins.append(Join(shown, "turn" if is_turn else "jump", float(options.costs[chosen])))
+            if is_turn:
+                way = -way
+                at = end + way if self._room(end, way) else end
+            else:
+                at = after
+        return _as_order(runs, tuple(joins), count, self._fade)
+
+    def blemish(self, order: LoopOrder) -> float:
+        """Return how bad an order is: the cost of its worst join, how restless its last frame is, and its repeats."""
+        worst = max((join.cost for join in order.joins), default=0.0) + float(self.restless[order.first[-1]])
+        shown = np.lexsort((np.arange(len(order)), order.first))
+        again = (np.diff(order.first[shown]) == 0) & (np.diff(shown) < self._repeat)
+        return worst + REPEATS_COST * float(again.sum()) / len(order)
+
+    def _joins_from(self, at: int, way: int) -> _Joins:
+        room = self._room(at, way)
+        least = min(self._least, max(room, 1))
+        lengths = np.arange(least, room + 1) if room >= least else np.array([room])
+        ends = at + way * lengths
+        targets, costs = (table[ends] for table in self._jumps[way])
+        row, scene = np.nonzero(targets >= 0)
+        return _Joins(
+            np.concatenate([ends, ends[row]]),
+            np.concatenate([self.restless[ends], costs[row, scene]]),
+            np.concatenate([np.full(len(ends), -1), targets[row, scene]]),
+        )
+
+    def _last_seen(self, options: _Joins, way: int, last_shown: Array) -> Array:
+        """Return when any of the frames that would follow a join was shown last, -inf for never [shape=(K,)]."""
+        following = options.nexts[:, None] + way * np.arange(self._least)
+        newest: Array = last_shown[np.clip(following, 0, len(last_shown) - 1)].max(axis=1)
+        return newest
+
+    def _room(self, at: int, way: int) -> int:
+        """Return how many frames there are behind a frame, in its scene."""
+        start, stop = self.scenes[int(self._scene_of[at])]
+        return stop - 1 - at if way > 0 else at - start
+
+    def _best_jumps(self, descriptors: FrameDescriptors) -> dict[int, tuple[Numbers, Array]]:
+        """Return the frame of each scene to which each frame is best followed by a jump, -1 for none, and the cost.
+
+        For both ways [each shape=(T, S)].
+        """
+        count = len(descriptors)
+        if count > MOST_COMPARED_FRAMES:
+            return {way: (np.full((count, 1), -1), np.full((count, 1), np.inf)) for way in (1, -1)}
+        distance = row_distances(descriptors.standardised(self.scenes, self._fade))
+        return {way: self._best_jumps_on(distance, way) for way in (1, -1)}
+
+    def _best_jumps_on(self, distance: Array, way: int) -> tuple[Numbers, Array]:
+        """Return the same for one direction, from the distances of frames [shape=(T, T)]."""
+        count = len(distance)
+        frames = np.arange(count)
+        power = np.zeros((count, count))
+        for shift, weight in _DYNAMICS:
+            old, new = (np.clip(frames + way * (k + shift), 0, count - 1) for k in (1, 0))
+            power += weight * np.square(distance[old][:, new])
+        room, behind = np.full(count, -1), np.full(count, -1)
+        for start, stop in self.scenes:
+            later = np.arange(stop - start)
+            room[start:stop], behind[start:stop] = (later[::-1], later)[::way]
+        near = np.abs(frames[:, None] + way - frames) < self._least
+        around = self._fade // 2 + 1
+        wrong = near | (distance > JUMP_LIMIT) | (power > JUMP_LIMIT**2)
+        wrong |= ((room < max(self._least, around)) | (behind < around) | self.busy)[None, :]
+        wrong |= ((behind < 0) | (room < around) | self.busy)[:, None]
+        power[wrong] = np.inf
+        best = np.stack([start + np.argmin(power[:, start:stop], axis=1) for start, stop in self.scenes], axis=1)
+        least = np.sqrt(np.take_along_axis(power, best, axis=1))
+        return np.where(np.isfinite(least), best, -1), least
+
+
+def fade_frames(rate_hz: float) -> int:
+    """Return the number of frames over which a jump is cross-faded, even."""
+    return max(2, 2 * round(FADE_S * rate_hz / 2))
+
+
+def scenes_of(allowed: NDArray[np.bool_], cuts: Sequence[int]) -> list[tuple[int, int]]:
+    """Return the parts of a background between cuts and frames that may not be shown.
+
+    allowed : the frames that may be shown [shape=(T,)]
+    cuts    : frames before which the camera changes
+    Each part is its first frame and the one after its last.
+    """
+    change = np.flatnonzero(np.diff(allowed.astype(int))) + 1
+    ends = sorted({0, len(allowed), *change.tolist(), *(cut for cut in cuts if 0 < cut < len(allowed))})
+    return [(start, stop) for start, stop in pairwise(ends) if allowed[start]]
+
+
+def _busy(eyes: Array, rate_hz: float, scenes: Sequence[tuple[int, int]]) -> NDArray[np.bool_]:
+    """Return the frames in a blink, or near one: the eyes change much [shape=(T,)]."""
+    from scipy.ndimage import binary_dilation
+
+    change = np.zeros(len(eyes))
+    for start, stop in scenes:
+        steps = np.sqrt(np.square(np.diff(eyes[start:stop], axis=0)).mean(axis=1))
+        change[start : stop - 1] = steps
+        change[start + 1 : stop] = np.maximum(change[start + 1 : stop], steps)
+    ordinary = np.median(change[change > 0]) if (change > 0).any() else np.inf
+    return binary_dilation(change > BUSY_CHANGE_RATIO * ordinary, iterations=max(1, round(BUSY_S * rate_hz)))
+
+
+def _restlessness(rows: Array, scenes: Sequence[tuple[int, int]]) -> Array:
+    """Return the speed of the background at each frame, relative to the median [shape=(T,)]."""
+    from scipy.ndimage import gaussian_filter1d
+
+    speed = np.zeros(len(rows))
+    for start, stop in scenes:
+        if stop - start > 1:
+            smooth = gaussian_filter1d(rows[start:stop], 1.0, axis=0, mode="nearest")
+            speed[start:stop] = np.linalg.norm(np.gradient(smooth, axis=0), axis=1)
+    median = float(np.median(speed[speed > 0])) if (speed > 0).any() else 1.0
+    return speed / median
+
+
+def _as_order(runs: Sequence[tuple[int, int, int]], joins: tuple[Join, ...], count: int, fade: int) -> LoopOrder:
+    """Return the order of some runs (first frame, direction, number of frames), of which ``count`` frames are shown.
+
+    fade : frames over which a jump is cross-faded, smoothly (3s² − 2s³)
+    """
+    first = np.concatenate([at + way * np.arange(length) for at, way, length in runs])[:count]
+    second, weight = first.copy(), np.zeros(count)
+    for join, (before, after) in zip(joins, pairwise(runs), strict=False):
+        if join.kind == "jump":
+            way = before[1]
+            for step in range(-fade // 2, fade // 2):
+                at, share = join.at + step, (step + fade / 2 + 0.5) / fade
+                if 0 <= at < count:
+                    first[at] = before[0] + way * (before[2] + step)
+                    second[at], weight[at] = after[0] + way * step, share * share * (3 - 2 * share)
+    return LoopOrder(first, second, weight, joins)

@@ -1,0 +1,149 @@
+"""The lower face: the part of a face that speech moves, from the nose to below the chin, and the mouth region in it.
+
+Pixels are those of the mouth region (``appearance.mouth_region``): a head that is upright and faces the camera, its
+outer eye corners 90 px apart. Footage of a large face has ``scale`` samples a pixel, along each side.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion.motion import mouth_region
+from lipmotion.motion.mouth_region import EYE_DISTANCE_PX
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Pictures = NDArray[np.uint8]
+
+WIDTH, HEIGHT = 128, 128
+"""Size of a picture of the lower face, px."""
+CORNER = (-64.0, 32.0)
+"""Upper left corner of the region, in px from the point between the eyes, y down."""
+LARGEST_SCALE = 4
+"""Most samples a pixel: an eye distance of 360 px. More would make the edge of the region too long to clone."""
+TOP_PX = 50.0
+"""Where the part that is replaced begins: under the nose, px below the eyes."""
+MARGIN_PX = 3.0
+"""The part that is replaced ends so far above the tip of the chin at its highest: on skin, not on neck or collar."""
+JAW_SHARE = 1.15
+"""Half of its width, as a share of half the distance between the ends of the tracked jaw line."""
+NARROWEST_PX, WIDEST_PX = 34.0, 58.0
+"""Limits of half its width: the mouth must fit in, and it must fit into the picture."""
+LEAST_BOTTOM_PX = 106.0
+"""The part that is replaced holds the mouth, whatever the chin."""
+MOUTH_AXES_PX = 34.0, 26.0
+"""Half width and half height of the ellipse in which the mouth is replaced, about the middle of the mouth region."""
+CHEEK_PX = 12, 10
+"""Width and height of the corners of the mouth region, in which the light is measured: they show skin in any pose."""
+
+
+@dataclass(frozen=True)
+class FaceShape:
+    """How large the lower face of a person is, in px.
+
+    half_width_px : of the part that is replaced
+    bottom_px     : where that part ends, below the eyes
+    """
+
+    half_width_px: float
+    bottom_px: float
+
+
+def face_shape(jaw_half_width: float, chin_px: Array) -> FaceShape:
+    """Return the shape of the part that is replaced.
+
+    jaw_half_width : half the distance between the ends of the jaw line, eye distances
+    chin_px        : how far the tip of the chin is below the eyes in all frames [shape=(T,)]
+    """
+    half = float(np.clip(JAW_SHARE * jaw_half_width * EYE_DISTANCE_PX, NARROWEST_PX, WIDEST_PX))
+    highest = float(np.percentile(chin_px, 1))
+    return FaceShape(half, float(np.clip(highest - MARGIN_PX, LEAST_BOTTOM_PX, CORNER[1] + HEIGHT - 4.0)))
+
+
+def region_map(face_to_frame: Array, scale: float, corner: tuple[float, float] = CORNER) -> Array:
+    """Return the affine maps from a pixel of a picture of the lower face, or of another part, to its position in the
+    frame.
+
+    face_to_frame : maps from px of the face to those of the frame [shape=(..., 2, 3)], of
+                    ``vision.mouth_pictures.face_to_image``
+    scale         : samples a pixel
+    corner        : upper left corner of the part, px of the face
+    Pixel (0, 0) is a centre. Returns an array of the same shape.
+    """
+    turn = face_to_frame[..., :2]
+    first = np.array(corner) + 0.5 / scale
+    return np.concatenate([turn / scale, (face_to_frame[..., 2] - 0.5 + turn @ first)[..., None]], axis=-1)
+
+
+def best_scale(face_to_frame: Array) -> int:
+    """Return the samples a pixel with which a person's footage loses nothing: 1 to ``LARGEST_SCALE``.
+
+    face_to_frame : maps of the frames [shape=(T, 2, 3)]
+    """
+    size = np.sqrt(np.abs(np.linalg.det(face_to_frame[:, :, :2])))
+    return int(np.clip(np.floor(np.median(size) + 0.25), 1, LARGEST_SCALE))
+
+
+def mouth_part(scale: int) -> tuple[slice, slice]:
+    """Return the rows and columns of the mouth region in a picture of the lower face."""
+    left, top = (round((near - far) * scale) for near, far in zip(mouth_region.CORNER, CORNER, strict=True))
+    return slice(top, top + mouth_region.HEIGHT * scale), slice(left, left + mouth_region.WIDTH * scale)
+
+
+def replaced_part(shape: FaceShape, scale: int) -> Mask:
+    """Return the part of the lower face that is replaced, jaw and mouth: bool array [shape=(H, W)]."""
+    middle, half_height = (shape.bottom_px + TOP_PX) / 2, (shape.bottom_px - TOP_PX) / 2
+    x, y = _positions(scale)
+    # wider than an ellipse under the nose, where cheeks and lip are one surface
+    inside = (np.abs(x) / shape.half_width_px) ** 2.5 + (np.abs(y - middle) / half_height) ** 2.5
+    return inside <= 1
+
+
+def mouth_ellipse(scale: int) -> Mask:
+    """Return the part in which the mouth is replaced, within the mouth region: bool array [shape=(H, W)]."""
+    middle = mouth_region.CORNER[1] + mouth_region.HEIGHT / 2
+    x, y = _positions(scale)
+    return (x / MOUTH_AXES_PX[0]) ** 2 + ((y - middle) / MOUTH_AXES_PX[1]) ** 2 <= 1
+
+
+def cheek_light(mouths: NDArray[Any]) -> Array:
+    """Return the light on the face in mouth pictures: the mean red, green and blue of their corners [shape=(T, 3)].
+
+    mouths : [shape=(T, 56 · scale, 72 · scale, 3)], grey levels
+    Raises InputError: pictures of another size.
+    """
+    scale = mouths.shape[1] // mouth_region.HEIGHT if mouths.ndim == 4 else 0
+    required = (mouth_region.HEIGHT * scale, mouth_region.WIDTH * scale, 3)
+    if not scale or mouths.shape[1:] != required:
+        raise InputError(
+            f"pictures of shape {mouths.shape}, required (T, {mouth_region.HEIGHT} · n, {mouth_region.WIDTH} · n, 3)"
+        )
+    width, height = CHEEK_PX[0] * scale, CHEEK_PX[1] * scale
+    corners = [
+        mouths[:, rows, columns].mean(axis=(1, 2), dtype=np.float64)
+        for rows in (slice(height), slice(-height, None))
+        for columns in (slice(width), slice(-width, None))
+    ]
+    return np.mean(corners, axis=0)
+
+
+def relit(pictures: Pictures, gains: Array) -> Pictures:
+    """Return pictures [shape=(T, H, W, 3)] whose colours are multiplied [gains: shape=(T, 3)], rounded, cut to 255."""
+    levels = np.arange(256)
+    tables = np.clip(np.rint(levels * gains[..., None]), 0, 255).astype(np.uint8)
+    result = np.empty_like(pictures)
+    for frame, (picture, table) in enumerate(zip(pictures, tables, strict=True)):
+        for colour in range(3):
+            result[frame, :, :, colour] = table[colour][picture[:, :, colour]]
+    return result
+
+
+def _positions(scale: int) -> tuple[Array, Array]:
+    """Return x and y of every sample of a lower-face picture, px from the point between the eyes."""
+    rows, columns = np.mgrid[: HEIGHT * scale, : WIDTH * scale]
+    return (columns + 0.5) / scale + CORNER[0], (rows + 0.5) / scale + CORNER[1]

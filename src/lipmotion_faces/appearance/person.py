@@ -1,0 +1,318 @@
+"""The appearance of a person: what mouth and jaw look like, for any motion of the face, learned from footage."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion.motion.eigenlips import COMPONENTS, Eigenlips, enlarged, fit_eigenlips
+from lipmotion.stats.pca import evenly_spaced
+from lipmotion.types import Channel, Motion
+from lipmotion_faces.appearance.camera_noise import CameraNoise, estimate_noise
+from lipmotion_faces.appearance.candidates import (
+    CANDIDATES,
+    LARGEST_DETAIL,
+    Candidates,
+    choose_candidates,
+    drawn_to_recorded,
+    make_candidates,
+    recorded_details,
+    squared_distances,
+)
+from lipmotion_faces.appearance.lower_face import (
+    HEIGHT,
+    FaceShape,
+    cheek_light,
+    mouth_ellipse,
+    mouth_part,
+    relit,
+    replaced_part,
+)
+from lipmotion_faces.appearance.motion_map import LEAST_DEVIATION, MotionMap, channel_values, fit_motion_map
+from lipmotion_faces.appearance.refinement import RefinementOptions, Refiner
+
+Array = NDArray[np.float64]
+Values = NDArray[np.floating[Any]]
+Floats = NDArray[np.float32]
+Index = NDArray[np.intp]
+Pictures = NDArray[np.uint8]
+
+TRAINING_PICTURES = 980
+"""Pictures of which the principal components are computed. Source: Xie & Liu 2007, §5."""
+JAW_COMPONENTS = 12
+"""Principal components of the jaw, of each colour."""
+JAW_CANDIDATES = 120
+"""Recorded lower faces whose detail the jaw has."""
+JAW_OPTIONS = RefinementOptions(steadiness=0.3)
+PICTURES_PER_BLOCK = 256
+"""Pictures that are projected at a time."""
+EDGE_PX = 3
+"""The jaw's pictures are its own so far beyond the part that is replaced: cloning reads its edge."""
+LIP_DISTANCES = ("opening", "width", "outer")
+"""Channels in which the mixture of recorded mouths is to be like the motion."""
+DISTANCE_GAINS = np.array([1.0, 1.1, 1.0])
+"""How much further from their middle they are sought: trackers measure so much less width in the mixtures."""
+DISTANCE_WEIGHTS = np.array([800.0, 1600.0, 800.0])
+"""What one standard deviation of each among the candidates counts, beside the eigenlips, grey levels: the regression
+alone shows two thirds of the width's deviation (docs/results/video.md)."""
+LONGEST_CLOSURE_S = 0.3
+"""A closure that lasts no longer shows one recorded mouth; in pauses mouths are mixed, as they live on."""
+MOUTH_RIDGE = 1e-3
+"""Ridge of the regression of the jaw on the mouth, as a share of the variance of the mouth."""
+
+
+@dataclass(frozen=True, eq=False)
+class FootagePictures:
+    """Pictures of the lower face in footage of one person, with the motion and the sound of the same frames.
+
+    clips     : pictures of consecutive frames, clip by clip [each shape=(T, 128, 128, 3)], uint8
+    motion    : of all these frames in turn, in ``channels`` [shape=(N, C)]
+    levels_db : of the sound in these frames [shape=(N,)]
+    chin_px   : how far the tip of the chin is below the eyes in these frames, px of the face [shape=(N,)]
+    shape     : of the lower face
+    scale     : samples a pixel with which the footage loses nothing
+    finer     : returns the pictures of some frames with ``scale`` samples a pixel
+                [shape=(n, 128 · scale, 128 · scale, 3)]
+    """
+
+    clips: tuple[Pictures, ...]
+    motion: Array
+    channels: tuple[Channel, ...]
+    levels_db: Array
+    chin_px: Array
+    shape: FaceShape
+    scale: int
+    finer: Callable[[Index], Pictures]
+
+
+@dataclass(frozen=True, eq=False)
+class FaceCodes:
+    """What the lower face is like in every frame.
+
+    mouth   : eigenlips [shape=(T, 90)]
+    jaw     : components of the jaw [shape=(T, 3·K)]
+    chin_px : how far the tip of the chin is below the eyes, px of the face [shape=(T,)]
+    """
+
+    mouth: Floats
+    jaw: Floats
+    chin_px: Floats
+
+    def __len__(self) -> int:
+        return len(self.mouth)
+
+
+@dataclass(frozen=True, eq=False)
+class Appearance:
+    """The appearance of a person. All pictures are in one light.
+
+    shape       : of the lower face
+    scale       : samples a pixel
+    light       : mean red, green and blue of the cheeks [shape=(3,)], grey levels
+    mouth       : eigenlips of the mouth region, 72 × 56 px
+    mouths      : recorded mouths, the candidates of refinement [shape=(N, 56 · scale, 72 · scale, 3)], uint8
+    mouth_codes : their eigenlips [shape=(N, 90)]
+    mouth_distances : their ``LIP_DISTANCES``, eye distances [shape=(N, 3)]; None in files of before
+    jaw         : principal components of the lower face, 128 × 128 px, whose mouth is always the mean one
+    jaws        : recorded lower faces, the candidates of the jaw [shape=(M, 128 · scale, 128 · scale, 3)], uint8
+    jaw_codes   : their components [shape=(M, 3·K)]
+    from_motion : regression of eigenlips, components of the jaw and place of the chin on motion of tracked points
+    from_mouth  : regression of jaw and chin on 1 and the eigenlips [shape=(1 + 90, 3·K + 1)]
+    from_sound  : regression of jaw and chin on 1 and the level of the sound, dB [shape=(2, 3·K + 1)]
+    noise       : of the camera
+    Source: Xie & Liu 2007, §5 (eigenlips), §6.1 (candidates, noise), §6.2 (jaw). Deviation: the jaw has components,
+    too, so that it moves smoothly; the paper shows recorded ones.
+    """
+
+    shape: FaceShape
+    scale: int
+    light: Array
+    mouth: Eigenlips
+    mouths: Pictures
+    mouth_codes: Floats
+    mouth_distances: Array | None
+    jaw: Eigenlips
+    jaws: Pictures
+    jaw_codes: Floats
+    from_motion: MotionMap
+    from_mouth: Floats
+    from_sound: Floats
+    noise: CameraNoise
+
+    @cached_property
+    def mouth_candidates(self) -> Candidates:
+        """The recorded mouths as eigenlips and detail."""
+        return make_candidates(enlarged(self.mouth, self.scale), self.mouths, self.mouth_codes)
+
+    @cached_property
+    def jaw_candidates(self) -> Candidates:
+        """The recorded lower faces as components and detail."""
+        details, _ = recorded_details(enlarged(self.jaw, self.scale), self.jaws, self.jaw_codes)
+        return Candidates(self.jaw_codes, details)
+
+    def mouth_refiner(self, options: RefinementOptions) -> Refiner:
+        """Return what makes pictures of the mouth from eigenlips."""
+        return Refiner(enlarged(self.mouth, self.scale), self.mouth_candidates, options)
+
+    def jaw_refiner(self, options: RefinementOptions = JAW_OPTIONS) -> Refiner:
+        """Return what makes pictures of the lower face from components of the jaw."""
+        return Refiner(enlarged(self.jaw, self.scale), self.jaw_candidates, options)
+
+    def of_motion(self, motion: Motion, contact: Array | None = None) -> FaceCodes:
+        """Return the lower face for motion of tracked points.
+
+        contact : how near the lips are to touching, 0 to 1, at which they touch [shape=(T,)]; None: as they are mixed
+        Raises InputError: the motion has not the channels of ``from_motion``, or values that are not finite.
+        """
+        values = self.from_motion.predict(motion)
+        count = self.mouth_codes.shape[1]
+        mouth = self._recorded_mouths(values[:, :count], motion, contact)
+        return FaceCodes(mouth, values[:, count:-1], values[:, -1])
+
+    def _recorded_mouths(self, predicted: Floats, motion: Motion, contact: Array | None) -> Floats:
+        """Return mixtures of recorded mouths [shape=(T, 90)] that look as predicted and are as open and as wide as the
+        motion, as far as this person has been; in closures, recorded mouths that are closed.
+        """
+        measured = self.mouth_distances
+        if measured is None:
+            return drawn_to_recorded(predicted, self.mouth_codes)
+        middle = measured.mean(axis=0)
+        wanted = middle + DISTANCE_GAINS * (channel_values(motion, LIP_DISTANCES) - middle)
+        wanted = np.clip(wanted, measured.min(axis=0), measured.max(axis=0))
+        weights = DISTANCE_WEIGHTS / np.maximum(measured.std(axis=0), LEAST_DEVIATION)
+        sought, recorded = (
+            np.concatenate([codes, ((distances - middle) * weights).astype(np.float32)], axis=1)
+            for codes, distances in ((predicted, wanted), (self.mouth_codes, measured))
+        )
+        mouths = drawn_to_recorded(sought, recorded)[:, : predicted.shape[1]]
+        if contact is None:
+            return mouths
+        for first, stop in _closures(contact, motion.rate_hz):
+            closed = measured[:, 0] <= max(wanted[first:stop, 0].max(), measured[:, 0].min())
+            apart = squared_distances(sought[first:stop], recorded).mean(axis=0)
+            pressed = self.mouth_codes[np.argmin(np.where(closed, apart, np.inf))]
+            around = slice(max(first - 1, 0), stop + 1)
+            mouths[around] += contact[around, None].astype(np.float32) * (pressed - mouths[around])
+        return mouths
+
+    def of_mouths(self, mouths: Pictures) -> FaceCodes:
+        """Return the lower face for pictures of the mouth [shape=(T, 56, 72, 3)], uint8, in any light."""
+        codes = self.mouth.project(relit(mouths, self.light / np.maximum(cheek_light(mouths), 1.0)))
+        values = codes @ self.from_mouth[1:] + self.from_mouth[0]
+        return FaceCodes(codes, values[:, :-1], values[:, -1])
+
+    def with_jaw_of_sound(self, codes: FaceCodes, levels_db: Array) -> FaceCodes:
+        """Return the lower face with another jaw, for the level of the sound in each frame [shape=(T,)].
+
+        Source: Xie & Liu 2007, §6.2: the jaw goes down about in proportion to the energy of the sound.
+        """
+        values = (levels_db[:, None] * self.from_sound[1] + self.from_sound[0]).astype(np.float32)
+        return FaceCodes(codes.mouth, values[:, :-1], values[:, -1])
+
+
+def _closures(contact: Array, rate_hz: float) -> list[tuple[int, int]]:
+    """Return the closures of at most ``LONGEST_CLOSURE_S``: the first frame of each, and the one after its last."""
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], contact >= 1, [False]]))).reshape(-1, 2)
+    return [(first, stop) for first, stop in ends.tolist() if stop - first <= max(1, LONGEST_CLOSURE_S * rate_hz)]
+
+
+def learn_appearance(footage: FootagePictures) -> Appearance:
+    """Return the appearance of a person.
+
+    Raises InputError: no pictures, or motion of another number of frames.
+    Cost: about 10 s for four minutes of footage; 100 kB a frame.
+    """
+    pictures, light, reference = _in_one_light(footage)
+    mouths = pictures[(slice(None), *mouth_part(1))]
+    mouth = fit_eigenlips(mouths[evenly_spaced(TRAINING_PICTURES, len(mouths))], COMPONENTS)
+    codes = mouth.project(mouths)
+    around = pictures[evenly_spaced(TRAINING_PICTURES, len(pictures))].mean(axis=0, dtype=np.float32)
+    faces = _jaw_alone(pictures[evenly_spaced(TRAINING_PICTURES, len(pictures))], around, footage.shape)
+    jaw = fit_eigenlips(faces, JAW_COMPONENTS)
+    jaw_codes = np.concatenate(
+        [
+            jaw.project(_jaw_alone(pictures[start : start + PICTURES_PER_BLOCK], around, footage.shape))
+            for start in range(0, len(pictures), PICTURES_PER_BLOCK)
+        ]
+    )
+    chosen = _undamaged(mouth, mouths, codes, choose_candidates(codes, CANDIDATES))
+    chosen_jaws = choose_candidates(jaw_codes, JAW_CANDIDATES)
+    names = [channel.name for channel in footage.channels]
+
+    def recorded(frames: Index) -> Pictures:
+        if footage.scale == 1:
+            return pictures[frames]
+        return relit(footage.finer(frames), reference / light[frames])
+
+    chosen_faces = recorded(chosen_jaws)
+    jaw_and_chin = np.concatenate([jaw_codes, footage.chin_px[:, None]], axis=1)
+    ends = np.cumsum([len(clip) for clip in footage.clips])[:-1]
+    return Appearance(
+        footage.shape,
+        footage.scale,
+        reference,
+        mouth,
+        np.ascontiguousarray(recorded(chosen)[(slice(None), *mouth_part(footage.scale))]),
+        codes[chosen],
+        footage.motion[chosen][:, [names.index(name) for name in LIP_DISTANCES]],
+        jaw,
+        _jaw_alone(chosen_faces, chosen_faces.mean(axis=0, dtype=np.float32), footage.shape),
+        jaw_codes[chosen_jaws],
+        fit_motion_map(footage.motion, footage.channels, np.concatenate([codes, jaw_and_chin], axis=1)),
+        _regression(codes, jaw_and_chin),
+        _regression(footage.levels_db[:, None], jaw_and_chin),
+        estimate_noise(np.split(mouths, ends)),
+    )
+
+
+def _in_one_light(footage: FootagePictures) -> tuple[Pictures, Array, Array]:
+    """Return all pictures in the same light, their own light [shape=(N, 3)], and that light [shape=(3,)]."""
+    count = sum(len(clip) for clip in footage.clips)
+    if not count or len(footage.motion) != count or len(footage.levels_db) != count:
+        raise InputError(
+            f"{count} pictures, {len(footage.motion)} frames of motion and {len(footage.levels_db)} of sound; required "
+            "as many of each"
+        )
+    part = (slice(None), *mouth_part(1))
+    light = np.maximum(np.concatenate([cheek_light(clip[part]) for clip in footage.clips]), 1.0)
+    reference = np.median(light, axis=0)
+    pictures = np.empty((count, *footage.clips[0].shape[1:]), np.uint8)
+    start = 0
+    for clip in footage.clips:
+        inside = slice(start, start + len(clip))
+        pictures[inside] = relit(clip, reference / light[inside])
+        start += len(clip)
+    return pictures, light, reference
+
+
+def _jaw_alone(pictures: Pictures, mean: Floats, shape: FaceShape) -> Pictures:
+    """Return lower faces that differ in the jaw alone: mouth and surroundings are the mean ones [shape=(H, W, 3)]."""
+    from scipy.ndimage import binary_dilation
+
+    scale = pictures.shape[1] // HEIGHT
+    other = mouth_ellipse(scale) | ~binary_dilation(replaced_part(shape, scale), iterations=EDGE_PX * scale)
+    result = pictures.copy()
+    result[:, other] = np.rint(mean[other]).astype(np.uint8)
+    return result
+
+
+def _undamaged(space: Eigenlips, pictures: Pictures, codes: Floats, chosen: Index) -> Index:
+    """Return those of the chosen pictures that are like what their components restore: damaged video is not."""
+    whole = recorded_details(space, pictures[chosen], codes[chosen])[1] <= LARGEST_DETAIL
+    return chosen[whole] if whole.any() else chosen
+
+
+def _regression(inputs: Values, targets: Values) -> Floats:
+    """Return the coefficients of a ridge regression on 1 and the inputs [shape=(1 + F, V)]."""
+    centre, middle = inputs.mean(axis=0, dtype=np.float64), targets.mean(axis=0, dtype=np.float64)
+    x = inputs - centre
+    products = x.T @ x
+    products[np.diag_indices(len(products))] += MOUTH_RIDGE * np.trace(products) / len(products) + 1e-9
+    slopes = np.linalg.solve(products, x.T @ (targets - middle))
+    return np.concatenate([(middle - centre @ slopes)[None], slopes]).astype(np.float32)

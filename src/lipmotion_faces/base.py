@@ -1,0 +1,122 @@
+"""The interface of faces."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import cached_property
+from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.meshes.fitting.living_curves import alive as alive  # noqa: PLC0414 (part of this module's interface)
+from lipmotion.types import Motion, Prosody, Timeline, Unit
+from lipmotion.types.staging import SCENE as SCENE  # noqa: PLC0414 (part of this module's interface)
+from lipmotion.types.staging import SMALLEST_PX as SMALLEST_PX  # noqa: PLC0414 (part of this module's interface)
+from lipmotion.types.staging import TRANSPARENT as TRANSPARENT  # noqa: PLC0414 (part of this module's interface)
+from lipmotion.types.staging import Staging as Staging  # noqa: PLC0414 (part of this module's interface)
+
+PoseT = TypeVar("PoseT")
+Picture = NDArray[np.uint8]
+THREADS = 2
+"""Pictures that are drawn at the same time."""
+
+
+class Face(ABC):
+    """Draws motion as pictures. A subclass needs no arguments to be made.
+
+    An entry point of the group ``lipmotion.faces`` makes it known by a name, for ``lipmotion animate --face NAME``;
+    ``lipmotion.testing.check_face`` tests the contract.
+    """
+
+    @abstractmethod
+    def render(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> Iterator[NDArray[np.uint8]]:
+        """Return RGB frames [shape=(H, W, 3)] of even height and width; frame n shows the time ``n / fps`` seconds.
+
+        A face that is staged with a transparent background returns RGBA frames [shape=(H, W, 4)], with straight alpha.
+        The last frame is at or before the last frame of the motion. The same input gives the same pixels.
+        units : phones in time; may be empty
+        Raises InputError: a channel that the face needs is missing, values are not finite, or fps is not positive.
+        """
+
+
+class DrawnMotion(Generic[PoseT]):
+    """The pictures of a motion as a face draws them: all in order, or single ones.
+
+    poses   : of every frame
+    painter : returns what draws the picture of a pose; called when the first picture is asked for. Several threads use
+              what it returns
+    ahead   : pictures that are drawn before they are asked for, by ``THREADS`` threads
+    The same pose gives the same pixels, whatever was drawn before.
+    """
+
+    def __init__(
+        self, poses: Sequence[PoseT], painter: Callable[[], Callable[[PoseT], Picture]], ahead: int = 6
+    ) -> None:
+        self._poses, self._painter, self._ahead = poses, painter, ahead
+
+    def __len__(self) -> int:
+        return len(self._poses)
+
+    def picture(self, number: int) -> Picture:
+        """Return the picture of a frame [shape as of ``Face.render``]."""
+        return self._paint(self._poses[number])
+
+    def __iter__(self) -> Iterator[Picture]:
+        """Yield the pictures in order; they are drawn while earlier ones are used."""
+        waiting: deque[Future[Picture]] = deque()
+        with ThreadPoolExecutor(THREADS) as threads:
+            try:
+                for pose in self._poses:
+                    waiting.append(threads.submit(self._paint, pose))
+                    if len(waiting) > self._ahead:
+                        yield waiting.popleft().result()
+                while waiting:
+                    yield waiting.popleft().result()
+            finally:  # the pictures may not all have been asked for
+                for future in waiting:
+                    future.cancel()
+
+    @cached_property
+    def _paint(self) -> Callable[[PoseT], Picture]:
+        return self._painter()
+
+
+@runtime_checkable
+class DrawsSingly(Protocol):
+    """A face that can draw single pictures; a face has this ability if it has the method."""
+
+    def drawn(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> DrawnMotion[Any]:
+        """Return the pictures of ``Face.render``, each of which can be drawn alone. Raises as ``render``.
+
+        A face that is asked again, for other motion, does not paint again what does not move.
+        """
+
+
+@runtime_checkable
+class Stageable(Protocol):
+    """A face that can be staged; a face has this ability if it has the method."""
+
+    def staged(self, staging: Staging, prosody: Prosody | None = None) -> Face:
+        """Return the same face with other settings.
+
+        prosody : of the speech that will be rendered, for movements of brows and head; None: not known
+        """
+
+
+@runtime_checkable
+class DrawsPlanes(Protocol):
+    """A face that draws in the colours of video encoders, which takes less time; a face has this ability if it has the
+    method."""
+
+    def render_planes(
+        self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0
+    ) -> Iterator[NDArray[np.uint8]] | None:
+        """Return the frames of ``render`` as YUV 4:2:0 [shape=(H · 3 / 2, W)], or None where they are transparent.
+
+        Of each frame the brightness (Y) comes first [shape=(H, W)], then the colours U and V [shape=(H / 2, W / 2)]:
+        ITU-R BT.601, limited range. H and W are even.
+        """

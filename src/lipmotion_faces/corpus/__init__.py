@@ -1,0 +1,1 @@
+"""Corpora from videos: tracking, division of long recordings."""

@@ -1,0 +1,384 @@
+"""Preparation: ``prepare(recordings) → corpus``."""
+
+from __future__ import annotations
+
+import logging
+import shutil
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from lipmotion.corpora.discover import discover
+from lipmotion.corpora.entry import quantise, read_entry, write_utterance
+from lipmotion.corpora.separate_sounds import with_separate_sounds
+from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES, RecordingFolder, SourceRecording
+from lipmotion.corpora.store import UTTERANCES, Corpus
+from lipmotion.errors import AlignmentError, CorpusError, ExportError, InputError, MissingDependencyError
+from lipmotion.extensions import installed_version
+from lipmotion.pipeline.workers import process_count, worker_pool
+from lipmotion.speech.features.analysed_audio import analysed
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.storage.files import confined, locked, portable_name, remove_unfinished, sha256_of
+from lipmotion.storage.sources import Source, check_apart, is_folder
+from lipmotion.types import Item, Monitor, Progress, Track, Utterance, silent_monitor
+from lipmotion.units import check_words
+from lipmotion_faces.corpus.long_videos import DIVIDING_SHARE, VideoPart, single_video, with_long_videos_divided
+from lipmotion_faces.corpus.separate_sound import earlier_phones, in_step, separate_sound
+from lipmotion_faces.corpus.supplied_motion import DIGESTS, source_digests, supplied_phones, supplied_track
+from lipmotion_faces.tracking.frames import VideoSpan
+from lipmotion_faces.tracking.track import track
+from lipmotion_faces.tracking.trackers import MEDIAPIPE, tracker_named
+
+LOG = logging.getLogger("lipmotion")
+RECIPE = "5"
+"""Version of the preparation, increased when the same video gives other values; older utterances are then replaced."""
+NAMED_UTTERANCES = 5
+"""Utterances that a warning names."""
+_STAGE = "preparing recordings"
+"""Name of the stage in reports of progress."""
+
+
+@dataclass(frozen=True)
+class PrepareReport:
+    """Report of a preparation.
+
+    corpus   : folder of the corpus
+    kind     : layout in which the recordings were read
+    prepared : names of the utterances that were prepared
+    kept     : names of the utterances that were prepared before, from the same source with the same settings
+    failed   : reason for every recording that cannot be used, by name
+    unseen   : number of frames without a face of every utterance that has any, by name
+    seconds  : duration of the preparation
+    notes    : remarks on videos (cuts, damage, a covered mouth), by name
+    """
+
+    corpus: Path
+    kind: str
+    prepared: tuple[str, ...]
+    kept: tuple[str, ...]
+    failed: dict[str, str]
+    unseen: dict[str, int]
+    seconds: float
+    notes: dict[str, tuple[str, ...]] = field(default_factory=dict)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many recordings were prepared, kept and skipped."""
+        return {"prepared": len(self.prepared), "kept": len(self.kept), "skipped": len(self.failed)}
+
+    def __str__(self) -> str:
+        counts = ", ".join(f"{count} {outcome}" for outcome, count in self.counts.items())
+        return f"{self.corpus}: {counts} ({self.kind})"
+
+
+@dataclass(frozen=True)
+class _Job:
+    """One recording, the folder of its utterance, its source and the settings of the preparation.
+
+    tracker : name of the tracker
+    part : the part of a long video that it is; None: it is a whole file
+    """
+
+    recording: SourceRecording
+    folder: Path
+    source: dict[str, str]
+    settings: dict[str, str]
+    tracker: str
+    part: VideoPart | None = None
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    """Outcome of the preparation of one recording; ``problem`` is empty if it succeeded."""
+
+    name: str
+    kept: bool = False
+    unseen: int = 0
+    problem: str = ""
+    notes: tuple[str, ...] = ()
+
+
+def prepare(
+    directory: str | Path,
+    output: str | Path,
+    *,
+    workers: int | None = None,
+    crops: bool = True,
+    offset_ms: float | None = None,
+    tracker: str = MEDIAPIPE,
+    monitor: Monitor = silent_monitor,
+) -> PrepareReport:
+    """Create a corpus from recordings, or add the recordings to a corpus; return a report.
+
+    directory : folder in the layout of a published corpus (recipes/), or any folder of videos, or of sounds with
+                motion (docs/corpora.md); or one video. Videos of more than half a minute are divided into utterances
+    output    : folder of the corpus; utterances that are up to date are kept, so that a stopped preparation continues
+    workers   : number of processes; None: one for each core. With more than one, a script must be guarded by
+                ``if __name__ == "__main__":``
+    crops     : store the mouth pictures, which eigenlips need
+    offset_ms : by how much the sound of every recording is late against its motion; None: it is in step, or a
+                recorder's sound beside it (``take.recorder.wav``) says it. ``offsets.csv`` in the folder goes before
+    tracker   : name of the tracker that finds faces in videos (docs/corpora.md)
+    monitor   : called with reports of progress, and with the outcome of every recording
+    Recordings that cannot be used are reported and left out. The corpus depends neither on ``workers`` nor on
+    interruptions.
+    Raises InputError, CorpusError: no recordings, none that can be used, or ``output`` is not a corpus; no tracker of
+    that name.
+    Raises MissingDependencyError: there are videos, and MediaPipe, or what another tracker needs, is not installed.
+    Raises ExportError: the disk is full, or another process is preparing the same corpus.
+
+    >>> import lipmotion
+    >>> lipmotion.prepare("my-recordings", "my-corpus").counts  # doctest: +SKIP
+    {'prepared': 12, 'kept': 0, 'skipped': 0}
+    """
+    directory, output = Path(directory), Path(output)
+    start_s = time.monotonic()
+    processes = process_count(workers)
+    check_apart((), [Source(directory, "folder of recordings")], folders=[output])
+    folder, place = _found(directory)
+    offset_s = None if offset_ms is None else offset_ms / 1000
+    folder = with_separate_sounds(folder, place, offset_s, is_whole=directory.is_dir())
+    chosen = tracker_named(tracker)
+    packages = chosen.versions() if any(item.motion_file is None for item in folder.recordings) else {}
+    is_new = not is_folder(output)
+    with locked(output):
+        corpus = Corpus.create(output)
+        folder, parts = with_long_videos_divided(folder, place, monitor, tracker)
+        jobs = [
+            _job(item, place.resolve(), corpus, tracker, packages, crops, parts.get(item.name))
+            for item in folder.recordings
+        ]
+        with _refreshed(corpus), worker_pool(min(processes, len(jobs))) as team:
+            outcomes = _collected(
+                folder, team.unordered_map(_process, jobs), len(jobs), monitor, DIVIDING_SHARE if parts else 0.0
+            )
+        _warn_of_older(corpus, _collection(place.resolve()), outcomes)
+    report = _report(corpus, folder, outcomes, time.monotonic() - start_s)
+    if not report.prepared and not report.kept:
+        if is_new:
+            shutil.rmtree(output)
+        name, reason = next(iter(report.failed.items()))
+        raise CorpusError(
+            f"{directory}: none of {len(report.failed)} recordings is usable; the first, {name}: {reason}"
+        )
+    return report
+
+
+def _found(path: Path) -> tuple[RecordingFolder, Path]:
+    """Return the recordings in a folder, or the one video that is given; and the folder that they are in."""
+    if path.is_file() and path.suffix.lower() in VIDEO_SUFFIXES:
+        return single_video(path), path.parent
+    return discover(path), path
+
+
+def _report(corpus: Corpus, folder: RecordingFolder, outcomes: list[_Outcome], seconds: float) -> PrepareReport:
+    outcomes = sorted(outcomes, key=lambda outcome: outcome.name)
+    good = [outcome for outcome in outcomes if not outcome.problem]
+    problems = folder.problems | {outcome.name: outcome.problem for outcome in outcomes if outcome.problem}
+    return PrepareReport(
+        corpus=corpus.path,
+        kind=folder.kind,
+        prepared=tuple(outcome.name for outcome in good if not outcome.kept),
+        kept=tuple(outcome.name for outcome in good if outcome.kept),
+        failed=dict(sorted(problems.items())),
+        unseen={outcome.name: outcome.unseen for outcome in good if outcome.unseen},
+        seconds=seconds,
+        notes={outcome.name: outcome.notes for outcome in good if outcome.notes},
+    )
+
+
+def _job(
+    recording: SourceRecording,
+    directory: Path,
+    corpus: Corpus,
+    tracker: str,
+    packages: dict[str, str],
+    crops: bool,
+    part: VideoPart | None,
+) -> _Job:
+    collection = _collection(directory)
+    name = portable_name(recording.name)
+    if _is_taken(corpus.folder(name), recording.file, collection):
+        name = f"{collection.replace('/', '-')}-{name}"
+    if recording.motion_file is None:
+        settings = {"tracker": f"{tracker} {packages[tracker]}", "crops": "yes" if crops else "no"}
+    else:
+        settings, packages = {"tracker": "none: motion was given"}, {"av": metadata.version("av")}
+    settings["recipe"] = RECIPE
+    if recording.offset_s is not None:
+        settings["sound"] = f"{recording.offset_s * 1000:.3f} ms late, as given"
+    source = {
+        "collection": collection,
+        "file": recording.file.name,
+        "lipmotion": installed_version(),
+        **packages,
+        **recording.rights,
+    }
+    if recording.end_s is not None:
+        source |= {"start_s": f"{recording.start_s:.3f}", "end_s": f"{recording.end_s:.3f}"}
+        settings["part"] = f"{recording.start_s:.3f} to {recording.end_s:.3f} s"
+    return _Job(replace(recording, name=name), corpus.folder(name), source, settings, tracker, part)
+
+
+def _collection(directory: Path) -> str:
+    """Return the name of a folder of recordings in the sources of their utterances: its last two names."""
+    return "/".join(directory.parts[-2:]).strip("/")
+
+
+def _warn_of_older(corpus: Corpus, collection: str, outcomes: list[_Outcome]) -> None:
+    """Log a warning if the corpus holds utterances of recordings that are gone, or that cannot be used any longer."""
+    good = {outcome.name for outcome in outcomes if not outcome.problem}
+    older = [name for name in corpus.names() if name not in good and _is_of(corpus.folder(name), collection)]
+    if older:
+        shown = ", ".join(older[:NAMED_UTTERANCES]) + (", ..." if len(older) > NAMED_UTTERANCES else "")
+        LOG.warning(
+            "%s: %d utterances are from recordings that are no longer there, or cannot be used any longer: %s; to do "
+            "without them, delete their folders and prepare again",
+            corpus.path / UTTERANCES,
+            len(older),
+            shown,
+        )
+
+
+def _is_of(folder: Path, collection: str) -> bool:
+    """Return whether a folder holds an utterance of a collection."""
+    with suppress(CorpusError):
+        return bool(read_entry(folder).get("source", {}).get("collection") == collection)
+    return False
+
+
+def _is_taken(folder: Path, video: Path, collection: str) -> bool:
+    """Return whether a folder holds an utterance of another recording (speakers of GRID share file names)."""
+    try:
+        source = read_entry(folder).get("source", {})
+    except CorpusError:
+        return False
+    return source.get("collection") != collection and source.get("sha256") != _digest(video)
+
+
+def _process(job: _Job) -> _Outcome:
+    """Prepare one recording, unless its utterance is up to date; return the outcome."""
+    name = job.recording.name
+    try:
+        sound = job.recording.file
+        source = (
+            job.source | {"sha256": _digest(sound), "bytes": str(sound.stat().st_size)} | source_digests(job.recording)
+        )
+        entry = _up_to_date(job, source)
+        if entry is not None:
+            return _Outcome(name, kept=True, unseen=int(entry["unseen_frames"]), notes=tuple(entry.get("notes", ())))
+        utterance = _utterance(job, source)
+        with confined(job.folder.parent.parent):  # the corpus, in this worker
+            write_utterance(job.folder, utterance, job.settings)
+    except (MissingDependencyError, ExportError):
+        raise  # all other recordings would fail in the same way
+    except (InputError, AlignmentError) as error:
+        return _Outcome(name, problem=str(error))
+    except Exception as error:  # one damaged file must not stop the others
+        return _Outcome(name, problem=f"{job.recording.file}: {type(error).__name__}: {error}")
+    return _Outcome(name, unseen=int((~utterance.track.seen).sum()), notes=utterance.track.notes)
+
+
+def _digest(path: Path) -> str:
+    """Return the SHA-256 digest of a file; the parts of a long video share one, which is computed once a process."""
+    status = path.stat()
+    return _digest_of_content(path, status.st_size, status.st_mtime_ns)
+
+
+@lru_cache(maxsize=16)
+def _digest_of_content(path: Path, _size: int, _changed_ns: int) -> str:
+    return sha256_of(path)
+
+
+def _up_to_date(job: _Job, source: dict[str, str]) -> dict[str, Any] | None:
+    """Return the description of the utterance if it is up to date, or None."""
+    try:
+        entry = read_entry(job.folder)
+    except CorpusError:
+        return None
+    words = None if job.recording.words is None else list(job.recording.words)
+    digests = [source.get(key) for key in DIGESTS]
+    required = (digests, words, job.recording.split, job.recording.speaker, job.settings)
+    stored_digests = [entry["source"].get(key) for key in DIGESTS]
+    stored = (stored_digests, entry["words"], entry["split"], entry.get("speaker", ""), entry["settings"])
+    return entry if stored == required else None
+
+
+def _utterance(job: _Job, source: dict[str, str]) -> Utterance:
+    recording = job.recording
+    separate = None if job.part else separate_sound(recording)
+    if separate is None:
+        audio = job.part.sound if job.part else read_audio(recording.file)
+        found = _track(job, audio.duration_s)
+    else:
+        own_s = None if recording.recorder is None else read_audio(recording.file, warn=False).duration_s
+        audio, found, begin_s = in_step(separate, _track(job, own_s))
+        labelled_s = begin_s if recording.recorder is not None else begin_s + separate.late_s
+        recording = replace(recording, phones=earlier_phones(recording.phones, labelled_s))
+        source = source | {"sound_late_ms": f"{separate.late_s * 1000:.3f}", "sound_found_by": separate.how}
+    audio = quantise(audio)
+    check_words(recording.words or (), audio.duration_s)
+    return Utterance(
+        name=recording.name,
+        audio=audio,
+        features=analysed(audio).mfcc(),
+        track=found,
+        words=recording.words,
+        split=recording.split,
+        source=source,
+        speaker=recording.speaker,
+        phones=supplied_phones(recording, audio.duration_s),
+    )
+
+
+def _track(job: _Job, duration_s: float | None) -> Track:
+    if job.recording.motion_file is not None:
+        return supplied_track(job.recording.motion_file, duration_s)
+    recording, crops = job.recording, job.settings["crops"] == "yes"
+    if job.part is None or recording.end_s is None:
+        return track(recording.file, crops=crops, tracker=job.tracker)
+    span = VideoSpan(recording.start_s, recording.end_s)
+    return track(recording.file, crops=crops, span=span, person=job.part.person, tracker=job.tracker)
+
+
+def _collected(
+    folder: RecordingFolder, outcomes: Iterator[_Outcome], count: int, monitor: Monitor, done: float
+) -> list[_Outcome]:
+    """Return all outcomes; each is reported to the monitor as soon as it is known.
+
+    done : the share of the whole work that was done before
+    """
+    for name, problem in folder.problems.items():
+        monitor(Item(name, "skipped", problem))
+    collected: list[_Outcome] = []
+    monitor(Progress(_STAGE, 0, count, done))
+    for outcome in outcomes:
+        collected.append(outcome)
+        kind = "skipped" if outcome.problem else "kept" if outcome.kept else "prepared"
+        unseen = (f"no face in {outcome.unseen} frames, interpolated",) if outcome.unseen else ()
+        monitor(Item(outcome.name, kind, outcome.problem or "; ".join((*outcome.notes, *unseen))))
+        monitor(Progress(_STAGE, len(collected), count, done + (1 - done) * len(collected) / count))
+    return collected
+
+
+@contextmanager
+def _refreshed(corpus: Corpus) -> Iterator[None]:
+    """At the end of the block, also after an error, list the finished utterances and remove unfinished ones."""
+    try:
+        yield
+    except ExportError as error:
+        with suppress(ExportError):
+            corpus.refresh()
+        raise ExportError(f"{error}; {len(corpus)} utterances are finished and kept") from error
+    except BaseException:
+        corpus.refresh()
+        raise
+    else:
+        corpus.refresh()
+    finally:
+        remove_unfinished(corpus.path / UTTERANCES)

@@ -1,0 +1,323 @@
+"""The background sequence: which part of the footage it is, and in which order its frames are shown."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from itertools import chain, pairwise
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.motion.mouth_region import CORNER, EYE_DISTANCE_PX, HEIGHT
+from lipmotion.stats.pca import evenly_spaced
+from lipmotion.storage.coded_video import encode_video
+from lipmotion.storage.frame_groups import FrameGroups
+from lipmotion_faces.appearance.frame_descriptors import FrameDescriptors, describe_frames, row_distances
+from lipmotion_faces.appearance.identity import SAME_PERSON_LIKENESS, face_signature, likeness
+from lipmotion_faces.appearance.looping import JUMP_LIMIT, LoopOrder, fade_frames, loop_order, scenes_of
+from lipmotion_faces.appearance.lower_face import HEIGHT as REGION_HEIGHT
+from lipmotion_faces.appearance.lower_face import WIDTH as REGION_WIDTH
+from lipmotion_faces.appearance.lower_face import region_map
+from lipmotion_faces.appearance.person import Appearance
+from lipmotion_faces.appearance.placing import cut, feather, inverse_map
+from lipmotion_faces.filmed.face import StoredBackground
+from lipmotion_faces.filmed.renderer import Background
+from lipmotion_faces.tracking.footage import Footage, footage_frames, footage_groups, track_footage
+from lipmotion_faces.tracking.frames import WHOLE, VideoSpan
+from lipmotion_faces.tracking.steadying import REGISTERED_NOISE_PX, registered_maps, steady_maps
+
+LOG = logging.getLogger("lipmotion")
+
+MOST_BACKGROUND_S, MOST_PART_S = 20.0, 10.0
+"""Longest background that is kept in the file of a face, and the longest part of it."""
+HEAD_PX = -75.0, -80.0, 75.0, 150.0
+"""Left, top, right and bottom of a head, px of the face, from the point between the eyes."""
+CHIN = "y_152"
+"""The tip of the chin."""
+SMOOTHING_FRAMES = 0.7
+"""Standard deviation of the smoothing of its place, frames: the tracker trembles."""
+ALIGNED_PX = -125.0, -135.0, 125.0, 155.0
+"""The part around a head in which heads are laid upon one another where one frame fades into another."""
+ALIGNED_EDGE_PX = 25.0
+"""Width of the edge of that part."""
+MOST_PARTS = 24
+"""Parts of the footage that are tried as backgrounds."""
+COMPARED_STEP = 3
+"""Every so many frames of them are compared."""
+SHOWN_S = 60.0
+"""How long they are shown then."""
+SHORT_S, SHORT_COST = 3.0, 2.0
+"""A part that is shorter costs so much more, in proportion to what is missing: it would repeat too soon."""
+COMPARED_SHARE = 0.9
+"""A part of this share of ``SHORT_S`` is still compared."""
+MOST_TRACKED_S = 120.0
+"""Seconds of a video that are used as a background."""
+LONGEST_GAP_S = 0.2
+"""Where the face is not seen for so short a time, as where pictures were dropped, its interpolated place will do."""
+
+
+@dataclass(frozen=True, eq=False)
+class BackgroundSequence:
+    """Footage that can be shown for any length.
+
+    groups        : returns access to its frames, in any order
+    rate_hz       : frames a second
+    face_to_frame : affine maps from px of the face to px of the frame [shape=(T, 2, 3)]
+    chin_px       : how far the tip of the chin is below the eyes, px of the face [shape=(T,)]
+    usable        : frames in which the face is seen [shape=(T,)]
+    cuts          : frames before which the camera changes
+    in_time       : whether it is the video of the speech, so that every frame is shown at its own time, also those
+                    without a face, and the last one stays
+    """
+
+    groups: Callable[[], FrameGroups]
+    rate_hz: float
+    face_to_frame: NDArray[np.float64]
+    chin_px: NDArray[np.float64]
+    usable: NDArray[np.bool_]
+    cuts: tuple[int, ...] = ()
+    in_time: bool = False
+
+    @property
+    def face_box(self) -> tuple[float, float, float, float]:
+        """The part of the frames in which the face is at any time: left, top, right and bottom, px."""
+        corners = np.array([[x, y, 1.0] for x in HEAD_PX[::2] for y in HEAD_PX[1::2]])
+        places = (self.face_to_frame @ corners.T).swapaxes(1, 2).reshape(-1, 2)
+        least, most = places.min(axis=0), places.max(axis=0)
+        return float(least[0]), float(least[1]), float(most[0]), float(most[1])
+
+    def enlarged(self, zoom: float) -> BackgroundSequence:
+        """Return the same background, on which a mouth is ``zoom`` times as large, in the same place."""
+        middle = np.array([0.0, CORNER[1] + HEIGHT / 2])
+        maps = self.face_to_frame.copy()
+        maps[:, :, 2] += maps[:, :, :2] @ middle * (1 - zoom)
+        maps[:, :, :2] *= zoom
+        return replace(self, face_to_frame=maps)
+
+    def frames(self, count: int, rate_hz: float) -> Iterator[Background]:
+        """Yield ``count`` frames at a rate, in ``order``."""
+        groups = self.groups()
+        shown = np.floor(np.arange(count) * (self.rate_hz / rate_hz) + 0.5).astype(int)
+        order = self.order(groups, int(shown[-1]) + 1)
+        for first, second, weight in zip(order.first[shown], order.second[shown], order.weight[shown], strict=True):
+            one, other = (self._frame(groups, int(number)) for number in (first, second))
+            yield one if weight == 0 else _mixed(one, other, float(weight))
+
+    def order(self, groups: FrameGroups, count: int) -> LoopOrder:
+        """Return which frames are shown, at the background's own rate.
+
+        They are the first ones, if these are as many and show the face without a cut; others are in ``loop_order``,
+        which shows no frame without a face.
+        """
+        total = len(self.chin_px)
+        is_whole = count <= total and self.usable[:count].all() and not any(0 < cut < count for cut in self.cuts)
+        if self.in_time or is_whole:
+            shown = np.minimum(np.arange(count), total - 1)
+            return LoopOrder(shown, shown, np.zeros(count), ())
+        descriptors = describe_frames((groups.frame(number) for number in range(total)), self.face_to_frame)
+        return loop_order(descriptors, count, self.rate_hz, usable=self.usable, cuts=self.cuts)
+
+    def _frame(self, groups: FrameGroups, number: int) -> Background:
+        frame = groups.frame(number)
+        height, width = (length // 2 * 2 for length in frame.shape[:2])
+        place, chin_px = self.face_to_frame[number], float(self.chin_px[number])
+        return Background(frame[:height, :width], place, chin_px, bool(self.usable[number]))
+
+
+def best_background(footages: Sequence[Footage]) -> StoredBackground:
+    """Return the parts of some footage that can be shown one after the other with the least visible joins.
+
+    ``MOST_PARTS`` parts of one size, spread evenly, are compared. They last at most ``MOST_PART_S``, show the face in
+    all frames, and have no cut. Parts much shorter than ``SHORT_S`` are compared only if there are no longer ones. The
+    first is the one that could best be shown alone for a minute; each next one has a frame that is most like one of
+    those before, up to ``MOST_BACKGROUND_S`` and as long as jumps lead there.
+    """
+    chosen = _joined(_compared(footages))
+    height, width = (length // 2 * 2 for length in chosen[0][0].size)
+    frames = (frame[:height, :width] for part in chosen for frame in footage_frames(*part))
+    video = encode_video(frames, chosen[0][0].rate_hz)
+    maps, chins = (
+        np.concatenate([of(footage)[start:stop] for footage, start, stop in chosen]) for of in (placed_maps, chin_px)
+    )
+    return StoredBackground(video, maps, chins, tuple(start for start, _ in _spans(chosen)[1:]))
+
+
+_Part = tuple[Footage, int, int]
+
+
+def _compared(footages: Sequence[Footage]) -> list[_Part]:
+    """Return the parts that are compared."""
+    parts = _of_one_size([part for footage in footages for part in _parts(footage)])
+    least_s = COMPARED_SHARE * min(SHORT_S, max(map(_duration_s, parts)))
+    parts = [part for part in parts if _duration_s(part) >= least_s]
+    return [parts[number] for number in evenly_spaced(MOST_PARTS, len(parts))]
+
+
+def _of_one_size(parts: Sequence[_Part]) -> list[_Part]:
+    """Return the parts whose pictures have the size and rate of most of the footage."""
+
+    def kind(part: _Part) -> tuple[tuple[int, int], float]:
+        return part[0].size, part[0].rate_hz
+
+    lengths = {each: sum(_duration_s(part) for part in parts if kind(part) == each) for each in map(kind, parts)}
+    longest = max(lengths, key=lambda each: lengths[each])
+    return [part for part in parts if kind(part) == longest]
+
+
+def _spans(parts: Sequence[_Part]) -> list[tuple[int, int]]:
+    """Return the first frame of each part, and the one after its last, where they follow one another."""
+    return list(pairwise(np.cumsum([0, *(stop - start for _, start, stop in parts)]).tolist()))
+
+
+def _joined(parts: Sequence[_Part]) -> list[_Part]:
+    """Return the parts that are shown, the best one first."""
+    rate_hz, scenes = parts[0][0].rate_hz, _spans(parts)
+    shown = chain.from_iterable(footage_frames(*part) for part in parts)
+    maps = np.concatenate([footage.face_to_image[start:stop] for footage, start, stop in parts])
+    descriptors = describe_frames(shown, maps)
+    blemishes = [_blemish(descriptors.part(*scene), rate_hz) for scene in scenes]
+    part_of = np.repeat(np.arange(len(parts)), [stop - start for start, stop in scenes])[::COMPARED_STEP]
+    distances = row_distances(descriptors.standardised(scenes, fade_frames(rate_hz))[::COMPARED_STEP])
+    chosen = [int(np.argmin(blemishes))]
+    while True:
+        nearest = distances[np.isin(part_of, chosen)].min(axis=0)
+        left_s = MOST_BACKGROUND_S - sum(_duration_s(parts[number]) for number in chosen)
+        apart = {
+            number: float(nearest[part_of == number].min())
+            for number in range(len(parts))
+            if number not in chosen and _duration_s(parts[number]) <= left_s
+        }
+        best = min(apart, key=lambda number: apart[number], default=-1)
+        if best < 0 or apart[best] > JUMP_LIMIT:
+            return [parts[number] for number in chosen]
+        chosen.append(best)
+
+
+def _parts(footage: Footage) -> list[_Part]:
+    """Return the parts of some footage that show the face without a cut: first frame, and the one after the last."""
+    longest = max(1, round(MOST_PART_S * footage.rate_hz))
+    parts = []
+    for first, last in scenes_of(_usable(footage), footage.cuts):
+        count = -(-(last - first) // longest)
+        ends = np.linspace(first, last, count + 1).astype(int).tolist()
+        parts += [(footage, start, stop) for start, stop in pairwise(ends)]
+    return parts
+
+
+def _duration_s(part: _Part) -> float:
+    footage, start, stop = part
+    return (stop - start) / footage.rate_hz
+
+
+def _usable(footage: Footage) -> NDArray[np.bool_]:
+    """Return the frames that show the face, and those of gaps of at most ``LONGEST_GAP_S`` [shape=(T,)]."""
+    usable = np.array(footage.track.seen)
+    for start, stop in scenes_of(~usable, ()):
+        if start > 0 and stop < len(usable) and stop - start <= LONGEST_GAP_S * footage.rate_hz:
+            usable[start:stop] = True
+    return usable
+
+
+def _blemish(descriptors: FrameDescriptors, rate_hz: float) -> float:
+    """Return how visible the worst join is if a part is shown for a minute; short ones are worse."""
+    order = loop_order(descriptors, round(SHOWN_S * rate_hz), rate_hz)
+    worst = max((join.cost for join in order.joins), default=0.0)
+    return worst + SHORT_COST * max(0.0, 1 - len(descriptors) / rate_hz / SHORT_S)
+
+
+def stored_sequence(background: StoredBackground) -> BackgroundSequence:
+    """Return the background in the file of a face."""
+    video = background.video
+    usable = np.ones(len(video), bool)
+    maps, chins = background.face_to_frame, background.chin_px
+    return BackgroundSequence(video.groups, video.rate_hz, maps, chins, usable, background.cuts)
+
+
+def open_background(path: Path, appearance: Appearance | None = None, *, in_time: bool = False) -> BackgroundSequence:
+    """Return a video as a background.
+
+    appearance : of the person who should be in it: somebody else is warned about; None: it may be anybody
+    in_time : as of ``BackgroundSequence``: all of the video is used; False: at most ``MOST_TRACKED_S`` of it
+    Raises InputError: no video, or no face in it.
+    """
+    footage = track_footage(path, WHOLE if in_time else VideoSpan(0.0, MOST_TRACKED_S))
+    if appearance is not None:
+        _warn_of_somebody_else(footage, appearance)
+    groups, maps = partial(footage_groups, footage), placed_maps(footage)
+    return BackgroundSequence(groups, footage.rate_hz, maps, chin_px(footage), _usable(footage), footage.cuts, in_time)
+
+
+def _warn_of_somebody_else(footage: Footage, appearance: Appearance) -> None:
+    frame = int(np.flatnonzero(footage.track.seen)[0])
+    shown = next(footage_frames(footage, frame, frame + 1))
+    picture = cut(shown, region_map(footage.face_to_image[frame], 1), (REGION_HEIGHT, REGION_WIDTH))
+    recorded = appearance.jaw.mean.T.reshape(REGION_HEIGHT, REGION_WIDTH, 3)
+    found = likeness(face_signature(picture), face_signature(recorded))
+    if found < SAME_PERSON_LIKENESS:
+        LOG.warning(
+            "%s: seems to show somebody else than the face (likeness %.2f, of one person at least %.2f); give "
+            "footage of the same person",
+            footage.path,
+            found,
+            SAME_PERSON_LIKENESS,
+        )
+
+
+def chin_px(footage: Footage) -> NDArray[np.float64]:
+    """Return how far the tip of the chin is below the eyes in every frame, px of the face [shape=(T,)]."""
+    from scipy.ndimage import gaussian_filter1d
+
+    return -EYE_DISTANCE_PX * gaussian_filter1d(np.asarray(footage.track.motion[CHIN], np.float64), SMOOTHING_FRAMES)
+
+
+def placed_maps(footage: Footage) -> NDArray[np.float64]:
+    """Return where the face is in every frame of some footage, without the noise of tracking [shape=(T, 2, 3)]."""
+    return steady_maps(registered_maps(footage), footage.rate_hz, footage.cuts, noise_px=REGISTERED_NOISE_PX)
+
+
+def _mixed(one: Background, other: Background, weight: float) -> Background:
+    """Return a frame between two, of which the second has some weight; its head is at a place between theirs."""
+    share = round(256 * weight)
+    levels = np.uint16(256 - share) * one.frame + np.uint16(share) * other.frame
+    frame = ((levels + np.uint16(128)) >> np.uint16(8)).astype(np.uint8)
+    between = (1 - weight) * one.face_to_frame + weight * other.face_to_frame
+    has_face = one.has_face and other.has_face
+    if has_face:
+        rows, columns, edge = _aligned_part(between, frame.shape)
+        corner = np.array([columns.start, rows.start]) + 0.5
+        back = inverse_map(between)
+        heads = []
+        for each in (one, other):
+            turn = each.face_to_frame[:, :2] @ back[:, :2]
+            start = turn @ corner + each.face_to_frame[:, :2] @ back[:, 2] + each.face_to_frame[:, 2] - 0.5
+            heads.append(cut(each.frame, np.column_stack([turn, start]), edge.shape))
+        part = frame[rows, columns]
+        aligned = heads[0] + np.float32(weight) * (heads[1] - heads[0])
+        part[...] = np.clip(np.rint(part + edge[..., None] * (aligned - part)), 0, 255)
+    return Background(frame, between, (1 - weight) * one.chin_px + weight * other.chin_px, has_face)
+
+
+def _aligned_part(
+    face_to_frame: NDArray[np.float64], shape: tuple[int, ...]
+) -> tuple[slice, slice, NDArray[np.float32]]:
+    """Return the rows and columns of ``ALIGNED_PX`` in a frame, and the weights of their pixels [shape=(h, w)]."""
+    scale = max(1, round(4 * float(np.sqrt(abs(np.linalg.det(face_to_frame[:, :2])))))) / 4
+    edge = _aligned_edge(scale)
+    left, top = (round(at + scale * by) for at, by in zip(face_to_frame[:, 2].tolist(), ALIGNED_PX[:2], strict=True))
+    rows, columns = (
+        slice(min(max(first, 0), length), min(max(first + wide, 0), length))
+        for first, wide, length in ((top, edge.shape[0], shape[0]), (left, edge.shape[1], shape[1]))
+    )
+    return rows, columns, edge[rows.start - top : rows.stop - top, columns.start - left : columns.stop - left]
+
+
+@cache
+def _aligned_edge(scale: float) -> NDArray[np.float32]:
+    """Return the weights of ``ALIGNED_PX`` with some samples a px of the face [shape=(h, w)]."""
+    left, top, right, bottom = ALIGNED_PX
+    height, width = round((bottom - top) * scale), round((right - left) * scale)
+    return feather(np.ones((height, width), bool), max(1.0, ALIGNED_EDGE_PX * scale))

@@ -1,0 +1,336 @@
+"""Video of a filmed face: generated motion, stitched into footage of the person."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.articulation.contact import FULL_DEFICIT_GAP, closed_lips, gap_in, in_pictures, opening_of
+from lipmotion.errors import InputError
+from lipmotion.kernels.threads import one_thread
+from lipmotion.motion.eigenlips import Eigenlips
+from lipmotion.pipeline.job import Mark
+from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.outputs.output import FILM, FilmOptions
+from lipmotion.speech.sound.pauses import levels_db_at
+from lipmotion.storage.files import check_source
+from lipmotion.storage.media import has_video
+from lipmotion.types import GREY, Audio, Monitor, Motion, Timeline, Unit, silent_monitor
+from lipmotion.types.progress import with_reports
+from lipmotion_faces.appearance.person import FaceCodes
+from lipmotion_faces.appearance.placing import cut
+from lipmotion_faces.film.background import BackgroundSequence, open_background, stored_sequence
+from lipmotion_faces.filmed.face import FilmedFace
+from lipmotion_faces.filmed.renderer import AS_PRINTED, BATCH, STITCHING, Stitcher, StitchingOptions
+from lipmotion_faces.tracking.footage import untracked_frames
+from lipmotion_faces.video.mp4 import write_mp4
+from lipmotion_faces.video.synthetic_mark import mark_frames, mark_metadata
+
+Frame = NDArray[np.uint8]
+
+WIDTH_SHARE, HEIGHT_SHARE = 0.33, 0.4
+"""Largest width and height of the inset, as shares of the frame's."""
+MARGIN_SHARE = 0.02
+"""Distance from the edges of the frame, as a share of its shorter side."""
+BORDER_SHARE = 0.006
+"""Width of the white border, as a share of the frame's shorter side."""
+WHITE = 245
+
+
+def inset_box(frame: tuple[int, int], picture: tuple[int, int]) -> tuple[int, int, int, int]:
+    """Return the part of a frame that the inset covers, with its border: left, top, right and bottom, px.
+
+    frame, picture : heights and widths, px
+    """
+    height, width = frame
+    shorter = min(height, width)
+    factor = min(WIDTH_SHARE * width / picture[1], HEIGHT_SHARE * height / picture[0])
+    rows, columns = (max(1, round(length * factor)) for length in picture)
+    bottom, right = (length - round(MARGIN_SHARE * shorter) for length in frame)
+    border = border_px(frame)
+    return right - columns - 2 * border, bottom - rows - 2 * border, right, bottom
+
+
+def border_px(frame: tuple[int, int]) -> int:
+    """Return the width of the border in a frame of some height and width, px."""
+    return max(1, round(BORDER_SHARE * min(frame)))
+
+
+def with_inset(frames: Iterable[Frame], pictures: Iterable[Frame]) -> Iterator[Frame]:
+    """Yield frames with a picture in the lower right corner; as many as there are of both.
+
+    frames   : uint8 RGB [each shape=(H, W, 3)], of one size; they are not changed
+    pictures : uint8 RGB [each shape=(h, w, 3)], of one size, enlarged or reduced by cubic interpolation
+    """
+    for frame, picture in zip(frames, pictures, strict=False):
+        size = (frame.shape[0], frame.shape[1])
+        left, top, right, bottom = inset_box(size, (picture.shape[0], picture.shape[1]))
+        border = border_px(size)
+        rows, columns = bottom - top - 2 * border, right - left - 2 * border
+        steps = picture.shape[1] / columns, picture.shape[0] / rows
+        to_picture = np.array([[steps[0], 0, steps[0] / 2 - 0.5], [0, steps[1], steps[1] / 2 - 0.5]])
+        enlarged = cut(picture, to_picture, (rows, columns))
+        result = frame.copy()
+        result[top:bottom, left:right] = WHITE
+        inner = result[top + border : bottom - border, left + border : right - border]
+        inner[...] = np.clip(np.rint(enlarged), 0, 255)
+        yield result
+
+
+Floats = NDArray[np.float32]
+Frames = Iterator[NDArray[np.uint8]]
+RENDERING = "rendering the video"
+"""Name of the stage in reports of progress."""
+LOG = logging.getLogger("lipmotion")
+ZOOM = 1.3
+"""How much larger than the speaker's own the mouth over it is."""
+
+
+@dataclass(frozen=True, eq=False)
+class Film:
+    """A video that is made while it is read.
+
+    frames  : each uint8 RGB [shape=(H, W, 3)], of even sizes
+    count   : number of the frames
+    rate_hz : frames a second
+    covered : the part of the frames in which the face, or the inset, is at any time: left, top, right, bottom, px
+    """
+
+    frames: Frames
+    count: int
+    rate_hz: float
+    covered: tuple[float, float, float, float]
+
+
+@one_thread()
+def film_of(  # noqa: PLR0913
+    face: FilmedFace,
+    motion: Motion,
+    *,
+    speech: Path | None = None,
+    sound: Audio | None = None,
+    model: Model | None = None,
+    units: Timeline[Unit] | None = None,
+    fps: float | None = None,
+    options: FilmOptions = FILM,
+) -> Film:
+    """Return the video of a filmed face.
+
+    face      : of the person
+    motion    : of tracked points of the same person, or eigenlips
+    speech    : the video of the speech, for an overlay
+    sound     : for a jaw that follows the energy
+    model     : that generated the motion; needed where the motion is eigenlips
+    units     : the phones in time, of which p, b and m close the lips; None: they are not known
+    fps       : frames a second; None, and with an overlay: those of the footage
+    Frame n shows the time n / fps; the last one is at or before the end of the motion. Frames are made a few at a time.
+    Raises InputError: motion without the channels that the face needs, no sound for ``energy``, a background in which
+    there is no face, a rate that is not positive, or an overlay of a sound without video.
+    """
+    check_film(options, speech)
+    eigenlips = model.eigenlips if model is not None else None
+    said = motion, Timeline(()) if units is None else units
+    if options.overlay == "inset" and speech is not None:
+        frames, rate_hz = untracked_frames(speech)
+        codes = _codes(face, said, sound, rate_hz, eigenlips, options)
+        mouths = Stitcher(face.appearance, _stitching(options)).mouths(codes)
+        first, frames = _first_of(_even(frames), speech)
+        covered = inset_box((first.shape[0], first.shape[1]), face.appearance.mouths.shape[1:3])
+        return Film(with_inset(frames, mouths), len(codes), rate_hz, covered)
+    background = _background(face, options, speech)
+    rate_hz = background.rate_hz if fps is None or options.overlay is not None else fps
+    codes = _codes(face, said, sound, rate_hz, eigenlips, options)
+    has_jaw = options.jaw != "none" and options.overlay is None
+    stitcher = Stitcher(face.appearance, replace(_stitching(options), jaw=has_jaw))
+    frames = stitcher.stitch(codes, background.frames(len(codes), rate_hz))
+    return Film(frames, len(codes), rate_hz, background.face_box)
+
+
+def _codes(
+    face: FilmedFace,
+    said: tuple[Motion, Timeline[Unit]],
+    sound: Audio | None,
+    rate_hz: float,
+    eigenlips: Eigenlips | None,
+    options: FilmOptions,
+) -> FaceCodes:
+    """Return what the lower face is like in every frame of a video."""
+    if not 0 < rate_hz < float("inf"):
+        raise InputError(f"the frame rate is {rate_hz}, required more than 0")
+    motion, units = said
+    count = int(np.floor((len(motion.values) - 1) / motion.rate_hz * rate_hz + 1e-9)) + 1
+    codes = face_codes(face, motion, units, count, rate_hz, eigenlips)
+    if options.jaw == "energy":
+        codes = face.appearance.with_jaw_of_sound(codes, _levels(sound, count, rate_hz))
+    return codes
+
+
+def _stitching(options: FilmOptions) -> StitchingOptions:
+    return AS_PRINTED if options.refinement == "paper" else STITCHING
+
+
+def _background(face: FilmedFace, options: FilmOptions, speech: Path | None) -> BackgroundSequence:
+    if options.overlay is not None and speech is not None:
+        return open_background(speech, in_time=True).enlarged(ZOOM)
+    if options.background is None:
+        return stored_sequence(face.background)
+    return open_background(options.background, face.appearance)
+
+
+def face_codes(
+    face: FilmedFace,
+    motion: Motion,
+    units: Timeline[Unit],
+    count: int,
+    rate_hz: float,
+    eigenlips: Eigenlips | None = None,
+) -> FaceCodes:
+    """Return what the lower face is like in ``count`` frames at the rate of a video.
+
+    units : the phones in time; in every p, b and m the lips touch (``contact.closed_lips``)
+    Raises InputError: motion without the channels that the face needs.
+    """
+    shown, contact = _with_contact(motion, units, count, rate_hz)
+    if eigenlips is None or not all(channel in shown.channels for channel in eigenlips.channels):
+        return face.appearance.of_motion(shown, contact)
+    values = shown.values[:, [shown.column(channel.name) for channel in eigenlips.channels]]
+    starts = range(0, count, BATCH)
+    parts = [face.appearance.of_mouths(eigenlips.restore(values[start : start + BATCH])) for start in starts]
+    mouth, jaw, chin_px = (np.concatenate(values) for values in zip(*map(_fields, parts), strict=True))
+    if all(channel.unit == GREY for channel in shown.channels):
+        return FaceCodes(mouth, jaw, chin_px)
+    return replace(face.appearance.of_motion(shown), mouth=mouth)  # points tell the jaw better
+
+
+def _with_contact(
+    motion: Motion, units: Timeline[Unit], count: int, rate_hz: float
+) -> tuple[Motion, NDArray[np.float64] | None]:
+    """Return motion in pictures, closed where the lips touch, and how near they are to that, 0 to 1 [shape=(T,)].
+
+    None where the motion has no ``opening``.
+    """
+    time_s = np.arange(count) / rate_hz
+    values = motion.at(time_s)
+    if "opening" not in motion.names or not np.isfinite(motion.values).all():
+        return Motion(values, rate_hz, motion.channels), None
+    gap = closed_lips(gap_in(motion), motion, units)
+    gap = in_pictures(gap, gap == 0, motion.rate_hz, time_s)
+    column = motion.column("opening")
+    values[:, column] = np.minimum(values[:, column], opening_of(gap))
+    return Motion(values, rate_hz, motion.channels), 1 - np.clip(gap / FULL_DEFICIT_GAP, 0, 1)
+
+
+def _fields(codes: FaceCodes) -> tuple[Floats, Floats, Floats]:
+    return codes.mouth, codes.jaw, codes.chin_px
+
+
+def person_shown(model: Model, face: FilmedFace, speaker: str = "") -> FilmedFace | None:
+    """Return a face if it is of another person than the motion of a model, so that it must be mapped onto it.
+
+    speaker : of the people of the model whose motion is generated
+    A face without speech (its footage has no sound) cannot be mapped onto: that is
+    logged as a warning, and the motion stays as it is. Raises InputError: as ``is_person_of``.
+    """
+    if is_person_of(model, face, speaker):
+        return None
+    if not face.takes:
+        LOG.warning(
+            "the face was built from footage without sound, so the motion, which is another person's, is not fitted to "
+            "it; build it from footage with sound"
+        )
+        return None
+    return face
+
+
+def is_person_of(model: Model, face: FilmedFace, speaker: str = "") -> bool:
+    """Return whether a model generates the motion of the person of a face: they are of one corpus and speaker.
+
+    speaker : of the people of the model whose motion is generated
+    The only person of a model is that of a face of the same corpus unless both have names, and these differ.
+    Raises InputError: it does not, and generates eigenlips alone, which cannot be mapped onto another person.
+    """
+    people = model.about.get("speakers") or [""]
+    same = bool(set(model.about.get("corpus", ())) & set(face.about.get("corpus", ())))
+    filmed = face.about.get("speaker", "")
+    same = same and (speaker == filmed if len(people) > 1 else people[0] == filmed or not (people[0] and filmed))
+    if not same and model.visual == "eigenlips":
+        raise InputError(
+            "the model generates mouth pictures of the person of "
+            f"{'; '.join(map(str, model.about.get('corpus', ['another corpus'])))}, the face is that of another; use a "
+            "model of tracked points, or train one of eigenlips on this person"
+        )
+    return same
+
+
+def _levels(sound: Audio | None, count: int, rate_hz: float) -> NDArray[np.float64]:
+    """Return the level of the sound in every frame of a video, dB [shape=(count,)]."""
+    if sound is None:
+        raise InputError("a jaw that follows the energy needs the sound; give the recording")
+    return levels_db_at(sound, np.arange(count) / rate_hz)
+
+
+def _first_of(frames: Frames, speech: Path) -> tuple[NDArray[np.uint8], Frames]:
+    """Return the first frame, and all of them. Raises InputError: there are none."""
+    first = next(frames, None)
+    if first is None:
+        raise InputError(f"{speech}: holds no pictures; give a video as speech")
+    return first, chain([first], frames)
+
+
+def _even(frames: Frames) -> Frames:
+    """Yield frames without a last row or column that makes their sizes odd."""
+    for frame in frames:
+        height, width = (length // 2 * 2 for length in frame.shape[:2])
+        yield frame[:height, :width]
+
+
+@one_thread()
+def write_film(
+    path: Path, film: Film, sound: Audio, *, mark: Mark = "metadata", monitor: Monitor = silent_monitor
+) -> None:
+    """Write a video of a filmed face, with sound; whole or not at all.
+
+    film, mark : of ``film_of``, which is read to its end; how the video says that it is synthetic
+    monitor    : receives reports of the progress
+    Raises InputError: the background cannot be read to its end. Raises ExportError: the file cannot be written, or the
+    face leaves no corner for a visible mark.
+    """
+    frames = with_reports(film.frames, film.count, RENDERING, monitor)
+    if mark == "visible":
+        frames = mark_frames(frames, film.covered)
+    metadata = mark_metadata() if mark != "none" else None
+    tags, xmp = (metadata.tags, metadata.xmp) if metadata is not None else (None, None)
+    write_mp4(path, frames, fps=film.rate_hz, audio=sound, tags=tags, xmp=xmp)
+
+
+def refuse_film(options: FilmOptions) -> None:
+    """Raise InputError if options are given that only a filmed face has."""
+    filmed = {
+        "a background": options.background,
+        "an overlay": options.overlay,
+        "another jaw": options.jaw if options.jaw != FILM.jaw else None,
+        "another refinement": options.refinement if options.refinement != FILM.refinement else None,
+        "a visible mark": options.mark if options.mark == "visible" else None,
+    }
+    given = next((name for name, value in filmed.items() if value is not None), None)
+    if given is not None:
+        raise InputError(f"{given} is for filmed faces; give one: --face FILE.face (docs/filmed-face.md)")
+
+
+def check_film(options: FilmOptions, speech: str | Path | None = None) -> None:
+    """Raise InputError if options do not go with the speech; called before long work begins.
+
+    speech : the recording; None: it is a sound that is in no file
+    """
+    if options.background is not None:
+        check_source(Path(options.background), "video")
+    if options.overlay is not None and (speech is None or options.background is not None):
+        raise InputError("an overlay shows the video of the speech: give a video as speech, and no background")
+    if options.overlay is not None and not has_video(Path(str(speech))):
+        raise InputError(f"{speech}: has no pictures, and an overlay shows them; give a video as speech")

@@ -1,0 +1,228 @@
+"""A filmed face as a value and as a file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError, ModelFormatError
+from lipmotion.storage.archive import UNREADABLE, read_archive, read_archive_header, write_archive
+from lipmotion.storage.coded_video import STORED_VIDEO, StoredVideo, stored_video_arrays, stored_video_from_arrays
+from lipmotion.storage.files import check_source
+from lipmotion.storage.schema import (
+    LARGEST_NUMBER,
+    POSITIVE,
+    Arrays,
+    ArraySpec,
+    arrays_under,
+    checked_arrays,
+    format_errors,
+    refuse_undeclared,
+)
+from lipmotion.types import Audio, Channel, Motion
+from lipmotion_faces.appearance.person import Appearance
+from lipmotion_faces.appearance.person_arrays import appearance_arrays, appearance_from_arrays
+
+Array = NDArray[np.float64]
+
+FORMAT, VERSION = "lipmotion.face", 1
+SUFFIX = ".face"
+FULL_SCALE = 32767
+"""Full scale of the stored sound."""
+
+
+@dataclass(frozen=True, eq=False)
+class StoredBackground:
+    """A background sequence: footage of the person, with the place of the face in every frame.
+
+    video         : T frames, of even height and width
+    face_to_frame : affine maps from px of the face to px of the frame [shape=(T, 2, 3)]
+    chin_px       : how far the tip of the chin is below the eyes in each frame, px of the face [shape=(T,)]
+    cuts          : frames at which another part of the footage begins, rising
+    """
+
+    video: StoredVideo
+    face_to_frame: Array
+    chin_px: Array
+    cuts: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class SpokenTake:
+    """Some speech of the person, and the motion of the face in it: what other people's motion is mapped onto.
+
+    sound  : of the person alone
+    motion : tracked, at the rate of the video
+    seen   : frames in which the face was measured [shape=(T,)]
+    """
+
+    sound: Audio
+    motion: Motion
+    seen: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class FilmedFace:
+    """The face of a person, from footage.
+
+    appearance : what mouth and jaw look like
+    background : the footage into which they are stitched if there is no other
+    takes      : speech with motion
+    about      : information for users: ``name``, ``corpus``, ``speaker``, ``licence``, ``attribution``, ``footage_s``
+    Make one with ``build_face``, or read one with ``load_face``.
+
+    >>> import lipmotion
+    >>> lipmotion.load_face("anna.face").summary["resolution"]  # doctest: +SKIP
+    '2 samples a pixel, 90 px between the eyes'
+    """
+
+    appearance: Appearance
+    background: StoredBackground
+    takes: tuple[SpokenTake, ...]
+    about: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def summary(self) -> dict[str, str]:
+        """A description of the face for users, by keyword."""
+        appearance, video = self.appearance, self.background.video
+        height, width = video.size
+        seconds = len(video) / video.rate_hz
+        explained = [f"{100 * float(space.explained.mean()):.1f} %" for space in (appearance.mouth, appearance.jaw)]
+        described = {
+            key: "; ".join(map(str, value)) if isinstance(value, list) else str(value)
+            for key, value in self.about.items()
+        }
+        return described | {
+            "mouth": f"{appearance.mouth.summary}; {len(appearance.mouths)} candidates",
+            "jaw": f"{len(appearance.jaw.channels)} components, {explained[1]} of the variance; "
+            f"{len(appearance.jaws)} candidates",
+            "resolution": f"{appearance.scale} samples a pixel, 90 px between the eyes",
+            "background": f"{seconds:.1f} s of {width} × {height} px at {video.rate_hz:g} frames a second",
+            "needs": f"{len(appearance.from_motion.names)} channels of tracked points, or eigenlips",
+        }
+
+
+def save_face(face: FilmedFace, path: str | Path) -> None:
+    """Write a face to a file: a zip of plain arrays and a JSON header, whole or not at all, never pickle.
+
+    Raises ExportError: the file cannot be written.
+
+    >>> import lipmotion
+    >>> lipmotion.save_face(lipmotion.build_face("anna.mp4"), "anna.face")  # doctest: +SKIP
+    """
+    background, takes = face.background, face.takes
+    channels = takes[0].motion.channels if takes else ()
+    arrays = {f"appearance/{name}": array for name, array in appearance_arrays(face.appearance).items()}
+    arrays |= {f"background/{name}": array for name, array in stored_video_arrays(background.video).items()}
+    arrays |= {"background/face_to_frame": background.face_to_frame, "background/chin_px": background.chin_px}
+    arrays |= {"background/cuts": np.array(background.cuts, np.intp)}
+    for number, take in enumerate(takes):
+        arrays |= {
+            f"take{number}/sound": np.rint(np.clip(take.sound.samples, -1, 1) * FULL_SCALE).astype(np.int16),
+            f"take{number}/sound_rate_hz": np.array(take.sound.rate_hz),
+            f"take{number}/motion": np.asarray(take.motion.values, np.float32),
+            f"take{number}/rate_hz": np.array(take.motion.rate_hz),
+            f"take{number}/seen": take.seen,
+        }
+    described = [{"name": channel.name, "unit": channel.unit} for channel in channels]
+    header = {"format": FORMAT, "version": VERSION, "about": dict(face.about), "takes": len(takes)}
+    write_archive(Path(path), header | {"channels": described}, arrays)
+
+
+def load_face(path: str | Path) -> FilmedFace:
+    """Return the face in a file.
+
+    Raises InputError: no such file. Raises ModelFormatError: not a face, damaged, or of another version.
+
+    >>> import lipmotion
+    >>> face = lipmotion.load_face("anna.face")  # doctest: +SKIP
+    """
+    path = Path(path)
+    check_source(path, "face")
+    header = read_face_header(path)
+    try:
+        arrays = read_archive(path)
+        with format_errors("the face", "build it again"):
+            count = int(header["takes"])
+            if not 0 <= count <= MOST_TAKES:
+                raise ValueError(f"{count} takes, required 0 to {MOST_TAKES}")
+            folders = ("appearance", "background", *(f"take{number}" for number in range(count)))
+            inner = {folder: arrays_under(arrays, f"{folder}/") for folder in folders}
+            refuse_undeclared(arrays, (f"{folder}/{key}" for folder, part in inner.items() for key in part))
+            channels = tuple(Channel(str(item["name"]), str(item["unit"])) for item in header["channels"])
+            takes = tuple(_take(inner[f"take{number}"], channels) for number in range(count))
+            about = header["about"]
+            if not isinstance(about, dict):
+                raise TypeError("about is no table")
+            return FilmedFace(
+                appearance_from_arrays(inner["appearance"]), _background(inner["background"]), takes, about
+            )
+    except (ModelFormatError, InputError) as error:
+        raise ModelFormatError(f"{path}: {error}") from error
+    except UNREADABLE as error:
+        raise ModelFormatError(f"{path}: the face is damaged ({error}); build it again") from error
+
+
+def read_face_header(path: Path) -> dict[str, Any]:
+    """Return the header of a face's file. Raises ModelFormatError: not a face, damaged, or of another version."""
+    try:
+        header = read_archive_header(path)
+    except UNREADABLE as error:
+        raise ModelFormatError(
+            f"{path}: not a face ({error}); give a file that `lipmotion face build` wrote"
+        ) from error
+    if not isinstance(header, dict) or header.get("format") != FORMAT:
+        raise ModelFormatError(f"{path}: not a face; give a file that `lipmotion face build` wrote")
+    if header.get("version") != VERSION:
+        raise ModelFormatError(
+            f"{path}: face version {header.get('version')}, this lipmotion reads version {VERSION}; upgrade lipmotion, "
+            "or build the face again"
+        )
+    return header
+
+
+MOST_TAKES = 1000
+BACKGROUND = {
+    "face_to_frame": ArraySpec(np.float64, "T 2 3", -1e5, 1e5),
+    "chin_px": ArraySpec(np.float64, "T", 0, 1000),
+    "cuts": ArraySpec(np.intp, "c", 1, LARGEST_NUMBER, optional=True),
+}
+"""The arrays of a background, beside those of its video."""
+TAKE = {
+    "sound": ArraySpec(np.int16, "S", -FULL_SCALE - 1, FULL_SCALE),
+    "sound_rate_hz": ArraySpec(np.intp, "", 8000, 48_000),
+    "motion": ArraySpec(np.float32, "T C"),
+    "rate_hz": ArraySpec(np.float64, "", POSITIVE, 1000),
+    "seen": ArraySpec(np.bool_, "T"),
+}
+"""The arrays of some speech with motion."""
+
+
+def _background(arrays: Arrays) -> StoredBackground:
+    refuse_undeclared(arrays, BACKGROUND, STORED_VIDEO)
+    video = stored_video_from_arrays({name: array for name, array in arrays.items() if name not in BACKGROUND})
+    stored = checked_arrays(arrays, BACKGROUND, T=len(video))
+    maps = stored["face_to_frame"]
+    if (np.abs(np.linalg.det(maps[:, :, :2])) < LEAST_DETERMINANT).any() or any(length % 2 for length in video.size):
+        raise ValueError("flat places of the face, or frames of odd sizes")
+    cuts = stored.arrays.get("cuts", np.zeros(0, np.intp))
+    if (np.diff(cuts) < 1).any() or (cuts >= len(video)).any():
+        raise ValueError(f"cuts {cuts.tolist()} of a background of {len(video)} frames")
+    return StoredBackground(video, maps, stored["chin_px"], tuple(cuts.tolist()))
+
+
+LEAST_DETERMINANT = 1e-6
+"""A map with a smaller determinant has no inverse."""
+
+
+def _take(arrays: Arrays, channels: tuple[Channel, ...]) -> SpokenTake:
+    refuse_undeclared(arrays, TAKE)
+    stored = checked_arrays(arrays, TAKE, C=len(channels))
+    sound = Audio(stored["sound"].astype(np.float32) / np.float32(FULL_SCALE), int(stored["sound_rate_hz"]))
+    motion = Motion(stored["motion"].astype(np.float64), float(stored["rate_hz"]), channels)
+    return SpokenTake(sound, motion, stored["seen"])

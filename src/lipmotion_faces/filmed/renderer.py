@@ -1,0 +1,213 @@
+"""Mouth and jaw of a person, for any motion, stitched into frames of the person's own footage."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion_faces.appearance.camera_noise import NoiseSource
+from lipmotion_faces.appearance.chin import moved_part, with_chin_moved
+from lipmotion_faces.appearance.lower_face import (
+    HEIGHT,
+    WIDTH,
+    cheek_light,
+    mouth_ellipse,
+    mouth_part,
+    region_map,
+    relit,
+    replaced_part,
+)
+from lipmotion_faces.appearance.person import JAW_OPTIONS, Appearance, FaceCodes
+from lipmotion_faces.appearance.placing import cut, feather, place
+from lipmotion_faces.appearance.poisson import CloningSystem, cloning_system
+from lipmotion_faces.appearance.refinement import (
+    PAPER,
+    SHARPENING,
+    STEADY,
+    RefinementOptions,
+    Refiner,
+    moving_average,
+    sharpened,
+)
+
+Array = NDArray[np.float64]
+Floats = NDArray[np.float32]
+Picture = NDArray[np.uint8]
+Pictures = NDArray[np.uint8]
+
+BATCH = 16
+"""Frames in memory at a time, at one sample a pixel; fewer of larger faces."""
+FEATHER_PX = 6.0
+"""Width of the seam, px of the face."""
+
+LARGEST_DIFFERENCE = 20.0
+"""Differences on the edge of the jaw above this are no difference of light, grey levels."""
+
+
+@dataclass(frozen=True)
+class Background:
+    """One frame of footage.
+
+    frame         : uint8 array [shape=(H, W, 3)], RGB
+    face_to_frame : affine map from px of the face to px of the frame [shape=(2, 3)]
+    chin_px       : how far the tip of the chin is below the eyes, px of the face
+    has_face      : whether the person is seen; False: the frame stays as it is
+    """
+
+    frame: Picture
+    face_to_frame: Array
+    chin_px: float
+    has_face: bool = True
+
+
+@dataclass(frozen=True)
+class StitchingOptions:
+    """How mouth and jaw are made.
+
+    jaw       : whether the jaw is replaced, too; False: the background's jaw stays, the mouth alone is replaced
+    mouth     : how the detail of the mouth is chosen; None: eigenlips alone, blurred
+    sharpening : by how much the mouth is sharpened (``sharpened``); 0: not
+    average   : number of pictures over which the mouth is averaged before, odd; 1: none
+    jaw_detail : how the detail of the jaw is chosen
+    noise     : whether the noise of the camera is added
+    seed      : of the noise
+    """
+
+    jaw: bool = True
+    mouth: RefinementOptions | None = STEADY
+    sharpening: float = SHARPENING
+    average: int = 1
+    jaw_detail: RefinementOptions = JAW_OPTIONS
+    noise: bool = True
+    seed: int = 0
+
+
+STITCHING = StitchingOptions()
+AS_PRINTED = StitchingOptions(mouth=PAPER, sharpening=0, average=3)
+"""The mean of three pictures, then the nearest of 500 candidates for every colour and picture: Xie & Liu 2007, §6.1 and
+Eqs. 14–16.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Stitcher:
+    """Stitches the mouth and the jaw of a person into frames of footage.
+
+    appearance : of the person
+    options    : how
+    """
+
+    appearance: Appearance
+    options: StitchingOptions = STITCHING
+
+    def stitch(self, codes: FaceCodes, backgrounds: Iterable[Background]) -> Iterator[Picture]:
+        """Yield frames, one for each frame of motion.
+
+        codes       : what the lower face is like, one row a frame of the video
+        backgrounds : at least as many; taken a few at a time, so memory does not grow with the length
+        Raises InputError: too few backgrounds.
+        """
+        codes = self._averaged(codes)
+        mouth_chosen = self._mouths.choose(codes.mouth)
+        jaw_chosen = self._jaws.choose(codes.jaw)
+        iterator = iter(backgrounds)
+        size = max(1, BATCH // self.appearance.scale)
+        for first in range(0, len(codes), size):
+            part = slice(first, first + size)
+            batch = list(islice(iterator, len(codes.mouth[part])))
+            if len(batch) < len(codes.mouth[part]):
+                raise InputError(
+                    f"{first + len(batch)} frames of background, required {len(codes)}; give longer footage"
+                )
+            mouths = self._pictures_of_mouth(codes.mouth[part], mouth_chosen[part], first)
+            if not self.options.jaw:
+                yield from self._stitched(mouths, self._behind(batch), batch)
+                continue
+            jaws = self._jaws.pictures(codes.jaw[part], jaw_chosen[part])
+            chins = np.array([each.chin_px for each in batch])
+            behind = with_chin_moved(self._behind(batch), chins, codes.chin_px[part] - chins)
+            gains = self._gains(behind)
+            yield from self._stitched(mouths, self._whole.clone(relit(jaws, gains), behind, LARGEST_DIFFERENCE), batch)
+
+    def mouths(self, codes: FaceCodes) -> Iterator[Picture]:
+        """Yield pictures of the mouth alone [shape=(56 · scale, 72 · scale, 3)], one for each frame of motion."""
+        codes = self._averaged(codes)
+        chosen = self._mouths.choose(codes.mouth)
+        for first in range(0, len(codes), BATCH):
+            part = slice(first, first + BATCH)
+            yield from self._pictures_of_mouth(codes.mouth[part], chosen[part], first)
+
+    def _averaged(self, codes: FaceCodes) -> FaceCodes:
+        """Return codes whose mouth is the mean of some pictures."""
+        if self.options.average == 1:
+            return codes
+        return replace(codes, mouth=moving_average(codes.mouth, self.options.average).astype(np.float32))
+
+    def _pictures_of_mouth(self, codes: Floats, chosen: NDArray[np.intp], first: int) -> Pictures:
+        if self.options.mouth is None:
+            pictures = self._mouths.eigenlips.restore(codes)
+        else:
+            pictures = self._mouths.pictures(codes, chosen)
+        return self._noise.add(pictures, first) if self.options.noise else pictures
+
+    def _behind(self, batch: Sequence[Background]) -> Pictures:
+        """Return the lower face of the footage, aligned [shape=(T, H, W, 3)]."""
+        size = HEIGHT * self.appearance.scale, WIDTH * self.appearance.scale
+        return np.stack(
+            [
+                np.clip(np.rint(cut(each.frame, to, size)), 0, 255).astype(np.uint8)
+                for each, to in zip(batch, self._maps(batch), strict=True)
+            ]
+        )
+
+    def _maps(self, batch: Sequence[Background]) -> Array:
+        return region_map(np.stack([each.face_to_frame for each in batch]), self.appearance.scale)
+
+    def _gains(self, behind: Pictures) -> Array:
+        """Return how much lighter the footage is than the pictures of the person, in each colour [shape=(T, 3)]."""
+        part = (slice(None), *mouth_part(self.appearance.scale))
+        return np.maximum(cheek_light(behind[part]), 1.0) / self.appearance.light
+
+    def _stitched(self, mouths: Pictures, behind: Pictures, batch: Sequence[Background]) -> Iterator[Picture]:
+        """Yield the frames of a batch with mouths in lower faces, and these in the frames."""
+        source = behind.copy()
+        sharp = sharpened(relit(mouths, self._gains(behind)), self.options.sharpening, self.appearance.scale)
+        source[(slice(None), *mouth_part(self.appearance.scale))] = sharp
+        patches = self._mouth_alone.clone(source, behind)
+        for each, patch, to in zip(batch, patches, self._maps(batch), strict=True):
+            frame = each.frame.copy()
+            if each.has_face:
+                place(frame, patch, self._weight, to)
+            yield frame
+
+    @cached_property
+    def _mouths(self) -> Refiner:
+        return self.appearance.mouth_refiner(self.options.mouth or STEADY)
+
+    @cached_property
+    def _jaws(self) -> Refiner:
+        return self.appearance.jaw_refiner(self.options.jaw_detail)
+
+    @cached_property
+    def _noise(self) -> NoiseSource:
+        return NoiseSource(self.appearance.noise, self._mouths.eigenlips.size, self.options.seed)
+
+    @cached_property
+    def _whole(self) -> CloningSystem:
+        return cloning_system(replaced_part(self.appearance.shape, self.appearance.scale))
+
+    @cached_property
+    def _mouth_alone(self) -> CloningSystem:
+        return cloning_system(mouth_ellipse(self.appearance.scale))
+
+    @cached_property
+    def _weight(self) -> Floats:
+        scale = self.appearance.scale
+        mask = moved_part(scale) if self.options.jaw else mouth_ellipse(scale)
+        return feather(mask, FEATHER_PX * scale)

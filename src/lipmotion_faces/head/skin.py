@@ -1,0 +1,342 @@
+"""The skin of the face with lips and eyelids: one surface, its binding to lips and jaw, and its places in a pose."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import Delaunay, cKDTree
+
+from lipmotion.meshes.model.surface import normals_of
+from lipmotion_faces.head import palette
+from lipmotion_faces.head.eyelids import LID_COLUMNS, LID_RINGS, Eyelids
+from lipmotion_faces.head.forms import MIDDLE, MOUTH_Y, head, outward, seen_from_front, seen_from_middle
+from lipmotion_faces.head.lips import (
+    ACROSS,
+    COLUMNS,
+    RINGS,
+    SIDE,
+    VISIBLE_RINGS,
+    closed_share,
+    lip_surface,
+    section_points,
+)
+from lipmotion_faces.head.part import Part
+from lipmotion_faces.head.pose import CharacterPose
+
+Real = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+SPACING = 0.033
+"""Distance of the vertices in the middle of the face, in radians about ``MIDDLE``."""
+HINGE = np.array([0.0, -0.32, -0.82])
+"""The axis of the jaw goes through here, from ear to ear."""
+REST = CharacterPose()
+CHEEKS_SPREAD, CHEEKS_ROUND = 0.035, 0.025
+"""How far cheeks come forward beside spread lips, and sink beside round ones."""
+CHEEKS_RAISED, NOSE_LIFT = 0.05, 0.07
+"""How far a mood raises the cheeks, and the wings of a wrinkled nose."""
+_LEFT_CORNER = 40
+_OPPOSITE = -np.arange(COLUMNS) % COLUMNS
+"""For every column of the lips the one of the other lip that it meets."""
+_JOINED = {VISIBLE_RINGS - 1: 0.3}
+"""By rings of the lips: how far the light on both sides of the seam is the same."""
+AT_CORNER = (np.clip((np.abs(ACROSS) - 0.72) / 0.28, 0, 1) ** 2)[:, None]
+"""How near each column of the lips is to a corner, 0 to 1 [shape=(COLUMNS, 1)]."""
+_NEAR_CORNER = np.clip((np.abs(ACROSS) - 0.5) / 0.5, 0, 1)[:, None]
+CORNER_LIGHT_SHARE, CORNER_SKIN_SHARE = 0.6, 0.75
+"""How far the light at the corners is the same on both lips, and that of the skin before them."""
+CALM_RADIUS = 0.035
+"""Round the corners of the lips, where the surface folds, the shading changes less than the surface."""
+
+
+@dataclass(frozen=True)
+class Binding:
+    """How vertices of the face follow the lips and the jaw.
+
+    places     : at rest [shape=(N, 3)]; the first ones are those of the outer contour of the lips
+    columns    : which columns of the lips these first ones are [indices]
+    jaw_weight : how far they belong to the jaw [shape=(N,)]
+    bound      : which of them follow the lips [B indices];  shares : of each column of the lips [shape=(B, COLUMNS)]
+    cheeks, nose : how they move with raised cheeks and a wrinkled nose [shape=(N, 3), both]
+    """
+
+    places: Real
+    columns: Index
+    jaw_weight: Real
+    bound: Index
+    shares: Real
+    cheeks: Real
+    nose: Real
+
+    def only(self, rows: Index) -> Binding:
+        """Return the binding of some vertices alone, in ascending order, of that of all."""
+        of = np.full(len(self.places), -1)
+        of[self.bound] = np.arange(len(self.bound))
+        bound, columns = np.flatnonzero(of[rows] >= 0), rows[rows < COLUMNS]
+        places, jaw, cheeks, nose = (each[rows] for each in (self.places, self.jaw_weight, self.cheeks, self.nose))
+        return Binding(places, columns, jaw, bound, self.shares[of[rows][bound]], cheeks, nose)
+
+    def moved(self, pose: CharacterPose, contour: Real, columns: Binding) -> Real:
+        """Return the places in a pose [shape=(..., N, 3)].
+
+        contour : places of the outer contour of the lips [shape=(..., COLUMNS, 3)]; columns : its binding
+        """
+        own = contour - columns._by_jaw(pose)
+        places = self._by_jaw(pose)
+        places[..., self.bound, :] += self.shares @ own
+        spread, roundness, cheek, sneer = (
+            np.asarray(number)[..., None] for number in (pose.spread, pose.roundness, pose.mood.cheek, pose.mood.sneer)
+        )
+        raised = CHEEKS_SPREAD * spread - CHEEKS_ROUND * roundness + CHEEKS_RAISED * cheek
+        places += raised * self.cheeks + NOSE_LIFT * sneer * self.nose
+        places[..., : len(self.columns), :] = contour[..., self.columns, :]
+        return places
+
+    def _by_jaw(self, pose: CharacterPose) -> Real:
+        """Return the places with the jaw of a pose [shape=(..., N, 3)]."""
+        turned = jaw_moved(self.places, pose.jaw)
+        return np.asarray(self.places + self.jaw_weight[:, None] * (turned - self.places))
+
+
+class Skin:
+    """The skin: vertices of face, lips, wall of the mouth and lids, in this order.
+
+    triangles : [shape=(F, 3)];  rest : places at rest [shape=(V, 3)];  normals : at rest [shape=(V, 3)]
+    pieces    : the number of triangles of the face, the lips, the wall of the mouth and the lids, in this order
+    """
+
+    def __init__(self) -> None:
+        self.lids_of_eye = Eyelids()
+        contour = section_points(REST, np.zeros(COLUMNS))[0]
+        self.base_z = seen_from_front(head, contour[:, 0], contour[:, 1])
+        contour[:, 2] = self.base_z
+        edge = self.lids_of_eye.edge()
+        edges = np.concatenate([edge, edge * [-1, 1, 1]])
+        fill = _fill(contour, edges)
+        self.face = np.concatenate([contour, edges, fill])
+        triangles = _triangles(self.face, len(contour), len(edges) // 2)
+        self._first_lip = len(self.face)
+        self._first_lid = self._first_lip + (RINGS - 1) * COLUMNS
+        grids = [_closed_grid(self.lip_rows())]
+        for eye in range(2):
+            rows = self.lid_rows(eye)
+            grids.append(_closed_grid(rows[::-1]) if eye == 0 else _closed_grid(rows))
+        self.triangles = np.concatenate([triangles, *grids]).astype(np.int32)
+        front = 2 * VISIBLE_RINGS * COLUMNS
+        self.pieces = {
+            "skin": len(triangles),
+            "lips": front,
+            "wall": len(grids[0]) - front,
+            "lids": len(grids[1]) + len(grids[2]),
+        }
+        self._contour = contour
+        self.binding = self._bound(fill)
+        self._columns = self.binding.only(np.arange(COLUMNS))
+        self.rest = self.places(REST)
+        meshed = normals_of(self.rest, self.triangles)
+        self.normals = meshed.copy()
+        self.normals[len(contour) + len(edges) : len(self.face)] = outward(head, fill)
+        self._meshed_rest = meshed
+        self._before_lips = outward(head, contour)
+        corners = self.rest[[0, _LEFT_CORNER]]
+        beside = np.linalg.norm(self.rest[: len(self.face), None] - corners, axis=2).min(axis=1)
+        self._calm = np.ones((len(self.rest), 1))
+        self._calm[: len(self.face), 0] -= 0.85 * np.exp(-((beside / CALM_RADIUS) ** 2))
+
+    def lip_rows(self) -> Index:
+        """Return the vertices of the lips, ring by ring from the skin inwards [shape=(RINGS, COLUMNS)]."""
+        inner = self._first_lip + np.arange((RINGS - 1) * COLUMNS).reshape(RINGS - 1, COLUMNS)
+        return np.concatenate([np.arange(COLUMNS)[None], inner])
+
+    def lid_rows(self, eye: int) -> Index:
+        """Return the vertices of the lids of the left (0) or right (1) eye [shape=(LID_RINGS + 1, LID_COLUMNS)]."""
+        outer = COLUMNS + eye * LID_COLUMNS + np.arange(LID_COLUMNS)
+        first = self._first_lid + eye * LID_RINGS * LID_COLUMNS
+        inner = first + np.arange(LID_RINGS * LID_COLUMNS).reshape(LID_RINGS, LID_COLUMNS)
+        return np.concatenate([inner, outer[None]])
+
+    def as_part(self, colours: Real) -> Part:
+        """Return the skin at rest with the diffuse reflection of its vertices, linear [shape=(V, 3)]."""
+        return Part("skin", self.rest, self.triangles, colours, palette.SKIN_FINISH, self.normals)
+
+    def posed(self, pose: CharacterPose) -> tuple[Real, Real]:
+        """Return places and normals of all vertices [shape=(V, 3), both], the head not turned."""
+        places = self.places(pose)
+        change = normals_of(places, self.triangles) - self._meshed_rest
+        normals = self.normals + self._calm * change
+        rows, closed = self.lip_rows(), closed_share(pose)
+        normals[rows[VISIBLE_RINGS - 1]] += closed * (
+            normals[rows[VISIBLE_RINGS - 2]] - normals[rows[VISIBLE_RINGS - 1]]
+        )
+        beside = AT_CORNER * (CORNER_LIGHT_SHARE + (1 - CORNER_LIGHT_SHARE) * pose.roundness)
+        for ring in range(1, VISIBLE_RINGS):
+            own = normals[rows[ring]]
+            share = np.maximum(closed * _JOINED.get(ring, 0.0), beside)
+            normals[rows[ring]] += 0.5 * share * (own[_OPPOSITE] - own)
+        outer = rows[1:VISIBLE_RINGS]
+        normals[outer] += CORNER_SKIN_SHARE * (1 - pose.roundness) * _NEAR_CORNER * (self._before_lips - normals[outer])
+        return places, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+
+    def _bound(self, fill: Real) -> Binding:
+        """Return how every vertex of the face is bound to the columns of the lips, and to the jaw.
+
+        fill : the last of them, between mouth, eyes and the back of the head
+        """
+        contour, face = self._contour, self.face
+        away = face[:, None, :2] - contour[None, :, :2]
+        nearest, across = cKDTree(contour[:, :2]).query(face[:, :2])[0], np.linalg.norm(away, axis=2)
+        angle = np.arctan2(face[:, 1] - MOUTH_Y, np.abs(face[:, 0]))
+        up = np.sin(angle) ** 2
+        reach = np.where(angle > 0, 0.18, 0.36) * up + 0.44 * (1 - up)
+        near = np.clip(1 - nearest / reach, 0, 1) * (face[:, 2] > -0.65)
+        self.lip_weight = near * near * (3 - 2 * near)
+        bound = np.flatnonzero(self.lip_weight)
+        length = np.linalg.norm(np.roll(contour, -1, axis=0) - np.roll(contour, 1, axis=0), axis=1)
+        width = (0.016 + 0.55 * nearest[bound])[:, None]
+        shares = length * np.exp(-0.5 * ((across[bound] - nearest[bound, None]) / width) ** 2)
+        shares *= np.exp(-across[bound] / 0.5)
+        shares = shares / shares.sum(axis=1, keepdims=True) * self.lip_weight[bound, None]
+        return Binding(face, np.arange(COLUMNS), jaw_weight(face), bound, shares, _cheeks(fill, len(face)), _nose(face))
+
+    def places(self, pose: CharacterPose) -> Real:
+        """Return the places of all vertices [shape=(V, 3)], the head not turned."""
+        left = self.lids_of_eye.rings(pose).reshape(-1, 3)
+        return np.concatenate([self.places_without_lids(pose), left, left * [-1, 1, 1]])
+
+    def places_without_lids(self, pose: CharacterPose) -> Real:
+        """Return the first of the places of ``places``: all but the lids of the eyes, which come last."""
+        lips, face = self.lips_and_face(pose, self.binding)
+        return np.concatenate([face, lips[1:].reshape(-1, 3)])
+
+    def lips_and_face(self, pose: CharacterPose, binding: Binding) -> tuple[Real, Real]:
+        """Return the places of the rings of the lips [shape=(..., RINGS, COLUMNS, 3)] and of vertices of the face.
+
+        pose    : one, or several of ``pose.stacked``
+        binding : of the vertices beside the lips [shape of their places=(..., N, 3)]
+        """
+        lips = lip_surface(section_points(pose, self.base_z))
+        return lips, binding.moved(pose, lips[..., 0, :, :], self._columns)
+
+
+def _cheeks(fill: Real, count: int) -> Real:
+    """Return how cheeks move, out and up, for all vertices of the face, of which these are the last [shape=(N, 3)]."""
+    away = np.stack([(np.abs(fill[:, 0]) - 0.40) / 0.15, (fill[:, 1] + 0.47) / 0.15], axis=1)
+    share = np.exp(-np.sum(away**2, axis=1)) * (fill[:, 2] > -0.75)
+    moved = np.zeros((count, 3))
+    moved[count - len(fill) :] = share[:, None] * (outward(head, fill) + np.array([0.0, 0.4, 0.0]))
+    return moved
+
+
+def _nose(face: Real) -> Real:
+    """Return how the nose moves when it is wrinkled, for all vertices of the face [shape=(N, 3)]."""
+    away = (np.abs(face[:, 0]) / 0.2) ** 4 + ((face[:, 1] + 0.4) / 0.14) ** 4
+    moved = np.zeros_like(face)
+    moved[:, 1] = np.exp(-away) * (face[:, 2] > -0.5)
+    return moved
+
+
+def jaw_weight(places: Real) -> Real:
+    """Return how far places at rest belong to the jaw, 0 to 1 [shape=(N,)]."""
+    down = _step((-0.47 - places[:, 1]) / 0.40)
+    front = _step((places[:, 2] + 0.98) / 0.45)
+    return down * front
+
+
+def jaw_moved(places: Real, drop: Any) -> Real:
+    """Return places turned with the jaw about its hinge, so that the chin drops by a length [shape=(..., N, 3)].
+
+    drop : a number, or several [shape=(T, 1)]
+    """
+    angle, (y, z) = drop / 0.72, (places - HINGE)[:, 1:].T
+    down, forward = y * np.cos(angle) - z * np.sin(angle), y * np.sin(angle) + z * np.cos(angle)
+    return np.stack([np.broadcast_to(places[:, 0], down.shape), HINGE[1] + down, HINGE[2] + forward], axis=-1)
+
+
+def _step(share: Real) -> Real:
+    clipped = np.clip(share, 0, 1)
+    return np.asarray(clipped * clipped * (3 - 2 * clipped))
+
+
+def _fill(contour: Real, edges: Real) -> Real:
+    """Return the vertices between mouth, eyes and the back of the head [shape=(N, 3)]."""
+    rings = []
+    for away in (0.016, 0.036, 0.06, 0.09):
+        x = contour[:, 0] * (1 + away / 0.27)
+        y = MOUTH_Y + (contour[:, 1] - MOUTH_Y) + SIDE * away * np.sqrt(np.maximum(1 - 0.94 * ACROSS**2, 0))
+        step = 1 if away < 0.05 else 2
+        rings.append(np.stack([x, y], axis=1)[::step])
+    near = np.concatenate(rings)
+    near3 = np.column_stack([near, seen_from_front(head, near[:, 0], near[:, 1])])
+    count = int(1.75 / SPACING)
+    i, j = np.meshgrid(np.arange(-count, count + 1), np.arange(-int(count * 1.2), int(count * 1.2) + 1))
+    u, v = SPACING * (i + 0.5 * (j % 2)).ravel(), SPACING * 0.866 * j.ravel()
+    radius = np.hypot(u, v)
+    u, v = u[radius < 1.72], v[radius < 1.72]
+    places = seen_from_middle(head, _directions(u, v))
+    close = cKDTree(near3).query(places)[0] < 0.024
+    inside = (np.abs(places[:, 0]) < 0.36) & _within(places[:, :2], near[-len(rings[-1]) :]) & (places[:, 2] > -0.5)
+    at_eye = cKDTree(edges).query(places)[0] < 0.02
+    for side in (1, -1):
+        ring = edges[: len(edges) // 2, :2] * [side, 1]
+        at_eye |= _within(places[:, :2], ring) & (places[:, 2] > -0.6)
+    return np.concatenate([near3, places[~(close | inside | at_eye)]])
+
+
+def _directions(u: Real, v: Real) -> Real:
+    """Return the directions of places of the map of the head, whose middle is the front [shape=(N, 3)]."""
+    radius = np.hypot(u, v)
+    angle = radius + 0.11 * radius**3
+    flat = np.sin(angle) / np.maximum(radius, 1e-9)
+    return np.stack([u * flat, v * flat, np.cos(angle)], axis=1)
+
+
+def _on_map(places: Real) -> Real:
+    """Return the place of places in space on the map of the head [shape=(N, 2)], without the stretching of its rim."""
+    away = places - MIDDLE
+    away = away / np.linalg.norm(away, axis=1, keepdims=True)
+    angle = np.arccos(np.clip(away[:, 2], -1, 1))
+    across = np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-9)
+    return away[:, :2] / across[:, None] * angle[:, None]
+
+
+def _triangles(face: Real, contour: int, edge: int) -> NDArray[np.int32]:
+    """Return the triangles between the vertices of the face, none in mouth and eyes [shape=(F, 3)]."""
+    flat = _on_map(face)
+    found = Delaunay(flat).simplices
+    middle = flat[found].mean(axis=1)
+    hole = _within(middle, flat[:contour]) | _under_hair(face[found].mean(axis=1))
+    for eye in range(2):
+        hole |= _within(middle, flat[contour + eye * edge : contour + (eye + 1) * edge])
+    found = found[~hole]
+    a, b, c = (flat[found[:, n]] for n in range(3))
+    turned = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
+    found[turned] = found[turned][:, ::-1]
+    return found.astype(np.int32)
+
+
+def _under_hair(places: Real) -> NDArray[np.bool_]:
+    """Return which places of the head the hair always hides [shape=(N,)]."""
+    x, y, z = np.abs(places[:, 0]), places[:, 1], places[:, 2]
+    return (y > 1.0 - 0.6 * np.maximum(x - 0.2, 0)) | ((y > 0.1) & (z < -0.75)) | (z < -1.2)
+
+
+def _within(points: Real, polygon: Real) -> NDArray[np.bool_]:
+    """Return which points lie in a closed polygon [shape=(N,)]."""
+    following = np.roll(polygon, -1, axis=0)
+    inside = np.zeros(len(points), bool)
+    for (xa, ya), (xb, yb) in zip(polygon.tolist(), following.tolist(), strict=True):
+        if ya != yb:
+            crosses = (ya > points[:, 1]) != (yb > points[:, 1])
+            inside ^= crosses & (points[:, 0] < (xb - xa) * (points[:, 1] - ya) / (yb - ya) + xa)
+    return inside
+
+
+def _closed_grid(rows: Index) -> NDArray[np.int32]:
+    """Return the triangles between successive closed rings of vertices [shape=(rings, columns)]; (F, 3)."""
+    a, b = rows[:-1], rows[1:]
+    c, d = np.roll(b, -1, axis=1), np.roll(a, -1, axis=1)
+    quads = np.stack([a, b, c, a, c, d], axis=-1)
+    return quads.reshape(-1, 3).astype(np.int32)

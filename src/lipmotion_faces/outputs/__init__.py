@@ -1,0 +1,1 @@
+"""Outputs that show a face: videos, pictures, scenes."""

@@ -1,0 +1,161 @@
+"""Generated motion as a drawn face: videos with sound, videos that are transparent, pictures."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import ExportError
+from lipmotion.kernels.choice import numba_works
+from lipmotion.meshes.fitting.blendshape_motion import is_of_blendshapes
+from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
+from lipmotion.pipeline.outputs.prosody import prosody_of_speech
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.types import Audio, Channel, Generation, Monitor, Motion, Prosody, Timeline
+from lipmotion.types.progress import with_reports
+from lipmotion_faces.base import SMALLEST_PX, TRANSPARENT, DrawsPlanes, Face, Staging
+from lipmotion_faces.film.filmed_video import RENDERING
+from lipmotion_faces.registry import staged_face
+
+OPAQUE_SUFFIX = ".mp4"
+VIDEO_SUFFIXES = (OPAQUE_SUFFIX, ".webm", ".mov")
+"""Videos with sound; all but the first can be transparent."""
+SOUND_RATE_HZ = 48_000
+"""Sampling rate of the sound track."""
+DRAWN_HZ, FASTEST_HZ = 25.0, 240.0
+"""Frame rate of videos of drawn faces, and the highest one: each picture is drawn, and no screen shows more."""
+
+
+class VideoOutput(Output):
+    """``.mp4``, ``.webm``, ``.mov``: a face that speaks, with sound."""
+
+    draws, has_sound = True, True
+
+    @classmethod
+    def suffixes(cls, settings: OutputSettings) -> tuple[str, ...]:  # noqa: D102, ARG003
+        return VIDEO_SUFFIXES
+
+    def check(self) -> None:  # noqa: D102
+        settings = self.settings
+        if settings.fps is not None and settings.fps > FASTEST_HZ:
+            raise ExportError(
+                f"{self.path}: {settings.fps:g} pictures a second, required {FASTEST_HZ:g} or fewer in a video; the "
+                "rate of motion files alone is --rate"
+            )
+        if settings.delivery.offset_ms and self.has_sound:
+            raise ExportError(
+                f"{self.path}: a video has its own sound, which begins with it; an offset is for files that are put "
+                "beside a sound: write the video without it"
+            )
+        settings.face.check_video(self.path, settings)
+        if settings.recording is None and not settings.sounded:
+            raise ExportError(f"{self.path}: a video needs the recording: write(..., speech=FILE)")
+
+    def prepared(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
+        face = self.settings.face
+        face.check_drawable(self.path, performance.generation)
+        return partial(face.write_video, self.path, performance)
+
+
+class PicturesOutput(VideoOutput):
+    """``NAME%05d.png``: the pictures of a video, numbered, without sound."""
+
+    has_sound = False
+
+    @classmethod
+    def suffixes(cls, settings: OutputSettings) -> tuple[str, ...]:  # noqa: D102, ARG003
+        return ("%05d.png",)
+
+    @classmethod
+    def takes(cls, path: Path, settings: OutputSettings) -> bool:  # noqa: D102, ARG003
+        return is_picture_sequence(path)
+
+
+def sound_track(performance: Performance) -> Audio:
+    """Return the sound of videos. Raises InputError: the recording cannot be read."""
+    return read_sound(performance.sound or performance.settings.recording)
+
+
+def read_sound(recording: str | Path | Audio | None) -> Audio:
+    """Return the sound of a recording as videos have it. Raises InputError: it cannot be read."""
+    if isinstance(recording, Audio):
+        return recording
+    return read_audio(Path(str(recording)), SOUND_RATE_HZ, warn=False)
+
+
+def is_picture_sequence(path: Path) -> bool:
+    """Return whether a path stands for numbered pictures: ``frame%05d.png``."""
+    return path.suffix.lower() == ".png" and re.search(r"%0?\d?d", path.name) is not None
+
+
+def check_background(path: Path, staging: Staging) -> None:
+    """Raise ExportError if a face is to be transparent in a file that cannot be."""
+    if staging.background == TRANSPARENT and path.suffix.lower() == OPAQUE_SUFFIX:
+        raise ExportError(
+            f"{path}: {OPAQUE_SUFFIX} cannot be transparent; write .webm, .mov or %05d.png, or give a colour"
+        )
+
+
+def check_drawable(path: Path, motion: Motion) -> None:
+    """Raise ExportError if motion has no channel from which a face can be drawn."""
+    if "opening" not in motion.names and not is_of_blendshapes(motion):
+        raise ExportError(
+            f"{path}: the motion has no channel 'opening' to draw a face from, nor the blendshape 'jawOpen'; write "
+            "motion files"
+        )
+
+
+def write_drawn_face(  # noqa: PLR0913
+    path: Path,
+    generation: Generation,
+    sound: Audio,
+    fps: float,
+    face: Face,
+    staging: Staging,
+    monitor: Monitor,
+    prosody: Prosody | None = None,
+) -> None:
+    """Write generated motion as a drawn face, in the format of the suffix; brows and head move with the sound.
+
+    prosody : loudness and pitch in the time of the motion; None: those of the sound, which begins with the motion
+    monitor : receives reports of the progress
+    Raises ExportError: the file cannot be written.  Raises InputError: no such face, or it cannot be staged so.
+    """
+    staged, drawn = staged_face(face, staging, prosody or prosody_of_speech(sound)), None
+    if path.suffix.lower() == OPAQUE_SUFFIX and isinstance(staged, DrawsPlanes):
+        drawn = staged.render_planes(generation.motion, generation.units, fps=fps)
+    if drawn is None:
+        drawn = staged.render(generation.motion, generation.units, fps=fps)
+    write_frames(path, with_reports(drawn, frame_count(generation, fps), RENDERING, monitor), fps, sound)
+
+
+def frame_count(generation: Generation, fps: float) -> int:
+    """Return the number of pictures of a motion."""
+    return int(generation.motion.time_s[-1] * fps + 1e-9) + 1
+
+
+def write_frames(path: Path, frames: Iterable[NDArray[np.uint8]], fps: float, sound: Audio) -> None:
+    """Write pictures with their sound in the format of the suffix. Raises ExportError: the file cannot be written."""
+    from lipmotion_faces.video.mp4 import write_mp4
+    from lipmotion_faces.video.transparent import write_pictures, write_with_alpha
+
+    if is_picture_sequence(path):
+        write_pictures(path, frames)
+    elif path.suffix.lower() == OPAQUE_SUFFIX:
+        write_mp4(path, frames, fps=fps, audio=sound)
+    else:
+        write_with_alpha(path, frames, fps=fps, audio=sound)
+
+
+def load_drawing(face: Face) -> None:
+    """Load what draws a face for videos (compiled kernels), so that drawing it begins sooner."""
+    if isinstance(face, DrawsPlanes) and numba_works():
+        closed = Motion(np.zeros((1, 1)), 1.0, (Channel("opening"),))
+        smallest = staged_face(face, Staging(size=SMALLEST_PX))
+        if isinstance(smallest, DrawsPlanes) and (frames := smallest.render_planes(closed, Timeline(()))) is not None:
+            list(frames)

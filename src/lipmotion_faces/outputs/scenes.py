@@ -1,0 +1,217 @@
+"""Files for 3D programs: a character with its animation and a reference to the sound, as ``.glb`` or ``.usda``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from lipmotion.articulation.contact import in_pictures
+from lipmotion.articulation.delivery import closed_times
+from lipmotion.articulation.expression import is_mood
+from lipmotion.articulation.liveliness import CALM
+from lipmotion.articulation.mouth import SpokenMouth, frame_times, mouth_at_rest, spoken_mouth
+from lipmotion.articulation.rest import beside_rest
+from lipmotion.meshes.files.gltf_animator import write_animated_gltf
+from lipmotion.meshes.files.gltf_writer import write_gltf_scene
+from lipmotion.meshes.files.usd_text import asset
+from lipmotion.meshes.files.usd_writer import write_usda
+from lipmotion.meshes.fitting.blendshape_motion import with_mouth
+from lipmotion.meshes.fitting.driven import DrivenCharacter
+from lipmotion.meshes.fitting.eyes_and_brows import eye_and_brow_weights
+from lipmotion.meshes.fitting.living_curves import living_curves
+from lipmotion.meshes.model.head_angles import head_quaternions
+from lipmotion.meshes.model.keys import Thinning
+from lipmotion.meshes.model.mesh import Blendshape
+from lipmotion.meshes.model.scene import HeadTurn, Scene
+from lipmotion.pipeline.outputs.curve_sets import edited_weights, known_names
+from lipmotion.pipeline.outputs.delivered import delivered, held_mouth, with_drawn_channels
+from lipmotion.pipeline.outputs.output import Output, OutputSettings, Performance
+from lipmotion.pipeline.outputs.prosody import recorded_prosody
+from lipmotion.storage.files import sound_reference
+from lipmotion.types import Channel, Generation, Motion, Prosody, StateTrace, Timeline, Unit
+from lipmotion.types.motion import WEIGHT
+from lipmotion_faces.base import Staging, alive
+from lipmotion_faces.outputs.drawn_video import check_drawable
+
+GLTF, USD = ".glb", ".usda"
+SCENE_SUFFIXES = (GLTF, USD)
+KEPT = (GLTF, ".vrm")
+"""Suffixes of files of characters that are kept as they are, with an animation more."""
+MARGIN, MOUTH_MARGIN = 10, 50
+"""Frames before and after those that are wanted alone, within which weights settle, and the mouth."""
+METRES = 0.09
+"""The distance between the outer eye corners of the 3D head, in metres."""
+
+
+class SceneOutput(Output):
+    """``.glb``, ``.usda``: a character with its animation, for 3D programs."""
+
+    @classmethod
+    def suffixes(cls, settings: OutputSettings) -> tuple[str, ...]:  # noqa: D102, ARG003
+        return SCENE_SUFFIXES
+
+    def check(self) -> None:  # noqa: D102
+        if self.settings.recording is not None:
+            check_sound_name(self.path, self.settings.recording)
+
+    def prepared(self, performance: Performance) -> Callable[[], None]:  # noqa: D102
+        check_drawable(self.path, performance.generation.motion)
+        return lambda: write_scene(self.path, performance.once(delivered_scene), sound=performance.sound_file)
+
+
+def delivered_scene(performance: Performance, frames: slice | None = None) -> Scene:
+    """Return the scene of a face as it is delivered; held poses are those of the mouth.
+
+    frames : of the motion, at its rate: the only ones that it is to have, which differ by less than 0.01 from those of
+             the whole; None: all
+    """
+    settings, delivery = performance.settings, performance.settings.delivery
+    moved = with_drawn_channels(delivered(performance.generation, delivery))
+    part = None if delivery.hold_ms else frames
+    scene = settings.face.scene(moved, settings, performance.once(recorded_prosody), part)
+    thinning = Thinning(delivery.key_tolerance, tuple(closed_times(moved)) if delivery.key_tolerance else ())
+    scene = replace(scene, sound_s=delivery.offset_ms / 1000, thinning=thinning)
+    weights = scene.weights
+    if weights is None or not delivery.hold_ms:
+        return scene
+    states = StateTrace(("",), np.zeros(len(weights.values), np.intp))
+    whole = Generation(weights, np.zeros(weights.values.shape), moved.units, states)
+    steps = held_mouth(whole, delivery.hold_frames(weights.rate_hz), closed_times(moved))
+    return replace(scene, weights=steps.motion, stepped=steps.stepped)
+
+
+def write_scene(path: Path, scene: Scene, sound: Path | None = None) -> None:
+    """Write a character with its animation as ``.glb`` or ``.usda``, by the suffix.
+
+    A ``.glb`` of a character from a ``.glb`` or ``.vrm`` is that file with one animation more, where that is possible.
+    sound : the file that is referred to, by its path from the folder of the output; None: none
+    Raises ExportError: the file cannot be written.
+    """
+    with_sound = replace(scene, sound="" if sound is None else sound_reference(sound, path))
+    if _keeps_original(path, with_sound):
+        return
+    if path.suffix.lower() == USD:
+        write_usda(path, with_sound)
+    else:
+        write_gltf_scene(path, with_sound)
+
+
+def _keeps_original(path: Path, scene: Scene) -> bool:
+    """Write the user's file with its animation, and return whether that was possible."""
+    if path.suffix.lower() != GLTF or scene.original is None or scene.original.suffix.lower() not in KEPT:
+        return False
+    return scene.weights is not None and write_animated_gltf(
+        path,
+        scene.original,
+        scene.weights,
+        scene.sound,
+        sound_s=scene.sound_s,
+        stepped=scene.stepped,
+        thinning=scene.thinning,
+    )
+
+
+def head_scene(
+    generation: Generation,
+    rate_hz: float | None = None,
+    *,
+    staging: Staging | None = None,
+    prosody: Prosody | None = None,
+    frames: slice | None = None,
+) -> Scene:
+    """Return the 3D head of ``--face head`` with its animation: what its videos show, as weights of blendshapes.
+
+    rate_hz : keys a second; None: those of the motion
+    staging, prosody : as of videos; size and background do not count
+    frames  : as of ``delivered_scene``
+    The mesh is in metres. Raises InputError: the motion has no channel ``opening``.
+    """
+    from lipmotion_faces.head.figure import PIVOT
+    from lipmotion_faces.head.performance import posed
+    from lipmotion_faces.head.shape_fit import mouth_weights
+    from lipmotion_faces.head.stage import figure, mesh_of_figure
+
+    motion, units, hertz = generation.motion, generation.units, rate_hz or generation.motion.rate_hz
+    times_s = frame_times(len(motion.values), motion.rate_hz, hertz)
+    around, kept = _around(frames, MARGIN)
+    mouth = spoken_mouth(motion, units, hertz) if frames is None else _mouth_in(motion, units, around)
+    moved = alive(times_s[around], motion, units, staging, prosody)
+    poses = posed(mouth, moved)
+    character, mesh = (
+        figure(),
+        mesh_of_figure(moods=any(map(is_mood, motion.names)) or any(pose.mood != CALM for pose in poses)),
+    )
+    curves = mouth_weights(character, mesh, poses)
+    curves |= eye_and_brow_weights(moved)
+    names = [name for name in mesh.shape_names if name in curves]
+    table, channels = np.zeros((len(times_s), len(names))), tuple(Channel(name, WEIGHT) for name in names)
+    table[around] = np.stack([curves[name] for name in names], axis=1)
+    weights = edited_weights(Motion(table, hertz, channels), units, generation.curve_edits)
+    weights = replace(weights, values=weights.values[around][kept])
+    shapes = tuple(Blendshape(each.name, each.rows, METRES * each.displacements) for each in mesh.shapes)
+    scaled = replace(mesh, vertices=METRES * mesh.vertices, shapes=shapes)
+    turns = head_quaternions(np.stack([pose.turn for pose in poses]))[kept]
+    return Scene(scaled, weights, HeadTurn(METRES * PIVOT, character.turning(), turns), split=False)
+
+
+def _around(frames: slice | None, margin: int) -> tuple[slice, slice]:
+    """Return the frames that are computed for some, None: all; and which of them these are."""
+    if frames is None:
+        return slice(None), slice(None)
+    first = max(frames.start - margin, 0)
+    return slice(first, frames.stop + margin), slice(frames.start - first, frames.stop - first)
+
+
+def _mouth_in(motion: Motion, units: Timeline[Unit], frames: slice) -> SpokenMouth:
+    """Return the mouth in some frames of a motion, made of those around them."""
+    around, kept = _around(frames, MOUTH_MARGIN)
+    part, rate_hz = replace(motion, values=motion.values[around]), motion.rate_hz
+    there = units.between(around.start / rate_hz, (around.start + len(part.values)) / rate_hz)
+    return spoken_mouth(part, there, at_rest=mouth_at_rest(motion, units)).within(kept)
+
+
+def character_scene(
+    generation: Generation,
+    character: DrivenCharacter,
+    rate_hz: float | None = None,
+    *,
+    staging: Staging | None = None,
+    prosody: Prosody | None = None,
+    frames: slice | None = None,
+) -> Scene:
+    """Return the user's own character with its animation; eyes and brows move where it has ARKit's blendshapes.
+
+    rate_hz : keys a second; None: those of the motion. A closure between two keys is at the nearer one
+    staging, prosody : seed, and what moves on its own
+    frames  : as of ``delivered_scene``
+    Raises InputError: the character has no blendshapes, or the motion has no channel ``opening``.
+    """
+    motion, units, rate = generation.motion, generation.units, generation.motion.rate_hz
+    around, kept = _around(frames, MOUTH_MARGIN)
+    is_part = frames is not None and (around.start > 0 or around.stop < len(motion.values))
+    part, said, there = beside_rest(motion, units, around) if is_part else (motion, units, slice(None))
+    solved, mouth = character.weights(part, said), spoken_mouth(with_mouth(part), said)
+    table = np.zeros((len(motion.values), len(solved.names)))
+    table[around] = solved.values[there]
+    known = known_names(character.mesh)
+    weights = edited_weights(replace(solved, values=table), units, generation.curve_edits, known)
+    living = living_curves(with_mouth(motion), units, staging, prosody, around)
+    others = {name: living[name].astype(np.float64) for name in living.names}
+    beside = {
+        name: curve for name, curve in character.beside(others, len(living.values)).items() if name not in weights.names
+    }
+    beside |= {name: curve[there] for name, curve in character.expressions(part, mouth).items()}
+    rows = np.concatenate([weights.values[around], *(curve[:, None] for curve in beside.values())], axis=1)
+    channels = weights.channels + tuple(Channel(name, WEIGHT) for name in beside)
+    hertz = rate if frames is not None else rate_hz or rate
+    shown = in_pictures(rows, mouth.contact[there], rate, frame_times(len(rows), rate, hertz))
+    return Scene(character.mesh, Motion(shown[kept], hertz, channels), original=character.file)
+
+
+def check_sound_name(path: Path, sound: Path) -> None:
+    """Raise ExportError if a scene cannot refer to a sound: its name holds what ``.usda`` cannot."""
+    if path.suffix.lower() == USD:
+        asset(sound_reference(sound, path))

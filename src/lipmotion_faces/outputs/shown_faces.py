@@ -1,0 +1,245 @@
+"""Faces as outputs show them: drawn faces, characters and filmed people answer the same questions."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from lipmotion.errors import ExportError, InputError
+from lipmotion.export.cues import OPTIONAL
+from lipmotion.export.cues.sheet import shown_shapes
+from lipmotion.meshes.fitting.driven import DrivenCharacter
+from lipmotion.meshes.model.scene import Scene
+from lipmotion.pipeline.outputs.cues import check_cue_options, cues
+from lipmotion.pipeline.outputs.delivered import shown
+from lipmotion.pipeline.outputs.output import OutputSettings, Performance, ShownFace
+from lipmotion.pipeline.outputs.prosody import moved_prosody, prosody_of_speech
+from lipmotion.storage.sources import check_kind, is_file
+from lipmotion.types import Generation, Prosody
+from lipmotion.types.moods import MOODS
+from lipmotion.types.progress import with_reports
+from lipmotion_faces.base import Face, Staging
+from lipmotion_faces.cut_out import CutOut, read_cut_out
+from lipmotion_faces.film.filmed_video import (
+    RENDERING,
+    Film,
+    check_film,
+    film_of,
+    person_shown,
+    refuse_film,
+    write_film,
+)
+from lipmotion_faces.filmed.face import SUFFIX, FilmedFace, load_face
+from lipmotion_faces.mesh import MeshFace
+from lipmotion_faces.outputs.drawn_video import (
+    DRAWN_HZ,
+    OPAQUE_SUFFIX,
+    check_background,
+    check_drawable,
+    frame_count,
+    load_drawing,
+    sound_track,
+    write_drawn_face,
+    write_frames,
+)
+from lipmotion_faces.outputs.scenes import character_scene, head_scene
+from lipmotion_faces.registry import FACES, face_named, is_drawings, staged_face
+
+if TYPE_CHECKING:
+    from lipmotion.pipeline.model import Model
+
+LOG = logging.getLogger("lipmotion")
+AnyFace = str | Path | Face | FilmedFace | CutOut | DrivenCharacter
+
+
+class _WithHead(ShownFace):
+    """A face of which files for 3D programs show the 3D head."""
+
+    def check_drawable(self, path: Path, generation: Generation) -> None:
+        check_drawable(path, generation.motion)
+
+    def scene(
+        self, generation: Generation, settings: OutputSettings, prosody: Prosody | None, frames: slice | None = None
+    ) -> Scene:
+        return head_scene(generation, settings.rate_hz, staging=settings.staging, prosody=prosody, frames=frames)
+
+
+class ShownDrawing(_WithHead):
+    """A drawing: of ``faces.registry``."""
+
+    def __init__(self, face: Face) -> None:
+        self.face = face
+
+    def check(self, settings: OutputSettings) -> None:  # noqa: D102
+        refuse_film(settings.film)
+        staged_face(self.face, settings.staging)
+
+    def check_video(self, path: Path, settings: OutputSettings) -> None:  # noqa: D102
+        check_background(path, settings.staging)
+
+    def write_video(self, path: Path, performance: Performance) -> None:  # noqa: D102
+        settings, played = performance.settings, performance.once(sound_track)
+        if performance.generation.curve_edits and self.character is None:
+            named = ", ".join(dict.fromkeys(edit.channel for edit in performance.generation.curve_edits))
+            LOG.warning("%s: the face has no curves, so changed %s does not show; pin the opening", path, named)
+        seen, prosody = performance.once(_seen), performance.once(_played_prosody)
+        monitor, hertz = performance.monitor, _frame_rate(settings)
+        write_drawn_face(path, seen, played, hertz, self.face, settings.staging, monitor, prosody)
+
+    def load(self) -> None:  # noqa: D102
+        load_drawing(self.face)
+
+
+class ShownCharacter(ShownDrawing):
+    """A character of the user's own."""
+
+    def __init__(self, face: MeshFace) -> None:
+        super().__init__(face)
+        self.character: DrivenCharacter = face.character
+
+    def scene(  # noqa: D102
+        self, generation: Generation, settings: OutputSettings, prosody: Prosody | None, frames: slice | None = None
+    ) -> Scene:
+        staging = settings.staging
+        return character_scene(
+            generation, self.character, settings.rate_hz, staging=staging, prosody=prosody, frames=frames
+        )
+
+
+class ShownCutOut(_WithHead):
+    """A character of pictures, one for each mouth shape: they are shown as cues are chosen."""
+
+    def __init__(self, face: CutOut) -> None:
+        self.face = face
+
+    def check(self, settings: OutputSettings) -> None:  # noqa: D102
+        refuse_film(settings.film)
+
+    def check_video(self, path: Path, settings: OutputSettings) -> None:  # noqa: D102
+        check_background(path, settings.staging)
+        check_cue_options(_frame_rate(settings), None, self._optional)
+
+    def check_drawable(self, path: Path, generation: Generation) -> None:
+        """Raise ExportError if a generation has no phones, from which shapes are chosen."""
+        if not len(generation.units):
+            raise ExportError(
+                f"{path}: the motion has no phones, from which drawings are chosen; give them: --units FILE"
+            )
+
+    def write_video(self, path: Path, performance: Performance) -> None:  # noqa: D102
+        settings, generation, fps = performance.settings, performance.generation, _frame_rate(performance.settings)
+        sheet = cues(generation, fps=fps, shapes=self._optional, delivery=settings.delivery)
+        count = frame_count(generation, fps)
+        shown = shown_shapes(sheet)[:count]
+        frames = self.face.frames([*shown, *[shown[-1]] * (count - len(shown))], settings.staging)
+        sound = performance.once(sound_track)
+        write_frames(path, with_reports(frames, count, RENDERING, performance.monitor), fps, sound)
+
+    @property
+    def _optional(self) -> str:
+        return "".join(name for name in OPTIONAL if name in self.face.shapes)
+
+
+class ShownPerson(_WithHead):
+    """A filmed face, whose mouth and jaw are stitched into footage."""
+
+    has_own_background = True
+
+    def __init__(self, face: FilmedFace) -> None:
+        self.face = face
+
+    def check(self, settings: OutputSettings) -> None:  # noqa: D102
+        check_film(settings.film, settings.recording)
+        if settings.staging != Staging():
+            raise InputError("size, colour of the background and what moves are of drawn faces; leave them out")
+
+    def check_video(self, path: Path, settings: OutputSettings) -> None:  # noqa: D102
+        if settings.delivery.hold_ms:
+            raise InputError(
+                "the poses of a filmed face cannot be held; hold those of a drawn face, or of motion files"
+            )
+        if any(key.mood in MOODS for key in settings.delivery.moods):
+            raise InputError(
+                "a filmed face has the mood of its footage; leave the mood out, or show a drawn face or a character"
+            )
+        if path.suffix.lower() != OPAQUE_SUFFIX:
+            raise ExportError(f"{path}: filmed faces are written as {OPAQUE_SUFFIX}; name the output so")
+
+    def check_drawable(self, path: Path, generation: Generation) -> None:
+        """Log a warning where tags in the words ask for a mood; ``film_of`` names the channels that the face needs."""
+        asked = [key.label for key in generation.moods if key.mood in MOODS]
+        if asked:
+            LOG.warning("%s: a filmed face has the mood of its footage; not shown: %s", path, ", ".join(asked))
+
+    def write_video(self, path: Path, performance: Performance) -> None:  # noqa: D102
+        settings = performance.settings
+        film, sound = self.film(performance), performance.once(sound_track)
+        write_film(path, film, sound, mark=settings.film.mark, monitor=performance.monitor)
+
+    def film(self, performance: Performance) -> Film:
+        """Return the video, which is made while it is read. Raises InputError: the motion lacks channels."""
+        settings, seen = performance.settings, performance.once(_seen)
+        return film_of(
+            self.face,
+            seen.motion,
+            speech=settings.recording,
+            sound=performance.once(sound_track),
+            model=performance.model,
+            units=seen.units,
+            fps=settings.fps,
+            options=settings.film,
+        )
+
+    def other_person(self, model: Model, speaker: str = "") -> FilmedFace | None:  # noqa: D102
+        return person_shown(model, self.face, speaker)
+
+
+def shown_face(face: AnyFace | ShownFace) -> ShownFace:
+    """Return a face as outputs show it: of its name, of the path of a ``.face`` file or of a folder of drawings, or of
+    a value.
+
+    Raises InputError: no such face or file. Raises ModelFormatError: the file is damaged, or of another version.
+    """
+    if isinstance(face, ShownFace):
+        return face
+    if isinstance(face, DrivenCharacter):
+        return ShownCharacter(MeshFace(face))
+    opened = _opened(face)
+    if isinstance(opened, CutOut):
+        return ShownCutOut(opened)
+    if isinstance(opened, FilmedFace):
+        return ShownPerson(opened)
+    return ShownCharacter(opened) if isinstance(opened, MeshFace) else ShownDrawing(opened)
+
+
+def _opened(face: str | Path | Face | FilmedFace | CutOut) -> Face | FilmedFace | CutOut:
+    if isinstance(face, Face | FilmedFace | CutOut):
+        return face
+    if is_drawings(face):
+        return read_cut_out(Path(face))
+    if Path(face).suffix.lower() == SUFFIX:
+        return load_face(face)
+    check_kind(Path(face), "face")
+    beside = Path(f"{face}{SUFFIX}")
+    if str(face) not in FACES.names and is_file(beside):
+        raise InputError(f"no drawn face {str(face)!r}; for the filmed face give its file: {beside}")
+    return face_named(str(face))
+
+
+def _seen(performance: Performance) -> Generation:
+    """Return the motion as videos show it."""
+    settings = performance.settings
+    character = settings.curves if isinstance(settings.curves, DrivenCharacter) else None
+    if performance.generation.curve_edits:
+        character = character or settings.face.character
+    return shown(performance.generation, settings.delivery, _frame_rate(settings), character)
+
+
+def _played_prosody(performance: Performance) -> Prosody:
+    """Return loudness and pitch of the sound track, in the time of the motion."""
+    return moved_prosody(prosody_of_speech(performance.once(sound_track)), performance.settings.delivery)
+
+
+def _frame_rate(settings: OutputSettings) -> float:
+    return DRAWN_HZ if settings.fps is None else settings.fps

@@ -1,0 +1,122 @@
+"""Drawn characters: flat portraits whose mouths are drawn from the motion. They need numpy and Pillow only.
+
+The stages of a frame: ``pose`` (motion and phones → numbers) and ``expression`` (voice → blinks, glances, head) →
+``geometry`` (numbers → outlines) → ``mouth`` (outlines → pixels, with ``textures``) → ``rasteriser`` (pixels →
+picture, moved by ``movement``). The still parts are painted once, by ``surroundings``, ``head`` and ``eyes`` on a
+``layer``. ``planar`` draws the same for the encoder of a video.
+A character is a ``design``: ``woman``, ``man``, ``cartoon``.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Iterator
+from functools import cached_property
+from typing import TYPE_CHECKING, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.kernels.choice import numba_works
+from lipmotion.types import Motion, Prosody, Timeline, Unit
+from lipmotion_faces.base import TRANSPARENT, DrawnMotion, Face, Staging
+from lipmotion_faces.portrait.design import Design
+
+if TYPE_CHECKING:
+    from lipmotion_faces.portrait.portrait_rasteriser import FacePose
+
+__all__ = ["Cartoon", "DrawnFace", "Man", "Portrait", "Woman"]
+
+OWN_SIZE = 640
+"""Height of pictures whose size is not given."""
+
+
+class DrawnFace(Face):
+    """A drawn character; ``design`` says which.
+
+    Motion needs ``opening``; ``width``, ``outer``, the chin ``y_152`` and the articulatory channels are used where they
+    exist. ``width`` and ``outer`` are taken relative to the rest pose in silence, so they suit any speaker.
+    """
+
+    def __init__(self, staging: Staging | None = None, prosody: Prosody | None = None) -> None:
+        self.staging, self.prosody = staging or Staging(), prosody
+
+    @property
+    @abstractmethod
+    def design(self) -> Design:
+        """The character."""
+
+    def staged(self, staging: Staging, prosody: Prosody | None = None) -> DrawnFace:
+        """Return the same character with other settings.
+
+        prosody : of the speech that will be rendered, for brows and head; None: not known
+        """
+        return type(self)(staging, prosody)
+
+    def render(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> Iterator[NDArray[np.uint8]]:  # noqa: D102
+        return iter(self.drawn(motion, units, fps=fps))
+
+    def drawn(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> DrawnMotion[FacePose]:  # noqa: D102
+        from lipmotion_faces.portrait.drawn_frames import face_poses
+
+        poses = face_poses(motion, units, fps, self.staging, self.prosody)
+        return DrawnMotion(poses, lambda: self._painter)
+
+    @cached_property
+    def _painter(self) -> Callable[[FacePose], NDArray[np.uint8]]:
+        from lipmotion_faces.portrait.drawn_frames import painter
+        from lipmotion_faces.portrait.portrait_rasteriser import Rasteriser
+
+        chosen = self.staging
+        background = None if chosen.background == TRANSPARENT else chosen.colour or chosen.background
+        return painter(Rasteriser(self.design, chosen.size or OWN_SIZE, background))
+
+    def render_planes(  # noqa: D102
+        self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0
+    ) -> Iterator[NDArray[np.uint8]] | None:
+        from lipmotion_faces.portrait.drawn_frames import face_poses, painter
+        from lipmotion_faces.portrait.planar import PlanarRasteriser
+
+        chosen = self.staging
+        if chosen.background == TRANSPARENT or not numba_works():
+            return None
+        poses = face_poses(motion, units, fps, chosen, self.prosody)
+        background, size = chosen.colour or chosen.background, chosen.size or OWN_SIZE
+        return iter(DrawnMotion(poses, lambda: painter(PlanarRasteriser(self.design, size, background))))
+
+
+@final
+class Woman(DrawnFace):
+    """A woman with long hair."""
+
+    @property
+    def design(self) -> Design:  # noqa: D102
+        from lipmotion_faces.portrait.characters import WOMAN
+
+        return WOMAN
+
+
+Portrait = Woman
+"""The best of the characters: what is shown where none is asked for."""
+
+
+@final
+class Man(DrawnFace):
+    """A man with short hair."""
+
+    @property
+    def design(self) -> Design:  # noqa: D102
+        from lipmotion_faces.portrait.characters import MAN
+
+        return MAN
+
+
+@final
+class Cartoon(DrawnFace):
+    """A flat cartoon with lines around its surfaces."""
+
+    @property
+    def design(self) -> Design:  # noqa: D102
+        from lipmotion_faces.portrait.characters import CARTOON
+
+        return CARTOON

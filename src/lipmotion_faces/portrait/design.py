@@ -1,0 +1,173 @@
+"""What tells one drawn character from another: colours, proportions, hair. The drawing itself is the same for all.
+
+Lengths are in eye distances: origin between the eyes, x to the right, y downwards. Paths are lists of points that a
+smooth curve goes through (``outlines``).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from lipmotion_faces.portrait.outlines import Path, Points, symmetric
+
+Colour = tuple[int, int, int]
+
+WHITE: Colour = (255, 255, 255)
+
+
+@dataclass(frozen=True)
+class Palette:
+    """The colours of a character. The defaults are those of the woman."""
+
+    wall: Colour = (214, 226, 228)
+    wall_light: Colour = (240, 243, 239)
+    gold: Colour = (232, 186, 92)
+    skin: Colour = (242, 190, 156)
+    skin_light: Colour = (255, 219, 190)
+    skin_shade: Colour = (214, 140, 108)
+    skin_deep: Colour = (172, 98, 74)
+    blush: Colour = (236, 132, 112)
+    hair: Colour = (82, 48, 40)
+    hair_dark: Colour = (56, 31, 28)
+    hair_light: Colour = (132, 80, 58)
+    cloth: Colour = (44, 92, 104)
+    cloth_light: Colour = (72, 128, 138)
+    cloth_dark: Colour = (30, 66, 78)
+    eye_white: Colour = (252, 248, 244)
+    eye_shade: Colour = (150, 128, 128)
+    eye_corner: Colour = (226, 150, 134)
+    iris: Colour = (92, 122, 98)
+    iris_light: Colour = (152, 176, 128)
+    iris_dark: Colour = (42, 60, 52)
+    lashes: Colour = (56, 31, 28)
+    pupil: Colour = (24, 20, 22)
+    upper_lip_light: Colour = (206, 104, 96)
+    upper_lip_dark: Colour = (172, 70, 70)
+    lower_lip_light: Colour = (222, 118, 108)
+    lower_lip_dark: Colour = (188, 84, 80)
+    gloss: Colour = (255, 196, 182)
+    seam: Colour = (112, 36, 40)
+    cavity: Colour = (58, 14, 22)
+    tooth: Colour = (240, 230, 216)
+    lower_tooth: Colour = (232, 218, 204)
+    tongue: Colour = (230, 124, 138)
+    mouth_shadow: Colour = (150, 76, 58)
+    beard: Colour = (150, 112, 100)
+    collar: Colour = (238, 240, 240)
+    collar_dark: Colour = (190, 196, 200)
+    line: Colour = (60, 34, 36)
+
+
+@dataclass(frozen=True)
+class LipDesign:
+    """Lips.
+
+    line_y       : height of the line where the closed lips meet
+    half_width   : half the distance of the corners at rest
+    upper, lower : thickness of the lips
+    seam         : half the thickness of the line between the closed lips
+    smile        : how far the corners lie below the middle; negative: above. Round, oval and tucked lips have none
+    outline      : thickness of a line around lips and mouth; 0: none
+    """
+
+    line_y: float = 0.9
+    half_width: float = 0.3
+    upper: float = 0.08
+    lower: float = 0.118
+    seam: float = 0.0065
+    smile: float = 0.0
+    outline: float = 0.0
+
+
+@dataclass(frozen=True)
+class EyeDesign:
+    """Eyes and brows.
+
+    x, y         : centre of the right iris at rest
+    iris         : its radius
+    upper, lower : lids of the right eye, from the inner to the outer corner, one x for both
+    lashes       : thickness of the upper lashes, relative to the woman's; over 0.5 with a wing
+    brow         : line of the right brow, from the inner to the outer end
+    brow_widths  : its thickness at even distances
+    """
+
+    x: float = 0.345
+    y: float = -0.014
+    iris: float = 0.1
+    upper: tuple[tuple[float, float], ...] = (
+        (0.175, 0.03),
+        (0.245, -0.053),
+        (0.35, -0.093),
+        (0.455, -0.073),
+        (0.51, -0.012),
+    )
+    lower: tuple[tuple[float, float], ...] = (
+        (0.175, 0.03),
+        (0.26, 0.062),
+        (0.37, 0.071),
+        (0.465, 0.04),
+        (0.51, -0.012),
+    )
+    lashes: float = 1.0
+    brow: Path = "0.155 -0.262, 0.28 -0.288, 0.42 -0.296, 0.575 -0.25"
+    brow_widths: tuple[float, ...] = (0.014, 0.038, 0.044, 0.034, 0.006)
+
+
+@dataclass(frozen=True, eq=False)
+class Lock:
+    """A part of the hair in front of the forehead.
+
+    outline : of the part
+    light   : (x, y, radius x, radius y) of its light; None: none
+    strands : lines in it
+    """
+
+    outline: Points
+    light: tuple[float, float, float, float] | None = None
+    strands: tuple[Path, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """A character.
+
+    head        : the outline of the bald head, down its right side from x = 0 to x = 0
+    neck, shoulders, collar : outlines; the collar is of light cloth over the shoulders
+    ear, ear_hollow : outlines on the right side
+    hair        : in front of the forehead
+    hair_behind : behind head and neck; None: none
+    cap         : hair on the sides and the back of the head, behind the ears; None: none
+    nose_width  : relative to the woman's
+    beard       : strength of the shade of a shaved beard, 0..1
+    blush       : strength of the red of the cheeks, 0..1
+    line        : thickness of lines around surfaces of one colour; 0: surfaces are shaded and have no lines
+    """
+
+    palette: Palette
+    head: Path
+    neck: Points
+    shoulders: Points
+    lips: LipDesign = field(default_factory=LipDesign)
+    eyes: EyeDesign = field(default_factory=EyeDesign)
+    ear: Path = "0.7 0, 0.8 -0.07, 0.875 0, 0.87 0.17, 0.82 0.34, 0.77 0.42, 0.7 0.38"
+    ear_hollow: Path = "0.765 0.05, 0.81 0.01, 0.835 0.07, 0.825 0.17, 0.79 0.26, 0.765 0.2"
+    collar: tuple[Points, ...] = ()
+    hair: tuple[Lock, ...] = ()
+    hair_behind: Points | None = None
+    cap: Points | None = None
+    earrings: bool = False
+    collarbones: bool = False
+    nose_width: float = 1.0
+    beard: float = 0.0
+    blush: float = 0.34
+    line: float = 0.0
+
+    @property
+    def flat(self) -> bool:
+        """Whether surfaces have one colour, and a line around them."""
+        return self.line > 0
+
+    @property
+    def skull(self) -> Points:
+        """The outline of the bald head."""
+        return symmetric(self.head)

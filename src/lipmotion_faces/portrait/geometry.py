@@ -1,0 +1,205 @@
+"""Outlines of the mouth for one pose, as heights over columns.
+
+Every outline is a function y(x), constructed outwards from the line where the lips meet, so that outlines
+cannot cross: lips enclose the opening, teeth and tongue stay inside it. Unit: eye distances, y downwards.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.articulation.mouth import upper_share
+from lipmotion_faces.portrait.design import LipDesign
+from lipmotion_faces.portrait.outlines import open_curve
+from lipmotion_faces.portrait.pose import MouthPose
+
+Heights = NDArray[np.float64]
+
+TEETH_EDGE = 0.024
+"""The upper incisors end this far below the line of the closed lips; they belong to the skull."""
+SPREAD_RISE = (0.5, 0.06)
+"""The upper lip of spread lips rises by this part of the gap, at most so far: more of the upper teeth shows."""
+LARGEST_RING_SHARE, LIP_RING_SHARE = 0.9, 0.8
+"""Protruded lips are a ring round a hole, this part of both lips thick; they are at most so much of their own width."""
+ROUND_HOLE = (0.012, 0.85)
+"""Half the width of the hole of protruded lips: a length, and so much of the gap."""
+SMILE_RISE, FROWN_FALL, RAISED_LIP, CHIN_RISE = 0.11, 0.1, 0.055, 0.03
+"""How far a mood raises the corners, lowers them, raises the upper lip, and the middle of both lips by the chin."""
+TUCKED_LIP = 0.05
+"""Least thickness of a lower lip under the upper teeth: thin lips are drawn thicker there, to be seen."""
+_LINE = [(0, 0.006), (0.16, 0.005), (0.4, -0.005), (0.72, -0.004), (1, 0.004)]
+_CUPIDS_BOW = [(0, 0.82), (0.08, 0.87), (0.22, 1.0), (0.36, 0.94), (0.62, 0.66), (0.85, 0.29), (1, 0)]
+_LOWER = [(0, 1), (0.25, 0.975), (0.5, 0.855), (0.72, 0.61), (0.89, 0.29), (1, 0)]
+_CURVES = {name: open_curve(knots).T for name, knots in (("line", _LINE), ("upper", _CUPIDS_BOW), ("lower", _LOWER))}
+
+
+@dataclass(frozen=True, eq=False)
+class LipOutlines:
+    """Heights of the lips' outlines over columns [shape=(C, ...)], top to bottom; all meet at the corners and beyond.
+
+    seam : half the thickness of the line where the lips meet
+    inner_half_width : half the width of the opening
+    """
+
+    half_width: float
+    inner_half_width: float
+    corner_y: float
+    upper_outer: Heights
+    upper_inner: Heights
+    lower_inner: Heights
+    lower_outer: Heights
+    seam: Heights
+
+
+@dataclass(frozen=True, eq=False)
+class MouthInterior:
+    """Heights of the teeth and the tongue over columns [shape=(C, ...)], cut by the inner lips.
+
+    Upper teeth reach down to ``teeth_upper``, lower teeth up to ``teeth_lower``. A tongue between the teeth reaches a
+    little over the lower lip.
+    """
+
+    teeth_upper: Heights
+    teeth_lower: Heights
+    tongue_top: Heights
+    tongue_bottom: Heights
+
+
+def lip_outlines(lips: LipDesign, pose: MouthPose, x: Heights) -> LipOutlines:
+    """Return the outlines of the lips of a pose over the columns ``x`` [shape=(C, ...)]."""
+    half_width = drawn_half_width(lips, pose)
+    u = np.minimum(np.abs(x) / half_width, 1)
+    out, wide = pose.protrusion, pose.spread
+    rise = float(upper_share(pose.gap))
+    rise += wide * max(min(SPREAD_RISE[0] * pose.gap, SPREAD_RISE[1]) - rise, 0)
+    rise += pose.tuck * (1 - out) * max(min(0.9 * pose.gap, 0.045) - rise, 0) + out * (0.47 * pose.gap - rise)
+    rise += pose.upper_raise * max(min(0.8 * pose.gap, RAISED_LIP) - rise, 0)
+    drop = pose.gap - rise
+    middle = lips.line_y - CHIN_RISE * pose.chin_raise + pose.tuck * max(TEETH_EDGE - 0.018 - drop, -0.03) - 0.008 * out
+    sag = (0.5 - 0.3 * wide) * drop * (1 - pose.tuck) - 0.012 * wide * (1 - pose.press)
+    sag += out * (0.5 * (drop - rise) + 0.004 - sag)
+    sag += pose.oval * (0.5 * (drop - rise) - sag) + 0.014 * pose.tuck
+    bend = sag * u * u
+    smile = lips.smile * (1 - out) * (1 - pose.oval) * (1 - pose.tuck) * calm_share(pose)
+    smile *= 1 - max(pose.frown, pose.stretched, pose.upper_raise, 0.8 * pose.tight)
+    smile += (FROWN_FALL * pose.frown + 0.3 * FROWN_FALL * pose.stretched - SMILE_RISE * pose.smile) * (1 - 0.7 * out)
+    line = middle + (1 - 0.7 * out) * _on("line", u) + smile * u * u + bend
+    inner_share = _inner_share(pose, half_width)
+    inner = u / inner_share
+    open_share = min(pose.gap / 0.05, 1)
+    free = wide * (1 - pose.tuck)
+    upper_power = 0.7 - 0.22 * open_share * max(out, 1 - wide) - 0.26 * free
+    lower_power = 0.6 - 0.12 * max(out, pose.oval) - 0.26 * free
+    upper_inner = line - rise * _arch(inner, upper_power + pose.tuck * (0.85 - upper_power))
+    lower_inner = line + drop * _arch(inner, lower_power + pose.tuck * (0.85 - lower_power))
+    thin = 1 - 0.28 * pose.press * (1 - out)
+    upper = lips.upper * pose.fullness * thin * (1 - 0.12 * pose.tuck + 0.2 * out - 0.14 * wide)
+    lower = lips.lower * pose.fullness * thin * (1 - 0.5 * pose.tuck + 0.16 * out - 0.16 * wide * (1 - pose.tuck))
+    lower = max(lower, TUCKED_LIP * pose.tuck)
+    follow = 0.85 * (1 - 0.35 * out)
+    return LipOutlines(
+        half_width=half_width,
+        inner_half_width=half_width * inner_share,
+        corner_y=float(middle + (1 - 0.7 * out) * _LINE[-1][1] + smile + sag),
+        upper_outer=np.minimum(line - rise * _arch(u, follow) - upper * _thickness("upper", u, out), upper_inner),
+        upper_inner=upper_inner,
+        lower_inner=lower_inner,
+        lower_outer=np.maximum(
+            line + drop * _arch(u, 0.62 - 0.15 * wide) + lower * _thickness("lower", u, out), lower_inner
+        ),
+        seam=lips.seam * (1 - u**4) * (1 + 0.2 * pose.press) * _seam_beside(pose, u, inner_share),
+    )
+
+
+def mouth_interior(lips: LipDesign, pose: MouthPose, x: Heights, outlines: LipOutlines) -> MouthInterior:
+    """Return teeth and tongue of a pose between the lips, over the columns ``x`` [shape=(C, ...)].
+
+    outlines : of the lips of this pose
+    """
+    edge = lips.line_y + TEETH_EDGE
+    upper_edge = edge - 0.06 * pose.protrusion - 0.05 * max(0.5 - pose.teeth, 0) * (1 - far_open(pose))
+    upper = upper_edge - 0.35 * x * x
+    reveal = min(max(2.8 * pose.teeth - 1.4, 0), 1) * (1 - pose.tuck)
+    low_lip = float(outlines.lower_inner.max())
+    below_lip = low_lip + 0.012 - 0.1 * pose.gap
+    met = upper_edge + 0.004 + 0.05 * pose.jaw + 0.6 * max(pose.gap - 0.14, 0)
+    met += max(0.86 - pose.teeth, 0) * (0.1 + 3 * max(pose.gap - 0.07, 0))
+    lower = below_lip + reveal * (min(met, below_lip) - below_lip) + (0.2 - 0.55 * reveal) * x * x
+    top, bottom = _tongue(pose, x, edge, low_lip)
+    over = max(pose.tongue - 0.6, 0) / 0.4 * 0.009 * _arch(x / min(0.09, 0.9 * outlines.inner_half_width), 0.5)
+    cut = outlines.upper_inner, outlines.lower_inner
+    return MouthInterior(
+        np.clip(upper, cut[0], cut[1]),
+        np.clip(np.maximum(lower, upper), *cut),
+        np.clip(top, *cut),
+        np.clip(np.maximum(top, bottom), cut[0], cut[1] + over),
+    )
+
+
+def drawn_half_width(lips: LipDesign, pose: MouthPose) -> float:
+    """Return half the width of the drawn lips: protruded lips draw their corners in, closed ones less."""
+    flat = lips.half_width * pose.width
+    ring = min(LARGEST_RING_SHARE * flat, _round_hole(pose) + LIP_RING_SHARE * (lips.upper + lips.lower))
+    return flat + pose.protrusion * (0.3 + 0.7 * min(pose.gap / 0.03, 1)) * (ring - flat)
+
+
+def _round_hole(pose: MouthPose) -> float:
+    """Return half the width of the hole of protruded lips."""
+    return ROUND_HOLE[0] + ROUND_HOLE[1] * pose.gap
+
+
+def calm_share(pose: MouthPose) -> float:
+    """Return how far the smile of the rest pose is there, 0..1: it fades as lips part or press."""
+    return (1 - 0.6 * min(pose.gap / 0.05, 1)) * (1 - 0.5 * pose.press)
+
+
+def far_open(pose: MouthPose) -> float:
+    """Return how far a mouth is open so wide that its upper teeth are seen whatever the sound, 0..1."""
+    return min(max((pose.gap - 0.06 - 0.05 * pose.protrusion) / 0.05, 0), 1)
+
+
+def _on(curve: str, u: Heights) -> Heights:
+    return np.interp(u, *_CURVES[curve])
+
+
+def _thickness(lip: str, u: Heights, out: float) -> Heights:
+    """Return the thickness of a lip along its half width; rounded lips stay thick towards their corners."""
+    round_ = min(1.15 * out, 1)
+    return (1 - round_) * _on(lip, u) + round_ * _arch(u, 0.5)
+
+
+def _arch(u: Heights, power: float) -> Heights:
+    """Return an arch over -1 <= u <= 1: 1 in the middle, 0 at the ends and beyond."""
+    return np.maximum(1 - u * u, 0) ** power
+
+
+def _inner_share(pose: MouthPose, half_width: float) -> float:
+    """Return the share of the mouth's width along which the lips are apart; it grows with the gap.
+
+    The hole of protruded lips is round, that above a tucked lip is as wide as the teeth that show in it.
+    """
+    gap, wide = pose.gap, pose.spread
+    share = min(0.72 + 0.2 * min(gap / 0.12, 1) + 0.1 * wide * min(gap / 0.05, 1), 0.95)
+    share += pose.tuck * (0.64 - share)
+    hole = _round_hole(pose) / half_width
+    return float(share + min(pose.protrusion / 0.85, 1) * (min(hole, share) - share))
+
+
+def _seam_beside(pose: MouthPose, u: Heights, inner_share: float) -> Heights:
+    """Return how thick the line is where the lips touch beside a round hole, 0..1: it fades towards the corners."""
+    beyond = np.clip((u - inner_share) / (0.08 * (1 - inner_share)), 0, 1)
+    return 1 - min(pose.protrusion / 0.7, 1) * min(pose.gap / 0.03, 1) * (0.6 + 0.4 * beyond**0.5)
+
+
+def _tongue(pose: MouthPose, x: Heights, edge: float, low_lip: float) -> tuple[Heights, Heights]:
+    """Return top and bottom of the visible tongue: low, its tip behind the upper teeth, or between the teeth."""
+    up, out = min(pose.tongue / 0.6, 1), max(pose.tongue - 0.6, 0) / 0.4
+    rest = max(low_lip - (0.3 * pose.gap + 0.012) * (1 - pose.protrusion) + 0.02 * pose.protrusion, edge - 0.01)
+    top = rest + up * (min(edge - 0.01, rest) - rest) + 0.004 * out
+    half_width = 0.2 - 0.085 * up - 0.015 * out
+    across = (x / half_width) ** 2
+    bulge = (1 - up) * 0.05 * (across + across**2) + up * 0.05 * across**2 * (0.5 + 0.5 * across)
+    return top + bulge, low_lip + 0.03 - 0.03 * across

@@ -1,0 +1,298 @@
+"""A character of the user's own: a drawing in layers, of which one mouth at a time is shown."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from copy import copy
+from functools import cached_property, lru_cache, partial
+from pathlib import Path
+from typing import NamedTuple, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError, shortened
+from lipmotion.kernels.pixels.painting import warp_bytes
+from lipmotion.types import Motion, Prosody, Timeline, Unit
+from lipmotion_faces.base import SCENE, TRANSPARENT, DrawnMotion, Face, Staging
+from lipmotion_faces.portrait.drawn_frames import face_poses
+from lipmotion_faces.portrait.movement import PIVOT_Y, HeadPlacement
+from lipmotion_faces.portrait.portrait_rasteriser import FacePose
+from lipmotion_faces.portrait.pose import MouthPose
+from lipmotion_faces.portrait.svg_document import Drawing, Shape, read_drawing
+
+Pixels = NDArray[np.float32]
+"""Premultiplied colour 0..255 and cover 0..1 [shape=(H, W, 4)]."""
+Lines = Sequence[tuple[NDArray[np.float64], bool]]
+"""Points in pixels [shape=(N, 2)], and whether each line returns to its beginning."""
+SUPERSAMPLING = 3
+
+
+def painted(
+    shapes: Sequence[tuple[Shape, tuple[float, float]]], to_pixels: NDArray[np.float64], width: int, height: int
+) -> Pixels:
+    """Return shapes from back to front on nothing.
+
+    shapes    : with how far each is moved to the right and down, in pixels
+    to_pixels : from the units of the drawing [shape=(2, 3)]
+    """
+    layer = np.zeros((height, width, 4), np.float32)
+    scale = float(np.sqrt(abs(np.linalg.det(to_pixels[:, :2]))))
+    for shape, moved in shapes:
+        lines = [
+            (np.clip(line.points @ to_pixels[:, :2].T + to_pixels[:, 2] + moved, -1e5, 1e5), line.closed)
+            for line in shape.lines
+        ]
+        if shape.fill is not None and shape.opacities[0] > 0:
+            _lay(layer, lines, partial(_filled, even_odd=shape.even_odd), shape.fill, shape.opacities[0])
+        if shape.stroke is not None and shape.opacities[1] > 0 and shape.width > 0:
+            thickness = min(shape.width * scale, 2 * height)
+            drawn = partial(_stroked, thickness=thickness)
+            _lay(layer, lines, drawn, shape.stroke, shape.opacities[1], margin=thickness / 2)
+    return layer
+
+
+def over(above: Pixels, below: Pixels) -> Pixels:
+    """Return a layer over another one."""
+    return np.asarray(above + (1 - above[..., 3:]) * below, np.float32)
+
+
+def _lay(
+    layer: Pixels,
+    lines: Lines,
+    drawn: Callable[[Lines, int, int], Pixels],
+    colour: tuple[int, int, int],
+    opacity: float,
+    margin: float = 0.0,
+) -> None:
+    """Paint lines on a layer, with how ``drawn`` covers a window around them that is ``margin`` pixels wider."""
+    if not lines:
+        return
+    height, width = layer.shape[:2]
+    left, top, right, bottom = _window(np.vstack([points for points, _ in lines]), margin, width, height)
+    if left < right and top < bottom:
+        part = layer[top:bottom, left:right]
+        inside = [(points - (left, top), closed) for points, closed in lines]
+        cover = opacity * drawn(inside, right - left, bottom - top)[..., None]
+        part += cover * (np.array([*colour, 1], np.float32) - part)
+
+
+def _window(points: NDArray[np.float64], margin: float, width: int, height: int) -> tuple[int, int, int, int]:
+    """Return the whole pixels around points that are in a picture: left, top, right, bottom."""
+    left, top = np.floor(points.min(axis=0) - margin - 1)
+    right, bottom = np.ceil(points.max(axis=0) + margin + 1)
+    return max(int(left), 0), max(int(top), 0), min(int(right), width), min(int(bottom), height)
+
+
+def _filled(lines: Lines, width: int, height: int, *, even_odd: bool) -> Pixels:
+    """Return the cover of the inside of subpaths, 0..1 [shape=(height, width)]."""
+    from PIL import Image, ImageDraw
+
+    winding = np.zeros((height * SUPERSAMPLING, width * SUPERSAMPLING), np.int16)
+    for points, _ in lines:
+        left, top, right, bottom = _window(points, 0.0, width, height)
+        if len(points) > 2 and left < right and top < bottom:
+            large = Image.new("L", ((right - left) * SUPERSAMPLING, (bottom - top) * SUPERSAMPLING))
+            corners = ((points - (left, top)) * SUPERSAMPLING - 0.5).tolist()
+            ImageDraw.Draw(large).polygon([tuple(p) for p in corners], fill=1)
+            x, y = points.T
+            turns = 1 if np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) >= 0 else -1
+            rows, columns = (slice(a * SUPERSAMPLING, b * SUPERSAMPLING) for a, b in ((top, bottom), (left, right)))
+            winding[rows, columns] += turns * np.asarray(large, np.int16)
+    inside = winding % 2 != 0 if even_odd else winding != 0
+    return _reduced(inside)
+
+
+def _stroked(lines: Lines, width: int, height: int, *, thickness: float) -> Pixels:
+    """Return the cover of lines with round ends and corners, 0..1 [shape=(height, width)]."""
+    from PIL import Image, ImageDraw
+
+    large = Image.new("L", (width * SUPERSAMPLING, height * SUPERSAMPLING))
+    draw, thick = ImageDraw.Draw(large), max(1, round(thickness * SUPERSAMPLING))
+    for points, closed in lines:
+        path = np.vstack([points, points[:1]]) if closed else points
+        at = [tuple(p) for p in (path * SUPERSAMPLING - 0.5).tolist()]
+        draw.line(at, fill=1, width=thick)
+        if thick > 2:
+            for x, y in at:
+                draw.ellipse([x - thick / 2, y - thick / 2, x + thick / 2, y + thick / 2], fill=1)
+    return _reduced(np.asarray(large, bool))
+
+
+def _reduced(mask: NDArray[np.bool_]) -> Pixels:
+    height, width = mask.shape[0] // SUPERSAMPLING, mask.shape[1] // SUPERSAMPLING
+    parts = mask.reshape(height, SUPERSAMPLING, width, SUPERSAMPLING)
+    return np.asarray(parts.mean(axis=(1, 3)), np.float32)
+
+
+OWN_SIZE = 640
+MOUTH = "mouth-"
+CHANGE_COST = 0.012
+"""A change of mouths costs as much as this squared distance at 2 frames a second, so that none is shown too shortly."""
+EYE_DISTANCE = 0.285
+"""Height of the picture that stands for an eye distance, in which heads and eyes are moved."""
+
+
+class _Key(NamedTuple):
+    """What a mouth layer stands for: gap, width, and articulatory channels of its poses."""
+
+    gap: float
+    width: float = 1.0
+    tongue: float = 0.0
+    tuck: float = 0.0
+    protrusion: float = 0.0
+    teeth: float = 0.5
+
+
+MOOD_RISE, MOOD_FALL = 0.1, 0.08
+"""How far a mood raises and lowers the brows, which are one layer."""
+MOUTHS = {
+    "rest": _Key(0.0, teeth=0.0),
+    "mbp": _Key(0.0),
+    "fv": _Key(0.05, tuck=1.0),
+    "th": _Key(0.09, tongue=1.0),
+    "l": _Key(0.09, tongue=0.58),
+    "s": _Key(0.055, 1.04, teeth=0.95),
+    "ee": _Key(0.075, 1.1, teeth=0.8),
+    "eh": _Key(0.12, 1.03),
+    "aa": _Key(0.2, 0.94),
+    "oh": _Key(0.1, 0.82, protrusion=0.55, teeth=0.2),
+    "oo": _Key(0.06, 0.7, protrusion=1.0, teeth=0.0),
+}
+"""The mouths that a drawing may have, as layers ``mouth-NAME``; ``rest`` is required, what is missing is replaced."""
+_WEIGHTS = np.array([6.0, 1.6, 0.5, 0.9, 0.7, 0.3])
+
+
+@final
+class LayeredFace(Face):
+    """A drawing in layers (docs/faces.md)."""
+
+    def __init__(self, path: Path, staging: Staging | None = None, prosody: Prosody | None = None) -> None:
+        """Raise InputError: the file is no drawing, or has no layer ``mouth-rest``."""
+        self.path, self.staging, self.prosody = path, staging or Staging(), prosody
+        self.layers = read_drawing(path)
+        names = {name for layers, _ in self.layers.shapes for name in layers}
+        self.mouths = tuple(name for name in MOUTHS if MOUTH + name in names)
+        unknown = sorted(name for name in names if name.startswith(MOUTH) and name[len(MOUTH) :] not in MOUTHS)
+        if unknown:
+            known = ", ".join(MOUTH + name for name in MOUTHS)
+            raise InputError(f"{path}: unknown layer {shortened(unknown[0])!r}; the mouths are: {known}")
+        if "rest" not in self.mouths:
+            raise InputError(f"{path}: no layer {MOUTH}rest; name the group of the closed mouth so")
+
+    def staged(self, staging: Staging, prosody: Prosody | None = None) -> LayeredFace:
+        """Return the same drawing with other settings; ``prosody`` is of the speech that will be rendered."""
+        other = copy(self)
+        other.__dict__.pop("_painter", None)
+        other.staging, other.prosody = staging, prosody
+        return other
+
+    def render(self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0) -> Iterator[NDArray[np.uint8]]:  # noqa: D102
+        return iter(self.drawn(motion, units, fps=fps))
+
+    def drawn(  # noqa: D102
+        self, motion: Motion, units: Timeline[Unit], *, fps: float = 25.0
+    ) -> DrawnMotion[tuple[FacePose, str]]:
+        poses = face_poses(motion, units, fps, self.staging, self.prosody)
+        shown = chosen_mouths([pose.mouth for pose in poses], self.mouths, fps)
+        return DrawnMotion(list(zip(poses, shown, strict=True)), lambda: self._painter)
+
+    @cached_property
+    def _painter(self) -> Callable[[tuple[FacePose, str]], NDArray[np.uint8]]:
+        picture = _LayeredPicture(self.layers, self.staging)
+        return lambda pose: picture.frame(*pose)
+
+
+def chosen_mouths(poses: Sequence[MouthPose], mouths: Sequence[str], fps: float) -> list[str]:
+    """Return the mouth to show in every frame: near the poses, and changing no more often than pays.
+
+    mouths : names of ``MOUTHS`` that there are
+    The cheapest sequence is found by dynamic programming; a closed mouth is shown whenever the lips are closed, if it
+    is closed for a frame alone.
+    """
+    keys = np.array([MOUTHS[name] for name in mouths])
+    values = np.array([[p.gap, p.width, p.tongue, p.tuck, p.protrusion, p.teeth] for p in poses])
+    distance = np.square((values[:, None] - keys) * _WEIGHTS).sum(axis=2)
+    shut = np.array([name in ("rest", "mbp") for name in mouths])
+    closed = (values[:, 0] < 1e-6) & (values[:, 3] < 0.3)
+    distance[np.ix_(closed, ~shut)] += 100.0
+    change = CHANGE_COST * fps / 2
+    cost, back = distance[0].copy(), np.zeros(distance.shape, int)
+    for n in range(1, len(distance)):
+        best = int(cost.argmin())
+        back[n] = np.where(cost <= cost[best] + change, np.arange(len(mouths)), best)
+        cost = np.minimum(cost, cost[best] + change) + distance[n]
+    at, found = int(cost.argmin()), []
+    for n in range(len(distance) - 1, -1, -1):
+        found.append(mouths[at])
+        at = int(back[n, at])
+    return found[::-1]
+
+
+class _LayeredPicture:
+    def __init__(self, drawing: Drawing, staging: Staging) -> None:
+        self._drawing, self._size = drawing, staging.size or OWN_SIZE
+        self._opaque, self._scene = staging.background != TRANSPARENT, staging.background == SCENE
+        x, y, width, height = drawing.box
+        self._width = max(2, 2 * round(self._size * width / height / 2))
+        scale = self._size / height
+        self._to_pixels = np.array([[scale, 0, -x * scale], [0, scale, -y * scale]])
+        names = {name for layers, _ in drawing.shapes for name in layers}
+        self._head = "head" if "head" in names else ""
+        behind: list[tuple[Shape, tuple[float, float]]] = []
+        front: list[tuple[Shape, tuple[float, float]]] = []
+        passed = False
+        for layers, shape in self._drawing.shapes:
+            if self._in_head(layers):
+                passed = True
+            elif self._scene or "background" not in layers:
+                (front if passed else behind).append((shape, (0.0, 0.0)))
+        self._behind, self._front = self._paint(behind), self._paint(front)
+        colour = staging.colour or ((255, 255, 255) if self._scene else None)
+        if colour is not None:
+            wall = np.ones_like(self._behind) * np.array([*colour, 1], np.float32)
+            self._behind = over(self._behind, wall)
+        self._heads = lru_cache(maxsize=64)(self._painted_head)
+
+    def frame(self, pose: FacePose, mouth: str) -> NDArray[np.uint8]:
+        """Return one frame [shape=(H, W, 3 or 4)]."""
+        unit = EYE_DISTANCE * self._size
+        eyes = "closed" if pose.lids > 0.5 else "open"
+        mood = pose.mood
+        brows = pose.brows + MOOD_RISE * (mood.inner + mood.outer) / 2 - MOOD_FALL * mood.lowered
+        look = (round(pose.gaze_x * unit), round(pose.gaze_y * unit), round(brows * unit))
+        head = self._heads(mouth, eyes, *look)
+        moved = np.empty(head.shape, np.uint8)
+        warp_bytes(head, *self._shifts(pose.head), 16, moved)
+        layer = moved.astype(np.float32) * np.array([1, 1, 1, 1 / 255], np.float32)
+        whole = over(self._front, over(layer, self._behind))
+        if self._opaque:
+            return np.asarray(whole[..., :3] + 0.5, np.uint8)
+        alpha = whole[..., 3:]
+        straight = np.where(alpha > 0, whole[..., :3] / np.maximum(alpha, 1e-6), 0)
+        return np.asarray(np.clip(np.dstack([straight, alpha * 255]) + 0.5, 0, 255), np.uint8)
+
+    def _in_head(self, layers: tuple[str, ...]) -> bool:
+        return not self._head or self._head in layers
+
+    def _painted_head(self, mouth: str, eyes: str, gaze_x: int, gaze_y: int, brows: int) -> NDArray[np.uint16]:
+        shown: list[tuple[Shape, tuple[float, float]]] = []
+        for layers, shape in self._drawing.shapes:
+            hidden = any(name.startswith(MOUTH) and name != MOUTH + mouth for name in layers)
+            hidden |= not self._scene and "background" in layers
+            hidden |= ("eyes-open" in layers and eyes == "closed") or ("eyes-closed" in layers and eyes == "open")
+            if self._in_head(layers) and not hidden:
+                moved = (gaze_x, gaze_y) if "pupils" in layers else (0, -brows) if "brows" in layers else (0, 0)
+                shown.append((shape, (float(moved[0]), float(moved[1]))))
+        return np.asarray(self._paint(shown) * (1, 1, 1, 255) + 0.5, np.uint16)
+
+    def _paint(self, shapes: Sequence[tuple[Shape, tuple[float, float]]]) -> Pixels:
+        return painted(shapes, self._to_pixels, self._width, self._size)
+
+    def _shifts(self, head: HeadPlacement) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        unit = EYE_DISTANCE * self._size
+        columns, rows = np.arange(0, self._width + 16, 16.0), np.arange(0, self._size + 16, 16.0)
+        x = np.broadcast_to(columns - self._width / 2, (len(rows), len(columns)))
+        y = np.broadcast_to((rows - 0.4 * self._size - PIVOT_Y * unit)[:, None], x.shape)
+        right, down = (head.x + 0.5 * head.yaw) * unit, (head.y + 0.5 * head.pitch) * unit
+        return head.roll * y - right, -head.roll * x - down

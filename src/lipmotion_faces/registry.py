@@ -1,0 +1,59 @@
+"""Faces by name: the built-in ones, and those of installed packages."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from lipmotion.errors import InputError
+from lipmotion.extensions import Registry
+from lipmotion.types import Prosody
+from lipmotion_faces.base import Face, Stageable, Staging
+
+_DRAWN = "lipmotion_faces.portrait"
+FACES: Registry[type[Face]] = Registry(
+    "face",
+    "lipmotion.faces",
+    {
+        "portrait": f"{_DRAWN}:Portrait",
+        "woman": f"{_DRAWN}:Woman",
+        "man": f"{_DRAWN}:Man",
+        "cartoon": f"{_DRAWN}:Cartoon",
+        "head": "lipmotion_faces.head:Head",
+    },
+)
+
+
+def face_named(name: str = "portrait") -> Face:
+    """Return a face; a name that ends in ``.svg`` is the path of a drawing in layers (docs/faces.md).
+
+    Raises InputError: none of that name, a drawing that cannot be used, or what an installed package adds is no face.
+    """
+    if name.lower().endswith(".svg"):
+        from lipmotion_faces.portrait.layered import LayeredFace
+
+        return LayeredFace(Path(name))
+    chosen = FACES.load(name)
+    if not (isinstance(chosen, type) and issubclass(chosen, Face)):
+        raise InputError(f"{chosen!r} is called a face, {name!r}, by an installed package; required a class of Face")
+    return chosen()
+
+
+def is_drawings(face: str | Path, folder: Path = Path()) -> bool:
+    """Return whether a face is a folder of drawings in a folder, and not the name of another face."""
+    return str(face) not in FACES.names and (folder / face).is_dir()
+
+
+def staged_face(face: str | Face, staging: Staging, prosody: Prosody | None = None) -> Face:
+    """Return a face, or the one of a name, with settings.
+
+    prosody : of the speech that will be rendered; None: not known
+    Raises InputError: as ``face_named``, or the face cannot be staged and settings differ from the defaults.
+    """
+    if isinstance(face, str):
+        face = face_named(face)
+    if isinstance(face, Stageable):
+        return face.staged(staging, prosody)
+    if staging != Staging():
+        kind = type(face).__name__
+        raise InputError(f"the face {kind!r} has no settings, as size and background; leave them out")
+    return face

@@ -1,0 +1,112 @@
+"""Light on surfaces: a warm key light, a cool fill light, two rim lights, and the sky."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.kernels.pixels.shading import shade
+
+Real = NDArray[np.float64]
+Triple = tuple[float, float, float]
+
+LEVELS = 4096
+"""Steps of the table from light to grey levels."""
+WHITE = 1.5
+"""The light that becomes white; the rasteriser takes light as parts of it."""
+
+
+@dataclass(frozen=True)
+class Lamp:
+    """A far light: the direction towards it, and its light, red, green and blue."""
+
+    towards: Triple
+    light: Triple
+
+
+KEY = Lamp((-0.5, 0.55, 0.8), (1.06, 0.97, 0.87))
+FILL = Lamp((0.85, 0.15, 0.6), (0.16, 0.19, 0.25))
+RIMS = (Lamp((-0.8, 0.45, -0.55), (0.55, 0.5, 0.45)), Lamp((0.85, 0.4, -0.5), (0.62, 0.7, 0.85)))
+SKY: Triple = (0.40, 0.42, 0.46)
+GROUND: Triple = (0.27, 0.21, 0.19)
+
+
+@dataclass(frozen=True)
+class Finish:
+    """How a surface reflects light.
+
+    wrap    : how far light reaches round into the shade, for red, green and blue; skin scatters red light furthest
+    gloss   : strength of the highlights
+    focus   : how small they are: 4 is dull, 6 wet; the exponent of Blinn and Phong is 2 to the power of this
+    edge    : additional reflection at grazing angles
+    strands : highlights run across strands, as on hair
+    """
+
+    wrap: Triple = (0.1, 0.1, 0.1)
+    gloss: float = 0.0
+    focus: int = 4
+    edge: float = 0.0
+    strands: bool = False
+
+
+class Lighting:
+    """The lamps, and some finishes under them.
+
+    finishes : the finish of a vertex is given by its number among these
+    """
+
+    def __init__(self, finishes: Sequence[Finish]) -> None:
+        rows = [[*f.wrap, f.gloss, f.focus, f.edge, f.strands] for f in finishes]
+        self._finishes = np.array(rows, dtype=float)
+        lamps = np.zeros((6, 6))
+        for row, lamp in zip(lamps, (KEY, FILL, *RIMS), strict=False):
+            row[:3] = unit(np.array(lamp.towards))
+            row[3:] = np.array(lamp.light) / WHITE
+        lamps[4:, :3] = np.array([SKY, GROUND]) / WHITE
+        self._lamps = lamps
+
+    def light(
+        self,
+        places: Real,
+        normals: Real,
+        colours: Real,
+        kinds: NDArray[np.intp],
+        viewer: Real,
+        *,
+        reaches: Real | None = None,
+        strands: Real | None = None,
+    ) -> NDArray[np.float32]:
+        """Return the light that vertices send to the viewer, as parts of ``WHITE`` [shape=(V, 3)].
+
+        places, normals : of the vertices, normals of length 1 [shape=(V, 3)]
+        colours : diffuse reflection, linear [shape=(V, 3)]
+        kinds   : the number of the finish of every vertex [shape=(V,)]
+        viewer  : the place of the camera [shape=(3,)]
+        reaches : the parts of the sky and of the key light that are not hidden [shape=(V, 2)]; None: all
+        strands : directions of hair [shape=(V, 3)]; None: no hair
+        """
+        open_sky = np.ones((len(places), 2)) if reaches is None else reaches
+        along = np.zeros_like(places) if strands is None else strands
+        return shade(normals, places, viewer, colours, open_sky, along, kinds, self._finishes, self._lamps)
+
+
+def tone_table() -> NDArray[np.uint8]:
+    """Return the grey level, 0 to 255, of light in even steps from 0 to ``WHITE`` [shape=(LEVELS,)].
+
+    The brightest light is compressed, as film does; the rest has the curve of sRGB.
+    """
+    light = np.linspace(0, WHITE, LEVELS)
+    knee = 0.7
+    room = 1 - knee
+    light = np.minimum(light, knee) + room * (1 - np.exp(-np.maximum(light - knee, 0) / room))
+    light = light / light[-1]
+    encoded = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    return np.rint(255 * encoded).astype(np.uint8)
+
+
+def unit(vectors: Real) -> Real:
+    """Return vectors along the last axis at length 1; the shape stays."""
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))

@@ -1,0 +1,339 @@
+"""Following one person through a video, across cuts and among other faces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion_faces.tracking.image_similarity import face_thumbnail, image_correlation, is_cut, scene_thumbnail
+from lipmotion_faces.tracking.landmarks import EYE_CORNERS, TRACKED_POINTS
+from lipmotion_faces.tracking.packages import import_opencv
+from lipmotion_faces.tracking.trackers import MEDIAPIPE, BoxFinder, FaceBox, LandmarkTracker, PointFinder, tracker_named
+
+Image = NDArray[np.uint8]
+Array = NDArray[np.float64]
+
+REACH = 2.5
+"""Side of a window, in sides of the face in it: the mesh's detector finds faces of a third of a picture best."""
+SIZE_PX = 384
+"""Every window is scaled to this side: the mesh then always sees faces of about one size."""
+STEADY_RATIO = 1.25
+"""The window keeps its side until that of the face has changed by this ratio."""
+
+
+@dataclass(frozen=True)
+class FaceWindow:
+    """A square part of a picture, possibly beyond its edges: upper left corner and side, px."""
+
+    left: int
+    top: int
+    side: int
+
+    @staticmethod
+    def around(x: float, y: float, side: float) -> FaceWindow:
+        """Return the window whose middle is nearest to a point; of a side given, px."""
+        whole = max(1, round(side))
+        return FaceWindow(round(x - whole / 2), round(y - whole / 2), whole)
+
+    def shown(self, image: Image) -> Image:
+        """Return this part of a picture, scaled to ``SIZE_PX``; beyond the picture it is black."""
+        cv2 = import_opencv()
+        height, width = image.shape[:2]
+        right, bottom = self.left + self.side, self.top + self.side
+        part = image[max(self.top, 0) : max(bottom, 0), max(self.left, 0) : max(right, 0)]
+        beyond = max(-self.top, 0), max(bottom - height, 0), max(-self.left, 0), max(right - width, 0)
+        if not part.size:
+            return np.zeros((SIZE_PX, SIZE_PX, 3), np.uint8)
+        if any(beyond):
+            part = cv2.copyMakeBorder(part, *beyond, cv2.BORDER_CONSTANT)
+        way = cv2.INTER_AREA if self.side > SIZE_PX else cv2.INTER_CUBIC
+        scaled: Image = cv2.resize(part, (SIZE_PX, SIZE_PX), interpolation=way)
+        return scaled
+
+    def to_picture(self, points: Array) -> Array:
+        """Return points of the scaled window [shape=(..., 3)] as points of the picture, px."""
+        moved: Array = points * (self.side / SIZE_PX) + (self.left, self.top, 0)
+        return moved
+
+
+class WindowedMesh:
+    """Follows one face with the mesh of a tracker in a window that goes along with it.
+
+    It is a ``PointFinder``. As the window moves with the face, the mesh sees a face that hardly moves.
+    box : of the face in the first picture
+    Use it as a context manager.
+    """
+
+    def __init__(self, box: FaceBox, tracker: LandmarkTracker) -> None:
+        self._window = FaceWindow.around(box.x, box.y, REACH * box.side)
+        self._mesh = tracker.points()
+
+    def __enter__(self) -> WindowedMesh:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._mesh.__exit__(None, None, None)
+
+    def faces(self, image: Image) -> list[Array]:
+        """Return the points of the face in the next picture, as ``PointFinder.faces``; none or one."""
+        found = [self._window.to_picture(face) for face in self._mesh.faces(self._window.shown(image))]
+        if found:
+            self._window = self._following(found[0])
+        return found
+
+    def _following(self, face: Array) -> FaceWindow:
+        low, high = face[:, :2].min(axis=0), face[:, :2].max(axis=0)
+        side = REACH * float((high - low).max())
+        is_steady = 1 / STEADY_RATIO < side / self._window.side < STEADY_RATIO
+        x, y = (low + high) / 2
+        return FaceWindow.around(float(x), float(y), self._window.side if is_steady else side)
+
+
+MOST_FACES = 4
+"""The most faces that are searched for where a scene begins."""
+JUMP, GROWTH = 0.6, 1.25
+"""Most eye distances that a face moves in a frame (GRID: up to 0.03), and the largest ratio of its sizes (1.06)."""
+LOST_FRAMES = 10
+"""A face that was missing in more frames must be recognised again."""
+SAME_PERSON_CORRELATION = 0.9
+"""Correlation of the upper faces above which two faces are one person's. GRID: 0.90 to 1 within a clip; two people, 0.2
+to 0.87 in 14 pairs of 15, and 0.94 in one."""
+LARGE_PX = 1280
+"""In a picture with a longer side than this, faces are first searched with the full-range detector, as they are likely
+to be small in it, and followed in a window, which takes less time than the mesh of the whole picture."""
+THOROUGH_STEP = 5
+"""Where no face is found, the parts of every such frame are searched too, not only the whole picture."""
+THUMBNAIL_STEP, MOST_THUMBNAILS = 5, 20
+"""Every how many frames of a scene a thumbnail of the face is kept for comparison, and how many at first."""
+NEW_LOOK_CORRELATION, MOST_LOOKS = 0.95, 60
+"""Later thumbnails are kept when they correlate less than this with all that are kept, and how many at most in all."""
+
+_EYES = [TRACKED_POINTS.index(index) for index in EYE_CORNERS]
+
+
+class FaceFollower:
+    """Finds one face in every scene of a clip, frame by frame, and then selects the scenes of one person.
+
+    The mesh finds a face that takes a fifth of the picture or more; smaller ones are found by the full-range detector
+    and followed in a window.
+    person  : thumbnails of the person who is to be followed; without any, it is the one with the most frames
+    tracker : name of the tracker that finds faces and points
+    Use it as a context manager.
+    Raises InputError: no tracker of that name.
+    """
+
+    def __init__(self, person: Sequence[Array] = (), tracker: str = MEDIAPIPE) -> None:
+        self._wanted = list(person)
+        self._tracker = tracker_named(tracker)
+        self._finder = self._tracker.boxes()
+        self._scenes = [_Scene(self._wanted, self._finder, self._tracker)]
+        self._picture: Array | None = None
+        self._scene_of_frame: list[int | None] = []  # None: no face was found
+
+    def __enter__(self) -> FaceFollower:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._scenes[-1].close()
+        self._finder.__exit__(None, None, None)
+
+    def points(self, image: Image) -> Array | None:
+        """Return the points of a face in the next frame, as of ``PointFinder.faces``; None if there is none.
+
+        Of several faces it is the one followed so far; where a scene begins, one that was followed before, else the
+        largest and most central.
+        """
+        before, self._picture = self._picture, scene_thumbnail(image)
+        if is_cut(before, self._picture) or self._scenes[-1].missing_frames > LOST_FRAMES:
+            self._begin_scene()
+        face = self._scenes[-1].next_face(image)
+        if face is None and self._scenes[-1].is_lost:
+            self._begin_scene()
+            face = self._scenes[-1].next_face(image)
+        self._scene_of_frame.append(None if face is None else len(self._scenes) - 1)
+        return face
+
+    def person(self) -> NDArray[np.bool_]:
+        """Return in which frames the face found is that of the person [shape=(T,)]."""
+        kept = self._scenes_of_person()
+        return np.array([scene in kept for scene in self._scene_of_frame])
+
+    def share_of_person(self) -> float:
+        """Return in which share of the frames with a face it is that of the person; 1 if there is no face."""
+        found = sum(scene is not None for scene in self._scene_of_frame)
+        return float(self.person().sum()) / found if found else 1.0
+
+    def thumbnails(self) -> list[Array]:
+        """Return thumbnails of the person's face, at most ``MOST_LOOKS`` from all scenes."""
+        kept = [self._scenes[index].thumbnails for index in sorted(self._scenes_of_person())]
+        found = [thumbnail for scene in kept for thumbnail in scene]
+        return found[:: -(-len(found) // MOST_LOOKS)] if found else []
+
+    def cuts(self) -> list[int]:
+        """Return the frames at which the camera changes, or the picture changes to or from somebody else."""
+        kept, cuts, last = self._scenes_of_person(), [], None
+        for index, scene in enumerate(self._scenes):
+            if scene.thumbnails:
+                if last is not None and (index in kept, True) != (last in kept, scene.is_near(self._scenes[last])):
+                    cuts.append(self._scene_of_frame.index(index))
+                last = index
+        return cuts
+
+    def _begin_scene(self) -> None:
+        self._scenes[-1].close()
+        known = self._wanted or [thumbnail for scene in self._scenes for thumbnail in scene.thumbnails]
+        self._scenes.append(_Scene(known, self._finder, self._tracker))
+
+    def _scenes_of_person(self) -> set[int]:
+        """Return the scene with the most frames, and all whose face resembles one of a scene returned.
+
+        If a person is wanted, these are the scenes whose face resembles hers, and all whose face resembles one of them.
+        """
+        counts = np.bincount([n for n in self._scene_of_frame if n is not None], minlength=len(self._scenes))
+        kept = set() if self._wanted else {int(np.argmax(counts))}
+        while True:
+            known = self._wanted + [thumbnail for index in kept for thumbnail in self._scenes[index].thumbnails]
+            more = {
+                index
+                for index, scene in enumerate(self._scenes)
+                if _best_correlation(scene.thumbnails, known) > SAME_PERSON_CORRELATION
+            } - kept
+            if not more:
+                return kept
+            kept |= more
+
+
+class _Scene:
+    """The frames between two cuts, and the face followed through them.
+
+    thumbnails     : of the face, every ``THUMBNAIL_STEP`` frames, later only where it looks different
+    missing_frames : frames since the face was last found, 0 before it was found
+    is_lost        : whether the mesh, which follows one face, has changed to another one
+    """
+
+    def __init__(self, known: Sequence[Array], finder: BoxFinder, tracker: LandmarkTracker) -> None:
+        self.thumbnails: list[Array] = []
+        self.missing_frames = 0
+        self.is_lost = False
+        self._known = known
+        self._finder, self._tracker = finder, tracker
+        self._searches = 0
+        self._first: Array | None = None
+        self._last: Array | None = None
+        self._frames = 0
+        self._open = ExitStack()
+        self._mesh: PointFinder | WindowedMesh | None = None
+        self._is_crowd = False
+
+    def close(self) -> None:
+        self._open.close()
+
+    def next_face(self, image: Image) -> Array | None:
+        """Return the points of the followed face in the next frame, None where it is not found."""
+        face = self._first_face(image) if self._last is None else self._same_face(image, self._last)
+        if face is None:
+            self.missing_frames += self._last is not None
+            return None
+        if self._frames % THUMBNAIL_STEP == 0 and len(self.thumbnails) < MOST_LOOKS:
+            self._keep_thumbnail(face_thumbnail(image, face[_EYES, :2]))
+        self._frames += 1
+        self._last, self.missing_frames = face, 0
+        return face
+
+    def _keep_thumbnail(self, thumbnail: Array) -> None:
+        is_early = len(self.thumbnails) < MOST_THUMBNAILS
+        if is_early or _best_correlation([thumbnail], self.thumbnails) < NEW_LOOK_CORRELATION:
+            self.thumbnails.append(thumbnail)
+
+    def is_near(self, before: _Scene) -> bool:
+        """Return whether this scene's face begins where the one before ended."""
+        return self._first is not None and before._last is not None and before._could_be(self._first, before._last)
+
+    def _first_face(self, image: Image) -> Array | None:
+        if max(image.shape[:2]) > LARGE_PX:
+            self._first = self._searched(image)
+        if self._first is None:
+            faces = self._faces(image)
+            if faces:
+                faces = self._several(image) or faces
+                self._first = max(faces, key=lambda face: self._priority(image, face))
+            elif max(image.shape[:2]) <= LARGE_PX:
+                self._first = self._searched(image)
+        return self._first
+
+    def _same_face(self, image: Image, last: Array) -> Array | None:
+        faces = self._faces(image)
+        if not faces:
+            return self._searched(image, last)
+        near = [face for face in faces if self._could_be(face, last)]
+        self.is_lost = not near and not self._is_crowd
+        return min(near, key=lambda face: _distance(face, last), default=None)
+
+    def _searched(self, image: Image, last: Array | None = None) -> Array | None:
+        """Return the face that the detector finds, and follow it in a window from now on; None if there is none.
+
+        last : the face followed so far, which it must be; None: the one of the highest priority is taken
+        """
+        boxes = self._finder.boxes(image, thorough=self._searches % THOROUGH_STEP == 0)
+        self._searches += 1
+        found: list[tuple[Array, WindowedMesh]] = []
+        with ExitStack() as tried:
+            for box in boxes[:MOST_FACES]:
+                mesh = tried.enter_context(WindowedMesh(box, self._tracker))
+                found += [(face, mesh) for face in mesh.faces(image) if last is None or self._could_be(face, last)]
+            if not found:
+                return None
+            face, self._mesh = max(found, key=lambda pair: self._priority(image, pair[0]))
+            self._open.push(tried.pop_all())
+        self._is_crowd = False
+        return face
+
+    def _could_be(self, face: Array, last: Array) -> bool:
+        growth = _size(face) / _size(last)
+        return _distance(face, last) < JUMP * (1 + self.missing_frames) and 1 / GROWTH < growth < GROWTH
+
+    def _faces(self, image: Image) -> list[Array]:
+        if self._mesh is None:
+            self._mesh = self._open.enter_context(self._tracker.points())
+        return self._mesh.faces(image)
+
+    def _several(self, image: Image) -> list[Array]:
+        """Return all faces if there are several, and follow all of them from now on, which takes twice the time."""
+        crowd = self._open.enter_context(self._tracker.points(MOST_FACES))
+        faces = crowd.faces(image)
+        if len(faces) < 2:
+            return []
+        self._mesh, self._is_crowd = crowd, True
+        return faces
+
+    def _priority(self, image: Image, face: Array) -> tuple[bool, float]:
+        """Return whether a face was followed before, and its size, which counts half at the edge of the picture."""
+        is_known = _best_correlation([face_thumbnail(image, face[_EYES, :2])], self._known) > SAME_PERSON_CORRELATION
+        return is_known, _size(face) * (1 - abs(float(_middle(face)[0]) / image.shape[1] - 0.5))
+
+
+def _best_correlation(thumbnails: Sequence[Array], others: Sequence[Array]) -> float:
+    """Return the highest correlation of a thumbnail with one of the others, 0 where there is none."""
+    if not thumbnails or not others:
+        return 0.0
+    return float(image_correlation(np.stack(thumbnails)[:, None], np.stack(others)).max())
+
+
+def _distance(face: Array, other: Array) -> float:
+    """Return the distance between the middles of two faces, in eye distances of the second."""
+    return float(np.linalg.norm(_middle(face) - _middle(other))) / _size(other)
+
+
+def _middle(face: Array) -> Array:
+    """Return the point between the outer eye corners, px [shape=(2,)]."""
+    middle: Array = face[_EYES, :2].mean(axis=0)
+    return middle
+
+
+def _size(face: Array) -> float:
+    """Return the distance between the outer eye corners, px."""
+    return float(np.linalg.norm(face[_EYES[1], :2] - face[_EYES[0], :2]))

@@ -1,0 +1,221 @@
+"""Decoding of a video into pictures with their times."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion.storage.files import check_source
+from lipmotion.storage.media import MOST_PIXELS, open_media, stated_duration_s, video_streams
+from lipmotion_faces.tracking.packages import import_opencv
+
+
+@dataclass(frozen=True, eq=False)
+class VideoFrame:
+    """One picture.
+
+    time_s : its time since the start of the container, or of the span, s
+    image  : uint8 array [shape=(H, W, 3)], RGB, upright, square pixels
+    """
+
+    time_s: float
+    image: NDArray[np.uint8]
+
+
+@dataclass(frozen=True, eq=False)
+class OpenVideo:
+    """An open video.
+
+    frames          : the pictures; each is decoded when the iterator reaches it
+    stated_rates_hz : the frame rates that the container states, the most reliable first
+    stated_s        : the duration that the container states, 0 if none
+    damage          : a reason for every packet or picture that was left out so far
+    """
+
+    frames: Iterator[VideoFrame]
+    stated_rates_hz: tuple[float, ...]
+    stated_s: float
+    damage: list[str]
+
+
+@dataclass(frozen=True)
+class VideoSpan:
+    """A part of a video, from ``start_s`` (included) to ``end_s`` (excluded), s since the container's start."""
+
+    start_s: float = 0.0
+    end_s: float = float("inf")
+
+
+WHOLE = VideoSpan()
+SEEK_MARGIN_S = 1.0
+"""Decoding starts at the key frame before the span by this much: containers that seek by the time of decoding are late
+by the pictures that wait for others."""
+ROUNDING_S = 1e-4
+"""A picture belongs to a span that begins this much later: times of the container are whole ticks."""
+SHORT_S = 0.5
+"""Pictures that end more than this before the stated duration are reported."""
+LEAST_SIDE_PX, LONGEST_SIDE_PX = 16, 8192
+"""Bounds of a picture's width and height, px: a smaller one shows no face, a larger one fills the memory."""
+
+
+@contextmanager
+def open_video(path: Path, span: VideoSpan = WHOLE, *, longest_px: int | None = None) -> Iterator[OpenVideo]:
+    """Open the first video stream of a file; memory use does not grow with its length.
+
+    span       : the part that is wanted, which the times and the duration then refer to; it is sought in the file
+    longest_px : reduce larger pictures to this while they are converted, for a quick look; decode in several threads
+    Time 0 is the container's start, as in ``speech.sound.audio_files``, so sound and picture agree.
+    Raises InputError: no such file, empty, not a video, no video stream, or no picture that can be decoded (in a span
+    there may be none).
+    Packets and pictures that are damaged later are left out, and listed in ``OpenVideo.damage``.
+    """
+    import av
+
+    check_source(path, "video")
+    try:
+        container = open_media(path)
+    except (av.FFmpegError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: not a readable video ({reason}); give a video file") from error
+    with container:
+        stream = next(iter(video_streams(container)), None)
+        if stream is None:
+            raise InputError(f"{path}: has no video stream; give a video that shows the speaker's face")
+        if stream.codec_context is None:
+            raise InputError(f"{path}: its pictures are coded in an unknown way; export the video again")
+        _check_size(path, stream.width, stream.height, float(stream.sample_aspect_ratio or 1))
+        stream.codec_context.options = {"max_pixels": str(MOST_PIXELS)}
+        rates = [float(rate) for rate in (stream.guessed_rate, stream.average_rate) if rate]
+        damage: list[str] = []
+        stated_s = stated_duration_s(container, stream)
+        if span != WHOLE:
+            stated_s = max(min(stated_s, span.end_s) - span.start_s, 0.0)
+        if longest_px is not None:
+            stream.thread_type = "AUTO"
+        with closing(
+            _frames(container, stream, path, span, longest_px, damage)
+        ) as frames:  # decoding from a closed container would crash
+            yield OpenVideo(frames, tuple(rates), stated_s, damage)
+
+
+def damage_notes(video: OpenVideo, times_s: NDArray[np.float64], rate_hz: float) -> list[str]:
+    """Return notes on pictures that cannot be decoded or are missing at the end; ``video`` was read to its end.
+
+    times_s : times of the pictures that were decoded
+    rate_hz : nominal frame rate
+    """
+    notes = []
+    end_s = float(times_s[-1]) + 1 / rate_hz
+    if video.damage:
+        expected = round(max(video.stated_s, end_s) * rate_hz)
+        notes.append(f"damaged: {len(times_s)} of about {expected} frames can be decoded")
+    if end_s < video.stated_s - SHORT_S:
+        notes.append(f"cut short: pictures up to {end_s:.2f} s of {video.stated_s:.2f} s")
+    return notes
+
+
+def _frames(
+    container: Any, stream: Any, path: Path, span: VideoSpan, longest_px: int | None, damage: list[str]
+) -> Generator[VideoFrame, None, None]:
+    start_s = (container.start_time or 0) / 1e6
+    pixel_shape = float(stream.sample_aspect_ratio or 1)
+    last_s = float("-inf")
+    for picture in _pictures_from(container, stream, start_s + span.start_s - ROUNDING_S, damage):
+        if picture.time is None or picture.time - start_s <= last_s:
+            continue  # it has no time, or one that another picture has
+        last_s = picture.time - start_s
+        if last_s >= span.end_s - ROUNDING_S:
+            break
+        _check_size(path, picture.width, picture.height, pixel_shape)
+        yield VideoFrame(max(last_s - span.start_s, 0.0), _upright(picture, pixel_shape, longest_px))
+    if last_s == float("-inf") and span == WHOLE:
+        raise InputError(f"{path}: holds no picture that can be decoded; export the video again")
+
+
+def _pictures_from(container: Any, stream: Any, first_s: float, damage: list[str]) -> Iterator[Any]:
+    """Yield the pictures from a time on, of the container's clock; ``damage`` lists what is damaged from there on.
+
+    If seeking ends behind that time, as without an index, all pictures before are decoded too.
+    """
+    start_s = (container.start_time or 0) / 1e6
+    if first_s <= start_s:
+        yield from _pictures(container, stream, damage)
+        return
+    container.seek(int(max(first_s - SEEK_MARGIN_S, start_s) / stream.time_base), stream=stream)
+    pictures = _pictures(container, stream, damage)
+    picture = next(pictures, None)
+    if picture is None or picture.time is None or picture.time > first_s:
+        container.seek(int(start_s / stream.time_base), stream=stream)
+        pictures = _pictures(container, stream, damage)
+        picture = next(pictures, None)
+    while picture is not None and (picture.time is None or picture.time < first_s):
+        picture = next(pictures, None)
+    damage.clear()
+    if picture is not None:
+        yield picture
+        yield from pictures
+
+
+def _pictures(container: Any, stream: Any, damage: list[str]) -> Iterator[Any]:
+    """Yield the pictures that are not damaged."""
+    import av
+
+    packets = container.demux(stream)
+    while True:
+        try:
+            for picture in next(packets).decode():
+                if picture.is_corrupt:
+                    damage.append("a damaged picture")
+                else:
+                    yield picture
+        except StopIteration:
+            return
+        except av.EOFError:
+            return
+        except av.FFmpegError as error:
+            damage.append(str(error.strerror))
+
+
+def _check_size(path: Path, width: int, height: int, pixel_shape: float) -> None:
+    """Raise InputError for pictures that are too small or too large.
+
+    pixel_shape : width of a pixel over its height
+    """
+    if not width or not height:  # FFmpeg gives no size for pictures that it refuses
+        raise InputError(f"{path}: pictures of no size, or of more than {MOST_PIXELS} pixels; scale the video")
+    shown = round(width * pixel_shape)
+    if not (LEAST_SIDE_PX <= shown <= LONGEST_SIDE_PX and LEAST_SIDE_PX <= height <= LONGEST_SIDE_PX):
+        raise InputError(
+            f"{path}: pictures of {shown} × {height} pixels, required {LEAST_SIDE_PX} to {LONGEST_SIDE_PX}; scale "
+            "the video"
+        )
+    if shown * height > MOST_PIXELS:
+        raise InputError(
+            f"{path}: pictures of {shown} × {height} pixels, required at most {MOST_PIXELS} in all; scale the video"
+        )
+
+
+def _upright(picture: Any, pixel_shape: float, longest_px: int | None = None) -> NDArray[np.uint8]:
+    """Return a picture as RGB [shape=(H, W, 3)], rotated upright, with square pixels, of at most ``longest_px``.
+
+    Raises MissingDependencyError: it is to be rotated, and OpenCV, which takes a tenth of NumPy's time, is missing.
+    """
+    width, height = round(picture.width * pixel_shape), picture.height
+    if longest_px is not None and max(width, height) > longest_px:
+        scale = longest_px / max(width, height)
+        width, height = max(1, round(width * scale)), max(1, round(height * scale))
+    image: NDArray[np.uint8] = picture.to_ndarray(format="rgb24", width=width, height=height)
+    quarter_turns = round(picture.rotation / 90) % 4
+    if not quarter_turns:
+        return image
+    cv2 = import_opencv()
+    turn = (cv2.ROTATE_90_COUNTERCLOCKWISE, cv2.ROTATE_180, cv2.ROTATE_90_CLOCKWISE)[quarter_turns - 1]
+    rotated: NDArray[np.uint8] = cv2.rotate(image, turn)
+    return rotated

@@ -1,0 +1,54 @@
+"""The optional packages of face tracking, imported when they are first needed."""
+
+from __future__ import annotations
+
+import os
+from importlib import import_module
+from typing import Any
+
+from lipmotion.errors import MissingDependencyError
+from lipmotion.extensions import install_command
+
+
+def import_opencv() -> Any:
+    """Return the module ``cv2``. Raises MissingDependencyError: it cannot be imported."""
+    try:
+        import cv2
+    except ImportError as error:
+        raise missing("OpenCV", error) from error
+    return cv2
+
+
+def import_face_mesh() -> Any:
+    """Return MediaPipe's module ``face_mesh``, with less logging. Raises MissingDependencyError: no import."""
+    return _import_solution("face_mesh")
+
+
+def import_face_detection() -> Any:
+    """Return MediaPipe's module ``face_detection``, with less logging. Raises MissingDependencyError: no import."""
+    return _import_solution("face_detection")
+
+
+def tracking_versions() -> str:
+    """Return the version of OpenCV; MediaPipe is imported, too. Raises MissingDependencyError: one cannot be."""
+    import_face_mesh()
+    version: str = import_opencv().__version__
+    return version
+
+
+def _import_solution(name: str) -> Any:
+    os.environ.setdefault("GLOG_minloglevel", "2")
+    os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
+    try:
+        solutions = import_module("mediapipe.python.solutions")  # all of them
+    except ImportError as error:
+        raise missing("MediaPipe", error) from error
+    return getattr(solutions, name)
+
+
+def missing(package: str, error: ImportError) -> MissingDependencyError:
+    """Return the error that a package cannot be imported, which says how to install it."""
+    return MissingDependencyError(
+        f"face tracking needs {package}, which cannot be imported ({error}); "
+        f"{install_command('video')} with Python 3.10 to 3.12 (MediaPipe needs Python < 3.13)"
+    )

@@ -1,0 +1,194 @@
+"""Transfer onto another face: ``map_onto(model, person) → map``, from footage of the person."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from math import ceil
+from pathlib import Path
+from zipfile import is_zipfile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.corpora.store import Corpus
+from lipmotion.errors import AlignmentError, InputError
+from lipmotion.kernels.threads import one_thread
+from lipmotion.motion.resample import model_motion
+from lipmotion.motion.speaker_maps import SpeakerMap
+from lipmotion.motion.transfer_map import measured_speech_s, transfer_map, with_channels
+from lipmotion.pipeline.generate.generation_for import generate_for, speaker_map
+from lipmotion.pipeline.model import Model, load_model
+from lipmotion.pipeline.understand.request import Onto, SpeechRequest
+from lipmotion.pipeline.understand.understood_speech import audio_of, understand
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.stats.pca import evenly_spaced
+from lipmotion.storage.files import check_source
+from lipmotion.types import Audio, Example, Motion, Speech, Track
+from lipmotion_faces.filmed.face import SUFFIX, FilmedFace, load_face
+from lipmotion_faces.tracking.frames import VideoSpan
+from lipmotion_faces.tracking.track import track
+
+MOST_FOOTAGE_S = 60.0
+"""Seconds of footage that are used: the first of a video, utterances spread evenly over a corpus."""
+LEAST_SPEECH_S = 0.5
+"""Fewest seconds of speech, with the face measured, of which a map is made."""
+
+
+@one_thread()
+def map_onto(
+    model: Model,
+    onto: Onto,
+    *,
+    speaker: str = "",
+    onto_speaker: str = "",
+    recogniser: str = "auto",
+    speech: SpeechRequest | None = None,
+) -> SpeakerMap:
+    """Return the map from the motion that a model generates to that of another person; ``SpeechRequest.onto`` takes it.
+
+    model        : whose motion is mapped
+    onto         : the person: a video, a prepared corpus, another model, or a filmed face
+    speaker      : whose motion is mapped, of the people whom ``model`` was trained on; empty: the mean person
+    onto_speaker : onto whose motion, where a corpus or another model has several people
+    recogniser   : how the person's recordings without a transcript are recognised, as of ``SpeechRequest``; best the
+                   one of the speech that is animated, for motion of doubtful phones is smaller
+    speech       : another model's person is measured in this speech; not used for videos and corpora
+    The model generates motion for the person's own recordings, and the person's motion is measured in the same frames,
+    so that both say the same. Transcripts are not needed; those of a corpus are used.
+    Raises InputError: no face, too little speech, other channels than those of the model, or no such speaker.
+    Raises CorpusError, ModelFormatError, MissingDependencyError: as the corpus, the model file and tracking.
+
+    >>> import lipmotion
+    >>> person = lipmotion.map_onto(lipmotion.load_model(), "person.mp4")  # doctest: +SKIP
+    >>> lipmotion.animate(lipmotion.SpeechRequest("speech.wav", onto=person))  # doctest: +SKIP
+    """
+    if isinstance(onto, SpeakerMap):
+        return onto
+    person = speaker_map(model.speakers, speaker)
+    opened, where = _opened(onto)
+    source, target = [], []
+    for name, request, measured in _takes(opened, where, onto_speaker, speech):
+        recognised = replace(request, recogniser=recogniser)
+        pair = measured_pair(model, person, name, recognised, measured, where, onto_speaker)
+        source.append(pair[0])
+        target.append(pair[1])
+    spoken_s = measured_speech_s(target)
+    if spoken_s < LEAST_SPEECH_S:
+        raise InputError(
+            f"{where}: {spoken_s:.2f} s of speech with a measured face, required {LEAST_SPEECH_S} s or more; give a "
+            "recording in which the person speaks, with sound"
+        )
+    return transfer_map(source, target)
+
+
+def measured_pair(
+    model: Model,
+    person: SpeakerMap | None,
+    name: str,
+    request: SpeechRequest,
+    measured: Track | Model,
+    where: str,
+    speaker: str = "",
+) -> tuple[Example, Example]:
+    """Return what a model generates for a recording of another person, and this person's own motion in it.
+
+    person   : of the model; None: the mean person
+    name     : of the recording
+    request  : the recording
+    measured : tracked motion, or the model that generates it
+    where    : name of the person, for messages
+    speaker  : of the model in ``measured``
+    Raises InputError: the person's motion has other channels.
+    """
+    speech = _understood(model, request)
+    generated = generate_for(person, model.engine, model.learned, speech).motion
+    motion, valid = _measured(measured, request, speech, speaker)
+    motion = with_channels(motion, generated.channels, where)
+    return Example(name, speech, generated, valid), Example(name, speech, motion, valid)
+
+
+_Opened = Corpus | Model | FilmedFace | Path
+
+
+def _opened(onto: str | Path | Corpus | Model | FilmedFace) -> tuple[_Opened, str]:
+    """Return the corpus, the model, or the path of the video; and its name for messages."""
+    if isinstance(onto, Corpus):
+        return onto, str(onto.path)
+    if isinstance(onto, Model):
+        return onto, "the model"
+    if isinstance(onto, FilmedFace):
+        return onto, "the face"
+    path = Path(onto)
+    if path.is_dir():
+        return Corpus.open(path), str(path)
+    check_source(path, "video, face or model")
+    if path.suffix.lower() == SUFFIX:
+        return load_face(path), str(path)
+    return (load_model(path) if is_zipfile(path) else path), str(path)
+
+
+def _takes(
+    opened: _Opened, where: str, speaker: str, speech: SpeechRequest | None
+) -> Iterator[tuple[str, SpeechRequest, Track | Model]]:
+    """Yield recordings of a person: name, request, and the tracked motion, or the model that generates it.
+
+    Raises InputError: several people, or no such speaker; no speech for a model.
+    """
+    if isinstance(opened, Model):
+        if speech is None:
+            raise InputError("the person of a model is measured in some speech; give a request (speech=...)")
+        yield where, replace(speech, speaker="", onto=None), opened
+    elif isinstance(opened, FilmedFace):
+        for number, take in enumerate(opened.takes):
+            yield f"take {number + 1}", SpeechRequest(take.sound), Track(take.motion, take.seen)
+    elif isinstance(opened, Corpus):
+        names = _names(opened, where, speaker)
+        mean_s = sum(seconds for _, seconds in opened.speakers.values()) / max(len(opened), 1)
+        for index in evenly_spaced(ceil(MOST_FOOTAGE_S / max(mean_s, 1e-3)), len(names)):
+            utterance = opened.utterance(names[index])
+            words = " ".join(utterance.words) if utterance.words else None
+            yield utterance.name, SpeechRequest(utterance.audio, words, utterance.phones), utterance.track
+    else:
+        if speaker:
+            raise InputError(f"{where}: a video has no speaker {speaker!r} by name; leave the name out")
+        audio = read_audio(opened)
+        first = Audio(audio.samples[: round(MOST_FOOTAGE_S * audio.rate_hz)], audio.rate_hz)
+        yield where, SpeechRequest(first), track(opened, crops=False, span=VideoSpan(0.0, MOST_FOOTAGE_S))
+
+
+def _names(corpus: Corpus, where: str, speaker: str) -> tuple[str, ...]:
+    """Return the utterances of one person: those of the training list if there are any.
+
+    Raises InputError: there are several people, no such person, or no utterances.
+    """
+    known = [name for name in corpus.speakers if name]
+    if (speaker and speaker not in known) or (not speaker and len(corpus.speakers) > 1):
+        found = f"no speaker {speaker!r}" if speaker else f"{len(corpus.speakers)} speakers"
+        raise InputError(f"{where}: {found}, required one of: {', '.join(known)}; name it (--onto-speaker)")
+    speakers = [speaker] if speaker else []
+    names = corpus.names("train", speakers) or corpus.names(None, speakers)
+    if not names:
+        raise InputError(f"{where}: the corpus is empty; prepare recordings of the person")
+    return names
+
+
+def _understood(model: Model, request: SpeechRequest) -> Speech:
+    """Return the speech of a recording; without its transcript where that cannot be aligned."""
+    try:
+        return understand(model, request)
+    except AlignmentError:
+        return understand(model, replace(request, transcript=None))
+
+
+def _measured(
+    measured: Track | Model, request: SpeechRequest, speech: Speech, speaker: str
+) -> tuple[Motion, NDArray[np.bool_]]:
+    """Return the motion of a person in speech at 100 Hz, and the frames in which it is valid [shape=(T,)]."""
+    if isinstance(measured, Track):
+        return model_motion(measured, len(speech.features.values))
+    same = SpeechRequest(audio_of(request), units=speech.units)
+    other = generate_for(
+        speaker_map(measured.speakers, speaker), measured.engine, measured.learned, understand(measured, same)
+    )
+    return other.motion, np.ones(len(other.motion.values), bool)

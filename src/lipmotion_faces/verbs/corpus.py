@@ -1,0 +1,165 @@
+"""``lipmotion corpus prepare|info|sync|offset|prompts|coverage``: make a corpus of recordings, correct it."""
+
+from __future__ import annotations
+
+import argparse
+
+from lipmotion.cli.arguments.declared import add_options
+from lipmotion.cli.arguments.options import add_machine_readable, add_workers
+from lipmotion.cli.arguments.paths import add_input, add_output
+from lipmotion.cli.terminal.printing import print_error, print_json, print_line
+from lipmotion.pipeline.job import Request
+
+LINES = 12
+
+
+def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the verb and its actions to the parser of the command line."""
+    parser = verbs.add_parser("corpus", help="prepare recordings for training")
+    actions = parser.add_subparsers(title="actions", required=True, metavar="ACTION")
+    prepare = actions.add_parser("prepare", help="make a corpus of recordings")
+    layouts = "folder of videos, or of sounds with motion; or one video (docs/corpora.md)"
+    add_input(prepare, "recordings", what="folder of recordings", help=layouts)
+    add_output(prepare, "-o", "--output", is_folder=True, required=True, metavar="CORPUS")
+    add_workers(prepare)
+    prepare.add_argument("--no-crops", dest="crops", action="store_false", help="do not store mouth pictures")
+    late = "the sound of every recording is MS milliseconds late against its motion (default: in step, or found)"
+    prepare.add_argument("--offset-ms", type=float, metavar="MS", help=late)
+    add_machine_readable(prepare)
+    prepare.set_defaults(run=run_prepare)
+    _add_info(actions)
+    _add_sync(actions)
+    _add_offset(actions)
+    _add_prompts(actions)
+    _add_coverage(actions)
+
+
+def run_prepare(options: argparse.Namespace) -> None:
+    """Call ``lipmotion.prepare``; report what was prepared, kept and skipped."""
+    from lipmotion.cli.terminal.progress import reporting
+    from lipmotion_faces.corpus.prepare import prepare
+
+    with reporting(options) as report:
+        done = prepare(
+            options.recordings,
+            options.output,
+            workers=options.workers,
+            crops=options.crops,
+            offset_ms=options.offset_ms,
+            monitor=report.receive,
+        )
+        report.finish(str(done), corpus=str(done.corpus), kind=done.kind, **done.counts)
+
+
+def _add_info(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = actions.add_parser("info", help="print what a corpus contains")
+    add_input(parser, "corpus", what="corpus")
+    parser.set_defaults(run=run_info)
+
+
+def run_info(options: argparse.Namespace) -> None:
+    """Print the summary of ``lipmotion.Corpus``, and by how much its sound is late."""
+    from lipmotion.corpora.store import Corpus
+    from lipmotion_faces.corpus.sync import offsets
+
+    corpus = Corpus.open(options.corpus)
+    for name, value in (*corpus.summary().items(), *(("offset", line) for line in offsets(corpus).lines())):
+        print_line(f"{name:12} {value}")
+
+
+def _add_sync(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = actions.add_parser("sync", help="correct the offset between sound and lips of a corpus")
+    add_input(parser, "corpus", what="corpus")
+    parser.set_defaults(run=run_sync)
+
+
+def run_sync(options: argparse.Namespace) -> None:
+    """Call ``lipmotion_faces.corpus.sync.sync``; print by how much the sound was moved."""
+    from lipmotion.corpora.store import Corpus
+    from lipmotion_faces.corpus.sync import sync
+
+    corpus = Corpus.open(options.corpus)
+    moved = sync(corpus)
+    for collection, late_s in moved.items():
+        print_line(f"{collection or corpus.path}: sound moved by {-1000 * late_s:+.0f} ms")
+    if not moved:
+        print_line(f"{corpus.path}: nothing moved: the sound is in step, or its offset could not be measured")
+
+
+def _add_offset(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = actions.add_parser("offset", help="measure by how much a separate recording of the sound is late")
+    add_input(parser, "camera", what="recording", help="the recording that is in step with the motion: video or sound")
+    add_input(parser, "recorder", what="recording", help="the separate recording of the same sound")
+    parser.set_defaults(run=run_offset)
+
+
+def run_offset(options: argparse.Namespace) -> None:
+    """Call ``sound_offset``; print the offset and how it was found."""
+    from lipmotion.speech.sound.audio_files import read_audio
+    from lipmotion.speech.sound.sound_offset import sound_offset
+
+    found = sound_offset(read_audio(options.camera), read_audio(options.recorder))
+    print_line(f"--offset-ms {found.late_s * 1000:.1f}  (by {found.how}; levels correlate by {found.alike:.2f})")
+
+
+def _add_prompts(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = actions.add_parser("prompts", help="print sentences to record, those that cover most sounds first")
+    parser.add_argument("--count", type=int, default=50, metavar="N", help="at most N sentences (default: 50)")
+    sentences = "choose from the sentences of this file, one per line"
+    add_input(parser, "--text", what="text", metavar="FILE", help=sentences)
+    covered = "do not count what this corpus covers already"
+    add_input(parser, "--have", what="corpus", metavar="CORPUS", help=covered)
+    add_options(parser, Request, "lexicon")
+    parser.set_defaults(run=run_prompts)
+
+
+def run_prompts(options: argparse.Namespace) -> None:
+    """Call ``prompts`` and print the sentences, each with the phones and diphones covered so far."""
+    from lipmotion.corpora.store import Corpus
+    from lipmotion.pipeline.training.prompts import prompts
+    from lipmotion.units import Lexicon
+
+    have = Corpus.open(options.have) if options.have else None
+    lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
+    selection = prompts(options.text, count=options.count, have=have, lexicon=lexicon)
+    for number, prompt in enumerate(selection.chosen, 1):
+        covered = f"phones {prompt.phones:2}/{selection.phones}  diphones {prompt.diphones:4}/{selection.diphones}"
+        print_line(f"{number:4}  {covered}  {prompt.text}")
+    last = selection.chosen[-1] if selection.chosen else None
+    covered = f"{last.diphones / selection.diphones:.0%} of all their diphones" if last else "they add nothing"
+    print_line(f"{len(selection.chosen)} of {selection.sentences} sentences: {covered}")
+    if selection.left_out:
+        words = sorted(set(selection.left_out.values()))
+        some = ", ".join(words[:10]) + (", ..." if len(words) > 10 else "")
+        print_error(f"warning: left out {len(selection.left_out)} sentences for their words: {some}")
+
+
+def _add_coverage(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = actions.add_parser("coverage", help="print which sounds a corpus lacks, and what is nearest to them")
+    add_input(parser, "corpus", what="corpus")
+    sentences = "the sentences whose sounds are needed, one per line (default: those of lipmotion corpus prompts)"
+    add_input(parser, "--text", what="text", metavar="FILE", help=sentences)
+    add_options(parser, Request, "lexicon")
+    most = f"at most N lines each of phones, diphones and triphones (default: {LINES})"
+    parser.add_argument("--count", type=int, default=LINES, metavar="N", help=most)
+    parser.add_argument("--json", action="store_true", help="print one JSON object, with everything that is missing")
+    parser.set_defaults(run=run_coverage)
+
+
+def run_coverage(options: argparse.Namespace) -> None:
+    """Call ``coverage`` and print it."""
+    from lipmotion.corpora.store import Corpus
+    from lipmotion.units import Lexicon
+    from lipmotion_faces.corpus.coverage import coverage, coverage_document, coverage_lines
+
+    lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
+    found = coverage(Corpus.open(options.corpus), options.text, lexicon=lexicon)
+    if options.json:
+        print_json(coverage_document(found))
+    else:
+        for line in coverage_lines(found, max(options.count, 0)):
+            print_line(line)
+    if found.left_out and not options.json:
+        print_error(f"warning: left out {len(found.left_out)} sentences for their words (--json has them)")
+    if found.unknown and not options.json:
+        print_error(f"warning: {found.unknown} utterances without known words or phones were not counted")

@@ -1,0 +1,64 @@
+"""``lipmotion face build|info``: make a filmed face of a person from footage, and describe one."""
+
+from __future__ import annotations
+
+import argparse
+
+from lipmotion.cli.arguments.options import add_execution
+from lipmotion.cli.arguments.paths import add_input, add_output
+from lipmotion.cli.terminal.printing import print_line
+
+
+def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the verb and its actions to the parser of the command line."""
+    parser = verbs.add_parser("face", help="make a video-realistic face from footage of a person")
+    actions = parser.add_subparsers(title="actions", required=True, metavar="ACTION")
+    build = actions.add_parser("build", help="make a face from a video, a folder of videos or a corpus")
+    footage = "a video of the person speaking, a folder of videos, or a prepared corpus; a minute or more is good"
+    add_input(build, "footage", what="footage", metavar="VIDEO|FOLDER|CORPUS", help=footage)
+    add_output(build, "-o", "--output", force=True, required=True, metavar="FILE.face")
+    videos = "of a corpus, the folder of the videos that it was prepared from"
+    add_input(build, "--recordings", what="folder of recordings", metavar="FOLDER", help=videos)
+    build.add_argument("--speaker", default="", metavar="NAME", help="whose face, where there are several people")
+    build.add_argument("--name", default="", help="of the face (default: the speaker's or the file's)")
+    add_execution(build)
+    build.set_defaults(run=run_build)
+    info = actions.add_parser("info", help="describe a face")
+    add_input(info, "face", what="face", metavar="FILE.face")
+    info.set_defaults(run=run_info)
+
+
+def run_build(options: argparse.Namespace) -> None:
+    """Call ``lipmotion.build_face`` and ``lipmotion.save_face``; report what was made."""
+    from lipmotion.cli.terminal.progress import reporting
+    from lipmotion.errors import ExportError
+    from lipmotion.storage.files import check_target
+    from lipmotion_faces.film.build import build_face
+    from lipmotion_faces.filmed.face import SUFFIX, save_face
+
+    if options.output.suffix.lower() != SUFFIX:
+        raise ExportError(f"{options.output}: a face is a file ending in {SUFFIX}; name it so")
+    check_target(options.output)
+    with reporting(options) as report:
+        face = build_face(
+            options.footage,
+            recordings=options.recordings,
+            speaker=options.speaker,
+            name=options.name,
+            workers=options.workers,
+            monitor=report.receive,
+        )
+        save_face(face, options.output)
+        report.finish(_described(face.summary | {"file": str(options.output)}), file=str(options.output))
+
+
+def run_info(options: argparse.Namespace) -> None:
+    """Print a description of a face."""
+    from lipmotion_faces.filmed.face import load_face
+
+    for line in _described(load_face(options.face).summary).splitlines():
+        print_line(line)
+
+
+def _described(summary: dict[str, str]) -> str:
+    return "\n".join(f"{key:12} {value}" for key, value in summary.items())

@@ -1,0 +1,258 @@
+"""Comparison of motion files or videos: ``compare(reference, other, …) → figures``."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES
+from lipmotion.errors import InputError
+from lipmotion.export.motion.marker_frame import MILLIMETRES
+from lipmotion.measures import curves, vertices
+from lipmotion.measures.closures import closed_threshold, closure_figures
+from lipmotion.measures.curves import modulation_distance_db
+from lipmotion.meshes.model.shape_names import ARKIT_OTHERS, arkit_name
+from lipmotion.pipeline.outputs.motion_input import read_generation
+from lipmotion.storage.json_text import nan_as_null
+from lipmotion.types import WEIGHT, Generation, Monitor, Motion, Track, silent_monitor, with_progress
+from lipmotion_faces.tracking.landmarks import LIP_POINTS
+from lipmotion_faces.tracking.track import track
+
+Source = str | Path | Motion | Track | Generation
+Array = NDArray[np.float64]
+OPENING = "opening"
+HIGHEST_RATE_HZ = 120.0
+"""Motion of a higher rate is compared at this one."""
+LEAST_FRAMES = 4
+"""Without them there is no third difference."""
+UPPER_FACE = tuple(name for name in ARKIT_OTHERS if name.startswith(("brow", "eyeBlink", "eyeSquint", "eyeWide")))
+"""Curves of the upper face."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Side:
+    """Motion that is compared: its name, its curves, which frames were measured."""
+
+    name: str
+    motion: Motion
+    seen: NDArray[np.bool_]
+
+
+def compare(reference: Source, *others: Source, monitor: Monitor = silent_monitor) -> dict[str, Any]:
+    """Return how far other motion is from that of a reference, by name (docs/compare.md).
+
+    reference, others : motion files, videos that show a face (they are tracked), or motion
+    monitor           : called with reports of progress
+    Motion is compared at the slower of its two rates, where both last; ``notes`` say what was done for it. Figures that
+    do not exist are None.
+    Raises InputError: a file that cannot be read, values that are not finite, no common channel, too few frames.
+    Raises MissingDependencyError: videos without the extra ``video``.
+
+    >>> import lipmotion
+    >>> motion = lipmotion.animate("examples/welcome.flac").motion
+    >>> figures = lipmotion.compare(motion, motion.resampled(50.0))
+    >>> (pair,) = figures["others"]
+    >>> round(pair["channels"]["opening"]["acc"], 3), pair["notes"]
+    (1.0, ['the reference is resampled from 100 to 50 frames a second'])
+    """
+    if not others:
+        raise InputError("there is nothing to compare the reference with; give another motion file or video")
+    items = list(enumerate((reference, *others)))
+    first, *rest = [_side(item, number) for number, item in with_progress(items, "reading", monitor)]
+    return nan_as_null({"reference": first.name, "others": [_figures(first, other) for other in rest]})
+
+
+def _side(source: Source, number: int) -> _Side:
+    """Return the motion of a file, or that is given. Raises InputError: as ``compare``."""
+    name = str(source) if isinstance(source, str | Path) else f"motion {number}" if number else "the reference"
+    if isinstance(source, str | Path):
+        path = Path(source)
+        source = track(path, crops=False) if path.suffix.lower() in VIDEO_SUFFIXES else read_generation(path)
+    motion = source if isinstance(source, Motion) else source.motion
+    if not len(motion.values):
+        raise InputError(f"{name}: the motion has no frames")
+    if not np.isfinite(motion.values).all():
+        raise InputError(f"{name}: there are values that are not finite; interpolate them first")
+    seen = np.asarray(source.seen) if isinstance(source, Track) else np.ones(len(motion.values), bool)
+    return _Side(name, _with_arkit_names(motion), seen)
+
+
+def _with_arkit_names(motion: Motion) -> Motion:
+    """Return the motion with ARKit's names of the blendshapes that programs spell otherwise."""
+    names = [(arkit_name(each.name) if each.unit == WEIGHT else None) or each.name for each in motion.channels]
+    if len(set(names)) < len(names):  # two spellings of one
+        return motion
+    return replace(
+        motion, channels=tuple(replace(each, name=name) for each, name in zip(motion.channels, names, strict=True))
+    )
+
+
+def _figures(reference: _Side, other: _Side) -> dict[str, Any]:
+    """Return the figures of one pair. Raises InputError: as ``compare``."""
+    names, notes = _common_channels(reference, other)
+    rate_hz = min(reference.motion.rate_hz, other.motion.rate_hz, HIGHEST_RATE_HZ)
+    count, more = _common_frames(reference, other, rate_hz)
+    time_s = np.arange(count) / rate_hz
+    seen = _seen(reference, time_s) & _seen(other, time_s)
+    if seen.sum() < LEAST_FRAMES:
+        raise InputError(f"{reference.name}, {other.name}: {seen.sum()} common frames, required {LEAST_FRAMES} or more")
+    if not seen.all():
+        more.append(f"{count - seen.sum()} of {count} frames are left out: the face was not measured")
+    made, original = (side.motion.at(time_s)[seen][:, _columns(side.motion, names)] for side in (other, reference))
+    channels = tuple(reference.motion.channels[column] for column in _columns(reference.motion, names))
+    pair = (Motion(made, rate_hz, channels), Motion(original, rate_hz, channels))
+    points = _points(names)
+    coordinates = {axis for axes in points.values() for axis in axes}
+    curve_figures, still = _channel_figures(*(_part(side, set(names) - coordinates) for side in pair))
+    if still:
+        more.append(f"left out, for they do not move in the reference: {', '.join(still)}")
+    accuracies = [row["acc"] for row in curve_figures.values()]
+    figures = {
+        "name": other.name,
+        "rate_hz": rate_hz,
+        "frames": int(seen.sum()),
+        "notes": notes + more,
+        "channels": curve_figures,
+        "acc": float(np.mean(accuracies)) if accuracies else None,
+    }
+    figures |= {"closures": _closures(*pair)} if OPENING in curve_figures else {}
+    figures |= {"points": _point_figures(*pair, points)} if points else {}
+    upper = [name for name in UPPER_FACE if name in names]
+    return figures | ({"upper_face": _upper_face(*pair, upper)} if upper else {})
+
+
+def _part(motion: Motion, names: Collection[str]) -> Motion:
+    """Return the channels with some names, in the order of the motion."""
+    columns = [column for column, name in enumerate(motion.names) if name in names]
+    channels = tuple(motion.channels[column] for column in columns)
+    return Motion(motion.values[:, columns], motion.rate_hz, channels)
+
+
+def _common_channels(reference: _Side, other: _Side) -> tuple[list[str], list[str]]:
+    """Return the names of the channels that both have, in the same unit, and notes on the others."""
+    units = {channel.name: channel.unit for channel in other.motion.channels}
+    same = [each.name for each in reference.motion.channels if units.get(each.name) == each.unit]
+    if not same:
+        raise InputError(
+            f"{other.name} has no channel of {reference.name} in the same unit: it has {_some(other)}, required one of "
+            f"{_some(reference)}"
+        )
+    missing = [name for name in reference.motion.names if name not in same]
+    notes = [f"left out, for the other has no such channel in the same unit: {', '.join(missing)}"] if missing else []
+    return same, notes
+
+
+def _some(side: _Side) -> str:
+    """Return the first channels of a side, with their units."""
+    shown = [f"{channel.name} ({channel.unit})" for channel in side.motion.channels[:4]]
+    return ", ".join(shown) + (", ..." if len(side.motion.channels) > len(shown) else "")
+
+
+def _common_frames(reference: _Side, other: _Side, rate_hz: float) -> tuple[int, list[str]]:
+    """Return the number of frames at a rate that both have, and notes on what is resampled and left out."""
+    lengths = [(len(side.motion.values) - 1) / side.motion.rate_hz for side in (reference, other)]
+    what = ("the reference", "the other")
+    notes = [
+        f"{name} is resampled from {side.motion.rate_hz:g} to {rate_hz:g} frames a second"
+        for name, side in zip(what, (reference, other), strict=True)
+        if side.motion.rate_hz != rate_hz
+    ]
+    if abs(lengths[0] - lengths[1]) * rate_hz >= 1:
+        notes.append(
+            f"the reference lasts {lengths[0]:.2f} s, the other {lengths[1]:.2f} s: the first {min(lengths):.2f} s are "
+            "compared"
+        )
+    return int(np.floor(min(lengths) * rate_hz + 1e-6)) + 1, notes
+
+
+def _seen(side: _Side, time_s: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which times lie next to a frame that was measured [shape=(len(time_s),)]."""
+    nearest = np.floor(time_s * side.motion.rate_hz + 0.5).astype(int)
+    return side.seen[np.minimum(nearest, len(side.seen) - 1)]
+
+
+def _columns(motion: Motion, names: Sequence[str]) -> list[int]:
+    return [motion.column(name) for name in names]
+
+
+def _values(motion: Motion, names: Sequence[str]) -> Array:
+    """Return the values of some channels [shape=(T, len(names))]."""
+    return np.asarray(motion.values[:, _columns(motion, names)], np.float64)
+
+
+def _channel_figures(made: Motion, original: Motion) -> tuple[dict[str, dict[str, Any]], list[str]]:
+    """Return the figures of every channel that moves in the original, and the names of the others."""
+    names, rate_hz = original.names, made.rate_hz
+    if not names:
+        return {}, []
+    generated, reference = [_values(made, names)], [_values(original, names)]
+    figures = {
+        "acc": curves.pooled_correlation(generated, reference),
+        "rmse": curves.rmse(generated, reference),
+        "nrmse": curves.normalised_rmse(generated, reference),
+        "variance": curves.global_variance_ratio(generated, reference),
+        "jerk": curves.jerk_ratio(generated, reference),
+        "modulation_db": modulation_distance_db(generated, reference, rate_hz),
+    }
+    moves = curves.moving(reference, [channel.unit for channel in original.channels])
+    rows = {
+        channel.name: {
+            "unit": channel.unit,
+            **{name: float(values[column]) for name, values in figures.items()},
+            "lag_ms": curves.lag_ms([generated[0][:, column:]], [reference[0][:, column:]], rate_hz),
+        }
+        for column, channel in enumerate(original.channels)
+        if moves[column]
+    }
+    return rows, [name for name in names if name not in rows]
+
+
+def _closures(made: Motion, original: Motion) -> dict[str, Any]:
+    """Return the figures of closures; the mouth is closed as far as the original's opening says."""
+    generated, reference = ([_values(side, [OPENING])[:, 0]] for side in (made, original))
+    threshold = closed_threshold(reference)
+    return asdict(closure_figures(generated, reference, threshold, made.rate_hz)) | {"closed_under": threshold}
+
+
+def _points(names: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Return the coordinates of every point that has all three, by its own name."""
+    axes = {name[2:]: tuple(f"{axis}_{name[2:]}" for axis in "xyz") for name in names if name.startswith("x_")}
+    return {point: parts for point, parts in axes.items() if set(names).issuperset(parts)}
+
+
+def _point_figures(made: Motion, original: Motion, points: Mapping[str, tuple[str, ...]]) -> dict[str, Any]:
+    """Return the figures of points in millimetres; None for lips and upper face where no point is theirs.
+
+    Points of the upper face are above the eyes; their place at rest is the median in the original.
+    """
+
+    def places(side: Motion, wanted: Sequence[str]) -> Array:
+        coordinates = _values(side, [axis for point in wanted for axis in points[point]])
+        return coordinates.reshape(len(coordinates), -1, 3) * MILLIMETRES
+
+    def both(wanted: Sequence[str]) -> tuple[list[Array], list[Array]]:
+        return [places(made, wanted)], [places(original, wanted)]
+
+    lips = [point for point in points if point.isdecimal() and int(point) in LIP_POINTS]
+    upper = [point for point in points if np.median(original[f"y_{point}"]) > 0]
+    rest = np.median(places(original, upper), axis=0)
+    return {
+        "points": len(points),
+        "lip_points": len(lips),
+        "upper_points": len(upper),
+        "landmark_distance_mm": vertices.landmark_distance(*both(list(points))),
+        "lip_vertex_error_mm": vertices.lip_vertex_error(*both(lips)) if lips else None,
+        "upper_face_deviation_mm": vertices.upper_face_deviation(*both(upper), rest) if upper else None,
+    }
+
+
+def _upper_face(made: Motion, original: Motion, names: Sequence[str]) -> dict[str, Any]:
+    """Return the upper-face deviation of weights, which are 0 at rest."""
+    generated, reference = ([_values(side, names)[:, :, None]] for side in (made, original))
+    deviation = vertices.upper_face_deviation(generated, reference, rest=np.zeros((len(names), 1)))
+    return {"curves": len(names), "deviation": deviation}

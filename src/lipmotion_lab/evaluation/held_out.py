@@ -1,0 +1,287 @@
+"""Held-out recordings, the conditions under which they are animated, and pairs of recorded and generated motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.corpora.store import Corpus, Selection
+from lipmotion.engines import Animator
+from lipmotion.errors import AlignmentError, CorpusError
+from lipmotion.measures import curves
+from lipmotion.measures.closures import closed_threshold
+from lipmotion.motion.eigenlips import Eigenlips
+from lipmotion.motion.speaker_maps import SpeakerMap, SpeakerMaps
+from lipmotion.pipeline.generate.generation_for import generate_for
+from lipmotion.pipeline.generate.prior import with_prior
+from lipmotion.pipeline.model import Model
+from lipmotion.pipeline.training.channels import GEOMETRY, with_visual_channels
+from lipmotion.pipeline.training.train import phones_of
+from lipmotion.pipeline.understand.transcribe import warn_of_guesses
+from lipmotion.pipeline.understand.understood_speech import recognised_speech, speech_of, with_voice
+from lipmotion.speech.recognition.recognised_speech import Recognition
+from lipmotion.speech.recognition.recogniser import Recogniser
+from lipmotion.types import (
+    GREY,
+    Monitor,
+    Motion,
+    Speech,
+    Timeline,
+    Unit,
+    Utterance,
+    silent_monitor,
+    sub_monitor,
+    with_progress,
+)
+from lipmotion.units import Lexicon, is_silent
+
+ModelT = TypeVar("ModelT")
+OPENING = "opening"
+TEST_LIST = Selection("test")
+AUDIO_ONLY, WITH_TRANSCRIPT = "audio only", "with transcript"
+DISTANCES = (OPENING, "width", "outer")
+"""The channels that are compared where faces were tracked; the other channels are points, which move with these."""
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOutRecordings:
+    """Recordings with which generated motion is compared, and their phones in time.
+
+    utterances   : the recordings
+    channels     : names of the channels that are compared
+    still        : names of the channels that are left out because they do not move
+    closed_under : the opening under which the mouth counts as closed, in eye distances (None: no channel ``opening``)
+    reference    : phones in time of every utterance: labelled, or aligned, or recognised
+    conditions   : phones in time that the engine is given, by condition: ``audio only``, ``with transcript``
+    phones       : the recogniser of these phones
+    recognitions : what it recognised in every utterance
+    eigenlips    : principal components of mouth pictures (None: their coefficients are not compared)
+    prior        : the model on which the evaluated one stands (None: it stands on none)
+    speakers     : maps of the people whom the evaluated model knows (None: it tells no people apart)
+    """
+
+    utterances: Sequence[Utterance]
+    channels: tuple[str, ...]
+    still: tuple[str, ...]
+    closed_under: float | None
+    reference: Sequence[Timeline[Unit]]
+    conditions: Mapping[str, Sequence[Timeline[Unit]]]
+    phones: Recogniser
+    recognitions: Sequence[Recognition]
+    eigenlips: Eigenlips | None = None
+    prior: Model | None = None
+    speakers: SpeakerMaps | None = None
+
+    @property
+    def strangers(self) -> tuple[str, ...]:
+        """Names of the speakers whom the model does not know: they are compared with the mean person."""
+        known = self.speakers.names if self.speakers is not None else ()
+        return tuple(sorted({utterance.speaker for utterance in self.utterances} - set(known)))
+
+    def first(self, count: int) -> HeldOutRecordings:
+        """Return the first recordings alone."""
+        parts = {name: phones[:count] for name, phones in self.conditions.items()}
+        return replace(
+            self,
+            utterances=self.utterances[:count],
+            reference=self.reference[:count],
+            conditions=parts,
+            recognitions=self.recognitions[:count],
+        )
+
+    def person(self, utterance: Utterance) -> SpeakerMap | None:
+        """Return the map to the motion of an utterance's speaker; None for a stranger."""
+        if self.speakers is None or utterance.speaker not in self.speakers.names:
+            return None
+        return self.speakers.of(utterance.speaker)
+
+    @property
+    def eigenlips_channels(self) -> tuple[str, ...]:
+        """Names of the compared channels that are eigenlips."""
+        names = {channel.name for channel in self.eigenlips.channels} if self.eigenlips is not None else ()
+        return tuple(name for name in self.channels if name in names)
+
+
+@dataclass(frozen=True, eq=False)
+class ComparedClip:
+    """Recorded and generated motion of one utterance, in the N frames of the recording in which the face was measured.
+
+    original, generated : values of the compared channels [each shape=(N, P)]
+    time_s : time of every frame in seconds [shape=(N,)]
+    spoken : start and end in seconds, and phone, of every phone that is not silence
+    """
+
+    original: NDArray[np.float64]
+    generated: NDArray[np.float64]
+    time_s: NDArray[np.float64]
+    spoken: tuple[tuple[float, float, str], ...]
+
+
+def held_out_recordings(  # noqa: PLR0913
+    corpus: Corpus,
+    phones: Recogniser,
+    *,
+    selection: Selection = TEST_LIST,
+    channels: Sequence[str] | None = None,
+    lexicon: Lexicon | None = None,
+    monitor: Monitor = silent_monitor,
+    visual: str = GEOMETRY,
+    eigenlips: Eigenlips | None = None,
+    prior: Model | None = None,
+    speakers: SpeakerMaps | None = None,
+) -> HeldOutRecordings:
+    """Return held-out recordings with aligned and recognised phones. Raises as ``evaluate``.
+
+    phones    : the recogniser
+    selection : the utterances; by default those of the list ``test``
+    channels  : the channels to compare, whether they move or not; None: from ``compared_channels``
+    visual, eigenlips : of the model: the kind of its channels, and its principal components of mouth pictures
+    prior     : the model on which the evaluated one stands, or None
+    speakers  : maps of the people whom the evaluated model knows, or None
+    """
+    lexicon = lexicon or Lexicon()
+    utterances = [
+        with_visual_channels(corpus.utterance(name), visual, eigenlips) for name in corpus.selected(selection)
+    ]
+    compared, still = (tuple(channels), ()) if channels is not None else compared_channels(utterances)
+    warn_of_guesses([word for utterance in utterances for word in utterance.words or ()], lexicon)
+    aligned = with_progress(utterances, "phones: alignment", sub_monitor(monitor, 0, 0.4))
+    reference = [_reference(utterance, phones, lexicon) for utterance in aligned]
+    threshold = None
+    if OPENING in compared:
+        training = [corpus.utterance(name) for name in corpus.names("train", selection.speakers)]
+        tracks = [utterance.track for utterance in training or utterances]
+        threshold = closed_threshold(
+            [np.asarray(each.motion[OPENING], float)[np.asarray(each.seen)] for each in tracks]
+        )
+    recognised = with_progress(utterances, "phones: recognition", sub_monitor(monitor, 0.4, 0.9))
+    found = [phones.recognition(utterance.audio, utterance.features) for utterance in recognised]
+    conditions = {AUDIO_ONLY: [each.units for each in found]}
+    if all(utterance.words or utterance.phones for utterance in utterances):
+        conditions[WITH_TRANSCRIPT] = reference
+    return HeldOutRecordings(
+        utterances, compared, still, threshold, reference, conditions, phones, found, eigenlips, prior, speakers
+    )
+
+
+def compared_channels(utterances: Sequence[Utterance]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the names of the channels to compare, and of those that are left out because they do not move.
+
+    All eigenlips are compared, whether they move or not: their figures are means over a known number.
+    Raises CorpusError: the utterances have different channels, or nothing moves.
+    """
+    channels = utterances[0].track.motion.channels
+    if any(utterance.track.motion.channels != channels for utterance in utterances):
+        raise CorpusError("the utterances have different motion channels; evaluate one kind, with --speaker or --split")
+    names = utterances[0].track.motion.names
+    eigenlips = tuple(channel.name for channel in channels if channel.unit == GREY)
+    if set(names) >= set(DISTANCES):
+        return (*DISTANCES, *eigenlips), ()
+    originals = [np.asarray(utterance.track.motion.values, float) for utterance in utterances]
+    moves = curves.moving(originals, [channel.unit for channel in channels])
+    moves |= np.array([channel.unit == GREY for channel in channels])
+    if not moves.any():
+        raise CorpusError(f"none of {len(names)} motion channels moves in these {len(utterances)} utterances")
+    moving = tuple(name for name, moved in zip(names, moves, strict=True) if moved)
+    return moving, tuple(name for name in names if name not in moving)
+
+
+def _check_channels(motion: Motion, compared: Sequence[str]) -> None:
+    """Raise CorpusError if generated motion lacks a channel that is compared."""
+    missing = [name for name in compared if name not in motion.names]
+    if missing:
+        raise CorpusError(
+            f"the model has no channels {', '.join(missing[:6])}, which the corpus has: it was trained on other motion"
+        )
+
+
+def _reference(utterance: Utterance, phones: Recogniser, lexicon: Lexicon) -> Timeline[Unit]:
+    try:
+        return phones_of(utterance, phones, lexicon)
+    except AlignmentError as error:
+        raise AlignmentError(f"{utterance.name}: {error}; correct its transcript, or leave it out") from error
+
+
+def compared_clips(
+    recordings: HeldOutRecordings, condition: str, engine: Animator[ModelT], learned: ModelT
+) -> list[ComparedClip]:
+    """Return recorded and generated motion of all utterances under a condition.
+
+    learned : the engine's model of motion
+    Raises CorpusError: the model has other channels.
+    """
+    speech = speech_of_condition(recordings, condition, engine, learned)
+    return compare_with_recorded(recordings, speech, engine, learned)
+
+
+def speech_of_condition(
+    recordings: HeldOutRecordings, condition: str, engine: Animator[ModelT], learned: ModelT
+) -> list[Speech]:
+    """Return the speech of all utterances under a condition, as ``animate`` gives it to the engine."""
+    phones, prior = recordings.phones, recordings.prior
+    if condition == AUDIO_ONLY:
+        pairs = [
+            _recognised(engine, learned, utterance, phones, found)
+            for utterance, found in zip(recordings.utterances, recordings.recognitions, strict=True)
+        ]
+    else:
+        pairs = [
+            (speech_of(engine, u.audio, u.features, units, phones.kind), None)
+            for u, units in zip(recordings.utterances, recordings.conditions[condition], strict=True)
+        ]
+    return [
+        with_prior(prior, with_voice(phones.own, utterance.audio, speech, found))
+        for utterance, (speech, found) in zip(recordings.utterances, pairs, strict=True)
+    ]
+
+
+def _recognised(
+    engine: Animator[ModelT], learned: ModelT, utterance: Utterance, phones: Recogniser, found: Recognition
+) -> tuple[Speech, Recognition | None]:
+    """Return the speech of an utterance whose words are not known, and what was found in it if that was needed."""
+    asked: list[Recognition] = []
+
+    def recognise() -> Recognition:
+        asked.append(found)
+        return found
+
+    speech = recognised_speech(engine, learned, utterance.audio, utterance.features, phones, recognise)
+    return speech, found if asked else None
+
+
+def compare_with_recorded(
+    recordings: HeldOutRecordings, speech: Sequence[Speech], engine: Animator[ModelT], learned: ModelT
+) -> list[ComparedClip]:
+    """Return recorded and generated motion of all utterances.
+
+    speech  : from ``speech_of_condition``, one for each utterance
+    learned : the engine's model of motion
+    Raises CorpusError: the model has other channels.
+    """
+    return [
+        _clip(
+            recordings, generate_for(recordings.person(utterance), engine, learned, spoken).motion, utterance, reference
+        )
+        for utterance, spoken, reference in zip(recordings.utterances, speech, recordings.reference, strict=True)
+    ]
+
+
+def _clip(
+    recordings: HeldOutRecordings, generated: Motion, utterance: Utterance, reference: Timeline[Unit]
+) -> ComparedClip:
+    """Return recorded and generated motion of one utterance."""
+    motion, channels = utterance.track.motion, recordings.channels
+    seen = np.asarray(utterance.track.seen)
+    time_s = (np.arange(len(motion.values)) / motion.rate_hz)[seen]
+    _check_channels(generated, channels)
+    spoken = tuple((s.start_s, s.end_s, s.label.phone) for s in reference if not is_silent(s.label.phone))
+    return ComparedClip(
+        original=np.stack([motion[name][seen] for name in channels], axis=1).astype(float),
+        generated=np.stack([np.interp(time_s, generated.time_s, generated[name]) for name in channels], axis=1),
+        time_s=time_s,
+        spoken=spoken,
+    )

@@ -1,0 +1,161 @@
+"""Quality over the amount of training data: models of the first N recordings of a list, for growing N."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lipmotion.corpora.store import Corpus
+from lipmotion.engines import engine_named
+from lipmotion.errors import CorpusError, InputError
+from lipmotion.kernels.threads import one_thread
+from lipmotion.measures.evaluation_table import figure_text
+from lipmotion.storage.json_text import nan_as_null
+from lipmotion.types import sub_monitor
+from lipmotion_lab.evaluation.figures import figures_of
+from lipmotion_lab.runner import (
+    DEFAULT_SETTINGS,
+    ExperimentSettings,
+    HeldOutResult,
+    PartKey,
+    channels_with_opening,
+    finished_parts,
+    opening_row,
+    shuffled,
+    train_and_generate,
+)
+
+SIZES = (20, 50, 100, 200)
+"""Default numbers of recordings: those of them that are smaller than the list; and the whole list."""
+OTHERS = ("width", "outer")
+"""Channels that are compared beside the opening."""
+_ROW = "row"
+"""Name of the array of a kept size: the threshold of a closed mouth, and its row."""
+
+
+@one_thread()
+def learning_curve(
+    corpus: Corpus,
+    *,
+    order: Sequence[str] | None = None,
+    sizes: Sequence[int] | None = None,
+    split: str | None = "test",
+    work: Path | None = None,
+    settings: ExperimentSettings = DEFAULT_SETTINGS,
+) -> dict[str, Any]:
+    """Train on the first N utterances of a list, for every N of ``sizes``; return figures of each model on ``split``.
+
+    order    : names of utterances; by default the training list, shuffled with the seed
+    sizes    : by default 20, 50, 100, 200, as far as the list goes, and the whole list
+    work     : a folder for the figures of finished sizes, from which the same call goes on after a stop; None: none
+    settings : its seed is also that of the shuffled list
+    Phone models and engine are both trained on those N utterances alone; the phone models also align and recognise
+    the utterances of the split.
+    Raises InputError: sizes under 1 or over the list, or an empty list.
+    Raises CorpusError: names that are not in the corpus, twice in the list or in the split; no utterances of this
+    split; or motion without an opening.
+    """
+    listed = tuple(order) if order is not None else shuffled(corpus.required("train"), settings.seed)
+    held_out = corpus.required(split)
+    steps = training_sizes(sizes, len(listed))
+    check_training_names(corpus, listed, held_out)
+    channels = channels_with_opening(corpus, held_out)
+    shares = np.cumsum([0, *steps]) / sum(steps)
+    kept = finished_parts(work, corpus, settings, PartKey(engine_named("trajectory"), (*listed, *held_out)))
+    rows = []
+    for count, (start, stop) in zip(steps, pairwise(shares), strict=True):
+        found = kept.load(str(count))
+        if found is None:
+            monitor = sub_monitor(settings.monitor, float(start), float(stop), f"{count} clips: ")
+            part = replace(settings, monitor=monitor)
+            result = train_and_generate(corpus, listed[:count], held_out, channels, part, work)
+            row = {"names": count} | _row(corpus, result, settings.seed)
+            for condition, clips in result.clips.items():
+                settings.receive(f"{count} recordings", condition, result.recordings, clips)
+            found = {_ROW: np.array(json.dumps([result.recordings.closed_under, row]))}
+            kept.save(str(count), found)
+        closed_under, row = json.loads(str(found[_ROW]))
+        rows.append(row)
+    about = {"split": split or "all", "clips": len(held_out), "seed": settings.seed, "workers": settings.workers}
+    about |= {"order": "given" if order is not None else "shuffled", "closed_under": closed_under}
+    return nan_as_null(about | {"rows": rows})
+
+
+def training_sizes(sizes: Sequence[int] | None, listed: int) -> list[int]:
+    """Return the sizes, each once, in rising order; the default ones where none are given.
+
+    listed : number of names in the list
+    Raises InputError: sizes under 1 or over the list, or an empty list.
+    """
+    if not listed:
+        raise InputError("the list of utterances to train on is empty; give one name a line")
+    steps = sorted(set(sizes)) if sizes is not None else [*(n for n in SIZES if n < listed), listed]
+    if not steps or not 1 <= steps[0] <= steps[-1] <= listed:
+        given = ", ".join(map(str, steps)) or "none"
+        raise InputError(f"sizes {given}; required: from 1 to {listed}, which is how many names the list has")
+    return steps
+
+
+def check_training_names(corpus: Corpus, listed: Sequence[str], held_out: Sequence[str]) -> None:
+    """Raise CorpusError if names to train on are not in the corpus, twice in the list, or held out."""
+    known, excluded = set(corpus.names()), set(held_out)
+    wrong = {
+        "are not in the corpus; take them out, or prepare them": [name for name in listed if name not in known],
+        "are in the split that is compared with; take them out": [name for name in listed if name in excluded],
+        "stand in the list more than once; keep one of each": [n for n in set(listed) if listed.count(n) > 1],
+    }
+    for reason, names in wrong.items():
+        if names:
+            some = ", ".join(sorted(names)[:5]) + (", ..." if len(names) > 5 else "")
+            raise CorpusError(f"{corpus.path}: {len(names)} of {len(listed)} names to train on ({some}) {reason}")
+
+
+def _row(corpus: Corpus, result: HeldOutResult, seed: int) -> dict[str, Any]:
+    """Return the figures of one model, by condition."""
+    conditions = {name: figures_of(clips, result.recordings, seed) for name, clips in result.clips.items()}
+    return {
+        "used": len(result.used),
+        "minutes": sum(corpus.utterance(name).audio.duration_s for name in result.used) / 60,
+        "seconds": result.seconds,
+        "conditions": {name: opening_row(figures) | _other_accs(figures) for name, figures in conditions.items()},
+    }
+
+
+def _other_accs(figures: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the ACC of the other channels; None where the corpus does not have them."""
+    channels = figures["channels"]
+    return {f"acc_{name}": channels[name]["acc"] if name in channels else None for name in OTHERS}
+
+
+def table(figures: Mapping[str, Any]) -> str:
+    """Return the figures of ``learning_curve`` as text."""
+    order = {"given": "the list given", "shuffled": f"the training list shuffled with seed {figures['seed']}"}
+    lines = [
+        f"trained on the first N clips of {order[figures['order']]}, with up to {figures['workers']} process(es); "
+        f"split {figures['split']}: {figures['clips']} clips"
+    ]
+    for condition in figures["rows"][0]["conditions"]:
+        lines += ["", condition, HEAD, *(_line(row, row["conditions"][condition]) for row in figures["rows"])]
+    return "\n".join([*lines, "", LEGEND])
+
+
+HEAD = f"      N  used  minutes  seconds  {'ACC (95 %)':20}  nRMSE  variance  width  outer"
+LEGEND = (
+    "used, minutes: of the N clips what training could use; seconds: of training; ACC, nRMSE, variance: of the "
+    "opening, the last by that of the recordings; width, outer: their ACC"
+)
+
+
+def _line(row: Mapping[str, Any], opening: Mapping[str, Any]) -> str:
+    acc = "{:.3f} ({:.3f}–{:.3f})".format(opening["acc"], *opening["acc_95"])
+    others = "".join(f"  {figure_text(opening[f'acc_{name}'], '5.3f')}" for name in OTHERS)
+    return (
+        f"  {row['names']:5}{row['used']:6}{row['minutes']:9.1f}{row['seconds']:9.1f}  {acc:20}"
+        f"{opening['nrmse']:7.3f}{opening['global_variance']:10.2f}{others}"
+    )

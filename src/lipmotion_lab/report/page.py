@@ -1,0 +1,200 @@
+"""The page of a report: what was found first, then every experiment with its words, charts, tables and videos."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from typing import Any
+
+from lipmotion.export.web_page import Html, element, joined, whole_page
+from lipmotion_lab.report.section import Section
+from lipmotion_lab.report.shown_clip import curves
+
+SCRIPT = """"use strict";
+for (const button of document.querySelectorAll("button.together")) {
+  const videos = button.parentElement.querySelectorAll("video");
+  button.hidden = false;
+  button.addEventListener("click", () => videos.forEach((video, number) => {
+    video.muted = number > 0;
+    video.currentTime = 0;
+    video.play();
+  }));
+}
+"""
+FOLDED = 3
+"""More tables than these are folded together."""
+QUICK_WARNING = (
+    "A quick run: few recordings, small models. It shows that everything runs; what it finds about the papers is worth "
+    "little. Run it without --quick for figures."
+)
+
+
+@dataclass(frozen=True)
+class FinishedPart:
+    """An experiment whose figures are there.
+
+    record : its file: figures, stamp, names of videos and pictures
+    motion : of one clip, as ``shown_clip.ClipKeeper`` keeps it; empty: none was kept
+    """
+
+    name: str
+    record: Mapping[str, Any]
+    motion: Mapping[str, Any]
+    section: Section
+
+
+@dataclass(frozen=True)
+class ReportPage:
+    """What the page shows.
+
+    title    : of the page
+    about    : of the corpus and the run, by name
+    finished : experiments, in their order
+    open     : names of those that are not finished, with what is the matter
+    failed   : names of those that failed, with their errors
+    quick    : whether it is a quick run
+    """
+
+    title: str
+    about: Mapping[str, str]
+    finished: Sequence[FinishedPart]
+    open: Mapping[str, str]
+    failed: Mapping[str, str]
+    quick: bool
+
+    def as_html(self) -> str:
+        """Return the whole page."""
+        style = resources.files(__package__).joinpath("report.css").read_text("utf-8")
+        header = element(
+            "header",
+            element("h1", self.title),
+            element("p", "How the systems of three papers, and those of this project, do on a corpus.", class_="quiet"),
+        )
+        main = element("main", *self._overview(), *map(_section, self.finished))
+        footer = element("footer", element("h2", "The corpus and the run"), _listed(self.about))
+        return whole_page(self.title, style, header, main, footer, script=SCRIPT)
+
+    def _overview(self) -> list[Html]:
+        found = [
+            element(
+                "li", element("strong", element("a", part.section.title, href=f"#{part.name}")), part.section.verdict
+            )
+            for part in self.finished
+        ]
+        for reasons, look in ((self.failed, "failed"), (self.open, None)):
+            found += [element("li", element("strong", name), why, class_=look) for name, why in reasons.items()]
+        warning = [element("p", QUICK_WARNING, class_="warning")] if self.quick else []
+        reading = element(
+            "p",
+            "How to read it: intervals are 95 % bootstrap intervals over the compared recordings; two systems are "
+            "compared by the interval of their difference on the same draws of recordings. A pair of the paper holds "
+            "where that interval is on the paper's side of 0, is reversed on the other side, open where 0 is in it. "
+            "The papers used other speakers and other measures: orders compare, values do not. Every sentence here "
+            "follows from the figures below it.",
+            class_="quiet",
+        )
+        return [*warning, element("ul", *found, class_="overview"), reading]
+
+
+def _section(part: FinishedPart) -> Html:
+    section, heading = part.section, f"{part.name}-heading"
+    words = [
+        joined(element("h3", title), element("ul", *(element("li", sentence) for sentence in sentences)))
+        for title, sentences in section.words.items()
+        if sentences
+    ]
+    more = [
+        element("details", element("summary", sentence), table.as_html(part.name)) for sentence, table in section.more
+    ]
+    if len(more) > FOLDED:
+        more = [element("details", element("summary", f"{len(more)} more tables"), *more)]
+    return element(
+        "section",
+        element("h2", section.title, id=heading),
+        element("p", section.about, class_="quiet"),
+        element("p", section.verdict, class_="verdict"),
+        element("div", element("div", *words), element("div", *section.charts), class_="beside"),
+        section.table.as_html(part.name),
+        *more,
+        *_clip(part),
+        *_pictures(part),
+        _made(part),
+        id=part.name,
+        aria_labelledby=heading,
+    )
+
+
+def _clip(part: FinishedPart) -> list[Html]:
+    """Return the recording that is shown: its videos and its curves."""
+    if not part.motion:
+        return []
+    name, words = part.motion["name"], " ".join(part.motion["words"])
+    videos = [
+        element(
+            "figure",
+            element(
+                "video",
+                src=f"{part.name}/{video['file']}",
+                controls=True,
+                preload="metadata",
+                playsinline=True,
+                aria_label=f"{name}: {video['caption']}",
+            ),
+            element("figcaption", video["caption"]),
+        )
+        for video in part.record["videos"]
+    ]
+    together = element("button", "Play all together", type="button", class_="together", hidden=True)
+    said = f", “{words}”" if words else ""
+    return [
+        element("h3", "One recording, seen and heard"),
+        element(
+            "p",
+            f"{name}{said}: of the compared recordings the one with most p, b and m, whatever the systems make of it. "
+            "Sound alone was given.",
+            class_="quiet",
+        ),
+        element("div", together, element("div", *videos, class_="videos"), class_="clip"),
+        element("h3", "Its opening of the mouth"),
+        element("p", "Dashed: recorded, in eye distances; line: generated; shaded: p, b and m.", class_="quiet"),
+        element("div", *curves(part.motion, part.section.shown), class_="grid"),
+    ]
+
+
+def _pictures(part: FinishedPart) -> list[Html]:
+    pictures = [
+        element(
+            "figure",
+            element("img", src=f"{part.name}/{picture['file']}", alt=picture["caption"], loading="lazy"),
+            element("figcaption", picture["caption"]),
+        )
+        for picture in part.record["pictures"]
+    ]
+    return (
+        [element("h3", "Pictures like the paper's"), element("div", *pictures, class_="pictures")] if pictures else []
+    )
+
+
+def _made(part: FinishedPart) -> Html:
+    """Return how an experiment was made, folded."""
+    stamp = part.record["stamp"]
+    entries = {
+        key: ", ".join(f"{name} {value}" for name, value in content.items() if value is not None)
+        if isinstance(content, Mapping)
+        else str(content)
+        for key, content in stamp.items()
+        if content is not None
+    }
+    everything = element("a", "all figures as JSON", href=f"{part.name}/figures.json")
+    return element(
+        "details",
+        element("summary", "How this was made"),
+        _listed(entries),
+        element("p", "Beside this page: ", everything, "."),
+    )
+
+
+def _listed(entries: Mapping[str, str]) -> Html:
+    """Return texts by name, one a line."""
+    return element("dl", *(joined(element("dt", key), element("dd", text)) for key, text in entries.items()))

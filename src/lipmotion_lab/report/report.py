@@ -1,0 +1,278 @@
+"""``lipmotion experiment all``: all experiments on a corpus, and one page of what they found."""
+
+from __future__ import annotations
+
+import hashlib
+import shlex
+import shutil
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from lipmotion.corpora.splits import SPLITS
+from lipmotion.corpora.store import Corpus
+from lipmotion.engines import engine_named
+from lipmotion.errors import CorpusError, ExportError, InputError, LipMotionError
+from lipmotion.export.web_page import GENERATOR
+from lipmotion.hmm.model import HmmConfig
+from lipmotion.pipeline.training.channels import GEOMETRY
+from lipmotion.pipeline.training.fingerprint import fingerprint
+from lipmotion.storage.files import TEMPORARY, locked, remove_unfinished, unfinished_work, whole_file, whole_folder
+from lipmotion.storage.json_text import as_json, from_json
+from lipmotion.storage.sources import Source, check_apart
+from lipmotion.types import Item, sub_monitor
+from lipmotion.units import Lexicon
+from lipmotion_lab.report.page import FinishedPart, ReportPage
+from lipmotion_lab.report.parts import PARTS, TEST, PartRun, can_draw
+from lipmotion_lab.report.shown_clip import ClipKeeper, write_videos
+from lipmotion_lab.runner import DEFAULT_SETTINGS, ExperimentSettings, channels_with_opening, quick_part
+from lipmotion_lab.stamp import Stamp
+from lipmotion_lab.xie_liu2007.plots import PLOT_CAPTIONS
+
+PAGE, FIGURES, MOTION = "index.html", "figures.json", "motion.json"
+"""The page; and in the folder of an experiment its figures with their stamp, and the motion of one clip."""
+KEY_DIGITS = 8
+"""Digits of a key in the name of a folder."""
+NOT_YET = "not finished; the same command goes on with it"
+FAILED, AGAIN = "failed: ", "mend that, then give the same command: it goes on with it"
+NOT_CHOSEN = "not chosen"
+
+
+@dataclass(frozen=True)
+class WrittenReport:
+    """A report that was written.
+
+    page     : its path
+    verdicts : what was found, one sentence by experiment
+    left_out : why experiments are not in it, by name
+    failed   : errors of experiments that failed, by name; the same command tries them again
+    made     : names of the experiments that ran now; the others were there
+    """
+
+    page: Path
+    verdicts: Mapping[str, str]
+    left_out: Mapping[str, str]
+    failed: Mapping[str, Exception]
+    made: Sequence[str]
+
+
+def experiment_report(
+    corpus: Corpus,
+    folder: Path,
+    *,
+    only: Sequence[str] | None = None,
+    quick: bool = False,
+    settings: ExperimentSettings = DEFAULT_SETTINGS,
+) -> WrittenReport:
+    """Run experiments on a corpus, and write a page of what they found, with its tables, pictures and videos.
+
+    folder   : of the report, made if need be. What is finished in it is not computed again; a call after a stop goes on
+    only     : names of ``parts.PARTS``; None: all that the corpus has recordings for
+    quick    : few recordings and small models, to see that it runs
+    settings : of all experiments
+    The page is written anew when an experiment is finished; where nothing is left to do, nothing is written. Every
+    experiment has a folder of its own beside the page. Where the corpus lacks a list, the page says what is left out.
+    An experiment that fails does not stop the others: the page says with what error it failed.
+    Raises InputError: no such experiment.
+    Raises CorpusError: no utterances to train on or for an experiment of ``only``, or motion without an opening.
+    Raises ExportError: the folder holds something else or cannot be written to, or another call is at work on it.
+    """
+    unknown = [name for name in only or () if name not in PARTS]
+    if unknown:
+        raise InputError(f"no experiment {unknown[0]!r}; there are: {', '.join(PARTS)}")
+    wanted = [name for name in PARTS if only is None or name in only]
+    corpus = quick_part(corpus, settings.seed) if quick else corpus
+    possible, lacking = _possible(corpus, wanted, named=only is not None)
+    check_apart((), [Source(corpus.path, "corpus")], folders=[folder])
+    _check_folder(folder)
+    with locked(folder):
+        remove_unfinished(folder)
+        config, lexicon = settings.recogniser or HmmConfig(), settings.lexicon or Lexicon()
+        of_input = fingerprint(corpus, corpus.names(), engine_named("trajectory"), config, lexicon, GEOMETRY, None)
+        lists = [[split, *corpus.names(split)] for split in SPLITS]
+        writer = _Writer(
+            corpus, folder, quick, settings, lacking, f"{of_input} {lists} {quick} {settings.seed} {can_draw()}"
+        )
+        writer.write_page(wanted)
+        missing = [name for name in possible if writer.record(name) is None]
+        whole = sum(PARTS[name].share for name in missing)
+        done = 0.0
+        for name in missing:
+            share = PARTS[name].share
+            part = sub_monitor(settings.monitor, done / whole, (done + share) / whole, f"{name}: ")
+            writer.try_to_run(name, replace(settings, monitor=part))
+            writer.write_page(wanted)
+            done += share
+        finished = writer.finished()
+    verdicts = {part.name: part.section.verdict for part in finished}
+    made = [name for name in missing if name not in writer.failed]
+    return WrittenReport(folder / PAGE, verdicts, lacking, writer.failed, made)
+
+
+def _possible(corpus: Corpus, wanted: Sequence[str], *, named: bool) -> tuple[list[str], dict[str, str]]:
+    """Return the experiments for which a corpus has recordings, and what the others lack.
+
+    named : whether somebody has asked for them by name
+    Raises CorpusError: there is none, one of those named is impossible, or systems cannot be compared on the corpus.
+    """
+    for split in ("train", TEST):
+        if names := corpus.names(split):
+            channels_with_opening(corpus, names)
+    reasons = {
+        name: f"left out: the corpus has no recordings of the list {', '.join(lists)} (docs/corpora.md says how to "
+        "make one)"
+        for name in wanted
+        if (lists := PARTS[name].lacking(corpus))
+    }
+    if reasons and (named or len(reasons) == len(wanted)):
+        name, reason = next(iter(reasons.items()))
+        raise CorpusError(f"{corpus.path}: {name} is {reason}")
+    return [name for name in wanted if name not in reasons], reasons
+
+
+def _check_folder(folder: Path) -> None:
+    """Raise ExportError if a folder is neither new, nor empty, nor a report."""
+    try:
+        if not folder.exists():
+            return
+        inner = [path for path in folder.iterdir() if not path.name.startswith(TEMPORARY)]
+        page = folder / PAGE
+        if not inner or (page.is_file() and GENERATOR in page.read_text("utf-8", errors="replace")):
+            return
+    except OSError as error:
+        raise ExportError(f"{folder}: cannot be used: {error.strerror or error}; give another folder") from error
+    raise ExportError(f"{folder}: holds something that is no report; give a new or an empty folder")
+
+
+@dataclass(frozen=True)
+class _Writer:
+    """Runs experiments and writes their folders and the page.
+
+    lacking : why experiments are left out, by name
+    digest  : of all that the figures of every experiment depend on
+    failed  : errors of experiments that failed, by name
+    """
+
+    corpus: Corpus
+    folder: Path
+    quick: bool
+    settings: ExperimentSettings
+    lacking: Mapping[str, str]
+    digest: str
+    failed: dict[str, Exception] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """The name of the corpus: that of its folder."""
+        return self.corpus.path.resolve().name
+
+    def key(self, name: str) -> str:
+        """Return a digest of all that the figures of an experiment depend on."""
+        return hashlib.sha256(f"{name} {self.digest}".encode()).hexdigest()
+
+    def record(self, name: str) -> tuple[dict[str, Any], dict[str, Any]] | None:
+        """Return figures and motion of an experiment that is finished; None: it is not, or was another one."""
+        try:
+            record, motion = (from_json((self.folder / name / file).read_bytes()) for file in (FIGURES, MOTION))
+            return (record, motion) if record["key"] == self.key(name) else None
+        except (OSError, ValueError, KeyError, TypeError):
+            return None
+
+    def finished(self) -> list[FinishedPart]:
+        """Return all experiments that are finished, in the order of the page."""
+        found = []
+        for name in PARTS:
+            record = self.record(name)
+            if record is not None:
+                try:
+                    found.append(FinishedPart(name, *record, PARTS[name].section(record[0]["figures"])))
+                except Exception as error:  # what one experiment says must not hide the others
+                    self.failed[name] = error
+        return found
+
+    def write_page(self, wanted: Sequence[str]) -> None:
+        """Write the page, if anything in it has changed."""
+        finished = self.finished()
+        there = {part.name for part in finished}
+        left_open = {
+            name: self.lacking.get(name, NOT_YET if name in wanted else NOT_CHOSEN)
+            for name in PARTS
+            if name not in there and name not in self.failed
+        }
+        failed = {name: f"{FAILED}{told(error)}; {AGAIN}" for name, error in self.failed.items()}
+        summary = self.corpus.summary() | {"corpus": self.name}
+        about = summary | {"made with": shlex.join(self._command(wanted))}
+        text = ReportPage(f"Experiments on {self.name}", about, finished, left_open, failed, self.quick).as_html()
+        page = self.folder / PAGE
+        if not page.is_file() or page.read_text("utf-8", errors="replace") != text:
+            with whole_file(page) as unfinished:
+                unfinished.write_text(text, encoding="utf-8")
+
+    def try_to_run(self, name: str, settings: ExperimentSettings) -> None:
+        """Run an experiment, and write its folder; where it fails, keep the error.
+
+        settings : with the monitor of this experiment
+        Raises ExportError: something cannot be written.
+        """
+        try:
+            self._run(name, settings)
+        except ExportError:
+            raise  # nor could the others write
+        except Exception as error:  # one experiment must not stop the others
+            settings.monitor(Item(name, "failed", told(error)))
+            self.failed[name] = error
+
+    def _run(self, name: str, settings: ExperimentSettings) -> None:
+        part, target = PARTS[name], self.folder / name
+        models = self.folder / "models" / self.key("models")[:KEY_DIGITS]  # of other recordings, other models
+        with unfinished_work(self.folder / f"{name}.json") as work:
+            stamp = Stamp()
+            keeper = ClipKeeper(work / MOTION, self.key(name))
+            running = replace(settings, monitor=sub_monitor(settings.monitor, 0, 0.95), receive=keeper)
+            plots = work / "plots" if part.draws and can_draw() else None
+            figures = part.run(PartRun(self.corpus, self.quick, work, models, plots, running))
+            section, motion = part.section(figures), keeper.content()
+            made_with = stamp.content(self._command([name]), self.corpus, settings)
+            shutil.rmtree(target, ignore_errors=True)
+            with whole_folder(target) as made:
+                videos = []
+                if motion:
+                    drawing = sub_monitor(settings.monitor, 0.95, 1)
+                    videos = write_videos(motion, section.shown, self.corpus, made, drawing)
+                record: dict[str, Any] = {"experiment": name, "key": self.key(name), "stamp": made_with}
+                record["figures"] = figures
+                record |= {"videos": videos, "pictures": _moved_pictures(plots, made)}
+                folder = made / "tables"
+                folder.mkdir()
+                for table in section.tables:
+                    with whole_file(folder / f"{table.name}.csv") as unfinished:
+                        unfinished.write_text(table.as_csv(), encoding="utf-8", newline="")
+                    _write_json(folder / f"{table.name}.json", table.as_content())
+                _write_json(made / MOTION, motion)
+                _write_json(made / FIGURES, record)
+
+    def _command(self, wanted: Sequence[str]) -> list[str]:
+        words = ["lipmotion", "experiment", "all", self.name, "-o", self.folder.resolve().name]
+        words += ["--only", ",".join(wanted)] if len(wanted) < len(PARTS) else []
+        words += ["--lexicon", "FILE"] if self.settings.lexicon else []
+        return [*words, *(["--quick"] if self.quick else [])]
+
+
+def told(error: Exception) -> str:
+    """Return what an error says; of one that is not raised on purpose its kind, too."""
+    return str(error) if isinstance(error, LipMotionError) else f"{type(error).__name__}: {error}"
+
+
+def _moved_pictures(plots: Path | None, target: Path) -> list[dict[str, str]]:
+    """Move the pictures of an experiment into its folder; return their files and captions."""
+    if plots is None:
+        return []
+    for file in PLOT_CAPTIONS:
+        shutil.move(plots / file, target / file)
+    return [{"file": file, "caption": caption} for file, caption in PLOT_CAPTIONS.items()]
+
+
+def _write_json(path: Path, content: Any) -> None:
+    with whole_file(path) as unfinished:
+        unfinished.write_text(as_json(content, indent=1) + "\n", encoding="utf-8")

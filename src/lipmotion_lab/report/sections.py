@@ -1,0 +1,395 @@
+"""What a report says of each experiment: of the papers, of all engines, learning curve, folds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from lipmotion.measures.evaluation_table import figure_text
+from lipmotion_lab.comparison import sign_of_difference
+from lipmotion_lab.evaluation.held_out import AUDIO_ONLY
+from lipmotion_lab.hofer2008.table1 import PAPER_SCORES, PINS, REFERENCE_SET, what_held
+from lipmotion_lab.minnis_breen2000.minnis2000 import ADDITIONS, EVERYTHING, PRINTED, UNGUIDED, VARIANTS
+from lipmotion_lab.report.charts import Dot, dots, rising
+from lipmotion_lab.report.order import PaperOrder, PaperPair
+from lipmotion_lab.report.section import Section, difference, named, warning_of
+from lipmotion_lab.report.table import (
+    ACC,
+    ELSEWHERE,
+    JERK,
+    NRMSE,
+    OPENING,
+    PRECISION,
+    RECALL,
+    SCORE,
+    VARIANCE,
+    Column,
+    Row,
+    Table,
+)
+from lipmotion_lab.xie_liu2007.systems import PAPER_FIGURES, REFERENCE_SYSTEM, TUNED
+
+AS_PRINTED = next(iter(PINS))
+HOFER_COLUMNS = (
+    Column("paper", "paper: score", ".1f", "the paper's Table 1, in %: another speaker, corpus and threshold"),
+    SCORE,
+    PRECISION,
+    RECALL,
+    Column("timing_ms", "timing", "+.0f", "by how much closings are late, in ms"),
+    ACC,
+    NRMSE,
+    JERK,
+    VARIANCE,
+    Column("units", "units", ".0f", "how many the set has"),
+    Column("gaussians", "K", ".0f", "Gaussians a state for speech, chosen on val"),
+)
+
+
+def hofer_section(figures: Mapping[str, Any]) -> Section:
+    """Return what the figures of ``hofer2008`` say; the paper's own case is audio alone, as printed, most states."""
+    blocks = list(figures["tables"])
+    most = max(block["states"] for block in blocks)
+    main = next(
+        block
+        for block in blocks
+        if (block["states"], block["condition"], block["pins"]) == (most, AUDIO_ONLY, AS_PRINTED)
+    )
+    order, others = _order(main), [block for block in blocks if block is not main]
+    table = _table(main)
+    charts = [
+        dots(
+            "Score of closings",
+            "% of the recording's closings",
+            [
+                Dot(name, row["score"], row["score_95"], row["paper"])
+                for name, row in sorted(table.rows.items(), key=lambda item: -item[1]["paper"])
+            ],
+        )
+    ]
+    closed = figures["closed_under"]
+    about = (
+        f"Which set of units predicts closings of the mouth best: the system of the paper, trained on "
+        f"{figures['trained_on']} recordings with each of {len(main['rows'])} sets, compared on {figures['clips']} of "
+        f"{figures['split']}. The mouth is closed under {closed:.4f} eye distances; the recordings close it "
+        f"{next(iter(main['rows'].values()))['closings']} times. Shown first: sound alone, {AS_PRINTED}, {most} states."
+    )
+    words = warning_of(figures["clips"]) | {"The paper's order": order.sentences()}
+    more = [(f"{_case(block)}: {what_held(block)}.", _table(block)) for block in others]
+    shown = [f"{units}, {most} states" for units in table.rows]
+    title = "Hofer, Yamagishi & Shimodaira 2008, Table 1: unit sets"
+    return Section(title, about, order.verdict(), words, charts, table, more, shown)
+
+
+def _order(block: Mapping[str, Any]) -> PaperOrder:
+    rows = block["rows"]
+    pairs = [
+        PaperPair(
+            pair["better"],
+            pair["worse"],
+            difference(rows[pair["better"]]["score"], rows[pair["worse"]]["score"]),
+            pair["score_gain_95"],
+        )
+        for pair in block["paper_order"]
+    ]
+    paper = {name: PAPER_SCORES[name] for name in rows}
+    return PaperOrder("Score of closings", paper, {name: row["score"] for name, row in rows.items()}, pairs, "+.1f")
+
+
+def _table(block: Mapping[str, Any]) -> Table:
+    name = f"hofer2008-{block['states']}-states-{block['condition']}-{block['pins']}".replace(" ", "-")
+    return Table(name, f"Unit sets, {_case(block)}", HOFER_COLUMNS, block["rows"], REFERENCE_SET, "unit set")
+
+
+def _case(block: Mapping[str, Any]) -> str:
+    return f"{block['states']} states, {block['condition']}, {block['pins']}"
+
+
+MINNIS_COLUMNS = (
+    ACC,
+    replace(RECALL, note="p, b and m in which the lips close, without pins, in %"),
+    SCORE,
+    ELSEWHERE,
+    NRMSE,
+    VARIANCE,
+    Column("joins_per_clip", "joins", ".1f", "a recording"),
+    Column("joins_hard", "hard", ".0f", "joins at which units abut, in %"),
+    Column("joins_smooth", "smooth", ".0f", "joins no rougher than 95 % of the speaker's own motion, in %"),
+)
+
+
+def minnis_section(figures: Mapping[str, Any]) -> Section:
+    """Return what the figures of ``minnis2000`` say, on the last of its lists, which is ``test``."""
+    tables = [
+        Table(
+            f"minnis2000-{split}-{condition}".replace(" ", "-"),
+            f"Unit selection, {split}, {condition}",
+            MINNIS_COLUMNS,
+            _rows(rows),
+            PRINTED,
+        )
+        for split, found in figures["lists"].items()
+        for condition, rows in found["conditions"].items()
+    ]
+    split, last = list(figures["lists"].items())[-1]
+    main = next(table for table in tables if table.caption == f"Unit selection, {split}, {AUDIO_ONLY}")
+    rows, everything = main.rows, main.rows[EVERYTHING]
+    acc = figure_text(rows[PRINTED]["acc"], ".3f"), figure_text(everything["acc"], ".3f")
+    gained = difference(everything["acc"], rows[PRINTED]["acc"])
+    sign = sign_of_difference(everything["acc_gain_95"])
+    effect = ("leave open whether they change", "raise", "lower")[sign]
+    verdict = (
+        f"The paper prints no figures. All additions together {effect} the correlation of the opening: "
+        f"{acc[0]} as printed, {acc[1]} with them ({_interval(gained, everything)})."
+    )
+    words = warning_of(last["clips"]) | {
+        "Each addition alone": _effects(rows, ADDITIONS),
+        "Other readings of the print": _effects(rows, VARIANTS),
+        "Lips in p, b and m": [
+            f"As printed, the lips close in {_percent(rows[PRINTED]['recall_p_b_m'])} of {rows[PRINTED]['p_b_m']} p, b "
+            f"and m; with all additions in {_percent(everything['recall_p_b_m'])}; nothing is pinned."
+        ],
+    }
+    about = (
+        f"The system of the paper as printed, each addition of this project alone, and other readings of the print: "
+        f"units of {figures['utterances']} recordings ({figures['minutes']} minutes), compared on {last['clips']} "
+        f"recordings of {split}, sound alone."
+    )
+    shown = [Dot(name, row["acc"], row["acc_95"]) for name, row in rows.items()]
+    charts = [dots("ACC of the opening", "ACC", shown)]
+    more = [(table.caption, table) for table in tables if table is not main]
+    title, compared = "Minnis & Breen 2000: unit selection", (PRINTED, UNGUIDED, EVERYTHING)
+    return Section(title, about, verdict, words, charts, main, more, compared)
+
+
+def _rows(rows: Mapping[str, Row]) -> dict[str, dict[str, Any]]:
+    """Return the rows with the figures of their joins beside the others."""
+    found = {}
+    for name, row in rows.items():
+        joins = row["joins"]
+        shares = {f"joins_{key}": None if joins[key] is None else 100 * joins[key] for key in ("hard", "smooth")}
+        found[name] = {**row, "joins_per_clip": joins["per_clip"], **shares}
+    return found
+
+
+def _effects(rows: Mapping[str, Row], names: Iterable[str]) -> list[str]:
+    """Return which of some rows are better than the system as printed, worse, and neither for sure."""
+    signs = {name: sign_of_difference(rows[name]["acc_gain_95"]) for name in names}
+    printed = rows[PRINTED]["acc"]
+    described = {name: f"{name} ({figure_text(difference(rows[name]['acc'], printed), '+.3f')})" for name in signs}
+    said = ((1, "ACC is higher"), (-1, "ACC is lower"), (0, "The interval of the difference contains 0"))
+    return [
+        f"{what}: {named([described[name] for name, each in signs.items() if each == sign])}." for sign, what in said
+    ]
+
+
+def _interval(gained: float | None, row: Row) -> str:
+    low, high = row["acc_gain_95"]
+    told = figure_text(gained, "+.3f")
+    return told if low is None else f"{told}, 95 % interval {low:+.3f} to {high:+.3f}"
+
+
+def _percent(share: float | None) -> str:
+    return "–" if share is None else f"{share:.1f} %"
+
+
+XIELIU_COLUMNS = (
+    Column("paper_acc", "paper: ACC", ".3f", "the paper's Table 3, of eigenlips of another speaker"),
+    Column("acc", "ACC", ".3f", "mean correlation of the channels with the recording"),
+    Column("paper_amse", "paper: AMSE", ".3f", "in the paper's units of eigenlips, which do not compare"),
+    Column("amse", "AMSE", ".4f", "mean distance from the recording, smaller is better"),
+    Column("opening_acc", "opening", ".3f", "correlation of the opening alone"),
+    SCORE,
+    RECALL,
+    VARIANCE,
+    Column("lag_ms", "lag", "+.0f", "in ms"),
+    Column("parameters", "numbers", ".0f", "what the chains have learned"),
+    Column("seconds", "seconds", ".1f", "of a processor, for training"),
+)
+MEASURES = (("acc", "ACC", "+.3f", False), ("amse", "AMSE", "+.4f", True))
+
+
+def xie_liu_section(figures: Mapping[str, Any]) -> Section:
+    """Return what the figures of ``xieliu2007`` say, of the largest number of recordings."""
+    size = figures["rows"][-1]
+    tables = {
+        condition: Table(
+            f"xieliu2007-{condition}".replace(" ", "-"),
+            f"Structures of chains, {condition}",
+            XIELIU_COLUMNS,
+            _rows_of_systems(size, rows),
+            REFERENCE_SYSTEM,
+        )
+        for condition, rows in size["conditions"].items()
+    }
+    main = tables.pop(AUDIO_ONLY)
+    words, verdict, by_amse = warning_of(figures["clips"]), "", []
+    for ending, called in (("", "as printed"), (TUNED, "as tuned on val")):
+        pairs = [pair for pair in size["pairs"] if pair["better"].endswith(TUNED) == bool(ending)]
+        if pairs:
+            acc, amse = (_order_of_systems(main.rows, pairs, ending, measure) for measure in MEASURES)
+            words[f"Systems {called}, by ACC"] = [*([acc.verdict()] if verdict else []), *acc.sentences()]
+            by_amse.append(f"Systems {called}: {amse.verdict()}")
+            verdict = verdict or acc.verdict()
+    words["By AMSE"] = by_amse
+    channels = figures["channels"]
+    about = (
+        f"Which structure of chains predicts lips best: {len(main.rows)} systems trained on {size['used']} recordings, "
+        f"compared on {figures['clips']} of {figures['split']}, by {len(channels)} channels "
+        f"({', '.join(channels[:3])}{', …' if len(channels) > 3 else ''})."
+    )
+    if figures["tuning"]["tried"]:
+        about += " Tuned systems have what the print leaves open as it was best on val; nothing was chosen on test."
+    shown = [Dot(name, row["acc"], row["acc_95"], row["paper_acc"]) for name, row in main.rows.items()]
+    charts = [dots("ACC of every system", "ACC", shown)]
+    title = "Xie & Liu 2007, Table 3: structures of chains"
+    more = [(table.caption, table) for table in tables.values()]
+    return Section(
+        title, about, verdict, words, charts, main, more, [name for name in PAPER_FIGURES if name in main.rows]
+    )
+
+
+def _rows_of_systems(size: Mapping[str, Any], rows: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return the rows of a table, with what stands elsewhere: the paper's figures, the opening, the training."""
+    found = {}
+    for name, row in rows.items():
+        amse, acc = PAPER_FIGURES.get(name.removesuffix(TUNED), (None, None))
+        training = {key: size["training"][name][key] for key in ("parameters", "seconds")}
+        found[name] = {**(row["opening"] or {}), **row, **training, "paper_amse": amse, "paper_acc": acc}
+    return found
+
+
+def _order_of_systems(
+    rows: Mapping[str, Mapping[str, Any]],
+    pairs: Sequence[Mapping[str, Any]],
+    ending: str,
+    measure: tuple[str, str, str, bool],
+) -> PaperOrder:
+    """Return the paper's order of systems by one measure.
+
+    ending : of their names here
+    """
+    key, name, form, is_error = measure
+    compared = [
+        PaperPair(
+            pair["better"].removesuffix(ending),
+            pair["worse"].removesuffix(ending),
+            _turned([pair[key]], is_error)[0],
+            _turned(pair[f"{key}_95"], is_error),
+        )
+        for pair in pairs
+    ]
+    names = [each for each in PAPER_FIGURES if each + ending in rows]
+    paper = {each: PAPER_FIGURES[each][0 if is_error else 1] for each in names}
+    here = {each: rows[each + ending][key] for each in names}
+    return PaperOrder(name, paper, here, compared, form, is_error)
+
+
+def _turned(values: Sequence[float | None], is_error: bool) -> tuple[float | None, ...]:
+    """Return differences, or the ends of an interval, such that positive ones are better."""
+    return tuple(None if value is None else -value for value in reversed(values)) if is_error else tuple(values)
+
+
+def engines_section(figures: Mapping[str, Any]) -> Section:
+    """Return what the figures of ``engines`` say."""
+    reference, tables = figures["reference"], {}
+    for condition, found in figures["conditions"].items():
+        rows = {
+            name: {**row, "acc_gain_95": row["acc_gain_95"].get(reference)} for name, row in found["systems"].items()
+        }
+        name, columns = f"engines-{condition}".replace(" ", "-"), (*OPENING, ELSEWHERE, JERK)
+        tables[condition] = Table(name, f"Engines, {condition}", columns, rows, reference)
+    main = tables.pop(AUDIO_ONLY)
+    signs = {name: sign_of_difference(row["acc_gain_95"]) for name, row in main.rows.items() if name != reference}
+    best = max(main.rows, key=lambda name: main.rows[name]["acc"] or 0.0)
+    acc = figure_text(main.rows[best]["acc"], ".3f")
+    verdict = f"Most alike to the recordings: {best} (ACC {acc}); nothing is in print to compare."
+    said = ((1, "higher than that"), (-1, "lower than that"), (0, "not different for sure from that"))
+    words = warning_of(figures["clips"]) | {
+        "ACC of the opening": [
+            f"{what.capitalize()} of the engine {reference}: {named([n for n, each in signs.items() if each == sign])}."
+            for sign, what in said
+        ]
+    }
+    minutes = ", ".join(sorted({f"{row['minutes']}" for row in figures["models"].values()}))
+    about = (
+        f"All engines with their defaults, trained on {minutes} minutes, on {figures['clips']} "
+        f"recordings of {figures['split']}, with closed lips forced in p, b and m."
+    )
+    charts = [dots("ACC of the opening", "ACC", [Dot(n, r["acc"], r["acc_95"]) for n, r in main.rows.items()])]
+    more = [(table.caption, table) for table in tables.values()]
+    return Section("The engines of this project", about, verdict, words, charts, main, more, list(main.rows))
+
+
+def learning_section(figures: Mapping[str, Any]) -> Section:
+    """Return what the figures of ``learning_curve`` say."""
+    sizes = {str(row["names"]): row for row in figures["rows"]}
+    trained = (
+        Column("used", "used", ".0f", "recordings that could be used"),
+        Column("minutes", "minutes", ".1f", "of training"),
+        Column("seconds", "seconds", ".0f", "that training took"),
+    )
+    conditions = list(figures["rows"][0]["conditions"])
+    tables = {
+        condition: Table(
+            f"learning-curve-{condition}".replace(" ", "-"),
+            f"Learning curve, {condition}",
+            (*trained, *OPENING),
+            {size: {**row, **row["conditions"][condition]} for size, row in sizes.items()},
+            head="recordings",
+        )
+        for condition in conditions
+    }
+    main = tables.pop(AUDIO_ONLY)
+    first, last = next(iter(main.rows)), list(main.rows)[-1]
+    low, high = (figure_text(main.rows[size]["acc"], ".3f") for size in (first, last))
+    steps = [
+        size
+        for size, before in zip(list(main.rows)[1:], main.rows, strict=False)
+        if (difference(main.rows[size]["acc"], main.rows[before]["acc"]) or 0) < 0
+    ]
+    words = warning_of(figures["clips"]) | {
+        "More recordings": [
+            f"From {first} to {last} recordings the correlation of the opening goes from {low} to {high}.",
+            f"It falls at: {', '.join(steps)}." if steps else "It falls at no step.",
+        ]
+    }
+    lines = {
+        condition: [
+            (float(size), Dot(size, row["conditions"][condition]["acc"], row["conditions"][condition]["acc_95"]))
+            for size, row in sizes.items()
+        ]
+        for condition in conditions
+    }
+    about = (
+        f"The default engine trained on the first recordings of the training list alone, in a random order, "
+        f"compared on {figures['clips']} of {figures['split']}."
+    )
+    verdict = f"ACC {low} with {first} recordings, {high} with {last}."
+    charts = [rising("ACC of the opening over recordings", "recordings", lines)] if len(sizes) > 1 else []
+    more = [(table.caption, table) for table in tables.values()]
+    shown = [f"{size} recordings" for size in dict.fromkeys((first, last))]
+    return Section("Learning curve", about, verdict, words, charts, main, more, shown)
+
+
+def folds_section(figures: Mapping[str, Any]) -> Section:
+    """Return what the figures of ``folds`` say."""
+    rows = figures["conditions"]
+    original = Column("original_per_minute", "recorded elsewhere", ".1f", "the same of the recordings")
+    table = Table(
+        "folds", f"Cross-validation, {figures['folds']} folds", (*OPENING, ELSEWHERE, original), rows, head="condition"
+    )
+    row = rows[AUDIO_ONLY]
+    acc, clips = figure_text(row["acc"], ".3f"), figures["clips"]
+    verdict = f"ACC {acc} on {clips} recordings, each generated by a model of the others."
+    about = (
+        f"The training list in {figures['folds']} parts: each is generated by a model of the others, "
+        f"{min(figures['trained_on'])} to {max(figures['trained_on'])} recordings."
+    )
+    words = warning_of(figures["clips"]) | {
+        "More closings than a test list has": [
+            f"Of {row['p_b_m']} p, b and m the lips close in {figure_text(row['recall_p_b_m'], '.1f')} %; of "
+            f"{row['closings']} closings {figure_text(row['score'], '.1f')} % are made in time."
+        ]
+    }
+    return Section("Cross-validation", about, verdict, words, [], table)

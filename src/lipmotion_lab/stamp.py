@@ -1,0 +1,118 @@
+"""Where, when and with what the figures of an experiment were made."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+from collections.abc import Sequence
+from datetime import datetime, timezone
+from importlib import metadata
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from lipmotion.corpora.splits import SPLITS
+from lipmotion.corpora.store import Corpus
+from lipmotion.engines import ENGINES
+from lipmotion.kernels.threads import blas_kernels
+from lipmotion.pipeline.training.fingerprint import corpus_digest
+from lipmotion_lab.runner import ExperimentSettings
+
+PACKAGES = ("lipmotion", "numpy", "scipy", "numba", "av", "pocketsphinx", "hama", "matplotlib")
+"""Packages on which figures, or pictures, depend."""
+ROOT = Path(__file__).parents[3]
+"""The root of a checkout of the source, where the package is in one."""
+DIGITS = 8
+"""Digits of a SHA-256 that name an engine's options."""
+CPU_INFO = Path("/proc/cpuinfo")
+"""Where Linux names the processor."""
+
+
+class Stamp:
+    """What the figures of an experiment are stamped with; its time begins when it is made."""
+
+    def __init__(self) -> None:
+        self._begun = datetime.now(timezone.utc)
+        self._start_s = perf_counter(), _processor_seconds()
+
+    def content(self, command: Sequence[str], corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
+        """Return command, time, corpus, seed, options, commit, engines, machine and versions, by name.
+
+        command : its words; of absolute paths the last name is kept, for figures are given to others
+        The time is that of this call: a call that goes on after a stop does not count what was finished before.
+        Processor seconds are those of this process and of its processes that have ended. None: not known, or not
+        installed.
+        """
+        seconds, used = perf_counter() - self._start_s[0], _processor_seconds() - self._start_s[1]
+        lists = {split: len(corpus.names(split)) for split in SPLITS}
+        lexicon = "the user's" if settings.lexicon else "none but the dictionary"
+        return {
+            "command": shlex.join(map(_without_folders, command)),
+            "begun": self._begun.isoformat(timespec="seconds"),
+            "seconds": round(seconds, 1),
+            "processor seconds": round(used, 1),
+            "corpus": {"name": corpus.path.resolve().name, "SHA-256": corpus_digest(corpus), **lists},
+            "seed": settings.seed,
+            "options": {"workers": settings.workers, "lexicon": lexicon},
+            "commit": commit(ROOT),
+            "engines": {name: engine_digest(name) for name in ENGINES.built_in},
+            **_machine(),
+        }
+
+
+def engine_digest(name: str) -> str:
+    """Return the digits that name the default options of an engine."""
+    options = json.dumps(ENGINES.load(name).Config().as_mapping(), sort_keys=True)
+    return hashlib.sha256(options.encode()).hexdigest()[:DIGITS]
+
+
+def _without_folders(word: str) -> str:
+    option, equals, value = word.rpartition("=")
+    return f"{option}{equals}{Path(value).name}" if Path(value).is_absolute() else word
+
+
+def _processor_seconds() -> float:
+    return sum(os.times()[:4])
+
+
+def _machine() -> dict[str, Any]:
+    try:
+        lines = CPU_INFO.read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return {
+        "machine": {
+            "cores": os.cpu_count(),
+            "processor": named[0] if named else platform.processor() or platform.machine(),
+            "system": platform.platform(),
+            "linear algebra": ", ".join(map(str, blas_kernels())),
+        },
+        "versions": {"Python": platform.python_version(), **{name: _version(name) for name in PACKAGES}},
+    }
+
+
+def commit(root: Path) -> str | None:
+    """Return the commit of a checkout of the source, and whether its ``src`` was changed since; None: it is none."""
+    git = shutil.which("git")
+    if git is None or not (root / ".git").exists():
+        return None
+
+    def said(*arguments: str) -> str | None:
+        done = subprocess.run([git, "-C", str(root), *arguments], capture_output=True, text=True, check=False)
+        return done.stdout.strip() if done.returncode == 0 else None
+
+    found = said("rev-parse", "HEAD")
+    return f"{found}, changed since" if found and said("status", "--porcelain", "--", "src") else found
+
+
+def _version(package: str) -> str | None:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return None

@@ -1,0 +1,297 @@
+"""``lipmotion experiment``: train and compare systems on a corpus."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from lipmotion.cli.arguments.declared import add_options
+from lipmotion.cli.arguments.figures import add_figures_arguments, report_figures
+from lipmotion.cli.arguments.options import add_execution, add_workers, list_or_all, numbers, worker_count
+from lipmotion.cli.arguments.paths import add_input, add_output
+from lipmotion.pipeline.job import Request
+from lipmotion.printable import printable
+
+if TYPE_CHECKING:
+    from lipmotion.corpora.store import Corpus
+    from lipmotion.types import Monitor
+    from lipmotion.units import Lexicon
+    from lipmotion_lab.runner import ExperimentSettings
+
+
+def add(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add the verb and its experiments to the parser of the command line."""
+    parser = verbs.add_parser("experiment", help="train and compare systems on a corpus, as in the papers")
+    actions = parser.add_subparsers(title="experiments", required=True, metavar="EXPERIMENT")
+    for experiment in (
+        _add_hofer2008,
+        _add_learning_curve,
+        _add_folds,
+        _add_xieliu2007,
+        _add_minnis2000,
+        _add_engines,
+        _add_all,
+    ):
+        experiment(actions)
+
+
+def add_experiment_arguments(parser: argparse.ArgumentParser, *, quick: str = "") -> None:
+    """Add the corpus, ``--workers``, and the options of ``add_figures_arguments``.
+
+    quick : what is small with ``--quick``, beside the recordings; without it there is no such option
+    """
+    add_input(parser, "corpus", what="corpus")
+    if quick:
+        help_text = f"see that it runs: 20 recordings to train on, at most 6 to compare, {quick}"
+        parser.add_argument("--quick", action="store_true", help=help_text)
+    add_workers(parser)
+    add_figures_arguments(parser)
+
+
+def run_experiment(
+    options: argparse.Namespace,
+    experiment: Callable[[Corpus, ExperimentSettings], dict[str, Any]],
+    table: Callable[[dict[str, Any]], str],
+) -> None:
+    """Call ``experiment(corpus, settings)``, print its table, and give its figures with their stamp.
+
+    With ``--quick`` the corpus is ``runner.quick_part``, the same recordings for all experiments.
+    """
+    from lipmotion.corpora.store import Corpus
+    from lipmotion_lab.runner import ExperimentSettings, quick_part
+    from lipmotion_lab.stamp import Stamp
+
+    def compute(lexicon: Lexicon | None, monitor: Monitor) -> dict[str, Any]:
+        stamp = Stamp()
+        settings = ExperimentSettings(lexicon=lexicon, workers=worker_count(options), monitor=monitor)
+        corpus = Corpus.open(options.corpus)
+        if getattr(options, "quick", False):
+            corpus = quick_part(corpus, settings.seed)
+        figures = experiment(corpus, settings)
+        return {"stamp": stamp.content(["lipmotion", *options.words], corpus, settings)} | figures
+
+    report_figures(options, compute, table)
+
+
+def unfinished_parts(options: argparse.Namespace) -> AbstractContextManager[Path | None]:
+    """Return the folder of finished parts, from which a second run of an experiment goes on; None without an output."""
+    from lipmotion.storage.files import unfinished_work
+
+    return unfinished_work(options.output) if options.output else nullcontext()
+
+
+def _add_hofer2008(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = actions.add_parser(
+        "hofer2008", help="which unit set predicts closings of the mouth, by the paper's own system (Table 1)"
+    )
+    parser.add_argument("--split", default="test", help="compare on test, val, train or all (default: test)")
+    add_experiment_arguments(parser, quick="one or two Gaussians a state")
+    parser.set_defaults(run=run_hofer2008)
+
+
+def run_hofer2008(options: argparse.Namespace) -> None:
+    """Call ``experiment.hofer2008`` and print its tables; with ``--output``, a second run goes on where one stopped."""
+    from lipmotion_lab.hofer2008.table1 import FULL, QUICK, hofer2008, table
+
+    def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
+        with unfinished_parts(options) as work:
+            chosen = QUICK if options.quick else FULL
+            return hofer2008(corpus, chosen, split=list_or_all(options.split), work=work, settings=settings)
+
+    run_experiment(options, experiment, table)
+
+
+def _add_learning_curve(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = actions.add_parser("learning-curve", help="quality of models trained on the first N recordings")
+    order = "names of recordings, one per line (default: the training list, shuffled with seed 0)"
+    add_input(parser, "--order", what="list", replaceable=True, metavar="FILE", help=order)
+    sizes = "numbers of recordings to train on (default: 20,50,100,200 and all)"
+    parser.add_argument("--sizes", type=numbers, metavar="N,N,...", help=sizes)
+    parser.add_argument("--split", default="test", help="compare on val or test (default: test)")
+    add_experiment_arguments(parser)
+    parser.set_defaults(run=run_learning_curve)
+
+
+def run_learning_curve(options: argparse.Namespace) -> None:
+    """Call ``experiment.learning_curve``, print its table; with ``--output``, a second run goes on after a stop."""
+    from lipmotion.corpora.splits import read_names
+    from lipmotion_lab.learning_curve import learning_curve, table
+
+    def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
+        order = read_names(options.order) if options.order else None
+        split = list_or_all(options.split)
+        with unfinished_parts(options) as work:
+            return learning_curve(corpus, order=order, sizes=options.sizes, split=split, work=work, settings=settings)
+
+    run_experiment(options, experiment, table)
+
+
+def _add_folds(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = actions.add_parser(
+        "folds", help="cross-validation: generate each part of the training list by a model of the others"
+    )
+    parser.add_argument("--by-speaker", action="store_true", help="leave whole speakers out: strangers to the model")
+    count = "number of parts (default: 5; by speaker: one each)"
+    parser.add_argument("--folds", type=int, metavar="K", help=count)
+    add_experiment_arguments(parser)
+    parser.set_defaults(run=run_folds)
+
+
+def run_folds(options: argparse.Namespace) -> None:
+    """Call ``experiment.folds``, print its table; with ``--output``, a second run goes on after a stop."""
+    from lipmotion_lab.folds import folds, table
+
+    def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
+        with unfinished_parts(options) as work:
+            return folds(corpus, count=options.folds, by_speaker=options.by_speaker, work=work, settings=settings)
+
+    run_experiment(options, experiment, table)
+
+
+def _add_xieliu2007(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = actions.add_parser(
+        "xieliu2007",
+        help="which structure of chains predicts lips best, as printed and tuned (Xie & Liu 2007, Table 3)",
+    )
+    parser.add_argument("--split", default="test", help="compare on test, or another list (default: test)")
+    order = "names of recordings, one per line (default: train, shuffled)"
+    add_input(parser, "--order", what="list", replaceable=True, metavar="FILE", help=order)
+    parser.add_argument(
+        "--sizes", type=numbers, metavar="N,N,...", help="numbers of recordings to train on (default: all)"
+    )
+    systems = "these systems, separated by semicolons (default: those of the paper, and baselines)"
+    parser.add_argument("--systems", type=lambda text: text.split(";"), metavar="NAME;NAME", help=systems)
+    parser.add_argument("--visual", default="geometry", metavar="KIND", help="geometry, eigenlips or both")
+    parser.add_argument("--transcripts", action="store_true", help="compare also with known transcripts")
+    parser.add_argument("--noise", default="", metavar="KIND,KIND", help="compare also in noise: white, babble")
+    parser.add_argument(
+        "--snr",
+        type=numbers,
+        default=[20, 10, 5, 0],
+        metavar="DB,...",
+        help="signal-to-noise ratios (default: 20,10,5,0)",
+    )
+    talkers = "recordings of other people, for the babble"
+    add_input(parser, "--talkers", what="folder of recordings", metavar="FOLDER", help=talkers)
+    add_output(parser, "--plots", metavar="FOLDER", help="write pictures like Figs. 7, 10 and 11 there")
+    add_experiment_arguments(parser, quick="the paper's systems, four of them also tuned; not with --order")
+    parser.set_defaults(run=run_xieliu2007)
+
+
+def run_xieliu2007(options: argparse.Namespace) -> None:
+    """Call ``experiment.xieliu2007`` and print its table."""
+    from lipmotion.corpora.splits import read_names
+    from lipmotion.errors import InputError
+    from lipmotion_lab.noise import NoiseConditions, read_talkers
+    from lipmotion_lab.xie_liu2007.six_systems import DEFAULT_OPTIONS, QUICK, xieliu2007
+    from lipmotion_lab.xie_liu2007.text import table
+
+    if options.quick and options.order:
+        raise InputError("--quick takes recordings of its own, and --order is a list of others; leave out one of them")
+
+    def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
+        kinds = tuple(kind for kind in options.noise.split(",") if kind)
+        talkers = tuple(read_talkers(options.talkers)) if options.talkers else ()
+        few = QUICK if options.quick else DEFAULT_OPTIONS
+        compared = replace(
+            few,
+            systems=options.systems or few.systems,
+            visual=options.visual,
+            transcripts=options.transcripts,
+            noise=NoiseConditions(kinds, tuple(map(float, options.snr)), talkers),
+        )
+        with unfinished_parts(options) as work:
+            return xieliu2007(
+                corpus,
+                compared,
+                split=list_or_all(options.split),
+                order=read_names(options.order) if options.order else None,
+                sizes=options.sizes,
+                plots=options.plots,
+                work=work,
+                settings=settings,
+            )
+
+    run_experiment(options, experiment, table)
+
+
+def _add_minnis2000(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = actions.add_parser("minnis2000", help="unit selection as Minnis & Breen 2000 print it, and each addition")
+    kept = "keep the model there, so that a run that was stopped goes on and a second one does not train"
+    add_output(parser, "--models", is_folder=True, metavar="FOLDER", help=kept)
+    add_experiment_arguments(parser, quick="few epochs; the model is not kept")
+    parser.set_defaults(run=run_minnis2000)
+
+
+def run_minnis2000(options: argparse.Namespace) -> None:
+    """Call ``experiment.minnis2000`` and print its table; with ``--output``, a second run goes on where one stopped."""
+    from lipmotion_lab.minnis_breen2000.minnis2000 import minnis2000, table
+
+    def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
+        with unfinished_parts(options) as work:
+            return minnis2000(corpus, models=options.models, quick=options.quick, work=work, settings=settings)
+
+    run_experiment(options, experiment, table)
+
+
+def _add_engines(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = actions.add_parser("engines", help="all engines in one table")
+    parser.add_argument("--split", default="val", help="compare on val or test (default: val)")
+    kept = "the engines' models: what is not there yet is trained and kept (default: train all, keep none)"
+    add_output(parser, "--models", is_folder=True, metavar="FOLDER", help=kept)
+    add_experiment_arguments(parser)
+    parser.set_defaults(run=run_engines)
+
+
+def run_engines(options: argparse.Namespace) -> None:
+    """Call ``experiment.engines`` and print its table."""
+    from lipmotion_lab.engines.engine_comparison import engines, table
+
+    def experiment(corpus: Corpus, settings: ExperimentSettings) -> dict[str, Any]:
+        return engines(corpus, split=list_or_all(options.split), models=options.models, settings=settings)
+
+    run_experiment(options, experiment, table)
+
+
+def _add_all(actions: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = actions.add_parser("all", help="the papers' experiments and ours, and one page of what they found")
+    add_input(parser, "corpus", what="corpus")
+    report = "folder of the report; run it again to go on after a stop"
+    add_output(parser, "-o", "--output", is_folder=True, required=True, metavar="REPORT", help=report)
+    only = "these alone: hofer2008, xieliu2007, minnis2000, engines, learning-curve, folds (default: all)"
+    parser.add_argument("--only", type=lambda text: text.split(","), metavar="NAME,NAME", help=only)
+    parser.add_argument("--quick", action="store_true", help="20 recordings, small models: see that it runs")
+    add_options(parser, Request, "lexicon")
+    add_execution(parser)
+    parser.set_defaults(run=run_all)
+
+
+def run_all(options: argparse.Namespace) -> None:
+    """Call ``experiment_report``; print what was found, and the page. Raises the error of an experiment that failed."""
+    from lipmotion.cli.terminal.progress import reporting
+    from lipmotion.corpora.store import Corpus
+    from lipmotion.units import Lexicon
+    from lipmotion_lab.report.report import experiment_report, told
+    from lipmotion_lab.runner import ExperimentSettings
+
+    with reporting(options) as report:
+        lexicon = Lexicon.from_file(options.lexicon) if options.lexicon else None
+        settings = ExperimentSettings(lexicon=lexicon, workers=worker_count(options), monitor=report.receive)
+        found = experiment_report(
+            Corpus.open(options.corpus), options.output, only=options.only, quick=options.quick, settings=settings
+        )
+        lines = [f"{name}: {verdict}" for name, verdict in found.verdicts.items()]
+        lines += [f"{name}: {reason}" for name, reason in found.left_out.items()]
+        lines += [f"{name}: failed: {told(error)}" for name, error in found.failed.items()]
+        is_done = not (found.made or found.failed)
+        lines.append(f"{'nothing was left to do; ' if is_done else ''}report: {found.page}")
+        figures: dict[str, Any] = {"report": str(found.page), "verdicts": dict(found.verdicts)}
+        figures |= {"left_out": dict(found.left_out), "made": list(found.made)}
+        if not (found.failed and options.machine_readable):  # the last event is that of the failure
+            report.finish("\n".join(map(printable, lines)), **figures)
+        if found.failed:
+            raise next(iter(found.failed.values()))

@@ -1,0 +1,391 @@
+"""Xie & Liu 2007, Table 3, on any corpus: which structure of chains predicts lips best, beside other systems."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from itertools import combinations, pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lipmotion.corpora.store import Corpus, Selection
+from lipmotion.engines import engine_named
+from lipmotion.engines.coupled.model import CoupledModel
+from lipmotion.hmm.model import HmmConfig
+from lipmotion.kernels.threads import one_thread
+from lipmotion.measures import curves
+from lipmotion.pipeline.training.channels import (
+    EIGENLIPS,
+    GEOMETRY,
+    check_visual,
+    train_eigenlips,
+    with_visual_channels,
+)
+from lipmotion.pipeline.training.train import UTTERANCES_PER_WORKER, phones_and_examples
+from lipmotion.pipeline.workers import worker_pool
+from lipmotion.speech.recognition.recogniser import cached_recogniser
+from lipmotion.stats.rounding import varies
+from lipmotion.storage.checkpoint import NO_CHECKPOINT, Checkpoint
+from lipmotion.storage.json_text import nan_as_null
+from lipmotion.storage.sources import Source, check_apart
+from lipmotion.types import Example, Monitor, sub_monitor, with_progress
+from lipmotion.units import Lexicon
+from lipmotion_lab.comparison import ClipStatistic, correlation_statistic, distance_statistic, opening_curves
+from lipmotion_lab.evaluation.figures import figures_of
+from lipmotion_lab.evaluation.held_out import (
+    AUDIO_ONLY,
+    OPENING,
+    ComparedClip,
+    HeldOutRecordings,
+    compared_clips,
+    held_out_recordings,
+)
+from lipmotion_lab.learning_curve import check_training_names, training_sizes
+from lipmotion_lab.noise import NoiseConditions, recordings_in_noise
+from lipmotion_lab.runner import (
+    DEFAULT_SETTINGS,
+    QUICK_CLIPS,
+    ExperimentSettings,
+    PartKey,
+    channels_with_opening,
+    clips_from_arrays,
+    finished_parts,
+    opening_row,
+    shuffled,
+    stored_clips,
+)
+from lipmotion_lab.xie_liu2007.plots import check_plot_folder, draw_plots
+from lipmotion_lab.xie_liu2007.systems import (
+    COMPARED_SYSTEMS,
+    PAPER_FIGURES,
+    REFERENCE_SYSTEM,
+    TUNED,
+    selected_systems,
+    stored_system,
+    system_from_arrays,
+    train_system,
+    tuned_options,
+    with_inputs_of,
+)
+from lipmotion_lab.xie_liu2007.tuning import (
+    TUNING,
+    TrainedSystem,
+    Trial,
+    TuningOptions,
+    as_row,
+    changed_options,
+)
+
+TRIALS = "trials"
+
+
+@dataclass(frozen=True)
+class ComparisonOptions:
+    """Which systems are compared, and in which conditions.
+
+    systems     : names of ``systems.COMPARED_SYSTEMS``; None: all whose packages are installed
+    tuning      : how the settings of tuned systems are chosen, on the list ``val``
+    visual      : which motion is modelled and compared, as in ``train``; eigenlips are those of the training
+    transcripts : compare also with known transcripts
+    noise       : noise in which the systems trained on the largest size are compared as well
+    """
+
+    systems: Sequence[str] | None = None
+    tuning: TuningOptions = TUNING
+    visual: str = GEOMETRY
+    transcripts: bool = False
+    noise: NoiseConditions | None = None
+
+
+DEFAULT_OPTIONS = ComparisonOptions()
+QUICK = ComparisonOptions(
+    systems=[*PAPER_FIGURES, *(name + TUNED for name in PAPER_FIGURES if "FHMM" not in name), "mean pose"],
+    tuning=TuningOptions(
+        clips=QUICK_CLIPS["train"], judges=QUICK_CLIPS["val"], weights=(1.0, 0.3), mixtures=2, states=()
+    ),
+)
+"""A small comparison, for the recordings of ``runner.quick_part``; conversion by factorial chains is slow."""
+
+
+@one_thread()
+def xieliu2007(  # noqa: PLR0913
+    corpus: Corpus,
+    options: ComparisonOptions = DEFAULT_OPTIONS,
+    *,
+    split: str | None = "test",
+    order: Sequence[str] | None = None,
+    sizes: Sequence[int] | None = None,
+    plots: Path | None = None,
+    work: Path | None = None,
+    settings: ExperimentSettings = DEFAULT_SETTINGS,
+) -> dict[str, Any]:
+    """Train the six systems of the paper, this project's engines and baselines; return their figures on ``split``.
+
+    order, sizes : train on the first N names of a list, as in ``learning_curve``; by default on all of ``train``
+    plots        : a folder for pictures like Figs. 7, 10 and 11 of the paper, of the largest size
+    work         : a folder for what is finished, from which the same call goes on after a stop; None: nothing is kept
+    settings     : its workers share the forced alignment
+    The phones in time are computed once for each size and are the same for all systems. The settings of tuned systems
+    are chosen on the list ``val``, with systems trained on the first recordings of the list; then their number of
+    Gaussians, and whether they are better than those printed, with systems of the size itself.
+    Raises InputError: no such system, or sizes that the list does not have.
+    Raises CorpusError: no utterances to train on, to choose with, or of this split, or motion without an opening.
+    Raises MissingDependencyError: a system or the pictures need a package that is not installed.
+    Raises ExportError: the pictures cannot be written.
+    """
+    names, seed = selected_systems(options.systems), settings.seed
+    check_visual(options.visual)
+    tunes = list(dict.fromkeys(filter(None, (COMPARED_SYSTEMS[name].tunes for name in names))))
+    listed = tuple(order) if order is not None else shuffled(corpus.required("train"), seed)
+    held_out, validation = corpus.required(split), corpus.required("val") if tunes else ()
+    check_training_names(corpus, listed, (*held_out, *validation))
+    steps = training_sizes(sizes if sizes is not None else [len(listed)], len(listed))
+    setup = _TrainingSetup(corpus, held_out, validation, options, settings, work)
+    if options.visual != EIGENLIPS:
+        channels_with_opening(corpus, held_out)  # before the long work
+    if plots is not None:
+        check_plot_folder(plots)
+        check_apart([plots], [Source(corpus.path, "corpus")])
+    shares = np.cumsum([0.3 * sum(steps), *steps, 0.1 * sum(steps)]) / (1.4 * sum(steps))
+    trials = (
+        setup.tune(tunes, listed, sub_monitor(settings.monitor, 0, float(shares[0]), "choosing: ")) if tunes else {}
+    )
+    rows: list[dict[str, Any]] = []
+    for count, (start, stop) in zip(steps, pairwise(shares), strict=False):
+        part = sub_monitor(settings.monitor, float(start), float(stop), f"{count} clips: ")
+        trained = setup.train(names, listed[:count], trials, part)
+        kept = setup.checkpoint(listed[:count], held_out)
+        rows.append({"names": count} | _size(trained, options.transcripts, settings, kept))
+    noise_rows = _noise_rows(trained, options.noise or NoiseConditions(), seed, sub_monitor(settings.monitor, 0.9, 1))
+    recordings = trained.recordings
+    if plots is not None:
+        draw_plots(trained.systems[REFERENCE_SYSTEM], recordings, plots)
+    about = {"split": split or "all", "clips": len(held_out), "seed": seed, "workers": settings.workers}
+    about |= {"order": "given" if order is not None else "shuffled", "visual": options.visual}
+    about |= {"channels": list(recordings.channels), "closed_under": recordings.closed_under}
+    chosen: dict[str, Any] = {
+        "clips": options.tuning.clips,
+        "judges": options.tuning.judges,
+        "validation": len(validation),
+    }
+    chosen |= {"tried": {name: [as_row(trial) for trial in tried] for name, tried in trials.items()}}
+    return nan_as_null(about | {"tuning": chosen, "rows": rows, "noise": noise_rows})
+
+
+@dataclass(frozen=True, eq=False)
+class _TrainedSystems:
+    """Systems trained on some utterances, and the held-out recordings.
+
+    used : names of the utterances that they were trained on
+    """
+
+    used: tuple[str, ...]
+    recordings: HeldOutRecordings
+    systems: Mapping[str, TrainedSystem]
+
+
+@dataclass(frozen=True, eq=False)
+class _TrainingSetup:
+    """What the trainings on all sizes have in common.
+
+    held_out, validation : names of utterances
+    work                 : folder for finished parts, or None
+    """
+
+    corpus: Corpus
+    held_out: Sequence[str]
+    validation: Sequence[str]
+    options: ComparisonOptions
+    settings: ExperimentSettings
+    work: Path | None
+
+    def tune(self, systems: Sequence[str], listed: Sequence[str], monitor: Monitor) -> dict[str, list[Trial]]:
+        """Return what was tried for each of some systems of the paper, trained on the first names of a list."""
+        names = listed[: self.options.tuning.clips]
+        examples, recordings = self._prepared(names, (), sub_monitor(monitor, 0, 0.2))
+        trials = {}
+        for number, name in enumerate(systems):
+            part = sub_monitor(monitor, 0.2 + 0.8 * number / len(systems), 0.2 + 0.8 * (number + 1) / len(systems))
+            kept, stage = self.checkpoint(names), f"trials-{name}"
+            found = kept.load(stage)
+            if found is None:
+                tried = tuned_options(name, examples, recordings["val"], self.options.tuning, part)
+                found = {TRIALS: np.array(json.dumps([asdict(trial) for trial in tried]))}
+                kept.save(stage, found)
+            trials[name] = [Trial(**trial) for trial in json.loads(str(found[TRIALS]))]
+        return trials
+
+    def train(
+        self, systems: Sequence[str], names: Sequence[str], trials: Mapping[str, Sequence[Trial]], monitor: Monitor
+    ) -> _TrainedSystems:
+        """Return systems, trained on the same phones of the utterances ``names``."""
+        examples, recordings = self._prepared(names, self.held_out, sub_monitor(monitor, 0, 0.3))
+        kept, trained = self.checkpoint(names), dict[str, TrainedSystem]()
+        for number, name in enumerate(systems):
+            start, stop = 0.3 + 0.7 * number / len(systems), 0.3 + 0.7 * (number + 1) / len(systems)
+            part, chains = sub_monitor(monitor, start, stop, f"{name}: "), COMPARED_SYSTEMS[name].is_trained_here
+            found = kept.load(f"system-{name}") if chains else None
+            if found is not None:
+                trained[name] = system_from_arrays(found)
+                continue
+            known = with_inputs_of(name, examples, self.corpus)
+            trained[name] = train_system(name, known, recordings.get("val"), trials, trained, part)
+            if chains:  # their arrays are rounded when they are stored, and so is every model that is used
+                found = stored_system(trained[name])
+                kept.save(f"system-{name}", found)
+                trained[name] = system_from_arrays(found)
+        return _TrainedSystems(tuple(example.name for example in examples), recordings["held out"], trained)
+
+    def _prepared(
+        self, names: Sequence[str], held_out: Sequence[str], monitor: Monitor
+    ) -> tuple[list[Example], dict[str, HeldOutRecordings]]:
+        """Return the examples of some utterances, and recordings with the phones of models trained on these.
+
+        The recordings are those of the list ``val`` and those ``held out``, by these names, where there are some.
+        """
+        lexicon, config = self.settings.lexicon or Lexicon(), self.settings.recogniser or HmmConfig()
+        visual = self.options.visual
+        utterances = [self.corpus.utterance(name) for name in sorted(names)]
+        eigenlips = train_eigenlips(utterances) if visual != GEOMETRY else None
+        utterances = [with_visual_channels(utterance, visual, eigenlips) for utterance in utterances]
+        with worker_pool(min(self.settings.workers, len(utterances) // UTTERANCES_PER_WORKER)) as team:
+            phones, examples, _ = phones_and_examples(
+                utterances, config, lexicon, sub_monitor(monitor, 0, 0.7), self.checkpoint(names), team.ordered_map
+            )
+        read = partial(held_out_recordings, self.corpus, cached_recogniser(phones), lexicon=lexicon)
+        read = partial(read, visual=visual, eigenlips=eigenlips)
+        parts = {name: part for name, part in (("held out", held_out), ("val", self.validation)) if part}
+        recordings: dict[str, HeldOutRecordings] = {}
+        for number, (name, part) in enumerate(parts.items()):
+            reading = sub_monitor(monitor, 0.7 + 0.15 * number, 0.85 + 0.15 * number)
+            channels = recordings["held out"].channels if recordings else None
+            recordings[name] = read(selection=Selection(names=part), channels=channels, monitor=reading)
+        return examples, recordings
+
+    def checkpoint(self, names: Sequence[str], compared: Sequence[str] = ()) -> Checkpoint:
+        """Return what is kept of the work on the first recordings of a list, and of comparisons on others."""
+        everything, others = (*names, *self.corpus.names("val")), " ".join((str(self.options.tuning), *compared))
+        key = PartKey(engine_named("coupled"), everything, self.options.visual, others=others)
+        return finished_parts(self.work and self.work / str(len(names)), self.corpus, self.settings, key)
+
+
+def _size(
+    trained: _TrainedSystems, transcripts: bool, settings: ExperimentSettings, kept: Checkpoint
+) -> dict[str, Any]:
+    """Return the figures of all systems trained on one number of utterances."""
+    recordings, systems, seed = trained.recordings, trained.systems, settings.seed
+    conditions = list(recordings.conditions) if transcripts else [AUDIO_ONLY]
+    made = {condition: _made(recordings, condition, systems, kept) for condition in conditions}
+    for condition, of_systems in made.items():
+        for name, clips in of_systems.items():
+            settings.receive(name, condition, recordings, clips)
+    return {
+        "used": len(trained.used),
+        "training": {name: _training_row(system) for name, system in systems.items()},
+        "conditions": {condition: _rows(recordings, own, seed) for condition, own in made.items()},
+        "pairs": _pairs(recordings, made[AUDIO_ONLY], seed),
+    }
+
+
+def _made(
+    recordings: HeldOutRecordings,
+    condition: str,
+    systems: Mapping[str, TrainedSystem],
+    kept: Checkpoint = NO_CHECKPOINT,
+) -> dict[str, list[ComparedClip]]:
+    """Return what all systems generate in one condition."""
+    made = {}
+    for name, system in systems.items():
+        stage = f"{condition}-{name}"
+        found = kept.load(stage)
+        if found is None:
+            found = stored_clips(compared_clips(recordings, condition, system.engine, system.model))
+            kept.save(stage, found)
+        made[name] = clips_from_arrays(found)
+    return made
+
+
+def _pairs(recordings: HeldOutRecordings, made: Mapping[str, list[ComparedClip]], seed: int) -> list[dict[str, Any]]:
+    """Return how much better each system of the paper is than each that is worse in print, on the same clips.
+
+    Printed systems are compared with printed ones, and tuned ones with tuned ones; ``acc`` and ``amse``: difference.
+    """
+    by_acc = sorted(PAPER_FIGURES, key=lambda name: -PAPER_FIGURES[name][1])
+    rows = []
+    for ending in ("", TUNED):
+        present = [name + ending for name in by_acc if name + ending in made]
+        statistics = {name: _statistics(recordings, made[name]) for name in present}
+        for better, worse in combinations(present, 2):
+            row: dict[str, Any] = {"better": better, "worse": worse}
+            for key in ("acc", "amse"):
+                own, other = statistics[better][key], statistics[worse][key]
+                row |= {key: own.value - other.value, f"{key}_95": own.gain(other, seed)}
+            rows.append(row)
+    return rows
+
+
+def _training_row(system: TrainedSystem) -> dict[str, Any]:
+    """Return training time, number of parameters, settings, and those among which they were chosen."""
+    row: dict[str, Any] = {
+        "seconds": system.seconds,
+        "parameters": None,
+        "options": None,
+        "tried": [*map(as_row, system.tried)],
+    }
+    if isinstance(system.model, CoupledModel):
+        row |= {"parameters": system.model.chains.parameters, "options": changed_options(system.engine.config)}
+    return row
+
+
+def _rows(recordings: HeldOutRecordings, made: Mapping[str, list[ComparedClip]], seed: int) -> dict[str, Any]:
+    """Return the figures of what all systems generate for the same recordings."""
+    return {name: _row(recordings, own, made[REFERENCE_SYSTEM], seed) for name, own in made.items()}
+
+
+def _row(
+    recordings: HeldOutRecordings, made: Sequence[ComparedClip], reference: Sequence[ComparedClip], seed: int
+) -> dict[str, Any]:
+    """Return the figures of one system, and its differences from the reference system."""
+    figures, others = figures_of(made, recordings, seed), _statistics(recordings, reference)
+    row: dict[str, Any] = {}
+    for name, statistic in _statistics(recordings, made).items():
+        intervals = {"95": statistic.interval(seed), "gain_95": statistic.gain(others[name], seed)}
+        row |= {name: statistic.value} | {f"{name}_{key}": interval for key, interval in intervals.items()}
+    still = not varies(np.concatenate([clip.generated for clip in made])).any()
+    row |= {"lag_ms": None if still else figures["lag_ms"], "opening": None}
+    if OPENING not in recordings.channels:
+        return row
+    lips, (generated, original) = figures["closures_p_b_m"], opening_curves(recordings, made)
+    opening = opening_row(figures) | {"rmse": float(curves.rmse(generated, original)[0])}
+    return row | {"opening": opening | {key: lips[key] for key in ("false_per_minute", "original_per_minute")}}
+
+
+def _statistics(recordings: HeldOutRecordings, made: Sequence[ComparedClip]) -> dict[str, ClipStatistic]:
+    """Return AMSE and ACC of geometry, or of eigenlips if there is no geometry; and the ACC of the opening."""
+    pictured = np.array([name in recordings.eigenlips_channels for name in recordings.channels])
+    parts = {"": pictured} if pictured.all() else {"": ~pictured, "eigenlips_": pictured}
+    statistics = {}
+    for part, columns in parts.items():
+        if columns.any():
+            generated = [clip.generated[:, columns] for clip in made]
+            original = [clip.original[:, columns] for clip in made]
+            statistics[f"{part}amse"] = distance_statistic(generated, original)
+            statistics[f"{part}acc"] = correlation_statistic(generated, original)
+    if OPENING in recordings.channels:
+        statistics["opening_acc"] = correlation_statistic(*opening_curves(recordings, made))
+    return statistics
+
+
+def _noise_rows(trained: _TrainedSystems, noise: NoiseConditions, seed: int, monitor: Monitor) -> list[dict[str, Any]]:
+    """Return the figures of all systems for every kind of noise and ratio."""
+    rows = []
+    conditions = [(kind, ratio_db) for kind in noise.kinds for ratio_db in noise.ratios_db]
+    for kind, ratio_db in with_progress(conditions, "comparing in noise", monitor):
+        recordings = recordings_in_noise(trained.recordings, kind, ratio_db, noise.talkers, seed)
+        systems = _rows(recordings, _made(recordings, AUDIO_ONLY, trained.systems), seed)
+        rows.append({"kind": kind, "snr_db": ratio_db, "systems": systems})
+    return rows

@@ -1,0 +1,111 @@
+"""Faces of the page: meshes with morph targets as ``.glb``, and the numbers that move them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from lipmotion.articulation.expression import is_mood, with_moods
+from lipmotion.errors import InputError, shortened
+from lipmotion.meshes.fitting.driven import driven_character
+from lipmotion.meshes.model.file_limits import Budget
+from lipmotion.meshes.model.scene import Scene
+from lipmotion.pipeline.outputs.output import OutputSettings, ShownFace
+from lipmotion.storage.files import temporary_folder
+from lipmotion.types import FRAME_RATE_HZ, Channel, Generation, Motion, StateTrace, Timeline
+from lipmotion.types.moods import MOODS, MoodKey
+from lipmotion_faces.filmed.face import SUFFIX
+from lipmotion_faces.mesh import MeshFace
+from lipmotion_faces.outputs.scenes import KEPT, head_scene, write_scene
+from lipmotion_faces.outputs.shown_faces import shown_face
+from lipmotion_faces.registry import FACES
+
+HEAD, HEAD_OF_MOODS = "head", "head-moods"
+"""The 3D head, and the same with the shapes of moods: motion that has moods moves the second one."""
+TURN = tuple(f"head.rotation.{axis}" for axis in "xyzw")
+"""Names of the numbers of a quaternion that turns the head."""
+
+
+class Faces:
+    """The faces of a project, by their names: those that are built in, its own characters and filmed faces.
+
+    characters : paths of characters and of filmed faces by their names
+    made       : returns those of filmed faces that were built here, which may become more
+    """
+
+    def __init__(self, characters: Mapping[str, Path], made: Callable[[], Mapping[str, Path]] = dict) -> None:
+        self._given, self._made = characters, made
+        self._shown: dict[str, ShownFace] = {}
+        self._meshes: dict[str, bytes] = {}
+
+    @property
+    def _characters(self) -> dict[str, Path]:
+        return {**self._made(), **self._given}
+
+    @property
+    def names(self) -> dict[str, bool]:
+        """The names of all faces, and whether each is a mesh."""
+        own = {name: path.suffix.lower() != SUFFIX for name, path in self._characters.items()}
+        return {name: name == HEAD for name in FACES.names} | own
+
+    def is_filmed(self, name: str) -> bool:
+        """Return whether a face is a filmed one, which is shown as a video alone."""
+        own = self._characters.get(name)
+        return own is not None and own.suffix.lower() == SUFFIX
+
+    def shown(self, name: str) -> ShownFace:
+        """Return a face. Raises InputError: there is none of that name, or its file cannot be read."""
+        if name not in self._shown:
+            if name not in self.names:
+                raise InputError(f"no face {shortened(repr(name))}; required one of: {', '.join(self.names)}")
+            own = self._characters.get(name)
+            found = name if own is None else own if self.is_filmed(name) else MeshFace(driven_character(own))
+            self._shown[name] = shown_face(found)
+        return self._shown[name]
+
+    def mesh_name(self, name: str, motion: Motion) -> str:
+        """Return the name of the mesh that a motion's weights are of."""
+        return HEAD_OF_MOODS if name == HEAD and any(map(is_mood, motion.names)) else name
+
+    def mesh(self, name: str) -> bytes:
+        """Return the ``.glb`` of a face at rest. Raises InputError: there is none of that name, or it is no mesh."""
+        if name not in self._meshes:
+            self._meshes[name] = self._written(name)
+        return self._meshes[name]
+
+    def _written(self, name: str) -> bytes:
+        own = self._characters.get(name)
+        if self.is_filmed(name):
+            raise InputError(f"{name} is a filmed face, and no mesh; ask for a video of it")
+        if own is not None and own.suffix.lower() in KEPT:
+            return Budget().file_bytes(own, "character")
+        if own is not None:
+            scene = self.shown(name).scene(_still(), OutputSettings(self.shown(name)), None)
+        elif name in (HEAD, HEAD_OF_MOODS):
+            scene = head_scene(_still(*((MoodKey(0.0, MOODS[0]),) if name == HEAD_OF_MOODS else ())))
+        else:
+            raise InputError(f"no mesh {shortened(repr(name))}; required one of: {HEAD}, {HEAD_OF_MOODS}")
+        with temporary_folder() as folder:
+            path = folder / "face.glb"
+            write_scene(path, scene)
+            return path.read_bytes()
+
+
+def _still(*keys: MoodKey) -> Generation:
+    """Return a frame of a closed mouth, with the channels of moods."""
+    closed = Motion(np.zeros((1, 1)), FRAME_RATE_HZ, (Channel("opening"),))
+    motion = with_moods(closed, keys) if keys else closed
+    return Generation(motion, np.zeros(motion.values.shape), Timeline(()), StateTrace(("",), np.zeros(1, np.intp)))
+
+
+def with_turn(scene: Scene) -> Motion:
+    """Return the weights of a scene, and the quaternion of its head, where it turns."""
+    weights = scene.weights
+    if weights is None:
+        raise InputError("the face has no morph targets; choose the head, or a character with blendshapes")
+    if scene.turn is None:
+        return weights
+    values = np.concatenate([weights.values, scene.turn.rotations], axis=1)
+    return Motion(values, weights.rate_hz, weights.channels + tuple(map(Channel, TURN)))

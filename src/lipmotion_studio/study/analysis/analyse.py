@@ -1,0 +1,184 @@
+"""The analysis of a study: all its figures, with and without screening of raters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lipmotion.errors import InputError, shortened
+from lipmotion_studio.study.analysis.crossed import CONFIDENCE, Components, variance_of_mean
+from lipmotion_studio.study.analysis.paired import pair_table, paired_figures, share_components
+from lipmotion_studio.study.analysis.ratings import difference_components, rating_figures, rating_table
+from lipmotion_studio.study.analysis.screening import counts, screen
+from lipmotion_studio.study.answers import ANCHOR, MOS, PAIRED, Answer, read_answers
+
+MOST_RATERS = 1000
+"""No search goes beyond."""
+DIFFERENCES = {MOS: (0.1, 0.2, 0.3, 0.5, 1.0)}
+"""Differences of means whose numbers of raters are given; on the scale of rankings, ``RANK_DIFFERENCES``."""
+RANK_DIFFERENCES = (2.0, 5.0, 10.0, 20.0)
+SHARES = (0.55, 0.6, 0.65, 0.7, 0.75)
+"""Preferences whose numbers of raters are given."""
+USUAL_POWER = 0.8
+DRAWS, SEED = 1000, 0
+"""Simulated studies of a size."""
+MOST_DEGREES = 1e6
+"""Degrees of freedom from which on Student's t is normal."""
+Figures = dict[str, Any]
+
+
+def power_of(components: Components, difference: float, raters: int, sentences: int) -> float:
+    """Return the probability that the test of ``crossed_mean`` tells a mean difference from 0, at the 5 % level.
+
+    Every rater judges every sentence; two raters and two sentences at least. Judgements are normal: mean squares are
+    then chi-squared, drawn with a fixed seed, and independent of the mean, whose probability is exact for each draw.
+    """
+    from scipy.special import ndtr, stdtrit
+
+    rater, sentence, rest = components.rater / raters, components.sentence / sentences, components.residual
+    rest /= raters * sentences
+    if rater + sentence + rest <= 0:
+        return 1.0 if difference else 1 - CONFIDENCE
+    free = raters - 1, sentences - 1, (raters - 1) * (sentences - 1)
+    of_rater, of_sentence, of_rest = np.random.default_rng(SEED).chisquare(free, (DRAWS, 3)).T / np.array(free)[:, None]
+    noise = rest * of_rest
+    found = [np.maximum((part + rest) * draw - noise, 0) for part, draw in ((rater, of_rater), (sentence, of_sentence))]
+    variance, degrees = variance_of_mean(found[0], found[1], noise, free)
+    limit = stdtrit(np.minimum(degrees, MOST_DEGREES), (1 + CONFIDENCE) / 2) * np.sqrt(variance)
+    truth = np.sqrt(rater + sentence + rest)
+    return float((ndtr((difference - limit) / truth) + ndtr((-difference - limit) / truth)).mean())
+
+
+def raters_needed(components: Components, difference: float, sentences: int, power: float = USUAL_POWER) -> int | None:
+    """Return the smallest number of raters that tells a difference with some power.
+
+    None: even ``MOST_RATERS`` do not; then the sentences are too few.
+    """
+    low, high = 1, 2  # the power grows with the raters; one rater is no panel
+    while power_of(components, difference, high, sentences) < power:
+        low, high = high, 2 * high
+        if low >= MOST_RATERS:
+            return None
+    while high - low > 1:
+        middle = (low + high) // 2
+        reached = power_of(components, difference, middle, sentences) >= power
+        low, high = (low, middle) if reached else (middle, high)
+    return high if high <= MOST_RATERS else None
+
+
+def rating_power(components: Components | None, kind: str, sentences: int, power: float) -> list[Figures]:
+    """Return the raters needed for differences of means of a kind of judgement."""
+    if components is None or sentences < 2:
+        return []
+    differences: Sequence[float] = DIFFERENCES.get(kind, RANK_DIFFERENCES)
+    return [{"difference": d, "raters": raters_needed(components, d, sentences, power)} for d in differences]
+
+
+def share_power(components: Components | None, sentences: int, power: float) -> list[Figures]:
+    """Return the raters needed for preferences; ``components``: of ``paired.share_components``."""
+    if components is None or sentences < 2:
+        return []
+    rows = []
+    for share in SHARES:
+        scaled = Components(*(share * (1 - share) * np.array(components)).tolist())
+        rows.append({"share": share, "raters": raters_needed(scaled, share - 0.5, sentences, power)})
+    return rows
+
+
+def analyse_study(
+    answers: Sequence[Answer] | Path | str,
+    *,
+    baseline: str | None = None,
+    power: float = USUAL_POWER,
+    sentences: int | None = None,
+) -> Figures:
+    """Return the figures of a study (docs/study-analysis.md).
+
+    answers   : of ``read_answers``, or the path of their table
+    baseline  : condition to which improvement is relative; None: that with the lowest mean
+    power     : with which planned studies shall tell a difference
+    sentences : of planned studies; None: as many as in this one
+    Returns ``screening``; ``screened``, a list of parts without the raters that are left out; and ``all``, with all
+    raters. A part is what was asked in one question of one kind. ``screened`` is None if no rater is left.
+    Raises InputError: no answer counts; the baseline is not a condition; a value that is not allowed.
+
+    >>> import lipmotion
+    >>> from lipmotion_studio.study.answers import Answer
+    >>> answers = [
+    ...     Answer(rater, "mos", 0, sentence, "overall", condition, "", value, 9.0, 1, False, "")
+    ...     for rater in ("r001", "r002")
+    ...     for sentence in ("bin blue", "place red")
+    ...     for condition, value in (("trajectory", "4"), ("coupled", "2"))
+    ... ]
+    >>> (part,) = lipmotion.analyse_study(answers)["all"]
+    >>> [(row["condition"], row["mean"]) for row in part["conditions"]]
+    [('trajectory', 4.0), ('coupled', 2.0)]
+    """
+    given = read_answers(Path(answers)) if isinstance(answers, str | Path) else list(answers)
+    counted = counts(given)
+    if not counted:
+        raise InputError(
+            f"{len(given)} answers, none of which counts: required some that are neither practice nor checks"
+        )
+    conditions = sorted({each.condition for each in counted if each.kind != PAIRED})
+    if baseline is not None and baseline not in conditions:
+        known = ", ".join(conditions) or "no condition, as nothing was rated"
+        raise InputError(f"the baseline {shortened(baseline)!r}, required one of: {known}")
+    if not 0.05 < power < 1:
+        raise InputError(f"a power of {power:g}, required between 0.05 and 1, such as {USUAL_POWER}")
+    if sentences is not None and sentences < 2:
+        raise InputError(f"{sentences} sentences of planned studies, required at least 2")
+    screening = screen(given)
+    kept = screening.kept(counted)
+    plan = (baseline, power, sentences)
+    everybody = _parts(counted, *plan)
+    screened = everybody if len(kept) == len(counted) else _parts(kept, *plan)
+    return {
+        "answers": len(counted),
+        "left_aside": len(given) - len(counted),
+        "power": power,
+        "screening": screening.figures(),
+        "screened": screened or None,
+        "all": everybody,
+    }
+
+
+def _parts(answers: Sequence[Answer], baseline: str | None, power: float, sentences: int | None) -> list[Figures]:
+    """Return the figures of each question of each kind."""
+    parts = []
+    for kind, question in dict.fromkeys((each.kind, each.question) for each in answers):
+        mine = [each for each in answers if (each.kind, each.question) == (kind, question)]
+        found = _compared(mine, power, sentences) if kind == PAIRED else _rated(mine, baseline, power, sentences)
+        asked: Figures = {"kind": kind, "question": question, "answers": len(mine)}
+        asked |= {"raters": len({each.rater for each in mine}), "sentences": len({each.sentence for each in mine})}
+        parts.append(asked | found)
+    return parts
+
+
+def _rated(answers: Sequence[Answer], baseline: str | None, power: float, sentences: int | None) -> Figures:
+    table = rating_table(answers)
+    components = difference_components(table)
+    planned = sentences or table.values.shape[2]
+    return rating_figures(table, baseline) | {
+        "variance": components._asdict() if components else None,
+        "planned_sentences": planned,
+        "raters_needed": rating_power(components, answers[0].kind, planned, power),
+    }
+
+
+def _compared(answers: Sequence[Answer], power: float, sentences: int | None) -> Figures:
+    """Return the figures of paired comparisons but those with the anchor, which only screen."""
+    mine = [each for each in answers if ANCHOR not in (each.condition, each.other)]
+    if not mine:
+        return {"missing": "all comparisons are with the anchor"}
+    table = pair_table(mine)
+    components = share_components(table)
+    planned = sentences or len(table.sentences)
+    return paired_figures(table) | {
+        "variance": components._asdict() if components else None,
+        "planned_sentences": planned,
+        "raters_needed": share_power(components, planned, power),
+    }

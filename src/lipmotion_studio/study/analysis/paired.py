@@ -1,0 +1,371 @@
+"""Paired comparisons: preferences with their tests, consistency of both orders, strengths."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lipmotion.errors import InputError
+from lipmotion_studio.study.analysis.crossed import (
+    CONFIDENCE,
+    NOTHING,
+    Array,
+    Components,
+    CrossedMean,
+    Interval,
+    crossed_mean,
+    holm,
+)
+from lipmotion_studio.study.answers import FIRST, Answer
+
+MOST_STEPS = 20_000
+SMALLEST_STEP = 1e-12
+"""Iteration ends when no strength changes by a larger share."""
+HALF_WIN = 0.5
+"""Given to both sides of every comparison that was made, in its order, where a strength were infinite."""
+
+
+@dataclass(frozen=True, eq=False)
+class Strengths:
+    """A fitted model: the log odds that i, shown first, is preferred to j are strength i - strength j + order.
+
+    strengths : mean 0 [shape=(C,)]
+    order     : of the first of two equal conditions; 0 where no pair was shown in both orders
+    covariance : of strengths and order, were all answers independent [shape=(C + 1, C + 1)]
+    is_shrunk : whether the likelihood has no maximum, so that half wins were added
+    """
+
+    strengths: Array
+    order: float
+    covariance: Array
+    is_shrunk: bool
+
+    def probability(self) -> Array:
+        """Return the probability that i, shown first, is preferred to j [shape=(C, C)]."""
+        return _logistic(self.strengths[:, None] - self.strengths + self.order)
+
+
+def fit_strengths(first_wins: Array, second_wins: Array) -> Strengths:
+    """Return the strengths of most likely preferences.
+
+    first_wins, second_wins : how often i, shown first, was preferred to j, and j to it [shape=(C, C)]
+    All conditions must be linked by comparisons (``linked``).
+    Where some condition always wins, or only the place decides, the likelihood grows without end (Albert & Anderson
+    1984): then every comparison that was made gets half a win on each side.
+    Source: Hunter 2004, §2 and 4 (minorisation and maximisation, effect of the place). Deviation: half wins.
+    """
+    has_order = bool(((first_wins + second_wins > 0) & (first_wins + second_wins > 0).T).any())
+    is_shrunk = not _has_maximum(first_wins, second_wins, has_order)
+    if is_shrunk:
+        made = HALF_WIN * (first_wins + second_wins > 0)
+        first_wins, second_wins = first_wins + made, second_wins + made
+    strengths, order = _maximised(first_wins, second_wins, has_order)
+    probability = _logistic(strengths[:, None] - strengths + order)
+    weights = (first_wins + second_wins) * probability * (1 - probability)
+    covariance: Array = np.linalg.pinv(_information(weights, has_order), hermitian=True, rcond=1e-10).astype(float)
+    return Strengths(strengths, order, covariance, is_shrunk)
+
+
+def linked(comparisons: Array) -> list[list[int]]:
+    """Return the groups of conditions that are linked by comparisons.
+
+    comparisons : how often i was compared with j, in this order [shape=(C, C)]
+    """
+    from scipy.sparse.csgraph import connected_components
+
+    count, labels = connected_components(comparisons, directed=False)
+    return [np.flatnonzero(labels == label).tolist() for label in range(count)]
+
+
+def _maximised(first_wins: Array, second_wins: Array, has_order: bool) -> tuple[Array, float]:
+    """Return log strengths, mean 0 [shape=(C,)], and the effect of the order."""
+    comparisons = first_wins + second_wins
+    wins = first_wins.sum(axis=1) + second_wins.sum(axis=0)
+    worth, place = np.ones(len(wins)), 1.0
+    for _ in range(MOST_STEPS):
+        before = np.append(worth, place)
+        weight = comparisons / (place * worth[:, None] + worth)
+        worth = wins / (place * weight.sum(axis=1) + weight.sum(axis=0))
+        worth /= np.exp(np.log(worth).mean())
+        if has_order:
+            place = first_wins.sum() / (comparisons * worth[:, None] / (place * worth[:, None] + worth)).sum()
+        if np.abs(np.append(worth, place) / before - 1).max() < SMALLEST_STEP:
+            break
+    return np.log(worth), float(np.log(place))
+
+
+def _has_maximum(first_wins: Array, second_wins: Array, has_order: bool) -> bool:
+    """Return whether the likelihood has a maximum: no direction of strengths and order in which it never falls."""
+    from scipy.optimize import linprog
+
+    rows = _contrasts(np.argwhere(first_wins > 0), len(first_wins)).tolist()
+    rows += (-_contrasts(np.argwhere(second_wins > 0), len(first_wins))).tolist()
+    contrasts = np.array(rows)
+    contrasts[:, -1] *= has_order
+    found = linprog(-contrasts.sum(axis=0), A_ub=-contrasts, b_ub=np.zeros(len(rows)), bounds=(-1, 1), method="highs")
+    return bool(-found.fun < 1e-7)
+
+
+def _contrasts(pairs: NDArray[np.intp], count: int) -> Array:
+    """Return what the log odds of comparisons are in strengths and order [shape=(N, C + 1)]; ``pairs``: (N, 2)."""
+    contrasts = np.zeros((len(pairs), count + 1))
+    rows = np.arange(len(pairs))
+    contrasts[rows, pairs[:, 0]] = 1
+    contrasts[rows, pairs[:, 1]] = -1
+    contrasts[:, -1] = 1
+    return contrasts
+
+
+def _information(weights: Array, has_order: bool) -> Array:
+    """Return Fisher's information on strengths and order [shape=(C + 1, C + 1)]; ``weights``: of each pair (C, C)."""
+    pairs = np.argwhere(weights > 0)
+    contrasts = _contrasts(pairs, len(weights))
+    contrasts[:, -1] *= has_order
+    return (contrasts * weights[tuple(pairs.T)][:, None]).T @ contrasts
+
+
+def deviations(model: Strengths, pairs: NDArray[np.intp], is_first: NDArray[np.bool_]) -> Array:
+    """Return by how much each answer moves strengths and order, to first order [shape=(N, C + 1)].
+
+    pairs : what was shown first and second [shape=(N, 2)];  is_first : whether the first was preferred [shape=(N,)]
+    Their sum over all answers is 0 at the maximum of the likelihood; how it varies with raters and sentences is how
+    sure the strengths are (Liang & Zeger 1986).
+    """
+    expected = model.probability()[pairs[:, 0], pairs[:, 1]]
+    return (_contrasts(pairs, len(model.strengths)) * (is_first - expected)[:, None]) @ model.covariance
+
+
+def group_text(names: Sequence[str], groups: Sequence[Sequence[int]]) -> str:
+    """Return groups of conditions in words."""
+    return "; ".join(", ".join(names[place] for place in group) for group in groups)
+
+
+def _logistic(values: Array) -> Array:
+    return 1 / (1 + np.exp(-values))
+
+
+Indices = NDArray[np.intp]
+Figures = dict[str, Any]
+ALL_EQUAL = "raters, all agree"
+"""What an interval of a share of 0 or 1 is over: each rater counts once."""
+
+
+@dataclass(frozen=True, eq=False)
+class PairTable:
+    """Answers to paired comparisons, N of them.
+
+    conditions, raters, sentences : their names, in alphabetical order
+    shown    : which conditions were shown first and second [shape=(N, 2)]
+    is_first : whether the first was preferred [shape=(N,)]
+    rater, sentence : of each answer [shape=(N,)]
+    """
+
+    conditions: tuple[str, ...]
+    raters: tuple[str, ...]
+    sentences: tuple[str, ...]
+    shown: Indices
+    is_first: NDArray[np.bool_]
+    rater: Indices
+    sentence: Indices
+
+    def cells(self, values: Array, chosen: NDArray[np.bool_]) -> Array:
+        """Return the mean of the chosen answers' values for each rater and sentence [shape=(R, S)]; NaN: no answer."""
+        count = self._sums(np.ones(len(values)), chosen)
+        return np.where(count > 0, self._sums(values, chosen) / np.maximum(count, 1), np.nan)
+
+    def influence(self, values: Array) -> Array:
+        """Return sums of all answers' values, times the number of cells, so that their mean is the sum of all."""
+        count = self._sums(np.ones(len(values)), np.full(len(values), True))
+        sums = self._sums(values, np.full(len(values), True))
+        return np.where(count > 0, sums * int((count > 0).sum()), np.nan)
+
+    def _sums(self, values: Array, chosen: NDArray[np.bool_]) -> Array:
+        sums = np.zeros((len(self.raters), len(self.sentences)))
+        np.add.at(sums, (self.rater[chosen], self.sentence[chosen]), values[chosen])
+        return sums
+
+    def between(self, condition: int, other: int) -> NDArray[np.bool_]:
+        """Return which answers compare two conditions, in whatever order [shape=(N,)]."""
+        return (self.shown == (condition, other)).all(axis=1) | (self.shown == (other, condition)).all(axis=1)
+
+    def is_preferred(self, condition: int) -> NDArray[np.bool_]:
+        """Return which answers prefer a condition [shape=(N,)]."""
+        return np.where(self.is_first, self.shown[:, 0], self.shown[:, 1]) == condition
+
+    def wins(self) -> tuple[Array, Array]:
+        """Return how often i, shown first, was preferred to j, and j to it [each shape=(C, C)]."""
+        first, second = (np.zeros((len(self.conditions),) * 2) for _ in range(2))
+        np.add.at(first, tuple(self.shown[self.is_first].T), 1)
+        np.add.at(second, tuple(self.shown[~self.is_first].T), 1)
+        return first, second
+
+
+def pair_table(answers: Sequence[Answer]) -> PairTable:
+    """Return the table of answers to paired comparisons.
+
+    Raises InputError: a condition is compared with itself, or with nothing.
+    """
+    for answer in answers:
+        if not answer.other or answer.other == answer.condition:
+            raise InputError(
+                f"rater {answer.rater!r}, trial {answer.trial}: {answer.condition!r} compared with {answer.other!r}, "
+                "required two conditions; mark trials that only check attention by the column 'expected'"
+            )
+    conditions = sorted({name for answer in answers for name in (answer.condition, answer.other)})
+    raters, sentences = (sorted({getattr(answer, name) for answer in answers}) for name in ("rater", "sentence"))
+    places = [{name: place for place, name in enumerate(names)} for names in (conditions, raters, sentences)]
+    return PairTable(
+        tuple(conditions),
+        tuple(raters),
+        tuple(sentences),
+        np.array([(places[0][each.condition], places[0][each.other]) for each in answers], np.intp).reshape(-1, 2),
+        np.array([each.value == FIRST for each in answers], bool),
+        np.array([places[1][each.rater] for each in answers], np.intp),
+        np.array([places[2][each.sentence] for each in answers], np.intp),
+    )
+
+
+def paired_figures(table: PairTable) -> Figures:
+    """Return the figures of paired comparisons."""
+    everything = np.full(len(table.is_first), True)
+    first = share_figures(table.cells(table.is_first.astype(float), everything))
+    rows = []
+    for i, j, cells in _pair_cells(table):
+        chosen = table.between(i, j)
+        wins, count = int((table.is_preferred(i) & chosen).sum()), int(chosen.sum())
+        names: Figures = {"condition": table.conditions[i], "other": table.conditions[j]}
+        counts = {"wins": wins, "answers": count, "p_binomial": binomial_p(wins, count)}
+        rows.append(names | counts | share_figures(cells))
+    corrected = holm([row["p"] for row in rows])
+    return {
+        "conditions": [_score_figures(table, place) for place in range(len(table.conditions))],
+        "pairs": [row | {"p_holm": p} for row, p in zip(rows, corrected, strict=True)],
+        "first_preferred": {"answers": len(table.is_first)} | first,
+        "consistency": consistency(table),
+        "bradley_terry": strength_figures(table),
+    }
+
+
+def share_figures(cells: Array) -> Figures:
+    """Return a share, its interval over raters and sentences, and the test against one half.
+
+    cells : share of each rater on each sentence; NaN: none [shape=(R, S)]
+    The interval is symmetric in log odds. Where all answers agree, it is the exact one of so many independent answers
+    as there are raters (Clopper & Pearson 1934), and so is the test.
+    """
+    share = crossed_mean(cells, 1.0)
+    raters = int(np.isfinite(cells).any(axis=1).sum())
+    if share.mean in (0.0, 1.0):
+        wins = int(share.mean) * raters
+        interval, p, over = exact_interval(wins, raters), binomial_p(wins, raters), ALL_EQUAL
+    else:
+        interval, p = share.interval_within(0, 1), share.log_odds(0, 1).p_value
+        over = share.over if share.is_known else NOTHING
+    return {"share": share.mean, "low": interval.low, "high": interval.high, "p": p, "over": over}
+
+
+def exact_interval(wins: int, count: int) -> Interval:
+    """Return the exact interval of a probability, from independent answers. Source: Clopper & Pearson 1934."""
+    from scipy.special import betaincinv
+
+    tail = (1 - CONFIDENCE) / 2
+    low = float(betaincinv(wins, count - wins + 1, tail)) if wins else 0.0
+    return Interval(low, float(betaincinv(wins + 1, count - wins, 1 - tail)) if wins < count else 1.0)
+
+
+def binomial_p(wins: int, count: int) -> float:
+    """Return the exact two-sided p-value of a binomial test against one half."""
+    from scipy.special import bdtr
+
+    return min(1.0, float(2 * bdtr(min(wins, count - wins), count, 0.5)))
+
+
+def consistency(table: PairTable) -> Figures:
+    """Return in what share of the pairs that a rater saw in both orders the same condition was preferred twice.
+
+    Chance alone gives one half, and so do conditions that look alike.
+    """
+    agreed = order_agreement(table)
+    count = int(agreed[:, 1].sum())
+    share = float(agreed[:, 0].sum() / count) if count else np.nan
+    return {"pairs": count, "consistent": int(agreed[:, 0].sum()), "share": share}
+
+
+def order_agreement(table: PairTable) -> Indices:
+    """Return for each rater how many pairs were preferred alike in both orders, and of how many [shape=(R, 2)]."""
+    found = np.zeros((len(table.raters), 2), np.intp)
+    preferred: dict[tuple[int, int, int, int], bool] = {}
+    columns = table.rater, table.sentence, *table.shown.T, table.is_first
+    for rater, sentence, first, second, is_first in zip(*(column.tolist() for column in columns), strict=True):
+        preferred[rater, sentence, first, second] = is_first
+    for (rater, sentence, first, second), is_first in preferred.items():
+        turned = preferred.get((rater, sentence, second, first))
+        if first < second and turned is not None:
+            found[rater] += (is_first != turned, 1)
+    return found
+
+
+def strength_figures(table: PairTable) -> Figures:
+    """Return strengths of all conditions with intervals, and the effect of the order; or why there are none."""
+    first, second = table.wins()
+    groups = linked(first + second)
+    if len(groups) > 1:
+        return {"missing": f"no comparison links the groups {group_text(table.conditions, groups)}"}
+    model = fit_strengths(first, second)
+    moved = deviations(model, table.shown, table.is_first)
+    names = table.conditions
+
+    def row(value: float, change: Array) -> Figures:
+        error = crossed_mean(table.influence(change), 1.0)
+        interval = CrossedMean(value, error.error, error.degrees, error.over, None).interval
+        low, high = (np.nan, np.nan) if model.is_shrunk else interval
+        return {"strength": value, "low": low, "high": high}
+
+    strengths = model.strengths
+    rows = [{"condition": name, **row(float(strengths[i]), moved[:, i])} for i, name in enumerate(names)]
+    return {
+        "conditions": sorted(rows, key=lambda each: -each["strength"]),
+        "pairs": [
+            {"condition": names[i], "other": names[j]}
+            | row(float(strengths[i] - strengths[j]), moved[:, i] - moved[:, j])
+            for i, j in combinations(range(len(names)), 2)
+        ],
+        "order": row(model.order, moved[:, -1]),
+        "is_shrunk": model.is_shrunk,
+    }
+
+
+def share_components(table: PairTable) -> Components | None:
+    """Return the mean variances of the effects on shares over all pairs, each divided by that of one answer.
+
+    None: they cannot be told apart in any pair, or all its answers agree.
+    """
+    found = []
+    for _, _, cells in _pair_cells(table):
+        share = crossed_mean(cells, 1.0)
+        if share.components and share.error > 0:
+            found.append(np.array(share.components) / (share.mean * (1 - share.mean)))
+    return Components(*np.mean(found, axis=0).tolist()) if found else None
+
+
+def _pair_cells(table: PairTable) -> list[tuple[int, int, Array]]:
+    """Return all pairs that were compared, and the share of the first for each rater and sentence."""
+    found = []
+    for i, j in combinations(range(len(table.conditions)), 2):
+        chosen = table.between(i, j)
+        if chosen.any():
+            found.append((i, j, table.cells(table.is_preferred(i).astype(float), chosen)))
+    return found
+
+
+def _score_figures(table: PairTable, place: int) -> Figures:
+    """Return in what share of its comparisons a condition was preferred (Hofer 2008, Fig. 6)."""
+    chosen, preferred = (table.shown == place).any(axis=1), table.is_preferred(place)
+    share = share_figures(table.cells(preferred.astype(float), chosen))
+    counts = {"wins": int((preferred & chosen).sum()), "answers": int(chosen.sum())}
+    return {"condition": table.conditions[place]} | counts | {name: share[name] for name in ("share", "low", "high")}

@@ -1,0 +1,175 @@
+"""The study as a web application: a page, its videos, and the answers; an ASGI application of Starlette.
+
+A rater is known by a token, which the page keeps in the part of its address that browsers do not send, and gives with
+every request. No part of an address is ever used as a path of a file: names are looked up among those of the study.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Collection, Mapping
+from functools import lru_cache, partial
+from importlib.resources import files
+from ipaddress import ip_address
+from pathlib import Path
+from socket import gethostname
+from typing import Any
+from urllib.parse import urlsplit
+
+from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import FileResponse, Response
+from starlette.routing import Route
+
+from lipmotion.errors import InputError
+from lipmotion.export.web_page import coloured
+from lipmotion_studio.study.answers import HIGHEST_MOS, HIGHEST_RANK, MOS, PAIRED
+from lipmotion_studio.study.limits import RateLimit
+from lipmotion_studio.study.manifest import VIDEOS, Study, StudyTrial
+from lipmotion_studio.study.questions import ASKED, POINTS, SCALES
+from lipmotion_studio.study.store import StudyStore, rater_name
+from lipmotion_studio.study.submission import submitted_sheet
+from lipmotion_studio.study.trials import questions_of, trials_of
+from lipmotion_studio.web.bodies import json_of
+from lipmotion_studio.web.replies import ERRORS, FRESH, Guard, JSONResponse, SecurityHeaders, foreign_refusal
+
+PAGE = {
+    "": ("study.html", "text/html; charset=utf-8"),
+    "study.css": ("study.css", "text/css; charset=utf-8"),
+    "study.js": ("study.js", "text/javascript; charset=utf-8"),
+    "media.js": ("media.js", "text/javascript; charset=utf-8"),
+    "icon.svg": ("icon.svg", "image/svg+xml"),
+}
+"""Files of the page, which are in the package, by their addresses."""
+ANSWER_HZ, ANSWER_BURST = 5.0, 60
+"""Requests a second of one rater: nobody judges videos faster."""
+JOIN_HZ, JOIN_BURST = 5.0, 200
+"""New raters a second, of all addresses together: a class that begins at once fits in."""
+WELL_KEPT = {"cache-control": "private, max-age=86400, immutable"}
+
+
+def study_application(
+    study: Study, videos: Mapping[str, Path], store: StudyStore, names: Collection[str] = ()
+) -> Starlette:
+    """Return the application.
+
+    videos : paths of the videos by their names, of ``check_videos``
+    names  : by which raters reach the server, besides addresses of numbers and the names of this machine
+    Requests by other names, and of other sites' pages, are refused. Addresses of numbers are not: no other site can let
+    a browser state one.
+    """
+    machine = gethostname().lower()
+    known = {"localhost", machine, f"{machine}.local", *(name.lower().partition(":")[0] for name in names)}
+
+    def is_own(host: str) -> bool:
+        try:
+            name = urlsplit(f"//{host}").hostname or ""
+            return name in known or bool(ip_address(name))
+        except ValueError:  # neither a known name nor an address of numbers
+            return False
+
+    def refusal(_method: str, path: str, _query: bytes, headers: Mapping[str, str]) -> tuple[int, str] | None:
+        return foreign_refusal(path, headers, is_own, names)
+
+    desk = _Desk(study, store)
+    folder = files("lipmotion_studio.study") / "page"
+    page = {name: (coloured((folder / file).read_text("utf-8")).encode(), kind) for name, (file, kind) in PAGE.items()}
+
+    async def packaged(request: Request) -> Response:
+        content, kind = page[request.url.path.removeprefix("/")]
+        return Response(content, headers=FRESH | {"content-type": kind})
+
+    async def video(request: Request) -> Response:
+        path = videos.get(request.path_params["name"])
+        if path is None or not path.is_file():
+            raise HTTPException(404, "no such video")
+        return FileResponse(path, media_type="video/mp4", headers=WELL_KEPT)
+
+    routes = [Route(f"/{name}", packaged) for name in page]
+    routes += [
+        Route(f"/{VIDEOS}/{{name}}", video),
+        Route("/api/study", desk.described),
+        Route("/api/raters", desk.joined, methods=["POST"]),
+        Route("/api/state", desk.state),
+        Route("/api/answers", desk.answered, methods=["POST"]),
+    ]
+    application = Starlette(routes=routes, exception_handlers=ERRORS)
+    application.add_middleware(Guard, refusal=refusal)
+    application.add_middleware(SecurityHeaders)
+    return application
+
+
+class _Desk:
+    """Where raters join, get their trials, and hand in answers."""
+
+    def __init__(self, study: Study, store: StudyStore) -> None:
+        self._study, self._store = study, store
+        self._answers = RateLimit(ANSWER_HZ, ANSWER_BURST)
+        self._joins = RateLimit(JOIN_HZ, JOIN_BURST)
+        self._trials = lru_cache(maxsize=1000)(partial(trials_of, study))
+
+    async def described(self, _: Request) -> Response:
+        """What raters read before they begin; nothing of conditions."""
+        study = self._study
+        told = {"kind": study.kind, "title": study.title, "consent": study.consent.split("\n")}
+        told |= {"instructions": study.instructions.split("\n"), "asks": ASKED[study.kind]}
+        return JSONResponse(told, headers=FRESH)
+
+    async def joined(self, request: Request) -> Response:
+        """A new rater, who has agreed to take part."""
+        if await json_of(request) != {"agrees": True}:
+            raise InputError('required {"agrees": true}')
+        if not self._joins.allows():
+            raise HTTPException(429, "too many raters join at the same time; try again", {"retry-after": "2"})
+        number, token = await asyncio.wrap_future(self._store.add_rater())
+        return JSONResponse({"token": token, **self._place(number, 0)}, 201, headers=FRESH)
+
+    async def state(self, request: Request) -> Response:
+        """The trial that a rater is at."""
+        rater = self._rater(request)
+        return JSONResponse(self._place(rater, self._store.next_trial(rater)), headers=FRESH)
+
+    async def answered(self, request: Request) -> Response:
+        """The answers to the next trial, or again those to one that was answered; replied to once they are stored."""
+        rater = self._rater(request)
+        sheet = submitted_sheet(self._study, self._trials(rater), rater, await json_of(request))
+        following = self._store.next_trial(rater)
+        if sheet.trial > following:
+            raise HTTPException(409, f"trial {sheet.trial} comes after trial {following}")
+        if sheet.trial == following:
+            if not await asyncio.wrap_future(self._store.record(sheet)):
+                raise HTTPException(401, "the rater has been forgotten")
+            following += 1
+        return JSONResponse({"stored": sheet.trial, **self._place(rater, following)}, headers=FRESH)
+
+    def _rater(self, request: Request) -> int:
+        """Return the rater of a request. Raises HTTPException: unknown, or too many requests."""
+        scheme, _, token = request.headers.get("authorization", "").partition(" ")
+        rater = self._store.rater_of(token) if scheme.lower() == "bearer" else None
+        if rater is None:
+            raise HTTPException(401, "this link is not known", {"www-authenticate": "Bearer"})
+        if not self._answers.allows(rater):
+            raise HTTPException(429, "too many requests; try again", {"retry-after": "2"})
+        return rater
+
+    def _place(self, rater: int, number: int) -> dict[str, Any]:
+        """Return what the page shows: a trial of a rater, and the videos of the one after it."""
+        trials = self._trials(rater)
+        place = {"rater": rater_name(rater), "trial": number, "trials": len(trials)}
+        if number >= len(trials):
+            return place
+        ahead = self._addresses(trials[number + 1]) if number + 1 < len(trials) else []
+        trial = trials[number]
+        study = self._study
+        asked: dict[str, Any] = {"practice": trial.practice, "note": trial.note, "videos": self._addresses(trial)}
+        if study.kind == MOS:
+            scales = [SCALES[question] for question, _, _ in questions_of(study, trial)]
+            asked["scales"] = [{"title": scale.title, "asks": scale.asks} for scale in scales]
+            asked["points"] = POINTS[:HIGHEST_MOS]
+        elif study.kind != PAIRED:
+            asked["highest"] = HIGHEST_RANK
+        return place | asked | {"ahead": ahead}
+
+    def _addresses(self, trial: StudyTrial) -> list[str]:
+        return [f"/{VIDEOS}/{video.file}" for video in self._study.shown(trial)]

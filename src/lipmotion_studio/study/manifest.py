@@ -1,0 +1,161 @@
+"""Studies as folders: ``study.json``, which says what is shown and how it was made, and ``videos/``."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from lipmotion.errors import InputError
+from lipmotion.storage.files import read_text_file, sha256_of
+from lipmotion.storage.json_text import as_json, from_json
+from lipmotion.types.values import any_members, items, number, text, truth, tupled, value_of, whole
+from lipmotion_studio.study.answers import KINDS, MOS, PAIRED, is_possible
+from lipmotion_studio.study.questions import SCALES
+
+FORMAT, VERSION = "lipmotion_studio.study", 1
+MANIFEST, VIDEOS = "study.json", "videos"
+VIDEO_NAME = re.compile(r"[0-9a-f]{32}\.mp4")
+"""Names of videos: the beginning of the digest of their content, which says nothing of what made them."""
+MOST_TRIALS = 10_000
+
+
+@dataclass(frozen=True)
+class StudyVideo:
+    """A video that raters watch.
+
+    file      : its name in the folder of videos
+    sentence  : name of the sentence that is said
+    condition : name of what made the motion
+    seconds   : how long it lasts
+    sha256    : digest of its content
+    made      : how it was made: texts by name, among them digests of what it was made from
+    """
+
+    file: str
+    sentence: str
+    condition: str
+    seconds: float
+    sha256: str
+    made: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class StudyTrial:
+    """What a rater sees on one page.
+
+    videos   : numbers of videos in the study, in the order in which they are shown
+    practice : whether it is for practice, and does not count
+    expected : the value that an attentive rater gives to every question; empty: there is none
+    note     : what the page asks for besides, where the answer is told; otherwise empty
+    """
+
+    videos: tuple[int, ...]
+    practice: bool = False
+    expected: str = ""
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study: what is shown, and what is asked.
+
+    kind         : ``paired``, ``mos`` or ``ranking``
+    title        : shown to raters
+    consent      : what raters agree to before they begin
+    instructions : what raters are asked to do
+    scales       : names of the scales of ``mos``
+    seed         : decides the order in which each rater sees the trials
+    conditions   : how each condition was given, by its name
+    sentences    : file and digest of each sentence's recording, by its name
+    videos       : all videos
+    trials       : all trials, those for practice first
+    made_by      : program and version that made the study, and its settings
+    """
+
+    kind: str
+    title: str
+    consent: str
+    instructions: str
+    scales: tuple[str, ...]
+    seed: int
+    conditions: Mapping[str, str]
+    sentences: Mapping[str, Mapping[str, str]]
+    videos: tuple[StudyVideo, ...]
+    trials: tuple[StudyTrial, ...]
+    made_by: Mapping[str, str]
+
+    def __post_init__(self) -> None:
+        """Raise ValueError: the parts do not fit one another."""
+        if self.kind not in KINDS:
+            raise ValueError(f"the kind {self.kind!r}, required one of {', '.join(KINDS)}")
+        if not self.trials or len(self.trials) > MOST_TRIALS:
+            raise ValueError(f"{len(self.trials)} trials, required 1 to {MOST_TRIALS}")
+        if self.kind == MOS and (not self.scales or not set(self.scales) <= SCALES.keys()):
+            raise ValueError(f"the scales {', '.join(self.scales)}, required some of {', '.join(SCALES)}")
+        for video in self.videos:
+            if not VIDEO_NAME.fullmatch(video.file):
+                raise ValueError(f"a video called {video.file!r}, required 32 hexadecimal digits and .mp4")
+        for trial in self.trials:
+            required = {PAIRED: range(2, 3), MOS: range(1, 2)}.get(self.kind, range(2, 100))
+            if len(trial.videos) not in required:
+                raise ValueError(f"a trial of {len(trial.videos)} videos in a study of the kind {self.kind}")
+            if not all(0 <= video < len(self.videos) for video in trial.videos):
+                raise ValueError("a trial shows a video that is not there")
+            if trial.expected and not is_possible(self.kind, trial.expected):
+                raise ValueError(f"a trial expects {trial.expected!r}, which nobody can answer")
+
+    def shown(self, trial: StudyTrial) -> list[StudyVideo]:
+        """Return the videos of a trial, in the order in which they are shown."""
+        return [self.videos[number] for number in trial.videos]
+
+
+def write_manifest(study: Study, folder: Path) -> None:
+    """Write ``study.json`` into a folder."""
+    content = {"format": FORMAT, "version": VERSION, **asdict(study)}
+    (folder / MANIFEST).write_text(as_json(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def read_study(folder: Path) -> Study:
+    """Return the study of a folder. Raises InputError: no study, or one that this version cannot read."""
+    path = folder / MANIFEST
+    if not path.is_file():
+        raise InputError(f"{folder}: has no {MANIFEST}; make a study: lipmotion study design -o {folder} ...")
+    found = read_text_file(path, "study")
+    try:
+        content = from_json(found)
+        if not isinstance(content, dict) or (content.pop("format", ""), content.pop("version", 0)) != (FORMAT, VERSION):
+            raise ValueError(f"not {FORMAT} of version {VERSION}")
+        return _STUDY(content)
+    except ValueError as error:
+        raise InputError(f"{path}: not a study that can be read ({error}); design it again") from error
+
+
+def check_videos(study: Study, folder: Path) -> dict[str, Path]:
+    """Return the paths of the videos of a study by their names.
+
+    Raises InputError: one is missing, or is not what it was when the study was designed.
+    """
+    paths = {video.file: folder / VIDEOS / video.file for video in study.videos}
+    for video in study.videos:
+        if not paths[video.file].is_file():
+            raise InputError(f"{paths[video.file]}: this video of the study is missing; copy the whole folder")
+        if sha256_of(paths[video.file]) != video.sha256:
+            raise InputError(f"{paths[video.file]}: has changed since the study was designed; design it again")
+    return paths
+
+
+_TEXT, _NUMBERS = text(1 << 20), tupled(items(whole(0, 1 << 31)))
+_VIDEO = {"seconds": number(0, 1e6), "made": any_members(_TEXT)} | dict.fromkeys(
+    ("file", "sentence", "condition", "sha256"), _TEXT
+)
+_TRIAL = {"videos": _NUMBERS, "practice": truth, "expected": _TEXT, "note": _TEXT}
+_MEMBERS = {
+    **dict.fromkeys(("kind", "title", "consent", "instructions"), _TEXT),
+    **{"scales": tupled(items(_TEXT)), "seed": whole(-(1 << 63), 1 << 63), "conditions": any_members(_TEXT)},
+    **{"sentences": any_members(any_members(_TEXT)), "made_by": any_members(_TEXT)},
+    "videos": tupled(items(value_of(StudyVideo, _VIDEO, _VIDEO))),
+    "trials": tupled(items(value_of(StudyTrial, _TRIAL, ("videos",)))),
+}
+_STUDY = value_of(Study, _MEMBERS, _MEMBERS)

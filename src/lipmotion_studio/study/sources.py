@@ -1,0 +1,162 @@
+"""What a study shows: sentences, and conditions, each of which gives a video of every sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
+from pathlib import Path
+
+from lipmotion.corpora.source_recordings import VIDEO_SUFFIXES
+from lipmotion.errors import InputError
+from lipmotion.export.base import readable_suffixes
+from lipmotion.pipeline.job import Job, Outputs, Request
+from lipmotion.pipeline.model import Model, load_model, shipped_path
+from lipmotion.pipeline.opened_job import opened
+from lipmotion.pipeline.outputs.motion_input import as_long_as, read_generation
+from lipmotion.pipeline.outputs.write import write
+from lipmotion.pipeline.understand.recordings import recordings_of
+from lipmotion.speech.sound.audio_files import read_audio
+from lipmotion.storage.files import sha256_of
+from lipmotion.storage.media import has_video
+from lipmotion_studio.study.answers import ANCHOR, RECORDING
+
+MODEL_SUFFIX, JOB_SUFFIX = ".lipmotion", ".toml"
+SHIPPED = "shipped"
+"""The source that is the model in the package."""
+
+
+@dataclass(frozen=True)
+class StudySentence:
+    """A sentence: its name, and its recording, which is the sound of all videos that are drawn."""
+
+    name: str
+    recording: Path
+
+
+@dataclass(frozen=True)
+class MadeVideo:
+    """A video that is ready to be shown: its file, and how it was made, in texts by name."""
+
+    file: Path
+    made: dict[str, str] = field(default_factory=dict)
+
+
+Condition = Callable[[StudySentence, Path], MadeVideo]
+"""Gives the video of a sentence; where it has to be made, as the file of the path."""
+
+
+def sentences_of(given: Sequence[Path]) -> list[StudySentence]:
+    """Return the sentences of files and folders of recordings, by the names of the files without suffix.
+
+    Raises InputError: none, two of one name, or a folder without recordings.
+    """
+    found = [StudySentence(path.stem, path) for path in recordings_of(given)]
+    if not found:
+        raise InputError("no sentences; give recordings: --sentence FILE|FOLDER")
+    names = [sentence.name for sentence in found]
+    for sentence in found:
+        if names.count(sentence.name) > 1:
+            raise InputError(f"{sentence.recording}: two sentences are called {sentence.name!r}; rename one file")
+        if not sentence.recording.is_file():
+            raise InputError(f"{sentence.recording}: no such file; give the recording of a sentence")
+    return found
+
+
+def named_conditions(given: Sequence[str]) -> dict[str, str]:
+    """Return the sources of conditions by their names, of texts ``NAME=SOURCE`` or ``recording``.
+
+    Raises InputError: a text of another form, a name that is taken, or fewer than two.
+    """
+    found: dict[str, str] = {}
+    for text in given:
+        name, equals, source = text.partition("=")
+        name, source = name.strip(), source.strip()
+        if text.strip() == RECORDING:
+            source = RECORDING
+        elif not (name and equals and source):
+            raise InputError(f"the condition {text!r}, required NAME=SOURCE, or {RECORDING}")
+        elif name in (ANCHOR, RECORDING) or source == RECORDING:
+            raise InputError(f"the condition {text!r}: the recordings themselves are called {RECORDING!r}, no other")
+        if name in found:
+            raise InputError(f"two conditions are called {name!r}; give them different names")
+        found[name] = source
+    if len(found) < 2:
+        raise InputError(f"{len(found)} condition, required at least 2: --condition NAME=SOURCE, or {RECORDING}")
+    return found
+
+
+def condition_of(source: str, sentences: Sequence[StudySentence], drawn: Job) -> Condition:
+    """Return what gives the videos of a condition.
+
+    source : ``recording``; a model, ``shipped`` or a file; a job file; or a folder with a video or a motion file of
+             each sentence, of its name
+    drawn  : how motion is drawn: the face and the frame rate of videos
+    Raises InputError: no such source, or it lacks a sentence.
+    """
+    path = Path(source)
+    if source == RECORDING:
+        for sentence in sentences:
+            if not has_video(sentence.recording):
+                raise InputError(
+                    f"{sentence.recording}: has no pictures, so the recording cannot be shown; give videos as "
+                    f"sentences, or leave the condition {RECORDING} out"
+                )
+        return lambda sentence, target: MadeVideo(sentence.recording, {"made": "recording"})  # noqa: ARG005
+    if path.is_dir():
+        found = {sentence.name: _file_of(path, sentence.name) for sentence in sentences}
+        return lambda sentence, target: _given(found[sentence.name], sentence, target, drawn)
+    if source != SHIPPED and not path.is_file():
+        raise InputError(f"{source}: no such model, job file or folder; give one, or {SHIPPED!r}: the model that ships")
+    if path.suffix.lower() == JOB_SUFFIX:
+        job = Job.from_file(path)
+        return _animated(job, {"job": str(path), "job_sha256": sha256_of(path)})
+    if source != SHIPPED and path.suffix.lower() != MODEL_SUFFIX:
+        raise InputError(f"{source}: required a model ({MODEL_SUFFIX}), a job file ({JOB_SUFFIX}) or a folder")
+    model = None if source == SHIPPED else path
+    return _animated(replace(drawn, request=replace(drawn.request, model=model)), {})
+
+
+def drawn_job(face: str, fps: float | None, recogniser: str) -> Job:
+    """Return how motion is made and drawn where a source does not say it."""
+    return Job(Request(recogniser=recogniser), Outputs(face=face, fps=fps))
+
+
+def _animated(job: Job, made: dict[str, str]) -> Condition:
+    """Return a condition whose videos are animated from the sound of the sentences."""
+    model_path = job.request.model or shipped_path()
+    made = made | {"made": "animated", "model": model_path.name, "model_sha256": sha256_of(model_path)}
+    made |= {"face": job.outputs.face}
+
+    @cache
+    def load() -> Model:
+        return load_model(job.request.model)
+
+    def condition(sentence: StudySentence, target: Path) -> MadeVideo:
+        opened(job.of(sentence.recording, (str(target),))).run(load, words_beside=True)
+        return MadeVideo(target, made)
+
+    return condition
+
+
+def _given(path: Path, sentence: StudySentence, target: Path, drawn: Job) -> MadeVideo:
+    """Return a finished video as it is, and motion drawn with the sound of the sentence."""
+    made = {"file": path.name, "file_sha256": sha256_of(path)}
+    if path.suffix.lower() in VIDEO_SUFFIXES:
+        return MadeVideo(path, made | {"made": "finished"})
+    outputs = drawn.outputs
+    generation = as_long_as(read_generation(path), read_audio(sentence.recording, warn=False).duration_s)
+    write(generation, target, speech=sentence.recording, face=outputs.face, fps=outputs.fps)
+    return MadeVideo(target, made | {"made": "drawn", "face": outputs.face})
+
+
+def _file_of(folder: Path, name: str) -> Path:
+    """Return the video, or else the motion file, of a sentence. Raises InputError: there is none, or several."""
+    there = [path for path in sorted(folder.iterdir()) if path.is_file() and path.stem == name]
+    for suffixes in (VIDEO_SUFFIXES, readable_suffixes()):
+        fitting = [path for path in there if path.suffix.lower() in suffixes]
+        if len(fitting) > 1:
+            raise InputError(f"{fitting[0]} and {fitting[1]}: both are of the sentence {name!r}; move one away")
+        if fitting:
+            return fitting[0]
+    raise InputError(f"{folder}: has no video and no motion of the sentence {name!r}; add {name}.mp4 or {name}.json")

@@ -1,0 +1,248 @@
+"""Raters and their answers in a database: SQLite, one file, in write-ahead-log mode."""
+
+from __future__ import annotations
+
+import queue
+import sqlite3
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from secrets import token_urlsafe
+from typing import Any, TypeVar
+
+from lipmotion.errors import ExportError, InputError
+from lipmotion.storage.files import check_own, sha256_of
+from lipmotion_studio.study.manifest import MANIFEST
+
+ResultT = TypeVar("ResultT")
+Work = Callable[[sqlite3.Connection], Any]
+ANSWERS = "answers.sqlite"
+SCHEMA_VERSION = 1
+MOST_RATERS = 100_000
+MOST_TOGETHER = 256
+"""Most pieces of work that are committed together."""
+BUSY_S = 30.0
+"""How long another process, such as ``forget``, is waited for."""
+_SCHEMA = """
+CREATE TABLE study (manifest_sha256 TEXT NOT NULL);
+CREATE TABLE raters (number INTEGER PRIMARY KEY AUTOINCREMENT, token_sha256 TEXT NOT NULL UNIQUE);
+CREATE TABLE answers (
+  rater INTEGER NOT NULL REFERENCES raters (number) ON DELETE CASCADE,
+  trial INTEGER NOT NULL,
+  item INTEGER NOT NULL,
+  value TEXT NOT NULL,
+  seconds REAL NOT NULL,
+  plays INTEGER NOT NULL,
+  PRIMARY KEY (rater, trial, item)
+) WITHOUT ROWID;
+"""
+_INSERT = """INSERT INTO answers SELECT :rater, :trial, :item, :value, :seconds, :plays
+WHERE EXISTS (SELECT 1 FROM raters WHERE number = :rater) ON CONFLICT DO NOTHING"""
+
+
+@dataclass(frozen=True)
+class AnswerSheet:
+    """The answers of a rater to all questions of one trial.
+
+    rater   : number of the rater
+    trial   : number of the trial in the rater's order, from 0
+    values  : one for each question
+    seconds : from the start of the trial to the answer
+    plays   : how often its videos were played to their ends, all together
+    """
+
+    rater: int
+    trial: int
+    values: tuple[str, ...]
+    seconds: float
+    plays: int
+
+
+class StudyStore:
+    """The database of a study folder, created where it is not there.
+
+    Whatever is written goes through one thread, which commits what waits together: a commit waits for the disk, and so
+    many answers wait for it once. A result is given after the commit: what is acknowledged is on the disk, also if the
+    process, or the machine, stops the moment after. The raters' tokens are stored as digests.
+
+    create : whether to create the database; otherwise a study without answers is an error
+    Raises InputError: no answers yet, answers of another study, or no such database. Raises ExportError: it cannot be
+    opened.
+    """
+
+    def __init__(self, folder: Path, *, create: bool = True) -> None:
+        self.path = folder / ANSWERS
+        if not create and not self.path.is_file():
+            raise InputError(f"{folder}: nobody has answered yet; let raters in: lipmotion study serve {folder}")
+        digest = sha256_of(folder / MANIFEST)
+        for suffix in ("", "-wal", "-shm", "-journal"):  # which SQLite opens through links
+            check_own(self.path.with_name(f"{ANSWERS}{suffix}"))
+        try:
+            self._reader = self._opened(digest)
+            self._writer = self._connected()
+        except sqlite3.OperationalError as error:
+            raise ExportError(f"{self.path}: cannot be opened: {error}") from error
+        except sqlite3.DatabaseError as error:
+            raise InputError(f"{self.path}: not a database of answers ({error}); move it away") from error
+        self._waiting: queue.SimpleQueue[tuple[Work, Future[Any]] | None] = queue.SimpleQueue()
+        self._thread = threading.Thread(target=self._write_all, name="answers", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Commit what waits, and close the database; a second time does nothing."""
+        self._waiting.put(None)
+        self._thread.join()
+        self._writer.close()
+        self._reader.close()
+
+    def add_rater(self) -> Future[tuple[int, str]]:
+        """Add a rater; the result is the rater's number and token, which cannot be guessed.
+
+        The result raises InputError: there are ``MOST_RATERS``.
+        """
+        token = token_urlsafe(24)
+
+        def work(database: sqlite3.Connection) -> tuple[int, str] | InputError:
+            (count,) = database.execute("SELECT count(*) FROM raters").fetchone()
+            if count >= MOST_RATERS:
+                return InputError(f"the study has {count} raters, required at most {MOST_RATERS}")
+            number = database.execute("INSERT INTO raters (token_sha256) VALUES (?)", [_digest(token)]).lastrowid
+            return int(number or 0), token
+
+        return self._submit(work)
+
+    def rater_of(self, token: str) -> int | None:
+        """Return the number of the rater with a token; None: nobody has it."""
+        row = self._reader.execute("SELECT number FROM raters WHERE token_sha256 = ?", [_digest(token)]).fetchone()
+        return None if row is None else int(row[0])
+
+    def next_trial(self, rater: int) -> int:
+        """Return the number of the trial that a rater has not answered yet, which may be one more than there are."""
+        (last,) = self._reader.execute("SELECT max(trial) FROM answers WHERE rater = ?", [rater]).fetchone()
+        return 0 if last is None else int(last) + 1
+
+    def record(self, sheet: AnswerSheet) -> Future[bool]:
+        """Store the answers to a trial; the first ones stand, however often, and whatever, is sent later.
+
+        The result is whether they are in the database: not if the rater has been forgotten.
+        """
+        rows = [
+            {"rater": sheet.rater, "trial": sheet.trial, "item": item, "value": value}
+            | {"seconds": sheet.seconds, "plays": sheet.plays}
+            for item, value in enumerate(sheet.values)
+        ]
+
+        def work(database: sqlite3.Connection) -> bool:
+            database.executemany(_INSERT, rows)
+            return database.execute("SELECT 1 FROM raters WHERE number = ?", [sheet.rater]).fetchone() is not None
+
+        return self._submit(work)
+
+    def sheets(self) -> list[AnswerSheet]:
+        """Return all answers, in the order of raters and trials."""
+        found: dict[tuple[int, int], list[tuple[str, float, int]]] = {}
+        order = "SELECT rater, trial, value, seconds, plays FROM answers ORDER BY rater, trial, item"
+        for rater, trial, *rest in self._reader.execute(order):
+            found.setdefault((rater, trial), []).append((rest[0], rest[1], rest[2]))
+        return [
+            AnswerSheet(rater, trial, tuple(value for value, _, _ in rows), rows[0][1], rows[0][2])
+            for (rater, trial), rows in found.items()
+        ]
+
+    def forget(self, rater: int) -> int:
+        """Delete a rater and all answers, and overwrite them on the disk; return how many answers there were.
+
+        Raises InputError: no such rater.
+        """
+
+        def work(database: sqlite3.Connection) -> int | None:
+            (count,) = database.execute("SELECT count(*) FROM answers WHERE rater = ?", [rater]).fetchone()
+            deleted = database.execute("DELETE FROM raters WHERE number = ?", [rater]).rowcount
+            return int(count) if deleted else None
+
+        count = self._submit(work).result()
+        if count is None:
+            raise InputError(f"{self.path}: no rater {rater_name(rater)}; the names are in the exported answers")
+        self._writer.execute("PRAGMA wal_checkpoint(TRUNCATE)")  # the log would hold the answers for a while
+        return int(count)
+
+    def _opened(self, digest: str) -> sqlite3.Connection:
+        database = self._connected()
+        database.execute("PRAGMA journal_mode = WAL")
+        database.execute("BEGIN IMMEDIATE")
+        (version,) = database.execute("PRAGMA user_version").fetchone()
+        if version == 0:
+            for statement in _SCHEMA.split(";"):
+                database.execute(statement)
+            database.execute("INSERT INTO study VALUES (?)", [digest])
+            database.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+        elif version != SCHEMA_VERSION:
+            raise InputError(f"{self.path}: of version {version}, required {SCHEMA_VERSION}; update lipmotion")
+        database.execute("COMMIT")
+        if database.execute("SELECT manifest_sha256 FROM study").fetchone() != (digest,):
+            raise InputError(
+                f"{self.path}: holds answers to another study, or {MANIFEST} has been changed since the first rater "
+                "came; restore it, or move the answers away"
+            )
+        return database
+
+    def _connected(self) -> sqlite3.Connection:
+        database = sqlite3.connect(self.path, timeout=BUSY_S, isolation_level=None, check_same_thread=False)
+        for setting in ("synchronous = FULL", "foreign_keys = ON", "secure_delete = ON"):
+            database.execute(f"PRAGMA {setting}")
+        return database
+
+    def _submit(self, work: Callable[[sqlite3.Connection], ResultT | InputError]) -> Future[ResultT]:
+        future: Future[ResultT] = Future()
+        self._waiting.put((work, future))
+        return future
+
+    def _write_all(self) -> None:
+        goes_on = True
+        while goes_on:
+            together = [self._waiting.get()]
+            while len(together) < MOST_TOGETHER and not self._waiting.empty():
+                together.append(self._waiting.get())
+            goes_on = None not in together
+            self._write([each for each in together if each is not None])
+
+    def _write(self, together: Sequence[tuple[Work, Future[Any]]]) -> None:
+        """Do pieces of work in one transaction, and give their results once it is on the disk."""
+        try:
+            self._writer.execute("BEGIN IMMEDIATE")
+            results = [work(self._writer) for work, _ in together]
+            self._writer.execute("COMMIT")
+        except sqlite3.Error as error:
+            if self._writer.in_transaction:
+                self._writer.execute("ROLLBACK")
+            results = [ExportError(f"{self.path}: cannot be written: {error}")] * len(together)
+        for (_, future), result in zip(together, results, strict=True):
+            if future.set_running_or_notify_cancel():
+                if isinstance(result, Exception):
+                    future.set_exception(result)
+                else:
+                    future.set_result(result)
+
+
+def rater_name(number: int) -> str:
+    """Return the name of a rater, who is known by a number alone.
+
+    >>> rater_name(7)
+    'r007'
+    """
+    return f"r{number:03d}"
+
+
+def rater_number(name: str) -> int:
+    """Return the number of a rater's name. Raises InputError: not such a name."""
+    digits = name.strip().lower().removeprefix("r")
+    if not (digits.isascii() and digits.isdecimal() and len(digits) <= 9):
+        raise InputError(f"no rater is called {name!r}; required a name as r007")
+    return int(digits)
+
+
+def _digest(token: str) -> str:
+    return sha256(token.encode("utf-8", "replace")).hexdigest()

@@ -1,0 +1,1 @@
+"""Verbs of the command line of the studio and the studies."""
