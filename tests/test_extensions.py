@@ -90,7 +90,7 @@ def plugin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str, st
         (tmp_path / "odd_name-1.0.dist-info" / "METADATA").write_text(
             "Metadata-Version: 2.1\nName: odd-name\nVersion: 1.0\n"
         )
-        (tmp_path / "odd_name-1.0.dist-info" / "entry_points.txt").write_text(f"[lipmotion_faces]\nodd = {value}\n")
+        (tmp_path / "odd_name-1.0.dist-info" / "entry_points.txt").write_text(f"[lipmotion.faces]\nodd = {value}\n")
         monkeypatch.syspath_prepend(tmp_path)
         monkeypatch.setattr(sys, "dont_write_bytecode", True)
         monkeypatch.delitem(sys.modules, "odd_plugin", raising=False)
@@ -110,7 +110,7 @@ def test_whatever_a_package_does_when_it_is_imported_is_one_error(plugin) -> Non
 def test_malformed_entry_points_are_named(plugin) -> None:
     for value in ("", "::", "odd plugin", "odd_plugin:x y", "odd_plugin:", "1/0", "odd_plugin:x.y"):
         with pytest.raises(
-            InputError, match=rf"'odd-name' \(entry point odd = {re.escape(value)} of lipmotion_faces\)"
+            InputError, match=rf"'odd-name' \(entry point odd = {re.escape(value)} of lipmotion.faces\)"
         ):
             pytest.fail(f"{value}: {plugin('x = 1', value).load('odd')}")
     with pytest.raises(InputError, match=r"entry_points.txt of the package 'odd-name' cannot be read: .*install the"):

@@ -20,7 +20,7 @@ PAGES = sorted(
     for path in chain(ROOT.glob("*.md"), *((ROOT / folder).rglob("*.md") for folder in ("docs", "tests", "examples")))
     if "build" not in path.parts
 )
-CODE_ROOTS = (ROOT, ROOT / "src" / "lipmotion", ROOT / "tests")
+CODE_ROOTS = (ROOT, ROOT / "src" / "lipmotion", ROOT / "src", ROOT / "tests")
 
 
 def without_code(text: str) -> str:

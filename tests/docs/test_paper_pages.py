@@ -13,7 +13,7 @@ from lipmotion.engines.joint.config import JointEngineConfig
 from lipmotion.engines.selection.config import SelectionConfig
 
 ROOT = DOCS.parent
-SOURCE, TESTS = ROOT / "src" / "lipmotion", ROOT / "tests"
+SOURCE, CORE, TESTS = ROOT / "src", ROOT / "src" / "lipmotion", ROOT / "tests"
 PAGES = {"hofer2008": 12, "xieliu2007": 21, "minnis2000": 0}
 """The pages, and how many equations each paper numbers, besides those of appendices."""
 CONFIGURATIONS = (JointEngineConfig, CoupledConfig, SelectionConfig)
@@ -39,7 +39,7 @@ def test_every_function_and_test_of_an_equation_exists() -> None:
     found = [match for page in PAGES for match in NAMED.findall(text(page))]
     assert len(found) > 10
     for path, name in found:
-        (place,) = [root / path for root in (SOURCE, TESTS) if (root / path).is_file()]
+        (place,) = [root / path for root in (CORE, SOURCE, TESTS) if (root / path).is_file()]
         assert f"def {name}(" in place.read_text("utf-8"), (path, name)
 
 
