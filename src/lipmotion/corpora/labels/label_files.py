@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from io import StringIO
 from itertools import islice
@@ -389,21 +388,15 @@ def _check_no_labels(text: str, where: str) -> None:
 def _seems_timed(text: str) -> bool:
     """Return whether most of the first lines begin with a number and some with a time, or half hold two times."""
     lines = numbered = timed = with_two = 0
-    for line in islice(_body(text), JUDGED_LINES):
+    header = re.search(r"^#$", text[:2000], re.MULTILINE)  # of ESPS
+    body = (line.strip() for line in StringIO(text[header.end() if header else 0 :]))
+    for line in islice(filter(None, body), JUDGED_LINES):
         lines += 1
         numbered += NUMBERED.match(line) is not None
         times = sum(1 for _, _ in zip(TIME.finditer(line), "12", strict=False))
         timed += TIME.match(line) is not None
         with_two += times > 1
     return lines > 1 and ((2 * numbered > lines and timed > 0) or 2 * with_two >= lines)
-
-
-def _body(text: str) -> Iterator[str]:
-    """Yield the lines that are not blank; of a file with a header, as of ESPS, those after the header."""
-    header = re.search(r"^#$", text[:2000], re.MULTILINE)
-    for line in StringIO(text[header.end() if header else 0 :]):
-        if line.strip():
-            yield line.strip()
 
 
 def _check_plain(text: str, path: Path) -> None:

@@ -68,7 +68,8 @@ class Times(NamedTuple):
     pieces: bool = False
 
 
-POLLY, SPEECHIFY = Times("time", usual=1000), Times("starttime", "endtime", "duration", 1000)
+POLLY = Times("time", usual=1000)
+SPEECHIFY = Times("starttime", "endtime", "duration", 1000)
 """Of marks whose start and end are places in the text."""
 TIMES = (
     Times("offsetsfrom", "offsetsto", per_s=1000),  # whisper.cpp

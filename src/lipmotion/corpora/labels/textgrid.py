@@ -41,13 +41,13 @@ def parse_interval_tiers(text: str, where: str) -> list[LabelTier]:
         _take(tokens, "text")
         if _take(tokens, "text") != "TextGrid":
             raise InputError(f"{where}: a Praat file of another kind; save a TextGrid")
-        _pass_range(tokens)
+        _take(tokens, "number"), _take(tokens, "number")  # from when to when it lasts
         tier_count = _count(tokens) if _take(tokens, "flag") == "exists" else 0
         for number in range(1, tier_count + 1):
             place = f"tier {number}"
             kind, name = _take(tokens, "text"), _take(tokens, "text")
             place = f"tier {shortened(name)!r}"
-            _pass_range(tokens)
+            _take(tokens, "number"), _take(tokens, "number")
             count = _count(tokens)
             total += count
             check_count(total, where)
@@ -68,20 +68,13 @@ def _tokens(text: str) -> Iterator[tuple[str, str]]:
     while match := TOKEN.search(text, at):
         at = match.end()
         if match.lastgroup == "text":
-            at = _text_end(text, at)
+            while (
+                text[at : at + 1] == '"' and (closing := text.find('"', at + 1)) > 0
+            ):  # written twice: one in the text
+                at = closing + 1
             yield "text", text[match.start() + 1 : at - 1]
         elif match.lastgroup:
             yield match.lastgroup, match[match.lastgroup]
-
-
-def _text_end(text: str, at: int) -> int:
-    """Return the end of a text in quotes, from the end of its second quote: quotes in it are written twice."""
-    while text[at : at + 1] == '"':
-        closing = text.find('"', at + 1)
-        if closing < 0:
-            break
-        at = closing + 1
-    return at
 
 
 def _label(tokens: Iterator[tuple[str, str]], kind: str, place: str, where: str) -> TimedLabel:
@@ -90,12 +83,6 @@ def _label(tokens: Iterator[tuple[str, str]], kind: str, place: str, where: str)
     start_s = required_time(_take(tokens, "number"), place, where)
     end_s = required_time(_take(tokens, "number"), place, where) if kind == INTERVALS else start_s
     return TimedLabel(start_s, end_s, _take(tokens, "text").replace('""', '"').strip(), place)
-
-
-def _pass_range(tokens: Iterator[tuple[str, str]]) -> None:
-    """Skip the start and end time of a file or a tier."""
-    for _ in range(2):
-        _take(tokens, "number")
 
 
 def _count(tokens: Iterator[tuple[str, str]]) -> int:

@@ -59,7 +59,7 @@ ROUNDING_S = 1e-3
 """Times may differ by this much: they are written with three digits or more."""
 WHOLE_WORD_S = 0.03
 """A span of unknown phones whose ends are so near to those of a word is all of it."""
-IN_CONTEXT = re.compile(r"[^-+]*-([^-+]+)\+.*")
+IN_CONTEXT = re.compile(r"\A[^-+]*-([^-+]+)\+.*\Z")
 """Triphones and full-context labels of HTK and HTS: ``t-iy+n``, ``x^sil-hh+iy=t@...``."""
 GLOTTAL_STOP = "q"
 """TIMIT's: a sound of the throat, with any lips."""
@@ -70,8 +70,7 @@ CLOCK = r"(?:(\d{1,6}):)?(\d{1,2}):(\d{1,2}(?:[.,]\d{1,9})?)"
 """A time of day, or of a file: hours, which may be missing, minutes, and seconds."""
 MOST_LABELS = 250_000
 """Most labels of a file: phones of five hours of speech."""
-TYPICAL_S = {PHONE_LABELS: 0.08}
-TYPICAL_WORD_S = 0.3
+TYPICAL_PHONE_S, TYPICAL_WORD_S = 0.08, 0.3
 """How long a phone, and a word, alone or of a line, last."""
 UNIT_LIMITS = ((150, 1), (6000, 1000), (300_000, 0), (3_200_000, 1_000_000))
 """If they last up to so many times as long as is typical, so many units are a second; 0: these are samples."""
@@ -160,7 +159,7 @@ def unit_of_times(spans: Sequence[tuple[float, float, str]], role: str, where: s
     whole = all(time == int(time) for span in spans for time in span[:2] if math.isfinite(time))
     if len(lengths) < 1 + (usual == 1):
         return usual if whole else 1
-    times = median(lengths) / TYPICAL_S.get(role, TYPICAL_WORD_S)
+    times = median(lengths) / (TYPICAL_PHONE_S if role == PHONE_LABELS else TYPICAL_WORD_S)
     limits = WHOLE_LIMITS if whole and role in (WORDS, PHONE_LABELS) else UNIT_LIMITS
     per_s = next((per_s for limit, per_s in limits if times < limit), TICKS_PER_S)
     if not whole and per_s != 1000:
@@ -303,7 +302,13 @@ def phone_timeline(
     """
     _check_order(tier.labels, where, with_gaps=with_gaps)
     labels = _whole_phones(tier.labels)
-    phones = [_required_phone(label, where) for label in labels]
+    phones: list[str] = []
+    for label in labels:
+        phone = phone_of(label.text) or phone_of(label.text.lower().removesuffix("n"))  # nasal vowels of Buckeye
+        if phone is None:
+            found = f"{label.position} is {label.text[:40]!r}"
+            raise InputError(f"{where}: {found}, which is no phone; the phones are: {' '.join(PHONES)}")
+        phones.append(phone)
     marked = any(re.search(r"\d$", label.text) for label in labels) or set(REDUCED_VOWELS.values()) & set(phones)
     if words and not marked:
         phones = _reduced(labels, phones, words)
@@ -350,29 +355,14 @@ def merged_timelines(timelines: Sequence[Timeline[Unit]]) -> Timeline[Unit]:
     return Timeline(tuple(merged))
 
 
-def _inner(text: str) -> str | None:
-    """Return the phone in the middle of a triphone or full-context label; None for other labels."""
-    match = IN_CONTEXT.fullmatch(text)
-    return match[1] if match else None
-
-
 def phone_of(text: str) -> str | None:
     """Return the phone that a label stands for, ``UNKNOWN_PHONES`` for speech of unknown ones, or None."""
     text = STATE_NUMBER.sub("", text)
-    name = phone_named(text) or phone_named(_inner(text) or "")
+    inner = IN_CONTEXT.sub(r"\1", text)
+    name = phone_named(text) or phone_named(inner)
     if name is not None or text == GLOTTAL_STOP:
         return name or "hh"
-    kind = spoken_as(_inner(text) or text)
-    return {SpokenAs.SILENCE: SILENCE, SpokenAs.UNKNOWN: UNKNOWN_PHONES}.get(kind)
-
-
-def _required_phone(label: TimedLabel, where: str) -> str:
-    phone = phone_of(label.text) or phone_of(label.text.lower().removesuffix("n"))  # nasal vowels of Buckeye
-    if phone is None:
-        raise InputError(
-            f"{where}: {label.position} is {label.text[:40]!r}, which is no phone; the phones are: {' '.join(PHONES)}"
-        )
-    return phone
+    return {SpokenAs.SILENCE: SILENCE, SpokenAs.UNKNOWN: UNKNOWN_PHONES}.get(spoken_as(inner))
 
 
 def _whole_phones(labels: Sequence[TimedLabel]) -> list[TimedLabel]:

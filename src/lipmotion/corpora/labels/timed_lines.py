@@ -81,7 +81,10 @@ def line_tiers(text: str, where: str) -> list[LabelTier] | None:
     lines = [line for _, line in islice(_lines(text), MOST_LABELS + 1)] if starts else []
     last = STARTS.fullmatch(lines[-1]) if len(lines) > 1 else None
     if last and float(last[1]) >= SHORTEST_TICKS:
-        return [_from_starts(text, where)]
+        rows = list(_fitted(text, STARTS, "start label", where))
+        edges_s = [required_time(row[0], f"line {number}", where) / TICKS_PER_S for number, row in rows] + [math.inf]
+        spans = zip(edges_s, edges_s[1:], rows, strict=False)
+        return [LabelTier("labels", tuple(TimedLabel(a, b, row[1], f"line {number}") for a, b, (number, row) in spans))]
     first = next((line for _, line in _lines(text) if not line.startswith(COMMENT)), "")[:1000]
     for form in (STM, CTM):
         found = form.fullmatch(first)
@@ -134,14 +137,6 @@ def _spans(text: str, form: re.Pattern[str], where: str) -> LabelTier:
         return scaled_tier(tier, TIMIT_HZ if short else TICKS_PER_S)
     role = PHONE_LABELS if all(phone_of(label.text) for label in labels) else WORDS
     return in_seconds([replace(tier, role=role)], where)[0]
-
-
-def _from_starts(text: str, where: str) -> LabelTier:
-    rows = list(_fitted(text, STARTS, "start label", where))
-    starts_s = [required_time(row[0], f"line {number}", where) / TICKS_PER_S for number, row in rows]
-    spans = zip(rows, starts_s, [*starts_s[1:], math.inf], strict=True)
-    labels = (TimedLabel(start_s, end_s, row[1], f"line {number}") for (number, row), start_s, end_s in spans)
-    return LabelTier("labels", tuple(labels))
 
 
 def _nist(text: str, form: re.Pattern[str], where: str) -> list[LabelTier]:
