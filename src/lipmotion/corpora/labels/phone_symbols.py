@@ -26,8 +26,6 @@ LONGEST_SYMBOL = 40
 """Most letters of a phone with all its marks."""
 WITH_GLIDES = {"aj": "aɪ", "ej": "eɪ", "ɔj": "ɔɪ", "ow": "oʊ", "əw": "əʊ", "aw": "aʊ"}
 """Diphthongs as the Montreal Forced Aligner writes them."""
-NO_SOUND = "<sil>"
-"""What stands for silence among tokens: no sound goes on beyond it."""
 
 
 def ipa_labels(labels: Sequence[TimedLabel], where: str) -> list[TimedLabel]:
@@ -51,7 +49,8 @@ def ipa_labels(labels: Sequence[TimedLabel], where: str) -> list[TimedLabel]:
                 f"required IPA, X-SAMPA, or: {' '.join(PHONES)}"
             )
     begun: dict[int, list[str]] = defaultdict(list)
-    tokens = [NO_SOUND if pause else label.text for label, pause in zip(labels, unspoken, strict=True)]
+    # no sound goes on beyond silence
+    tokens = ["<sil>" if pause else label.text for label, pause in zip(labels, unspoken, strict=True)]
     for phone, number in token_phones(tokens):
         begun[number].append(phone)
     found: list[TimedLabel] = []

@@ -203,10 +203,9 @@ def described(text: str, where: str) -> str:
     value = next(_documents(text, where), (1, None))[1]
     first = value[0] if isinstance(value, list) and value else value
     names = list(first) if isinstance(first, dict) else []
-    if "blendshapes" in names:
-        return "holds weights of blendshapes (as Azure's 55), which is motion and no labels; render it"
-    if "mouthcues" in names:
-        return "holds mouth cues, which are motion and no labels; render it"
+    for name, what in (("blendshapes", "weights of blendshapes (as Azure's 55)"), ("mouthcues", "mouth cues")):
+        if name in names:
+            return f"holds {what}, which is motion and no labels; render it"
     named = ", ".join(map(shortened, names[:8])) or "no names"
     return f"is JSON in which no words in time are found (it has {named}; known are {KNOWN_SHAPES})"
 
@@ -407,14 +406,19 @@ def _listed_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
         lists = [item[name] for _, item in objects for name in (*LINE_LISTS, *WORD_LISTS) if name in item]
         return [] if lists and not any(lists) else None
     phones = _until_next([row for row in rows if row.role == PHONE_LABELS], [])
-    rows = [row for row in rows if row.role != PHONE_LABELS]
+    spoken = [LabelTier(PHONE_LABELS, tuple(_labels(phones, PHONE_LABELS, where)), PHONE_LABELS)] if phones else []
+    silences = [row.start for row in phones if row.text == SILENCE]
+    return spoken + _said_tiers(_until_next([row for row in rows if row.role != PHONE_LABELS], silences), where)
+
+
+def _said_tiers(rows: list[Row], where: str) -> list[LabelTier]:
+    """Return a tier of each speaker: of words, if nearly all are single ones, else of lines."""
     half = len(rows) // 2
     first, again = ([(row.text, row.start) for row in part] for part in (rows[:half], rows[half:]))
     if half and first == again and rows[0].speaker != rows[-1].speaker:
         rows = rows[half:]  # Google's last result has the words of all again, with their speakers
     if any(len({part.speaker for part in row.parts}) > 1 for row in rows):
         rows = [part for row in rows for part in row.parts or (row,)]
-    rows = _until_next(rows, [row.start for row in phones if row.text == SILENCE])
     counts = [len(words_in(spoken_text(row.text[:LONGEST_JUDGED]))) for row in rows]
     check_word_count(sum(counts) + sum(len(row.parts) for row in rows), where)
     single = sum(row.role == WORDS or count < 2 for row, count in zip(rows, counts, strict=True))
@@ -422,9 +426,7 @@ def _listed_tiers(objects: Objects, where: str) -> list[LabelTier] | None:
     by_speaker: dict[str, list[TimedLabel]] = defaultdict(list)
     for row, label in zip(rows, _labels(rows, role, where), strict=True):
         by_speaker[row.speaker or (row.parts[0].speaker if row.parts else "")].append(label)
-    tiers = [LabelTier(who or role, tuple(said), role, who) for who, said in by_speaker.items()]
-    spoken = _labels(phones, PHONE_LABELS, where)
-    return [*([LabelTier(PHONE_LABELS, tuple(spoken), PHONE_LABELS)] if spoken else []), *tiers]
+    return [LabelTier(who or role, tuple(said), role, who) for who, said in by_speaker.items()]
 
 
 def _until_next(rows: list[Row], silences: Iterable[float]) -> list[Row]:

@@ -13,8 +13,6 @@ TOKEN = re.compile(
 )
 """What Praat itself reads: texts in quotes, flags, and numbers between blanks. All else (``xmin =``) is ignored."""
 MARK = re.compile(r'\s*(?:File type\s*=\s*)?"?oo(Text|Binary)File')
-LONGEST_COUNT = 18
-"""Most digits of a count."""
 INTERVALS, POINTS = "IntervalTier", "TextTier"
 
 
@@ -51,9 +49,14 @@ def parse_interval_tiers(text: str, where: str) -> list[LabelTier]:
             count = _count(tokens)
             total += count
             check_count(total, where)
-            labels = [_label(tokens, kind, f"{place}, interval {i + 1}", where) for i in range(count)]
-            if kind == INTERVALS:
-                tiers.append(named_tier(name, labels))
+            if count and kind not in (INTERVALS, POINTS):
+                raise _DamagedError(f"its kind is {shortened(kind)!r}, required {INTERVALS} or {POINTS}")
+            labels = []
+            for position in (f"{place}, interval {i + 1}" for i in range(count)):
+                start_s = required_time(_take(tokens, "number"), position, where)
+                end_s = required_time(_take(tokens, "number"), position, where) if kind == INTERVALS else start_s
+                labels.append(TimedLabel(start_s, end_s, _take(tokens, "text").replace('""', '"').strip(), position))
+            tiers += [named_tier(name, labels)] if kind == INTERVALS else []
         place = "what follows the last tier"
         if next(tokens, None) is not None:
             raise _DamagedError("more is there than the counts say")
@@ -77,17 +80,9 @@ def _tokens(text: str) -> Iterator[tuple[str, str]]:
             yield match.lastgroup, match[match.lastgroup]
 
 
-def _label(tokens: Iterator[tuple[str, str]], kind: str, place: str, where: str) -> TimedLabel:
-    if kind not in (INTERVALS, POINTS):
-        raise _DamagedError(f"its kind is {shortened(kind)!r}, required {INTERVALS} or {POINTS}")
-    start_s = required_time(_take(tokens, "number"), place, where)
-    end_s = required_time(_take(tokens, "number"), place, where) if kind == INTERVALS else start_s
-    return TimedLabel(start_s, end_s, _take(tokens, "text").replace('""', '"').strip(), place)
-
-
 def _count(tokens: Iterator[tuple[str, str]]) -> int:
     value = _take(tokens, "number")
-    if not (value.isascii() and value.isdecimal()) or len(value) > LONGEST_COUNT:
+    if re.fullmatch("[0-9]{1,18}", value) is None:
         raise _DamagedError(f"there stands number {value[:40]}, required a count")
     return int(value)
 

@@ -19,10 +19,8 @@ from lipmotion.units import (
     RECOGNISED,
     SILENCE,
     UNKNOWN_PHONES,
-    RecognisedPhone,
     is_silent,
     phone_named,
-    with_confidences,
     with_reduced_vowels,
 )
 from lipmotion.units.phones import CLOSURES, REDUCED_VOWELS
@@ -77,13 +75,8 @@ UNIT_LIMITS = ((150, 1), (6000, 1000), (300_000, 0), (3_200_000, 1_000_000))
 WHOLE_LIMITS = ((15, 1), (70, 0), (220, 100), *UNIT_LIMITS[1:])
 """The same for whole numbers of words and phones, which may be frames (0), too; lines in seconds last that long."""
 TICKS_PER_S = 10_000_000
-UNITS = {
-    1: "seconds",
-    100: "hundredths of a second",
-    1000: "milliseconds",
-    1_000_000: "microseconds",
-    TICKS_PER_S: "ticks of 100 ns",
-}
+UNITS = {1: "seconds", 100: "hundredths of a second", 1000: "milliseconds", 1_000_000: "microseconds"}
+UNITS[TICKS_PER_S] = "ticks of 100 ns"
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,23 +166,21 @@ def unit_of_times(spans: Sequence[tuple[float, float, str]], role: str, where: s
     return per_s
 
 
-def in_seconds(tiers: list[LabelTier], where: str) -> list[LabelTier]:
+def in_seconds(tiers: list[LabelTier], where: str, per_s: float = 0) -> list[LabelTier]:
     """Return tiers in seconds; times of which a word would last a minute are in the unit that they seem to be.
 
+    per_s : how many of their units are a second; 0: how long words last decides
     Raises InputError: as ``unit_of_times``.
     """
     said = [tier for tier in tiers if tier.role != OTHER]
     judged = next((tier for tier in said if tier.role == WORDS or holds_phones(tier)), next(iter(said), None))
     spans = [(label.start_s, label.end_s, label.text) for label in judged.labels] if judged else []
     role = PHONE_LABELS if judged and holds_phones(judged) else judged.role if judged else ""
-    per_s = unit_of_times(spans, role, where)
-    return [scaled_tier(tier, per_s) for tier in tiers]
-
-
-def scaled_tier(tier: LabelTier, per_s: float) -> LabelTier:
-    """Return a tier in seconds, of whose units of time so many are a second."""
-    labels = (replace(label, start_s=label.start_s / per_s, end_s=label.end_s / per_s) for label in tier.labels)
-    return replace(tier, labels=tuple(labels))
+    per_s = per_s or unit_of_times(spans, role, where)
+    scaled = [
+        [replace(each, start_s=each.start_s / per_s, end_s=each.end_s / per_s) for each in t.labels] for t in tiers
+    ]
+    return [replace(tier, labels=tuple(labels)) for tier, labels in zip(tiers, scaled, strict=True)]
 
 
 def holds_phones(tier: LabelTier) -> bool:
@@ -216,13 +207,6 @@ def tiers_of_speakers(tiers: list[LabelTier]) -> list[LabelTier]:
     if shared_s > SHARED_TIME * spoken_s:
         return tiers
     return [replace(tier, speaker=tier.name, role=LINES) if tier in unknown else tier for tier in tiers]
-
-
-def with_recognised(units: Timeline[Unit], tier: LabelTier) -> Timeline[Unit]:
-    """Return phones in time in which those of a tier of recognised ones have their confidence; the others are known."""
-    found = [(label, RECOGNISED_LABEL.fullmatch(label.text)) for label in tier.labels]
-    rows = (RecognisedPhone(label.start_s, label.end_s, match[1], float(match[2])) for label, match in found if match)
-    return with_confidences(units, rows)
 
 
 def with_words(units: Timeline[Unit], labels: Sequence[TimedLabel]) -> Timeline[Unit]:
@@ -329,15 +313,13 @@ def _check_order(labels: Sequence[TimedLabel], where: str, *, with_gaps: bool) -
             raise InputError(f"{where}: {label.position} has no time, required the start and the end of a phone")
         if label.end_s < label.start_s:
             raise _reversed(label, where)
-        if label.start_s < end_s - ROUNDING_S:
+        late_s, found = label.start_s - end_s, f"{where}: {label.position} starts at {label.start_s:g} s, "
+        if late_s < -ROUNDING_S:
+            raise InputError(f"{found}before the one ahead of it ends ({end_s:g} s); labels must not overlap")
+        if number and not with_gaps and late_s > ROUNDING_S:
             raise InputError(
-                f"{where}: {label.position} starts at {label.start_s:g} s, before the one ahead of it ends ({end_s:g} "
-                "s); labels must not overlap"
-            )
-        if number and not with_gaps and label.start_s > end_s + ROUNDING_S:
-            raise InputError(
-                f"{where}: {label.position} starts at {label.start_s:g} s, the one before it ends at {end_s:g} "
-                "s; phones must follow each other without a gap: label silence as sil"
+                f"{found}the one before it ends at {end_s:g} s; phones must follow each other without a gap: label "
+                "silence as sil"
             )
         end_s = label.end_s
 

@@ -26,7 +26,6 @@ from lipmotion.corpora.labels.tier import (
     named_tier,
     phone_of,
     required_time,
-    scaled_tier,
 )
 from lipmotion.errors import InputError, shortened
 
@@ -134,7 +133,7 @@ def _spans(text: str, form: re.Pattern[str], where: str) -> LabelTier:
     is_timit = Path(where).suffix.lower() in TIMIT_SUFFIXES or any(label.text == TIMIT_SILENCE for label in labels)
     short = bool(lengths) and median(lengths) < LONGEST_SAMPLES and labels[-1].end_s < LAST_SAMPLE
     if is_timit or not short:
-        return scaled_tier(tier, TIMIT_HZ if short else TICKS_PER_S)
+        return in_seconds([tier], where, TIMIT_HZ if short else TICKS_PER_S)[0]
     role = PHONE_LABELS if all(phone_of(label.text) for label in labels) else WORDS
     return in_seconds([replace(tier, role=role)], where)[0]
 
@@ -201,12 +200,10 @@ def _table(text: str, columns: dict[str, int], where: str) -> list[LabelTier]:
             row = {
                 kind: fields[column] for kind, column in columns.items() if column < len(fields) or kind != "speaker"
             }
-            start_s = required_time(row["start"], place, where)
-            end_s = required_time(row.get("end") or row["duration"], place, where)
-        except InputError:
-            raise
+            times = (row["start"], row.get("end") or row["duration"])
         except (ValueError, IndexError, KeyError, csv.Error) as error:
             raise InputError(f"{where}: {place} is {shortened(line)!r}; required, as in line 1: {header}") from error
+        start_s, end_s = (required_time(time, place, where) for time in times)
         end_s += 0.0 if row.get("end") else start_s
         key = (row.get("kind", named), row.get("speaker", ""))
         kinds[key].append(TimedLabel(start_s, end_s, row["text"], place))
