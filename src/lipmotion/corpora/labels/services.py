@@ -28,14 +28,13 @@ from lipmotion.corpora.labels.tier import (
     LabelTier,
     TimedLabel,
     check_count,
-    clock_seconds,
     in_seconds,
     named_tier,
     unit_of_times,
 )
 from lipmotion.errors import InputError, shortened
 from lipmotion.types import values
-from lipmotion.types.values import number_of, require
+from lipmotion.types.values import clock_seconds, number_of, require
 from lipmotion.units import SILENCE
 from lipmotion.units.spoken_text import check_word_count, spoken_text
 from lipmotion.units.text_normalisation import words_in

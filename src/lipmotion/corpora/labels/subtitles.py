@@ -10,8 +10,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 from io import StringIO
 
-from lipmotion.corpora.labels.tier import LINES, LabelTier, TimedLabel, check_count, clock_seconds
+from lipmotion.corpora.labels.tier import LINES, LabelTier, TimedLabel, check_count
 from lipmotion.errors import InputError, shortened
+from lipmotion.types.values import clock_seconds
 from lipmotion.units.spoken_text import speaker_names, spoken_text
 
 TIME = r"((?:\d{1,4}:)?\d{1,2}:\d{1,2}(?:[.,]\d{1,6})?)"

@@ -64,8 +64,6 @@ GLOTTAL_STOP = "q"
 STATE_NUMBER = re.compile(r"\[(\d{1,9})\]$")
 RECOGNISED_LABEL = re.compile(r"(\S+) (0|1|1\.0|0\.\d+|\d(?:\.\d+)?e-\d+)")
 """A phone or unit, and its confidence from 0 to 1."""
-CLOCK = r"(?:(\d{1,6}):)?(\d{1,2}):(\d{1,2}(?:[.,]\d{1,9})?)"
-"""A time of day, or of a file: hours, which may be missing, minutes, and seconds."""
 MOST_LABELS = 250_000
 """Most labels of a file: phones of five hours of speech."""
 TYPICAL_PHONE_S, TYPICAL_WORD_S = 0.08, 0.3
@@ -120,15 +118,6 @@ def check_count(count: int, where: str) -> None:
     """Raise InputError for more labels than a recording has."""
     if count > MOST_LABELS:
         raise InputError(f"{where}: more than {MOST_LABELS} labels; give those of one recording")
-
-
-def clock_seconds(text: str, frames_per_s: float = 0) -> float:
-    """Return the seconds of a time as 1:02:03.5, 2:03,5 or, if frames have a rate, 00:02:03:12; NaN: it is none."""
-    found = re.fullmatch(rf"{CLOCK}(?::(\d+(?:\.\d+)?))?", text.strip())
-    if found is None or (found[4] and not frames_per_s):
-        return math.nan
-    seconds = float(found[3].replace(",", ".")) + float(found[4] or 0) / (frames_per_s or 1)
-    return int(found[1] or 0) * 3600 + int(found[2]) * 60 + seconds
 
 
 def required_time(text: str, place: str, where: str) -> float:
