@@ -264,18 +264,17 @@ def analysed(audio: Audio, features: Features | None = None) -> AnalysedAudio:
 def _without_offset(samples: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return samples without a constant offset, which would make pauses as loud as speech; digital silence stays.
 
-    It is that of the quietest sound, and taken off where it is most of what is heard there.
+    It is that of the quietest sound between digital silences, and taken off where it is most of what is heard there.
     """
     count = len(samples) // HOP if samples.ndim == 1 else 0
-    frames = samples[: count * HOP].reshape(count, HOP)
+    frames, offsets = samples[: count * HOP].reshape(count, HOP), np.zeros(count + 1, np.float32)
     with np.errstate(all="ignore"):  # what is not finite is refused later
         means, powers = frames.mean(axis=1, dtype=np.float64), np.einsum("ti,ti->t", frames, frames) / HOP
         spread, sound = powers - means**2, np.flatnonzero(powers)
-        quiet = sound[np.argsort(spread[sound], kind="stable")[: int(len(sound) * QUIETEST) + 1]]
-        offset = float(np.median(means[quiet])) if len(quiet) else 0.0
-        heard = max(float(np.median(spread[quiet])), OFFSET_SHARE**2 * float(powers[sound].mean())) if offset else 0.0
-    if not 0 <= heard < offset**2 < np.inf:
-        return samples
-    taken = np.full(len(samples), np.float32(offset))
-    taken[: count * HOP][np.repeat(powers == 0, HOP)] = 0
-    return samples - taken
+        for part in np.split(sound, np.flatnonzero(np.diff(sound) > SILENT_FRAMES) + 1) if len(sound) else ():
+            quiet = part[np.argsort(spread[part], kind="stable")[: int(len(part) * QUIETEST) + 1]]
+            offset, heard = np.median(means[quiet]), np.median(spread[quiet])
+            if max(heard, OFFSET_SHARE**2 * powers[part].mean(), 0) < offset**2 < np.inf:
+                offsets[part] = offset
+    offsets[-1] = offsets[count - 1]
+    return samples - np.repeat(offsets, HOP)[: len(samples)] if offsets.any() else samples
